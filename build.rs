@@ -1,0 +1,18 @@
+//! Lets every built binary find MuJoCo's shared library without environment variables.
+
+use std::env;
+
+fn main() {
+    println!("cargo::rerun-if-env-changed=MUJOCO_DYNAMIC_LINK_DIR");
+    if env::var_os("CARGO_FEATURE_MUJOCO").is_none() {
+        return;
+    }
+    // Relative first, so that a folder that was moved whole still runs: binaries lie in
+    // target/PROFILE, tests and examples one level deeper.
+    for up in ["../..", "../../.."] {
+        println!("cargo::rustc-link-arg=-Wl,-rpath,$ORIGIN/{up}/.deps/lib");
+    }
+    if let Ok(dir) = env::var("MUJOCO_DYNAMIC_LINK_DIR") {
+        println!("cargo::rustc-link-arg=-Wl,-rpath,{dir}");
+    }
+}

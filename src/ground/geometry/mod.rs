@@ -1,0 +1,1 @@
+//! Triangle meshes, analytic surfaces, and what is asked of them.

@@ -1,0 +1,3 @@
+//! Floor 0: what knows nothing of touch.
+
+pub mod geometry;
