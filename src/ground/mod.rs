@@ -1,3 +1,6 @@
 //! Floor 0: what knows nothing of touch.
 
 pub mod geometry;
+pub mod gp;
+pub mod optimize;
+pub mod seed;

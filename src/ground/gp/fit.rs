@@ -1,0 +1,192 @@
+//! Hyperparameters by maximum likelihood: a coarse scan finds the hills, L-BFGS climbs them.
+
+use super::kernel::{Hyperparameters, Kernel};
+use super::likelihood::Likelihood;
+use super::posterior::Observations;
+use crate::ground::optimize::{self, Stop};
+use serde::{Deserialize, Serialize};
+
+/// The box in which hyperparameters are sought.
+#[derive(Clone, Debug)]
+pub struct SearchBox {
+    /// Smallest and largest length scale of each input, in the unit of the inputs.
+    pub length_scales: Vec<(f64, f64)>,
+    /// Smallest and largest noise, as a fraction of the signal's standard deviation.
+    pub noise_ratio: (f64, f64),
+    /// Smallest and largest standard deviation of the signal, in the unit of the heights.
+    pub signal_sd: (f64, f64),
+}
+
+/// What a fit found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fit {
+    /// The most likely hyperparameters.
+    #[serde(flatten)]
+    pub hyperparameters: Hyperparameters,
+    /// Their log marginal likelihood.
+    pub log_likelihood: f64,
+    /// How many covariance matrices were factored.
+    pub factorisations: u32,
+    /// Why the climb that won stopped.
+    pub stop: Stop,
+}
+
+/// Evaluations allowed to one climb; most need a fifth of it.
+const CLIMB_BUDGET: u32 = 100;
+/// Hills of the scan that are climbed, besides the last fit's; chosen: the fourth best hill
+/// never won on the toy.
+const CLIMBS: usize = 3;
+/// Noise levels of the scan, spread over the logarithm of their range.
+const NOISE_LEVELS: usize = 3;
+
+impl SearchBox {
+    /// Maximises the marginal likelihood globally and deterministically.
+    ///
+    /// The likelihood is profiled over signal_sd, which has a closed form, so the search runs
+    /// over (ln lengths, ln noise ratio) only. `last`, the fit before the newest touches, is one
+    /// more start. With no observations, or if no covariance can be factored, the middle of the
+    /// box is returned with [`Stop::Failed`].
+    pub fn fit(
+        &self,
+        kernel: &'static dyn Kernel,
+        observations: &Observations,
+        last: Option<&Hyperparameters>,
+    ) -> Fit {
+        let mut likelihood = Likelihood::new(kernel, observations);
+        let (lower, upper) = self.log_bounds();
+        let mut best: Option<Fit> = None;
+        if !observations.is_empty() {
+            let mut starts = self.hills(&mut likelihood, &lower, &upper);
+            starts.extend(last.map(|last| log_parameters(last)));
+            for start in starts {
+                let bounds = optimize::Bounds { lower: &lower, upper: &upper };
+                let top = optimize::lbfgs(bounds, &start, CLIMB_BUDGET, |x, gradient| {
+                    let (lengths, noise_ratio) = parameters(x);
+                    likelihood
+                        .profile(&lengths, noise_ratio, self.signal_sd, Some(gradient))
+                        .map_or(f64::NAN, |profile| profile.log_likelihood)
+                });
+                if best.as_ref().is_none_or(|best| top.value > best.log_likelihood) {
+                    best = self.conclude(&mut likelihood, &top.x, top.stop).or(best);
+                }
+            }
+        }
+        let mut best = best.unwrap_or_else(|| self.prior(&lower, &upper));
+        best.factorisations = likelihood.factorisations();
+        best
+    }
+
+    fn log_bounds(&self) -> (Vec<f64>, Vec<f64>) {
+        self.length_scales
+            .iter()
+            .chain([&self.noise_ratio])
+            .map(|(low, high)| (low.ln(), high.ln()))
+            .unzip()
+    }
+
+    fn conclude(&self, likelihood: &mut Likelihood, x: &[f64], stop: Stop) -> Option<Fit> {
+        let (length_scales, noise_ratio) = parameters(x);
+        let profile = likelihood.profile(&length_scales, noise_ratio, self.signal_sd, None).ok()?;
+        let hyperparameters = Hyperparameters {
+            signal_sd: profile.signal_sd,
+            length_scales,
+            noise_sd: noise_ratio * profile.signal_sd,
+        };
+        Some(Fit {
+            hyperparameters,
+            log_likelihood: profile.log_likelihood,
+            factorisations: 0,
+            stop,
+        })
+    }
+
+    /// What is believed before any touch: the geometric middle of the box.
+    fn prior(&self, lower: &[f64], upper: &[f64]) -> Fit {
+        let middle: Vec<f64> = lower.iter().zip(upper).map(|(l, u)| 0.5 * (l + u)).collect();
+        let (length_scales, noise_ratio) = parameters(&middle);
+        let signal_sd = (self.signal_sd.0 * self.signal_sd.1).sqrt();
+        Fit {
+            hyperparameters: Hyperparameters {
+                signal_sd,
+                length_scales,
+                noise_sd: noise_ratio * signal_sd,
+            },
+            log_likelihood: 0.0,
+            factorisations: 0,
+            stop: Stop::Failed,
+        }
+    }
+
+    /// The highest local maxima of the profiled likelihood on a grid over the box.
+    fn hills(&self, likelihood: &mut Likelihood, lower: &[f64], upper: &[f64]) -> Vec<Vec<f64>> {
+        let levels = self.levels();
+        let count: usize = levels.iter().product();
+        let point = |index: usize| -> Vec<f64> {
+            digits(index, &levels)
+                .zip(&levels)
+                .zip(lower.iter().zip(upper))
+                .map(|((digit, &levels), (lower, upper))| {
+                    lower + (upper - lower) * digit as f64 / (levels.max(2) - 1) as f64
+                })
+                .collect()
+        };
+        let values: Vec<f64> = (0..count)
+            .map(|index| {
+                let (lengths, noise_ratio) = parameters(&point(index));
+                likelihood
+                    .profile(&lengths, noise_ratio, self.signal_sd, None)
+                    .map_or(f64::NEG_INFINITY, |profile| profile.log_likelihood)
+            })
+            .collect();
+        let mut hills: Vec<usize> =
+            (0..count).filter(|&index| is_hill(index, &levels, &values)).collect();
+        hills.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
+        hills.truncate(CLIMBS);
+        hills.into_iter().map(point).collect()
+    }
+
+    /// Grid points per parameter, the noise last so that it varies fastest: correlations are
+    /// computed once per set of lengths.
+    fn levels(&self) -> Vec<usize> {
+        let per_length = match self.length_scales.len() {
+            1 => 24,
+            2 => 8,
+            _ => 5,
+        };
+        let mut levels = vec![per_length; self.length_scales.len()];
+        levels.push(NOISE_LEVELS);
+        levels
+    }
+}
+
+/// The place of grid point `index` along each parameter, the last varying fastest.
+fn digits(index: usize, levels: &[usize]) -> impl Iterator<Item = usize> {
+    let mut stride: usize = levels.iter().product();
+    let mut rest = index;
+    levels.iter().map(move |levels| {
+        stride /= levels;
+        let digit = rest / stride;
+        rest %= stride;
+        digit
+    })
+}
+
+/// Whether no neighbour along any parameter is higher.
+fn is_hill(index: usize, levels: &[usize], values: &[f64]) -> bool {
+    let mut stride = values.len();
+    digits(index, levels).zip(levels).all(|(digit, levels)| {
+        stride /= levels;
+        (digit == 0 || values[index - stride] <= values[index])
+            && (digit + 1 == *levels || values[index + stride] <= values[index])
+    })
+}
+
+fn parameters(logs: &[f64]) -> (Vec<f64>, f64) {
+    let mut lengths: Vec<f64> = logs.iter().map(|log| log.exp()).collect();
+    let noise_ratio = lengths.pop().unwrap_or(0.0);
+    (lengths, noise_ratio)
+}
+
+fn log_parameters(at: &Hyperparameters) -> Vec<f64> {
+    at.length_scales.iter().copied().chain([at.noise_sd / at.signal_sd]).map(f64::ln).collect()
+}
