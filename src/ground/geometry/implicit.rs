@@ -17,7 +17,7 @@ const SHORTEST_STEP_M: f64 = 1e-7;
 const RAY_TOLERANCE_M: f64 = 1e-12;
 /// Field value that counts as zero, metres. Chosen: some ten roundings at 0.1 m.
 const ZERO_M: f64 = 1e-15;
-/// Newton steps before giving up. Chosen: near the surface six suffice.
+/// Newton steps before giving up. Chosen: far more than a point near the surface needs.
 const NEWTON_STEPS: usize = 50;
 
 /// A solid given by a 1-Lipschitz field, in its own frame, metres.

@@ -23,7 +23,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 
 /// A steel container, 120 mm wide and 200 mm high: an elliptic cylinder, straight along z, with
 /// rounded edges and a round bead about its top. The bead stands 2 mm out of the front and 3 mm
-/// out of the sides; below z = 85 mm and above -85 mm the front is y = 40 mm √(1 - (x / 60 mm)²).
+/// out of the sides; where |z| < 84 mm the front is y = 40 mm √(1 - (x / 60 mm)²).
 pub struct Container;
 
 impl Implicit for Container {
@@ -78,10 +78,8 @@ fn right_half(p: Point3<f64>) -> Field {
     // 52² + 675² = 677².
     let (sine, cosine) = (52.0 / 677.0, 675.0 / 677.0);
     let tilt = matrix![cosine, 0.0, sine; 0.0, 1.0, 0.0; -sine, 0.0, cosine];
-    let upright = Field::ellipsoid(
-        tilt * (p - point![0.039, -0.010, -0.006]),
-        vector![0.015, 0.026, 0.056],
-    );
+    let upright =
+        Field::ellipsoid(tilt * (p - point![0.039, -0.010, -0.006]), vector![0.015, 0.026, 0.056]);
     let wing = Field { gradient: tilt.tr_mul(&upright.gradient), ..upright };
 
     let tuft = Field::round_cone(
