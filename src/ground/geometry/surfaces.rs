@@ -1,7 +1,7 @@
 //! The analytic objects, by name. Their formulas are the ground truth of the meshes in `models/`.
 //!
-//! Each lies in its own frame: origin in its middle, x to the right of who looks along -y, z up,
-//! front towards +y. Metres. All lengths are chosen: the shapes of the objects of Yi et al. (IROS
+//! Each lies in its own frame: origin in its middle, front towards +y, z up, and so x to its own
+//! right. Metres. All lengths are chosen: the shapes of the objects of Yi et al. (IROS
 //! 2016, Fig. 2), which these stand in for, are not published.
 
 use nalgebra::{Point3, Vector3, matrix, point, vector};
@@ -9,7 +9,7 @@ use nalgebra::{Point3, Vector3, matrix, point, vector};
 use super::implicit::{Field, Implicit};
 
 /// Every analytic object; one line adds one.
-static SURFACES: [(&str, &dyn Implicit); 2] = [("container", &Container), ("bird", &Bird)];
+static SURFACES: &[(&str, &dyn Implicit)] = &[("container", &Container), ("bird", &Bird)];
 
 /// The analytic object called `name`.
 pub fn by_name(name: &str) -> Option<&'static dyn Implicit> {
