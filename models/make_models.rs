@@ -1,0 +1,281 @@
+//! Makes the meshes in this folder from the analytic surfaces of `palpate::ground::geometry`.
+//!
+//! `cargo run --release --example make_models` writes the same bytes each time and prints how far
+//! the triangles are from the surface. `SOURCE.md` describes the files.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
+use nalgebra::{Point3, Vector3};
+use ndshape::{RuntimeShape, Shape};
+use palpate::ground::geometry::implicit::Implicit;
+use palpate::ground::geometry::surfaces;
+use serde_json::json;
+
+/// Edges whose middle is farther from the surface are split, metres. Chosen: the middle of an
+/// equal-sided triangle is 4/3 as far, well within the 0.05 mm that `tests/models.rs` asks for.
+const EDGE_ERROR_M: f64 = 2.5e-5;
+/// Rounds of splits that are evened out by relaxing. Chosen: later ones find few edges.
+const SPLIT_ROUNDS: usize = 4;
+/// Rounds of relaxing before a split. Chosen: more hardly change the triangles.
+const RELAX_ROUNDS: usize = 5;
+/// Triangles are measured at the points whose barycentric coordinates are multiples of 1/6.
+const SAMPLES_PER_EDGE: usize = 6;
+
+/// A closed triangle mesh, metres, wound counterclockwise as seen from outside.
+struct Mesh {
+    vertices: Vec<Point3<f64>>,
+    triangles: Vec<[usize; 3]>,
+}
+
+fn main() -> Result<()> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+    // Cells chosen: the bird's nose, 5 mm thick, needs the finer ones.
+    for (name, cell_m, file, encode) in [
+        ("container", 3.0e-3, "container.obj", obj as fn(&Mesh) -> Result<Vec<u8>>),
+        ("bird", 2.0e-3, "bird.glb", glb),
+    ] {
+        let surface = surfaces::by_name(name).context("a known surface")?;
+        let mesh = triangulate(surface, cell_m)?;
+        let bytes = encode(&mesh)?;
+        fs::write(folder.join(file), &bytes)?;
+        println!("{file}: {} bytes", bytes.len());
+        describe(&mesh, surface);
+    }
+    Ok(())
+}
+
+/// The surface as triangles: surface nets on a grid, put onto the surface, evened out, and split
+/// until every edge follows the surface.
+fn triangulate(surface: &dyn Implicit, cell_m: f64) -> Result<Mesh> {
+    let mut mesh = nets(surface, cell_m)?;
+    for _ in 0..SPLIT_ROUNDS {
+        for _ in 0..RELAX_ROUNDS {
+            relax(&mut mesh, surface)?;
+        }
+        split(&mut mesh, surface)?;
+    }
+    // Relaxing makes split edges longer again, so that the last splits go without.
+    while split(&mut mesh, surface)? {}
+    Ok(mesh)
+}
+
+fn nets(surface: &dyn Implicit, cell_m: f64) -> Result<Mesh> {
+    // A cell of air on every side, so that the mesh closes.
+    let [low, high] = surface.bounds();
+    let low = low.map(|x| x - cell_m);
+    let size = (high - low).map(|x| (x / cell_m).ceil() as u32 + 2);
+    let shape = RuntimeShape::<u32, 3>::new(size.into());
+    let values: Vec<f32> = (0..shape.size())
+        .map(|index| {
+            let [x, y, z] = shape.delinearize(index).map(f64::from);
+            surface.value(low + Vector3::new(x, y, z) * cell_m) as f32
+        })
+        .collect();
+    let mut buffer = SurfaceNetsBuffer::default();
+    surface_nets(&values, &shape, [0; 3], size.map(|n| n - 1).into(), &mut buffer);
+
+    let vertices = buffer
+        .positions
+        .iter()
+        .map(|p| project(surface, low + Vector3::from(p.map(f64::from)) * cell_m))
+        .collect::<Result<_>>()?;
+    let triangles =
+        buffer.indices.as_chunks().0.iter().map(|t: &[u32; 3]| t.map(|i| i as usize)).collect();
+    Ok(Mesh { vertices, triangles })
+}
+
+fn project(surface: &dyn Implicit, p: Point3<f64>) -> Result<Point3<f64>> {
+    surface.project(p).with_context(|| format!("{p} does not project onto the surface"))
+}
+
+/// Moves every vertex half way to the mean of its neighbours, along the surface.
+fn relax(mesh: &mut Mesh, surface: &dyn Implicit) -> Result<()> {
+    let mut sums = vec![(Vector3::zeros(), 0.0); mesh.vertices.len()];
+    for &[a, b, c] in &mesh.triangles {
+        // Each edge is in two triangles, once in each direction.
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            sums[from].0 += mesh.vertices[to].coords;
+            sums[from].1 += 1.0;
+        }
+    }
+    for (vertex, (sum, count)) in mesh.vertices.iter_mut().zip(sums) {
+        let normal = surface.gradient(*vertex).normalize();
+        let step = 0.5 * (sum / count - vertex.coords);
+        *vertex = project(surface, *vertex + step - normal * normal.dot(&step))?;
+    }
+    Ok(())
+}
+
+/// Splits every edge whose middle is off the surface; false if there was none. An edge's two
+/// triangles agree on whether it is split, so that the mesh stays closed.
+fn split(mesh: &mut Mesh, surface: &dyn Implicit) -> Result<bool> {
+    let Mesh { vertices, triangles } = mesh;
+    let mut middles = HashMap::new();
+    for &[a, b, c] in triangles.iter() {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            let middle = nalgebra::center(&vertices[from], &vertices[to]);
+            if from < to && distance_m(surface, middle) > EDGE_ERROR_M {
+                middles.insert((from, to), vertices.len());
+                vertices.push(project(surface, middle)?);
+            }
+        }
+    }
+    let middle = |a: usize, b: usize| middles.get(&(a.min(b), a.max(b))).copied();
+    *triangles = triangles.iter().flat_map(|&t| parts(t, middle, vertices)).collect();
+    Ok(!middles.is_empty())
+}
+
+/// The triangles that a triangle falls into when the edges with a `middle` are split there.
+fn parts(
+    [a, b, c]: [usize; 3],
+    middle: impl Fn(usize, usize) -> Option<usize>,
+    vertices: &[Point3<f64>],
+) -> Vec<[usize; 3]> {
+    match (middle(a, b), middle(b, c), middle(c, a)) {
+        (None, None, None) => vec![[a, b, c]],
+        (Some(ab), None, None) => vec![[a, ab, c], [ab, b, c]],
+        (Some(ab), Some(bc), None) => {
+            let across = |p: usize, q: usize| (vertices[p] - vertices[q]).norm();
+            let rest = if across(a, bc) < across(ab, c) {
+                [[a, ab, bc], [a, bc, c]]
+            } else {
+                [[a, ab, c], [ab, bc, c]]
+            };
+            vec![[ab, b, bc], rest[0], rest[1]]
+        }
+        (Some(ab), Some(bc), Some(ca)) => {
+            vec![[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        }
+        _ => parts([b, c, a], middle, vertices),
+    }
+}
+
+/// Distance of a point near the surface from it, to second order: |f| / |∇f|.
+fn distance_m(surface: &dyn Implicit, p: Point3<f64>) -> f64 {
+    let field = surface.field(p);
+    field.value.abs() / field.gradient.norm()
+}
+
+fn describe(mesh: &Mesh, surface: &dyn Implicit) {
+    let (mut sum_m, mut most_m, mut samples) = (0.0, 0.0_f64, 0.0);
+    let (mut quality, mut worst, mut volume_m3) = (0.0, 1.0_f64, 0.0);
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|i| mesh.vertices[i].coords);
+        for i in 0..=SAMPLES_PER_EDGE {
+            for j in 0..=SAMPLES_PER_EDGE - i {
+                let (u, v) = (i as f64, j as f64);
+                let n = SAMPLES_PER_EDGE as f64;
+                let p = (a * u + b * v + c * (n - u - v)) / n;
+                let error_m = distance_m(surface, p.into());
+                (sum_m, most_m, samples) = (sum_m + error_m, most_m.max(error_m), samples + 1.0);
+            }
+        }
+        // 4√3 area / sum of squared edges: 1 for equal sides, 0 for a sliver.
+        let squares = (b - a).norm_squared() + (c - b).norm_squared() + (a - c).norm_squared();
+        let shape = 2.0 * 3.0_f64.sqrt() * (b - a).cross(&(c - a)).norm() / squares;
+        (quality, worst) = (quality + shape, worst.min(shape));
+        volume_m3 += a.dot(&b.cross(&c)) / 6.0;
+    }
+    let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
+    let (low, high) = mesh.vertices.iter().fold(
+        (Point3::from([f64::INFINITY; 3]), Point3::from([-f64::INFINITY; 3])),
+        |(low, high), v| (low.inf(v), high.sup(v)),
+    );
+    println!("  {vertices} vertices, {triangles} triangles, {:.1} cm³", volume_m3 * 1e6);
+    println!("  from {:.2} to {:.2} mm", low * 1e3, high * 1e3);
+    println!("  quality: mean {:.3}, least {worst:.3}", quality / triangles as f64);
+    println!(
+        "  from the surface: mean {:.4} mm, most {:.4} mm",
+        sum_m / samples * 1e3,
+        most_m * 1e3
+    );
+}
+
+/// Wavefront OBJ in millimetres, z up, front +y.
+fn obj(mesh: &Mesh) -> Result<Vec<u8>> {
+    let mut text = String::from(
+        "# Steel container, made by models/make_models.rs of Palpate.\n\
+         # Unit: millimetre. z up, front +y.\no container\n",
+    );
+    for v in &mesh.vertices {
+        text += &format!("v {:.5} {:.5} {:.5}\n", v.x * 1e3, v.y * 1e3, v.z * 1e3);
+    }
+    for [a, b, c] in &mesh.triangles {
+        text += &format!("f {} {} {}\n", a + 1, b + 1, c + 1);
+    }
+    Ok(text.into_bytes())
+}
+
+/// Binary glTF 2.0 (Khronos Group, "glTF 2.0 specification", section 4.4). The vertices are in the
+/// bird's own frame; the node's matrix turns them to glTF's +y up, +z front.
+fn glb(mesh: &Mesh) -> Result<Vec<u8>> {
+    let vertices: Vec<[f32; 3]> =
+        mesh.vertices.iter().map(|v| [v.x as f32, v.y as f32, v.z as f32]).collect();
+    let mut binary: Vec<u8> =
+        vertices.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
+    let indices_start = binary.len();
+    for &index in mesh.triangles.as_flattened() {
+        binary.extend(u32::try_from(index)?.to_le_bytes());
+    }
+    let extreme = |pick: fn(f32, f32) -> f32| {
+        [0, 1, 2].map(|axis| vertices.iter().map(|v| v[axis]).reduce(pick))
+    };
+    // Component types 5126 and 5125 are f32 and u32; targets 34962 and 34963 vertices and indices.
+    let document = json!({
+        "asset": { "version": "2.0", "generator": "models/make_models.rs of Palpate" },
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{
+            "name": "bird",
+            "mesh": 0,
+            // By columns: (x, y, z) of the bird is (-x, z, y) of glTF.
+            "matrix": [-1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1],
+        }],
+        "meshes": [{
+            "name": "bird",
+            "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1, "material": 0 }],
+        }],
+        "materials": [{
+            "name": "porcelain",
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [0.9, 0.9, 0.88, 1.0], "metallicFactor": 0, "roughnessFactor": 0.3,
+            },
+        }],
+        "accessors": [
+            {
+                "bufferView": 0, "componentType": 5126, "type": "VEC3",
+                "count": vertices.len(), "min": extreme(f32::min), "max": extreme(f32::max),
+            },
+            {
+                "bufferView": 1, "componentType": 5125, "type": "SCALAR",
+                "count": 3 * mesh.triangles.len(),
+            },
+        ],
+        "bufferViews": [
+            { "buffer": 0, "byteLength": indices_start, "target": 34962 },
+            {
+                "buffer": 0, "byteOffset": indices_start,
+                "byteLength": binary.len() - indices_start, "target": 34963,
+            },
+        ],
+        "buffers": [{ "byteLength": binary.len() }],
+    });
+    let mut text = serde_json::to_vec(&document)?;
+    // Chunks are padded to four bytes; the binary one already is.
+    text.resize(text.len().next_multiple_of(4), b' ');
+
+    let total = 12 + 8 + text.len() + 8 + binary.len();
+    let mut file = b"glTF".to_vec();
+    file.extend(2_u32.to_le_bytes());
+    file.extend(u32::try_from(total)?.to_le_bytes());
+    for (kind, chunk) in [(b"JSON", text), (b"BIN\0", binary)] {
+        file.extend(u32::try_from(chunk.len())?.to_le_bytes());
+        file.extend(kind);
+        file.extend(chunk);
+    }
+    Ok(file)
+}
