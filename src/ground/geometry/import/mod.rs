@@ -1,0 +1,62 @@
+//! Mesh files. To add a format: write its file here and give it a line in `FORMATS`.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use super::error::{MeshError, MeshFault};
+use super::mesh::Mesh;
+use super::raw::RawMesh;
+use super::repair::repair;
+use super::report::MeshReport;
+
+mod accessor;
+mod gltf;
+mod obj;
+
+/// Reads the bytes of a file; the path is for files it refers to.
+type Reader = fn(&Path, &[u8]) -> Result<RawMesh, MeshFault>;
+
+/// Extensions, in lower case, and who reads them.
+const FORMATS: &[(&str, Reader)] = &[("obj", obj::read), ("gltf", gltf::read), ("glb", gltf::read)];
+
+/// Reads a mesh file, scales it by `metres_per_unit` and repairs it.
+///
+/// The extension decides the format: OBJ, glTF (`.gltf` or `.glb`). A glTF file is in metres by
+/// its specification; the scale multiplies all the same.
+///
+/// # Errors
+/// [`MeshError`] says which file, and what is wrong with it.
+pub fn import(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshReport), MeshError> {
+    read_and_repair(path, metres_per_unit)
+        .map_err(|fault| MeshError { path: path.to_owned(), fault })
+}
+
+fn read_and_repair(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshReport), MeshFault> {
+    if !(metres_per_unit > 0.0 && metres_per_unit.is_finite()) {
+        return Err(MeshFault::BadScale { metres_per_unit });
+    }
+    if path.is_dir() {
+        return Err(MeshFault::Unreadable(io::ErrorKind::IsADirectory.into()));
+    }
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let Some((_, read)) = FORMATS.iter().find(|(known, _)| *known == extension) else {
+        let supported = FORMATS.iter().map(|(known, _)| *known).collect();
+        return Err(MeshFault::UnsupportedExtension { extension, supported });
+    };
+    let mut raw = read(path, &read_file(path)?)?;
+    raw.scale(metres_per_unit);
+    repair(raw)
+}
+
+/// Reads a regular file. A folder, pipe or device is refused, because it may never end.
+fn read_file(path: &Path) -> io::Result<Vec<u8>> {
+    let kind = fs::metadata(path)?;
+    if kind.is_dir() {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    if !kind.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
+    }
+    fs::read(path)
+}

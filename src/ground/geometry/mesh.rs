@@ -1,0 +1,96 @@
+//! The triangle mesh that can be trusted.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::error::MeshFault;
+use super::raw::RawMesh;
+use super::repair::repair;
+use super::report::MeshReport;
+
+/// A triangle mesh, in metres.
+///
+/// Only [`repair`] makes one, so it always has at least one triangle, finite vertices that are
+/// all used, indices in range, and no degenerate or duplicate triangles. Winding is consistent
+/// over each edge-connected component: seen from outside, corners run counter-clockwise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mesh {
+    vertices: Vec<Point3<f64>>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Mesh {
+    /// Repairs vertices (metres) and triangles (indices into them) into a mesh.
+    ///
+    /// # Errors
+    /// Whatever [`repair`] refuses; elements are named as parts of "the mesh".
+    pub fn new(
+        vertices: &[Point3<f64>],
+        triangles: &[[u32; 3]],
+    ) -> Result<(Self, MeshReport), MeshFault> {
+        let mut raw = RawMesh::default();
+        raw.add_part("the mesh", vertices.iter().copied(), triangles.iter().copied())?;
+        repair(raw)
+    }
+
+    /// The caller promises what the type promises.
+    pub(super) fn from_sound_parts(vertices: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Self {
+        Self { vertices, triangles }
+    }
+
+    /// Vertex positions, in metres.
+    pub fn vertices(&self) -> &[Point3<f64>] {
+        &self.vertices
+    }
+
+    /// Triangles as indices into [`vertices`](Self::vertices).
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The corners of triangle `triangle`, in winding order, in metres.
+    ///
+    /// # Panics
+    /// If there is no such triangle, like any index.
+    #[inline]
+    pub fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
+        self.triangles[triangle].map(|vertex| self.vertices[vertex as usize])
+    }
+
+    /// Corners of all triangles, in order.
+    pub fn iter_corners(&self) -> impl ExactSizeIterator<Item = [Point3<f64>; 3]> + '_ {
+        (0..self.triangles.len()).map(|triangle| self.corners(triangle))
+    }
+
+    /// The smallest axis-aligned box around the mesh: least and greatest corner, in metres.
+    pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
+        let first = self.vertices[0];
+        self.vertices
+            .iter()
+            .fold((first, first), |(low, high), vertex| (low.inf(vertex), high.sup(vertex)))
+    }
+
+    /// Surface area, in m²: half the sum of ‖(b − a) × (c − a)‖.
+    pub fn area_m2(&self) -> f64 {
+        self.iter_corners().map(|[a, b, c]| (b - a).cross(&(c - a)).norm()).sum::<f64>() / 2.0
+    }
+
+    /// Enclosed volume, in m³, by the divergence theorem: a sixth of the sum of a · (b × c).
+    ///
+    /// Meaningful when the mesh is closed. An inner wall counts as a body of its own.
+    pub fn volume_m3(&self) -> f64 {
+        // Measured from a vertex, so that a mesh far from the origin loses no digits.
+        let origin = self.vertices[0];
+        self.iter_corners()
+            .map(|[a, b, c]| (a - origin).dot(&(b - origin).cross(&(c - origin))))
+            .sum::<f64>()
+            / 6.0
+    }
+
+    /// The mesh moved by the finite pose `x_wm`: a vertex p in M becomes `x_wm` p in W.
+    pub fn transformed(&self, x_wm: &Isometry3<f64>) -> Self {
+        Self {
+            vertices: self.vertices.iter().map(|vertex| x_wm * vertex).collect(),
+            triangles: self.triangles.clone(),
+        }
+    }
+}

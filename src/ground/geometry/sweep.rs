@@ -1,0 +1,160 @@
+//! A capsule in straight motion against one triangle.
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+
+use super::primitives::{Line, nearest_of_segment_and_triangle};
+
+/// A start this close to touching, in metres, touches: rounding must not let a shape that rests
+/// on a surface fall through it.
+const TOUCH_M: f64 = 1e-11;
+
+/// Squared sine below which a motion runs along an edge and meets only the corners at its ends.
+const PARALLEL: f64 = 1e-24;
+
+/// All points within `radius_m` of a segment. Equal ends make a sphere, a zero radius a segment
+/// or a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Capsule {
+    /// One end of the axis, in W, in metres.
+    pub p0_w: Point3<f64>,
+    /// The other end of the axis, in W, in metres.
+    pub p1_w: Point3<f64>,
+    /// Radius, in metres, not negative.
+    pub radius_m: f64,
+}
+
+impl Capsule {
+    /// A sphere.
+    pub fn sphere(centre_w: Point3<f64>, radius_m: f64) -> Self {
+        Self { p0_w: centre_w, p1_w: centre_w, radius_m }
+    }
+
+    /// The nearest points of the axis and a triangle, in this order.
+    pub fn nearest(&self, triangle: &[Point3<f64>; 3]) -> (Point3<f64>, Point3<f64>) {
+        nearest_of_segment_and_triangle([&self.p0_w, &self.p1_w], triangle)
+    }
+
+    /// This capsule, moved by `by`.
+    pub fn translated(&self, by: &Vector3<f64>) -> Self {
+        Self { p0_w: self.p0_w + by, p1_w: self.p1_w + by, ..*self }
+    }
+}
+
+/// A capsule moving along a direction, prepared for many triangles.
+///
+/// Sliding the capsule against a triangle T is sliding the point p0 against T drawn out along
+/// p0 − p1 and rounded by the radius r. That body is convex, so p0 enters it where it first
+/// meets one of the pieces that cover its surface: the prism's faces moved outwards by r, the
+/// cylinders of radius r about its edges, the spheres of radius r about its corners. Parts of a
+/// piece that lie inside the body are met later and change nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Sweep {
+    start: Point3<f64>,
+    draw: Vector3<f64>,
+    radius_m: f64,
+    direction: UnitVector3<f64>,
+    line: Line,
+}
+
+impl Sweep {
+    /// `capsule` moving along `direction`.
+    pub fn new(capsule: &Capsule, direction: UnitVector3<f64>) -> Self {
+        Self {
+            start: capsule.p0_w,
+            draw: capsule.p0_w - capsule.p1_w,
+            radius_m: capsule.radius_m,
+            direction,
+            line: Line::along(&direction),
+        }
+    }
+
+    /// The travel, in metres, at which the capsule first touches the triangle, if it ever does.
+    ///
+    /// The capsule must not overlap the triangle at the start.
+    pub fn travel_m(&self, triangle: &[Point3<f64>; 3]) -> Option<f64> {
+        let far = triangle.map(|corner| corner + self.draw);
+        let is_sphere = self.draw == Vector3::zeros();
+        let mut first = First(f64::INFINITY);
+        self.base(triangle, &mut first);
+        if !is_sphere {
+            self.base(&far, &mut first);
+        }
+        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+            let (a, b) = (&triangle[i], &triangle[j]);
+            first.offer(self.onto_edge(a, b));
+            first.offer(self.onto_corner(a));
+            if !is_sphere {
+                first.offer(self.onto_edge(&far[i], &far[j]));
+                first.offer(self.onto_edge(a, &far[i]));
+                first.offer(self.onto_corner(&far[i]));
+                self.side([a, b, &far[j], &far[i]], &mut first);
+            }
+        }
+        first.0.is_finite().then_some(first.0)
+    }
+
+    fn base(&self, triangle: &[Point3<f64>; 3], first: &mut First) {
+        let [a, b, c] = triangle;
+        self.face((b - a).cross(&(c - a)), &[*triangle], first);
+    }
+
+    /// The parallelogram an edge is drawn out to.
+    fn side(&self, [a, b, c, d]: [&Point3<f64>; 4], first: &mut First) {
+        let normal = (b - a).cross(&(d - a));
+        self.face(normal, &[[*a, *b, *c], [*a, *c, *d]], first);
+    }
+
+    /// A flat face moved by the radius towards where the capsule comes from.
+    fn face(&self, normal: Vector3<f64>, triangles: &[[Point3<f64>; 3]], first: &mut First) {
+        let Some(normal) = UnitVector3::try_new(normal, 0.0) else { return };
+        let offset_m = -self.radius_m * normal.dot(&self.direction).signum();
+        let origin = self.start - normal.scale(offset_m);
+        for triangle in triangles {
+            first.offer(self.line.distance_m(&origin, triangle));
+        }
+    }
+
+    /// The cylinder about an edge, without its ends.
+    fn onto_edge(&self, a: &Point3<f64>, b: &Point3<f64>) -> Option<f64> {
+        let (axis, length_m) = UnitVector3::try_new_and_get(b - a, 0.0)?;
+        let arm = self.start - a;
+        let (arm_along, speed_along) = (arm.dot(&axis), self.direction.dot(&axis));
+        let across = arm - axis.scale(arm_along);
+        let velocity = self.direction.into_inner() - axis.scale(speed_along);
+        let speed_squared = velocity.norm_squared();
+        if speed_squared < PARALLEL {
+            return None;
+        }
+        let nearest_m = -across.dot(&velocity) / speed_squared;
+        let miss_squared = (across + velocity * nearest_m).norm_squared();
+        let half_chord = self.half_chord(miss_squared)? / speed_squared.sqrt();
+        let travel_m = nearest_m - half_chord;
+        (0.0..=length_m).contains(&(arm_along + speed_along * travel_m)).then_some(travel_m)
+    }
+
+    /// The sphere about a corner.
+    fn onto_corner(&self, corner: &Point3<f64>) -> Option<f64> {
+        let arm = self.start - corner;
+        let nearest_m = -arm.dot(&self.direction);
+        let miss_squared = (arm + self.direction.scale(nearest_m)).norm_squared();
+        Some(nearest_m - self.half_chord(miss_squared)?)
+    }
+
+    fn half_chord(&self, miss_squared: f64) -> Option<f64> {
+        let squared = self.radius_m * self.radius_m - miss_squared;
+        (squared >= 0.0).then(|| squared.sqrt())
+    }
+}
+
+/// The least travel offered that does not lie behind the start.
+struct First(f64);
+
+impl First {
+    fn offer(&mut self, travel_m: Option<f64>) {
+        if let Some(travel_m) = travel_m
+            && travel_m >= -TOUCH_M
+        {
+            self.0 = self.0.min(travel_m.max(0.0));
+        }
+    }
+}
