@@ -21,4 +21,10 @@
 //! frame W, `X_WT` the pose of T in W; in code they are written `p_wc` and `x_wt`.
 #![warn(missing_docs)]
 
+pub mod bodies;
+pub mod conduct;
+pub mod faces;
 pub mod ground;
+pub mod things;
+pub mod trials;
+pub mod world;

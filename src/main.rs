@@ -1,1 +1,7 @@
-fn main() {}
+//! The `palpate` program.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    palpate::faces::cli::main()
+}

@@ -1,5 +1,6 @@
 //! Floor 0: what knows nothing of touch.
 
+pub mod config;
 pub mod geometry;
 pub mod gp;
 pub mod optimize;

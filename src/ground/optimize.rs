@@ -1,7 +1,10 @@
 //! Maximisation in a box: DIRECT finds the hill, L-BFGS climbs it (NLopt).
 
-use nlopt::{Algorithm, FailState, Nlopt, SuccessState, Target};
 use serde::{Deserialize, Serialize};
+
+/// Whether this build has optimisers (feature `nlopt`). Without them [`direct`] and [`lbfgs`]
+/// return where they began, with [`Stop::Failed`].
+pub const BUILT: bool = cfg!(feature = "nlopt");
 
 /// Why an optimiser returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,7 +52,7 @@ pub fn direct(
 ) -> Optimum {
     let middle: Vec<f64> =
         bounds.lower.iter().zip(bounds.upper).map(|(lower, upper)| 0.5 * (lower + upper)).collect();
-    run(Algorithm::Direct, bounds, &middle, max_evaluations, &mut |x, _| objective(x))
+    run(Method::Direct, bounds, &middle, max_evaluations, &mut |x, _| objective(x))
 }
 
 /// Maximises `objective` from `start` by limited-memory BFGS within the box.
@@ -62,39 +65,28 @@ pub fn lbfgs(
     max_evaluations: u32,
     mut objective: impl FnMut(&[f64], &mut [f64]) -> f64,
 ) -> Optimum {
-    run(Algorithm::Lbfgs, bounds, start, max_evaluations, &mut |x, gradient| {
+    run(Method::Lbfgs, bounds, start, max_evaluations, &mut |x, gradient| {
         objective(x, gradient.unwrap_or(&mut []))
     })
 }
 
-/// Relative change of the value below which L-BFGS counts as converged; chosen well above
-/// rounding, far below what changes a plan.
-const VALUE_TOLERANCE: f64 = 1e-10;
+#[derive(Clone, Copy, PartialEq)]
+enum Method {
+    Direct,
+    Lbfgs,
+}
 
 type Objective<'a> = dyn FnMut(&[f64], Option<&mut [f64]>) -> f64 + 'a;
 
-/// What the callback keeps: NLopt may return a point that is not the best it evaluated.
+/// The objective with the best it returned: an optimiser may end on a point that is not.
+#[cfg_attr(not(feature = "nlopt"), allow(dead_code))]
 struct Watch<'a, 'b> {
     objective: &'a mut Objective<'b>,
     best: Optimum,
 }
 
-fn watched(x: &[f64], mut gradient: Option<&mut [f64]>, watch: &mut Watch) -> f64 {
-    let mut value = (watch.objective)(x, gradient.as_deref_mut());
-    if !value.is_finite() {
-        value = f64::MIN;
-        gradient.into_iter().flatten().for_each(|slope| *slope = 0.0);
-    }
-    watch.best.evaluations += 1;
-    if value > watch.best.value {
-        watch.best.value = value;
-        watch.best.x.copy_from_slice(x);
-    }
-    value
-}
-
 fn run(
-    algorithm: Algorithm,
+    method: Method,
     bounds: Bounds,
     start: &[f64],
     max_evaluations: u32,
@@ -106,30 +98,70 @@ fn run(
     }
     let best =
         Optimum { x: x.clone(), value: f64::NEG_INFINITY, evaluations: 0, stop: Stop::Failed };
-    let watch = Watch { objective, best };
-    let mut nlopt = Nlopt::new(algorithm, x.len(), watched, Target::Maximize, watch);
-    let prepared = nlopt
-        .set_lower_bounds(bounds.lower)
-        .and_then(|_| nlopt.set_upper_bounds(bounds.upper))
-        .and_then(|_| nlopt.set_maxeval(max_evaluations))
-        .and_then(|_| match algorithm {
-            Algorithm::Lbfgs => nlopt.set_ftol_rel(VALUE_TOLERANCE),
-            _ => Ok(SuccessState::Success),
-        });
-    let outcome = match prepared {
-        Ok(_) => nlopt.optimize(&mut x).map(|(success, _)| success).map_err(|(fail, _)| fail),
-        Err(fail) => Err(fail),
-    };
-    let stop = match outcome {
-        Ok(SuccessState::MaxEvalReached) => Stop::Budget,
-        Ok(_) => Stop::Converged,
-        Err(FailState::RoundoffLimited) => Stop::Roundoff,
-        Err(_) => Stop::Failed,
-    };
-    Optimum { stop, ..nlopt.recover_user_data().best }
+    engine::run(method, bounds, x, max_evaluations, Watch { objective, best })
 }
 
-#[cfg(test)]
+#[cfg(not(feature = "nlopt"))]
+mod engine {
+    use super::{Bounds, Method, Optimum, Watch};
+
+    pub(super) fn run(_: Method, _: Bounds, _: Vec<f64>, _: u32, watch: Watch) -> Optimum {
+        watch.best
+    }
+}
+
+#[cfg(feature = "nlopt")]
+mod engine {
+    use super::{Bounds, Method, Optimum, Stop, Watch};
+    use nlopt::{Algorithm, FailState, Nlopt, SuccessState, Target};
+
+    /// Relative change of the value below which L-BFGS counts as converged; chosen well above
+    /// rounding, far below what changes a plan.
+    const VALUE_TOLERANCE: f64 = 1e-10;
+
+    fn watched(x: &[f64], mut gradient: Option<&mut [f64]>, watch: &mut Watch) -> f64 {
+        let mut value = (watch.objective)(x, gradient.as_deref_mut());
+        if !value.is_finite() {
+            value = f64::MIN;
+            gradient.into_iter().flatten().for_each(|slope| *slope = 0.0);
+        }
+        watch.best.evaluations += 1;
+        if value > watch.best.value {
+            watch.best.value = value;
+            watch.best.x.copy_from_slice(x);
+        }
+        value
+    }
+
+    pub(super) fn run(
+        method: Method,
+        bounds: Bounds,
+        mut x: Vec<f64>,
+        max_evaluations: u32,
+        watch: Watch,
+    ) -> Optimum {
+        let (algorithm, tolerance) = match method {
+            Method::Direct => (Algorithm::Direct, 0.0),
+            Method::Lbfgs => (Algorithm::Lbfgs, VALUE_TOLERANCE),
+        };
+        let mut nlopt = Nlopt::new(algorithm, x.len(), watched, Target::Maximize, watch);
+        let outcome = nlopt
+            .set_lower_bounds(bounds.lower)
+            .and_then(|_| nlopt.set_upper_bounds(bounds.upper))
+            .and_then(|_| nlopt.set_maxeval(max_evaluations))
+            .and_then(|_| nlopt.set_ftol_rel(tolerance))
+            .and_then(|_| nlopt.optimize(&mut x).map_err(|(fail, _)| fail).map(|(end, _)| end));
+        let stop = match outcome {
+            Ok(SuccessState::MaxEvalReached) => Stop::Budget,
+            Ok(_) => Stop::Converged,
+            Err(FailState::RoundoffLimited) => Stop::Roundoff,
+            Err(_) => Stop::Failed,
+        };
+        Optimum { stop, ..nlopt.recover_user_data().best }
+    }
+}
+
+#[cfg(all(test, feature = "nlopt"))]
 mod tests {
     use super::*;
 

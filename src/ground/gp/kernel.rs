@@ -28,6 +28,14 @@ impl Kernel for SquaredExponential {
     }
 }
 
+/// Every kernel by the name it has in an experiment file; one line to add one.
+pub const KERNELS: &[(&str, &dyn Kernel)] = &[("squared_exponential", &SquaredExponential)];
+
+/// The kernel called `name`.
+pub fn by_name(name: &str) -> Option<&'static dyn Kernel> {
+    KERNELS.iter().find(|(known, _)| *known == name).map(|(_, kernel)| *kernel)
+}
+
 /// What a fit chooses: k(a, b) = signal_sd² · c(r²(a, b)) + noise_sd² · [a is b].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hyperparameters {

@@ -5,7 +5,6 @@
 //! hyperparameters and `fit` finds the best ones.
 
 pub mod cholesky;
-#[cfg(feature = "nlopt")]
 pub mod fit;
 pub mod kernel;
 pub mod likelihood;

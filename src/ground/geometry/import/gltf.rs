@@ -1,5 +1,6 @@
 //! glTF 2.0, as `.gltf` or `.glb`: the triangles of the default scene, or of all root nodes if
-//! there is none, in scene coordinates. Skins, morph targets and animations are not applied.
+//! there is none. The format's up (+y) becomes z and its front (+z) becomes y, so that a model
+//! stands upright and faces the finger. Skins, morph targets and animations are not applied.
 //!
 //! Only the JSON model of the `gltf` crate is used: its readers and its validation panic on some
 //! broken documents.
@@ -19,6 +20,15 @@ use super::{MeshFault, RawMesh};
 /// Extensions with these prefixes leave the geometry alone.
 const HARMLESS_EXTENSIONS: [&str; 4] =
     ["KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_"];
+
+/// From glTF's frame to ours: (x, y, z) becomes (-x, z, y).
+#[rustfmt::skip]
+const UPRIGHT: Matrix4<f64> = Matrix4::new(
+    -1.0, 0.0, 0.0, 0.0,
+     0.0, 0.0, 1.0, 0.0,
+     0.0, 1.0, 0.0, 0.0,
+     0.0, 0.0, 0.0, 1.0,
+);
 
 /// Reads a glTF file; `path` is where files it refers to are looked for.
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<RawMesh, MeshFault> {
@@ -53,14 +63,14 @@ fn parse(bytes: &[u8]) -> Result<(Root, Option<Vec<u8>>), GltfFault> {
     Ok((root, container.bin.map(Into::into)))
 }
 
-/// The nodes of the scene with their poses: a point p of node N is `pose` p in the scene.
+/// The nodes of the scene with their poses: a point p of node N is `pose` p in our frame.
 fn placed_nodes(root: &Root) -> Result<Vec<(Index<Node>, Matrix4<f64>)>, GltfFault> {
     let roots = match root.scene {
         Some(scene) => find(&root.scenes, "scene", scene)?.nodes.clone(),
         None => orphans(root)?,
     };
     let mut reached = vec![false; root.nodes.len()];
-    let mut waiting: Vec<_> = roots.iter().rev().map(|&node| (node, Matrix4::identity())).collect();
+    let mut waiting: Vec<_> = roots.iter().rev().map(|&node| (node, UPRIGHT)).collect();
     let mut placed = Vec::new();
     while let Some((index, parent)) = waiting.pop() {
         let node = find(&root.nodes, "node", index)?;

@@ -1,0 +1,86 @@
+//! One control tick of a body.
+
+use thiserror::Error;
+
+/// Joint velocities for the next tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Command {
+    /// One entry per joint, in the order of [`Capabilities::joints`].
+    pub qdot_rad_s: Vec<f64>,
+}
+
+/// What a body returns after a tick. Time stands in it and is never read from a clock.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// Since reset.
+    pub time_s: f64,
+    /// Joint positions.
+    pub q_rad: Vec<f64>,
+    /// Joint velocities.
+    pub qdot_rad_s: Vec<f64>,
+    /// The command as it was really applied after limiting.
+    pub applied: Command,
+}
+
+/// What a body can do, known before it is connected.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Capabilities {
+    /// Joint names; commands and readings follow their order.
+    pub joints: Vec<String>,
+    /// Smallest and largest position of each joint.
+    pub q_limits_rad: Vec<[f64; 2]>,
+    /// Largest speed of each joint.
+    pub qdot_limits_rad_s: Vec<f64>,
+    /// Duration of one tick.
+    pub period_s: f64,
+    /// Whether `reset` restores the same state for the same seed.
+    pub resettable: bool,
+    /// Whether its time passes by itself.
+    pub real_time: bool,
+}
+
+/// Why a body or a touch could not go on. A fault is data: it reaches the trial's row.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum Fault {
+    /// A command or target with a number that is not finite, or of the wrong length.
+    #[error("command refused: {values:?}")]
+    Refused {
+        /// The command or target.
+        values: Vec<f64>,
+    },
+    /// The state is no longer finite or left its limits.
+    #[error("diverged at {time_s} s: {state:?}")]
+    Diverged {
+        /// When.
+        time_s: f64,
+        /// The state.
+        state: Vec<f64>,
+    },
+    /// The body stopped answering.
+    #[error("no answer since {time_s} s")]
+    Lost {
+        /// When it last answered.
+        time_s: f64,
+    },
+}
+
+/// A body that is commanded and read: simulated, recorded or real.
+///
+/// Object-safe, synchronous and of plain data, so that the code that drives the simulator
+/// drives the arm. Limits, recording and fault injection are wrappers that are backends too.
+pub trait Backend: Send {
+    /// What it can do; does not need a connection.
+    fn capabilities(&self) -> &Capabilities;
+
+    /// Brings it to its start and returns the first reading.
+    ///
+    /// # Errors
+    /// If it cannot be reached or brought there.
+    fn reset(&mut self, seed: u64) -> Result<Reading, Fault>;
+
+    /// Applies `command` for one period.
+    ///
+    /// # Errors
+    /// A fault ends the touch; the body is left at rest.
+    fn step(&mut self, command: &Command) -> Result<Reading, Fault>;
+}

@@ -1,0 +1,5 @@
+//! Floor 4: one touch, the belief after it, and where to touch next.
+
+pub mod belief;
+pub mod planner;
+pub mod probe;

@@ -1,0 +1,30 @@
+//! A scrambled Sobol sequence: evenly spread targets without any model.
+
+use super::{Belief, Entry, Plan, Planner, PlanningSettings};
+use crate::world::Zone;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "sobol",
+    about: "a scrambled Sobol sequence: evenly spread, no model (the fairer baseline)",
+    make: |zone, _: &PlanningSettings, mut rng: ChaCha8Rng| {
+        Box::new(Sobol { zone: zone.clone(), seed: rng.random(), index: 0 })
+    },
+};
+
+struct Sobol {
+    zone: Zone,
+    seed: u32,
+    index: u32,
+}
+
+impl Planner for Sobol {
+    fn plan(&mut self, _: &Belief) -> Plan {
+        let fractions: Vec<f64> = (0..self.zone.dimension())
+            .map(|axis| f64::from(sobol_burley::sample(self.index, axis as u32, self.seed)))
+            .collect();
+        self.index += 1;
+        Plan { target: self.zone.at(&fractions), sd_m: None, stall: None }
+    }
+}

@@ -1,0 +1,52 @@
+//! One touch: ask for a target, get a contact or a miss.
+
+mod cast;
+mod function;
+
+use crate::bodies::backend::Fault;
+use crate::world::World;
+use crate::world::scene::Body;
+use nalgebra::{Point3, Vector3};
+use std::sync::Arc;
+
+/// What a touch ended with.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Touch {
+    /// The finger met the surface.
+    Contact(Contact),
+    /// The finger travelled its whole way and met nothing.
+    Miss,
+}
+
+/// Where a touch met the surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contact {
+    /// The point of contact in `W`; its (x, z) may differ from the target.
+    pub p_wc: Point3<f64>,
+    /// Unit normal in `W`, from the surface towards the finger.
+    pub normal_w: Vector3<f64>,
+}
+
+/// A body that can be sent to a target.
+pub trait Probe: Send {
+    /// Approaches along −y over `target` (a place of the zone) until contact, and returns.
+    ///
+    /// # Errors
+    /// A fault of the body, or a target that is not finite.
+    fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault>;
+}
+
+/// The probe that the scene's body asks for.
+pub fn open(world: &Arc<World>) -> Box<dyn Probe> {
+    match world.scene().body {
+        Body::Function => Box::new(function::FunctionProbe::new(world.clone())),
+        Body::Cast => Box::new(cast::Cast::new(world.clone())),
+    }
+}
+
+fn refuse_unless_finite(target: &[f64]) -> Result<(), Fault> {
+    match target.iter().all(|coordinate| coordinate.is_finite()) {
+        true => Ok(()),
+        false => Err(Fault::Refused { values: target.into() }),
+    }
+}

@@ -1,0 +1,77 @@
+//! The command line.
+
+mod report;
+mod run;
+mod show;
+
+use crate::conduct::planner::PLANNERS;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+/// A testbed for active touch: a robot finger explores an object it cannot see.
+#[derive(Parser)]
+#[command(version, after_help = EXAMPLES, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  palpate run experiments/toy.toml          run an experiment and write its report
+  palpate run experiments/bird.toml --set trials=4 --set planners='[\"active\"]'
+  palpate report runs/toy                   draw the figures again, without running
+  palpate show my-part.obj --unit mm        check a mesh before exploring it
+
+Exit codes: 0 done, 2 could not (the message says why), 130 interrupted; run the same command \
+again to continue.";
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run an experiment: planners × trials, then its report.
+    Run(run::Args),
+    /// Draw a run's figures and page again from its rows.
+    Report(report::Args),
+    /// Say what a mesh, scene, experiment or run folder holds.
+    Show(show::Args),
+}
+
+/// How a command ended, if it did not fail.
+enum Ending {
+    Done,
+    Interrupted,
+}
+
+/// Runs the program on the process's arguments.
+pub fn main() -> ExitCode {
+    let command = Cli::command().mut_subcommand("run", |run| {
+        let planners: Vec<String> = PLANNERS
+            .iter()
+            .map(|planner| format!("  {:<9} {}", planner.name, planner.about))
+            .collect();
+        run.after_help(format!("{}\n\nPlanners:\n{}", run::EXAMPLES, planners.join("\n")))
+    });
+    let cli = Cli::from_arg_matches(&command.get_matches()).unwrap_or_else(|error| error.exit());
+    let outcome = match cli.command {
+        Command::Run(args) => run::run(&args),
+        Command::Report(args) => report::run(&args),
+        Command::Show(args) => show::run(&args),
+    };
+    match outcome {
+        Ok(Ending::Done) => ExitCode::SUCCESS,
+        Ok(Ending::Interrupted) => ExitCode::from(130),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Prints to standard output; a reader who has gone away is no error.
+fn print(text: &str) -> anyhow::Result<()> {
+    match writeln!(io::stdout(), "{text}") {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}

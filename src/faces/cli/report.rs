@@ -1,0 +1,25 @@
+//! `palpate report`.
+
+use super::{Ending, print};
+use crate::faces::report;
+use crate::trials::store::Run;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  palpate report runs/toy")]
+pub(super) struct Args {
+    /// A run's folder.
+    folder: PathBuf,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let run = Run::read(&args.folder)?;
+    report::table::write_csv(&run, &args.folder)?;
+    report::write(&run, &args.folder)?;
+    print(&format!(
+        "{}\nreport: {}",
+        report::table::summary(&run),
+        args.folder.join("report.html").display()
+    ))?;
+    Ok(Ending::Done)
+}

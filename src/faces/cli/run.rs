@@ -1,0 +1,159 @@
+//! `palpate run`.
+
+use super::{Ending, print};
+use crate::faces::report;
+use crate::trials::experiment::Experiment;
+use crate::trials::metrics::Truth;
+use crate::trials::runner;
+use crate::trials::store::{Manifest, Run, RunFolder};
+use crate::world::World;
+use anyhow::Context;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  palpate run experiments/container.toml
+  palpate run experiments/toy.toml --out runs/noisy --set gp.noise='[0.01, 1]' --set trials=200
+  palpate run runs/toy/resolved.toml --out runs/again    the same run again, to the byte
+
+Press Ctrl-C to stop after the trials in hand; the same command continues where it stopped.";
+
+#[derive(clap::Args)]
+pub(super) struct Args {
+    /// Experiment file (TOML).
+    experiment: PathBuf,
+    /// Change one setting: a dotted key and a TOML value; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder for the results [default: runs/NAME].
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// Threads; 0 means all cores. Results do not depend on it.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    threads: usize,
+    /// Throw away what an earlier run left in the folder.
+    #[arg(long)]
+    fresh: bool,
+    /// Write rows and summary only, no figures.
+    #[arg(long)]
+    no_report: bool,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let experiment = Experiment::load(&args.experiment, &args.set)?;
+    let world = Arc::new(World::build(experiment.scene.clone())?);
+    let truth = Truth::sample(&world, experiment.grid as usize);
+    let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&experiment.name));
+    if args.fresh {
+        RunFolder::clear(&path)?;
+    }
+    let (mut folder, done) = RunFolder::open(&path, &experiment, &truth, &manifest(&experiment))?;
+    let stop = Arc::new(AtomicBool::new(false));
+    stop_on_interrupt(stop.clone())?;
+
+    let total = u64::from(experiment.trials) * experiment.planners.len() as u64;
+    let bar = progress_bar(&experiment.name, total, done.len() as u64);
+    let begun = Instant::now();
+    let count = runner::run(
+        &experiment,
+        &world,
+        &truth,
+        (&mut folder, &done),
+        args.threads,
+        &stop,
+        &|_| step(&bar),
+    )?;
+    bar.finish_and_clear();
+    folder.sort(&experiment.planners)?;
+
+    let run = Run::read(&path)?;
+    let finished = run.rows.len() as u64 == total;
+    let mut text = report::table::summary(&run);
+    text += &format!("\n{count} trials in {:.1} s", begun.elapsed().as_secs_f64());
+    if !done.is_empty() {
+        text += &format!(", {} were there already", done.len());
+    }
+    report::table::write_csv(&run, &path)?;
+    if !finished {
+        text += &format!(
+            "\nstopped with {} of {total} trials in {}; the same command continues",
+            run.rows.len(),
+            path.display()
+        );
+    } else if args.no_report {
+        text += &format!("\nrows and summary in {}", path.display());
+    } else {
+        report::write(&run, &path).context("the rows are safe, but the report failed")?;
+        text += &format!("\nreport: {}", path.join("report.html").display());
+    }
+    print(&text)?;
+    Ok(if finished { Ending::Done } else { Ending::Interrupted })
+}
+
+fn manifest(experiment: &Experiment) -> Manifest {
+    #[cfg(feature = "mujoco")]
+    let mujoco = Some(crate::bodies::mujoco::version().to_owned());
+    #[cfg(not(feature = "mujoco"))]
+    let mujoco = None;
+    Manifest {
+        version: env!("CARGO_PKG_VERSION"),
+        commit: env!("PALPATE_COMMIT"),
+        mujoco,
+        platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
+        cpu_features: cpu_features(),
+        seed: experiment.seed,
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+fn cpu_features() -> Vec<&'static str> {
+    let features = [
+        ("avx2", is_x86_feature_detected!("avx2")),
+        ("fma", is_x86_feature_detected!("fma")),
+        ("avx512f", is_x86_feature_detected!("avx512f")),
+    ];
+    features.iter().filter(|(_, present)| *present).map(|(name, _)| *name).collect()
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn cpu_features() -> Vec<&'static str> {
+    Vec::new()
+}
+
+/// The first Ctrl-C asks to stop, the second ends the program at once.
+fn stop_on_interrupt(stop: Arc<AtomicBool>) -> anyhow::Result<()> {
+    let handler = move || {
+        if stop.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        eprintln!("stopping after the trials in hand; Ctrl-C again to stop at once");
+    };
+    ctrlc::set_handler(handler).context("cannot listen for Ctrl-C")
+}
+
+fn progress_bar(name: &str, total: u64, done: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
+    let template = "{prefix} {wide_bar} {pos}/{len} trials, {elapsed} gone, {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar.set_prefix(name.to_owned());
+    bar.set_position(done);
+    bar.reset_eta();
+    bar
+}
+
+/// Moves the bar; where no terminal shows it, says so in a line for each tenth.
+fn step(bar: &ProgressBar) {
+    bar.inc(1);
+    let (position, total) = (bar.position(), bar.length().unwrap_or(0));
+    let tenth = |count: u64| count * 10 / total.max(1);
+    if !std::io::stderr().is_terminal() && tenth(position) > tenth(position - 1) {
+        eprintln!("{}: {position} of {total} trials, {:.0?} left", bar.prefix(), bar.eta());
+    }
+}

@@ -1,0 +1,113 @@
+//! `palpate show`.
+
+use super::{Ending, print};
+use crate::faces::report;
+use crate::ground::geometry::import::import;
+use crate::trials::experiment::Experiment;
+use crate::trials::metrics::Truth;
+use crate::trials::store::{self, Run};
+use crate::world::scene::Unit;
+use crate::world::world::{Shape, World};
+use crate::world::{Scene, mjcf};
+use anyhow::{Context, bail};
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate show models/bird.glb
+  palpate show my-part.obj --unit mm
+  palpate show scenes/container.toml --mjcf container.xml    for MuJoCo's own viewer
+  palpate show experiments/toy.toml --set seed=1             every setting, defaults included
+  palpate show runs/toy")]
+pub(super) struct Args {
+    /// A mesh (.obj, .gltf, .glb), a scene or an experiment (.toml), or a run's folder.
+    path: PathBuf,
+    /// Unit of a mesh file's numbers.
+    #[arg(long, default_value = "m", value_name = "UNIT")]
+    unit: Unit,
+    /// Change one setting of a scene or experiment; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Write a scene as MJCF, the format of MuJoCo.
+    #[arg(long, value_name = "FILE")]
+    mjcf: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let extension = args.path.extension().and_then(|extension| extension.to_str());
+    let is_scene = extension == Some("toml") && !is_experiment(&args.path);
+    if args.mjcf.is_some() && !is_scene {
+        bail!("--mjcf goes with a scene (.toml), and {} is none", args.path.display());
+    }
+    let text = match extension {
+        _ if args.path.is_dir() => report::table::summary(&Run::read(&args.path)?),
+        Some("toml") if is_scene => scene(args)?,
+        Some("toml") => store::resolved(&Experiment::load(&args.path, &args.set)?),
+        _ => {
+            let (_, report) = import(&args.path, args.unit.metres())?;
+            format!("{}\n{report}", args.path.display())
+        }
+    };
+    print(text.trim_end())?;
+    Ok(Ending::Done)
+}
+
+/// An experiment names planners, a scene does not; a file that is neither is read as a scene.
+fn is_experiment(path: &Path) -> bool {
+    std::fs::read_to_string(path)
+        .ok()
+        .and_then(|text| text.parse::<toml::Table>().ok())
+        .is_some_and(|table| table.contains_key("planners") || table.contains_key("scene"))
+}
+
+/// Test places along each side of the zone from which a scene's heights are described.
+const GRID: usize = 41;
+
+fn scene(args: &Args) -> anyhow::Result<String> {
+    let scene = Scene::load(&args.path, &args.set)?;
+    let mut text = toml::to_string(&scene).context("cannot write the scene")?;
+    let world = World::build(scene)?;
+    let truth = Truth::sample(&world, GRID);
+    let heights = || truth.heights_m.iter().flatten();
+    let (low, high) = heights()
+        .fold((f64::MAX, f64::MIN), |(low, high), &height| (low.min(height), high.max(height)));
+    text += &format!(
+        "\nsurface in the zone: {} of {} test places, heights {:.2} to {:.2} mm above the datum\n",
+        truth.count(),
+        truth.places.len(),
+        low * 1e3,
+        high * 1e3
+    );
+    if let Shape::Mesh { report, .. } = world.shape() {
+        text += &format!("{report}\n");
+    }
+    if let Some(model) = mjcf::scene(&world) {
+        text += &compiled(&model)?;
+        if let Some(path) = &args.mjcf {
+            store::write_whole(path, &model)?;
+            text += &format!("\nMJCF: {}", path.display());
+        }
+    } else if args.mjcf.is_some() {
+        bail!("this scene has no mesh, so there is nothing to write as MJCF");
+    }
+    Ok(text)
+}
+
+#[cfg(feature = "mujoco")]
+fn compiled(mjcf: &str) -> anyhow::Result<String> {
+    use crate::bodies::mujoco;
+    let model = mujoco::compile(mjcf)?;
+    Ok(format!(
+        "MuJoCo {} compiles the scene: {} geoms, {} mesh vertices, {} mesh triangles",
+        mujoco::version(),
+        model.ngeom(),
+        model.nmeshvert(),
+        model.nmeshface()
+    ))
+}
+
+#[cfg(not(feature = "mujoco"))]
+fn compiled(_: &str) -> anyhow::Result<String> {
+    Ok("this build is without MuJoCo (feature `mujoco`)".into())
+}

@@ -1,0 +1,4 @@
+//! Floor 6: what people see.
+
+pub mod cli;
+pub mod report;

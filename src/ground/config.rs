@@ -1,0 +1,398 @@
+//! Configuration: defaults → file → `--set key=value` → checked, with errors that say where.
+
+use serde::de::DeserializeOwned;
+use std::fmt;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+use toml::{Table, Value};
+
+/// Where a value came from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Origin {
+    /// A file, and the line if the key stands in it.
+    File {
+        /// Its path as given.
+        path: PathBuf,
+        /// Line of the key, counted from 1.
+        line: Option<usize>,
+    },
+    /// A `--set` on the command line, as typed.
+    Set(String),
+}
+
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::File { path, line: Some(line) } => write!(f, "{}:{line}", path.display()),
+            Self::File { path, line: None } => write!(f, "{}", path.display()),
+            Self::Set(text) => write!(f, "--set {text}"),
+        }
+    }
+}
+
+/// What is wrong with a configuration.
+#[derive(Debug, Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{}: {cause}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: std::io::Error,
+    },
+    /// The file is not TOML.
+    #[error("{origin}: not valid TOML: {message}")]
+    Syntax {
+        /// Where.
+        origin: Origin,
+        /// What the parser expected.
+        message: String,
+    },
+    /// No such key.
+    #[error("{origin}: unknown key `{key}`{}; allowed here: {}", did_you_mean(nearest), allowed.join(", "))]
+    UnknownKey {
+        /// Where.
+        origin: Origin,
+        /// The key.
+        key: String,
+        /// The known key most like it.
+        nearest: Option<String>,
+        /// All keys known there.
+        allowed: Vec<String>,
+    },
+    /// A value of the wrong type, a missing key, or an unknown choice.
+    #[error("{origin}: `{key}`{}: {message}", shown(value))]
+    Invalid {
+        /// Where.
+        origin: Origin,
+        /// The key.
+        key: String,
+        /// The value found there.
+        value: Option<String>,
+        /// What was expected.
+        message: String,
+    },
+    /// A value that is not allowed.
+    #[error("{origin}: `{key}` = {value}: allowed is {allowed}")]
+    NotAllowed {
+        /// Where.
+        origin: Origin,
+        /// The key.
+        key: String,
+        /// The value.
+        value: String,
+        /// What may stand there.
+        allowed: String,
+    },
+    /// A `--set` that is not `key=value`, or whose key leads through a value.
+    #[error(
+        "--set {text}: write it as key=value, with dots between tables, as in gp.noise_max=0.1"
+    )]
+    Assignment {
+        /// As typed.
+        text: String,
+    },
+}
+
+fn did_you_mean(nearest: &Option<String>) -> String {
+    nearest.as_ref().map_or(String::new(), |key| format!(", did you mean `{key}`?"))
+}
+
+fn shown(value: &Option<String>) -> String {
+    value.as_ref().map_or(String::new(), |value| format!(" = {value}"))
+}
+
+/// A violated rule: the key, the value found, what is allowed.
+type Violation = (String, String, String);
+
+/// Checks values against what is allowed and keeps the first violation.
+#[derive(Default)]
+pub struct Rules {
+    prefix: String,
+    violation: Option<Violation>,
+}
+
+impl Rules {
+    /// `key` must be a number in `allowed`; NaN never is.
+    pub fn number(&mut self, key: &str, value: f64, allowed: RangeInclusive<f64>) {
+        let described = || format!("{} to {}", allowed.start(), allowed.end());
+        self.require(key, value, allowed.contains(&value), described);
+    }
+
+    /// Each entry of `key` must be a number in `allowed`.
+    pub fn numbers(&mut self, key: &str, values: &[f64], allowed: RangeInclusive<f64>) {
+        for (i, &value) in values.iter().enumerate() {
+            self.number(&format!("{key}[{i}]"), value, allowed.clone());
+        }
+    }
+
+    /// `key` must be an interval [smallest, largest] within `allowed`.
+    pub fn interval(&mut self, key: &str, [low, high]: [f64; 2], allowed: RangeInclusive<f64>) {
+        self.numbers(key, &[low, high], allowed);
+        self.require(key, format!("[{low}, {high}]"), low < high, || {
+            "the smaller number first, then a larger one".into()
+        });
+    }
+
+    /// `key` must be one of `names`.
+    pub fn one_of(&mut self, key: &str, value: &str, names: &[&str]) {
+        let known = names.contains(&value);
+        self.require(key, format!("\"{value}\""), known, || format!("one of {}", names.join(", ")));
+    }
+
+    /// `key` with `value` must hold `condition`; if it does not, `allowed` says what would.
+    pub fn require(
+        &mut self,
+        key: &str,
+        value: impl fmt::Display,
+        condition: bool,
+        allowed: impl FnOnce() -> String,
+    ) {
+        if !condition && self.violation.is_none() {
+            self.violation = Some((format!("{}{key}", self.prefix), value.to_string(), allowed()));
+        }
+    }
+
+    /// Checks the table under `key`.
+    pub fn table(&mut self, key: &str, checked: &impl Checked) {
+        let outer = self.prefix.len();
+        self.prefix += key;
+        self.prefix.push('.');
+        checked.check(self);
+        self.prefix.truncate(outer);
+    }
+}
+
+/// A configuration that knows what its values may be.
+pub trait Checked {
+    /// Applies every rule to `rules`.
+    fn check(&self, rules: &mut Rules);
+}
+
+/// A file's text with the place of each of its keys.
+struct Source {
+    path: PathBuf,
+    /// The key under which the file was included; empty for the outermost.
+    prefix: String,
+    document: toml_edit::Document<String>,
+}
+
+/// A configuration while it is put together.
+pub struct Loader {
+    table: Table,
+    sources: Vec<Source>,
+    /// Keys set on the command line and how they were typed.
+    sets: Vec<(String, String)>,
+}
+
+impl Loader {
+    /// Reads `path`.
+    ///
+    /// # Errors
+    /// If it cannot be read or is not TOML.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let (table, document) = parse(path)?;
+        let source = Source { path: path.into(), prefix: String::new(), document };
+        Ok(Self { table, sources: vec![source], sets: Vec::new() })
+    }
+
+    /// If `key` names a file, puts that file's table in its place.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is not TOML.
+    pub fn include(&mut self, key: &str) -> Result<(), ConfigError> {
+        let Some(Value::String(name)) = self.table.get(key) else { return Ok(()) };
+        let path = self.beside(key, Path::new(name));
+        let (table, document) = parse(&path).map_err(|error| match error {
+            ConfigError::Unreadable { path, cause } => ConfigError::NotAllowed {
+                origin: self.origin(key),
+                key: key.into(),
+                value: format!("\"{name}\""),
+                allowed: format!("a readable file ({}: {cause})", path.display()),
+            },
+            other => other,
+        })?;
+        self.table.insert(key.into(), Value::Table(table));
+        self.sources.push(Source { path, prefix: format!("{key}."), document });
+        Ok(())
+    }
+
+    /// Applies `key=value` as typed after `--set`; a value that is not TOML is taken as text.
+    ///
+    /// # Errors
+    /// If it is not of that form, or its key leads through something that is not a table.
+    pub fn set(&mut self, text: &str) -> Result<(), ConfigError> {
+        let refused = || ConfigError::Assignment { text: text.into() };
+        let (key, value) = text.split_once('=').ok_or_else(refused)?;
+        let (key, value) = (key.trim(), value.trim());
+        let value = toml::from_str::<Table>(&format!("value = {value}"))
+            .ok()
+            .and_then(|mut table| table.remove("value").filter(|_| table.is_empty()))
+            .unwrap_or_else(|| Value::String(value.into()));
+        let mut parts: Vec<&str> = key.split('.').collect();
+        let last = parts.pop().filter(|last| !last.is_empty()).ok_or_else(refused)?;
+        let mut table = &mut self.table;
+        for part in parts {
+            let entry = table.entry(part).or_insert_with(|| Value::Table(Table::new()));
+            table = entry.as_table_mut().ok_or_else(refused)?;
+        }
+        table.insert(last.into(), value);
+        self.sets.push((key.into(), text.into()));
+        Ok(())
+    }
+
+    /// Makes the file name under the dotted `key` absolute: one from a file is relative to that
+    /// file's folder, one from `--set` to the current folder.
+    pub fn resolve_path(&mut self, key: &str) {
+        let Some(Value::String(name)) = self.value(key) else { return };
+        let path = self.beside(key, Path::new(name));
+        let path = std::path::absolute(&path).unwrap_or(path);
+        let text = tidy(&path).to_string_lossy().into_owned();
+        let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
+        let mut table = Some(&mut self.table);
+        for part in tables.split('.').filter(|part| !part.is_empty()) {
+            table = table.and_then(|table| table.get_mut(part)?.as_table_mut());
+        }
+        if let Some(table) = table {
+            table.insert(last.into(), Value::String(text));
+        }
+    }
+
+    /// Fills in defaults and checks everything.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with its origin.
+    pub fn finish<T: DeserializeOwned + Checked>(self) -> Result<T, ConfigError> {
+        let config: T = serde_path_to_error::deserialize(self.table.clone())
+            .map_err(|error| self.explain(&error.path().to_string(), error.inner().message()))?;
+        let mut rules = Rules::default();
+        config.check(&mut rules);
+        match rules.violation {
+            None => Ok(config),
+            Some((key, value, allowed)) => {
+                Err(ConfigError::NotAllowed { origin: self.origin(&key), key, value, allowed })
+            }
+        }
+    }
+
+    fn explain(&self, path: &str, message: &str) -> ConfigError {
+        let mut names = message.split('`').skip(1).step_by(2).map(String::from);
+        if message.starts_with("unknown field") {
+            let unknown = names.next().unwrap_or_default();
+            let allowed: Vec<String> = names.collect();
+            let parent = path.rsplit_once('.').map_or("", |(parent, _)| parent);
+            let key = if parent.is_empty() { unknown } else { format!("{parent}.{unknown}") };
+            let nearest = nearest(key.rsplit('.').next().unwrap_or(&key), &allowed);
+            return ConfigError::UnknownKey { origin: self.origin(&key), key, nearest, allowed };
+        }
+        let key = if path == "." { names.next().unwrap_or_default() } else { path.into() };
+        let value = self.value(&key).map(|value| value.to_string());
+        ConfigError::Invalid { origin: self.origin(&key), key, value, message: message.into() }
+    }
+
+    fn value(&self, key: &str) -> Option<&Value> {
+        let mut parts = steps(key);
+        let mut value = self.table.get(parts.next()?)?;
+        for part in parts {
+            value = match part.parse::<usize>() {
+                Ok(index) => value.as_array()?.get(index)?,
+                Err(_) => value.as_table()?.get(part)?,
+            };
+        }
+        Some(value)
+    }
+
+    /// `name` as meant by whoever wrote it under `key`.
+    fn beside(&self, key: &str, name: &Path) -> PathBuf {
+        match self.origin(key) {
+            Origin::File { path, .. } => {
+                path.parent().map_or_else(|| name.into(), |folder| folder.join(name))
+            }
+            Origin::Set(_) => name.into(),
+        }
+    }
+
+    fn origin(&self, key: &str) -> Origin {
+        let under = |set: &str| {
+            key.strip_prefix(set)
+                .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+        };
+        if let Some((_, text)) = self.sets.iter().rev().find(|(set, _)| under(set)) {
+            return Origin::Set(text.clone());
+        }
+        let inner = self.sources.iter().rev().find_map(|source| {
+            key.strip_prefix(source.prefix.as_str()).map(|inner| (source, inner))
+        });
+        let Some((source, inner)) = inner else {
+            return Origin::File { path: PathBuf::new(), line: None };
+        };
+        Origin::File { path: source.path.clone(), line: line_of(&source.document, inner) }
+    }
+}
+
+/// The parts of a dotted key; an index in brackets is a part of its own.
+fn steps(key: &str) -> impl Iterator<Item = &str> {
+    key.split(['.', '[', ']']).filter(|part| !part.is_empty())
+}
+
+/// Line of the innermost part of `key` that stands in the document.
+fn line_of(document: &toml_edit::Document<String>, key: &str) -> Option<usize> {
+    let mut table: &dyn toml_edit::TableLike = document.as_table();
+    let mut found = None;
+    for part in steps(key) {
+        let Some((name, item)) = table.get_key_value(part) else { break };
+        found = name.span().or_else(|| item.span()).or(found);
+        match item.as_table_like() {
+            Some(inner) => table = inner,
+            None => break,
+        }
+    }
+    let before = document.raw().get(..found?.start)?;
+    Some(before.matches('\n').count() + 1)
+}
+
+fn parse(path: &Path) -> Result<(Table, toml_edit::Document<String>), ConfigError> {
+    let unreadable = |cause| ConfigError::Unreadable { path: path.into(), cause };
+    let text = std::fs::read_to_string(path).map_err(unreadable)?;
+    let document = toml_edit::Document::parse(text.clone()).map_err(|error| {
+        let line = error
+            .span()
+            .and_then(|span| text.get(..span.start))
+            .map(|before| before.matches('\n').count() + 1);
+        let origin = Origin::File { path: path.into(), line };
+        ConfigError::Syntax { origin, message: error.message().trim().replace('\n', ", ") }
+    })?;
+    let table = toml::from_str(&text).map_err(|error| ConfigError::Syntax {
+        origin: Origin::File { path: path.into(), line: None },
+        message: error.message().into(),
+    })?;
+    Ok((table, document))
+}
+
+/// The name most like `key`, if any is alike enough to be a slip of the hand.
+pub fn nearest(key: &str, names: &[String]) -> Option<String> {
+    names
+        .iter()
+        .map(|name| (strsim::jaro_winkler(key, name), name))
+        .filter(|(likeness, _)| *likeness > 0.7)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name.clone())
+}
+
+/// Removes `.` and `folder/..` without asking the file system.
+fn tidy(path: &Path) -> PathBuf {
+    use std::path::Component;
+    let mut tidy = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => {
+                tidy.pop();
+            }
+            part => tidy.push(part),
+        }
+    }
+    tidy
+}

@@ -1,0 +1,3 @@
+//! Floor 1: the finger.
+
+pub mod finger;

@@ -1,0 +1,117 @@
+//! How near the belief's mean is to the true surface.
+
+use crate::ground::gp::Posterior;
+use crate::world::{World, Zone};
+use serde::{Deserialize, Serialize};
+
+/// True heights on the test grid of an experiment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Truth {
+    /// The test places.
+    pub places: Vec<Vec<f64>>,
+    /// The true height at each, above the zone's datum; none where the zone looks past the
+    /// object.
+    pub heights_m: Vec<Option<f64>>,
+    /// Whether each lies in the outer tenth of the zone.
+    pub is_edge: Vec<bool>,
+}
+
+/// Agreement of the belief's mean with the truth on the grid.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Metrics {
+    /// Eq. 5 of Yi et al. 2016: Σ f·f̂ / sqrt(Σ f² · Σ f̂²). Not centred: a constant scores
+    /// high wherever the heights' mean outweighs their spread.
+    pub r: f64,
+    /// The same after subtracting each one's mean; 0 for a constant.
+    pub centred_r: f64,
+    /// Root mean square error.
+    pub rmse_m: f64,
+    /// Largest error.
+    pub max_error_m: f64,
+    /// Root mean square error in the outer tenth of the zone; none where no surface is there.
+    pub edge_rmse_m: Option<f64>,
+}
+
+impl Truth {
+    /// Reads the world's surface on a grid of `per_side` places along each side of the zone.
+    pub fn sample(world: &World, per_side: usize) -> Self {
+        let places = world.scene().zone.grid(per_side);
+        let heights_m = places.iter().map(|place| world.true_height_m(place)).collect();
+        Self::new(&world.scene().zone, places, heights_m)
+    }
+
+    /// From recorded heights.
+    pub fn new(zone: &Zone, places: Vec<Vec<f64>>, heights_m: Vec<Option<f64>>) -> Self {
+        let is_edge = places.iter().map(|place| zone.is_edge(place)).collect();
+        Self { places, heights_m, is_edge }
+    }
+
+    /// How many test places have a surface.
+    pub fn count(&self) -> usize {
+        self.heights_m.iter().flatten().count()
+    }
+
+    /// Compares a belief's mean with the truth wherever there is a surface.
+    pub fn compare(&self, belief: &Posterior) -> Metrics {
+        let mut sums = Sums::default();
+        let mut edge = Sums::default();
+        for ((place, height), &is_edge) in
+            self.places.iter().zip(&self.heights_m).zip(&self.is_edge)
+        {
+            let Some(truth) = *height else { continue };
+            let mean = belief.mean(place);
+            sums.add(truth, mean);
+            if is_edge {
+                edge.add(truth, mean);
+            }
+        }
+        sums.metrics((edge.count > 0.0).then(|| edge.rmse()))
+    }
+}
+
+#[derive(Default)]
+struct Sums {
+    count: f64,
+    f: f64,
+    g: f64,
+    ff: f64,
+    gg: f64,
+    fg: f64,
+    error2: f64,
+    max_error: f64,
+}
+
+impl Sums {
+    fn add(&mut self, f: f64, g: f64) {
+        self.count += 1.0;
+        self.f += f;
+        self.g += g;
+        self.ff += f * f;
+        self.gg += g * g;
+        self.fg += f * g;
+        self.error2 += (f - g) * (f - g);
+        self.max_error = self.max_error.max((f - g).abs());
+    }
+
+    fn rmse(&self) -> f64 {
+        (self.error2 / self.count).sqrt()
+    }
+
+    fn metrics(&self, edge_rmse_m: Option<f64>) -> Metrics {
+        let (mean_f, mean_g) = (self.f / self.count, self.g / self.count);
+        let covariance = self.fg - self.f * mean_g;
+        let spreads = (self.ff - self.f * mean_f) * (self.gg - self.g * mean_g);
+        Metrics {
+            r: ratio(self.fg, (self.ff * self.gg).sqrt()),
+            centred_r: ratio(covariance, spreads.max(0.0).sqrt()),
+            rmse_m: self.rmse(),
+            max_error_m: self.max_error,
+            edge_rmse_m,
+        }
+    }
+}
+
+/// A constant has no direction: its correlation counts as 0.
+fn ratio(numerator: f64, denominator: f64) -> f64 {
+    if denominator > 0.0 { numerator / denominator } else { 0.0 }
+}

@@ -1,0 +1,9 @@
+//! Floor 5: experiments, their trials, and the folder their results lie in.
+
+pub mod experiment;
+pub mod metrics;
+pub mod row;
+pub mod runner;
+pub mod store;
+pub mod summary;
+pub mod trial;

@@ -1,0 +1,48 @@
+//! One line of `trials.jsonl`: everything a trial did.
+
+use super::metrics::Metrics;
+use crate::conduct::planner::Stall;
+use crate::ground::gp::fit::Fit;
+use serde::{Deserialize, Serialize};
+
+/// One trial of one planner. Holds no wall time, so that it is the same bytes on every run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrialRow {
+    /// Which trial; trials of the same number share initial touches.
+    pub trial: u32,
+    /// Which planner.
+    pub planner: String,
+    /// Why it ended before its last touch, if it did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+    /// Its touches in order.
+    pub touches: Vec<TouchRow>,
+}
+
+/// One touch and the belief after it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TouchRow {
+    /// Where the finger was sent: (x) or (x, z) in `W`.
+    pub target: Vec<f64>,
+    /// The point of contact (x, y, z) in `W`; none for a miss.
+    pub contact: Option<[f64; 3]>,
+    /// Posterior standard deviation at the target when it was chosen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub planned_sd_m: Option<f64>,
+    /// Why the planner's own rule could not decide.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stall: Option<Stall>,
+    /// The fit after this touch; none before the last initial touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<Fit>,
+    /// Jitter the covariance needed, relative to its diagonal; left out when none.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub jitter: f64,
+    /// The belief after this touch against the truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub metrics: Option<Metrics>,
+}
+
+fn is_zero(jitter: &f64) -> bool {
+    *jitter == 0.0
+}

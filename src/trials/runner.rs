@@ -1,0 +1,103 @@
+//! Trials × planners on all cores.
+
+use super::experiment::Experiment;
+use super::metrics::Truth;
+use super::row::TrialRow;
+use super::store::{RunFolder, StoreError};
+use super::trial;
+use crate::conduct::planner;
+use crate::ground::optimize;
+use crate::world::World;
+use rayon::iter::{ParallelBridge, ParallelIterator};
+use std::collections::HashSet;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use thiserror::Error;
+
+/// Why an experiment could not be run.
+#[derive(Debug, Error)]
+pub enum RunError {
+    /// Its folder is unusable.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// This build lacks what it needs.
+    #[error("this build has no optimisers; build with the feature `{feature}` to run experiments")]
+    NotBuilt {
+        /// The missing feature.
+        feature: &'static str,
+    },
+    /// No surface at any test place.
+    #[error("no place of the zone has a surface along -y: nothing to explore")]
+    NoSurface,
+    /// Threads could not be started.
+    #[error("cannot start {threads} threads: {message}")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// What the system says.
+        message: String,
+    },
+}
+
+/// One piece of work.
+type Job = (u32, &'static planner::Entry);
+
+/// Runs what `done` lacks and adds each row to `folder` as it finishes; returns how many trials
+/// it ran.
+///
+/// `progress` is called after each trial, from any thread. When `stop` becomes true, running
+/// trials are finished and no others begun. `threads` 0 means all cores.
+///
+/// # Errors
+/// If a row cannot be stored, or the experiment cannot be run at all.
+pub fn run(
+    experiment: &Experiment,
+    world: &Arc<World>,
+    truth: &Truth,
+    (folder, done): (&mut RunFolder, &[TrialRow]),
+    threads: usize,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(&TrialRow) + Sync),
+) -> Result<usize, RunError> {
+    if !optimize::BUILT {
+        return Err(RunError::NotBuilt { feature: "nlopt" });
+    }
+    if truth.count() == 0 {
+        return Err(RunError::NoSurface);
+    }
+    let jobs = jobs(experiment, done);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| RunError::Threads { threads, message: error.to_string() })?;
+    let finished = Mutex::new((folder, 0));
+    // Handed out one by one, so that rows finish about in order and an interrupted run has
+    // whole pairs.
+    pool.install(|| {
+        jobs.into_iter().par_bridge().try_for_each(|(trial, planner)| {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            let row = trial::run(experiment, world, truth, planner, trial);
+            let mut finished = finished.lock().unwrap_or_else(PoisonError::into_inner);
+            finished.0.append(&row)?;
+            finished.1 += 1;
+            progress(&row);
+            Ok(())
+        })
+    })
+    .map_err(|error: StoreError| RunError::Store(error))?;
+    let (_, count) = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
+    Ok(count)
+}
+
+/// Every trial of every planner that `done` lacks, trial by trial.
+fn jobs(experiment: &Experiment, done: &[TrialRow]) -> Vec<Job> {
+    let done: HashSet<_> = done.iter().map(|row| (row.trial, row.planner.as_str())).collect();
+    let planners: Vec<_> =
+        experiment.planners.iter().filter_map(|name| planner::by_name(name)).collect();
+    (0..experiment.trials)
+        .flat_map(|trial| planners.iter().map(move |&planner| (trial, planner)))
+        .filter(|(trial, planner)| !done.contains(&(*trial, planner.name)))
+        .collect()
+}

@@ -1,0 +1,159 @@
+//! What there is: the object, the finger, the zone, and which body carries out a touch.
+
+use super::function::Function;
+use super::zone::Zone;
+use crate::ground::config::{Checked, ConfigError, Loader, Rules};
+use crate::ground::geometry::surfaces;
+use crate::things::finger::Finger;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A scene means one thing: everything that decides what a touch returns stands in it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// What carries out a touch.
+    pub body: Body,
+    /// The surface, if the body is `function`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub function: Option<Function>,
+    /// The rectangle explored.
+    pub zone: Zone,
+    /// The object, if the body is not `function`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object: Option<Object>,
+    /// The finger; ignored if the body is `function`.
+    #[serde(default)]
+    pub finger: Finger,
+}
+
+/// How faithfully a touch is carried out, cheapest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Body {
+    /// An analytic surface is read where it is asked.
+    Function,
+    /// The finger's hull is swept along −y to first contact on the exact mesh.
+    Cast,
+}
+
+/// A mesh and where it stands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Object {
+    /// Its file: .obj, .gltf or .glb, relative to the scene's file.
+    pub mesh: PathBuf,
+    /// Unit of the file's numbers.
+    #[serde(default)]
+    pub unit: Unit,
+    /// Factor on top of the unit.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Where the mesh's origin stands in `W`.
+    #[serde(default)]
+    pub position_m: [f64; 3],
+    /// Turns about the fixed axes x, then y, then z of `W`.
+    #[serde(default)]
+    pub rotation_deg: [f64; 3],
+    /// Name of the analytic surface the mesh was made from; metrics then compare with it
+    /// instead of with the mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<String>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// Unit of a mesh file's numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+pub enum Unit {
+    /// Metres, as glTF prescribes.
+    #[default]
+    #[serde(rename = "m")]
+    M,
+    /// Centimetres.
+    #[serde(rename = "cm")]
+    Cm,
+    /// Millimetres.
+    #[serde(rename = "mm")]
+    Mm,
+    /// Inches.
+    #[serde(rename = "in")]
+    In,
+}
+
+impl Unit {
+    /// Metres per unit.
+    pub fn metres(self) -> f64 {
+        match self {
+            Self::M => 1.0,
+            Self::Cm => 1e-2,
+            Self::Mm => 1e-3,
+            Self::In => 0.0254,
+        }
+    }
+}
+
+impl Object {
+    /// Pose of the mesh's frame in `W`.
+    pub fn x_wo(&self) -> Isometry3<f64> {
+        let [roll, pitch, yaw] = self.rotation_deg.map(f64::to_radians);
+        Isometry3::from_parts(
+            Translation3::from(self.position_m),
+            UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+        )
+    }
+}
+
+impl Checked for Object {
+    fn check(&self, rules: &mut Rules) {
+        rules.number("scale", self.scale, 1e-9..=1e9);
+        rules.numbers("position_m", &self.position_m, -1e3..=1e3);
+        rules.numbers("rotation_deg", &self.rotation_deg, -360.0..=360.0);
+        if let Some(truth) = &self.truth {
+            let known: Vec<&str> = surfaces::names().collect();
+            rules.one_of("truth", truth, &known);
+        }
+    }
+}
+
+impl Checked for Scene {
+    fn check(&self, rules: &mut Rules) {
+        rules.table("zone", &self.zone);
+        rules.table("finger", &self.finger);
+        match self.body {
+            Body::Function => {
+                rules.require("function", "(none)", self.function.is_some(), || {
+                    "\"toy\", because body = \"function\"".into()
+                });
+                let flat = self.zone.z_m.is_none();
+                rules.require("zone.z_m", "(given)", flat, || {
+                    "no z_m: the surface of body = \"function\" is a curve over x".into()
+                });
+            }
+            Body::Cast => {
+                rules.require("object", "(none)", self.object.is_some(), || {
+                    "a table with a mesh, because body = \"cast\"".into()
+                });
+            }
+        }
+        if let Some(object) = &self.object {
+            rules.table("object", object);
+        }
+    }
+}
+
+impl Scene {
+    /// Reads a scene file and applies `--set` assignments.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with its place.
+    pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
+        let mut loader = Loader::read(path)?;
+        sets.iter().try_for_each(|set| loader.set(set))?;
+        loader.resolve_path("object.mesh");
+        loader.finish()
+    }
+}
