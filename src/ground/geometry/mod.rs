@@ -4,6 +4,7 @@
 //! and becomes a [`Mesh`](mesh::Mesh) that can be trusted everywhere above. A
 //! [`MeshBvh`](bvh::MeshBvh) answers where a ray, a point or a moving capsule meets it.
 
+mod bounds;
 pub mod bvh;
 pub mod error;
 pub mod import;
