@@ -15,8 +15,8 @@ use super::mesh::Mesh;
 use super::primitives::{Line, nearest_on_triangle, normal};
 use super::sweep::{Capsule, Sweep};
 
-/// Boxes grow by this part of their distance from the mesh's centre plus the mesh's size: more
-/// than f32 and f64 rounding together can take away.
+/// Boxes grow by this part of the mesh's diagonal: more than rounding to f32, and the rounding of
+/// a query kilometres away, can take off them.
 const PADDING: f64 = 1e-6;
 
 /// Below this distance, in metres, the direction between two points says nothing.
