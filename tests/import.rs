@@ -244,6 +244,11 @@ fn gltf_without_a_default_scene_shows_all_roots() {
             json!([{"children": [1]}, {"mesh": 0}, {"mesh": 0, "translation": [3, 0, 0]}]);
     });
     is_tetrahedron(outcome, 2);
+    let cycle = changed(|document, _| {
+        document.as_object_mut().unwrap().remove("scene");
+        document["nodes"] = json!([{"children": [1], "mesh": 0}, {"children": [0]}]);
+    });
+    refused("a cycle and no root", cycle, "nodes must form a tree");
 }
 
 #[test]
