@@ -1,5 +1,6 @@
 //! Where a ray, a point or a moving capsule meets a mesh.
 
+use std::cell::Cell;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,12 +10,13 @@ use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use obvhs::faststack::FastStack;
 use obvhs::{BvhBuildParams, fast_stack};
 
+use super::bounds::{Box3, Slab, Swept, Tube, Wall};
 use super::mesh::Mesh;
 use super::primitives::{Line, nearest_on_triangle, normal};
 use super::sweep::{Capsule, Sweep};
 
-/// Boxes grow by this part of their distance from the mesh's centre plus the mesh's size: more
-/// than f32 and f64 rounding together can take away.
+/// Boxes grow by this part of the mesh's diagonal: more than rounding to f32, and the rounding of
+/// a query kilometres away, can take off them.
 const PADDING: f64 = 1e-6;
 
 /// Below this distance, in metres, the direction between two points says nothing.
@@ -171,23 +173,29 @@ impl MeshBvh {
         let slab = Slab::new(&(capsule.p0_w - self.centre), direction);
         let body = Swept::new(capsule);
         let sweep = Sweep::new(capsule, *direction);
+        let wall = Cell::new(Wall::default());
+        let tube = Tube::new(capsule, &self.centre, direction);
+        let lower = |node: &Box3| {
+            wall.get().travel_m(node).max(slab.enter_m(&body.grown(node))).max(tube.enter_m(node))
+        };
         let mut hit = None;
-        let lower = |node: &Box3| slab.enter_m(&body.grown(node));
         self.visit(max_travel_m.next_up(), lower, |triangle, limit_m| {
             let corners = self.corners(triangle);
-            if lower(&Box3::around(&corners, &self.centre)) >= limit_m {
+            let reach_m = wall.get().travel_to_m(&corners.map(|corner| corner - self.centre));
+            if reach_m >= limit_m || lower(&Box3::around(&corners, &self.centre)) >= limit_m {
                 return limit_m;
             }
             match sweep.travel_m(&corners).filter(|&travel_m| travel_m < limit_m) {
                 Some(travel_m) => {
-                    hit = Some((travel_m, triangle));
+                    let contact = self.contact(capsule, direction, travel_m, triangle);
+                    wall.set(Wall::new(capsule, &self.centre, direction, &contact.normal));
+                    hit = Some(contact);
                     travel_m
                 }
                 None => limit_m,
             }
         });
-        let (travel_m, triangle) = hit?;
-        Some(self.contact(capsule, direction, travel_m, triangle))
+        hit
     }
 
     /// The triangle nearest to the axis, if it is no farther than the radius.
@@ -287,78 +295,4 @@ fn depth(bvh: &Bvh2) -> usize {
         }
     }
     deepest
-}
-
-/// An axis-aligned box, in metres from the centre of the mesh.
-#[derive(Clone, Copy)]
-struct Box3 {
-    low: Vector3<f64>,
-    high: Vector3<f64>,
-}
-
-impl Box3 {
-    #[inline]
-    fn of(aabb: &Aabb) -> Self {
-        let f64s = |corner: [f32; 3]| Vector3::from(corner.map(f64::from));
-        Self { low: f64s(aabb.min.into()), high: f64s(aabb.max.into()) }
-    }
-
-    #[inline]
-    fn around(corners: &[Point3<f64>; 3], centre: &Vector3<f64>) -> Self {
-        let [a, b, c] = corners;
-        Self { low: a.inf(b).inf(c).coords - centre, high: a.sup(b).sup(c).coords - centre }
-    }
-
-    /// Squared distance to the box from `low` to `high`, in m².
-    #[inline]
-    fn distance_squared(&self, low: &Point3<f64>, high: &Point3<f64>) -> f64 {
-        let gap = (self.low - high.coords).sup(&(low.coords - self.high));
-        gap.sup(&Vector3::zeros()).norm_squared()
-    }
-}
-
-/// What a box grows by, so that a capsule against the box is its end p0 against the grown box.
-struct Swept {
-    low: Vector3<f64>,
-    high: Vector3<f64>,
-}
-
-impl Swept {
-    fn new(capsule: &Capsule) -> Self {
-        let draw = capsule.p0_w - capsule.p1_w;
-        let zero = Vector3::zeros();
-        Self {
-            low: draw.inf(&zero).add_scalar(-capsule.radius_m),
-            high: draw.sup(&zero).add_scalar(capsule.radius_m),
-        }
-    }
-
-    #[inline]
-    fn grown(&self, node: &Box3) -> Box3 {
-        Box3 { low: node.low + self.low, high: node.high + self.high }
-    }
-}
-
-/// A ray prepared for boxes.
-struct Slab {
-    origin: Vector3<f64>,
-    inverse: Vector3<f64>,
-}
-
-impl Slab {
-    fn new(origin: &Point3<f64>, direction: &UnitVector3<f64>) -> Self {
-        // Large but finite, so that an origin in the plane of a side gives 0, not NaN.
-        let inverse = direction.map(|x| if x.abs() < 1e-290 { 1e290 } else { 1.0 / x });
-        Self { origin: origin.coords, inverse }
-    }
-
-    /// Distance at which the ray enters a box, 0 from inside, infinite if it misses.
-    #[inline]
-    fn enter_m(&self, node: &Box3) -> f64 {
-        let low = (node.low - self.origin).component_mul(&self.inverse);
-        let high = (node.high - self.origin).component_mul(&self.inverse);
-        let (near, far) = (low.inf(&high), low.sup(&high));
-        let enter = near.x.max(near.y).max(near.z).max(0.0);
-        if enter <= far.x.min(far.y).min(far.z) { enter } else { f64::INFINITY }
-    }
 }

@@ -5,6 +5,7 @@
 //! [`MeshBvh`](bvh::MeshBvh) answers where a ray, a point or a moving capsule meets it. An
 //! [`Implicit`](implicit::Implicit) surface is given by a formula instead.
 
+mod bounds;
 pub mod bvh;
 pub mod error;
 pub mod implicit;

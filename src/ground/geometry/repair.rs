@@ -141,9 +141,8 @@ fn sift(
 fn is_degenerate(triangle: [u32; 3], vertices: &[Point3<f64>], rounding_m: f64) -> bool {
     let [a, b, c] = triangle.map(|vertex| vertices[vertex as usize]);
     let longest_m = (b - a).norm().max((c - b).norm()).max((a - c).norm());
-    let height_m = (b - a).cross(&(c - a)).norm() / longest_m;
-    // A zero longest side gives NaN, which is not greater than anything.
-    !(height_m > rounding_m.max(MIN_ASPECT * longest_m))
+    let twice_area_m2 = (b - a).cross(&(c - a)).norm();
+    twice_area_m2 <= longest_m * rounding_m.max(MIN_ASPECT * longest_m)
 }
 
 /// Drops unused vertices, keeping the order of the others.

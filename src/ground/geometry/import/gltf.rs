@@ -39,9 +39,9 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<RawMesh, MeshFault> {
     }
     let document = Document::load(path, root, chunk)?;
     let mut raw = RawMesh::default();
-    for (node, pose) in placed_nodes(&document.root)? {
+    for (node, x_sn) in placed_nodes(&document.root)? {
         if let Some(mesh) = find(&document.root.nodes, "node", node)?.mesh {
-            add_mesh(&document, node, mesh, &pose, &mut raw)?;
+            add_mesh(&document, node, mesh, &x_sn, &mut raw)?;
         }
     }
     Ok(raw)
@@ -63,8 +63,11 @@ fn parse(bytes: &[u8]) -> Result<(Root, Option<Vec<u8>>), GltfFault> {
     Ok((root, container.bin.map(Into::into)))
 }
 
-/// The nodes of the scene with their poses: a point p of node N is `pose` p in our frame.
-fn placed_nodes(root: &Root) -> Result<Vec<(Index<Node>, Matrix4<f64>)>, GltfFault> {
+/// A node N with its pose in our upright frame S: the point p of N is `x_sn` p in S.
+type Placed = (Index<Node>, Matrix4<f64>);
+
+/// The nodes of the scene, parents before children.
+fn placed_nodes(root: &Root) -> Result<Vec<Placed>, GltfFault> {
     let roots = match root.scene {
         Some(scene) => find(&root.scenes, "scene", scene)?.nodes.clone(),
         None => orphans(root)?,
@@ -77,10 +80,10 @@ fn placed_nodes(root: &Root) -> Result<Vec<(Index<Node>, Matrix4<f64>)>, GltfFau
         if std::mem::replace(&mut reached[index.value()], true) {
             return Err(GltfFault::NotATree { node: index.value() });
         }
-        let pose = parent * local_pose(index, node)?;
+        let x_sn = parent * local_pose(index, node)?;
         let children = node.children.iter().flatten().rev();
-        waiting.extend(children.map(|&child| (child, pose)));
-        placed.push((index, pose));
+        waiting.extend(children.map(|&child| (child, x_sn)));
+        placed.push((index, x_sn));
     }
     Ok(placed)
 }
@@ -94,7 +97,8 @@ fn orphans(root: &Root) -> Result<Vec<Index<Node>>, GltfFault> {
     }
     let orphans: Vec<_> = (0u32..)
         .zip(&is_child)
-        .filter_map(|(node, is_child)| (!is_child).then(|| Index::new(node)))
+        .filter(|&(_, is_child)| !is_child)
+        .map(|(node, _)| Index::new(node))
         .collect();
     if orphans.is_empty() && !is_child.is_empty() {
         return Err(GltfFault::NotATree { node: 0 });
@@ -102,6 +106,7 @@ fn orphans(root: &Root) -> Result<Vec<Index<Node>>, GltfFault> {
     Ok(orphans)
 }
 
+/// The pose of a node in its parent.
 fn local_pose(index: Index<Node>, node: &Node) -> Result<Matrix4<f64>, GltfFault> {
     if let Some(columns) = node.matrix {
         let matrix = Matrix4::from_column_slice(&columns.map(f64::from));
@@ -125,11 +130,11 @@ fn add_mesh(
     document: &Document,
     node: Index<Node>,
     index: Index<Mesh>,
-    pose: &Matrix4<f64>,
+    x_sn: &Matrix4<f64>,
     raw: &mut RawMesh,
 ) -> Result<(), MeshFault> {
     let mesh = find(&document.root.meshes, "mesh", index)?;
-    let mirrored = pose.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
+    let mirrored = x_sn.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
     for (number, primitive) in mesh.primitives.iter().enumerate() {
         let label = match &mesh.name {
             Some(name) => format!("primitive {number} of mesh {index} \"{name}\" at node {node}"),
@@ -146,7 +151,7 @@ fn add_mesh(
         let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
         let positions = document.positions(*positions.ok_or_else(|| incomplete("positions"))?)?;
         let corners = corners(document, primitive, positions.len())?;
-        let place = |p: [f32; 3]| pose.transform_point(&Point3::from(p.map(f64::from)));
+        let place = |p: [f32; 3]| x_sn.transform_point(&Point3::from(p.map(f64::from)));
         let triangles =
             assemble(mode, &corners).map(|[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] });
         raw.add_part(label, positions.into_iter().map(place), triangles)?;

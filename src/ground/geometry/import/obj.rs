@@ -1,5 +1,6 @@
-//! Wavefront OBJ. Polygons become triangle fans, and all objects and groups become one mesh;
-//! materials, normals, texture coordinates, colours, points and lines are ignored.
+//! Wavefront OBJ. Polygons become triangle fans, which is exact if they are flat and convex; all
+//! objects and groups become one mesh; materials, normals, texture coordinates, colours, points
+//! and lines are ignored.
 
 use std::path::Path;
 
