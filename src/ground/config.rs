@@ -282,12 +282,14 @@ impl Loader {
         if message.starts_with("unknown field") {
             let unknown = names.next().unwrap_or_default();
             let allowed: Vec<String> = names.collect();
-            let parent = path.rsplit_once('.').map_or("", |(parent, _)| parent);
-            let key = if parent.is_empty() { unknown } else { format!("{parent}.{unknown}") };
+            let key = join(path.rsplit_once('.').map_or(".", |(parent, _)| parent), &unknown);
             let nearest = nearest(key.rsplit('.').next().unwrap_or(&key), &allowed);
             return ConfigError::UnknownKey { origin: self.origin(&key), key, nearest, allowed };
         }
-        let key = if path == "." { names.next().unwrap_or_default() } else { path.into() };
+        let key = match names.next() {
+            Some(missing) if message.starts_with("missing field") => join(path, &missing),
+            _ => path.into(),
+        };
         let value = self.value(&key).map(|value| value.to_string());
         ConfigError::Invalid { origin: self.origin(&key), key, value, message: message.into() }
     }
@@ -332,6 +334,11 @@ impl Loader {
     }
 }
 
+/// `name` in the table at `path`, where `.` is the outermost.
+fn join(path: &str, name: &str) -> String {
+    if path == "." { name.into() } else { format!("{path}.{name}") }
+}
+
 /// The parts of a dotted key; an index in brackets is a part of its own.
 fn steps(key: &str) -> impl Iterator<Item = &str> {
     key.split(['.', '[', ']']).filter(|part| !part.is_empty())
@@ -371,14 +378,10 @@ fn parse(path: &Path) -> Result<(Table, toml_edit::Document<String>), ConfigErro
     Ok((table, document))
 }
 
-/// The name most like `key`, if any is alike enough to be a slip of the hand.
-pub fn nearest(key: &str, names: &[String]) -> Option<String> {
-    names
-        .iter()
-        .map(|name| (strsim::jaro_winkler(key, name), name))
-        .filter(|(likeness, _)| *likeness > 0.7)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, name)| name.clone())
+/// The name most like `key`, if it takes few enough slips of the hand to turn one into the other.
+fn nearest(key: &str, names: &[String]) -> Option<String> {
+    let slips = |name: &String| strsim::damerau_levenshtein(key, name);
+    names.iter().min_by_key(|name| slips(name)).filter(|name| slips(name) <= 2).cloned()
 }
 
 /// Removes `.` and `folder/..` without asking the file system.

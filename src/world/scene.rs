@@ -79,6 +79,9 @@ pub enum Unit {
     /// Millimetres.
     #[serde(rename = "mm")]
     Mm,
+    /// Micrometres.
+    #[serde(rename = "um")]
+    Um,
     /// Inches.
     #[serde(rename = "in")]
     In,
@@ -91,6 +94,7 @@ impl Unit {
             Self::M => 1.0,
             Self::Cm => 1e-2,
             Self::Mm => 1e-3,
+            Self::Um => 1e-6,
             Self::In => 0.0254,
         }
     }
@@ -109,6 +113,8 @@ impl Object {
 
 impl Checked for Object {
     fn check(&self, rules: &mut Rules) {
+        let named = !self.mesh.as_os_str().is_empty();
+        rules.require("mesh", "\"\"", named, || "the name of an .obj, .gltf or .glb file".into());
         rules.number("scale", self.scale, 1e-9..=1e9);
         rules.numbers("position_m", &self.position_m, -1e3..=1e3);
         rules.numbers("rotation_deg", &self.rotation_deg, -360.0..=360.0);

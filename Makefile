@@ -1,0 +1,61 @@
+# `make demo` and `make test` are all a fresh machine needs: they set up, build and run.
+# Needs cargo, a C compiler, python3 with pip, and make.
+
+DEPS := .deps
+MUJOCO := 3.17.0
+LIBRARY := $(DEPS)/lib/libmujoco.so
+CMAKE := $(DEPS)/bin/cmake
+# Which file of the package does not depend on the Python that fetches it.
+PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementation cp --abi cp312
+FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
+PALPATE := target/release/palpate
+
+.PHONY: demo test lint bench setup tools clean
+
+demo: setup
+	cargo build --release --locked
+	$(PALPATE) run experiments/demo.toml
+
+test: setup
+	cargo test --locked
+
+lint: setup
+	cargo fmt --check
+	cargo clippy --locked --all-targets -- -D warnings
+
+bench: setup
+	cargo bench --locked
+
+setup: tools $(LIBRARY) $(CMAKE)
+
+tools:
+	@command -v cargo >/dev/null || { echo "cargo is missing: install Rust with rustup" >&2; exit 1; }
+	@command -v cc >/dev/null || { echo "a C compiler is missing: install gcc (Debian: apt-get install gcc)" >&2; exit 1; }
+	@command -v python3 >/dev/null || { echo "python3 is missing (Debian: apt-get install python3 python3-pip)" >&2; exit 1; }
+
+# The physics engine's shared library, out of its Python package.
+$(LIBRARY): .cargo/mujoco.txt | tools
+	@python3 -m pip --version >/dev/null || { echo "pip is missing (Debian: apt-get install python3-pip)" >&2; exit 1; }
+	rm -rf $(DEPS)/mujoco && mkdir -p $(DEPS)/mujoco $(DEPS)/lib
+	$(FETCH) $(PLATFORM) -r .cargo/mujoco.txt -d $(DEPS)/mujoco
+	cd $(DEPS)/mujoco && python3 -m zipfile -e mujoco-*.whl .
+	cp $(DEPS)/mujoco/mujoco/libmujoco.so.$(MUJOCO) $(DEPS)/lib/
+	rm -rf $(DEPS)/mujoco
+	ln -sf libmujoco.so.$(MUJOCO) $@
+
+# cmake builds NLopt: the machine's own, or the one of the Python package.
+$(CMAKE): .cargo/cmake.txt | tools
+	mkdir -p $(DEPS)/bin
+	@if command -v cmake >/dev/null; then \
+		tool=$$(command -v cmake); \
+	else \
+		python3 -m pip --version >/dev/null || { echo "pip is missing (Debian: apt-get install python3-pip)" >&2; exit 1; }; \
+		rm -rf $(DEPS)/cmake && mkdir -p $(DEPS)/cmake && \
+		$(FETCH) --platform manylinux2014_x86_64 -r .cargo/cmake.txt -d $(DEPS)/cmake && \
+		cd $(DEPS)/cmake && python3 -m zipfile -e cmake-*.whl . && rm cmake-*.whl && \
+		chmod +x cmake/data/bin/* && cd - >/dev/null && tool='$$(dirname "$$0")/../cmake/cmake/data/bin/cmake'; \
+	fi; \
+	printf '#!/bin/sh\nexec "%s" "$$@"\n' "$$tool" > $@ && chmod +x $@
+
+clean:
+	rm -rf target $(DEPS) runs

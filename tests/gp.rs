@@ -1,0 +1,267 @@
+//! The Gaussian process against values to 80 digits, against laws, and against slow twins.
+
+use palpate::ground::gp::fit::SearchBox;
+use palpate::ground::gp::kernel::{Hyperparameters, SquaredExponential};
+use palpate::ground::gp::likelihood::Likelihood;
+use palpate::ground::gp::posterior::Scratch;
+use palpate::ground::gp::{Observations, Posterior};
+use proptest::prelude::*;
+use serde::Deserialize;
+
+static KERNEL: SquaredExponential = SquaredExponential;
+
+/// `data/gp_reference.json`: made with mpmath at 80 digits and rounded to the nearest float64;
+/// its `model` field says of what.
+#[derive(Deserialize)]
+struct Reference {
+    cases: Vec<Case>,
+}
+
+#[derive(Deserialize)]
+struct Case {
+    name: String,
+    x: Vec<Vec<f64>>,
+    y: Vec<f64>,
+    query: Vec<Vec<f64>>,
+    signal_sd: f64,
+    length_scales: Vec<f64>,
+    noise_sd: f64,
+    condition_number: f64,
+    mean: Vec<f64>,
+    variance: Vec<f64>,
+    log_marginal_likelihood: f64,
+    gradient_log_sf_l_sw: Vec<f64>,
+}
+
+impl Case {
+    fn hyperparameters(&self) -> Hyperparameters {
+        Hyperparameters {
+            signal_sd: self.signal_sd,
+            length_scales: self.length_scales.clone(),
+            noise_sd: self.noise_sd,
+        }
+    }
+
+    fn observations(&self) -> Observations {
+        observations(self.x.iter().map(Vec::as_slice).zip(self.y.iter().copied()))
+    }
+}
+
+fn reference() -> Vec<Case> {
+    let reference: Reference = serde_json::from_str(include_str!("data/gp_reference.json")).unwrap();
+    assert_eq!(reference.cases.len(), 9);
+    reference.cases
+}
+
+fn observations<'a>(pairs: impl IntoIterator<Item = (&'a [f64], f64)>) -> Observations {
+    let mut pairs = pairs.into_iter().peekable();
+    let mut all = Observations::new(pairs.peek().map_or(1, |(place, _)| place.len()));
+    pairs.for_each(|(place, height)| all.push(place, height));
+    all
+}
+
+fn posterior(at: Hyperparameters, observations: Observations) -> Posterior {
+    Posterior::new(&KERNEL, at, observations).unwrap()
+}
+
+/// What float64 can keep at a condition number: `share` of its rounding, or 1e-11.
+fn tolerance(share: f64, case: &Case) -> f64 {
+    (share * f64::EPSILON * case.condition_number).max(1e-11)
+}
+
+#[test]
+fn posterior_keeps_the_digits_the_condition_number_allows() {
+    for case in reference() {
+        let tolerance = tolerance(0.02, &case);
+        let ours = posterior(case.hyperparameters(), case.observations());
+        assert_eq!(ours.jitter(), 0.0, "{}", case.name);
+        let largest = case.y.iter().fold(0.0, |largest: f64, y| largest.max(y.abs()));
+        let mut scratch = Scratch::default();
+        for (i, place) in case.query.iter().enumerate() {
+            let mean_error = (ours.mean(place) - case.mean[i]).abs() / largest;
+            let variance_error = (ours.variance(place, &mut scratch) - case.variance[i]).abs();
+            assert!(mean_error <= tolerance, "{} mean {i}: {mean_error:e}", case.name);
+            let variance_error = variance_error / case.signal_sd.powi(2);
+            assert!(variance_error <= tolerance, "{} variance {i}: {variance_error:e}", case.name);
+        }
+    }
+}
+
+#[test]
+fn likelihood_and_gradient_keep_the_digits_the_condition_number_allows() {
+    for case in reference() {
+        let tolerance = tolerance(0.2, &case);
+        let observations = case.observations();
+        let mut gradient = vec![0.0; case.gradient_log_sf_l_sw.len()];
+        let value = Likelihood::new(&KERNEL, &observations)
+            .value_gradient(&case.hyperparameters(), &mut gradient)
+            .unwrap();
+        let error = (value / case.log_marginal_likelihood - 1.0).abs();
+        assert!(error <= tolerance, "{} likelihood: {error:e}", case.name);
+        let scale = case.gradient_log_sf_l_sw.iter().fold(0.0, |s: f64, g| s.max(g.abs()));
+        for (i, (ours, exact)) in gradient.iter().zip(&case.gradient_log_sf_l_sw).enumerate() {
+            let error = (ours - exact).abs() / scale;
+            assert!(error <= tolerance, "{} gradient {i}: {error:e}", case.name);
+        }
+    }
+}
+
+#[test]
+fn one_touch_gives_the_closed_form() {
+    let at = Hyperparameters { signal_sd: 2.0, length_scales: vec![0.5], noise_sd: 0.1 };
+    let ours = posterior(at, observations([(&[0.3][..], 1.5)]));
+    let mut scratch = Scratch::default();
+    for x in [-1.0, 0.3, 0.31, 4.0] {
+        let k = 4.0 * (-0.5 * ((x - 0.3) / 0.5f64).powi(2)).exp();
+        let k_yy = 4.0 + 0.01;
+        assert!((ours.mean(&[x]) - k * 1.5 / k_yy).abs() < 1e-14);
+        assert!((ours.variance(&[x], &mut scratch) - (4.0 - k * k / k_yy)).abs() < 1e-14);
+    }
+}
+
+#[test]
+fn coinciding_places_without_noise_need_jitter_and_say_so() {
+    let at = Hyperparameters { signal_sd: 1.0, length_scales: vec![1.0], noise_sd: 0.0 };
+    let twice = observations([(&[0.0][..], 1.0), (&[0.0][..], 1.0), (&[0.5][..], 0.0)]);
+    let ours = posterior(at, twice);
+    assert!(ours.jitter() > 0.0 && ours.jitter() < 1e-12, "{:e}", ours.jitter());
+    assert!((ours.mean(&[0.0]) - 1.0).abs() < 1e-6);
+}
+
+/// Between 1 and 25 distinct touches on [-1, 1]², with sane hyperparameters.
+fn any_belief() -> impl Strategy<Value = (Hyperparameters, Vec<([f64; 2], f64)>)> {
+    let touch = ([-1.0..1.0f64, -1.0..1.0f64], -1.0..1.0f64);
+    let at = (0.1..3.0f64, 0.1..2.0f64, 0.1..2.0f64, 1e-3..0.3f64).prop_map(|(s, a, b, ratio)| {
+        Hyperparameters { signal_sd: s, length_scales: vec![a, b], noise_sd: s * ratio }
+    });
+    (at, proptest::collection::vec(touch, 1..25))
+}
+
+fn all(touches: &[([f64; 2], f64)]) -> Observations {
+    observations(touches.iter().map(|(place, height)| (&place[..], *height)))
+}
+
+proptest! {
+    #[test]
+    fn gradients_are_central_differences((at, touches) in any_belief(), place in [-1.0..1.0f64, -1.0..1.0f64]) {
+        let touches = all(&touches);
+        let mut likelihood = Likelihood::new(&KERNEL, &touches);
+        let mut gradient = vec![0.0; 4];
+        likelihood.value_gradient(&at, &mut gradient).unwrap();
+        for i in 0..4 {
+            let mut moved = |by: f64| {
+                let mut at = at.clone();
+                match i {
+                    0 => at.signal_sd *= by.exp(),
+                    3 => at.noise_sd *= by.exp(),
+                    _ => at.length_scales[i - 1] *= by.exp(),
+                }
+                likelihood.value_gradient(&at, &mut []).unwrap()
+            };
+            let step = 1e-5;
+            let twin = (moved(step) - moved(-step)) / (2.0 * step);
+            prop_assert!((gradient[i] - twin).abs() < 1e-4 * (1.0 + twin.abs()), "{i}: {} {twin}", gradient[i]);
+        }
+        let ours = posterior(at, touches);
+        let mut scratch = Scratch::default();
+        let mut slope = [0.0; 2];
+        let value = ours.variance_gradient(&place, &mut slope, &mut scratch);
+        prop_assert!((value - ours.variance(&place, &mut scratch)).abs() < 1e-12);
+        for axis in 0..2 {
+            let mut moved = |by: f64| {
+                let mut place = place;
+                place[axis] += by;
+                ours.variance(&place, &mut scratch)
+            };
+            let twin = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+            prop_assert!((slope[axis] - twin).abs() < 1e-4 * (1.0 + twin.abs()));
+        }
+    }
+
+    #[test]
+    fn a_touch_never_raises_the_variance((at, touches) in any_belief(), place in [-1.5..1.5f64, -1.5..1.5f64]) {
+        let prior = at.signal_sd.powi(2);
+        let mut scratch = Scratch::default();
+        let mut last = prior;
+        for count in 1..=touches.len() {
+            let now = posterior(at.clone(), all(&touches[..count])).variance(&place, &mut scratch);
+            prop_assert!(now >= 0.0 && now <= last + 1e-10 * prior, "{count}: {now} after {last}");
+            last = now;
+        }
+    }
+
+    #[test]
+    fn the_order_of_touches_is_only_rounding((at, touches) in any_belief(), place in [-1.0..1.0f64, -1.0..1.0f64]) {
+        let mut backwards = touches.clone();
+        backwards.reverse();
+        let (a, b) = (posterior(at.clone(), all(&touches)), posterior(at, all(&backwards)));
+        let mut scratch = Scratch::default();
+        prop_assert!((a.mean(&place) - b.mean(&place)).abs() < 1e-8);
+        prop_assert!((a.variance(&place, &mut scratch) - b.variance(&place, &mut scratch)).abs() < 1e-8);
+    }
+}
+
+fn toy(x: f64) -> f64 {
+    if x.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x).sin() + 1.0 } else { 1.0 }
+}
+
+/// The slow twin of a fit: the profiled likelihood on a dense grid over the same box.
+fn best_on_grid(bounds: &SearchBox, touches: &Observations) -> f64 {
+    let mut likelihood = Likelihood::new(&KERNEL, touches);
+    let level = |(low, high): (f64, f64), i: usize, of: usize| {
+        low * (high / low).powf(i as f64 / (of - 1) as f64)
+    };
+    let mut best = f64::MIN;
+    for i in 0..240 {
+        let length = level(bounds.length_scales[0], i, 240);
+        for j in 0..30 {
+            let ratio = level(bounds.noise_ratio, j, 30);
+            if let Ok(profile) = likelihood.profile(&[length], ratio, bounds.signal_sd, None) {
+                best = best.max(profile.log_likelihood);
+            }
+        }
+    }
+    best
+}
+
+#[test]
+#[cfg(feature = "nlopt")]
+fn fits_of_the_toy_reach_the_global_maximum() {
+    let bounds = SearchBox {
+        length_scales: vec![(0.02, 4.0)],
+        noise_ratio: (1e-4, 1e-2),
+        signal_sd: (1e-3, 1e3),
+    };
+    let (mut fits, mut short) = (0, 0);
+    for trial in 0..12u64 {
+        // A golden-ratio walk: spread, irregular, and different in each trial.
+        let mut touches = Observations::new(1);
+        for i in 0..40u64 {
+            let x = -2.0 + 4.0 * ((trial as f64 * 0.377 + i as f64 * 0.618_033_988_75) % 1.0);
+            touches.push(&[x], toy(x));
+            if [3, 6, 10, 15, 20, 27, 40].contains(&touches.len()) {
+                let fit = bounds.fit(&KERNEL, &touches, None);
+                fits += 1;
+                short += usize::from(fit.log_likelihood < best_on_grid(&bounds, &touches) - 1e-3);
+            }
+        }
+    }
+    assert_eq!((fits, short), (84, 0));
+}
+
+#[test]
+#[cfg(feature = "nlopt")]
+fn a_fit_recovers_the_lengths_of_an_anisotropic_surface() {
+    let mut touches = Observations::new(2);
+    for i in 0..64u64 {
+        let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
+        touches.push(&place, (9.0 * place[0]).sin() + 0.3 * place[1]);
+    }
+    let bounds = SearchBox {
+        length_scales: vec![(0.005, 1.0); 2],
+        noise_ratio: (1e-4, 1e-2),
+        signal_sd: (1e-3, 1e3),
+    };
+    let fit = bounds.fit(&KERNEL, &touches, None).hyperparameters;
+    assert!(fit.length_scales[1] > 2.0 * fit.length_scales[0], "{fit:?}");
+}
