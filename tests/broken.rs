@@ -181,7 +181,11 @@ fn broken_scenes_are_refused_with_file_line_key_and_remedy() {
         ("[object]", "[object]\nrotation_deg = [0, 0, 1e9]", &["scene.toml:4", "rotation_deg[2]"]),
         ("[object]", "[object]\ntruth = \"brid\"", &["scene.toml:4", "brid", "container, bird"]),
         ("[object]", "[finger]\nradius_m = 0\n[object]", &["scene.toml:4", "finger.radius_m"]),
-        ("[object]", "[finger]\nradius = 1\n[object]", &["scene.toml:4", "did you mean `radius_m`"]),
+        (
+            "[object]",
+            "[finger]\nradius = 1\n[object]",
+            &["scene.toml:4", "did you mean `radius_m`"],
+        ),
         ("[object]", "[finger]\npitch_deg = 400\n[object]", &["scene.toml:4", "-90 to 90"]),
         ("[object]", "[finger]\nlength_m = nan\n[object]", &["scene.toml:4", "finger.length_m"]),
     ];
@@ -252,12 +256,17 @@ fn broken_command_lines_are_refused() {
 #[cfg(feature = "nlopt")]
 fn damaged_run_folders_are_refused_and_lose_nothing() {
     let folder = folder();
-    let run = |arguments: &[&str]| palpate(folder.path(), &[&["run", "small.toml"], arguments].concat());
+    let run =
+        |arguments: &[&str]| palpate(folder.path(), &[&["run", "small.toml"], arguments].concat());
     assert!(run(&[]).status.success());
     let trials = folder.path().join("runs/small/trials.jsonl");
     let rows = fs::read(&trials).unwrap();
     let mut accepted = Accepted::default();
-    accepted.refuse("another experiment", &run(&["--set", "seed=9"]), &["seed = 9", "--out", "--fresh"]);
+    accepted.refuse(
+        "another experiment",
+        &run(&["--set", "seed=9"]),
+        &["seed = 9", "--out", "--fresh"],
+    );
     assert_eq!(fs::read(&trials).unwrap(), rows);
     fs::write(&trials, [b"{\"trial\": \"x\"}\n", rows.as_slice()].concat()).unwrap();
     accepted.refuse("a line that is no row", &run(&[]), &["trials.jsonl:1"]);

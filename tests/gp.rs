@@ -48,7 +48,8 @@ impl Case {
 }
 
 fn reference() -> Vec<Case> {
-    let reference: Reference = serde_json::from_str(include_str!("data/gp_reference.json")).unwrap();
+    let reference: Reference =
+        serde_json::from_str(include_str!("data/gp_reference.json")).unwrap();
     assert_eq!(reference.cases.len(), 9);
     reference.cases
 }

@@ -1,0 +1,71 @@
+//! What values may be: written once, used for the check and for the message.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+
+/// A violated rule: the key, the value found, what is allowed.
+pub(super) type Violation = (String, String, String);
+
+/// Checks values against what is allowed and keeps the first violation.
+#[derive(Default)]
+pub struct Rules {
+    prefix: String,
+    pub(super) violation: Option<Violation>,
+}
+
+impl Rules {
+    /// `key` must be a number in `allowed`; NaN never is.
+    pub fn number(&mut self, key: &str, value: f64, allowed: RangeInclusive<f64>) {
+        let described = || format!("{} to {}", allowed.start(), allowed.end());
+        self.require(key, value, allowed.contains(&value), described);
+    }
+
+    /// Each entry of `key` must be a number in `allowed`.
+    pub fn numbers(&mut self, key: &str, values: &[f64], allowed: RangeInclusive<f64>) {
+        for (i, &value) in values.iter().enumerate() {
+            self.number(&format!("{key}[{i}]"), value, allowed.clone());
+        }
+    }
+
+    /// `key` must be an interval [smallest, largest] within `allowed`.
+    pub fn interval(&mut self, key: &str, [low, high]: [f64; 2], allowed: RangeInclusive<f64>) {
+        self.numbers(key, &[low, high], allowed);
+        self.require(key, format!("[{low}, {high}]"), low < high, || {
+            "the smaller number first, then a larger one".into()
+        });
+    }
+
+    /// `key` must be one of `names`.
+    pub fn one_of(&mut self, key: &str, value: &str, names: &[&str]) {
+        let known = names.contains(&value);
+        self.require(key, format!("\"{value}\""), known, || format!("one of {}", names.join(", ")));
+    }
+
+    /// `key` with `value` must hold `condition`; if it does not, `allowed` says what would.
+    pub fn require(
+        &mut self,
+        key: &str,
+        value: impl fmt::Display,
+        condition: bool,
+        allowed: impl FnOnce() -> String,
+    ) {
+        if !condition && self.violation.is_none() {
+            self.violation = Some((format!("{}{key}", self.prefix), value.to_string(), allowed()));
+        }
+    }
+
+    /// Checks the table under `key`.
+    pub fn table(&mut self, key: &str, checked: &impl Checked) {
+        let outer = self.prefix.len();
+        self.prefix += key;
+        self.prefix.push('.');
+        checked.check(self);
+        self.prefix.truncate(outer);
+    }
+}
+
+/// A configuration that knows what its values may be.
+pub trait Checked {
+    /// Applies every rule to `rules`.
+    fn check(&self, rules: &mut Rules);
+}
