@@ -65,6 +65,8 @@ pub enum StoreError {
 const RESOLVED: &str = "resolved.toml";
 const SURFACE: &str = "surface.csv";
 const TRIALS: &str = "trials.jsonl";
+/// Folder of a run's figures.
+pub const FIGURES: &str = "figures";
 /// Everything a run writes, which `--fresh` removes.
 const WRITTEN: &[&str] =
     &[TRIALS, RESOLVED, SURFACE, "manifest.json", "summary.csv", "report.html"];
@@ -134,21 +136,18 @@ impl RunFolder {
         Ok((Self { path: path.into(), trials }, rows))
     }
 
-    /// Removes what an earlier run wrote to `path`, and nothing else.
+    /// Removes what an earlier run wrote to `path`; a folder that is no run's is left alone.
     ///
     /// # Errors
     /// If a file cannot be removed.
     pub fn clear(path: &Path) -> Result<(), StoreError> {
-        for name in WRITTEN {
-            let file = path.join(name);
-            match fs::remove_file(&file) {
-                Err(cause) if cause.kind() != io::ErrorKind::NotFound => {
-                    return Err(StoreError::Io { path: file, cause });
-                }
-                _ => {}
-            }
+        if !path.join(RESOLVED).exists() {
+            return Ok(());
         }
-        Ok(())
+        for name in WRITTEN {
+            remove(&path.join(name), |file| fs::remove_file(file))?;
+        }
+        remove(&path.join(FIGURES), |folder| fs::remove_dir_all(folder))
     }
 
     /// Adds a row and hands it to the operating system, so that a later kill cannot lose it.
@@ -297,6 +296,15 @@ pub fn write_whole(path: &Path, text: &str) -> Result<(), StoreError> {
     let partial = PathBuf::from(partial);
     fs::write(&partial, text).map_err(io_error(&partial))?;
     fs::rename(&partial, path).map_err(io_error(path))
+}
+
+fn remove(path: &Path, how: impl Fn(&Path) -> io::Result<()>) -> Result<(), StoreError> {
+    match how(path) {
+        Err(cause) if cause.kind() != io::ErrorKind::NotFound => {
+            Err(StoreError::Io { path: path.into(), cause })
+        }
+        _ => Ok(()),
+    }
 }
 
 fn io_error(path: &Path) -> impl Fn(io::Error) -> StoreError {

@@ -1,14 +1,64 @@
-//! Tables, figures and the page of a run, drawn from its rows.
+//! Tables, figures and the page of a run, drawn from its rows: nothing is run again.
 
+pub mod axes;
+pub mod canvas;
+pub mod figures;
+pub mod findings;
+pub mod heat;
+pub mod page;
+pub mod png;
+pub mod relief;
+pub mod replay;
+pub mod style;
 pub mod table;
 
-use crate::trials::store::Run;
+pub use figures::{FIGURES, Figure};
+
+use crate::trials::store::{FIGURES as FIGURES_FOLDER, Run, write_whole};
+use anyhow::Context;
+use std::fs;
+use std::io;
 use std::path::Path;
 
-/// Draws everything into the run's folder.
+/// A figure of one run as it was drawn.
+pub struct Drawing {
+    /// Which figure.
+    pub figure: &'static Figure,
+    /// Its SVG.
+    pub svg: String,
+}
+
+/// Draws everything into the run's folder: `figures/*.svg`, the same as `.png`, `report.html`.
 ///
 /// # Errors
-/// If a file cannot be written.
-pub fn write(_run: &Run, _path: &Path) -> anyhow::Result<()> {
-    Ok(())
+/// If the rows do not belong to the experiment, or a file cannot be written.
+pub fn write(run: &Run, folder: &Path) -> anyhow::Result<()> {
+    let figures = folder.join(FIGURES_FOLDER);
+    fs::create_dir_all(&figures).with_context(|| figures.display().to_string())?;
+    let mut drawings = Vec::new();
+    for figure in FIGURES {
+        let path = figures.join(figure.name);
+        let svg = (figure.draw)(run).with_context(|| path.display().to_string())?;
+        write_figure(&path, svg.as_deref()).with_context(|| path.display().to_string())?;
+        drawings.extend(svg.map(|svg| Drawing { figure, svg }));
+    }
+    let manifest = fs::read_to_string(folder.join("manifest.json")).ok();
+    let html = page::html(run, &drawings, manifest.as_deref());
+    Ok(write_whole(&folder.join("report.html"), &html)?)
+}
+
+/// Writes a figure in both formats; one that does not apply leaves no older one behind.
+fn write_figure(path: &Path, svg: Option<&str>) -> anyhow::Result<()> {
+    let [vector, raster] = ["svg", "png"].map(|extension| path.with_extension(extension));
+    let Some(svg) = svg else {
+        for file in [vector, raster] {
+            match fs::remove_file(file) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error.into()),
+                _ => {}
+            }
+        }
+        return Ok(());
+    };
+    write_whole(&vector, svg)?;
+    Ok(fs::write(raster, png::render(svg)?)?)
 }

@@ -1,0 +1,156 @@
+//! The page of a run: one file that needs nothing beside it.
+
+use super::canvas::escape;
+use super::{Drawing, findings, table};
+use crate::trials::store::{self, Run};
+use crate::trials::summary;
+
+/// Files of a run folder that the page points to.
+const RAW: &[(&str, &str)] = &[
+    ("trials.jsonl", "a row per trial with every touch"),
+    ("summary.csv", "the curves as a table"),
+    ("surface.csv", "the true surface on the test grid"),
+    ("resolved.toml", "every setting; can be run again"),
+    ("manifest.json", "what ran it"),
+];
+
+/// Failures told one by one; more are only counted.
+const FAILURES_TOLD: usize = 10;
+
+/// The page as HTML. `manifest` is the text of the run's manifest, if there is one.
+pub fn html(run: &Run, drawings: &[Drawing], manifest: Option<&str>) -> String {
+    let name = escape(&run.experiment.name);
+    let question = match run.experiment.question.trim() {
+        "" => String::new(),
+        question => format!("<p class=\"question\">{}</p>\n", escape(question)),
+    };
+    let figures: String = drawings.iter().map(|drawing| figure(run, drawing)).collect();
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{name} – Palpate</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
+         <p class=\"kind\">Palpate run</p>\n<h1>{name}</h1>\n{question}\
+         <section>\n<h2>Found</h2>\n{}</section>\n{}{}{figures}{}{}</body>\n</html>\n",
+        paragraph(&findings::sentences(run)),
+        summary_table(run),
+        events(run),
+        settings(run, manifest),
+        raw_files(drawings),
+    )
+}
+
+fn paragraph(sentences: &[String]) -> String {
+    format!("<p>{}</p>\n", escape(&sentences.join(" ")))
+}
+
+fn summary_table(run: &Run) -> String {
+    let mut lines = String::new();
+    for count in run.experiment.drawn_touch_counts() {
+        for planner in &run.experiment.planners {
+            let curve = summary::curve(&run.experiment, &run.rows, planner);
+            if let Some(point) = curve.iter().find(|point| point.touches == count) {
+                let cells: String = table::cells(point)
+                    .iter()
+                    .map(|cell| format!("<td>{}</td>", escape(cell)))
+                    .collect();
+                lines += &format!("<tr>{cells}</tr>\n");
+            }
+        }
+    }
+    if lines.is_empty() {
+        return String::new();
+    }
+    let head: String = table::HEADER.iter().map(|head| format!("<th>{head}</th>")).collect();
+    format!(
+        "<section>\n<div class=\"wide\"><table>\n<thead><tr>{head}</tr></thead>\n\
+         <tbody>\n{lines}</tbody>\n</table></div>\n\
+         <p class=\"note\">± is one standard error of the mean over {} trials.</p>\n</section>\n",
+        run.experiment.trials
+    )
+}
+
+fn events(run: &Run) -> String {
+    let mut items: Vec<String> = run
+        .experiment
+        .planners
+        .iter()
+        .map(|planner| table::described(planner, &summary::events(&run.rows, planner)))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let failures = run.rows.iter().filter_map(|row| {
+        Some(format!("{}, trial {}: {}", row.planner, row.trial, row.failure.as_ref()?))
+    });
+    items.extend(failures.take(FAILURES_TOLD));
+    if items.is_empty() {
+        return String::new();
+    }
+    let items: String =
+        items.iter().map(|item| format!("<li>{}</li>\n", escape(item.trim_end()))).collect();
+    format!("<section>\n<h2>What else happened</h2>\n<ul>\n{items}</ul>\n</section>\n")
+}
+
+fn figure(run: &Run, drawing: &Drawing) -> String {
+    let name = drawing.figure.name;
+    format!(
+        "<figure id=\"{name}\">\n{}<figcaption>{} <span class=\"files\">\
+         <a href=\"figures/{name}.svg\">SVG</a> <a href=\"figures/{name}.png\">PNG</a></span>\
+         </figcaption>\n</figure>\n",
+        drawing.svg,
+        escape(&(drawing.figure.caption)(run)),
+    )
+}
+
+fn settings(run: &Run, manifest: Option<&str>) -> String {
+    let manifest = manifest.map_or(String::new(), |text| {
+        format!(
+            "<details>\n<summary>What ran it</summary>\n<pre>{}</pre>\n</details>\n",
+            escape(text)
+        )
+    });
+    format!(
+        "<section>\n<h2>Settings</h2>\n<details>\n<summary>Every setting, defaults written \
+         out</summary>\n<pre>{}</pre>\n</details>\n{manifest}</section>\n",
+        escape(&store::resolved(&run.experiment))
+    )
+}
+
+fn raw_files(drawings: &[Drawing]) -> String {
+    let mut items: String = RAW
+        .iter()
+        .map(|(file, what)| format!("<li><a href=\"{file}\">{file}</a>: {what}</li>\n"))
+        .collect();
+    if !drawings.is_empty() {
+        items += "<li><a href=\"figures/\">figures</a>: each figure as SVG and PNG</li>\n";
+    }
+    format!("<section>\n<h2>Files beside this page</h2>\n<ul>\n{items}</ul>\n</section>\n")
+}
+
+const STYLE: &str = "
+:root { color-scheme: light; }
+* { box-sizing: border-box; }
+body { max-width: 1120px; margin: 0 auto; padding: 2.2rem 1.4rem 4rem; color: #222;
+  background: #fff; font: 16px/1.55 system-ui, 'Segoe UI', Helvetica, Arial, sans-serif; }
+.kind { margin: 0; color: #666; font-size: .85rem; letter-spacing: .06em;
+  text-transform: uppercase; }
+h1 { margin: .1rem 0 .4rem; font-size: 2rem; line-height: 1.2; overflow-wrap: anywhere; }
+h2 { margin: 2.2rem 0 .5rem; font-size: 1.15rem; }
+p, li { max-width: 78ch; }
+p { margin: .4rem 0; }
+.question { color: #444; font-size: 1.15rem; }
+.note, figcaption { color: #555; font-size: .9rem; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; margin: 1.4rem 0 .4rem; font-size: .92rem;
+  font-variant-numeric: tabular-nums; white-space: nowrap; }
+th { font-weight: 600; border-bottom: 1.5px solid #222; }
+th, td { padding: .28rem .9rem; text-align: right; }
+th:nth-child(2), td:nth-child(2) { text-align: left; }
+tbody tr + tr td { border-top: 1px solid #eee; }
+figure { margin: 2.6rem 0 0; }
+figure > svg { display: block; width: 100%; height: auto; }
+figcaption { max-width: 92ch; margin-top: .5rem; }
+.files a { margin-left: .3rem; }
+a { color: #0b5394; }
+summary { cursor: pointer; }
+pre { overflow-x: auto; padding: .9rem 1rem; background: #f6f6f4; font-size: .85rem;
+  line-height: 1.4; }
+";

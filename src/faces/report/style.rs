@@ -1,0 +1,104 @@
+//! Colours, line widths and the font of all figures, in one place.
+//!
+//! The categorical colours are those of Okabe and Ito, which differ for every kind of colour
+//! vision; the colour map of deviations is viridis.
+
+/// Generic family, so that a browser takes its own and the PNG the embedded font.
+pub const FONT: &str = "sans-serif";
+/// Size of ordinary text in pixels.
+pub const TEXT_PX: f64 = 13.0;
+/// Size of tick labels and notes in pixels.
+pub const SMALL_PX: f64 = 11.5;
+/// Text and axes.
+pub const INK: &str = "#222222";
+/// Text that steps back.
+pub const FAINT_INK: &str = "#666666";
+/// Lines behind the data.
+pub const GRID: &str = "#e4e4e4";
+/// Paper.
+pub const PAPER: &str = "#ffffff";
+/// The true surface.
+pub const TRUTH: &str = "#009e73";
+/// Touches that every planner starts with.
+pub const INITIAL: &str = "#0046c8";
+/// Touches that a planner chose.
+pub const LATER: &str = "#d00000";
+/// The place where the belief is least sure.
+pub const MAXIMUM: &str = "#000000";
+
+/// Colours of planners that have none of their own.
+const SPARE: [&str; 3] = ["#e69f00", "#56b4e9", "#000000"];
+
+/// The colour of a planner; the paper's two keep theirs.
+pub fn planner(planners: &[String], name: &str) -> &'static str {
+    match name {
+        "active" => "#0072b2",
+        "random" => "#d55e00",
+        "sobol" => "#cc79a7",
+        _ => {
+            let index = planners.iter().position(|planner| planner == name).unwrap_or(0);
+            SPARE[index % SPARE.len()]
+        }
+    }
+}
+
+/// Attributes of a line.
+pub fn stroke(colour: &str, width_px: f64) -> String {
+    format!(
+        r#"fill="none" stroke="{colour}" stroke-width="{width_px}" stroke-linejoin="round" stroke-linecap="round""#
+    )
+}
+
+/// Attributes of a dashed line.
+pub fn dashed(colour: &str, width_px: f64, dash: &str) -> String {
+    format!(r#"fill="none" stroke="{colour}" stroke-width="{width_px}" stroke-dasharray="{dash}""#)
+}
+
+/// Attributes of an area.
+pub fn fill(colour: &str, opacity: f64) -> String {
+    format!(r#"fill="{colour}" fill-opacity="{opacity}""#)
+}
+
+/// Viridis, dark to light.
+const DEVIATION: [[f64; 3]; 9] = [
+    [68.0, 1.0, 84.0],
+    [71.0, 44.0, 122.0],
+    [59.0, 81.0, 139.0],
+    [44.0, 113.0, 142.0],
+    [33.0, 144.0, 141.0],
+    [39.0, 173.0, 129.0],
+    [92.0, 200.0, 99.0],
+    [170.0, 220.0, 50.0],
+    [253.0, 231.0, 37.0],
+];
+
+/// Slate to cream: pale enough for blue and red points to stand out under shading.
+const HEIGHT: [[f64; 3]; 5] = [
+    [104.0, 134.0, 158.0],
+    [150.0, 178.0, 184.0],
+    [196.0, 211.0, 196.0],
+    [230.0, 228.0, 193.0],
+    [252.0, 238.0, 190.0],
+];
+
+/// Colour of a standard deviation, 0..1 of the largest.
+pub fn deviation(fraction: f64) -> String {
+    hex(between(&DEVIATION, fraction))
+}
+
+/// Colour of a height, 0..1 of the range, under light of strength 0..1.
+pub fn height(fraction: f64, light: f64) -> String {
+    hex(between(&HEIGHT, fraction).map(|channel| channel * light))
+}
+
+fn between(map: &[[f64; 3]], fraction: f64) -> [f64; 3] {
+    let place = fraction.clamp(0.0, 1.0) * (map.len() - 1) as f64;
+    let below = (place as usize).min(map.len() - 2);
+    let t = place - below as f64;
+    std::array::from_fn(|i| map[below][i] + t * (map[below + 1][i] - map[below][i]))
+}
+
+fn hex(rgb: [f64; 3]) -> String {
+    let [red, green, blue] = rgb.map(|channel| channel.round() as u8);
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}

@@ -1,0 +1,102 @@
+//! One touch: the finger's hull against the exact mesh, and the analytic curve.
+
+use palpate::conduct::probe::{self, Contact, Touch};
+use palpate::ground::geometry::sweep::Capsule;
+use palpate::world::world::Shape;
+use palpate::world::{Scene, World};
+use proptest::prelude::*;
+use std::path::Path;
+use std::sync::{Arc, LazyLock};
+
+fn world(name: &str, sets: &[&str]) -> Arc<World> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
+    Arc::new(World::build(Scene::load(&path, &sets).unwrap()).unwrap())
+}
+
+fn contact(world: &Arc<World>, target: &[f64]) -> Contact {
+    match probe::open(world).touch(target).unwrap() {
+        Touch::Contact(contact) => contact,
+        Touch::Miss => panic!("{target:?} was missed"),
+    }
+}
+
+static CONTAINER: LazyLock<Arc<World>> = LazyLock::new(|| world("container.toml", &[]));
+static BIRD: LazyLock<Arc<World>> = LazyLock::new(|| world("bird.toml", &[]));
+
+#[test]
+fn the_toy_is_read_where_it_is_asked() {
+    let toy = world("toy.toml", &[]);
+    for (x, height_m) in [(-1.7, 1.0), (0.125, 2.0), (-0.125, 0.0), (1.0, 1.0)] {
+        let contact = contact(&toy, &[x]);
+        assert!((contact.p_wc.y - height_m).abs() < 1e-12, "{x}: {}", contact.p_wc.y);
+        assert_eq!(contact.p_wc.x, x);
+    }
+}
+
+/// The front is the ellipse y = 40 mm √(1 − (x / 60 mm)²), straight along z. A sphere of radius
+/// r touches it from outside where the outward normal leads to the sphere's centre, so the
+/// contact at ellipse point (x, y) belongs to the target x + r·n_x.
+#[test]
+fn the_container_is_touched_where_the_ellipses_normal_says() {
+    for t in [-0.7f64, -0.4, -0.1, 0.0, 0.3, 0.6] {
+        let (x, y) = (0.060 * t, 0.040 * (1.0 - t * t).sqrt());
+        let normal = nalgebra::Vector2::new(x / 0.060f64.powi(2), y / 0.040f64.powi(2)).normalize();
+        let contact = contact(&CONTAINER, &[x + 0.007 * normal.x, 0.5]);
+        assert!((contact.p_wc.x - x).abs() < 2e-4, "{t}: {} {x}", contact.p_wc.x);
+        assert!((contact.p_wc.y + 0.65 - y).abs() < 5e-5, "{t}: {}", contact.p_wc.y);
+        assert!((contact.normal_w.x - normal.x).abs() < 0.03, "{t}: {}", contact.normal_w);
+    }
+}
+
+#[test]
+fn a_thin_probe_finds_the_nose_that_the_finger_cannot_enter_beside() {
+    let thin = world("bird.toml", &["finger.radius_m=0.0005", "finger.length_m=0"]);
+    // Just beside the nose, whose radius is about 3 mm.
+    let beside = [0.005, 0.528];
+    let truth = BIRD.true_height_m(&beside).unwrap();
+    let datum = BIRD.scene().zone.datum_y_m;
+    assert!((contact(&thin, &beside).p_wc.y - datum - truth).abs() < 1e-3);
+    let finger = contact(&BIRD, &beside);
+    assert!(finger.p_wc.y - datum - truth > 5e-3, "the finger stays on the nose");
+}
+
+#[test]
+fn past_the_object_the_finger_meets_nothing() {
+    assert_eq!(probe::open(&BIRD).touch(&[0.3, 0.5]), Ok(Touch::Miss));
+    assert!(probe::open(&BIRD).touch(&[f64::NAN, 0.5]).is_err());
+    assert!(probe::open(&BIRD).touch(&[0.0, f64::INFINITY]).is_err());
+}
+
+proptest! {
+    /// The hull touches the mesh at the contact and enters it nowhere, and is never farther back
+    /// than the surface under its middle asks.
+    #[test]
+    fn the_finger_stops_at_the_surface(x in -0.04..0.04f64, z in 0.44..0.54f64, is_bird in any::<bool>()) {
+        let world = if is_bird { &*BIRD } else { &*CONTAINER };
+        let Shape::Mesh { bvh, .. } = world.shape() else { unreachable!() };
+        let finger = &world.scene().finger;
+        let hit = contact(world, &[x, z]);
+        prop_assert!(bvh.closest_point(&hit.p_wc).distance_m < 1e-9);
+        // The tip lies over the target at the height that puts the contact on the hull.
+        let direct = world.true_height_m(&[x, z]).unwrap() + world.scene().zone.datum_y_m;
+        let (mut near, mut far) = (direct - 1e-4, direct + 0.1);
+        let clearance = |tip_y: f64| {
+            let tip = nalgebra::Point3::new(x, tip_y, z);
+            let hull = Capsule { p0_w: tip, p1_w: tip + finger.axis_w(), radius_m: finger.radius_m };
+            let nearest = hull.nearest(&[hit.p_wc; 3]);
+            (nearest.0 - nearest.1).norm() - finger.radius_m
+        };
+        for _ in 0..60 {
+            let middle = 0.5 * (near + far);
+            if clearance(middle) > 0.0 { far = middle } else { near = middle }
+        }
+        prop_assert!(clearance(far).abs() < 1e-9, "the contact lies on the hull");
+        let steps = 15;
+        for i in 0..=steps {
+            let on_axis = nalgebra::Point3::new(x, far, z) + finger.axis_w() * (f64::from(i) / f64::from(steps));
+            let distance_m = bvh.closest_point(&on_axis).distance_m;
+            prop_assert!(distance_m > finger.radius_m - 1e-9, "{distance_m} at {i}");
+        }
+    }
+}

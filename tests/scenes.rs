@@ -1,0 +1,138 @@
+//! Scene and experiment files: all that ship load, all that are saved mean the same.
+
+use palpate::trials::experiment::Experiment;
+use palpate::trials::store;
+use palpate::world::{Scene, World, mjcf};
+use proptest::prelude::*;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn shipped(folder: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    paths.filter(|path| path.extension().is_some_and(|extension| extension == "toml")).collect()
+}
+
+#[test]
+fn every_shipped_scene_can_be_built() {
+    let scenes = shipped("scenes");
+    assert!(scenes.len() >= 3);
+    for path in scenes {
+        let world = World::build(Scene::load(&path, &[]).unwrap()).unwrap();
+        let middle = world.scene().zone.at(&[0.5, 0.5]);
+        assert!(world.true_height_m(&middle).is_some(), "{}", path.display());
+    }
+}
+
+#[test]
+fn every_shipped_experiment_loads_and_its_saved_form_means_the_same() {
+    let experiments = shipped("experiments");
+    assert!(experiments.len() >= 4);
+    let folder = TempDir::new().unwrap();
+    for path in experiments {
+        let experiment = Experiment::load(&path, &[]).unwrap();
+        let saved = folder.path().join("resolved.toml");
+        fs::write(&saved, store::resolved(&experiment)).unwrap();
+        assert_eq!(Experiment::load(&saved, &[]).unwrap(), experiment, "{}", path.display());
+    }
+}
+
+#[test]
+fn settings_are_overridden_in_order_and_reach_into_the_scene() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/bird.toml");
+    let sets =
+        ["trials=3", "trials=4", "scene.finger.radius_m = 0.001", "name=thin", "gp.noise=[1e-3,1]"];
+    let experiment = Experiment::load(&path, &sets.map(String::from)).unwrap();
+    assert_eq!((experiment.trials, experiment.name.as_str()), (4, "thin"));
+    assert_eq!(experiment.scene.finger.radius_m, 0.001);
+    assert_eq!(experiment.gp.noise, [1e-3, 1.0]);
+    let other = Experiment::load(&path, &["scene=scenes/container.toml".into()]).unwrap();
+    assert_eq!(other.scene.object.unwrap().truth.as_deref(), Some("container"));
+}
+
+/// The mesh is the truth to within its tested distance from the formula, wherever it is placed.
+#[test]
+fn the_mesh_and_its_formula_give_the_same_heights() {
+    for name in ["container", "bird"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
+        let analytic = World::build(Scene::load(&path, &[]).unwrap()).unwrap();
+        let mut scene = Scene::load(&path, &[]).unwrap();
+        scene.object.as_mut().unwrap().truth = None;
+        let mesh = World::build(scene).unwrap();
+        let mut errors: Vec<f64> = (analytic.scene().zone.grid(60).iter())
+            .map(|place| {
+                let heights = [&analytic, &mesh].map(|world| world.true_height_m(place).unwrap());
+                (heights[0] - heights[1]).abs()
+            })
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        // Along a slope of 60 degrees a distance of 0.05 mm is 0.1 mm of height; at the nose's
+        // side the height jumps.
+        assert!(errors[errors.len() * 99 / 100] < 1e-4, "{name}: {errors:?}");
+    }
+}
+
+#[test]
+fn the_generated_model_names_the_object_the_board_and_the_finger() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
+    let world = World::build(Scene::load(&path, &[]).unwrap()).unwrap();
+    let text = mjcf::scene(&world).unwrap();
+    for name in ["object", "board", "finger"] {
+        assert!(text.contains(&format!("name=\"{name}\"")), "{name}");
+    }
+    let toy = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/toy.toml");
+    let toy = World::build(Scene::load(&toy, &[]).unwrap()).unwrap();
+    assert!(mjcf::scene(&toy).is_none());
+}
+
+#[test]
+#[cfg(feature = "mujoco")]
+fn mujoco_compiles_the_generated_model() {
+    use palpate::bodies::mujoco;
+    assert_eq!(mujoco::version(), "3.17.0");
+    for (name, vertices) in [("container", 21_559), ("bird", 24_102)] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
+        let world = World::build(Scene::load(&path, &[]).unwrap()).unwrap();
+        let model = mujoco::compile(&mjcf::scene(&world).unwrap()).unwrap();
+        assert_eq!((model.ngeom(), model.nmeshvert()), (3, vertices), "{name}");
+    }
+    assert!(mujoco::compile("<mujoco><worldbody><geom/></worldbody></mujoco>").is_err());
+}
+
+const EXPERIMENT: &str = include_str!("../experiments/toy.toml");
+const SCENE: &str = include_str!("../scenes/bird.toml");
+
+fn damaged(text: &str, at: usize, bytes: &[u8], removed: usize) -> Vec<u8> {
+    let mut text = text.as_bytes().to_vec();
+    let at = at % text.len();
+    let end = (at + removed).min(text.len());
+    text.splice(at..end, bytes.iter().copied());
+    text
+}
+
+proptest! {
+    /// Whatever stands in a file, reading it ends in a value or an error.
+    #[test]
+    fn damaged_files_never_panic(
+        at in 0..10_000usize,
+        bytes in proptest::collection::vec(any::<u8>(), 0..8),
+        removed in 0..40usize,
+    ) {
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("damaged.toml");
+        fs::write(&path, damaged(EXPERIMENT, at, &bytes, removed)).unwrap();
+        let _ = Experiment::load(&path, &[]).map_err(|error| error.to_string());
+        fs::write(&path, damaged(SCENE, at, &bytes, removed)).unwrap();
+        let _ = Scene::load(&path, &[]).map_err(|error| error.to_string());
+    }
+
+    #[test]
+    fn any_assignment_ends_in_a_value_or_an_error(key in "[a-z_.]{0,20}", value in "\\PC{0,20}") {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/toy.toml");
+        for key in [key.as_str(), "scene", "scene.zone.x_m", "gp.noise", "touches", "report"] {
+            let set = format!("{key}={value}");
+            let _ = Experiment::load(&path, &[set]).map_err(|error| error.to_string());
+        }
+    }
+}
