@@ -21,6 +21,19 @@ const SAME_TARGET: f64 = 1e-6;
 /// of a covariance with the least noise allowed; chosen.
 const LOST_IN_ROUNDING: f64 = 1e-5;
 
+/// Hills that L-BFGS climbs, see [`MARGIN`].
+const HILLS: usize = 8;
+
+/// DIRECT searches the zone with this fraction of its sides added all around, and what it asks
+/// outside is answered from the nearest place inside: it divides from the middles of rectangles
+/// and would reach the zone's border, where the variance often peaks, only in the limit. On 78
+/// beliefs of the bird, 200 evaluations and one climb came within 2 % of the maximum on a dense
+/// grid 23 times; with the margin and eight climbs 73 times, and 500 evaluations 76 times.
+const MARGIN: f64 = 0.1;
+
+/// Places nearer than this, in units of the zone's sides, are taken for the same hill; chosen.
+const SAME_HILL: f64 = 0.04;
+
 struct Active {
     zone: Zone,
     settings: PlanningSettings,
@@ -29,22 +42,31 @@ struct Active {
 
 impl Planner for Active {
     fn plan(&mut self, belief: &Belief) -> Plan {
-        let (lower, upper): (Vec<f64>, Vec<f64>) =
-            self.zone.sides().map(|[low, high]| (low, high)).unzip();
-        let bounds = Bounds { lower: &lower, upper: &upper };
         let mut scratch = Scratch::default();
-        let found = optimize::direct(bounds, self.settings.direct_evaluations, |place| {
-            belief.explorable_variance(place, &mut [], &mut scratch)
+        let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
+        let (lower, upper) = self.corners(MARGIN);
+        let budget = self.settings.direct_evaluations;
+        optimize::direct(Bounds { lower: &lower, upper: &upper }, budget, |place| {
+            let place = self.clamped(place);
+            let variance = belief.explorable_variance(&place, &mut [], &mut scratch);
+            seen.push((variance, place));
+            variance
         });
-        let climbed = optimize::lbfgs(
-            bounds,
-            &found.x,
-            self.settings.lbfgs_evaluations,
-            |place, gradient| belief.explorable_variance(place, gradient, &mut scratch),
-        );
-        let best = if climbed.value >= found.value { climbed } else { found };
-        match self.stall(belief, &best.x, best.value) {
-            None => Plan { target: best.x, sd_m: Some(best.value.sqrt()), stall: None },
+        let (lower, upper) = self.corners(0.0);
+        let bounds = Bounds { lower: &lower, upper: &upper };
+        let mut best = (f64::MIN, Vec::new());
+        for start in self.hills(seen) {
+            let budget = self.settings.lbfgs_evaluations;
+            let top = optimize::lbfgs(bounds, &start, budget, |place, gradient| {
+                belief.explorable_variance(place, gradient, &mut scratch)
+            });
+            if top.value > best.0 {
+                best = (top.value, top.x);
+            }
+        }
+        let (variance, place) = best;
+        match self.stall(belief, &place, variance) {
+            None => Plan { target: place, sd_m: Some(variance.sqrt()), stall: None },
             stall => {
                 let target = uniform(&self.zone, &mut self.rng);
                 let variance = belief.explorable_variance(&target, &mut [], &mut scratch);
@@ -55,6 +77,35 @@ impl Planner for Active {
 }
 
 impl Active {
+    /// Lowest and highest corner of the zone, moved out by `margin` of its sides.
+    fn corners(&self, margin: f64) -> (Vec<f64>, Vec<f64>) {
+        let moved = |[low, high]: [f64; 2]| {
+            let step = margin * (high - low);
+            (low - step, high + step)
+        };
+        self.zone.sides().map(moved).unzip()
+    }
+
+    fn clamped(&self, place: &[f64]) -> Vec<f64> {
+        place.iter().zip(self.zone.sides()).map(|(at, [low, high])| at.clamp(low, high)).collect()
+    }
+
+    /// The best places seen that are not next to a better one.
+    fn hills(&self, mut seen: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
+        seen.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut hills: Vec<Vec<f64>> = Vec::new();
+        for (_, place) in seen {
+            let is_apart = |hill: &Vec<f64>| self.zone.distance(hill, &place) > SAME_HILL;
+            if hills.iter().all(is_apart) {
+                hills.push(place);
+            }
+            if hills.len() == HILLS {
+                break;
+            }
+        }
+        hills
+    }
+
     fn stall(&self, belief: &Belief, place: &[f64], variance: f64) -> Option<Stall> {
         let lost_sd = LOST_IN_ROUNDING * belief.surface()?.hyperparameters().signal_sd;
         let same = |target: &Vec<f64>| self.zone.distance(target, place) < SAME_TARGET;
