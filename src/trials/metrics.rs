@@ -115,3 +115,44 @@ impl Sums {
 fn ratio(numerator: f64, denominator: f64) -> f64 {
     if denominator > 0.0 { numerator / denominator } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn compare(pairs: &[(f64, f64)]) -> Metrics {
+        let mut sums = Sums::default();
+        pairs.iter().for_each(|&(truth, mean)| sums.add(truth, mean));
+        sums.metrics(None)
+    }
+
+    /// Half of the toy is 1 and the other half has mean 1 and mean square 1.5, so a constant
+    /// scores 1 / sqrt(1.25).
+    #[test]
+    fn a_constant_scores_high_in_r_and_zero_when_centred() {
+        let toy = |x: f64| {
+            if x.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x).sin() + 1.0 } else { 1.0 }
+        };
+        let places = (0..4000).map(|i| -2.0 + (f64::from(i) + 0.5) / 1000.0);
+        let constant: Vec<(f64, f64)> = places.map(|x| (toy(x), 0.7)).collect();
+        let metrics = compare(&constant);
+        assert!((metrics.r - 1.25f64.powf(-0.5)).abs() < 1e-6, "{}", metrics.r);
+        assert!(metrics.centred_r.abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_perfect_belief_scores_one_and_an_offset_shows_in_rmse_only_when_centred() {
+        let perfect = compare(&[(1.0, 1.0), (2.0, 2.0), (4.0, 4.0)]);
+        assert!((perfect.r - 1.0).abs() < 1e-15 && (perfect.centred_r - 1.0).abs() < 1e-15);
+        assert_eq!((perfect.rmse_m, perfect.max_error_m), (0.0, 0.0));
+        let offset = compare(&[(1.0, 2.0), (2.0, 3.0), (4.0, 5.0)]);
+        assert!((offset.centred_r - 1.0).abs() < 1e-14 && offset.r < 1.0);
+        assert!((offset.rmse_m - 1.0).abs() < 1e-15 && (offset.max_error_m - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_zero_belief_scores_zero_not_nan() {
+        let zero = compare(&[(1.0, 0.0), (2.0, 0.0)]);
+        assert_eq!((zero.r, zero.centred_r), (0.0, 0.0));
+    }
+}

@@ -119,3 +119,19 @@ pub fn events(rows: &[TrialRow], planner: &str) -> Events {
 pub fn of<'a>(rows: &'a [TrialRow], planner: &'a str) -> impl Iterator<Item = &'a TrialRow> {
     rows.iter().filter(move |row| row.planner == planner)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mean_error_and_median_are_the_textbooks() {
+        let (mean, error) = mean_and_error(&[1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(mean, 2.5);
+        assert!((error - (5.0f64 / 3.0 / 4.0).sqrt()).abs() < 1e-15);
+        assert_eq!(mean_and_error(&[3.0]), (3.0, 0.0));
+        assert_eq!(median(&[4.0, 1.0, 3.0]), Some(3.0));
+        assert_eq!(median(&[4.0, 1.0, 3.0, 2.0]), Some(2.5));
+        assert_eq!(median(&[]), None);
+    }
+}

@@ -26,7 +26,7 @@ pub enum Shape {
         /// The mesh with its search tree.
         bvh: MeshBvh,
         /// What its import found and repaired.
-        report: MeshReport,
+        report: Box<MeshReport>,
     },
 }
 
@@ -68,7 +68,10 @@ impl World {
             Body::Cast => {
                 let object = scene.object.as_ref().ok_or(WorldError::Missing { part: "object" })?;
                 let (mesh, report) = import(&object.mesh, object.unit.metres() * object.scale)?;
-                Shape::Mesh { bvh: MeshBvh::new(mesh.transformed(&object.x_wo())), report }
+                Shape::Mesh {
+                    bvh: MeshBvh::new(mesh.transformed(&object.x_wo())),
+                    report: report.into(),
+                }
             }
         };
         let world = Self { scene, shape };

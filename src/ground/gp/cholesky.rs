@@ -59,7 +59,7 @@ impl Factor {
         self.order = 0;
     }
 
-    /// Adds one row and column to A: `row` holds A[n][0..=n]. Costs n² operations.
+    /// Adds one row and column to A: `row` holds the entries n, 0 to n. Costs n² operations.
     ///
     /// # Errors
     /// If the enlarged matrix is not positive definite; the factor is then left as it was.
@@ -74,7 +74,8 @@ impl Factor {
         }
         let pivot = new[n] - dot(&new[..n], &new[..n]);
         // A pivot lost to cancellation is as good as none: its sign is noise.
-        if !(pivot > f64::EPSILON * row[n]) || !pivot.is_finite() {
+        let is_positive = pivot > f64::EPSILON * row[n] && pivot.is_finite();
+        if !is_positive {
             self.rows.truncate(begin);
             return Err(NotPositiveDefinite { index: n, value: pivot });
         }

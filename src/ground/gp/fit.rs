@@ -57,7 +57,7 @@ impl SearchBox {
         let mut best: Option<Fit> = None;
         if !observations.is_empty() {
             let mut starts = self.hills(&mut likelihood, &lower, &upper);
-            starts.extend(last.map(|last| log_parameters(last)));
+            starts.extend(last.map(log_parameters));
             for start in starts {
                 let bounds = optimize::Bounds { lower: &lower, upper: &upper };
                 let top = optimize::lbfgs(bounds, &start, CLIMB_BUDGET, |x, gradient| {

@@ -58,7 +58,7 @@ impl Observations {
 /// Largest jitter tried, relative to the diagonal; beyond it the data contradict the kernel.
 const JITTER_MAX: f64 = 1e-4;
 
-/// No jitter up to [`JITTER_MAX`] made the covariance positive definite.
+/// No jitter, however large, made the covariance positive definite.
 #[derive(Clone, Debug, Error)]
 #[error("covariance of {count} touches stays indefinite with jitter {jitter:e}: {cause}")]
 pub struct Indefinite {

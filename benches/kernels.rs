@@ -1,0 +1,72 @@
+//! What one trial spends its time on, piece by piece.
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use nalgebra::{Point3, UnitVector3, Vector3};
+use palpate::conduct::probe;
+use palpate::ground::gp::fit::SearchBox;
+use palpate::ground::gp::kernel::{Hyperparameters, SquaredExponential};
+use palpate::ground::gp::posterior::Scratch;
+use palpate::ground::gp::{Observations, Posterior};
+use palpate::world::world::Shape;
+use palpate::world::{Scene, World};
+use std::hint::black_box;
+use std::path::Path;
+use std::sync::Arc;
+
+static KERNEL: SquaredExponential = SquaredExponential;
+
+/// `count` touches of a smooth surface over a unit square, spread by a low-discrepancy walk.
+fn touches(count: usize) -> Observations {
+    let mut touches = Observations::new(2);
+    for i in 0..count {
+        let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
+        touches.push(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
+    }
+    touches
+}
+
+fn hyperparameters() -> Hyperparameters {
+    Hyperparameters { signal_sd: 1.0, length_scales: vec![0.2, 0.4], noise_sd: 1e-3 }
+}
+
+fn gaussian_process(c: &mut Criterion) {
+    let bounds = SearchBox {
+        length_scales: vec![(0.005, 1.0); 2],
+        noise_ratio: (1e-4, 1e-2),
+        signal_sd: (1e-3, 1e3),
+    };
+    let mut group = c.benchmark_group("gp");
+    for count in [20, 50, 100] {
+        let touches = touches(count);
+        group.bench_with_input(BenchmarkId::new("cold fit", count), &touches, |b, touches| {
+            b.iter(|| bounds.fit(&KERNEL, black_box(touches), None));
+        });
+        let Ok(posterior) = Posterior::new(&KERNEL, hyperparameters(), touches) else { continue };
+        let mut scratch = Scratch::default();
+        group.bench_with_input(BenchmarkId::new("variance", count), &posterior, |b, posterior| {
+            b.iter(|| posterior.variance(black_box(&[0.31, 0.47]), &mut scratch));
+        });
+    }
+    group.finish();
+}
+
+fn contact(c: &mut Criterion) {
+    let mut group = c.benchmark_group("bird, 48 200 triangles");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
+    let Some(world) = Scene::load(&path, &[]).ok().and_then(|scene| World::build(scene).ok())
+    else {
+        return;
+    };
+    let world = Arc::new(world);
+    let mut probe = probe::open(&world);
+    group.bench_function("touch", |b| b.iter(|| probe.touch(black_box(&[0.013, 0.487]))));
+    if let Shape::Mesh { bvh, .. } = world.shape() {
+        let origin = Point3::new(0.013, -0.5, 0.487);
+        let direction = UnitVector3::new_unchecked(-Vector3::y());
+        group.bench_function("ray", |b| b.iter(|| bvh.ray(black_box(&origin), &direction, 1.0)));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, gaussian_process, contact);
+criterion_main!(benches);

@@ -1,0 +1,72 @@
+//! Fits reach the global maximum of the likelihood.
+#![cfg(feature = "nlopt")]
+
+use palpate::ground::gp::Observations;
+use palpate::ground::gp::fit::SearchBox;
+use palpate::ground::gp::kernel::SquaredExponential;
+use palpate::ground::gp::likelihood::Likelihood;
+
+static KERNEL: SquaredExponential = SquaredExponential;
+
+fn toy(x: f64) -> f64 {
+    if x.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x).sin() + 1.0 } else { 1.0 }
+}
+
+/// The slow twin of a fit: the profiled likelihood on a dense grid over the same box.
+fn best_on_grid(bounds: &SearchBox, touches: &Observations) -> f64 {
+    let mut likelihood = Likelihood::new(&KERNEL, touches);
+    let level = |(low, high): (f64, f64), i: usize, of: usize| {
+        low * (high / low).powf(i as f64 / (of - 1) as f64)
+    };
+    let mut best = f64::MIN;
+    for i in 0..240 {
+        let length = level(bounds.length_scales[0], i, 240);
+        for j in 0..30 {
+            let ratio = level(bounds.noise_ratio, j, 30);
+            if let Ok(profile) = likelihood.profile(&[length], ratio, bounds.signal_sd, None) {
+                best = best.max(profile.log_likelihood);
+            }
+        }
+    }
+    best
+}
+
+#[test]
+fn fits_of_the_toy_reach_the_global_maximum() {
+    let bounds = SearchBox {
+        length_scales: vec![(0.02, 4.0)],
+        noise_ratio: (1e-4, 1e-2),
+        signal_sd: (1e-3, 1e3),
+    };
+    let (mut fits, mut short) = (0, 0);
+    for trial in 0..12u64 {
+        // A golden-ratio walk: spread, irregular, and different in each trial.
+        let mut touches = Observations::new(1);
+        for i in 0..40u64 {
+            let x = -2.0 + 4.0 * ((trial as f64 * 0.377 + i as f64 * 0.618_033_988_75) % 1.0);
+            touches.push(&[x], toy(x));
+            if [3, 6, 10, 15, 20, 27, 40].contains(&touches.len()) {
+                let fit = bounds.fit(&KERNEL, &touches, None);
+                fits += 1;
+                short += usize::from(fit.log_likelihood < best_on_grid(&bounds, &touches) - 1e-3);
+            }
+        }
+    }
+    assert_eq!((fits, short), (84, 0));
+}
+
+#[test]
+fn a_fit_recovers_the_lengths_of_an_anisotropic_surface() {
+    let mut touches = Observations::new(2);
+    for i in 0..64u64 {
+        let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
+        touches.push(&place, (9.0 * place[0]).sin() + 0.3 * place[1]);
+    }
+    let bounds = SearchBox {
+        length_scales: vec![(0.005, 1.0); 2],
+        noise_ratio: (1e-4, 1e-2),
+        signal_sd: (1e-3, 1e3),
+    };
+    let fit = bounds.fit(&KERNEL, &touches, None).hyperparameters;
+    assert!(fit.length_scales[1] > 2.0 * fit.length_scales[0], "{fit:?}");
+}
