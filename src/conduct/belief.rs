@@ -2,9 +2,11 @@
 
 use super::probe::Touch;
 use crate::ground::config::{Checked, Rules};
+use crate::ground::gp::Observations;
+use crate::ground::gp::covariance::Indefinite;
 use crate::ground::gp::fit::{Fit, SearchBox};
 use crate::ground::gp::kernel::{self, Hyperparameters, Kernel};
-use crate::ground::gp::posterior::{Indefinite, Observations, Posterior, Scratch};
+use crate::ground::gp::posterior::{Posterior, Scratch};
 use crate::world::Zone;
 use serde::{Deserialize, Serialize};
 

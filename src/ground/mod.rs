@@ -5,3 +5,4 @@ pub mod geometry;
 pub mod gp;
 pub mod optimize;
 pub mod seed;
+pub mod simd;

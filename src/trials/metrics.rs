@@ -1,6 +1,7 @@
 //! How near the belief's mean is to the true surface.
 
 use crate::ground::gp::Posterior;
+use crate::ground::gp::posterior::Scratch;
 use crate::world::{World, Zone};
 use serde::{Deserialize, Serialize};
 
@@ -55,11 +56,12 @@ impl Truth {
     pub fn compare(&self, belief: &Posterior) -> Metrics {
         let mut sums = Sums::default();
         let mut edge = Sums::default();
+        let mut scratch = Scratch::default();
         for ((place, height), &is_edge) in
             self.places.iter().zip(&self.heights_m).zip(&self.is_edge)
         {
             let Some(truth) = *height else { continue };
-            let mean = belief.mean(place);
+            let mean = belief.mean(place, &mut scratch);
             sums.add(truth, mean);
             if is_edge {
                 edge.add(truth, mean);

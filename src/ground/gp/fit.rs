@@ -2,7 +2,7 @@
 
 use super::kernel::{Hyperparameters, Kernel};
 use super::likelihood::Likelihood;
-use super::posterior::Observations;
+use super::observations::Observations;
 use crate::ground::optimize::{self, Stop};
 use serde::{Deserialize, Serialize};
 

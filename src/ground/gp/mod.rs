@@ -1,14 +1,18 @@
 //! Gaussian-process regression with an exact posterior (Rasmussen & Williams 2006, ch. 2 and 5).
 //!
-//! `kernel` says how alike two places are, `cholesky` factors the covariance of what was
-//! observed, `posterior` predicts (Eq. 3 of Yi et al. 2016), `likelihood` scores
+//! `kernel` says how alike two places are, `covariance` factors that of what was observed (whole
+//! in `dense`, row by row in `cholesky`), `posterior` predicts (Eq. 3 of Yi et al. 2016), `likelihood` scores
 //! hyperparameters and `fit` finds the best ones.
 
 pub mod cholesky;
+pub mod covariance;
+pub mod dense;
 pub mod fit;
 pub mod kernel;
 pub mod likelihood;
+pub mod observations;
 pub mod posterior;
 
 pub use kernel::{Hyperparameters, Kernel};
-pub use posterior::{Observations, Posterior};
+pub use observations::Observations;
+pub use posterior::Posterior;

@@ -1,110 +1,16 @@
 //! The exact posterior of a zero-mean Gaussian process, Eq. 3 of Yi et al. 2016.
 
 use super::cholesky::{Factor, NotPositiveDefinite};
-use super::kernel::{Hyperparameters, Kernel, scaled_distance2};
-use thiserror::Error;
-
-/// Places and the heights observed there.
-#[derive(Clone, Debug, Default)]
-pub struct Observations {
-    dimension: usize,
-    inputs: Vec<f64>,
-    heights: Vec<f64>,
-}
-
-impl Observations {
-    /// None yet, with `dimension` inputs each.
-    pub fn new(dimension: usize) -> Self {
-        Self { dimension, ..Self::default() }
-    }
-
-    /// Adds one; `place` has `dimension` coordinates.
-    pub fn push(&mut self, place: &[f64], height: f64) {
-        self.inputs.extend_from_slice(&place[..self.dimension]);
-        self.heights.push(height);
-    }
-
-    /// Number of inputs.
-    pub fn dimension(&self) -> usize {
-        self.dimension
-    }
-
-    /// How many there are.
-    pub fn len(&self) -> usize {
-        self.heights.len()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.heights.is_empty()
-    }
-
-    /// Where observation `i` was made.
-    pub fn place(&self, i: usize) -> &[f64] {
-        &self.inputs[i * self.dimension..(i + 1) * self.dimension]
-    }
-
-    /// All places in order.
-    pub fn places(&self) -> impl Iterator<Item = &[f64]> {
-        self.inputs.chunks_exact(self.dimension.max(1))
-    }
-
-    /// All heights in order.
-    pub fn heights(&self) -> &[f64] {
-        &self.heights
-    }
-}
-
-/// Largest jitter tried, relative to the diagonal; beyond it the data contradict the kernel.
-const JITTER_MAX: f64 = 1e-4;
-
-/// No jitter, however large, made the covariance positive definite.
-#[derive(Clone, Debug, Error)]
-#[error("covariance of {count} touches stays indefinite with jitter {jitter:e}: {cause}")]
-pub struct Indefinite {
-    /// Number of observations.
-    pub count: usize,
-    /// Largest jitter tried, relative to the diagonal.
-    pub jitter: f64,
-    /// What the factorisation met.
-    pub cause: NotPositiveDefinite,
-}
-
-/// Factors C + (noise² + jitter)·I with the smallest jitter of 0, 1e-15, 1e-14, … that works.
-///
-/// `covariance(i, row)` writes C[i][0..=i], whose diagonal is `diagonal`; `noise2` and the
-/// returned jitter are in units of that diagonal.
-///
-/// # Errors
-/// [`Indefinite`] if even the largest jitter does not help.
-pub(super) fn factor_with_jitter(
-    factor: &mut Factor,
-    count: usize,
-    noise2: f64,
-    row: &mut Vec<f64>,
-    mut covariance: impl FnMut(usize, &mut [f64]),
-) -> Result<f64, Indefinite> {
-    let mut jitter = 0.0;
-    loop {
-        factor.clear();
-        let outcome = (0..count).try_for_each(|i| {
-            row.resize(i + 1, 0.0);
-            covariance(i, row);
-            row[i] += noise2 + jitter;
-            factor.append(row)
-        });
-        match outcome {
-            Ok(()) => return Ok(jitter),
-            Err(cause) if jitter >= JITTER_MAX => return Err(Indefinite { count, jitter, cause }),
-            Err(_) => jitter = if jitter == 0.0 { 1e-15 } else { jitter * 10.0 },
-        }
-    }
-}
+use super::covariance::{self, Indefinite};
+use super::dense::Dense;
+use super::kernel::{Hyperparameters, Kernel};
+use super::observations::Observations;
+use crate::ground::simd::{dot, widest};
 
 /// Buffers of a query, so that asking allocates nothing.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
-    slope: Vec<f64>,
+    slopes: Vec<f64>,
     solved: Vec<f64>,
 }
 
@@ -129,21 +35,45 @@ impl Posterior {
         hyperparameters: Hyperparameters,
         observations: Observations,
     ) -> Result<Self, Indefinite> {
-        let mut factor = Factor::default();
-        let signal2 = hyperparameters.signal_sd.powi(2);
-        let noise2 = (hyperparameters.noise_sd / hyperparameters.signal_sd).powi(2);
-        let jitter = factor_with_jitter(
-            &mut factor,
-            observations.len(),
-            noise2,
-            &mut Vec::new(),
-            |i, row| correlations(kernel, &hyperparameters, &observations, i, row),
-        )?;
-        let mut weights = observations.heights().to_vec();
-        factor.solve_lower(&mut weights);
-        factor.solve_upper(&mut weights);
-        weights.iter_mut().for_each(|weight| *weight /= signal2);
-        Ok(Self { kernel, hyperparameters, observations, factor, weights, jitter })
+        let mut dense = Dense::new(observations.len());
+        let noise_ratio = hyperparameters.noise_sd / hyperparameters.signal_sd;
+        let lengths = &hyperparameters.length_scales;
+        let jitter = covariance::factor(&mut dense, kernel, &observations, lengths, noise_ratio)?;
+        let factor = Factor::from(&dense);
+        let weights = Vec::new();
+        let mut new = Self { kernel, hyperparameters, observations, factor, weights, jitter };
+        new.weigh();
+        Ok(new)
+    }
+
+    /// Takes in one more observation without factoring again: n² operations. The
+    /// hyperparameters stay.
+    ///
+    /// # Errors
+    /// If the enlarged covariance is not positive definite; nothing is taken in then, and
+    /// [`new`](Self::new) would find the jitter it needs.
+    pub fn add(&mut self, place: &[f64], height: f64) -> Result<(), NotPositiveDefinite> {
+        let mut row = vec![0.0; self.observations.len()];
+        self.correlations(place, &mut row);
+        let noise_ratio = self.hyperparameters.noise_sd / self.hyperparameters.signal_sd;
+        row.push(1.0 + noise_ratio * noise_ratio + self.jitter);
+        self.factor.append(&row)?;
+        self.observations.push(place, height);
+        self.weigh();
+        Ok(())
+    }
+
+    fn weigh(&mut self) {
+        self.weights.clear();
+        self.weights.extend_from_slice(self.observations.heights());
+        self.factor.solve_lower(&mut self.weights);
+        self.factor.solve_upper(&mut self.weights);
+    }
+
+    fn correlations(&self, place: &[f64], out: &mut [f64]) {
+        let lengths = &self.hyperparameters.length_scales;
+        self.observations.distances2(place.iter().copied(), lengths, 0, out);
+        self.kernel.correlate(out);
     }
 
     /// The hyperparameters it was made with.
@@ -162,29 +92,17 @@ impl Posterior {
     }
 
     /// Mean height k*ᵀ·K⁻¹·y at `place`.
-    pub fn mean(&self, place: &[f64]) -> f64 {
-        let signal2 = self.hyperparameters.signal_sd.powi(2);
-        let lengths = &self.hyperparameters.length_scales;
-        let sum: f64 = (self.observations.places().zip(&self.weights))
-            .map(|(at, weight)| {
-                self.kernel.correlation(scaled_distance2(place, at, lengths)) * weight
-            })
-            .sum();
-        signal2 * sum
+    pub fn mean(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
+        scratch.solved.resize(self.observations.len(), 0.0);
+        self.correlations(place, &mut scratch.solved);
+        widest(|| dot(&scratch.solved, &self.weights))
     }
 
     /// Variance of the surface (without touch noise) k** − k*ᵀ·K⁻¹·k* at `place`, in [0, k**].
     pub fn variance(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
-        let lengths = &self.hyperparameters.length_scales;
-        scratch.solved.clear();
-        scratch.solved.extend(
-            self.observations
-                .places()
-                .map(|at| self.kernel.correlation(scaled_distance2(place, at, lengths))),
-        );
-        self.factor.solve_lower(&mut scratch.solved);
-        let explained: f64 = scratch.solved.iter().map(|v| v * v).sum();
-        self.hyperparameters.signal_sd.powi(2) * (1.0 - explained).max(0.0)
+        scratch.solved.resize(self.observations.len(), 0.0);
+        self.correlations(place, &mut scratch.solved);
+        self.remaining(self.factor.solve_lower(&mut scratch.solved))
     }
 
     /// As [`variance`](Self::variance), and writes its gradient with respect to the place.
@@ -195,43 +113,24 @@ impl Posterior {
         scratch: &mut Scratch,
     ) -> f64 {
         let lengths = &self.hyperparameters.length_scales;
+        let Scratch { solved, slopes } = scratch;
+        solved.resize(self.observations.len(), 0.0);
+        slopes.resize(self.observations.len(), 0.0);
+        self.observations.distances2(place.iter().copied(), lengths, 0, solved);
+        self.kernel.correlate_slope(solved, slopes);
+        let explained = self.factor.solve_lower(solved);
+        self.factor.solve_upper(solved);
         let signal2 = self.hyperparameters.signal_sd.powi(2);
-        scratch.solved.clear();
-        scratch.slope.clear();
-        for at in self.observations.places() {
-            let r2 = scaled_distance2(place, at, lengths);
-            let (correlation, slope) = self.kernel.correlation_slope(r2);
-            scratch.solved.push(correlation);
-            scratch.slope.push(slope);
+        for (axis, (slope, at)) in gradient.iter_mut().zip(place).enumerate() {
+            let column = self.observations.column(axis);
+            let terms = solved.iter().zip(slopes.iter()).zip(column);
+            let sum: f64 = terms.map(|((solved, slope), x)| solved * slope * (at - x)).sum();
+            *slope = -4.0 * signal2 * sum / (lengths[axis] * lengths[axis]);
         }
-        self.factor.solve_lower(&mut scratch.solved);
-        let explained: f64 = scratch.solved.iter().map(|v| v * v).sum();
-        self.factor.solve_upper(&mut scratch.solved);
-        gradient.fill(0.0);
-        for (i, at) in self.observations.places().enumerate() {
-            let factor = -4.0 * signal2 * scratch.solved[i] * scratch.slope[i];
-            for (d, slope) in gradient.iter_mut().enumerate() {
-                *slope += factor * (place[d] - at[d]) / (lengths[d] * lengths[d]);
-            }
-        }
-        signal2 * (1.0 - explained).max(0.0)
+        self.remaining(explained)
     }
-}
 
-/// Writes the correlations of observation `i` with observations 0..=i.
-fn correlations(
-    kernel: &dyn Kernel,
-    hyperparameters: &Hyperparameters,
-    observations: &Observations,
-    i: usize,
-    row: &mut [f64],
-) {
-    for (j, entry) in row.iter_mut().enumerate() {
-        let r2 = scaled_distance2(
-            observations.place(i),
-            observations.place(j),
-            &hyperparameters.length_scales,
-        );
-        *entry = kernel.correlation(r2);
+    fn remaining(&self, explained: f64) -> f64 {
+        self.hyperparameters.signal_sd.powi(2) * (1.0 - explained).max(0.0)
     }
 }

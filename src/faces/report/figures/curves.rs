@@ -133,7 +133,8 @@ fn read(zone: &Zone, surface: &Posterior) -> Vec<(f64, f64, f64)> {
     let mut scratch = Scratch::default();
     (zone.grid(STEPS).into_iter())
         .map(|place| {
-            (place[0], surface.mean(&place), surface.variance(&place, &mut scratch).sqrt())
+            let mean = surface.mean(&place, &mut scratch);
+            (place[0], mean, surface.variance(&place, &mut scratch).sqrt())
         })
         .collect()
 }

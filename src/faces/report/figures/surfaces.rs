@@ -6,6 +6,7 @@ use crate::faces::report::canvas::{Anchor, Area, Canvas, Point};
 use crate::faces::report::relief::{Relief, Space, View};
 use crate::faces::report::replay::{self, Replay};
 use crate::faces::report::style::{self, FAINT_INK, INITIAL, LATER, PAPER, SMALL_PX, TEXT_PX};
+use crate::ground::gp::posterior::Scratch;
 use crate::trials::row::TouchRow;
 use crate::trials::store::Run;
 use anyhow::ensure;
@@ -62,7 +63,9 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             };
             sheet.frame(&mut canvas, &format!("{planner}, {count} touches"), &score);
             if let Some(replay) = replay {
-                let heights = grid.heights(|place, _| Some(replay.surface.mean(place)));
+                let mut scratch = Scratch::default();
+                let heights =
+                    grid.heights(|place, _| Some(replay.surface.mean(place, &mut scratch)));
                 let relief = Relief::new(&sheet.view, &grid.xs, &grid.zs, &heights, &axis);
                 relief.draw(&mut canvas);
                 for (touch, is_initial) in replay.marks() {
@@ -111,7 +114,7 @@ impl<'a> Grid<'a> {
     }
 
     /// A height for each place that has a true one, given that.
-    fn heights(&self, height: impl Fn(&[f64], f64) -> Option<f64>) -> Vec<Option<f64>> {
+    fn heights(&self, mut height: impl FnMut(&[f64], f64) -> Option<f64>) -> Vec<Option<f64>> {
         let truth = &self.run.truth;
         (self.picked.iter())
             .flat_map(|&j| self.picked.iter().map(move |&i| j * self.side + i))

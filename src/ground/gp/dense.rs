@@ -1,0 +1,104 @@
+//! Blocked factorisation and inversion of a whole covariance matrix (faer).
+
+use super::cholesky::NotPositiveDefinite;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt;
+use faer::{Mat, Par};
+
+/// A symmetric matrix that is factored in place; only its lower triangle is read and written.
+pub struct Dense {
+    matrix: Mat<f64>,
+    inverse: Mat<f64>,
+    scratch: MemBuffer,
+}
+
+impl Dense {
+    /// All zeros, of order `n`.
+    pub fn new(n: usize) -> Self {
+        let need = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
+        Self { matrix: Mat::zeros(n, n), inverse: Mat::zeros(0, 0), scratch: MemBuffer::new(need) }
+    }
+
+    /// Order of the matrix.
+    pub fn order(&self) -> usize {
+        self.matrix.nrows()
+    }
+
+    /// Column `j` from its diagonal down.
+    pub fn column(&self, j: usize) -> &[f64] {
+        &self.matrix.col_as_slice(j)[j..]
+    }
+
+    /// Column `j` from its diagonal down.
+    pub fn column_mut(&mut self, j: usize) -> &mut [f64] {
+        &mut self.matrix.col_as_slice_mut(j)[j..]
+    }
+
+    /// Replaces A by L with A = L·Lᵀ: n³/3 operations.
+    ///
+    /// # Errors
+    /// If A is not positive definite to within rounding: a pivot lost to cancellation is as good
+    /// as none, its sign is noise. `largest` is A's largest diagonal entry.
+    pub fn factor(&mut self, largest: f64) -> Result<(), NotPositiveDefinite> {
+        let stack = MemStack::new(&mut self.scratch);
+        let matrix = self.matrix.as_mut();
+        llt::factor::cholesky_in_place(
+            matrix,
+            Default::default(),
+            Par::Seq,
+            stack,
+            Default::default(),
+        )
+        .map_err(|llt::factor::LltError::NonPositivePivot { index }| {
+            NotPositiveDefinite { index }
+        })?;
+        let is_lost = |i: &usize| {
+            let pivot = self.matrix[(*i, *i)];
+            let is_kept = pivot * pivot > f64::EPSILON * largest && pivot.is_finite();
+            !is_kept
+        };
+        (0..self.order()).find(is_lost).map_or(Ok(()), |index| Err(NotPositiveDefinite { index }))
+    }
+
+    /// ln |A| of the factored matrix.
+    pub fn log_determinant(&self) -> f64 {
+        (0..self.order()).map(|i| 2.0 * self.matrix[(i, i)].ln()).sum()
+    }
+
+    /// Replaces b by A⁻¹·b with the factored matrix; returns bᵀ·A⁻¹·b.
+    pub fn solve(&self, b: &mut [f64]) -> f64 {
+        for j in 0..b.len() {
+            let column = self.column(j);
+            b[j] /= column[0];
+            let (done, rest) = b.split_at_mut(j + 1);
+            for (b, l) in rest.iter_mut().zip(&column[1..]) {
+                *b -= done[j] * l;
+            }
+        }
+        let square = b.iter().map(|v| v * v).sum();
+        for j in (0..b.len()).rev() {
+            let column = self.column(j);
+            let below: f64 = super::super::simd::dot(&column[1..], &b[j + 1..]);
+            b[j] = (b[j] - below) / column[0];
+        }
+        square
+    }
+
+    /// Computes A⁻¹ of the factored matrix: 2n³/3 operations.
+    pub fn invert(&mut self) {
+        let n = self.order();
+        if self.inverse.nrows() != n {
+            self.inverse = Mat::zeros(n, n);
+            self.scratch = MemBuffer::new(llt::inverse::inverse_scratch::<f64>(n, Par::Seq).or(
+                llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default()),
+            ));
+        }
+        let stack = MemStack::new(&mut self.scratch);
+        llt::inverse::inverse(self.inverse.as_mut(), self.matrix.as_ref(), Par::Seq, stack);
+    }
+
+    /// Column `j` of A⁻¹ from its diagonal down, after [`invert`](Self::invert).
+    pub fn inverse_column(&self, j: usize) -> &[f64] {
+        &self.inverse.col_as_slice(j)[j..]
+    }
+}

@@ -1,0 +1,95 @@
+//! Stationary kernels with one length scale per input (automatic relevance determination).
+
+mod matern;
+mod squared_exponential;
+
+pub use matern::{Matern32, Matern52};
+pub use squared_exponential::SquaredExponential;
+
+use crate::ground::simd::widest;
+use serde::{Deserialize, Serialize};
+
+/// A correlation that depends on the scaled squared distance r² = Σ_d ((a_d − b_d) / l_d)².
+///
+/// A new kernel is one file with this trait and one line in [`KERNELS`].
+pub trait Radial: Send + Sync {
+    /// Correlation c(r²), with c(0) = 1, and its derivative dc/d(r²). Branch-free and
+    /// `#[inline(always)]`, so that loops over it are vectorised.
+    fn correlation_slope(r2: f64) -> (f64, f64);
+}
+
+/// A kernel, many distances at a time.
+pub trait Kernel: Send + Sync {
+    /// Replaces each r² by c(r²).
+    fn correlate(&self, r2: &mut [f64]);
+
+    /// Replaces each r² by c(r²) and writes dc/d(r²) into `slopes`.
+    fn correlate_slope(&self, r2: &mut [f64], slopes: &mut [f64]);
+}
+
+impl<R: Radial> Kernel for R {
+    fn correlate(&self, r2: &mut [f64]) {
+        widest(|| r2.iter_mut().for_each(|r2| *r2 = R::correlation_slope(*r2).0));
+    }
+
+    fn correlate_slope(&self, r2: &mut [f64], slopes: &mut [f64]) {
+        widest(|| {
+            for (r2, slope) in r2.iter_mut().zip(slopes) {
+                (*r2, *slope) = R::correlation_slope(*r2);
+            }
+        });
+    }
+}
+
+/// Every kernel by the name it has in an experiment file; one line to add one.
+pub const KERNELS: &[(&str, &dyn Kernel)] = &[
+    ("squared_exponential", &SquaredExponential),
+    ("matern_52", &Matern52),
+    ("matern_32", &Matern32),
+];
+
+/// The kernel called `name`.
+pub fn by_name(name: &str) -> Option<&'static dyn Kernel> {
+    KERNELS.iter().find(|(known, _)| *known == name).map(|(_, kernel)| *kernel)
+}
+
+/// What a fit chooses: k(a, b) = signal_sd² · c(r²(a, b)) + noise_sd² · [a is b].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hyperparameters {
+    /// Standard deviation of the surface around its mean, in the unit of the heights.
+    pub signal_sd: f64,
+    /// Distance over which heights stay alike, one per input, in the unit of the inputs.
+    pub length_scales: Vec<f64>,
+    /// Standard deviation of one touch's error, in the unit of the heights.
+    pub noise_sd: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kernel_is_one_at_zero_falls_and_has_its_central_difference_as_slope() {
+        for (name, kernel) in KERNELS {
+            let at = |r2: f64| {
+                let (mut value, mut slope) = ([r2], [0.0]);
+                kernel.correlate_slope(&mut value, &mut slope);
+                let mut alone = [r2];
+                kernel.correlate(&mut alone);
+                assert_eq!(alone, value, "{name}");
+                (value[0], slope[0])
+            };
+            assert_eq!(at(0.0).0, 1.0, "{name}");
+            let mut last = 1.0;
+            for i in 1..200 {
+                let r2 = 0.05 * f64::from(i);
+                let (value, slope) = at(r2);
+                assert!(value > 0.0 && value < last, "{name} at {r2}");
+                last = value;
+                let twin = (at(r2 + 1e-6).0 - at(r2 - 1e-6).0) / 2e-6;
+                assert!((slope - twin).abs() < 1e-8, "{name} at {r2}: {slope} {twin}");
+            }
+            assert!(at(1e9).0 < 1e-300 && at(f64::MAX).0 == 0.0, "{name}");
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Places and the heights observed there.
+
+use crate::ground::simd::widest;
+
+/// Places and heights, stored coordinate by coordinate.
+#[derive(Clone, Debug, Default)]
+pub struct Observations {
+    columns: Vec<Vec<f64>>,
+    heights: Vec<f64>,
+}
+
+impl Observations {
+    /// None yet, with `dimension` coordinates each.
+    pub fn new(dimension: usize) -> Self {
+        Self { columns: vec![Vec::new(); dimension], heights: Vec::new() }
+    }
+
+    /// Adds one; `place` has `dimension` coordinates.
+    pub fn push(&mut self, place: &[f64], height: f64) {
+        for (column, at) in self.columns.iter_mut().zip(place) {
+            column.push(*at);
+        }
+        self.heights.push(height);
+    }
+
+    /// Number of coordinates.
+    pub fn dimension(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.heights.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.heights.is_empty()
+    }
+
+    /// Coordinate `axis` of every place.
+    pub fn column(&self, axis: usize) -> &[f64] {
+        &self.columns[axis]
+    }
+
+    /// Where observation `i` was made.
+    pub fn place(&self, i: usize) -> impl Iterator<Item = f64> {
+        self.columns.iter().map(move |column| column[i])
+    }
+
+    /// All heights in order.
+    pub fn heights(&self) -> &[f64] {
+        &self.heights
+    }
+
+    /// Writes the scaled squared distances Σ_d ((place_d − x_d) / l_d)² of `place` from the
+    /// observations beginning with `first`, as many as `r2` holds.
+    pub fn distances2(
+        &self,
+        place: impl Iterator<Item = f64>,
+        length_scales: &[f64],
+        first: usize,
+        r2: &mut [f64],
+    ) {
+        r2.fill(0.0);
+        for ((column, at), length) in self.columns.iter().zip(place).zip(length_scales) {
+            let column = &column[first..first + r2.len()];
+            widest(|| {
+                for (r2, x) in r2.iter_mut().zip(column) {
+                    let step = (at - x) / length;
+                    *r2 += step * step;
+                }
+            });
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Plain loops, compiled for the widest vectors this processor has.
+
+/// Runs `work` with its loops compiled once for each vector width and the widest one chosen.
+///
+/// What it calls must be `#[inline(always)]` to be compiled along. Sums keep the order in which
+/// they are written, so that the width changes speed and not results.
+#[inline(always)]
+pub fn widest<R>(work: impl FnOnce() -> R) -> R {
+    pulp::Arch::new().dispatch(work)
+}
+
+/// Σ a_i b_i in eight independent sums, which the processor adds side by side.
+#[inline(always)]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a_blocks, a_rest) = a.as_chunks::<8>();
+    let (b_blocks, b_rest) = b.as_chunks::<8>();
+    for (a, b) in a_blocks.iter().zip(b_blocks) {
+        for lane in 0..8 {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    let [a, b, c, d, e, f, g, h] = sums;
+    ((a + e) + (b + f)) + ((c + g) + (d + h)) + rest
+}
+
+/// e^x for x ≤ 0, to within a unit in the last place; 0 below -708, where e^x leaves the normal
+/// numbers, and NaN for NaN.
+///
+/// Branch-free, so that a loop over it is vectorised, and the same bits on every machine:
+/// x = k·ln 2 + r with |r| ≤ ln 2 / 2, and e^r by its Taylor series to r¹³ / 13!, whose
+/// remainder is below 5e-18.
+#[inline(always)]
+pub fn exp_of_negative(x: f64) -> f64 {
+    /// Adding it leaves the nearest integer in the low bits of the sum.
+    const ROUND: f64 = 6_755_399_441_055_744.0;
+    /// ln 2 in two parts; the first has trailing zeros, so that its multiples are exact.
+    const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
+    const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+    const TAYLOR: [f64; 14] = [
+        1.0,
+        1.0,
+        1.0 / 2.0,
+        1.0 / 6.0,
+        1.0 / 24.0,
+        1.0 / 120.0,
+        1.0 / 720.0,
+        1.0 / 5_040.0,
+        1.0 / 40_320.0,
+        1.0 / 362_880.0,
+        1.0 / 3_628_800.0,
+        1.0 / 39_916_800.0,
+        1.0 / 479_001_600.0,
+        1.0 / 6_227_020_800.0,
+    ];
+    let shifted = x * std::f64::consts::LOG2_E + ROUND;
+    let k = shifted - ROUND;
+    let r = (x - k * LN_2_HIGH) - k * LN_2_LOW;
+    let mut series = TAYLOR[13];
+    for coefficient in TAYLOR[..13].iter().rev() {
+        series = series * r + coefficient;
+    }
+    let power = f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52);
+    let value = series * power;
+    if x < -708.0 { 0.0 } else { value }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exp_is_within_a_unit_in_the_last_place() {
+        let mut worst: f64 = 0.0;
+        for i in 0..200_000 {
+            let x = -708.0 * (f64::from(i) / 200_000.0).powi(3);
+            let exact = x.exp();
+            worst = worst.max((exp_of_negative(x) - exact).abs() / (exact * f64::EPSILON));
+        }
+        assert!(worst <= 1.0, "{worst}");
+        assert_eq!(exp_of_negative(0.0), 1.0);
+        assert_eq!(exp_of_negative(f64::NEG_INFINITY), 0.0);
+        assert_eq!(exp_of_negative(-1e300), 0.0);
+        assert!(exp_of_negative(f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn dot_is_the_sum_of_products_at_every_length() {
+        for n in 0..40 {
+            let a: Vec<f64> = (0..n).map(|i| f64::from(i).sin()).collect();
+            let b: Vec<f64> = (0..n).map(|i| f64::from(i).cos()).collect();
+            let plain: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
+            assert!((widest(|| dot(&a, &b)) - plain).abs() < 1e-13, "{n}");
+        }
+    }
+}
