@@ -137,6 +137,7 @@ fn broken_experiments_are_refused_with_file_line_key_and_remedy() {
         ("[3]", "[-3]", &["small.toml:13", "report.touch_counts[0]"]),
         ("[3]", "[0]", &["small.toml:13", "report.touch_counts[0]"]),
         ("[3]", "[3]\ntrial = -5", &["small.toml:14", "report.trial"]),
+        ("[3]", "[1,1,1,1,1,1,1,1,1]", &["small.toml:13", "report.touch_counts", "at most 8"]),
         ("[3]", "[3]\nplanners = [\"x\"]", &["small.toml:14", "report.planners[0]"]),
         ("[report]", "[planning]\ndirect_evaluations = 0\n[report]", &["small.toml:13"]),
         ("[report]", "[[report]]", &["small.toml:12", "report"]),
@@ -162,6 +163,8 @@ fn broken_scenes_are_refused_with_file_line_key_and_remedy() {
         ("[0.1, 0.4]\nz", "[nan, 0.1]\nz", &["scene.toml:7", "zone.x_m[0]"]),
         ("[0.1, 0.4]\nz", "[0, 1e300]\nz", &["scene.toml:7", "zone.x_m[1]", "-1000 to 1000"]),
         ("[0.1, 0.4]\nz", "[0, 1, 2]\nz", &["scene.toml:7", "zone.x_m"]),
+        ("[0.1, 0.4]\nz", "[0, 1e-320]\nz", &["scene.toml:7", "zone.x_m", "wide"]),
+        ("[object]", "function = \"toy\"\n[object]", &["scene.toml:3", "function"]),
         ("[0.1, 0.4]\nz", "[8, 9]\nz", &["no surface in the zone", "x 0 to 1"]),
         ("x_m", "x_mm", &["scene.toml:7", "zone.x_mm", "did you mean `x_m`"]),
         ("x_m", "datum_y_m = inf\nx_m", &["scene.toml:7", "zone.datum_y_m"]),
@@ -237,6 +240,7 @@ fn broken_command_lines_are_refused() {
         (&["run", "small.toml", "--set", "gp.noise=7"], &["--set gp.noise=7"]),
         (&["run", "small.toml", "--set", "scene=none.toml"], &["--set scene=none.toml"]),
         (&["run", "small.toml", "--out", "mesh.obj"], &["mesh.obj"]),
+        (&["run", "small.toml", "--out", "."], &[".", "something else", "--out"]),
         (&["run", "small.toml", "--threads", "x"], &["--threads"]),
         (&["report", "none"], &["none"]),
         (&["report", "mesh.obj"], &["mesh.obj"]),
@@ -270,7 +274,14 @@ fn damaged_run_folders_are_refused_and_lose_nothing() {
     assert_eq!(fs::read(&trials).unwrap(), rows);
     fs::write(&trials, [b"{\"trial\": \"x\"}\n", rows.as_slice()].concat()).unwrap();
     accepted.refuse("a line that is no row", &run(&[]), &["trials.jsonl:1"]);
+    fs::write(&trials, [rows.as_slice(), b"{\"trial\": null}\n"].concat()).unwrap();
+    accepted.refuse("a whole last line that is no row", &run(&[]), &["trials.jsonl:2"]);
     fs::write(&trials, &rows).unwrap();
+    let locked = fs::File::open(&trials).unwrap();
+    locked.lock().unwrap();
+    accepted.refuse("a folder being written", &run(&["--fresh"]), &["another run"]);
+    locked.unlock().unwrap();
+    assert_eq!(fs::read(&trials).unwrap(), rows);
     fs::write(folder.path().join("runs/small/surface.csv"), "x_m,z_m,height_m\n1,2,x\n").unwrap();
     let report = palpate(folder.path(), &["report", "runs/small"]);
     accepted.refuse("a surface that is none", &report, &["surface.csv:2", "\"x\""]);

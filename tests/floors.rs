@@ -40,6 +40,29 @@ fn imports_point_down() {
     assert!(seen > 50, "the test found only {seen} imports");
 }
 
+/// A planner that could see the world could peek at the truth.
+#[test]
+fn planners_see_the_belief_and_the_zone_and_nothing_else() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/conduct/planner");
+    for path in sources(&folder) {
+        let text = fs::read_to_string(&path).unwrap();
+        for line in text.lines().filter(|line| line.contains("crate::") || line.contains("super::"))
+        {
+            let allowed = [
+                "crate::ground::",
+                "use crate::world::Zone;",
+                "use super::belief::Belief;",
+                "use super::{",
+            ];
+            assert!(
+                allowed.iter().any(|import| line.contains(import)),
+                "{}: {line}",
+                path.display()
+            );
+        }
+    }
+}
+
 #[test]
 fn a_file_is_one_idea() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");

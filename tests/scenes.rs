@@ -48,7 +48,9 @@ fn settings_are_overridden_in_order_and_reach_into_the_scene() {
     assert_eq!(experiment.scene.finger.radius_m, 0.001);
     assert_eq!(experiment.gp.noise, [1e-3, 1.0]);
     let other = Experiment::load(&path, &["scene=scenes/container.toml".into()]).unwrap();
-    assert_eq!(other.scene.object.unwrap().truth.as_deref(), Some("container"));
+    let object = other.scene.object.unwrap();
+    assert_eq!(object.truth.as_deref(), Some("container"));
+    assert!(object.mesh.is_file(), "{}", object.mesh.display());
 }
 
 /// The mesh is the truth to within its tested distance from the formula, wherever it is placed.

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 /// MuJoCo refused a model.
 #[derive(Debug, Error)]
-#[error("MuJoCo refuses the scene: {cause:?}")]
+#[error("MuJoCo refuses the scene: {cause}")]
 pub struct CompileError {
     /// What it says.
     pub cause: MjModelError,

@@ -103,11 +103,12 @@ impl Belief {
     ///
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
-    pub fn refit(&mut self) -> Result<&Fit, Indefinite> {
+    pub fn refit(&mut self) -> Result<(&Fit, &Posterior), Indefinite> {
         let last = self.fit.take().map(|fit| fit.hyperparameters);
         let fit = self.search_box().fit(self.kernel, &self.contacts, last.as_ref());
-        self.condition(fit.hyperparameters.clone())?;
-        Ok(self.fit.insert(fit))
+        let posterior = self.posterior(fit.hyperparameters.clone())?;
+        self.explore(&posterior)?;
+        Ok((self.fit.insert(fit), self.surface.insert(posterior)))
     }
 
     /// Conditions on all contacts with given hyperparameters, as when a recorded belief is
@@ -116,18 +117,29 @@ impl Belief {
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
     pub fn condition(&mut self, hyperparameters: Hyperparameters) -> Result<(), Indefinite> {
-        let contacts = self.contacts.clone();
-        let surface = Posterior::new(self.kernel, hyperparameters.clone(), contacts)?;
+        let posterior = self.posterior(hyperparameters)?;
+        self.explore(&posterior)?;
+        self.surface = Some(posterior);
+        Ok(())
+    }
+
+    fn posterior(&self, hyperparameters: Hyperparameters) -> Result<Posterior, Indefinite> {
+        Posterior::new(self.kernel, hyperparameters, self.contacts.clone())
+    }
+
+    /// Adds the unreached targets to what `surface` knows of its variance.
+    fn explore(&mut self, surface: &Posterior) -> Result<(), Indefinite> {
         self.explored = match self.unreached.is_empty() {
             true => None,
-            false => {
-                let mut visited = self.contacts.clone();
-                self.unreached.iter().for_each(|target| visited.push(target, 0.0));
-                Some(Posterior::new(self.kernel, hyperparameters, visited)?)
-            }
+            false => Some(surface.visiting(self.unreached.iter().map(Vec::as_slice))?),
         };
-        self.surface = Some(surface);
         Ok(())
+    }
+
+    /// Largest jitter that a covariance of this belief needed, relative to its diagonal.
+    pub fn jitter(&self) -> f64 {
+        let posteriors = self.surface.iter().chain(&self.explored);
+        posteriors.map(Posterior::jitter).fold(0.0, f64::max)
     }
 
     fn search_box(&self) -> SearchBox {

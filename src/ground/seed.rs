@@ -5,17 +5,21 @@ use rand_chacha::rand_core::SeedableRng;
 
 /// The stream of `purpose` in `trial` of an experiment with root seed `root`.
 ///
-/// ChaCha's 32-byte key is filled without hashing (root, trial, then the purpose's first 16
-/// bytes), so two streams are equal only if all three are. Streams do not depend on the order
-/// in which they are asked for: trials may run on any thread and resume after a kill.
+/// ChaCha's 32-byte key holds root, trial, and two FNV-1a hashes of the purpose. Streams do not
+/// depend on the order in which they are asked for: trials may run on any thread and resume
+/// after a kill.
 pub fn stream(root: u64, trial: u64, purpose: &str) -> ChaCha8Rng {
     let mut key = [0; 32];
     key[..8].copy_from_slice(&root.to_le_bytes());
     key[8..16].copy_from_slice(&trial.to_le_bytes());
-    for (slot, byte) in key[16..].iter_mut().zip(purpose.bytes()) {
-        *slot = byte;
-    }
+    key[16..24].copy_from_slice(&fnv1a(0xcbf2_9ce4_8422_2325, purpose).to_le_bytes());
+    key[24..].copy_from_slice(&fnv1a(0x6c62_272e_07bb_0142, purpose).to_le_bytes());
     ChaCha8Rng::from_seed(key)
+}
+
+/// The 64-bit hash of Fowler, Noll and Vo, variant 1a, from a chosen start.
+fn fnv1a(start: u64, text: &str) -> u64 {
+    text.bytes().fold(start, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 #[cfg(test)]

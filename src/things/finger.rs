@@ -19,9 +19,8 @@ pub struct Finger {
 
 impl Default for Finger {
     /// The BioTac: the outer skin lies 7.0 mm from the axis at the sides and the sensing part
-    /// is 28 mm long (NVIDIA's FEM mesh of the sensor). The pitch is chosen: at 60° the
-    /// normal of the flat facet under the fingertip's four central electrodes, tilted 30°
-    /// distally, points along the approach.
+    /// is 28 mm long (NVIDIA's FEM mesh of the sensor). The pitch is chosen, half-way between
+    /// touching with the tip's apex and with the pad.
     fn default() -> Self {
         Self { radius_m: 0.007, length_m: 0.021, pitch_deg: 45.0 }
     }

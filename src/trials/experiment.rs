@@ -58,6 +58,9 @@ pub struct ReportSettings {
 /// Most touches of a trial; a fit costs the cube of their number.
 const TOUCHES_MAX: f64 = 2000.0;
 
+/// Most beliefs drawn side by side.
+const DRAWN_MAX: usize = 8;
+
 impl Experiment {
     /// Reads an experiment file with the scene it names, and applies `--set` assignments.
     ///
@@ -89,9 +92,11 @@ impl Experiment {
     /// Touch counts after which beliefs are drawn.
     pub fn drawn_touch_counts(&self) -> Vec<u32> {
         let possible = self.initial_touches..=self.touches;
-        let chosen: Vec<u32> = (self.report.touch_counts.iter().copied())
+        let mut chosen: Vec<u32> = (self.report.touch_counts.iter().copied())
             .filter(|count| possible.contains(count))
             .collect();
+        chosen.sort_unstable();
+        chosen.dedup();
         if !chosen.is_empty() {
             return chosen;
         }
@@ -129,6 +134,10 @@ impl Checked for Experiment {
         });
         rules.table("gp", &self.gp);
         rules.table("planning", &self.planning);
+        let drawn = self.report.touch_counts.len();
+        rules.require("report.touch_counts", drawn, drawn <= DRAWN_MAX, || {
+            format!("at most {DRAWN_MAX} touch counts")
+        });
         for (i, &count) in self.report.touch_counts.iter().enumerate() {
             rules.number(&format!("report.touch_counts[{i}]"), count.into(), 1.0..=TOUCHES_MAX);
         }

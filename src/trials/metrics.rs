@@ -71,14 +71,19 @@ impl Truth {
     }
 }
 
+/// Running sums of true heights f and believed heights g. The centred ones are updated by
+/// Welford's rule: a large common offset must not cancel what little the heights vary.
 #[derive(Default)]
 struct Sums {
     count: f64,
-    f: f64,
-    g: f64,
     ff: f64,
     gg: f64,
     fg: f64,
+    mean_f: f64,
+    mean_g: f64,
+    spread_f: f64,
+    spread_g: f64,
+    covariance: f64,
     error2: f64,
     max_error: f64,
 }
@@ -86,11 +91,15 @@ struct Sums {
 impl Sums {
     fn add(&mut self, f: f64, g: f64) {
         self.count += 1.0;
-        self.f += f;
-        self.g += g;
         self.ff += f * f;
         self.gg += g * g;
         self.fg += f * g;
+        let (from_f, from_g) = (f - self.mean_f, g - self.mean_g);
+        self.mean_f += from_f / self.count;
+        self.mean_g += from_g / self.count;
+        self.spread_f += from_f * (f - self.mean_f);
+        self.spread_g += from_g * (g - self.mean_g);
+        self.covariance += from_f * (g - self.mean_g);
         self.error2 += (f - g) * (f - g);
         self.max_error = self.max_error.max((f - g).abs());
     }
@@ -100,12 +109,14 @@ impl Sums {
     }
 
     fn metrics(&self, edge_rmse_m: Option<f64>) -> Metrics {
-        let (mean_f, mean_g) = (self.f / self.count, self.g / self.count);
-        let covariance = self.fg - self.f * mean_g;
-        let spreads = (self.ff - self.f * mean_f) * (self.gg - self.g * mean_g);
+        // A spread of rounding errors is none.
+        let spread = |spread: f64, square: f64| {
+            if spread > 1e3 * f64::EPSILON * f64::EPSILON * square { spread } else { 0.0 }
+        };
+        let spreads = spread(self.spread_f, self.ff) * spread(self.spread_g, self.gg);
         Metrics {
             r: ratio(self.fg, (self.ff * self.gg).sqrt()),
-            centred_r: ratio(covariance, spreads.max(0.0).sqrt()),
+            centred_r: ratio(self.covariance, spreads.sqrt()),
             rmse_m: self.rmse(),
             max_error_m: self.max_error,
             edge_rmse_m,
@@ -150,6 +161,18 @@ mod tests {
         let offset = compare(&[(1.0, 2.0), (2.0, 3.0), (4.0, 5.0)]);
         assert!((offset.centred_r - 1.0).abs() < 1e-14 && offset.r < 1.0);
         assert!((offset.rmse_m - 1.0).abs() < 1e-15 && (offset.max_error_m - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn an_offset_of_a_kilometre_changes_no_digit_that_counts() {
+        let pairs: Vec<(f64, f64)> = (0..400)
+            .map(|i| (1e-3 * f64::from(i).sin(), 1e-3 * (f64::from(i) + 0.3).sin()))
+            .collect();
+        let moved: Vec<(f64, f64)> = pairs.iter().map(|(f, g)| (f + 1e3, g + 1e3)).collect();
+        assert!((compare(&pairs).centred_r - compare(&moved).centred_r).abs() < 1e-9);
+        assert!((compare(&pairs).centred_r - 0.3f64.cos()).abs() < 0.01);
+        let flat = vec![(0.65, 0.65); 1681];
+        assert_eq!(compare(&flat).centred_r, 0.0);
     }
 
     #[test]

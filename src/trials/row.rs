@@ -26,7 +26,8 @@ pub struct TouchRow {
     pub target: Vec<f64>,
     /// The point of contact (x, y, z) in `W`; none for a miss.
     pub contact: Option<[f64; 3]>,
-    /// Posterior standard deviation at the target when it was chosen.
+    /// Standard deviation that the planner saw at the target when it chose it, if it looked:
+    /// the posterior's, given also that unreached targets are no news.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub planned_sd_m: Option<f64>,
     /// Why the planner's own rule could not decide.

@@ -42,6 +42,20 @@ pub enum RunError {
 /// One piece of work.
 type Job = (u32, &'static planner::Entry);
 
+/// Whether an experiment can be run at all.
+///
+/// # Errors
+/// If this build lacks what it needs, or the zone has no surface.
+pub fn check(truth: &Truth) -> Result<(), RunError> {
+    if !optimize::BUILT {
+        return Err(RunError::NotBuilt { feature: "nlopt" });
+    }
+    if truth.count() == 0 {
+        return Err(RunError::NoSurface);
+    }
+    Ok(())
+}
+
 /// Runs what `done` lacks and adds each row to `folder` as it finishes; returns how many trials
 /// it ran.
 ///
@@ -49,7 +63,7 @@ type Job = (u32, &'static planner::Entry);
 /// trials are finished and no others begun. `threads` 0 means all cores.
 ///
 /// # Errors
-/// If a row cannot be stored, or the experiment cannot be run at all.
+/// If a row cannot be stored, or threads cannot be started.
 pub fn run(
     experiment: &Experiment,
     world: &Arc<World>,
@@ -59,12 +73,6 @@ pub fn run(
     stop: &AtomicBool,
     progress: &(dyn Fn(&TrialRow) + Sync),
 ) -> Result<usize, RunError> {
-    if !optimize::BUILT {
-        return Err(RunError::NotBuilt { feature: "nlopt" });
-    }
-    if truth.count() == 0 {
-        return Err(RunError::NoSurface);
-    }
     let jobs = jobs(experiment, done);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)

@@ -1,7 +1,7 @@
 //! The folder a run's results lie in.
 //!
 //! `resolved.toml` (the experiment with every default written out), `manifest.json` (what ran
-//! it), `surface.csv` (the truth on the test grid), `trials.jsonl` (a row per finished trial).
+//! it, a program each), `surface.csv` (the truth on the test grid), `trials.jsonl` (a row per finished trial).
 //! Everything else in it is drawn from these.
 
 use super::experiment::Experiment;
@@ -10,9 +10,9 @@ use super::row::TrialRow;
 use crate::ground::config::ConfigError;
 use crate::world::Zone;
 use serde::Serialize;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use thiserror::Error;
 
 /// What can go wrong with a run folder.
@@ -47,6 +47,12 @@ pub enum StoreError {
         /// The folder.
         path: PathBuf,
     },
+    /// The folder is not empty and holds no run.
+    #[error("{}: this folder holds something else; choose another with --out", path.display())]
+    Foreign {
+        /// The folder.
+        path: PathBuf,
+    },
     /// A line is not a row.
     #[error("{}:{line}: not a row of results: {message}", path.display())]
     BadRow {
@@ -62,14 +68,14 @@ pub enum StoreError {
     Config(#[from] ConfigError),
 }
 
-const RESOLVED: &str = "resolved.toml";
+/// File of a run's settings, defaults written out.
+pub const RESOLVED: &str = "resolved.toml";
 const SURFACE: &str = "surface.csv";
 const TRIALS: &str = "trials.jsonl";
 /// Folder of a run's figures.
 pub const FIGURES: &str = "figures";
-/// Everything a run writes, which `--fresh` removes.
-const WRITTEN: &[&str] =
-    &[TRIALS, RESOLVED, SURFACE, "manifest.json", "summary.csv", "report.html"];
+/// File that says what ran a run.
+pub const MANIFEST: &str = "manifest.json";
 
 /// What ran an experiment.
 #[derive(Clone, Debug, Serialize)]
@@ -82,7 +88,7 @@ pub struct Manifest {
     pub mujoco: Option<String>,
     /// Processor architecture and operating system.
     pub platform: String,
-    /// Vector extensions of this processor that change speed, not results.
+    /// Vector extensions of this processor; the last bits of a factorisation depend on them.
     pub cpu_features: Vec<&'static str>,
     /// Root of all randomness.
     pub seed: u64,
@@ -105,7 +111,8 @@ pub struct Run {
 }
 
 impl RunFolder {
-    /// Opens `path` for `experiment`: makes it, or continues what was begun there.
+    /// Opens `path` for `experiment`: makes it, or continues what was begun there, or, if
+    /// `fresh`, throws that away.
     ///
     /// Returns the rows that are already there. A last line cut short by a crash is dropped.
     ///
@@ -116,38 +123,36 @@ impl RunFolder {
         experiment: &Experiment,
         truth: &Truth,
         manifest: &Manifest,
+        fresh: bool,
     ) -> Result<(Self, Vec<TrialRow>), StoreError> {
         fs::create_dir_all(path).map_err(io_error(path))?;
         let file = path.join(TRIALS);
+        let is_run = path.join(RESOLVED).exists() || file.exists();
+        let mut entries = fs::read_dir(path).map_err(io_error(path))?;
+        if !is_run && entries.next().is_some() {
+            return Err(StoreError::Foreign { path: path.into() });
+        }
         let trials = OpenOptions::new()
             .create(true)
             .read(true)
             .append(true)
             .open(&file)
             .map_err(io_error(&file))?;
-        trials.try_lock().map_err(|_| StoreError::Busy { path: path.into() })?;
-        write_or_compare(path, RESOLVED, &resolved(experiment))?;
+        match trials.try_lock() {
+            Err(TryLockError::WouldBlock) => return Err(StoreError::Busy { path: path.into() }),
+            Err(TryLockError::Error(cause)) => return Err(StoreError::Io { path: file, cause }),
+            Ok(()) => {}
+        }
+        if fresh {
+            trials.set_len(0).map_err(io_error(&file))?;
+            clear(path)?;
+        }
+        write_or_compare(path, RESOLVED, &saved(experiment, path))?;
         write_or_compare(path, SURFACE, &surface(experiment, truth))?;
-        let manifest = serde_json::to_string_pretty(manifest).map_err(io::Error::from);
-        let manifest = manifest.map_err(io_error(path))?;
-        write_whole(&path.join("manifest.json"), &manifest)?;
-        let (rows, good_bytes) = read_rows(&file, true)?;
+        let (rows, good_bytes) = read_rows(&file)?;
         trials.set_len(good_bytes).map_err(io_error(&file))?;
+        sign(&path.join(MANIFEST), manifest)?;
         Ok((Self { path: path.into(), trials }, rows))
-    }
-
-    /// Removes what an earlier run wrote to `path`; a folder that is no run's is left alone.
-    ///
-    /// # Errors
-    /// If a file cannot be removed.
-    pub fn clear(path: &Path) -> Result<(), StoreError> {
-        if !path.join(RESOLVED).exists() {
-            return Ok(());
-        }
-        for name in WRITTEN {
-            remove(&path.join(name), |file| fs::remove_file(file))?;
-        }
-        remove(&path.join(FIGURES), |folder| fs::remove_dir_all(folder))
     }
 
     /// Adds a row and hands it to the operating system, so that a later kill cannot lose it.
@@ -157,6 +162,10 @@ impl RunFolder {
     pub fn append(&mut self, row: &TrialRow) -> Result<(), StoreError> {
         let file = self.path.join(TRIALS);
         let mut line = serde_json::to_vec(row).map_err(io::Error::from).map_err(io_error(&file))?;
+        // A number that is not finite has no JSON: such a row could not be read back.
+        if let Err(error) = serde_json::from_slice::<TrialRow>(&line) {
+            return Err(StoreError::BadRow { path: file, line: 0, message: error.to_string() });
+        }
         line.push(b'\n');
         self.trials.write_all(&line).map_err(io_error(&file))
     }
@@ -165,9 +174,9 @@ impl RunFolder {
     ///
     /// # Errors
     /// If the file cannot be read back or replaced.
-    pub fn sort(self, planners: &[String]) -> Result<Vec<TrialRow>, StoreError> {
+    pub fn sort(self, planners: &[String]) -> Result<(), StoreError> {
         let file = self.path.join(TRIALS);
-        let (mut rows, _) = read_rows(&file, false)?;
+        let (mut rows, _) = read_rows(&file)?;
         sort(&mut rows, planners);
         let mut text = String::new();
         for row in &rows {
@@ -175,8 +184,7 @@ impl RunFolder {
                 &serde_json::to_string(row).map_err(io::Error::from).map_err(io_error(&file))?;
             text.push('\n');
         }
-        write_whole(&file, &text)?;
-        Ok(rows)
+        write_whole(&file, &text)
     }
 }
 
@@ -188,7 +196,7 @@ impl Run {
     pub fn read(path: &Path) -> Result<Self, StoreError> {
         let experiment = Experiment::load(&path.join(RESOLVED), &[])?;
         let truth = read_surface(&path.join(SURFACE), &experiment.scene.zone)?;
-        let (mut rows, _) = read_rows(&path.join(TRIALS), true)?;
+        let (mut rows, _) = read_rows(&path.join(TRIALS))?;
         sort(&mut rows, &experiment.planners);
         Ok(Self { experiment, truth, rows })
     }
@@ -204,6 +212,45 @@ pub fn resolved(experiment: &Experiment) -> String {
     format!(
         "# Every setting of this run, defaults written out. It can be run again as it is.\n{text}"
     )
+}
+
+/// As [`resolved`], with the mesh's path relative to the run's folder, so that both may move.
+fn saved(experiment: &Experiment, folder: &Path) -> String {
+    let mut experiment = experiment.clone();
+    if let (Some(object), Ok(folder)) = (&mut experiment.scene.object, folder.canonicalize()) {
+        let mesh = object.mesh.canonicalize().unwrap_or_else(|_| object.mesh.clone());
+        object.mesh = relative(&mesh, &folder);
+    }
+    resolved(&experiment)
+}
+
+/// `path` as seen from `folder`, both absolute.
+fn relative(path: &Path, folder: &Path) -> PathBuf {
+    let shared = path.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
+    let up = folder.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(path.components().skip(shared)).collect()
+}
+
+/// Adds `manifest` to the list of programs that wrote a run, unless the last one was the same.
+fn sign(path: &Path, manifest: &Manifest) -> Result<(), StoreError> {
+    let to_value = |text: String| serde_json::from_str::<Vec<serde_json::Value>>(&text).ok();
+    let mut signed = fs::read_to_string(path).ok().and_then(to_value).unwrap_or_default();
+    let new = serde_json::to_value(manifest).map_err(io::Error::from).map_err(io_error(path))?;
+    if signed.last() != Some(&new) {
+        signed.push(new);
+        let text = serde_json::to_string_pretty(&signed).map_err(io::Error::from);
+        write_whole(path, &text.map_err(io_error(path))?)?;
+    }
+    Ok(())
+}
+
+/// Removes what an earlier run wrote, the mark of a run's folder last.
+fn clear(path: &Path) -> Result<(), StoreError> {
+    for name in ["report.html", "summary.csv", MANIFEST, SURFACE] {
+        remove(&path.join(name), |file| fs::remove_file(file))?;
+    }
+    remove(&path.join(FIGURES), |folder| fs::remove_dir_all(folder))?;
+    remove(&path.join(RESOLVED), |file| fs::remove_file(file))
 }
 
 fn surface(experiment: &Experiment, truth: &Truth) -> String {
@@ -243,24 +290,18 @@ fn read_surface(path: &Path, zone: &Zone) -> Result<Truth, StoreError> {
     Ok(Truth::new(zone, places, heights_m))
 }
 
-/// Rows of a results file and the number of bytes they fill.
-///
-/// A last line without its end, or that is no row, was cut short: it is left out if `forgive`.
-fn read_rows(path: &Path, forgive: bool) -> Result<(Vec<TrialRow>, u64), StoreError> {
+/// Rows of a results file and the number of bytes they fill; a last line without its end was cut
+/// short and is left out.
+fn read_rows(path: &Path) -> Result<(Vec<TrialRow>, u64), StoreError> {
     let bytes = fs::read(path).map_err(io_error(path))?;
     let (mut rows, mut good) = (Vec::new(), 0);
-    for (i, line) in bytes.split_inclusive(|&byte| byte == b'\n').enumerate() {
-        let is_last = good + line.len() == bytes.len();
-        match serde_json::from_slice(line) {
-            Ok(row) if line.ends_with(b"\n") => rows.push(row),
-            Ok(_) if forgive => break,
-            Err(_) if forgive && is_last => break,
-            Ok(_) => break,
-            Err(error) => {
-                let message = error.to_string();
-                return Err(StoreError::BadRow { path: path.into(), line: i + 1, message });
-            }
-        }
+    let lines = bytes.split_inclusive(|&byte| byte == b'\n').filter(|line| line.ends_with(b"\n"));
+    for (i, line) in lines.enumerate() {
+        rows.push(serde_json::from_slice(line).map_err(|error| StoreError::BadRow {
+            path: path.into(),
+            line: i + 1,
+            message: error.to_string(),
+        })?);
         good += line.len();
     }
     Ok((rows, good as u64))

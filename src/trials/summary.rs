@@ -17,16 +17,16 @@ pub struct Point {
     pub trials: usize,
     /// Mean of Eq. 5.
     pub r_mean: f64,
-    /// Standard error of that mean.
-    pub r_se: f64,
+    /// Standard error of that mean; none of a single trial.
+    pub r_se: Option<f64>,
     /// Mean of the centred correlation.
     pub centred_r_mean: f64,
     /// Standard error of that mean.
-    pub centred_r_se: f64,
+    pub centred_r_se: Option<f64>,
     /// Mean root mean square error.
     pub rmse_mean_m: f64,
     /// Standard error of that mean.
-    pub rmse_se_m: f64,
+    pub rmse_se_m: Option<f64>,
     /// Median root mean square error.
     pub rmse_median_m: f64,
     /// Median root mean square error in the outer tenth of the zone.
@@ -48,12 +48,12 @@ pub struct Events {
     pub repeated: usize,
 }
 
-/// A number with its standard error.
-pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
+/// A mean with its standard error, which a single value does not have.
+pub fn mean_and_error(values: &[f64]) -> (f64, Option<f64>) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    let error = if values.len() > 1 { (squares / (count - 1.0) / count).sqrt() } else { 0.0 };
+    let error = (values.len() > 1).then(|| (squares / (count - 1.0) / count).sqrt());
     (mean, error)
 }
 
@@ -128,8 +128,8 @@ mod tests {
     fn mean_error_and_median_are_the_textbooks() {
         let (mean, error) = mean_and_error(&[1.0, 2.0, 3.0, 4.0]);
         assert_eq!(mean, 2.5);
-        assert!((error - (5.0f64 / 3.0 / 4.0).sqrt()).abs() < 1e-15);
-        assert_eq!(mean_and_error(&[3.0]), (3.0, 0.0));
+        assert!((error.unwrap() - (5.0f64 / 3.0 / 4.0).sqrt()).abs() < 1e-15);
+        assert_eq!(mean_and_error(&[3.0]), (3.0, None));
         assert_eq!(median(&[4.0, 1.0, 3.0]), Some(3.0));
         assert_eq!(median(&[4.0, 1.0, 3.0, 2.0]), Some(2.5));
         assert_eq!(median(&[]), None);

@@ -55,12 +55,12 @@ pub fn run(
         };
         if count >= experiment.initial_touches {
             match belief.refit() {
-                Ok(fit) => touch_row.fit = Some(fit.clone()),
+                Ok((fit, surface)) => {
+                    touch_row.metrics = Some(truth.compare(surface));
+                    touch_row.fit = Some(fit.clone());
+                    touch_row.jitter = belief.jitter();
+                }
                 Err(error) => row.failure = Some(format!("fit after touch {count}: {error}")),
-            }
-            if let Some(surface) = belief.surface() {
-                touch_row.jitter = surface.jitter();
-                touch_row.metrics = Some(truth.compare(surface));
             }
         }
         row.touches.push(touch_row);

@@ -23,6 +23,13 @@ pub fn scene(world: &World) -> Option<String> {
     let mut tip = zone.point(&zone.at(&[0.5, 0.5]), 0.0);
     tip.y = high.y + 2.0 * finger.radius_m;
     let heel = tip + finger.axis_w();
+    // MuJoCo refuses a capsule without length.
+    let hull = match finger.length_m > 1e-9 {
+        true => {
+            format!(r#"type="capsule" fromto="{} {}""#, triple(&tip.coords), triple(&heel.coords))
+        }
+        false => format!(r#"type="sphere" pos="{}""#, triple(&tip.coords)),
+    };
     let board = Point3::new(middle.x, low.y - BOARD_M / 2.0, middle.z);
     let camera = middle + Vector3::new(0.9, 2.2, 0.7) * (4.0 * half.norm());
     let mut vertices = String::new();
@@ -47,13 +54,13 @@ pub fn scene(world: &World) -> Option<String> {
   </asset>
   <worldbody>
     <light pos="{light}" dir="-1 -2 -2" directional="true"/>
-    <camera name="front" mode="targetbody" target="object" pos="{camera}"/>
+    <camera name="front" mode="targetbodycom" target="object" pos="{camera}"/>
     <body name="object">
       <geom name="object" type="mesh" mesh="object" rgba=".75 .75 .78 1"/>
     </body>
     <geom name="board" type="box" pos="{board}" size="{board_size}" rgba=".55 .45 .35 1"/>
     <body name="finger" mocap="true">
-      <geom name="finger" type="capsule" fromto="{tip} {heel}" size="{radius}" rgba=".2 .35 .6 1"/>
+      <geom name="finger" {hull} size="{radius}" rgba=".2 .35 .6 1"/>
     </body>
   </worldbody>
 </mujoco>
@@ -64,8 +71,6 @@ pub fn scene(world: &World) -> Option<String> {
         camera = triple(&camera.coords),
         board = triple(&board.coords),
         board_size = triple(&Vector3::new(half.x + 0.05, BOARD_M / 2.0, half.z + 0.05)),
-        tip = triple(&tip.coords),
-        heel = triple(&heel.coords),
         radius = finger.radius_m,
     );
     Some(text)

@@ -23,7 +23,7 @@ pub struct Scene {
     /// The object, if the body is not `function`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<Object>,
-    /// The finger; ignored if the body is `function`.
+    /// The finger; a `function` is touched without one.
     #[serde(default)]
     pub finger: Finger,
 }
@@ -134,12 +134,18 @@ impl Checked for Scene {
                 rules.require("function", "(none)", self.function.is_some(), || {
                     "\"toy\", because body = \"function\"".into()
                 });
+                rules.require("object", "(given)", self.object.is_none(), || {
+                    "no object: body = \"function\" touches a curve".into()
+                });
                 let flat = self.zone.z_m.is_none();
                 rules.require("zone.z_m", "(given)", flat, || {
                     "no z_m: the surface of body = \"function\" is a curve over x".into()
                 });
             }
             Body::Cast => {
+                rules.require("function", "(given)", self.function.is_none(), || {
+                    "no function: body = \"cast\" touches an object".into()
+                });
                 rules.require("object", "(none)", self.object.is_some(), || {
                     "a table with a mesh, because body = \"cast\"".into()
                 });

@@ -22,11 +22,20 @@ pub struct Zone {
 /// Largest coordinate of a zone; far beyond any arm's reach.
 const REACH_M: f64 = 1e3;
 
+/// Smallest side of a zone; below it, places differ by rounding only.
+const SIDE_MIN_M: f64 = 1e-6;
+
 impl Checked for Zone {
     fn check(&self, rules: &mut Rules) {
         rules.interval("x_m", self.x_m, -REACH_M..=REACH_M);
         if let Some(z_m) = self.z_m {
             rules.interval("z_m", z_m, -REACH_M..=REACH_M);
+        }
+        for (key, side) in ["x_m", "z_m"].iter().zip(self.sides()) {
+            let wide = side[1] - side[0] >= SIDE_MIN_M;
+            rules.require(key, format!("{side:?}"), wide, || {
+                format!("at least {SIDE_MIN_M} m wide")
+            });
         }
         rules.number("datum_y_m", self.datum_y_m, -REACH_M..=REACH_M);
     }

@@ -42,6 +42,9 @@ struct Active {
 
 impl Planner for Active {
     fn plan(&mut self, belief: &Belief) -> Plan {
+        if belief.surface().is_none() {
+            return Plan { target: uniform(&self.zone, &mut self.rng), sd_m: None, stall: None };
+        }
         let mut scratch = Scratch::default();
         let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
         let (lower, upper) = self.corners(MARGIN);

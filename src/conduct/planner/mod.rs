@@ -16,7 +16,8 @@ use serde::{Deserialize, Serialize};
 pub struct Plan {
     /// The place to touch.
     pub target: Vec<f64>,
-    /// Posterior standard deviation there, if the planner looked at it.
+    /// Standard deviation there, if the planner looked at it: the root of
+    /// [`Belief::explorable_variance`].
     pub sd_m: Option<f64>,
     /// Why the planner's own rule could not decide, if it could not.
     pub stall: Option<Stall>,

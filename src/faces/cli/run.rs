@@ -49,10 +49,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let world = Arc::new(World::build(experiment.scene.clone())?);
     let truth = Truth::sample(&world, experiment.grid as usize);
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&experiment.name));
-    if args.fresh {
-        RunFolder::clear(&path)?;
-    }
-    let (mut folder, done) = RunFolder::open(&path, &experiment, &truth, &manifest(&experiment))?;
+    runner::check(&truth)?;
+    let manifest = manifest(&experiment);
+    let (mut folder, done) = RunFolder::open(&path, &experiment, &truth, &manifest, args.fresh)?;
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(stop.clone())?;
 

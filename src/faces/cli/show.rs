@@ -69,21 +69,18 @@ fn scene(args: &Args) -> anyhow::Result<String> {
     let mut text = toml::to_string(&scene).context("cannot write the scene")?;
     let world = World::build(scene)?;
     let truth = Truth::sample(&world, GRID);
-    let heights = || truth.heights_m.iter().flatten();
-    let (low, high) = heights()
-        .fold((f64::MAX, f64::MIN), |(low, high), &height| (low.min(height), high.max(height)));
-    text += &format!(
-        "\nsurface in the zone: {} of {} test places, heights {:.2} to {:.2} mm above the datum\n",
-        truth.count(),
-        truth.places.len(),
-        low * 1e3,
-        high * 1e3
-    );
+    text +=
+        &format!("\nsurface in the zone: {} of {} test places", truth.count(), truth.places.len());
+    let heights = || truth.heights_m.iter().flatten().copied();
+    if let (Some(low), Some(high)) = (heights().reduce(f64::min), heights().reduce(f64::max)) {
+        text += &format!(", heights {:.2} to {:.2} mm above the datum", low * 1e3, high * 1e3);
+    }
+    text.push('\n');
     if let Shape::Mesh { report, .. } = world.shape() {
         text += &format!("{report}\n");
     }
     if let Some(model) = mjcf::scene(&world) {
-        text += &compiled(&model)?;
+        text += &compiled(&model);
         if let Some(path) = &args.mjcf {
             store::write_whole(path, &model)?;
             text += &format!("\nMJCF: {}", path.display());
@@ -95,19 +92,21 @@ fn scene(args: &Args) -> anyhow::Result<String> {
 }
 
 #[cfg(feature = "mujoco")]
-fn compiled(mjcf: &str) -> anyhow::Result<String> {
+fn compiled(mjcf: &str) -> String {
     use crate::bodies::mujoco;
-    let model = mujoco::compile(mjcf)?;
-    Ok(format!(
-        "MuJoCo {} compiles the scene: {} geoms, {} mesh vertices, {} mesh triangles",
-        mujoco::version(),
-        model.ngeom(),
-        model.nmeshvert(),
-        model.nmeshface()
-    ))
+    match mujoco::compile(mjcf) {
+        Ok(model) => format!(
+            "MuJoCo {} compiles the scene: {} geoms, {} mesh vertices, {} mesh triangles",
+            mujoco::version(),
+            model.ngeom(),
+            model.nmeshvert(),
+            model.nmeshface()
+        ),
+        Err(error) => error.to_string(),
+    }
 }
 
 #[cfg(not(feature = "mujoco"))]
-fn compiled(_: &str) -> anyhow::Result<String> {
-    Ok("this build is without MuJoCo (feature `mujoco`)".into())
+fn compiled(_: &str) -> String {
+    "this build is without MuJoCo (feature `mujoco`)".into()
 }

@@ -2,6 +2,7 @@
 
 use super::axes::MM;
 use super::replay::digits;
+use crate::faces::report::table::with_error;
 use crate::trials::store::Run;
 use crate::trials::summary::{self, Point};
 
@@ -57,15 +58,12 @@ fn scores(run: &Run, curves: &[(&str, Vec<Point>)]) -> Option<String> {
         .iter()
         .filter_map(|(name, points)| {
             let point = at(points, count)?;
-            let error = match point.trials > 1 {
-                true => format!(" ± {:.4}", point.r_se),
-                false => String::new(),
-            };
+            let r = with_error(point.r_mean, point.r_se, 4);
             let rmse = digits(MM.per_m * point.rmse_median_m);
             let edge = point.edge_rmse_median_m.map_or(String::new(), |edge_m| {
                 format!(", {} mm in the outer tenth of the zone", digits(MM.per_m * edge_m))
             });
-            Some(format!("{name} {:.4}{error} (median RMSE {rmse} mm{edge})", point.r_mean))
+            Some(format!("{name} {r} (median RMSE {rmse} mm{edge})"))
         })
         .collect();
     Some(format!("After {count} touches the mean R (Eq. 5) is: {}.", told.join("; ")))

@@ -14,7 +14,7 @@ pub mod table;
 
 pub use figures::{FIGURES, Figure};
 
-use crate::trials::store::{FIGURES as FIGURES_FOLDER, Run, write_whole};
+use crate::trials::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
 use anyhow::Context;
 use std::fs;
 use std::io;
@@ -42,8 +42,9 @@ pub fn write(run: &Run, folder: &Path) -> anyhow::Result<()> {
         write_figure(&path, svg.as_deref()).with_context(|| path.display().to_string())?;
         drawings.extend(svg.map(|svg| Drawing { figure, svg }));
     }
-    let manifest = fs::read_to_string(folder.join("manifest.json")).ok();
-    let html = page::html(run, &drawings, manifest.as_deref());
+    let text = |name| fs::read_to_string(folder.join(name)).ok();
+    let (settings, manifest) = (text(RESOLVED), text(MANIFEST));
+    let html = page::html(run, &drawings, settings.as_deref(), manifest.as_deref());
     Ok(write_whole(&folder.join("report.html"), &html)?)
 }
 

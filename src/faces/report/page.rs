@@ -2,7 +2,7 @@
 
 use super::canvas::escape;
 use super::{Drawing, findings, table};
-use crate::trials::store::{self, Run};
+use crate::trials::store::Run;
 use crate::trials::summary;
 
 /// Files of a run folder that the page points to.
@@ -17,8 +17,14 @@ const RAW: &[(&str, &str)] = &[
 /// Failures told one by one; more are only counted.
 const FAILURES_TOLD: usize = 10;
 
-/// The page as HTML. `manifest` is the text of the run's manifest, if there is one.
-pub fn html(run: &Run, drawings: &[Drawing], manifest: Option<&str>) -> String {
+/// The page as HTML; `settings` and `manifest` are the texts of the files of that name, if
+/// they are there.
+pub fn html(
+    run: &Run,
+    drawings: &[Drawing],
+    settings: Option<&str>,
+    manifest: Option<&str>,
+) -> String {
     let name = escape(&run.experiment.name);
     let question = match run.experiment.question.trim() {
         "" => String::new(),
@@ -34,7 +40,8 @@ pub fn html(run: &Run, drawings: &[Drawing], manifest: Option<&str>) -> String {
         paragraph(&findings::sentences(run)),
         summary_table(run),
         events(run),
-        settings(run, manifest),
+        details("Every setting, defaults written out", settings)
+            + &details("What ran it", manifest),
         raw_files(drawings),
     )
 }
@@ -100,18 +107,11 @@ fn figure(run: &Run, drawing: &Drawing) -> String {
     )
 }
 
-fn settings(run: &Run, manifest: Option<&str>) -> String {
-    let manifest = manifest.map_or(String::new(), |text| {
-        format!(
-            "<details>\n<summary>What ran it</summary>\n<pre>{}</pre>\n</details>\n",
-            escape(text)
-        )
-    });
-    format!(
-        "<section>\n<h2>Settings</h2>\n<details>\n<summary>Every setting, defaults written \
-         out</summary>\n<pre>{}</pre>\n</details>\n{manifest}</section>\n",
-        escape(&store::resolved(&run.experiment))
-    )
+fn details(summary: &str, text: Option<&str>) -> String {
+    text.map_or(String::new(), |text| {
+        let text = escape(text);
+        format!("<details>\n<summary>{summary}</summary>\n<pre>{text}</pre>\n</details>\n")
+    })
 }
 
 fn raw_files(drawings: &[Drawing]) -> String {

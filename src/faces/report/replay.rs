@@ -81,14 +81,6 @@ pub fn row<'a>(run: &'a Run, planner: &str) -> Option<&'a TrialRow> {
     run.rows.iter().find(|row| row.planner == planner && row.trial == trial)
 }
 
-/// Planners whose beliefs are drawn.
-pub fn planners(run: &Run) -> &[String] {
-    match run.experiment.report.planners.as_slice() {
-        [] => &run.experiment.planners,
-        chosen => chosen,
-    }
-}
-
 /// The place (x) or (x, z) of a touch and its height above the datum; none for a miss.
 pub fn contact(zone: &Zone, touch: &TouchRow) -> Option<(Vec<f64>, f64)> {
     let p_wc = Point3::from(touch.contact?);
@@ -97,8 +89,9 @@ pub fn contact(zone: &Zone, touch: &TouchRow) -> Option<(Vec<f64>, f64)> {
 
 /// Every height that a drawing of beliefs should have room for: true ones and touched ones.
 pub fn heights_m(run: &Run) -> impl Iterator<Item = f64> {
-    let touched = planners(run)
-        .iter()
+    let planners = run.experiment.drawn_planners();
+    let touched = planners
+        .into_iter()
         .filter_map(|planner| row(run, planner))
         .flat_map(|row| &row.touches)
         .filter_map(|touch| Some(contact(&run.experiment.scene.zone, touch)?.1));

@@ -61,12 +61,18 @@ pub fn cells(point: &Point) -> [String; 7] {
     [
         point.touches.to_string(),
         point.planner.clone(),
-        format!("{:.4} ± {:.4}", point.r_mean, point.r_se),
-        format!("{:.4} ± {:.4}", point.centred_r_mean, point.centred_r_se),
-        format!("{:.3} ± {:.3}", 1e3 * point.rmse_mean_m, 1e3 * point.rmse_se_m),
+        with_error(point.r_mean, point.r_se, 4),
+        with_error(point.centred_r_mean, point.centred_r_se, 4),
+        with_error(1e3 * point.rmse_mean_m, point.rmse_se_m.map(|error| 1e3 * error), 3),
         format!("{:.3}", 1e3 * point.rmse_median_m),
         point.edge_rmse_median_m.map_or("-".into(), |edge| format!("{:.3}", 1e3 * edge)),
     ]
+}
+
+/// A mean and its standard error, if it has one.
+pub fn with_error(mean: f64, error: Option<f64>, decimals: usize) -> String {
+    let error = error.map_or(String::new(), |error| format!(" ± {error:.decimals$}"));
+    format!("{mean:.decimals$}{error}")
 }
 
 /// What happened to a planner's trials, in a line; empty if nothing did.

@@ -85,7 +85,7 @@ pub enum ConfigError {
     },
     /// A `--set` that is not `key=value`, or whose key leads through a value.
     #[error(
-        "--set {text}: write it as key=value, with dots between tables, as in gp.noise_max=0.1"
+        "--set {text}: write it as key=value, with dots between tables, as in gp.noise=[1e-4,0.1]"
     )]
     Assignment {
         /// As typed.

@@ -54,6 +54,8 @@ impl Loader {
             other => other,
         })?;
         self.table.insert(key.into(), Value::Table(table));
+        // From here on, what stands under the key comes from the file.
+        self.sets.retain(|(set, _)| set != key);
         self.sources.push(Source { path, prefix: format!("{key}."), document });
         Ok(())
     }

@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use super::error::MeshFault;
 
 /// More triangles than this are refused, so that a corrupt count cannot exhaust memory.
-pub const MAX_TRIANGLES: usize = 50_000_000;
+pub const MAX_TRIANGLES: usize = 5_000_000;
 
 /// More vertices than this are refused: three for each triangle.
 pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;

@@ -53,14 +53,37 @@ impl Posterior {
     /// If the enlarged covariance is not positive definite; nothing is taken in then, and
     /// [`new`](Self::new) would find the jitter it needs.
     pub fn add(&mut self, place: &[f64], height: f64) -> Result<(), NotPositiveDefinite> {
+        self.append(place, height)?;
+        self.weigh();
+        Ok(())
+    }
+
+    fn append(&mut self, place: &[f64], height: f64) -> Result<(), NotPositiveDefinite> {
         let mut row = vec![0.0; self.observations.len()];
         self.correlations(place, &mut row);
         let noise_ratio = self.hyperparameters.noise_sd / self.hyperparameters.signal_sd;
         row.push(1.0 + noise_ratio * noise_ratio + self.jitter);
         self.factor.append(&row)?;
         self.observations.push(place, height);
-        self.weigh();
         Ok(())
+    }
+
+    /// What would be known of the variance if `places` had been touched as well; its mean means
+    /// nothing. n² operations for each.
+    ///
+    /// # Errors
+    /// [`Indefinite`] if the enlarged covariance cannot be factored.
+    pub fn visiting<'a>(
+        &self,
+        places: impl Iterator<Item = &'a [f64]> + Clone,
+    ) -> Result<Self, Indefinite> {
+        let mut visiting = self.clone();
+        if places.clone().try_for_each(|place| visiting.append(place, 0.0)).is_ok() {
+            return Ok(visiting);
+        }
+        let mut observations = self.observations.clone();
+        places.for_each(|place| observations.push(place, 0.0));
+        Self::new(self.kernel, self.hyperparameters.clone(), observations)
     }
 
     fn weigh(&mut self) {

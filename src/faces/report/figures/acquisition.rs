@@ -26,9 +26,8 @@ fn caption(run: &Run) -> String {
 
 /// The planner drawn: the one that follows this map, if it is there.
 fn planner(run: &Run) -> Option<&str> {
-    let planners = replay::planners(run);
-    let chosen = planners.iter().find(|name| *name == "active").or(planners.first());
-    chosen.map(String::as_str)
+    let planners = run.experiment.drawn_planners();
+    planners.iter().find(|&&name| name == "active").or(planners.first()).copied()
 }
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {

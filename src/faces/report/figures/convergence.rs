@@ -17,7 +17,7 @@ struct Measure {
     /// The line.
     value: fn(&Point) -> Option<f64>,
     /// Its standard error, for a band.
-    error: Option<fn(&Point) -> f64>,
+    error: fn(&Point) -> Option<f64>,
     /// A second, thin line.
     other: Option<fn(&Point) -> f64>,
 }
@@ -27,28 +27,28 @@ const MEASURES: [Measure; 4] = [
         title: "correlation R (Eq. 5), mean",
         is_log: false,
         value: |point| Some(point.r_mean),
-        error: Some(|point| point.r_se),
+        error: |point| point.r_se,
         other: None,
     },
     Measure {
         title: "centred correlation, mean",
         is_log: false,
         value: |point| Some(point.centred_r_mean),
-        error: Some(|point| point.centred_r_se),
+        error: |point| point.centred_r_se,
         other: None,
     },
     Measure {
         title: "RMSE (mm): median, and mean (dotted)",
         is_log: true,
         value: |point| Some(MM.per_m * point.rmse_median_m),
-        error: None,
+        error: |_| None,
         other: Some(|point| MM.per_m * point.rmse_mean_m),
     },
     Measure {
         title: "RMSE in the outer tenth of the zone (mm): median",
         is_log: true,
         value: |point| Some(MM.per_m * point.edge_rmse_median_m?),
-        error: None,
+        error: |_| None,
         other: None,
     },
 ];
@@ -56,7 +56,7 @@ const MEASURES: [Measure; 4] = [
 fn caption(run: &Run) -> String {
     let score = constant_score(run).map_or(String::new(), |score| {
         format!(
-            " R is not centred: a constant, whatever its height, scores {score:.3} here (dashed), \
+            " R is not centred: a positive constant, however high, scores {score:.3} here (dashed), \
              so the centred correlation stands beside it."
         )
     });
@@ -118,9 +118,8 @@ fn draw_measure(
     constant: Option<f64>,
 ) {
     let points = || curves.iter().flat_map(|(_, points)| points);
-    let lowest = |point: &Point| {
-        Some((measure.value)(point)? - measure.error.map_or(0.0, |error| error(point)))
-    };
+    let lowest =
+        |point: &Point| Some((measure.value)(point)? - (measure.error)(point).unwrap_or(0.0));
     let values = points().filter_map(lowest).chain(points().filter_map(measure.value));
     let values = values.chain(constant);
     let y = match (measure.is_log, measure.other) {
@@ -159,14 +158,14 @@ fn draw_curve(
     let over = |value: &dyn Fn(&Point) -> Option<f64>| -> Vec<(f64, f64)> {
         points.iter().filter_map(|point| Some((point.touches.into(), value(point)?))).collect()
     };
-    if let Some(error) = measure.error.filter(|_| points.iter().any(|point| point.trials > 1)) {
-        let band: Vec<(f64, f64, f64)> = points
-            .iter()
-            .filter_map(|point| {
-                let (value, error) = ((measure.value)(point)?, error(point));
-                Some((point.touches.into(), value - error, value + error))
-            })
-            .collect();
+    let band: Vec<(f64, f64, f64)> = points
+        .iter()
+        .filter_map(|point| {
+            let (value, error) = ((measure.value)(point)?, (measure.error)(point)?);
+            Some((point.touches.into(), value - error, value + error))
+        })
+        .collect();
+    if !band.is_empty() {
         panel.band(canvas, &band, colour);
     }
     if let Some(other) = measure.other {

@@ -31,7 +31,7 @@ const GAP: (f64, f64) = (22.0, 68.0);
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let zone = &run.experiment.scene.zone;
-    let (planners, counts) = (replay::planners(run), run.experiment.drawn_touch_counts());
+    let (planners, counts) = (run.experiment.drawn_planners(), run.experiment.drawn_touch_counts());
     if zone.dimension() != 1 || !planners.iter().any(|name| replay::row(run, name).is_some()) {
         return Ok(None);
     }

@@ -35,7 +35,7 @@ const TITLE_PX: f64 = 42.0;
 const FOOT_PX: f64 = 62.0;
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
-    let (planners, counts) = (replay::planners(run), run.experiment.drawn_touch_counts());
+    let (planners, counts) = (run.experiment.drawn_planners(), run.experiment.drawn_touch_counts());
     let Some(space) = space(run) else { return Ok(None) };
     if !planners.iter().any(|planner| replay::row(run, planner).is_some()) {
         return Ok(None);
