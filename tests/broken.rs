@@ -242,6 +242,7 @@ fn broken_command_lines_are_refused() {
         (&["run", "small.toml", "--out", "mesh.obj"], &["mesh.obj"]),
         (&["run", "small.toml", "--out", "."], &[".", "something else", "--out"]),
         (&["run", "small.toml", "--threads", "x"], &["--threads"]),
+        (&["run", "small.toml", "--threads", "100000"], &["--threads", "1024"]),
         (&["report", "none"], &["none"]),
         (&["report", "mesh.obj"], &["mesh.obj"]),
         (&["show", "none.obj"], &["none.obj", "cannot be read"]),

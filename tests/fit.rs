@@ -55,6 +55,38 @@ fn fits_of_the_toy_reach_the_global_maximum() {
     assert_eq!((fits, short), (84, 0));
 }
 
+/// A trial's fits begin from the last one and do not scan each time; what they reach is what a
+/// scan would have, but for a twentieth of a nat until the next scan.
+#[test]
+fn fits_touch_by_touch_reach_what_cold_fits_reach() {
+    let bounds = SearchBox {
+        length_scales: vec![(0.005, 1.0); 2],
+        noise_ratio: (1e-4, 1e-2),
+        signal_sd: (1e-3, 1e3),
+    };
+    let (mut fits, mut gaps) = (0, Vec::new());
+    for trial in 0..4 {
+        let mut touches = Observations::new(2);
+        let mut last = None;
+        for i in 0..90 {
+            let step = f64::from(trial) * 0.377 + f64::from(i);
+            let place = [(step * 0.754_877_666) % 1.0, (step * 0.569_840_291) % 1.0];
+            let bump = (-40.0 * ((place[0] - 0.6).powi(2) + (place[1] - 0.4).powi(2))).exp();
+            touches.push(&place, 1.0 - place[0] * place[0] + 0.3 * bump);
+            let fit = bounds.fit(&KERNEL, &touches, last.as_ref());
+            if i >= 20 && i % 5 == 0 {
+                let cold = bounds.fit(&KERNEL, &touches, None);
+                fits += 1;
+                gaps.push(cold.log_likelihood - fit.log_likelihood);
+            }
+            last = Some(fit);
+        }
+    }
+    let short = gaps.iter().filter(|gap| **gap > 1e-3).count();
+    let worst = gaps.iter().fold(0.0, |worst: f64, gap| worst.max(*gap));
+    assert!(fits == 56 && short <= 1 && worst < 0.05, "{short} of {fits}, worst {worst}");
+}
+
 #[test]
 fn a_fit_recovers_the_lengths_of_an_anisotropic_surface() {
     let mut touches = Observations::new(2);

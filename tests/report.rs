@@ -85,6 +85,7 @@ fn touch(experiment: &Experiment, trial: u32, count: u32) -> TouchRow {
         },
         log_likelihood: 0.0,
         factorisations: 1,
+        scanned_at: 0,
         stop: Stop::Converged,
     };
     let error_m = 0.02 / f64::from(count);

@@ -104,7 +104,7 @@ impl Belief {
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
     pub fn refit(&mut self) -> Result<(&Fit, &Posterior), Indefinite> {
-        let last = self.fit.take().map(|fit| fit.hyperparameters);
+        let last = self.fit.take();
         let fit = self.search_box().fit(self.kernel, &self.contacts, last.as_ref());
         let posterior = self.posterior(fit.hyperparameters.clone())?;
         self.explore(&posterior)?;

@@ -117,7 +117,7 @@ mod engine {
 
     /// Relative change of the value below which L-BFGS counts as converged; chosen well above
     /// rounding, far below what changes a plan.
-    const VALUE_TOLERANCE: f64 = 1e-10;
+    const VALUE_TOLERANCE: f64 = 1e-8;
 
     fn watched(x: &[f64], mut gradient: Option<&mut [f64]>, watch: &mut Watch) -> f64 {
         let mut value = (watch.objective)(x, gradient.as_deref_mut());

@@ -34,8 +34,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     /// Threads; 0 means all cores. Results do not depend on it.
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    threads: usize,
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
     /// Throw away what an earlier run left in the folder.
     #[arg(long)]
     fresh: bool,
@@ -63,7 +63,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         &world,
         &truth,
         (&mut folder, &done),
-        args.threads,
+        args.threads.into(),
         &stop,
         &|_| step(&bar),
     )?;

@@ -27,15 +27,23 @@ pub struct Fit {
     pub log_likelihood: f64,
     /// How many covariance matrices were factored.
     pub factorisations: u32,
+    /// With how many observations the whole box was last scanned, in this fit or one it began
+    /// from.
+    pub scanned_at: usize,
     /// Why the climb that won stopped.
     pub stop: Stop,
 }
 
 /// Evaluations allowed to one climb; most need a fifth of it.
 const CLIMB_BUDGET: u32 = 100;
-/// Hills of the scan that are climbed, besides the last fit's; chosen: the fourth best hill
-/// never won on the toy.
+/// Hills of the scan that are climbed, besides the last fit's; chosen: enough for every fit of
+/// the toy that was held against a dense grid.
 const CLIMBS: usize = 3;
+/// Up to this many observations each fit scans the whole box: few touches change their mind.
+const SCAN_ALWAYS: usize = 32;
+/// Beyond, a fit scans once the observations have grown by this factor since the last scan, and
+/// in between climbs from where it stood; chosen.
+const SCAN_AGAIN: f64 = 1.2;
 /// Noise levels of the scan, spread over the logarithm of their range.
 const NOISE_LEVELS: usize = 3;
 
@@ -44,20 +52,27 @@ impl SearchBox {
     ///
     /// The likelihood is profiled over signal_sd, which has a closed form, so the search runs
     /// over (ln lengths, ln noise ratio) only. `last`, the fit before the newest touches, is one
-    /// more start. With no observations, or if no covariance can be factored, the middle of the
+    /// more start, or the only one while the box need not be scanned again. With no observations, or if no covariance can be factored, the middle of the
     /// box is returned with [`Stop::Failed`].
     pub fn fit(
         &self,
         kernel: &'static dyn Kernel,
         observations: &Observations,
-        last: Option<&Hyperparameters>,
+        last: Option<&Fit>,
     ) -> Fit {
         let mut likelihood = Likelihood::new(kernel, observations);
         let (lower, upper) = self.log_bounds();
+        let count = observations.len();
+        let is_recent = |last: &&Fit| count as f64 <= SCAN_AGAIN * last.scanned_at as f64;
+        let recent = last.filter(is_recent).filter(|_| count > SCAN_ALWAYS);
+        let scanned_at = recent.map_or(count, |last| last.scanned_at);
         let mut best: Option<Fit> = None;
         if !observations.is_empty() {
-            let mut starts = self.hills(&mut likelihood, &lower, &upper);
-            starts.extend(last.map(log_parameters));
+            let mut starts = match recent {
+                Some(last) => vec![shorter(&last.hyperparameters, &lower, &upper)],
+                None => self.hills(&mut likelihood, &lower, &upper),
+            };
+            starts.extend(last.map(|last| log_parameters(&last.hyperparameters)));
             for start in starts {
                 let bounds = optimize::Bounds { lower: &lower, upper: &upper };
                 let top = optimize::lbfgs(bounds, &start, CLIMB_BUDGET, |x, gradient| {
@@ -73,6 +88,7 @@ impl SearchBox {
         }
         let mut best = best.unwrap_or_else(|| self.prior(&lower, &upper));
         best.factorisations = likelihood.factorisations();
+        best.scanned_at = scanned_at;
         best
     }
 
@@ -96,6 +112,7 @@ impl SearchBox {
             hyperparameters,
             log_likelihood: profile.log_likelihood,
             factorisations: 0,
+            scanned_at: 0,
             stop,
         })
     }
@@ -113,6 +130,7 @@ impl SearchBox {
             },
             log_likelihood: 0.0,
             factorisations: 0,
+            scanned_at: 0,
             stop: Stop::Failed,
         }
     }
@@ -185,6 +203,17 @@ fn parameters(logs: &[f64]) -> (Vec<f64>, f64) {
     let mut lengths: Vec<f64> = logs.iter().map(|log| log.exp()).collect();
     let noise_ratio = lengths.pop().unwrap_or(0.0);
     (lengths, noise_ratio)
+}
+
+/// A third of the lengths and the middle noise: a start from which a fit that sits in a corner of
+/// its box finds out that new touches have shown a rougher surface.
+fn shorter(at: &Hyperparameters, lower: &[f64], upper: &[f64]) -> Vec<f64> {
+    let mut logs = log_parameters(at);
+    logs.iter_mut().for_each(|log| *log -= 3f64.ln());
+    if let (Some(noise), Some(lower), Some(upper)) = (logs.last_mut(), lower.last(), upper.last()) {
+        *noise = 0.5 * (lower + upper);
+    }
+    logs
 }
 
 fn log_parameters(at: &Hyperparameters) -> Vec<f64> {
