@@ -1,10 +1,11 @@
 //! What one trial spends its time on, piece by piece.
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate::conduct::probe;
 use palpate::ground::gp::fit::SearchBox;
 use palpate::ground::gp::kernel::{Hyperparameters, SquaredExponential};
+use palpate::ground::gp::likelihood::Likelihood;
 use palpate::ground::gp::posterior::Scratch;
 use palpate::ground::gp::{Observations, Posterior};
 use palpate::world::world::Shape;
@@ -36,15 +37,40 @@ fn gaussian_process(c: &mut Criterion) {
         signal_sd: (1e-3, 1e3),
     };
     let mut group = c.benchmark_group("gp");
-    for count in [20, 50, 100] {
+    for count in [20, 50, 200] {
+        group.bench_with_input(
+            BenchmarkId::new("cold fit", count),
+            &touches(count),
+            |b, touches| {
+                b.iter(|| bounds.fit(&KERNEL, black_box(touches), None));
+            },
+        );
+    }
+    for count in [50, 200, 1000] {
         let touches = touches(count);
-        group.bench_with_input(BenchmarkId::new("cold fit", count), &touches, |b, touches| {
-            b.iter(|| bounds.fit(&KERNEL, black_box(touches), None));
+        let mut likelihood = Likelihood::new(&KERNEL, &touches);
+        let mut gradient = [0.0; 4];
+        group.bench_function(BenchmarkId::new("likelihood with gradient", count), |b| {
+            b.iter(|| likelihood.value_gradient(black_box(&hyperparameters()), &mut gradient));
         });
+        let touches = touches.clone();
         let Ok(posterior) = Posterior::new(&KERNEL, hyperparameters(), touches) else { continue };
         let mut scratch = Scratch::default();
         group.bench_with_input(BenchmarkId::new("variance", count), &posterior, |b, posterior| {
             b.iter(|| posterior.variance(black_box(&[0.31, 0.47]), &mut scratch));
+        });
+        let mut slope = [0.0; 2];
+        group.bench_function(BenchmarkId::new("variance with gradient", count), |b| {
+            b.iter(|| {
+                posterior.variance_gradient(black_box(&[0.31, 0.47]), &mut slope, &mut scratch)
+            });
+        });
+        group.bench_function(BenchmarkId::new("add a touch", count), |b| {
+            b.iter_batched_ref(
+                || posterior.clone(),
+                |posterior| posterior.add(black_box(&[0.313, 0.471]), 1.0),
+                BatchSize::LargeInput,
+            );
         });
     }
     group.finish();
