@@ -7,7 +7,7 @@ use palpate::ground::gp::fit::SearchBox;
 use palpate::ground::gp::kernel::{Hyperparameters, SquaredExponential};
 use palpate::ground::gp::likelihood::Likelihood;
 use palpate::ground::gp::posterior::Scratch;
-use palpate::ground::gp::{Observations, Posterior};
+use palpate::ground::gp::{Mean, Observations, Posterior};
 use palpate::world::world::Shape;
 use palpate::world::{Scene, World};
 use std::hint::black_box;
@@ -27,14 +27,16 @@ fn touches(count: usize) -> Observations {
 }
 
 fn hyperparameters() -> Hyperparameters {
-    Hyperparameters { signal_sd: 1.0, length_scales: vec![0.2, 0.4], noise_sd: 1e-3 }
+    Hyperparameters { signal_sd: 1.0, length_scales: vec![0.2, 0.4], noise_sd: 1e-3, mean: 0.0 }
 }
 
 fn gaussian_process(c: &mut Criterion) {
     let bounds = SearchBox {
-        length_scales: vec![(0.005, 1.0); 2],
-        noise_ratio: (1e-4, 1e-2),
-        signal_sd: (1e-3, 1e3),
+        mean: Mean::Zero,
+        length_scales: vec![(0.005, 1.0).into(); 2],
+        noise_ratio: (1e-4, 1e-2).into(),
+        signal_sd: (1e-3, 1e3).into(),
+        noise_sd: None,
     };
     let mut group = c.benchmark_group("gp");
     for count in [20, 50, 200] {
@@ -48,7 +50,7 @@ fn gaussian_process(c: &mut Criterion) {
     }
     for count in [50, 200, 1000] {
         let touches = touches(count);
-        let mut likelihood = Likelihood::new(&KERNEL, &touches);
+        let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, &touches);
         let mut gradient = [0.0; 4];
         group.bench_function(BenchmarkId::new("likelihood with gradient", count), |b| {
             b.iter(|| likelihood.value_gradient(black_box(&hyperparameters()), &mut gradient));

@@ -1,10 +1,10 @@
 //! Fits reach the global maximum of the likelihood.
 #![cfg(feature = "nlopt")]
 
-use palpate::ground::gp::Observations;
 use palpate::ground::gp::fit::SearchBox;
 use palpate::ground::gp::kernel::SquaredExponential;
 use palpate::ground::gp::likelihood::Likelihood;
+use palpate::ground::gp::{LogNormal, Mean, Observations, Range, Scale};
 
 static KERNEL: SquaredExponential = SquaredExponential;
 
@@ -14,8 +14,8 @@ fn toy(x: f64) -> f64 {
 
 /// The slow twin of a fit: the profiled likelihood on a dense grid over the same box.
 fn best_on_grid(bounds: &SearchBox, touches: &Observations) -> f64 {
-    let mut likelihood = Likelihood::new(&KERNEL, touches);
-    let level = |(low, high): (f64, f64), i: usize, of: usize| {
+    let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, touches);
+    let level = |Range { low, high, .. }: Range, i: usize, of: usize| {
         low * (high / low).powf(i as f64 / (of - 1) as f64)
     };
     let mut best = f64::MIN;
@@ -23,7 +23,9 @@ fn best_on_grid(bounds: &SearchBox, touches: &Observations) -> f64 {
         let length = level(bounds.length_scales[0], i, 240);
         for j in 0..30 {
             let ratio = level(bounds.noise_ratio, j, 30);
-            if let Ok(profile) = likelihood.profile(&[length], ratio, bounds.signal_sd, None) {
+            if let Ok(profile) =
+                likelihood.profile(&[length], ratio, &Scale::Best(bounds.signal_sd), None)
+            {
                 best = best.max(profile.log_likelihood);
             }
         }
@@ -34,9 +36,11 @@ fn best_on_grid(bounds: &SearchBox, touches: &Observations) -> f64 {
 #[test]
 fn fits_of_the_toy_reach_the_global_maximum() {
     let bounds = SearchBox {
-        length_scales: vec![(0.02, 4.0)],
-        noise_ratio: (1e-4, 1e-2),
-        signal_sd: (1e-3, 1e3),
+        mean: Mean::Zero,
+        length_scales: vec![(0.02, 4.0).into()],
+        noise_ratio: (1e-4, 1e-2).into(),
+        signal_sd: (1e-3, 1e3).into(),
+        noise_sd: None,
     };
     let (mut fits, mut short) = (0, 0);
     for trial in 0..12u64 {
@@ -60,9 +64,11 @@ fn fits_of_the_toy_reach_the_global_maximum() {
 #[test]
 fn fits_touch_by_touch_reach_what_cold_fits_reach() {
     let bounds = SearchBox {
-        length_scales: vec![(0.005, 1.0); 2],
-        noise_ratio: (1e-4, 1e-2),
-        signal_sd: (1e-3, 1e3),
+        mean: Mean::Zero,
+        length_scales: vec![(0.005, 1.0).into(); 2],
+        noise_ratio: (1e-4, 1e-2).into(),
+        signal_sd: (1e-3, 1e3).into(),
+        noise_sd: None,
     };
     let (mut fits, mut gaps) = (0, Vec::new());
     for trial in 0..4 {
@@ -95,10 +101,39 @@ fn a_fit_recovers_the_lengths_of_an_anisotropic_surface() {
         touches.push(&place, (9.0 * place[0]).sin() + 0.3 * place[1]);
     }
     let bounds = SearchBox {
-        length_scales: vec![(0.005, 1.0); 2],
-        noise_ratio: (1e-4, 1e-2),
-        signal_sd: (1e-3, 1e3),
+        mean: Mean::Zero,
+        length_scales: vec![(0.005, 1.0).into(); 2],
+        noise_ratio: (1e-4, 1e-2).into(),
+        signal_sd: (1e-3, 1e3).into(),
+        noise_sd: None,
     };
     let fit = bounds.fit(&KERNEL, &touches, None).hyperparameters;
     assert!(fit.length_scales[1] > 2.0 * fit.length_scales[0], "{fit:?}");
+}
+
+#[test]
+fn a_prior_pulls_a_known_noise_stays_and_a_constant_is_found() {
+    let mut touches = Observations::new(1);
+    for i in 0..12 {
+        let x = -2.0 + 4.0 * (f64::from(i) * 0.618_033_988_75 % 1.0);
+        touches.push(&[x], 1000.0 + toy(x));
+    }
+    let free = SearchBox {
+        mean: Mean::Constant,
+        length_scales: vec![(0.02, 4.0).into()],
+        noise_ratio: (1e-4, 1e-2).into(),
+        signal_sd: (1e-3, 1e3).into(),
+        noise_sd: None,
+    };
+    let found = free.fit(&KERNEL, &touches, None).hyperparameters;
+    assert!((found.mean - 1001.0).abs() < 1.0 && found.signal_sd < 2.0, "{found:?}");
+    let prior = Some(LogNormal { median: 1.0, spread: 1.05 });
+    let ranges = vec![Range { prior, ..free.length_scales[0] }];
+    let pulled = SearchBox { length_scales: ranges, ..free.clone() };
+    let pulled = pulled.fit(&KERNEL, &touches, None).hyperparameters;
+    let off = |length: f64| length.ln().abs();
+    assert!(off(pulled.length_scales[0]) < off(found.length_scales[0]), "{pulled:?}");
+    let known = SearchBox { noise_sd: Some(0.05), ..free };
+    let known = known.fit(&KERNEL, &touches, None).hyperparameters;
+    assert!((known.noise_sd - 0.05).abs() < 1e-12, "{known:?}");
 }

@@ -3,7 +3,7 @@
 use palpate::ground::gp::kernel::{Hyperparameters, SquaredExponential};
 use palpate::ground::gp::likelihood::Likelihood;
 use palpate::ground::gp::posterior::Scratch;
-use palpate::ground::gp::{Observations, Posterior};
+use palpate::ground::gp::{LogNormal, Mean, Observations, Posterior, Range, Scale};
 use proptest::prelude::*;
 use serde::Deserialize;
 
@@ -38,6 +38,7 @@ impl Case {
             signal_sd: self.signal_sd,
             length_scales: self.length_scales.clone(),
             noise_sd: self.noise_sd,
+            mean: 0.0,
         }
     }
 
@@ -93,7 +94,7 @@ fn likelihood_and_gradient_keep_the_digits_the_condition_number_allows() {
         let tolerance = tolerance(0.2, &case);
         let observations = case.observations();
         let mut gradient = vec![0.0; case.gradient_log_sf_l_sw.len()];
-        let value = Likelihood::new(&KERNEL, &observations)
+        let value = Likelihood::new(&KERNEL, Mean::Zero, &observations)
             .value_gradient(&case.hyperparameters(), &mut gradient)
             .unwrap();
         let error = (value / case.log_marginal_likelihood - 1.0).abs();
@@ -108,7 +109,7 @@ fn likelihood_and_gradient_keep_the_digits_the_condition_number_allows() {
 
 #[test]
 fn one_touch_gives_the_closed_form() {
-    let at = Hyperparameters { signal_sd: 2.0, length_scales: vec![0.5], noise_sd: 0.1 };
+    let at = Hyperparameters { signal_sd: 2.0, length_scales: vec![0.5], noise_sd: 0.1, mean: 0.0 };
     let ours = posterior(at, observations([(&[0.3][..], 1.5)]));
     let mut scratch = Scratch::default();
     for x in [-1.0, 0.3, 0.31, 4.0] {
@@ -121,7 +122,7 @@ fn one_touch_gives_the_closed_form() {
 
 #[test]
 fn coinciding_places_without_noise_need_jitter_and_say_so() {
-    let at = Hyperparameters { signal_sd: 1.0, length_scales: vec![1.0], noise_sd: 0.0 };
+    let at = Hyperparameters { signal_sd: 1.0, length_scales: vec![1.0], noise_sd: 0.0, mean: 0.0 };
     let twice = observations([(&[0.0][..], 1.0), (&[0.0][..], 1.0), (&[0.5][..], 0.0)]);
     let ours = posterior(at, twice);
     assert!(ours.jitter() > 0.0 && ours.jitter() < 1e-12, "{:e}", ours.jitter());
@@ -132,7 +133,7 @@ fn coinciding_places_without_noise_need_jitter_and_say_so() {
 fn any_belief() -> impl Strategy<Value = (Hyperparameters, Vec<([f64; 2], f64)>)> {
     let touch = ([-1.0..1.0f64, -1.0..1.0f64], -1.0..1.0f64);
     let at = (0.1..3.0f64, 0.1..2.0f64, 0.1..2.0f64, 1e-3..0.3f64).prop_map(|(s, a, b, ratio)| {
-        Hyperparameters { signal_sd: s, length_scales: vec![a, b], noise_sd: s * ratio }
+        Hyperparameters { signal_sd: s, length_scales: vec![a, b], noise_sd: s * ratio, mean: 0.0 }
     });
     (at, proptest::collection::vec(touch, 1..25))
 }
@@ -145,7 +146,7 @@ proptest! {
     #[test]
     fn gradients_are_central_differences((at, touches) in any_belief(), place in [-1.0..1.0f64, -1.0..1.0f64]) {
         let touches = all(&touches);
-        let mut likelihood = Likelihood::new(&KERNEL, &touches);
+        let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, &touches);
         let mut gradient = vec![0.0; 4];
         likelihood.value_gradient(&at, &mut gradient).unwrap();
         for (i, ours) in gradient.iter().enumerate() {
@@ -175,6 +176,38 @@ proptest! {
             };
             let twin = (moved(1e-5) - moved(-1e-5)) / 2e-5;
             prop_assert!((slope[axis] - twin).abs() < 1e-4 * (1.0 + twin.abs()));
+        }
+    }
+
+    /// However signal and mean are chosen, the profiled gradient is a central difference.
+    #[test]
+    fn profiled_gradients_are_central_differences((at, touches) in any_belief(), choice in 0..3usize) {
+        let touches = all(&touches);
+        let prior = Some(LogNormal { median: 1.0, spread: 1.5 });
+        let scale = [
+            Scale::Best((1e-3, 1e3).into()),
+            Scale::Best(Range { low: 1e-3, high: 1e3, prior }),
+            Scale::KnownNoise(0.05),
+        ][choice];
+        let mean = [Mean::Zero, Mean::Constant, Mean::Data][choice];
+        let mut likelihood = Likelihood::new(&KERNEL, mean, &touches);
+        let logs: Vec<f64> =
+            [at.length_scales[0], at.length_scales[1], at.noise_sd / at.signal_sd].map(f64::ln).into();
+        let mut score = |logs: &[f64], gradient: Option<&mut [f64]>| {
+            let (lengths, ratio) = ([logs[0].exp(), logs[1].exp()], logs[2].exp());
+            let profile = likelihood.profile(&lengths, ratio, &scale, gradient).unwrap();
+            profile.log_likelihood + scale.log_prior(profile.signal_sd)
+        };
+        let mut gradient = [0.0; 3];
+        score(&logs, Some(&mut gradient));
+        for (i, ours) in gradient.iter().enumerate() {
+            let mut moved = |by: f64| {
+                let mut logs = logs.clone();
+                logs[i] += by;
+                score(&logs, None)
+            };
+            let twin = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+            prop_assert!((ours - twin).abs() < 1e-3 * (1.0 + twin.abs()), "{i}: {ours} {twin}");
         }
     }
 

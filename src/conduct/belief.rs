@@ -2,11 +2,11 @@
 
 use super::probe::Touch;
 use crate::ground::config::{Checked, Rules};
-use crate::ground::gp::Observations;
 use crate::ground::gp::covariance::Indefinite;
 use crate::ground::gp::fit::{Fit, SearchBox};
 use crate::ground::gp::kernel::{self, Hyperparameters, Kernel};
 use crate::ground::gp::posterior::{Posterior, Scratch};
+use crate::ground::gp::{LogNormal, Mean, Observations, Range};
 use crate::world::Zone;
 use serde::{Deserialize, Serialize};
 
@@ -16,21 +16,50 @@ use serde::{Deserialize, Serialize};
 pub struct GpSettings {
     /// Name of the kernel.
     pub kernel: String,
+    /// How the prior mean is chosen.
+    pub mean: Mean,
     /// Range of each length scale, as a fraction of the zone's side.
     pub length_scale: [f64; 2],
     /// Range of the touch noise's standard deviation, as a fraction of the signal's.
     pub noise: [f64; 2],
+    /// The touch noise's standard deviation, if it is known: then it is not fitted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_sd_m: Option<f64>,
+    /// Range of the signal's standard deviation, as a fraction of the heights' root mean square.
+    pub signal: [f64; 2],
+    /// What the hyperparameters probably are.
+    pub prior: Priors,
+}
+
+/// Log-normal priors, in the units of the ranges; left out, every value is as probable.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Priors {
+    /// Of each length scale.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub length_scale: Option<LogNormal>,
+    /// Of the noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<LogNormal>,
+    /// Of the signal.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub signal: Option<LogNormal>,
 }
 
 impl Default for GpSettings {
     /// Chosen: no length scale beyond the zone, where the data cannot tell it from a constant;
     /// no noise so small that the covariance of a few hundred touches nears singularity, and
-    /// none above a hundredth of the relief, or a curve not yet resolved passes for noise.
+    /// none above a hundredth of the relief, or a curve not yet resolved passes for noise; a
+    /// signal range that never binds on heights that vary.
     fn default() -> Self {
         Self {
             kernel: "squared_exponential".into(),
+            mean: Mean::Zero,
             length_scale: [0.005, 1.0],
             noise: [1e-4, 1e-2],
+            noise_sd_m: None,
+            signal: [1e-3, 1e3],
+            prior: Priors::default(),
         }
     }
 }
@@ -41,12 +70,23 @@ impl Checked for GpSettings {
         rules.one_of("kernel", &self.kernel, &names);
         rules.interval("length_scale", self.length_scale, 1e-4..=1e3);
         rules.interval("noise", self.noise, 1e-7..=1e3);
+        rules.interval("signal", self.signal, 1e-9..=1e9);
+        if let Some(noise_sd_m) = self.noise_sd_m {
+            rules.number("noise_sd_m", noise_sd_m, 1e-9..=1e3);
+        }
+        let priors = [
+            ("prior.length_scale", self.prior.length_scale),
+            ("prior.noise", self.prior.noise),
+            ("prior.signal", self.prior.signal),
+        ];
+        for (key, prior) in priors {
+            if let Some(LogNormal { median, spread }) = prior {
+                rules.number(&format!("{key}.median"), median, 1e-9..=1e9);
+                rules.number(&format!("{key}.spread"), spread, 1.001..=1e6);
+            }
+        }
     }
 }
-
-/// Range of the signal's standard deviation as a fraction of the heights' root mean square;
-/// chosen wide enough never to bind on heights that vary.
-const SIGNAL_RANGE: (f64, f64) = (1e-3, 1e3);
 
 /// A contact farther than this from its target, in units of the zone's sides, leaves the target
 /// unreached; chosen well above rounding, below any grid a figure shows.
@@ -150,10 +190,26 @@ impl Belief {
         // Heights that are all zero have no scale of their own.
         let scale = if rms > 0.0 { rms } else { extents_m[0] };
         let [shortest, longest] = self.settings.length_scale;
+        let [quietest, loudest] = self.settings.noise;
+        let [smallest, largest] = self.settings.signal;
+        let prior = &self.settings.prior;
         SearchBox {
-            length_scales: extents_m.iter().map(|side| (shortest * side, longest * side)).collect(),
-            noise_ratio: self.settings.noise.into(),
-            signal_sd: (SIGNAL_RANGE.0 * scale, SIGNAL_RANGE.1 * scale),
+            mean: self.settings.mean,
+            length_scales: extents_m
+                .iter()
+                .map(|side| Range {
+                    low: shortest * side,
+                    high: longest * side,
+                    prior: prior.length_scale.map(|prior| prior.scaled(*side)),
+                })
+                .collect(),
+            noise_ratio: Range { low: quietest, high: loudest, prior: prior.noise },
+            signal_sd: Range {
+                low: smallest * scale,
+                high: largest * scale,
+                prior: prior.signal.map(|prior| prior.scaled(scale)),
+            },
+            noise_sd: self.settings.noise_sd_m,
         }
     }
 

@@ -2,25 +2,32 @@
 
 use super::kernel::{Hyperparameters, Kernel};
 use super::likelihood::Likelihood;
+use super::mean::Mean;
 use super::observations::Observations;
+use super::range::{Range, Scale};
 use crate::ground::optimize::{self, Stop};
 use serde::{Deserialize, Serialize};
 
-/// The box in which hyperparameters are sought.
+/// The box in which hyperparameters are sought, and how the mean is chosen.
 #[derive(Clone, Debug)]
 pub struct SearchBox {
-    /// Smallest and largest length scale of each input, in the unit of the inputs.
-    pub length_scales: Vec<(f64, f64)>,
-    /// Smallest and largest noise, as a fraction of the signal's standard deviation.
-    pub noise_ratio: (f64, f64),
-    /// Smallest and largest standard deviation of the signal, in the unit of the heights.
-    pub signal_sd: (f64, f64),
+    /// How the mean is chosen.
+    pub mean: Mean,
+    /// Each length scale, in the unit of the inputs.
+    pub length_scales: Vec<Range>,
+    /// The noise, as a fraction of the signal's standard deviation. If the noise is known, what
+    /// this range leaves of `signal_sd`.
+    pub noise_ratio: Range,
+    /// The signal's standard deviation, in the unit of the heights.
+    pub signal_sd: Range,
+    /// The touch noise's standard deviation, if it is known and not to be fitted.
+    pub noise_sd: Option<f64>,
 }
 
 /// What a fit found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
-    /// The most likely hyperparameters.
+    /// The most probable hyperparameters.
     #[serde(flatten)]
     pub hyperparameters: Hyperparameters,
     /// Their log marginal likelihood.
@@ -48,7 +55,8 @@ const SCAN_AGAIN: f64 = 1.2;
 const NOISE_LEVELS: usize = 3;
 
 impl SearchBox {
-    /// Maximises the marginal likelihood globally and deterministically.
+    /// Maximises the marginal likelihood, times what priors there are, globally and
+    /// deterministically.
     ///
     /// The likelihood is profiled over signal_sd, which has a closed form, so the search runs
     /// over (ln lengths, ln noise ratio) only. `last`, the fit before the newest touches, is one
@@ -60,53 +68,93 @@ impl SearchBox {
         observations: &Observations,
         last: Option<&Fit>,
     ) -> Fit {
-        let mut likelihood = Likelihood::new(kernel, observations);
+        let mut likelihood = Likelihood::new(kernel, self.mean, observations);
+        let scale = match self.noise_sd {
+            Some(noise_sd) => Scale::KnownNoise(noise_sd),
+            None => Scale::Best(self.signal_sd),
+        };
         let (lower, upper) = self.log_bounds();
         let count = observations.len();
         let is_recent = |last: &&Fit| count as f64 <= SCAN_AGAIN * last.scanned_at as f64;
         let recent = last.filter(is_recent).filter(|_| count > SCAN_ALWAYS);
         let scanned_at = recent.map_or(count, |last| last.scanned_at);
-        let mut best: Option<Fit> = None;
+        let (mut best, mut best_score) = (None, f64::NEG_INFINITY);
         if !observations.is_empty() {
             let mut starts = match recent {
                 Some(last) => vec![shorter(&last.hyperparameters, &lower, &upper)],
-                None => self.hills(&mut likelihood, &lower, &upper),
+                None => self.hills(&mut likelihood, &scale, &lower, &upper),
             };
             starts.extend(last.map(|last| log_parameters(&last.hyperparameters)));
             for start in starts {
                 let bounds = optimize::Bounds { lower: &lower, upper: &upper };
                 let top = optimize::lbfgs(bounds, &start, CLIMB_BUDGET, |x, gradient| {
-                    let (lengths, noise_ratio) = parameters(x);
-                    likelihood
-                        .profile(&lengths, noise_ratio, self.signal_sd, Some(gradient))
-                        .map_or(f64::NAN, |profile| profile.log_likelihood)
+                    self.score(&mut likelihood, &scale, x, Some(gradient))
                 });
-                if best.as_ref().is_none_or(|best| top.value > best.log_likelihood) {
-                    best = self.conclude(&mut likelihood, &top.x, top.stop).or(best);
+                if top.value > best_score {
+                    best_score = top.value;
+                    best = self.conclude(&mut likelihood, &scale, &top.x, top.stop).or(best);
                 }
             }
         }
-        let mut best = best.unwrap_or_else(|| self.prior(&lower, &upper));
+        let mut best = best.unwrap_or_else(|| self.prior(&scale, &lower, &upper));
         best.factorisations = likelihood.factorisations();
         best.scanned_at = scanned_at;
         best
     }
 
-    fn log_bounds(&self) -> (Vec<f64>, Vec<f64>) {
-        self.length_scales
-            .iter()
-            .chain([&self.noise_ratio])
-            .map(|(low, high)| (low.ln(), high.ln()))
-            .unzip()
+    /// The ranges searched over: lengths, then noise ratio.
+    fn ranges(&self) -> impl Iterator<Item = Range> {
+        // A known noise and a range of the signal leave a range of their ratio.
+        let noise_ratio = match self.noise_sd {
+            Some(noise_sd) => {
+                (noise_sd / self.signal_sd.high, noise_sd / self.signal_sd.low).into()
+            }
+            None => self.noise_ratio,
+        };
+        self.length_scales.iter().copied().chain([noise_ratio])
     }
 
-    fn conclude(&self, likelihood: &mut Likelihood, x: &[f64], stop: Stop) -> Option<Fit> {
+    fn log_bounds(&self) -> (Vec<f64>, Vec<f64>) {
+        self.ranges().map(|range| (range.low.ln(), range.high.ln())).unzip()
+    }
+
+    /// Log likelihood plus log priors at `x`, with the gradient if asked; NaN where the
+    /// covariance cannot be factored.
+    fn score(
+        &self,
+        likelihood: &mut Likelihood,
+        scale: &Scale,
+        x: &[f64],
+        mut gradient: Option<&mut [f64]>,
+    ) -> f64 {
+        let (lengths, noise_ratio) = parameters(x);
+        let profile = likelihood.profile(&lengths, noise_ratio, scale, gradient.as_deref_mut());
+        let Ok(profile) = profile else { return f64::NAN };
+        let mut score = profile.log_likelihood + scale.log_prior(profile.signal_sd);
+        for (i, (range, &log)) in self.ranges().zip(x).enumerate() {
+            let Some(prior) = range.prior else { continue };
+            score += prior.log_density(log);
+            if let Some(slope) = gradient.as_deref_mut().and_then(|gradient| gradient.get_mut(i)) {
+                *slope += prior.slope(log);
+            }
+        }
+        score
+    }
+
+    fn conclude(
+        &self,
+        likelihood: &mut Likelihood,
+        scale: &Scale,
+        x: &[f64],
+        stop: Stop,
+    ) -> Option<Fit> {
         let (length_scales, noise_ratio) = parameters(x);
-        let profile = likelihood.profile(&length_scales, noise_ratio, self.signal_sd, None).ok()?;
+        let profile = likelihood.profile(&length_scales, noise_ratio, scale, None).ok()?;
         let hyperparameters = Hyperparameters {
             signal_sd: profile.signal_sd,
             length_scales,
             noise_sd: noise_ratio * profile.signal_sd,
+            mean: profile.mean,
         };
         Some(Fit {
             hyperparameters,
@@ -118,15 +166,19 @@ impl SearchBox {
     }
 
     /// What is believed before any touch: the geometric middle of the box.
-    fn prior(&self, lower: &[f64], upper: &[f64]) -> Fit {
+    fn prior(&self, scale: &Scale, lower: &[f64], upper: &[f64]) -> Fit {
         let middle: Vec<f64> = lower.iter().zip(upper).map(|(l, u)| 0.5 * (l + u)).collect();
         let (length_scales, noise_ratio) = parameters(&middle);
-        let signal_sd = (self.signal_sd.0 * self.signal_sd.1).sqrt();
+        let signal_sd = match scale {
+            Scale::KnownNoise(noise_sd) => noise_sd / noise_ratio,
+            Scale::Best(range) => (range.low * range.high).sqrt(),
+        };
         Fit {
             hyperparameters: Hyperparameters {
                 signal_sd,
                 length_scales,
                 noise_sd: noise_ratio * signal_sd,
+                mean: 0.0,
             },
             log_likelihood: 0.0,
             factorisations: 0,
@@ -136,7 +188,13 @@ impl SearchBox {
     }
 
     /// The highest local maxima of the profiled likelihood on a grid over the box.
-    fn hills(&self, likelihood: &mut Likelihood, lower: &[f64], upper: &[f64]) -> Vec<Vec<f64>> {
+    fn hills(
+        &self,
+        likelihood: &mut Likelihood,
+        scale: &Scale,
+        lower: &[f64],
+        upper: &[f64],
+    ) -> Vec<Vec<f64>> {
         let levels = self.levels();
         let count: usize = levels.iter().product();
         let point = |index: usize| -> Vec<f64> {
@@ -150,10 +208,8 @@ impl SearchBox {
         };
         let values: Vec<f64> = (0..count)
             .map(|index| {
-                let (lengths, noise_ratio) = parameters(&point(index));
-                likelihood
-                    .profile(&lengths, noise_ratio, self.signal_sd, None)
-                    .map_or(f64::NEG_INFINITY, |profile| profile.log_likelihood)
+                let score = self.score(likelihood, scale, &point(index), None);
+                if score.is_nan() { f64::NEG_INFINITY } else { score }
             })
             .collect();
         let mut hills: Vec<usize> =
@@ -163,8 +219,7 @@ impl SearchBox {
         hills.into_iter().map(point).collect()
     }
 
-    /// Grid points per parameter, the noise last so that it varies fastest: correlations are
-    /// computed once per set of lengths.
+    /// Grid points per parameter, the noise last.
     fn levels(&self) -> Vec<usize> {
         let per_length = match self.length_scales.len() {
             1 => 24,

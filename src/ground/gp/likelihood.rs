@@ -3,43 +3,51 @@
 use super::covariance::{self, Indefinite};
 use super::dense::Dense;
 use super::kernel::{Hyperparameters, Kernel};
+use super::mean::Mean;
 use super::observations::Observations;
+use super::range::Scale;
 use crate::ground::simd::widest;
 
 /// Scores hyperparameters against fixed observations; keeps its buffers between calls.
 ///
 /// With K = s²·A, A = C + g²·I (s the signal's standard deviation, C the correlations, g the
 /// noise as a fraction of s) the log marginal likelihood is
-/// −½·yᵀA⁻¹y / s² − n·ln s − ½·ln|A| − (n/2)·ln 2π.
+/// −½·yᵀA⁻¹y / s² − n·ln s − ½·ln|A| − (n/2)·ln 2π, where y are the heights above the mean.
 pub struct Likelihood<'a> {
     kernel: &'static dyn Kernel,
+    mean: Mean,
     observations: &'a Observations,
     dense: Dense,
     /// A⁻¹·y.
     weights: Vec<f64>,
+    scratch: Vec<f64>,
     distances2: Vec<f64>,
     slopes: Vec<f64>,
     factorisations: u32,
 }
 
-/// A profiled score: the signal's standard deviation is the best one for its other parameters.
+/// A profiled score: the signal's standard deviation follows from the other parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct Profile {
     /// Log marginal likelihood.
     pub log_likelihood: f64,
-    /// The best signal standard deviation within its bounds, sqrt(yᵀA⁻¹y / n).
+    /// Signal standard deviation.
     pub signal_sd: f64,
+    /// The mean that the model chooses.
+    pub mean: f64,
 }
 
 impl<'a> Likelihood<'a> {
     /// Prepares to score hyperparameters against `observations`.
-    pub fn new(kernel: &'static dyn Kernel, observations: &'a Observations) -> Self {
+    pub fn new(kernel: &'static dyn Kernel, mean: Mean, observations: &'a Observations) -> Self {
         let count = observations.len();
         Self {
             kernel,
+            mean,
             observations,
             dense: Dense::new(count),
             weights: Vec::with_capacity(count),
+            scratch: Vec::with_capacity(count),
             distances2: vec![0.0; count],
             slopes: vec![0.0; count],
             factorisations: 0,
@@ -62,7 +70,8 @@ impl<'a> Likelihood<'a> {
         gradient: &mut [f64],
     ) -> Result<f64, Indefinite> {
         let noise_ratio = at.noise_sd / at.signal_sd;
-        let fit = self.factor(&at.length_scales, noise_ratio)?;
+        self.factor(&at.length_scales, noise_ratio)?;
+        let fit = self.weigh(at.mean);
         let [by_signal, rest @ ..] = gradient else { return Ok(self.value(at.signal_sd, fit)) };
         let signal2 = at.signal_sd * at.signal_sd;
         self.gradient(signal2, &at.length_scales, noise_ratio, rest);
@@ -71,8 +80,9 @@ impl<'a> Likelihood<'a> {
         Ok(self.value(at.signal_sd, fit))
     }
 
-    /// Log marginal likelihood with the best signal_sd in `signal_bounds`; with a `gradient`,
-    /// writes it with respect to (ln length_1, …, ln length_d, ln noise_ratio).
+    /// Log marginal likelihood with the signal_sd that `scale` says; with a `gradient`, writes it
+    /// with respect to (ln length_1, …, ln length_d, ln noise_ratio), the prior of signal_sd
+    /// included.
     ///
     /// # Errors
     /// [`Indefinite`] if the covariance cannot be factored.
@@ -80,16 +90,24 @@ impl<'a> Likelihood<'a> {
         &mut self,
         length_scales: &[f64],
         noise_ratio: f64,
-        signal_bounds: (f64, f64),
+        scale: &Scale,
         gradient: Option<&mut [f64]>,
     ) -> Result<Profile, Indefinite> {
-        let fit = self.factor(length_scales, noise_ratio)?;
-        let best = (fit / self.observations.len().max(1) as f64).sqrt();
-        let signal_sd = best.max(signal_bounds.0).min(signal_bounds.1);
+        self.factor(length_scales, noise_ratio)?;
+        let mean = self.mean.of(self.observations.heights(), &self.dense, &mut self.scratch);
+        let fit = self.weigh(mean);
+        let count = self.observations.len();
+        let signal_sd = scale.signal_sd(fit, count, noise_ratio);
         if let Some(gradient) = gradient {
-            self.gradient(signal_sd * signal_sd, length_scales, noise_ratio, gradient);
+            let signal2 = signal_sd * signal_sd;
+            self.gradient(signal2, length_scales, noise_ratio, gradient);
+            // The best signal_sd does not change the value to first order; a known noise makes
+            // it fall as the ratio rises.
+            if let (Scale::KnownNoise(_), Some(by_noise)) = (scale, gradient.last_mut()) {
+                *by_noise -= fit / signal2 - count as f64;
+            }
         }
-        Ok(Profile { log_likelihood: self.value(signal_sd, fit), signal_sd })
+        Ok(Profile { log_likelihood: self.value(signal_sd, fit), signal_sd, mean })
     }
 
     fn value(&self, signal_sd: f64, fit: f64) -> f64 {
@@ -100,18 +118,23 @@ impl<'a> Likelihood<'a> {
             - 0.5 * n * (2.0 * std::f64::consts::PI).ln()
     }
 
-    /// Factors A, solves for the weights, and returns yᵀA⁻¹y.
-    fn factor(&mut self, length_scales: &[f64], noise_ratio: f64) -> Result<f64, Indefinite> {
+    fn factor(&mut self, length_scales: &[f64], noise_ratio: f64) -> Result<(), Indefinite> {
         self.factorisations += 1;
         let (kernel, observations) = (self.kernel, self.observations);
-        covariance::factor(&mut self.dense, kernel, observations, length_scales, noise_ratio)?;
+        covariance::factor(&mut self.dense, kernel, observations, length_scales, noise_ratio)
+            .map(|_| ())
+    }
+
+    /// Solves for the weights of the heights above `mean`, and returns yᵀA⁻¹y.
+    fn weigh(&mut self, mean: f64) -> f64 {
         self.weights.clear();
-        self.weights.extend_from_slice(observations.heights());
-        Ok(self.dense.solve(&mut self.weights))
+        self.weights.extend(self.observations.heights().iter().map(|y| y - mean));
+        self.dense.solve(&mut self.weights)
     }
 
     /// With respect to the logarithms of the length scales and of the noise ratio, by
-    /// ½·tr((w·wᵀ/s² − A⁻¹)·∂A), after [`factor`](Self::factor) at the same parameters.
+    /// ½·tr((w·wᵀ/s² − A⁻¹)·∂A), after [`weigh`](Self::weigh) at the same parameters. The
+    /// mean is the best one or does not depend on them, so it has no part in this.
     fn gradient(&mut self, signal2: f64, lengths: &[f64], noise_ratio: f64, gradient: &mut [f64]) {
         self.dense.invert();
         gradient.fill(0.0);

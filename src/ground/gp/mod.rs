@@ -10,9 +10,13 @@ pub mod dense;
 pub mod fit;
 pub mod kernel;
 pub mod likelihood;
+pub mod mean;
 pub mod observations;
 pub mod posterior;
+pub mod range;
 
 pub use kernel::{Hyperparameters, Kernel};
+pub use mean::Mean;
 pub use observations::Observations;
 pub use posterior::Posterior;
+pub use range::{LogNormal, Range, Scale};

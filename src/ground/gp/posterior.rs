@@ -1,4 +1,4 @@
-//! The exact posterior of a zero-mean Gaussian process, Eq. 3 of Yi et al. 2016.
+//! The exact posterior of a Gaussian process, Eq. 3 of Yi et al. 2016.
 
 use super::cholesky::{Factor, NotPositiveDefinite};
 use super::covariance::{self, Indefinite};
@@ -88,7 +88,8 @@ impl Posterior {
 
     fn weigh(&mut self) {
         self.weights.clear();
-        self.weights.extend_from_slice(self.observations.heights());
+        let mean = self.hyperparameters.mean;
+        self.weights.extend(self.observations.heights().iter().map(|y| y - mean));
         self.factor.solve_lower(&mut self.weights);
         self.factor.solve_upper(&mut self.weights);
     }
@@ -114,11 +115,11 @@ impl Posterior {
         self.jitter
     }
 
-    /// Mean height k*ᵀ·K⁻¹·y at `place`.
+    /// Mean height m + k*ᵀ·K⁻¹·(y − m) at `place`.
     pub fn mean(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
         scratch.solved.resize(self.observations.len(), 0.0);
         self.correlations(place, &mut scratch.solved);
-        widest(|| dot(&scratch.solved, &self.weights))
+        self.hyperparameters.mean + widest(|| dot(&scratch.solved, &self.weights))
     }
 
     /// Variance of the surface (without touch noise) k** − k*ᵀ·K⁻¹·k* at `place`, in [0, k**].

@@ -62,6 +62,13 @@ pub struct Hyperparameters {
     pub length_scales: Vec<f64>,
     /// Standard deviation of one touch's error, in the unit of the heights.
     pub noise_sd: f64,
+    /// Height that the belief returns to away from all observations.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub mean: f64,
+}
+
+fn is_zero(mean: &f64) -> bool {
+    *mean == 0.0
 }
 
 #[cfg(test)]
