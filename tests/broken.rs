@@ -137,6 +137,7 @@ fn broken_experiments_are_refused_with_file_line_key_and_remedy() {
         ("[3]", "[-3]", &["small.toml:13", "report.touch_counts[0]"]),
         ("[3]", "[0]", &["small.toml:13", "report.touch_counts[0]"]),
         ("[3]", "[3]\ntrial = -5", &["small.toml:14", "report.trial"]),
+        ("[3]", "[3]\ntrial = 1", &["small.toml:14", "report.trial", "0 to 0"]),
         ("[3]", "[1,1,1,1,1,1,1,1,1]", &["small.toml:13", "report.touch_counts", "at most 8"]),
         ("[3]", "[3]\nplanners = [\"x\"]", &["small.toml:14", "report.planners[0]"]),
         ("[report]", "[planning]\ndirect_evaluations = 0\n[report]", &["small.toml:13"]),
@@ -237,6 +238,9 @@ fn broken_command_lines_are_refused() {
         (&["run", "small.toml", "--set", "trials=0"], &["--set trials=0", "1 to 1000000"]),
         (&["run", "small.toml", "--set", "trails=3"], &["--set trails=3", "`trials`"]),
         (&["run", "small.toml", "--set", "trials.x=3"], &["--set trials.x=3"]),
+        (&["run", "small.toml", "--set", "a.b.c=3"], &["--set a.b.c=3", "unknown key `a`"]),
+        (&["show", "mesh.obj", "--set", "a=1"], &["--set", "mesh.obj"]),
+        (&["show", "scene.toml", "--unit", "mm"], &["--unit", "object.unit"]),
         (&["run", "small.toml", "--set", "gp.noise=7"], &["--set gp.noise=7"]),
         (&["run", "small.toml", "--set", "scene=none.toml"], &["--set scene=none.toml"]),
         (&["run", "small.toml", "--out", "mesh.obj"], &["mesh.obj"]),
@@ -245,7 +249,7 @@ fn broken_command_lines_are_refused() {
         (&["run", "small.toml", "--threads", "100000"], &["--threads", "1024"]),
         (&["report", "none"], &["none"]),
         (&["report", "mesh.obj"], &["mesh.obj"]),
-        (&["show", "none.obj"], &["none.obj", "cannot be read"]),
+        (&["show", "none.obj"], &["none.obj", "no such file"]),
         (&["show", "small.toml", "--mjcf", "x.xml"], &["--mjcf", "scene"]),
         (&["show", "mesh.obj", "--unit", "mile"], &["--unit"]),
         (&["shew", "mesh.obj"], &["shew"]),
@@ -278,6 +282,12 @@ fn damaged_run_folders_are_refused_and_lose_nothing() {
     fs::write(&trials, [rows.as_slice(), b"{\"trial\": null}\n"].concat()).unwrap();
     accepted.refuse("a whole last line that is no row", &run(&[]), &["trials.jsonl:2"]);
     fs::write(&trials, &rows).unwrap();
+    fs::write(&trials, [rows.as_slice(), rows.as_slice()].concat()).unwrap();
+    accepted.refuse("the same trial twice", &run(&[]), &["trials.jsonl:2", "twice"]);
+    let other = String::from_utf8(rows.clone()).unwrap().replace("\"trial\":0", "\"trial\":7");
+    fs::write(&trials, other).unwrap();
+    accepted.refuse("a trial of another run", &run(&[]), &["trials.jsonl:1", "no trial 7"]);
+    fs::write(&trials, &rows).unwrap();
     let locked = fs::File::open(&trials).unwrap();
     locked.lock().unwrap();
     accepted.refuse("a folder being written", &run(&["--fresh"]), &["another run"]);
@@ -285,5 +295,7 @@ fn damaged_run_folders_are_refused_and_lose_nothing() {
     assert_eq!(fs::read(&trials).unwrap(), rows);
     fs::write(folder.path().join("runs/small/surface.csv"), "x_m,z_m,height_m\n1,2,x\n").unwrap();
     let report = palpate(folder.path(), &["report", "runs/small"]);
+    let none = palpate(folder.path(), &["report", "."]);
+    accepted.refuse("a folder that is no run", &none, &["not a run's folder"]);
     accepted.refuse("a surface that is none", &report, &["surface.csv:2", "\"x\""]);
 }

@@ -144,6 +144,8 @@ impl Checked for Experiment {
         for (i, name) in self.report.planners.iter().enumerate() {
             rules.one_of(&format!("report.planners[{i}]"), name, &known);
         }
+        let last = f64::from(self.trials.max(1) - 1);
+        rules.number("report.trial", self.report.trial.into(), 0.0..=last);
         rules.table("scene", &self.scene);
     }
 }

@@ -10,6 +10,7 @@ use crate::ground::optimize;
 use crate::world::World;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::collections::HashSet;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use thiserror::Error;
@@ -86,7 +87,7 @@ pub fn run(
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let row = trial::run(experiment, world, truth, planner, trial);
+            let row = run_caught(experiment, world, truth, planner, trial);
             let mut finished = finished.lock().unwrap_or_else(PoisonError::into_inner);
             finished.0.append(&row)?;
             finished.1 += 1;
@@ -97,6 +98,24 @@ pub fn run(
     .map_err(|error: StoreError| RunError::Store(error))?;
     let (_, count) = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok(count)
+}
+
+/// Runs one trial; a planner's or probe's panic becomes the trial's failure, so that one fault
+/// in somebody's code does not lose the others' work.
+fn run_caught(
+    experiment: &Experiment,
+    world: &Arc<World>,
+    truth: &Truth,
+    planner: &'static planner::Entry,
+    trial: u32,
+) -> TrialRow {
+    let run = || trial::run(experiment, world, truth, planner, trial);
+    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
+        let words = panic.downcast_ref::<String>().map(String::as_str);
+        let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+        let failure = Some(format!("panicked: {words}"));
+        TrialRow { trial, planner: planner.name.into(), failure, touches: Vec::new() }
+    })
 }
 
 /// Every trial of every planner that `done` lacks, trial by trial.

@@ -33,6 +33,11 @@ pub fn run(
             true => Plan { target: uniform(zone, &mut start), sd_m: None, stall: None },
             false => planner.plan(&belief),
         };
+        if !zone.contains(&plan.target) {
+            let target = plan.target;
+            row.failure = Some(format!("touch {count}: planned at {target:?}, not in the zone"));
+            break;
+        }
         let touch = match probe.touch(&plan.target) {
             Ok(touch) => touch,
             Err(fault) => {

@@ -57,6 +57,12 @@ impl Zone {
         self.sides().map(|[low, high]| high - low).collect()
     }
 
+    /// Whether `place` has as many coordinates as the zone and lies in it, edges included.
+    pub fn contains(&self, place: &[f64]) -> bool {
+        place.len() == self.dimension()
+            && self.sides().zip(place).all(|([low, high], at)| (low..=high).contains(at))
+    }
+
     /// The place at fractions 0..1 of the sides.
     pub fn at(&self, fractions: &[f64]) -> Vec<f64> {
         self.sides().zip(fractions).map(|([low, high], t)| low + (high - low) * t).collect()

@@ -68,7 +68,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         &|_| step(&bar),
     )?;
     bar.finish_and_clear();
-    folder.sort(&experiment.planners)?;
+    if count > 0 {
+        folder.sort(&experiment)?;
+    }
 
     let run = Run::read(&path)?;
     let finished = run.rows.len() as u64 == total;

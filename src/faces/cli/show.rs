@@ -23,9 +23,9 @@ Examples:
 pub(super) struct Args {
     /// A mesh (.obj, .gltf, .glb), a scene or an experiment (.toml), or a run's folder.
     path: PathBuf,
-    /// Unit of a mesh file's numbers.
-    #[arg(long, default_value = "m", value_name = "UNIT")]
-    unit: Unit,
+    /// Unit of a mesh file's numbers [default: m].
+    #[arg(long, value_name = "UNIT")]
+    unit: Option<Unit>,
     /// Change one setting of a scene or experiment; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -40,12 +40,25 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     if args.mjcf.is_some() && !is_scene {
         bail!("--mjcf goes with a scene (.toml), and {} is none", args.path.display());
     }
+    if !args.path.exists() {
+        bail!("{}: no such file or folder", args.path.display());
+    }
+    let is_toml = extension == Some("toml");
+    if args.unit.is_some() && (is_toml || args.path.is_dir()) {
+        bail!("--unit goes with a mesh; a scene names the unit of its own: object.unit");
+    }
+    if !args.set.is_empty() && !is_toml {
+        bail!(
+            "--set goes with a scene or an experiment (.toml), and {} is none",
+            args.path.display()
+        );
+    }
     let text = match extension {
         _ if args.path.is_dir() => report::table::summary(&Run::read(&args.path)?),
         Some("toml") if is_scene => scene(args)?,
         Some("toml") => store::resolved(&Experiment::load(&args.path, &args.set)?),
         _ => {
-            let (_, report) = import(&args.path, args.unit.metres())?;
+            let (_, report) = import(&args.path, args.unit.unwrap_or_default().metres())?;
             format!("{}\n{report}", args.path.display())
         }
     };

@@ -80,8 +80,11 @@ pub fn described(planner: &str, events: &Events) -> String {
     let counts = [
         (events.failures, "failed trials"),
         (events.misses, "touches met nothing"),
-        (events.collapsed, "plans fell back because the belief was sure everywhere"),
-        (events.repeated, "plans fell back because they repeated a target"),
+        (
+            events.collapsed,
+            "plans went to a random place instead, because the belief was sure everywhere",
+        ),
+        (events.repeated, "plans went to a random place instead, because they repeated a target"),
     ];
     let told: Vec<String> = counts
         .iter()

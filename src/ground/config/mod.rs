@@ -157,12 +157,23 @@ impl Loader {
         }
     }
 
+    /// Whether no file says anything of `key`, so that only `--set` can have made it.
+    fn in_no_file(&self, key: &str) -> bool {
+        self.sources.iter().all(|source| {
+            let inner = key.strip_prefix(source.prefix.as_str()).unwrap_or(key);
+            steps(inner).next().is_none_or(|first| !source.document.as_table().contains_key(first))
+        })
+    }
+
     fn origin(&self, key: &str) -> Origin {
         let under = |set: &str| {
             key.strip_prefix(set)
                 .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
         };
-        if let Some((_, text)) = self.sets.iter().rev().find(|(set, _)| under(set)) {
+        let over = |set: &str| set.strip_prefix(key).is_some_and(|rest| rest.starts_with('.'));
+        let unknown = |set: &str| over(set) && self.in_no_file(key);
+        if let Some((_, text)) = self.sets.iter().rev().find(|(set, _)| under(set) || unknown(set))
+        {
             return Origin::Set(text.clone());
         }
         let inner = self.sources.iter().rev().find_map(|source| {
@@ -222,7 +233,8 @@ fn parse(path: &Path) -> Result<(Table, toml_edit::Document<String>), ConfigErro
 /// The name most like `key`, if it takes few enough slips of the hand to turn one into the other.
 fn nearest(key: &str, names: &[String]) -> Option<String> {
     let slips = |name: &String| strsim::damerau_levenshtein(key, name);
-    names.iter().min_by_key(|name| slips(name)).filter(|name| slips(name) <= 2).cloned()
+    let most = (key.chars().count() / 2).min(2);
+    names.iter().min_by_key(|name| slips(name)).filter(|name| slips(name) <= most).cloned()
 }
 
 /// Removes `.` and `folder/..` without asking the file system.

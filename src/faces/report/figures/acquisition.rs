@@ -17,8 +17,8 @@ fn caption(run: &Run) -> String {
     let planner = planner(run).unwrap_or("the planner");
     format!(
         "Standard deviation that another touch could still remove, before and after one more \
-         touch of {planner} in trial {}: the circle marks the largest that was found, where the \
-         next touch goes. Crosses are points of contact, which may lie beside their targets. \
+         touch of {planner} in trial {}: the circle marks the largest that \
+         was found. Crosses are points of contact, which may lie beside their targets. \
          Corresponds to Fig. 6 of the paper.",
         run.experiment.report.trial
     )

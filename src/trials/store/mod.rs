@@ -4,69 +4,20 @@
 //! it, a program each), `surface.csv` (the truth on the test grid), `trials.jsonl` (a row per finished trial).
 //! Everything else in it is drawn from these.
 
-use super::experiment::Experiment;
-use super::metrics::Truth;
-use super::row::TrialRow;
-use crate::ground::config::ConfigError;
+mod error;
+mod rows;
+
+pub use error::StoreError;
+
+use self::error::io_error;
+use crate::trials::experiment::Experiment;
+use crate::trials::metrics::Truth;
+use crate::trials::row::TrialRow;
 use crate::world::Zone;
 use serde::Serialize;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
-use thiserror::Error;
-
-/// What can go wrong with a run folder.
-#[derive(Debug, Error)]
-pub enum StoreError {
-    /// Reading or writing failed.
-    #[error("{}: {cause}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        cause: io::Error,
-    },
-    /// The folder holds another experiment.
-    #[error(
-        "{} holds another experiment: {file} says `{found}`, this one `{wanted}`; \
-         choose another folder with --out, or start over with --fresh", path.display()
-    )]
-    Differs {
-        /// The folder.
-        path: PathBuf,
-        /// The file that differs.
-        file: &'static str,
-        /// First line of it that differs.
-        found: String,
-        /// What that line is in this experiment.
-        wanted: String,
-    },
-    /// Another process writes there.
-    #[error("{}: another run is writing this folder", path.display())]
-    Busy {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// The folder is not empty and holds no run.
-    #[error("{}: this folder holds something else; choose another with --out", path.display())]
-    Foreign {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// A line is not a row.
-    #[error("{}:{line}: not a row of results: {message}", path.display())]
-    BadRow {
-        /// The file.
-        path: PathBuf,
-        /// Its line.
-        line: usize,
-        /// What the parser says.
-        message: String,
-    },
-    /// The recorded experiment cannot be read.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-}
 
 /// File of a run's settings, defaults written out.
 pub const RESOLVED: &str = "resolved.toml";
@@ -98,6 +49,8 @@ pub struct Manifest {
 pub struct RunFolder {
     path: PathBuf,
     trials: File,
+    /// What is about to add its first row.
+    unsigned: Option<Manifest>,
 }
 
 /// A run folder read back.
@@ -127,11 +80,7 @@ impl RunFolder {
     ) -> Result<(Self, Vec<TrialRow>), StoreError> {
         fs::create_dir_all(path).map_err(io_error(path))?;
         let file = path.join(TRIALS);
-        let is_run = path.join(RESOLVED).exists() || file.exists();
-        let mut entries = fs::read_dir(path).map_err(io_error(path))?;
-        if !is_run && entries.next().is_some() {
-            return Err(StoreError::Foreign { path: path.into() });
-        }
+        refuse_foreign(path)?;
         let trials = OpenOptions::new()
             .create(true)
             .read(true)
@@ -149,10 +98,10 @@ impl RunFolder {
         }
         write_or_compare(path, RESOLVED, &saved(experiment, path))?;
         write_or_compare(path, SURFACE, &surface(experiment, truth))?;
-        let (rows, good_bytes) = read_rows(&file)?;
+        let (rows, good_bytes) = rows::read(&file, experiment)?;
         trials.set_len(good_bytes).map_err(io_error(&file))?;
-        sign(&path.join(MANIFEST), manifest)?;
-        Ok((Self { path: path.into(), trials }, rows))
+        let unsigned = Some(manifest.clone());
+        Ok((Self { path: path.into(), trials, unsigned }, rows))
     }
 
     /// Adds a row and hands it to the operating system, so that a later kill cannot lose it.
@@ -167,6 +116,9 @@ impl RunFolder {
             return Err(StoreError::BadRow { path: file, line: 0, message: error.to_string() });
         }
         line.push(b'\n');
+        if let Some(manifest) = self.unsigned.take() {
+            sign(&self.path.join(MANIFEST), &manifest)?;
+        }
         self.trials.write_all(&line).map_err(io_error(&file))
     }
 
@@ -174,10 +126,10 @@ impl RunFolder {
     ///
     /// # Errors
     /// If the file cannot be read back or replaced.
-    pub fn sort(self, planners: &[String]) -> Result<(), StoreError> {
+    pub fn sort(self, experiment: &Experiment) -> Result<(), StoreError> {
         let file = self.path.join(TRIALS);
-        let (mut rows, _) = read_rows(&file)?;
-        sort(&mut rows, planners);
+        let (mut rows, _) = rows::read(&file, experiment)?;
+        rows::sort(&mut rows, experiment);
         let mut text = String::new();
         for row in &rows {
             text +=
@@ -194,16 +146,17 @@ impl Run {
     /// # Errors
     /// If it is not one, or a file in it is damaged.
     pub fn read(path: &Path) -> Result<Self, StoreError> {
+        for missing in [RESOLVED, SURFACE, TRIALS] {
+            if !path.join(missing).is_file() {
+                return Err(StoreError::NotARun { path: path.into(), missing });
+            }
+        }
         let experiment = Experiment::load(&path.join(RESOLVED), &[])?;
         let truth = read_surface(&path.join(SURFACE), &experiment.scene.zone)?;
-        let (mut rows, _) = read_rows(&path.join(TRIALS))?;
-        sort(&mut rows, &experiment.planners);
+        let (mut rows, _) = rows::read(&path.join(TRIALS), &experiment)?;
+        rows::sort(&mut rows, &experiment);
         Ok(Self { experiment, truth, rows })
     }
-}
-
-fn sort(rows: &mut [TrialRow], planners: &[String]) {
-    rows.sort_by_key(|row| (row.trial, planners.iter().position(|name| *name == row.planner)));
 }
 
 /// The experiment with every default written out.
@@ -249,8 +202,23 @@ fn clear(path: &Path) -> Result<(), StoreError> {
     for name in ["report.html", "summary.csv", MANIFEST, SURFACE] {
         remove(&path.join(name), |file| fs::remove_file(file))?;
     }
-    remove(&path.join(FIGURES), |folder| fs::remove_dir_all(folder))?;
+    // Figures are drawn again; others' files beside them are not ours to remove.
     remove(&path.join(RESOLVED), |file| fs::remove_file(file))
+}
+
+/// A folder that is not empty must hold a run, or at most the empty beginning of one.
+fn refuse_foreign(path: &Path) -> Result<(), StoreError> {
+    if path.join(RESOLVED).exists() {
+        return Ok(());
+    }
+    for entry in fs::read_dir(path).map_err(io_error(path))? {
+        let entry = entry.map_err(io_error(path))?;
+        let is_empty = entry.metadata().is_ok_and(|metadata| metadata.len() == 0);
+        if entry.file_name() != TRIALS || !is_empty {
+            return Err(StoreError::Foreign { path: path.into() });
+        }
+    }
+    Ok(())
 }
 
 fn surface(experiment: &Experiment, truth: &Truth) -> String {
@@ -275,7 +243,8 @@ fn read_surface(path: &Path, zone: &Zone) -> Result<Truth, StoreError> {
     for (i, record) in csv::Reader::from_reader(text.as_bytes()).records().enumerate() {
         let record = record.map_err(|error| bad(i + 2, error.to_string()))?;
         let number = |field: &str| {
-            field.parse::<f64>().map_err(|_| bad(i + 2, format!("\"{field}\" is not a number")))
+            let number = field.parse::<f64>().ok().filter(|number| number.is_finite());
+            number.ok_or_else(|| bad(i + 2, format!("\"{field}\" is not a number")))
         };
         let mut fields = record.iter();
         let height =
@@ -288,23 +257,6 @@ fn read_surface(path: &Path, zone: &Zone) -> Result<Truth, StoreError> {
         heights_m.push(height);
     }
     Ok(Truth::new(zone, places, heights_m))
-}
-
-/// Rows of a results file and the number of bytes they fill; a last line without its end was cut
-/// short and is left out.
-fn read_rows(path: &Path) -> Result<(Vec<TrialRow>, u64), StoreError> {
-    let bytes = fs::read(path).map_err(io_error(path))?;
-    let (mut rows, mut good) = (Vec::new(), 0);
-    let lines = bytes.split_inclusive(|&byte| byte == b'\n').filter(|line| line.ends_with(b"\n"));
-    for (i, line) in lines.enumerate() {
-        rows.push(serde_json::from_slice(line).map_err(|error| StoreError::BadRow {
-            path: path.into(),
-            line: i + 1,
-            message: error.to_string(),
-        })?);
-        good += line.len();
-    }
-    Ok((rows, good as u64))
 }
 
 /// Writes `name`, or, if the folder has it already, insists that it says the same.
@@ -346,8 +298,4 @@ fn remove(path: &Path, how: impl Fn(&Path) -> io::Result<()>) -> Result<(), Stor
         }
         _ => Ok(()),
     }
-}
-
-fn io_error(path: &Path) -> impl Fn(io::Error) -> StoreError {
-    move |cause| StoreError::Io { path: path.into(), cause }
 }
