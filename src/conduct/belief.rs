@@ -2,7 +2,7 @@
 
 use super::probe::Touch;
 use crate::ground::config::{Checked, Rules};
-use crate::ground::gp::covariance::Indefinite;
+use crate::ground::gp::covariance::CovarianceError;
 use crate::ground::gp::fit::{Fit, SearchBox};
 use crate::ground::gp::kernel::{self, Hyperparameters, Kernel};
 use crate::ground::gp::posterior::{Posterior, Scratch};
@@ -143,7 +143,7 @@ impl Belief {
     ///
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
-    pub fn refit(&mut self) -> Result<(&Fit, &Posterior), Indefinite> {
+    pub fn refit(&mut self) -> Result<(&Fit, &Posterior), CovarianceError> {
         let last = self.fit.take();
         let fit = self.search_box().fit(self.kernel, &self.contacts, last.as_ref());
         let posterior = self.posterior(fit.hyperparameters.clone())?;
@@ -156,19 +156,19 @@ impl Belief {
     ///
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
-    pub fn condition(&mut self, hyperparameters: Hyperparameters) -> Result<(), Indefinite> {
+    pub fn condition(&mut self, hyperparameters: Hyperparameters) -> Result<(), CovarianceError> {
         let posterior = self.posterior(hyperparameters)?;
         self.explore(&posterior)?;
         self.surface = Some(posterior);
         Ok(())
     }
 
-    fn posterior(&self, hyperparameters: Hyperparameters) -> Result<Posterior, Indefinite> {
+    fn posterior(&self, hyperparameters: Hyperparameters) -> Result<Posterior, CovarianceError> {
         Posterior::new(self.kernel, hyperparameters, self.contacts.clone())
     }
 
     /// Adds the unreached targets to what `surface` knows of its variance.
-    fn explore(&mut self, surface: &Posterior) -> Result<(), Indefinite> {
+    fn explore(&mut self, surface: &Posterior) -> Result<(), CovarianceError> {
         self.explored = match self.unreached.is_empty() {
             true => None,
             false => Some(surface.visiting(self.unreached.iter().map(Vec::as_slice))?),

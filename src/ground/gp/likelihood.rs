@@ -1,6 +1,6 @@
 //! The log marginal likelihood of hyperparameters and its gradient.
 
-use super::covariance::{self, Indefinite};
+use super::covariance::{self, CovarianceError};
 use super::dense::Dense;
 use super::kernel::{Hyperparameters, Kernel};
 use super::mean::Mean;
@@ -63,12 +63,12 @@ impl<'a> Likelihood<'a> {
     /// (ln signal_sd, ln length_1, …, ln length_d, ln noise_sd), unless `gradient` is empty.
     ///
     /// # Errors
-    /// [`Indefinite`] if the covariance cannot be factored.
+    /// [`CovarianceError`] if the covariance cannot be factored.
     pub fn value_gradient(
         &mut self,
         at: &Hyperparameters,
         gradient: &mut [f64],
-    ) -> Result<f64, Indefinite> {
+    ) -> Result<f64, CovarianceError> {
         let noise_ratio = at.noise_sd / at.signal_sd;
         self.factor(&at.length_scales, noise_ratio)?;
         let fit = self.weigh(at.mean);
@@ -85,14 +85,14 @@ impl<'a> Likelihood<'a> {
     /// included.
     ///
     /// # Errors
-    /// [`Indefinite`] if the covariance cannot be factored.
+    /// [`CovarianceError`] if the covariance cannot be factored.
     pub fn profile(
         &mut self,
         length_scales: &[f64],
         noise_ratio: f64,
         scale: &Scale,
         gradient: Option<&mut [f64]>,
-    ) -> Result<Profile, Indefinite> {
+    ) -> Result<Profile, CovarianceError> {
         self.factor(length_scales, noise_ratio)?;
         let mean = self.mean.of(self.observations.heights(), &self.dense, &mut self.scratch);
         let fit = self.weigh(mean);
@@ -118,7 +118,7 @@ impl<'a> Likelihood<'a> {
             - 0.5 * n * (2.0 * std::f64::consts::PI).ln()
     }
 
-    fn factor(&mut self, length_scales: &[f64], noise_ratio: f64) -> Result<(), Indefinite> {
+    fn factor(&mut self, length_scales: &[f64], noise_ratio: f64) -> Result<(), CovarianceError> {
         self.factorisations += 1;
         let (kernel, observations) = (self.kernel, self.observations);
         covariance::factor(&mut self.dense, kernel, observations, length_scales, noise_ratio)

@@ -48,6 +48,12 @@ impl Observations {
         self.columns.iter().map(move |column| column[i])
     }
 
+    /// The first one with a coordinate or height that is not finite.
+    pub fn first_not_finite(&self) -> Option<usize> {
+        let columns = self.columns.iter().chain([&self.heights]);
+        columns.filter_map(|column| column.iter().position(|x| !x.is_finite())).min()
+    }
+
     /// All heights in order.
     pub fn heights(&self) -> &[f64] {
         &self.heights

@@ -1,7 +1,7 @@
 //! The exact posterior of a Gaussian process, Eq. 3 of Yi et al. 2016.
 
 use super::cholesky::{Factor, NotPositiveDefinite};
-use super::covariance::{self, Indefinite};
+use super::covariance::{self, CovarianceError};
 use super::dense::Dense;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::Observations;
@@ -29,12 +29,12 @@ impl Posterior {
     /// Conditions the prior on `observations`: n³/3 operations.
     ///
     /// # Errors
-    /// [`Indefinite`] if the covariance cannot be factored.
+    /// [`CovarianceError`] if the covariance cannot be factored.
     pub fn new(
         kernel: &'static dyn Kernel,
         hyperparameters: Hyperparameters,
         observations: Observations,
-    ) -> Result<Self, Indefinite> {
+    ) -> Result<Self, CovarianceError> {
         let mut dense = Dense::new(observations.len());
         let noise_ratio = hyperparameters.noise_sd / hyperparameters.signal_sd;
         let lengths = &hyperparameters.length_scales;
@@ -72,11 +72,11 @@ impl Posterior {
     /// nothing. n² operations for each.
     ///
     /// # Errors
-    /// [`Indefinite`] if the enlarged covariance cannot be factored.
+    /// [`CovarianceError`] if the enlarged covariance cannot be factored.
     pub fn visiting<'a>(
         &self,
         places: impl Iterator<Item = &'a [f64]> + Clone,
-    ) -> Result<Self, Indefinite> {
+    ) -> Result<Self, CovarianceError> {
         let mut visiting = self.clone();
         if places.clone().try_for_each(|place| visiting.append(place, 0.0)).is_ok() {
             return Ok(visiting);
