@@ -10,7 +10,7 @@ PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementat
 FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
 PALPATE := target/release/palpate
 
-.PHONY: demo test lint bench setup tools clean
+.PHONY: demo test lint bench growth bench-peers setup tools clean
 
 demo: setup
 	cargo build --release --locked
@@ -26,7 +26,21 @@ lint: setup
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
 
 bench: setup
-	cargo bench --locked
+	cargo bench --locked --bench kernels
+
+# How the cost grows with the number of touches; draws docs/growth.svg.
+growth: setup
+	cargo bench --locked --bench growth
+
+# Palpate beside scikit-learn and egobox, in an environment of its own.
+bench-peers: setup $(DEPS)/peers/bin/python
+	cargo build --release --locked
+	$(DEPS)/peers/bin/python benches/peers.py
+
+$(DEPS)/peers/bin/python: benches/peers.txt
+	python3 -m venv $(DEPS)/peers
+	$(DEPS)/peers/bin/python -m pip install --quiet --only-binary=:all: -r benches/peers.txt
+	touch $@
 
 setup: tools $(LIBRARY) $(CMAKE)
 

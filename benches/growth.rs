@@ -1,0 +1,194 @@
+//! How the cost of the Gaussian process grows with the number of touches: `make growth`.
+//!
+//! Prints a table with measured exponents and the share of this machine's own matrix
+//! multiplication, and draws `docs/growth.svg` and `.png`. One thread.
+
+use palpate::faces::report::axes::{Axis, Panel, Sample, legend};
+use palpate::faces::report::canvas::{Area, Canvas};
+use palpate::faces::report::{png, style};
+use palpate::ground::gp::fit::SearchBox;
+use palpate::ground::gp::kernel::{Hyperparameters, SquaredExponential};
+use palpate::ground::gp::likelihood::Likelihood;
+use palpate::ground::gp::posterior::Scratch;
+use palpate::ground::gp::{Mean, Observations, Posterior};
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Instant;
+
+static KERNEL: SquaredExponential = SquaredExponential;
+
+const COUNTS: [usize; 9] = [10, 25, 50, 100, 200, 400, 1000, 2000, 4000];
+
+/// Cold fits are measured up to here; beyond, a fit is as many likelihoods as below.
+const FIT_MAX: usize = 1000;
+
+/// One measured quantity over the counts.
+struct Curve {
+    name: &'static str,
+    colour: &'static str,
+    /// The power of n that its operations grow with.
+    expected: f64,
+    seconds: Vec<(f64, f64)>,
+}
+
+/// `count` touches of a smooth surface over a unit square, spread by a low-discrepancy walk.
+fn touches(count: usize) -> Observations {
+    let mut touches = Observations::new(2);
+    for i in 0..count {
+        let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
+        touches.push(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
+    }
+    touches
+}
+
+/// Seconds of one call: the least of three rounds that last some ten milliseconds each.
+fn seconds(mut work: impl FnMut()) -> f64 {
+    let begun = Instant::now();
+    work();
+    let once = begun.elapsed().as_secs_f64();
+    let repeats = (0.01 / once).clamp(1.0, 1e5) as u32;
+    let round = |_| {
+        let begun = Instant::now();
+        (0..repeats).for_each(|_| work());
+        begun.elapsed().as_secs_f64() / f64::from(repeats)
+    };
+    (0..3).map(round).fold(once, f64::min)
+}
+
+fn measure() -> Vec<Curve> {
+    let at = Hyperparameters {
+        signal_sd: 1.0,
+        length_scales: vec![0.2, 0.4],
+        noise_sd: 1e-3,
+        mean: 0.0,
+    };
+    let bounds = SearchBox {
+        mean: Mean::Zero,
+        length_scales: vec![(0.005, 1.0).into(); 2],
+        noise_ratio: (1e-4, 1e-2).into(),
+        signal_sd: (1e-3, 1e3).into(),
+        noise_sd: None,
+    };
+    let curve = |name, colour, expected| Curve { name, colour, expected, seconds: Vec::new() };
+    let mut fit = curve("cold fit", "#0072b2", 3.0);
+    let mut likelihood = curve("likelihood with gradient", "#d55e00", 3.0);
+    let mut add = curve("adding a touch", "#cc79a7", 2.0);
+    let mut query = curve("σ at a place, with gradient", style::TRUTH, 2.0);
+    for count in COUNTS {
+        let n = count as f64;
+        let touches = touches(count);
+        if count <= FIT_MAX {
+            fit.seconds.push((
+                n,
+                seconds(|| {
+                    black_box(bounds.fit(&KERNEL, &touches, None));
+                }),
+            ));
+        }
+        let mut scorer = Likelihood::new(&KERNEL, Mean::Zero, &touches);
+        let mut gradient = [0.0; 4];
+        likelihood.seconds.push((
+            n,
+            seconds(|| {
+                let _ = black_box(scorer.value_gradient(&at, &mut gradient));
+            }),
+        ));
+        drop(scorer);
+        let Ok(posterior) = Posterior::new(&KERNEL, at.clone(), touches) else { continue };
+        let mut scratch = Scratch::default();
+        let mut slope = [0.0; 2];
+        query.seconds.push((
+            n,
+            seconds(|| {
+                black_box(posterior.variance_gradient(&[0.31, 0.47], &mut slope, &mut scratch));
+            }),
+        ));
+        // A touch at a time on one growing posterior, so that no copy is measured.
+        let mut growing = posterior.clone();
+        let mut step = 0.0;
+        add.seconds.push((
+            n,
+            seconds(|| {
+                if growing.observations().len() > count + count / 10 + 3 {
+                    growing.clone_from(&posterior);
+                }
+                step += 0.381_966;
+                let _ = black_box(growing.add(&[step % 1.0, (step * 0.7) % 1.0], 1.0));
+            }),
+        ));
+    }
+    vec![fit, likelihood, add, query]
+}
+
+/// Exponent between the last two counts.
+fn exponent(curve: &Curve) -> f64 {
+    match curve.seconds.as_slice() {
+        [.., (n, before), (m, after)] => (after / before).ln() / (m / n).ln(),
+        _ => f64::NAN,
+    }
+}
+
+fn matmul_flops() -> f64 {
+    let n = 1000;
+    let a = faer::Mat::<f64>::from_fn(n, n, |i, j| ((i * 7 + j * 13) % 11) as f64);
+    let mut c = faer::Mat::<f64>::zeros(n, n);
+    let once = seconds(|| {
+        let (replace, sequential) = (faer::Accum::Replace, faer::Par::Seq);
+        faer::linalg::matmul::matmul(c.as_mut(), replace, &a, &a, 1.0, sequential);
+    });
+    2.0 * (n as f64).powi(3) / once
+}
+
+fn draw(curves: &[Curve]) -> Option<String> {
+    let mut canvas = Canvas::new(760.0, 470.0);
+    let area = Area { left: 80.0, top: 70.0, width: 640.0, height: 340.0 };
+    let points = || curves.iter().flat_map(|curve| &curve.seconds);
+    let x = Axis::log(points().map(|(n, _)| *n))?;
+    let y = Axis::log(points().map(|(_, seconds)| *seconds))?;
+    let panel = Panel { area, x, y };
+    panel.frame(&mut canvas);
+    panel.label(&mut canvas, "", "touches n", "seconds");
+    let mut entries = Vec::new();
+    for curve in curves {
+        let stroke = style::stroke(curve.colour, 2.0);
+        panel.curve(&mut canvas, &curve.seconds, &stroke);
+        entries.push((Sample::Line(stroke), curve.name));
+        if let Some((last, seconds)) = curve.seconds.last() {
+            let law = |(n, _): &(f64, f64)| (*n, seconds * (n / last).powf(curve.expected));
+            let upper = curve.seconds.iter().filter(|(n, _)| *n >= last / 10.0);
+            let law: Vec<(f64, f64)> = upper.map(law).collect();
+            panel.curve(&mut canvas, &law, &style::dashed(style::FAINT_INK, 1.0, "4 4"));
+        }
+    }
+    legend(&mut canvas, [80.0, 28.0], &entries);
+    Some(canvas.finish())
+}
+
+fn main() -> anyhow::Result<()> {
+    if std::env::args().any(|argument| argument == "--test") {
+        return Ok(());
+    }
+    let curves = measure();
+    println!("{:<30}{}", "seconds at n =", COUNTS.map(|n| format!("{n:>10}")).concat());
+    for curve in &curves {
+        let cells: String = curve.seconds.iter().map(|(_, s)| format!("{s:>10.2e}")).collect();
+        let (measured, expected) = (exponent(curve), curve.expected);
+        println!("{:<30}{cells}   n^{measured:.2}, operations n^{expected}", curve.name);
+    }
+    let flops = matmul_flops();
+    if let Some((n, seconds)) = curves[1].seconds.iter().find(|(n, _)| *n == 1000.0) {
+        let share = n.powi(3) / seconds / flops;
+        println!(
+            "likelihood with gradient at n = 1000: {:.1} Gflop/s, {:.0} % of the {:.1} of a matrix product",
+            n.powi(3) / seconds / 1e9,
+            1e2 * share,
+            flops / 1e9
+        );
+    }
+    if let Some(svg) = draw(&curves) {
+        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+        std::fs::write(docs.join("growth.png"), png::render(&svg)?)?;
+        std::fs::write(docs.join("growth.svg"), svg)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,127 @@
+"""Algorithm 1 on the toy with scikit-learn, egobox and Palpate: the same initial touches, one thread.
+
+Run by `make bench-peers`, which makes the environment. Prints seconds per trial, ratios to Palpate,
+and the touches after which the mean R (Eq. 5) first reaches 0.99.
+"""
+
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from importlib.metadata import version
+
+for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"):
+    os.environ[threads] = "1"
+
+import egobox
+import numpy as np
+from scipy.optimize import direct, minimize
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
+warnings.filterwarnings("ignore")
+TRIALS, TOUCHES, LOW, HIGH = 3, 50, -2.0, 2.0
+TEST = np.linspace(LOW, HIGH, 401)[:, None]
+
+
+def toy(x):
+    return np.where(np.abs(x) <= 1.0, np.sin(4 * np.pi * x) + 1.0, 1.0)
+
+
+def correlation(f, g):
+    norm = np.sqrt((f * f).sum() * (g * g).sum())
+    return float((f * g).sum() / norm) if norm > 0 else 0.0
+
+
+class ScikitLearn:
+    """Two restarts, heights normalised, noise fitted: the settings a lab would start from."""
+
+    def fit(self, x, y):
+        kernel = ConstantKernel() * RBF(0.5, (1e-2, 10)) + WhiteKernel(1e-5, (1e-10, 1))
+        self.model = GaussianProcessRegressor(
+            kernel, normalize_y=True, n_restarts_optimizer=2, random_state=0
+        ).fit(x, y)
+
+    def mean(self, x):
+        return self.model.predict(x)
+
+    def deviation(self, x):
+        return float(self.model.predict(x[None], return_std=True)[1][0])
+
+
+class Egobox:
+    """Ten starts, its default, with bounds that hold the toy's length scale."""
+
+    def fit(self, x, y):
+        gp = egobox.GpMix(theta_bounds=[[1e-2, 1e3]], theta_n_start=10, seed=0)
+        self.model = gp.fit(x, y[:, None])
+
+    def mean(self, x):
+        return np.asarray(self.model.predict(x)).ravel()
+
+    def deviation(self, x):
+        return float(np.sqrt(max(0.0, np.asarray(self.model.predict_var(x[None])).item())))
+
+
+def next_touch(model):
+    """DIRECT with 200 evaluations, refined by L-BFGS-B."""
+    cost = lambda x: -model.deviation(np.asarray(x))
+    found = direct(cost, [(LOW, HIGH)], maxfun=200)
+    return minimize(cost, found.x, method="L-BFGS-B", bounds=[(LOW, HIGH)]).x
+
+
+def explore(model, start):
+    """R after each touch, and seconds without scoring."""
+    x = np.array(start)[:, None]
+    scores, seconds = [], 0.0
+    while True:
+        begun = time.perf_counter()
+        model.fit(x, toy(x[:, 0]))
+        seconds += time.perf_counter() - begun
+        scores.append(correlation(toy(TEST[:, 0]), model.mean(TEST)))
+        if len(x) == TOUCHES:
+            return scores, seconds
+        begun = time.perf_counter()
+        x = np.vstack([x, next_touch(model)[None]])
+        seconds += time.perf_counter() - begun
+
+
+def palpate(folder):
+    """Runs Palpate on one thread; its seconds include scoring and writing rows."""
+    command = ["target/release/palpate", "run", "experiments/toy.toml", "--out", folder, "--threads", "1"]
+    command += ["--no-report", "--set", f"trials={TRIALS}", "--set", 'planners=["active"]']
+    begun = time.perf_counter()
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    seconds = (time.perf_counter() - begun) / TRIALS
+    with open(os.path.join(folder, "trials.jsonl")) as lines:
+        return [json.loads(line)["touches"] for line in lines], seconds
+
+
+def reached(curves, goal=0.99):
+    mean = np.mean(curves, axis=0)
+    first = np.flatnonzero(mean >= goal)
+    return str(TOUCHES - len(mean) + 1 + first[0]) if len(first) else "-"
+
+
+def main():
+    with tempfile.TemporaryDirectory() as folder:
+        trials, ours = palpate(os.path.join(folder, "run"))
+    starts = [[touch["target"][0] for touch in touches[:3]] for touches in trials]
+    curves = [[touch["metrics"]["r"] for touch in touches[2:]] for touches in trials]
+    print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {TRIALS} trials of {TOUCHES} touches")
+    print(f"{'system':<24}{'s/trial':>9}{'ratio':>8}{'0.99 at':>9}")
+    print(f"{'Palpate':<24}{ours:>9.3f}{1:>8}{reached(curves):>9}", flush=True)
+    for name, model in (("egobox", Egobox), ("scikit-learn", ScikitLearn)):
+        results = [explore(model(), start) for start in starts]
+        seconds = float(np.mean([seconds for _, seconds in results]))
+        goal = reached([scores for scores, _ in results])
+        label = f"{name} {version(name)}"
+        print(f"{label:<24}{seconds:>9.3f}{seconds / ours:>8.0f}{goal:>9}", flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
