@@ -2,7 +2,7 @@
 
 use palpate::conduct::probe::{self, Contact, Touch};
 use palpate::ground::geometry::sweep::Capsule;
-use palpate::world::world::Shape;
+use palpate::world::world::{APPROACH_W, Shape};
 use palpate::world::{Scene, World};
 use proptest::prelude::*;
 use std::path::Path;
@@ -69,32 +69,30 @@ fn past_the_object_the_finger_meets_nothing() {
 }
 
 proptest! {
-    /// The hull touches the mesh at the contact and enters it nowhere, and is never farther back
-    /// than the surface under its middle asks.
+    /// Where the sweep stops, the hull touches the mesh at the contact that the probe returns, and
+    /// enters it nowhere.
     #[test]
     fn the_finger_stops_at_the_surface(x in -0.04..0.04f64, z in 0.44..0.54f64, is_bird in any::<bool>()) {
         let world = if is_bird { &*BIRD } else { &*CONTAINER };
         let Shape::Mesh { bvh, .. } = world.shape() else { unreachable!() };
         let finger = &world.scene().finger;
-        let hit = contact(world, &[x, z]);
-        prop_assert!(bvh.closest_point(&hit.p_wc).distance_m < 1e-9);
-        // The tip lies over the target at the height that puts the contact on the hull.
-        let direct = world.true_height_m(&[x, z]).unwrap() + world.scene().zone.datum_y_m;
-        let (mut near, mut far) = (direct - 1e-4, direct + 0.1);
-        let clearance = |tip_y: f64| {
-            let tip = nalgebra::Point3::new(x, tip_y, z);
-            let hull = Capsule { p0_w: tip, p1_w: tip + finger.axis_w(), radius_m: finger.radius_m };
-            let nearest = hull.nearest(&[hit.p_wc; 3]);
-            (nearest.0 - nearest.1).norm() - finger.radius_m
+        let start = nalgebra::Point3::new(x, -0.5, z);
+        let hull = Capsule {
+            p0_w: start,
+            p1_w: start + finger.axis_w(),
+            radius_m: finger.radius_m,
         };
-        for _ in 0..60 {
-            let middle = 0.5 * (near + far);
-            if clearance(middle) > 0.0 { far = middle } else { near = middle }
-        }
-        prop_assert!(clearance(far).abs() < 1e-9, "the contact lies on the hull");
+        let hit = bvh.sweep(&hull, &APPROACH_W, 1.0).unwrap();
+        let touched = contact(world, &[x, z]);
+        prop_assert!((touched.p_wc - hit.point).norm() < 1e-9);
+        prop_assert!((touched.normal_w - hit.normal).norm() < 1e-6);
+        let stopped = hull.translated(&APPROACH_W.scale(hit.travel_m));
+        let (on_axis, on_mesh) = stopped.nearest(&[hit.point; 3]);
+        prop_assert!(((on_axis - on_mesh).norm() - finger.radius_m).abs() < 1e-9);
+        prop_assert!(bvh.closest_point(&hit.point).distance_m < 1e-9);
         let steps = 15;
         for i in 0..=steps {
-            let on_axis = nalgebra::Point3::new(x, far, z) + finger.axis_w() * (f64::from(i) / f64::from(steps));
+            let on_axis = stopped.p0_w + finger.axis_w() * (f64::from(i) / f64::from(steps));
             let distance_m = bvh.closest_point(&on_axis).distance_m;
             prop_assert!(distance_m > finger.radius_m - 1e-9, "{distance_m} at {i}");
         }

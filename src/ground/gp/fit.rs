@@ -46,8 +46,10 @@ const CLIMB_BUDGET: u32 = 100;
 /// Hills of the scan that are climbed, besides the last fit's; chosen: enough for every fit of
 /// the toy that was held against a dense grid.
 const CLIMBS: usize = 3;
-/// Up to this many observations each fit scans the whole box: few touches change their mind.
-const SCAN_ALWAYS: usize = 32;
+/// Up to this many observations each fit scans the whole box: few touches change their mind. On
+/// the toy, 13 of 524 fits missed the global maximum when scans ended at 32, and 4 do with a scan
+/// each time.
+const SCAN_ALWAYS: usize = 50;
 /// Beyond, a fit scans once the observations have grown by this factor since the last scan, and
 /// in between climbs from where it stood; chosen.
 const SCAN_AGAIN: f64 = 1.2;
