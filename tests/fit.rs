@@ -12,6 +12,12 @@ fn toy(x: f64) -> f64 {
     if x.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x).sin() + 1.0 } else { 1.0 }
 }
 
+/// The ranges of noise and signal that a belief searches by default.
+fn search_box(mean: Mean, length_scales: Vec<Range>) -> SearchBox {
+    let (noise_ratio, signal_sd) = ((1e-4, 1e-2).into(), (1e-3, 1e3).into());
+    SearchBox { mean, length_scales, noise_ratio, signal_sd, noise_sd: None }
+}
+
 /// The slow twin of a fit: the profiled likelihood on a dense grid over the same box.
 fn best_on_grid(bounds: &SearchBox, touches: &Observations) -> f64 {
     let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, touches);
@@ -35,13 +41,7 @@ fn best_on_grid(bounds: &SearchBox, touches: &Observations) -> f64 {
 
 #[test]
 fn fits_of_the_toy_reach_the_global_maximum() {
-    let bounds = SearchBox {
-        mean: Mean::Zero,
-        length_scales: vec![(0.02, 4.0).into()],
-        noise_ratio: (1e-4, 1e-2).into(),
-        signal_sd: (1e-3, 1e3).into(),
-        noise_sd: None,
-    };
+    let bounds = search_box(Mean::Zero, vec![(0.02, 4.0).into()]);
     let (mut fits, mut short) = (0, 0);
     for trial in 0..12u64 {
         // A golden-ratio walk: spread, irregular, and different in each trial.
@@ -63,13 +63,7 @@ fn fits_of_the_toy_reach_the_global_maximum() {
 /// scan would have, but for a twentieth of a nat until the next scan.
 #[test]
 fn fits_touch_by_touch_reach_what_cold_fits_reach() {
-    let bounds = SearchBox {
-        mean: Mean::Zero,
-        length_scales: vec![(0.005, 1.0).into(); 2],
-        noise_ratio: (1e-4, 1e-2).into(),
-        signal_sd: (1e-3, 1e3).into(),
-        noise_sd: None,
-    };
+    let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
     let (mut fits, mut gaps) = (0, Vec::new());
     for trial in 0..4 {
         let mut touches = Observations::new(2);
@@ -100,13 +94,7 @@ fn a_fit_recovers_the_lengths_of_an_anisotropic_surface() {
         let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
         touches.push(&place, (9.0 * place[0]).sin() + 0.3 * place[1]);
     }
-    let bounds = SearchBox {
-        mean: Mean::Zero,
-        length_scales: vec![(0.005, 1.0).into(); 2],
-        noise_ratio: (1e-4, 1e-2).into(),
-        signal_sd: (1e-3, 1e3).into(),
-        noise_sd: None,
-    };
+    let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
     let fit = bounds.fit(&KERNEL, &touches, None).hyperparameters;
     assert!(fit.length_scales[1] > 2.0 * fit.length_scales[0], "{fit:?}");
 }
@@ -118,13 +106,7 @@ fn a_prior_pulls_a_known_noise_stays_and_a_constant_is_found() {
         let x = -2.0 + 4.0 * (f64::from(i) * 0.618_033_988_75 % 1.0);
         touches.push(&[x], 1000.0 + toy(x));
     }
-    let free = SearchBox {
-        mean: Mean::Constant,
-        length_scales: vec![(0.02, 4.0).into()],
-        noise_ratio: (1e-4, 1e-2).into(),
-        signal_sd: (1e-3, 1e3).into(),
-        noise_sd: None,
-    };
+    let free = search_box(Mean::Constant, vec![(0.02, 4.0).into()]);
     let found = free.fit(&KERNEL, &touches, None).hyperparameters;
     assert!((found.mean - 1001.0).abs() < 1.0 && found.signal_sd < 2.0, "{found:?}");
     let prior = Some(LogNormal { median: 1.0, spread: 1.05 });

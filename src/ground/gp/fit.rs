@@ -62,8 +62,9 @@ impl SearchBox {
     ///
     /// The likelihood is profiled over signal_sd, which has a closed form, so the search runs
     /// over (ln lengths, ln noise ratio) only. `last`, the fit before the newest touches, is one
-    /// more start, or the only one while the box need not be scanned again. With no observations, or if no covariance can be factored, the middle of the
-    /// box is returned with [`Stop::Failed`].
+    /// more start, or, while the box need not be scanned again, the only one beside shorter
+    /// lengths. With no observations, or if no covariance can be factored, the middle of the box
+    /// is returned with [`Stop::Failed`].
     pub fn fit(
         &self,
         kernel: &'static dyn Kernel,
