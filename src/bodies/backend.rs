@@ -1,12 +1,15 @@
 //! One control tick of a body.
 
+use crate::things::finger::Frame;
+use nalgebra::{Point3, Vector3};
 use thiserror::Error;
 
 /// Joint velocities for the next tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Command {
-    /// One entry per joint, in the order of [`Capabilities::joints`].
-    pub qdot_rad_s: Vec<f64>,
+    /// One entry per joint, in the order of [`Capabilities::joints`]: rad/s, or m/s where the
+    /// joint slides.
+    pub qdot: Vec<f64>,
 }
 
 /// What a body returns after a tick. Time stands in it and is never read from a clock.
@@ -14,12 +17,38 @@ pub struct Command {
 pub struct Reading {
     /// Since reset.
     pub time_s: f64,
-    /// Joint positions.
-    pub q_rad: Vec<f64>,
-    /// Joint velocities.
-    pub qdot_rad_s: Vec<f64>,
+    /// Joint positions, rad, or m where the joint slides.
+    pub q: Vec<f64>,
+    /// Joint velocities, rad/s or m/s.
+    pub qdot: Vec<f64>,
+    /// What the force/torque sensor at the finger's mount says, if there is one.
+    pub wrench: Option<Wrench>,
+    /// The newest tactile frame, if the finger has a sensor and one has arrived.
+    pub tactile: Option<Frame>,
+    /// Where the skin is loaded, in a scene without electrodes; a real body never knows it.
+    pub ideal: Option<IdealContact>,
     /// The command as it was really applied after limiting.
     pub applied: Command,
+}
+
+/// Force and torque of the object on the finger, in the fingertip's frame `T` about its origin.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// Force.
+    pub force_n: Vector3<f64>,
+    /// Torque about the origin of `T`.
+    pub torque_nm: Vector3<f64>,
+}
+
+/// A contact as a simulator knows it: exact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IdealContact {
+    /// Centre of pressure on the skin, in `T`.
+    pub p_tc: Point3<f64>,
+    /// Unit outward normal of the object there, in `T`.
+    pub normal_t: Vector3<f64>,
+    /// Magnitude of the force.
+    pub force_n: f64,
 }
 
 /// What a body can do, known before it is connected.
@@ -27,10 +56,10 @@ pub struct Reading {
 pub struct Capabilities {
     /// Joint names; commands and readings follow their order.
     pub joints: Vec<String>,
-    /// Smallest and largest position of each joint.
-    pub q_limits_rad: Vec<[f64; 2]>,
-    /// Largest speed of each joint.
-    pub qdot_limits_rad_s: Vec<f64>,
+    /// Smallest and largest position of each joint, rad or m.
+    pub q_limits: Vec<[f64; 2]>,
+    /// Largest speed of each joint, rad/s or m/s.
+    pub qdot_limits: Vec<f64>,
     /// Duration of one tick.
     pub period_s: f64,
     /// Whether `reset` restores the same state for the same seed.

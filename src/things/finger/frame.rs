@@ -1,0 +1,27 @@
+//! What the finger's sensor sends.
+
+use serde::{Deserialize, Serialize};
+
+/// Electrodes of a BioTac.
+pub const ELECTRODES: usize = 19;
+
+/// Vibration samples in a frame of 44 slots.
+pub const VIBRATIONS: usize = 22;
+
+/// One tactile frame in raw counts, as a BioTac sends it; what the scene does not simulate, or
+/// the sensor does not have, is none.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Frame {
+    /// When its last channel was sampled, since reset.
+    pub time_s: f64,
+    /// E1 to E19: high where the fluid is thick, falling as the skin comes down.
+    pub electrode_counts: Option<[f64; ELECTRODES]>,
+    /// Static fluid pressure (PDC).
+    pub pdc_counts: Option<f64>,
+    /// Dynamic fluid pressure (PAC), oldest first.
+    pub pac_counts: Option<[f64; VIBRATIONS]>,
+    /// Temperature (TDC).
+    pub tdc_counts: Option<f64>,
+    /// Change of temperature (TAC).
+    pub tac_counts: Option<f64>,
+}
