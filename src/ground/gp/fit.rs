@@ -41,6 +41,19 @@ pub struct Fit {
     pub stop: Stop,
 }
 
+/// Where a climb may begin.
+struct Hill {
+    start: Vec<f64>,
+    /// What its top can be expected to score at most.
+    at_most: f64,
+}
+
+impl Hill {
+    fn unknown(start: Vec<f64>) -> Self {
+        Self { start, at_most: f64::INFINITY }
+    }
+}
+
 /// Evaluations allowed to one climb; most need a fifth of it.
 const CLIMB_BUDGET: u32 = 100;
 /// Hills of the scan that are climbed, besides the last fit's; chosen: enough for every fit of
@@ -83,12 +96,20 @@ impl SearchBox {
         let scanned_at = recent.map_or(count, |last| last.scanned_at);
         let (mut best, mut best_score) = (None, f64::NEG_INFINITY);
         if !observations.is_empty() {
-            let mut starts = match recent {
-                Some(last) => vec![shorter(&last.hyperparameters, &lower, &upper)],
-                None => self.hills(&mut likelihood, &scale, &lower, &upper),
-            };
-            starts.extend(last.map(|last| log_parameters(&last.hyperparameters)));
-            for start in starts {
+            let mut starts: Vec<Hill> = last
+                .map(|last| Hill::unknown(log_parameters(&last.hyperparameters)))
+                .into_iter()
+                .collect();
+            match recent {
+                Some(last) => {
+                    starts.push(Hill::unknown(shorter(&last.hyperparameters, &lower, &upper)));
+                }
+                None => starts.extend(self.hills(&mut likelihood, &scale, &lower, &upper)),
+            }
+            for Hill { start, at_most } in starts {
+                if at_most < best_score {
+                    continue;
+                }
                 let bounds = optimize::Bounds { lower: &lower, upper: &upper };
                 let top = optimize::lbfgs(bounds, &start, CLIMB_BUDGET, |x, gradient| {
                     self.score(&mut likelihood, &scale, x, Some(gradient))
@@ -197,7 +218,7 @@ impl SearchBox {
         scale: &Scale,
         lower: &[f64],
         upper: &[f64],
-    ) -> Vec<Vec<f64>> {
+    ) -> Vec<Hill> {
         let levels = self.levels();
         let count: usize = levels.iter().product();
         let point = |index: usize| -> Vec<f64> {
@@ -219,7 +240,11 @@ impl SearchBox {
             (0..count).filter(|&index| is_hill(index, &levels, &values)).collect();
         hills.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
         hills.truncate(CLIMBS);
-        hills.into_iter().map(point).collect()
+        let hill = |index| {
+            let at_most = values[index] + rise(index, &levels, &values);
+            Hill { start: point(index), at_most }
+        };
+        hills.into_iter().map(hill).collect()
     }
 
     /// Grid points per parameter, the noise last.
@@ -247,14 +272,33 @@ fn digits(index: usize, levels: &[usize]) -> impl Iterator<Item = usize> {
     })
 }
 
+/// The values of the neighbours of grid point `index`, parameter by parameter.
+fn neighbours(
+    index: usize,
+    levels: &[usize],
+    values: &[f64],
+) -> impl Iterator<Item = [Option<f64>; 2]> {
+    let mut stride = values.len();
+    digits(index, levels).zip(levels).map(move |(digit, levels)| {
+        stride /= levels;
+        let below = (digit > 0).then(|| values[index - stride]);
+        let above = (digit + 1 < *levels).then(|| values[index + stride]);
+        [below, above]
+    })
+}
+
 /// Whether no neighbour along any parameter is higher.
 fn is_hill(index: usize, levels: &[usize], values: &[f64]) -> bool {
-    let mut stride = values.len();
-    digits(index, levels).zip(levels).all(|(digit, levels)| {
-        stride /= levels;
-        (digit == 0 || values[index - stride] <= values[index])
-            && (digit + 1 == *levels || values[index + stride] <= values[index])
-    })
+    let mut beside = neighbours(index, levels, values).flatten().flatten();
+    beside.all(|value| value <= values[index])
+}
+
+/// What a hill may rise above its highest grid point: along each parameter a quarter of its fall
+/// to the lower neighbour, where a parabola's top is at most an eighth of it higher.
+fn rise(index: usize, levels: &[usize], values: &[f64]) -> f64 {
+    let lowest =
+        |beside: [Option<f64>; 2]| beside.into_iter().flatten().fold(values[index], f64::min);
+    neighbours(index, levels, values).map(|beside| 0.25 * (values[index] - lowest(beside))).sum()
 }
 
 fn parameters(logs: &[f64]) -> (Vec<f64>, f64) {

@@ -6,7 +6,7 @@ use super::kernel::{Hyperparameters, Kernel};
 use super::mean::Mean;
 use super::observations::Observations;
 use super::range::Scale;
-use crate::ground::simd::widest;
+use crate::ground::simd::{dot, widest};
 
 /// Scores hyperparameters against fixed observations; keeps its buffers between calls.
 ///
@@ -21,7 +21,7 @@ pub struct Likelihood<'a> {
     /// A⁻¹·y.
     weights: Vec<f64>,
     scratch: Vec<f64>,
-    distances2: Vec<f64>,
+    correlations: Vec<f64>,
     slopes: Vec<f64>,
     factorisations: u32,
 }
@@ -48,8 +48,8 @@ impl<'a> Likelihood<'a> {
             dense: Dense::new(count),
             weights: Vec::with_capacity(count),
             scratch: Vec::with_capacity(count),
-            distances2: vec![0.0; count],
-            slopes: vec![0.0; count],
+            correlations: Vec::new(),
+            slopes: Vec::new(),
             factorisations: 0,
         }
     }
@@ -121,7 +121,9 @@ impl<'a> Likelihood<'a> {
     fn factor(&mut self, length_scales: &[f64], noise_ratio: f64) -> Result<(), CovarianceError> {
         self.factorisations += 1;
         let (kernel, observations) = (self.kernel, self.observations);
-        covariance::factor(&mut self.dense, kernel, observations, length_scales, noise_ratio)
+        let buffer = &mut self.correlations;
+        let dense = &mut self.dense;
+        covariance::factor(dense, kernel, observations, length_scales, noise_ratio, buffer)
             .map(|_| ())
     }
 
@@ -142,28 +144,35 @@ impl<'a> Likelihood<'a> {
         let observations = self.observations;
         let count = observations.len();
         let mut trace = 0.0;
-        for j in 0..count {
-            let weight = self.weights[j] / signal2;
-            let [on, inverse @ ..] = self.dense.inverse_column(j) else { return };
-            trace += weight * self.weights[j] - on;
-            let below = j + 1..count;
-            let distances2 = &mut self.distances2[below.clone()];
-            let slopes = &mut self.slopes[below.clone()];
-            observations.distances2(observations.place(j), lengths, j + 1, distances2);
-            self.kernel.correlate_slope(distances2, slopes);
-            let weights = &self.weights[below.clone()];
-            widest(|| {
-                for ((slope, other), inverse) in slopes.iter_mut().zip(weights).zip(inverse) {
-                    *slope *= -2.0 * (weight * other - inverse);
-                }
-            });
-            for (axis, (by_length, length)) in by_length.iter_mut().zip(lengths).enumerate() {
-                let column = observations.column(axis);
-                let at = column[j];
-                let steps = column[below.clone()].iter().map(|x| (at - x) / length);
-                *by_length += widest(|| {
-                    slopes.iter().zip(steps).map(|(pull, step)| pull * step * step).sum::<f64>()
+        for columns in covariance::batches(count) {
+            observations.distances2_below(columns.clone(), lengths, &mut self.correlations);
+            self.slopes.resize(self.correlations.len(), 0.0);
+            self.kernel.correlate_slope(&mut self.correlations, &mut self.slopes);
+            let mut rest = self.slopes.as_mut_slice();
+            for j in columns {
+                let weight = self.weights[j] / signal2;
+                let [on, inverse @ ..] = self.dense.inverse_column(j) else { return };
+                trace += weight * self.weights[j] - on;
+                let (slopes, others) = rest.split_at_mut(inverse.len());
+                rest = others;
+                let weights = &self.weights[j + 1..];
+                widest(|| {
+                    for ((slope, other), inverse) in slopes.iter_mut().zip(weights).zip(inverse) {
+                        *slope *= -2.0 * (weight * other - inverse);
+                    }
                 });
+                for (axis, (by_length, length)) in by_length.iter_mut().zip(lengths).enumerate() {
+                    let column = observations.column(axis);
+                    let (at, per_length) = (column[j], 1.0 / length);
+                    self.scratch.resize(slopes.len(), 0.0);
+                    *by_length += widest(|| {
+                        for (square, x) in self.scratch.iter_mut().zip(&column[j + 1..]) {
+                            let step = (at - x) * per_length;
+                            *square = step * step;
+                        }
+                        dot(slopes, &self.scratch)
+                    });
+                }
             }
         }
         *by_noise = noise_ratio * noise_ratio * trace;

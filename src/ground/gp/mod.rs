@@ -12,6 +12,7 @@ pub mod kernel;
 pub mod likelihood;
 pub mod mean;
 pub mod observations;
+mod plain;
 pub mod posterior;
 pub mod range;
 

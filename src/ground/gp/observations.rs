@@ -1,6 +1,7 @@
 //! Places and the heights observed there.
 
 use crate::ground::simd::widest;
+use std::ops::Range;
 
 /// Places and heights, stored coordinate by coordinate.
 #[derive(Clone, Debug, Default)]
@@ -59,6 +60,22 @@ impl Observations {
         &self.heights
     }
 
+    /// Writes the scaled squared distances of the pairs in `columns` of the lower triangle, column
+    /// after column, each from below its diagonal down.
+    pub(super) fn distances2_below(
+        &self,
+        columns: Range<usize>,
+        length_scales: &[f64],
+        r2: &mut Vec<f64>,
+    ) {
+        r2.clear();
+        for j in columns {
+            let begin = r2.len();
+            r2.resize(begin + self.len() - j - 1, 0.0);
+            self.distances2(self.place(j), length_scales, j + 1, &mut r2[begin..]);
+        }
+    }
+
     /// Writes the scaled squared distances Σ_d ((place_d − x_d) / l_d)² of `place` from the
     /// observations beginning with `first`, as many as `r2` holds.
     pub fn distances2(
@@ -71,9 +88,10 @@ impl Observations {
         r2.fill(0.0);
         for ((column, at), length) in self.columns.iter().zip(place).zip(length_scales) {
             let column = &column[first..first + r2.len()];
+            let per_length = 1.0 / length;
             widest(|| {
                 for (r2, x) in r2.iter_mut().zip(column) {
-                    let step = (at - x) / length;
+                    let step = (at - x) * per_length;
                     *r2 += step * step;
                 }
             });

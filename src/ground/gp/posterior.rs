@@ -38,7 +38,9 @@ impl Posterior {
         let mut dense = Dense::new(observations.len());
         let noise_ratio = hyperparameters.noise_sd / hyperparameters.signal_sd;
         let lengths = &hyperparameters.length_scales;
-        let jitter = covariance::factor(&mut dense, kernel, &observations, lengths, noise_ratio)?;
+        let buffer = &mut Vec::new();
+        let jitter =
+            covariance::factor(&mut dense, kernel, &observations, lengths, noise_ratio, buffer)?;
         let factor = Factor::from(&dense);
         let weights = Vec::new();
         let mut new = Self { kernel, hyperparameters, observations, factor, weights, jitter };
