@@ -24,7 +24,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 warnings.filterwarnings("ignore")
-TRIALS, TOUCHES, LOW, HIGH = 3, 50, -2.0, 2.0
+TRIALS, TOUCHES, LOW, HIGH = 10, 50, -2.0, 2.0
 TEST = np.linspace(LOW, HIGH, 401)[:, None]
 
 

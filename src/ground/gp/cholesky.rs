@@ -5,6 +5,7 @@
 
 use super::dense::Dense;
 use crate::ground::simd::{dot, widest};
+use pulp::NullaryFnOnce;
 use thiserror::Error;
 
 /// The matrix is not positive definite in floating point.
@@ -28,6 +29,12 @@ fn start(i: usize) -> usize {
     i * (i + 1) / 2
 }
 
+/// Row `i` of L: its first i + 1 entries.
+#[inline(always)]
+fn row(rows: &[f64], i: usize) -> &[f64] {
+    &rows[start(i)..start(i + 1)]
+}
+
 impl From<&Dense> for Factor {
     /// Copies the lower triangle of a factored matrix.
     fn from(dense: &Dense) -> Self {
@@ -43,12 +50,6 @@ impl From<&Dense> for Factor {
 }
 
 impl Factor {
-    /// Row `i` of L: its first i + 1 entries.
-    #[inline(always)]
-    fn row(&self, i: usize) -> &[f64] {
-        &self.rows[start(i)..start(i + 1)]
-    }
-
     /// Adds one row and column to A: `row` holds the entries n, 0 to n. Costs n² operations.
     ///
     /// # Errors
@@ -59,13 +60,7 @@ impl Factor {
         let begin = self.rows.len();
         self.rows.extend_from_slice(&row[..=n]);
         let (done, new) = self.rows.split_at_mut(begin);
-        let pivot = widest(|| {
-            for j in 0..n {
-                let above = &done[start(j)..start(j + 1)];
-                new[j] = (new[j] - dot(&new[..j], &above[..j])) / above[j];
-            }
-            new[n] - dot(&new[..n], &new[..n])
-        });
+        let pivot = new[n] - widest(SolveLower { rows: done, b: &mut new[..n] });
         let is_kept = pivot > f64::EPSILON * row[n] && pivot.is_finite();
         if !is_kept {
             self.rows.truncate(begin);
@@ -78,27 +73,55 @@ impl Factor {
 
     /// Replaces b by L⁻¹·b and returns bᵀ·A⁻¹·b.
     pub fn solve_lower(&self, b: &mut [f64]) -> f64 {
-        widest(|| {
-            for i in 0..self.order {
-                let row = self.row(i);
-                b[i] = (b[i] - dot(&row[..i], &b[..i])) / row[i];
-            }
-            dot(b, b)
-        })
+        widest(SolveLower { rows: &self.rows, b })
     }
 
     /// Replaces b by L⁻ᵀ·b.
     pub fn solve_upper(&self, b: &mut [f64]) {
-        widest(|| {
-            for i in (0..self.order).rev() {
-                let row = self.row(i);
-                b[i] /= row[i];
-                let scale = b[i];
-                for (b, l) in b[..i].iter_mut().zip(row) {
-                    *b -= scale * l;
-                }
+        widest(SolveUpper { rows: &self.rows, b });
+    }
+}
+
+/// See [`Factor::solve_lower`].
+struct SolveLower<'a> {
+    rows: &'a [f64],
+    b: &'a mut [f64],
+}
+
+impl NullaryFnOnce for SolveLower<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let Self { rows, b } = self;
+        for i in 0..b.len() {
+            let row = row(rows, i);
+            b[i] = (b[i] - dot(&row[..i], &b[..i])) / row[i];
+        }
+        dot(b, b)
+    }
+}
+
+/// See [`Factor::solve_upper`].
+struct SolveUpper<'a> {
+    rows: &'a [f64],
+    b: &'a mut [f64],
+}
+
+impl NullaryFnOnce for SolveUpper<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { rows, b } = self;
+        for i in (0..b.len()).rev() {
+            let row = row(rows, i);
+            b[i] /= row[i];
+            let scale = b[i];
+            for (b, l) in b[..i].iter_mut().zip(row) {
+                *b -= scale * l;
             }
-        });
+        }
     }
 }
 
@@ -152,7 +175,9 @@ mod tests {
                 assert!(residual.amax() < 1e-12, "{n}: {}", residual.amax());
             }
             let mut x = b.clone();
-            let square = blocked.solve(&mut x);
+            blocked.solve_lower(&mut x);
+            let square = dot(&x, &x);
+            blocked.solve_upper(&mut x);
             assert!((square - x.iter().zip(&b).map(|(x, b)| x * b).sum::<f64>()).abs() < 1e-12);
             blocked.invert();
             let inverse = twin.inverse();

@@ -1,31 +1,14 @@
 //! The covariance of what was observed, factored with as little jitter as it needs.
 
 use super::cholesky::NotPositiveDefinite;
+use super::correlations::{Correlations, batches};
 use super::dense::Dense;
 use super::kernel::Kernel;
 use super::observations::Observations;
-use std::ops::Range;
 use thiserror::Error;
 
 /// Largest jitter tried, relative to the diagonal; beyond it the data contradict the kernel.
 const JITTER_MAX: f64 = 1e-4;
-
-/// Columns of a triangle are correlated together until they hold this many entries: vector loops
-/// over single short columns would run half empty. Chosen to stay in the first-level cache.
-const BATCH: usize = 2048;
-
-/// Consecutive ranges of the columns 0..count of a lower triangle with about [`BATCH`] entries.
-pub(super) fn batches(count: usize) -> impl Iterator<Item = Range<usize>> {
-    let mut begin = 0;
-    std::iter::from_fn(move || {
-        let (first, mut entries) = (begin, 0);
-        while begin < count && (begin == first || entries + count - begin <= BATCH) {
-            entries += count - begin;
-            begin += 1;
-        }
-        (first < begin).then_some(first..begin)
-    })
-}
 
 /// Observations that no posterior can be made of.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -49,18 +32,18 @@ pub enum CovarianceError {
 }
 
 /// Factors C + (noise_ratio² + jitter)·I, where C are the correlations, into `dense` with the
-/// smallest jitter of 0, 1e-15, 1e-14, … that works, and returns that jitter. `correlations` is
-/// overwritten.
+/// smallest jitter of 0, 1e-15, 1e-14, … that works, and returns that jitter. `correlations` are
+/// the buffer, and skip what they hold already.
 ///
 /// # Errors
 /// If an observation is not finite, or even the largest jitter does not help.
-pub fn factor(
+pub(super) fn factor(
     dense: &mut Dense,
     kernel: &dyn Kernel,
     observations: &Observations,
     length_scales: &[f64],
     noise_ratio: f64,
-    correlations: &mut Vec<f64>,
+    correlations: &mut Correlations,
 ) -> Result<f64, CovarianceError> {
     if let Some(index) = observations.first_not_finite() {
         return Err(CovarianceError::NotFinite { index });
@@ -70,9 +53,7 @@ pub fn factor(
     loop {
         let diagonal = 1.0 + noise_ratio * noise_ratio + jitter;
         for columns in batches(count) {
-            observations.distances2_below(columns.clone(), length_scales, correlations);
-            kernel.correlate(correlations);
-            let mut rest = correlations.as_slice();
+            let mut rest = correlations.of(kernel, observations, length_scales, &columns);
             for j in columns {
                 if let [on, below @ ..] = dense.column_mut(j) {
                     let (column, others) = rest.split_at(below.len());

@@ -1,5 +1,6 @@
 //! The log marginal likelihood of hyperparameters and its gradient.
 
+use super::correlations::{Correlations, batches};
 use super::covariance::{self, CovarianceError};
 use super::dense::Dense;
 use super::kernel::{Hyperparameters, Kernel};
@@ -18,11 +19,10 @@ pub struct Likelihood<'a> {
     mean: Mean,
     observations: &'a Observations,
     dense: Dense,
-    /// A⁻¹·y.
+    /// L⁻¹·y, then A⁻¹·y where a gradient is asked for.
     weights: Vec<f64>,
     scratch: Vec<f64>,
-    correlations: Vec<f64>,
-    slopes: Vec<f64>,
+    correlations: Correlations,
     factorisations: u32,
 }
 
@@ -48,8 +48,7 @@ impl<'a> Likelihood<'a> {
             dense: Dense::new(count),
             weights: Vec::with_capacity(count),
             scratch: Vec::with_capacity(count),
-            correlations: Vec::new(),
-            slopes: Vec::new(),
+            correlations: Correlations::default(),
             factorisations: 0,
         }
     }
@@ -71,7 +70,7 @@ impl<'a> Likelihood<'a> {
     ) -> Result<f64, CovarianceError> {
         let noise_ratio = at.noise_sd / at.signal_sd;
         self.factor(&at.length_scales, noise_ratio)?;
-        let fit = self.weigh(at.mean);
+        let fit = self.whiten(at.mean);
         let [by_signal, rest @ ..] = gradient else { return Ok(self.value(at.signal_sd, fit)) };
         let signal2 = at.signal_sd * at.signal_sd;
         self.gradient(signal2, &at.length_scales, noise_ratio, rest);
@@ -95,7 +94,7 @@ impl<'a> Likelihood<'a> {
     ) -> Result<Profile, CovarianceError> {
         self.factor(length_scales, noise_ratio)?;
         let mean = self.mean.of(self.observations.heights(), &self.dense, &mut self.scratch);
-        let fit = self.weigh(mean);
+        let fit = self.whiten(mean);
         let count = self.observations.len();
         let signal_sd = scale.signal_sd(fit, count, noise_ratio);
         if let Some(gradient) = gradient {
@@ -127,28 +126,28 @@ impl<'a> Likelihood<'a> {
             .map(|_| ())
     }
 
-    /// Solves for the weights of the heights above `mean`, and returns yᵀA⁻¹y.
-    fn weigh(&mut self, mean: f64) -> f64 {
+    /// Makes L⁻¹·y of the heights above `mean` the weights, and returns its square yᵀA⁻¹y.
+    fn whiten(&mut self, mean: f64) -> f64 {
         self.weights.clear();
         self.weights.extend(self.observations.heights().iter().map(|y| y - mean));
-        self.dense.solve(&mut self.weights)
+        self.dense.solve_lower(&mut self.weights);
+        widest(|| dot(&self.weights, &self.weights))
     }
 
     /// With respect to the logarithms of the length scales and of the noise ratio, by
-    /// ½·tr((w·wᵀ/s² − A⁻¹)·∂A), after [`weigh`](Self::weigh) at the same parameters. The
+    /// ½·tr((w·wᵀ/s² − A⁻¹)·∂A), after [`whiten`](Self::whiten) at the same parameters. The
     /// mean is the best one or does not depend on them, so it has no part in this.
     fn gradient(&mut self, signal2: f64, lengths: &[f64], noise_ratio: f64, gradient: &mut [f64]) {
+        self.dense.solve_upper(&mut self.weights);
         self.dense.invert();
         gradient.fill(0.0);
         let Some((by_noise, by_length)) = gradient.split_last_mut() else { return };
         let observations = self.observations;
         let count = observations.len();
         let mut trace = 0.0;
-        for columns in covariance::batches(count) {
-            observations.distances2_below(columns.clone(), lengths, &mut self.correlations);
-            self.slopes.resize(self.correlations.len(), 0.0);
-            self.kernel.correlate_slope(&mut self.correlations, &mut self.slopes);
-            let mut rest = self.slopes.as_mut_slice();
+        for columns in batches(count) {
+            let mut rest =
+                self.correlations.slopes_of(self.kernel, observations, lengths, &columns);
             for j in columns {
                 let weight = self.weights[j] / signal2;
                 let [on, inverse @ ..] = self.dense.inverse_column(j) else { return };

@@ -29,7 +29,9 @@ impl Mean {
             Self::Constant => {
                 scratch.clear();
                 scratch.resize(heights.len(), 1.0);
-                let ones = factored.solve(scratch);
+                factored.solve_lower(scratch);
+                let ones: f64 = scratch.iter().map(|v| v * v).sum();
+                factored.solve_upper(scratch);
                 scratch.iter().zip(heights).map(|(weight, y)| weight * y).sum::<f64>() / ones
             }
         }

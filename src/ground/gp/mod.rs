@@ -5,6 +5,7 @@
 //! hyperparameters and `fit` finds the best ones.
 
 pub mod cholesky;
+mod correlations;
 pub mod covariance;
 pub mod dense;
 pub mod fit;
@@ -15,6 +16,7 @@ pub mod observations;
 mod plain;
 pub mod posterior;
 pub mod range;
+mod search;
 
 pub use kernel::{Hyperparameters, Kernel};
 pub use mean::Mean;

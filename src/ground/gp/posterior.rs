@@ -1,6 +1,7 @@
 //! The exact posterior of a Gaussian process, Eq. 3 of Yi et al. 2016.
 
 use super::cholesky::{Factor, NotPositiveDefinite};
+use super::correlations::Correlations;
 use super::covariance::{self, CovarianceError};
 use super::dense::Dense;
 use super::kernel::{Hyperparameters, Kernel};
@@ -38,7 +39,7 @@ impl Posterior {
         let mut dense = Dense::new(observations.len());
         let noise_ratio = hyperparameters.noise_sd / hyperparameters.signal_sd;
         let lengths = &hyperparameters.length_scales;
-        let buffer = &mut Vec::new();
+        let buffer = &mut Correlations::default();
         let jitter =
             covariance::factor(&mut dense, kernel, &observations, lengths, noise_ratio, buffer)?;
         let factor = Factor::from(&dense);
