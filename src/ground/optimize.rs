@@ -151,13 +151,16 @@ mod engine {
             .and_then(|_| nlopt.set_maxeval(max_evaluations))
             .and_then(|_| nlopt.set_ftol_rel(tolerance))
             .and_then(|_| nlopt.optimize(&mut x).map_err(|(fail, _)| fail).map(|(end, _)| end));
+        let best = nlopt.recover_user_data().best;
         let stop = match outcome {
             Ok(SuccessState::MaxEvalReached) => Stop::Budget,
             Ok(_) => Stop::Converged,
             Err(FailState::RoundoffLimited) => Stop::Roundoff,
+            // A line search that finds no step uphill: at a top, where only rounding is left.
+            Err(FailState::Failure) if best.value > f64::MIN => Stop::Roundoff,
             Err(_) => Stop::Failed,
         };
-        Optimum { stop, ..nlopt.recover_user_data().best }
+        Optimum { stop, ..best }
     }
 }
 

@@ -15,6 +15,8 @@ const CLIMB_BUDGET: u32 = 100;
 const CLIMBS: usize = 3;
 /// Noise levels of the scan, spread over the logarithm of their range.
 const NOISE_LEVELS: usize = 3;
+/// Tops that differ by less nats are the same one; chosen above the likelihood's rounding.
+const GAIN_MIN: f64 = 1e-6;
 /// Where another noise makes the data less likely by up to this many nats, its own top may be the
 /// higher one; chosen.
 const NEARLY_AS_LIKELY: f64 = 0.3;
@@ -61,7 +63,7 @@ impl<'a> Search<'a> {
         let top = optimize::lbfgs(self.bounds, start, CLIMB_BUDGET, |x, gradient| {
             score(self.sought, &mut self.likelihood, &self.scale, x, Some(gradient))
         });
-        if top.value > self.best_score() {
+        if top.value > self.best_score() + GAIN_MIN {
             self.best = Some(top);
         }
     }
