@@ -13,8 +13,8 @@ const CLIMB_BUDGET: u32 = 100;
 /// Hills of the scan that are climbed at most; chosen: enough for the fits of the toy that were
 /// held against a dense grid.
 const CLIMBS: usize = 3;
-/// Noise levels of the scan, spread over the logarithm of their range.
-const NOISE_LEVELS: usize = 3;
+/// Noise levels of the scan, from the least to the largest; climbs find what lies between.
+const NOISE_LEVELS: usize = 2;
 /// Tops that differ by less nats are the same one; chosen above the likelihood's rounding.
 const GAIN_MIN: f64 = 1e-6;
 /// Where another noise makes the data less likely by up to this many nats, its own top may be the
