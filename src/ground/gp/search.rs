@@ -12,7 +12,7 @@ use crate::ground::optimize::{self, Optimum};
 const CLIMB_BUDGET: u32 = 100;
 /// Hills of the scan that are climbed at most; chosen: enough for the fits of the toy that were
 /// held against a dense grid.
-const CLIMBS: usize = 3;
+const CLIMBS: usize = 2;
 /// Noise levels of the scan, from the least to the largest; climbs find what lies between.
 const NOISE_LEVELS: usize = 2;
 /// Tops that differ by less nats are the same one; chosen above the likelihood's rounding.
