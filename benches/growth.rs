@@ -74,6 +74,9 @@ fn measure() -> Vec<Curve> {
     let mut likelihood = curve("likelihood with gradient", "#d55e00", 3.0);
     let mut add = curve("adding a touch", "#cc79a7", 2.0);
     let mut query = curve("σ at a place, with gradient", style::TRUTH, 2.0);
+    let mut grid = curve("mean and σ at one of 1000 places", "#009e73", 2.0);
+    let places: Vec<[f64; 2]> =
+        (0..1000).map(|i| [f64::from(i % 32) / 31.0, f64::from(i / 32) / 31.0]).collect();
     for count in COUNTS {
         let n = count as f64;
         let touches = touches(count);
@@ -103,6 +106,10 @@ fn measure() -> Vec<Curve> {
                 black_box(posterior.variance_gradient(&[0.31, 0.47], &mut slope, &mut scratch));
             }),
         ));
+        let together = seconds(|| {
+            black_box(posterior.predict(places.iter().map(|place| place.as_slice())));
+        });
+        grid.seconds.push((n, together / places.len() as f64));
         // A touch at a time on one growing posterior, so that no copy is measured.
         let mut growing = posterior.clone();
         let mut step = 0.0;
@@ -117,7 +124,7 @@ fn measure() -> Vec<Curve> {
             }),
         ));
     }
-    vec![fit, likelihood, add, query]
+    vec![fit, likelihood, add, query, grid]
 }
 
 /// Exponent between the last two counts.

@@ -224,6 +224,21 @@ proptest! {
     }
 
     #[test]
+    fn many_places_at_once_are_the_places_one_by_one((at, touches) in any_belief(), count in 0..40usize) {
+        let belief = posterior(at.clone(), all(&touches));
+        let place = |i: usize| [(i as f64).sin(), (1.7 * i as f64).cos()];
+        let places: Vec<[f64; 2]> = (0..count).map(place).collect();
+        let together = belief.predict(places.iter().map(|place| place.as_slice()));
+        prop_assert_eq!(together.len(), count);
+        let mut scratch = Scratch::default();
+        for (place, prediction) in places.iter().zip(together) {
+            prop_assert_eq!(prediction.mean, belief.mean(place, &mut scratch));
+            let variance = belief.variance(place, &mut scratch);
+            prop_assert!((prediction.variance - variance).abs() <= 1e-8 * at.signal_sd.powi(2));
+        }
+    }
+
+    #[test]
     fn the_order_of_touches_is_only_rounding((at, touches) in any_belief(), place in [-1.0..1.0f64, -1.0..1.0f64]) {
         let mut backwards = touches.clone();
         backwards.reverse();

@@ -50,6 +50,12 @@ impl From<&Dense> for Factor {
 }
 
 impl Factor {
+    /// Row `i` of L: its first i + 1 entries.
+    #[inline(always)]
+    pub(super) fn row(&self, i: usize) -> &[f64] {
+        row(&self.rows, i)
+    }
+
     /// Adds one row and column to A: `row` holds the entries n, 0 to n. Costs n² operations.
     ///
     /// # Errors

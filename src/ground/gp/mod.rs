@@ -4,6 +4,7 @@
 //! in `dense`, row by row in `cholesky`), `posterior` predicts (Eq. 3 of Yi et al. 2016), `likelihood` scores
 //! hyperparameters and `fit` finds the best ones.
 
+pub mod batch;
 pub mod cholesky;
 mod correlations;
 pub mod covariance;

@@ -120,9 +120,20 @@ impl Posterior {
 
     /// Mean height m + k*ᵀ·K⁻¹·(y − m) at `place`.
     pub fn mean(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
-        scratch.solved.resize(self.observations.len(), 0.0);
-        self.correlations(place, &mut scratch.solved);
-        self.hyperparameters.mean + widest(|| dot(&scratch.solved, &self.weights))
+        self.mean_with_correlations(place, scratch).0
+    }
+
+    /// The mean, and the correlations of `place` with the observations.
+    pub(super) fn mean_with_correlations<'a>(
+        &self,
+        place: &[f64],
+        scratch: &'a mut Scratch,
+    ) -> (f64, &'a [f64]) {
+        let correlations = &mut scratch.solved;
+        correlations.resize(self.observations.len(), 0.0);
+        self.correlations(place, correlations);
+        let mean = self.hyperparameters.mean + widest(|| dot(correlations, &self.weights));
+        (mean, correlations)
     }
 
     /// Variance of the surface (without touch noise) k** − k*ᵀ·K⁻¹·k* at `place`, in [0, k**].
@@ -157,7 +168,12 @@ impl Posterior {
         self.remaining(explained)
     }
 
-    fn remaining(&self, explained: f64) -> f64 {
+    pub(super) fn factor(&self) -> &Factor {
+        &self.factor
+    }
+
+    /// The variance left when `explained` of the prior's, as a share, is.
+    pub(super) fn remaining(&self, explained: f64) -> f64 {
         self.hyperparameters.signal_sd.powi(2) * (1.0 - explained).max(0.0)
     }
 }
