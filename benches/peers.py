@@ -91,15 +91,15 @@ def explore(model, start):
         seconds += time.process_time() - begun
 
 
-def palpate(folder, grid):
+def palpate(folder, trials, grid):
     """Runs Palpate on one thread; its seconds include start-up, writing rows, and scoring on `grid` places."""
     command = ["target/release/palpate", "run", "experiments/toy.toml", "--out", folder, "--threads", "1"]
-    command += ["--no-report", "--set", f"trials={TRIALS}", "--set", 'planners=["active"]']
+    command += ["--no-report", "--set", f"trials={trials}", "--set", 'planners=["active"]']
     command += ["--set", "planning.direct_evaluations=200", "--set", f"grid={grid}"]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    seconds = (after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime) / TRIALS
+    seconds = (after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime) / trials
     with open(os.path.join(folder, "trials.jsonl")) as lines:
         return [json.loads(line)["touches"] for line in lines], seconds
 
@@ -112,8 +112,8 @@ def reached(curves, goal=0.99):
 
 def main():
     with tempfile.TemporaryDirectory() as folder:
-        trials, _ = palpate(os.path.join(folder, "scored"), len(TEST))
-        _, ours = palpate(os.path.join(folder, "timed"), 2)
+        trials, _ = palpate(os.path.join(folder, "scored"), TRIALS, len(TEST))
+        _, ours = palpate(os.path.join(folder, "timed"), 10 * TRIALS, 2)
     starts = [[touch["target"][0] for touch in touches[:3]] for touches in trials]
     curves = [[touch["metrics"]["r"] for touch in touches[2:]] for touches in trials]
     print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {TRIALS} trials of {TOUCHES} touches")
