@@ -186,9 +186,7 @@ impl MeshBvh {
         [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()]
             .into_iter()
             .flat_map(|axis| [axis, -axis])
-            .all(|axis| {
-                self.ray(p, &axis, f64::MAX).is_some_and(|hit| hit.normal.dot(&axis) > 0.0)
-            })
+            .all(|axis| self.ray(p, &axis, f64::MAX).is_some_and(|hit| hit.normal.dot(&axis) > 0.0))
     }
 
     /// First contact of a capsule that travels along `direction` by at most `max_travel_m`: the

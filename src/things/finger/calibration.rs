@@ -1,161 +1,165 @@
-//! Constants of the skin from recordings of a finger pressed on a flat plate.
+//! Constants of skin and electrodes from recordings of a finger pressed on a flat plate.
+//!
+//! A hand held the finger, so its attitude is unknown and is fitted with the constants; it says
+//! nothing about the sensor. Loads below 2 N are left out: few frames, and the counts at rest are
+//! from another session.
 
-use super::electrodes::{Electrodes, ElectrodesEffect};
+use super::electrodes::ElectrodesEffect;
 use super::frame::ELECTRODES;
-use super::hull::Finger;
-use super::load::{Load, PressError};
-use super::profile::Profile;
-use super::skin::{Pressed, Skin, SkinEffect};
-use crate::ground::geometry::bvh::MeshBvh;
-use crate::ground::geometry::mesh::Mesh;
-use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
+use super::plate::{Attitude, Plate, Recording, direction_t};
+use super::skin::SkinEffect;
+use serde::Serialize;
 
-/// Half the side of the plate the finger is pressed on.
-const PLATE_M: f64 = 0.1;
+/// Least normal force of a bin that is fitted.
+const LEAST_N: f64 = 2.0;
 
-/// Depths are halved this often to meet a force: below a nanometre.
-const HALVINGS: usize = 26;
+/// A measured change below this is too small to have a sign.
+const SIGNED_COUNTS: f64 = 100.0;
 
-/// Recordings of one or more sensors.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Recordings {
-    /// Where the numbers come from.
-    pub note: String,
-    /// One entry per sensor.
-    pub sensors: Vec<Recording>,
+/// From 4 to 8 N the pressure may rise, per newton, by this part of its rise over the first
+/// newton: the sensor's manual says it saturates at about 2 N. Chosen.
+const SATURATED: f64 = 0.15;
+
+/// What a unit of saturation missed costs, in counts of mean error (chosen: 0.05 more costs 10).
+const SATURATION_COUNTS: f64 = 200.0;
+
+/// A search ends when its steps are this part of the first (chosen).
+const FINEST: f64 = 1.0 / 64.0;
+
+/// What is known about a finger on a plate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Model {
+    /// Constants of the skin.
+    pub skin: SkinEffect,
+    /// Constants of the electrodes; baselines are the recording's own.
+    pub electrodes: ElectrodesEffect,
+    /// Stiffness of the fluid.
+    pub cavity_pa_m3: f64,
+    /// How the hand held the finger.
+    pub attitude: Attitude,
 }
 
-/// One sensor on the plate.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Recording {
-    /// Its name in the source.
-    pub sensor: String,
-    /// What it reads untouched.
-    pub no_contact_median_counts: [f64; ELECTRODES],
-    /// Spread of that.
-    pub no_contact_std_counts: [f64; ELECTRODES],
-    /// Means over bins of normal force.
-    pub near_normal_loads: Vec<Bin>,
+/// How a model agrees with a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Residual {
+    /// Mean absolute error over electrodes and bins of force.
+    pub mean_error_counts: f64,
+    /// Part of the entries measured to change by more than 100 counts whose change has the right
+    /// sign.
+    pub right_sign: f64,
+    /// Rise of pressure per newton from 4 to 8 N, relative to the first newton.
+    pub saturation: f64,
 }
 
-/// Means over frames whose normal force lies in a range.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Bin {
-    /// The range.
-    pub normal_force_n: [f64; 2],
-    /// Mean normal force.
-    pub mean_normal_force_n: f64,
-    /// Number of frames.
-    pub frames: u32,
-    /// Mean of each electrode.
-    pub mean_counts: [f64; ELECTRODES],
-    /// Standard deviation of each electrode.
-    pub std_counts: [f64; ELECTRODES],
+/// What a fit may change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Free {
+    /// Only how the hand held the finger: a test of the constants.
+    Attitude,
+    /// Also the stiffnesses and the electrodes' spread.
+    Constants,
 }
 
-/// How a hand holds the finger over a plate.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Attitude {
-    /// From the pad towards the tip: 0 presses the pulp, 90° the apex.
-    pub pitch_rad: f64,
-    /// From the pad towards +y.
-    pub roll_rad: f64,
-    /// Standard deviation of the roll from press to press.
-    pub roll_sd_rad: f64,
+/// Normal force and predicted counts of each bin of `recording` from 2 N; none if a pose has no
+/// answer.
+pub fn predict(model: &Model, recording: &Recording) -> Option<Vec<(f64, [f64; ELECTRODES])>> {
+    let mut plate = plate(model, recording)?;
+    let bins = recording.near_normal_loads.iter();
+    bins.filter(|bin| bin.normal_force_n[0] >= LEAST_N)
+        .map(|bin| {
+            let force_n = bin.mean_normal_force_n;
+            Some((force_n, plate.mean_counts(&model.attitude, force_n).ok()?))
+        })
+        .collect()
 }
 
-/// A fingertip over a flat plate.
-pub struct Plate {
-    skin: Skin,
-    electrodes: Electrodes,
-    bvh: MeshBvh,
-    pressed: Pressed,
-}
-
-impl Plate {
-    /// The BioTac with these constants; none if the plate cannot be built.
-    pub fn new(skin: &SkinEffect, cavity_pa_m3: f64, electrodes: &ElectrodesEffect) -> Option<Self> {
-        let profile = Profile::biotac(&Finger::default());
-        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-        let corners = corners.map(|(x, y)| Point3::new(PLATE_M * x, PLATE_M * y, 0.0));
-        let (mesh, _) = Mesh::new(&corners, &[[0, 1, 2], [0, 2, 3]]).ok()?;
-        let skin = Skin::new(&profile, skin, cavity_pa_m3);
-        let electrodes = Electrodes::new(electrodes, skin.samples(), profile.scale());
-        let pressed = skin.relaxed();
-        Some(Self { skin, electrodes, bvh: MeshBvh::new(mesh), pressed })
-    }
-
-    /// Load and ideal counts with the plate across the direction `towards_t` and the origin of `T`
-    /// `height_m` above it.
-    ///
-    /// # Errors
-    /// See [`Skin::press`].
-    pub fn press(
-        &mut self,
-        towards_t: &Vector3<f64>,
-        height_m: f64,
-    ) -> Result<(Load, [f64; ELECTRODES]), PressError> {
-        let turn = Rotation3::rotation_between(towards_t, &-Vector3::z())
-            .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
-        let x_wt = Isometry3::from_parts(
-            Vector3::new(0.0, 0.0, height_m).into(),
-            UnitQuaternion::from_rotation_matrix(&turn),
-        );
-        let load = self.skin.press(&self.bvh, &x_wt, &mut self.pressed)?;
-        Ok((load, self.electrodes.counts(&self.pressed.inward_m, 1.0)))
-    }
-
-    /// The same at a given normal force.
-    ///
-    /// # Errors
-    /// See [`Skin::press`].
-    pub fn press_to(
-        &mut self,
-        towards_t: &Vector3<f64>,
-        normal_force_n: f64,
-    ) -> Result<(Load, [f64; ELECTRODES]), PressError> {
-        let profile_m = self.skin.samples().iter().map(|s| s.point().coords.dot(towards_t));
-        let mut high_m = profile_m.fold(0.0, f64::max);
-        let mut low_m = 0.0;
-        for _ in 0..HALVINGS {
-            let middle_m = 0.5 * (low_m + high_m);
-            let pushed_n = match self.press(towards_t, middle_m) {
-                Ok((load, _)) => -load.force_n.dot(towards_t),
-                Err(PressError::Inside) => f64::INFINITY,
-                Err(error) => return Err(error),
-            };
-            if pushed_n > normal_force_n {
-                low_m = middle_m;
-            } else {
-                high_m = middle_m;
+/// Compares a model with a recording; none if a pose has no answer or the recording is empty.
+pub fn residual(model: &Model, recording: &Recording) -> Option<Residual> {
+    let predicted = predict(model, recording)?;
+    let bins = recording.near_normal_loads.iter();
+    let bins = bins.filter(|bin| bin.normal_force_n[0] >= LEAST_N);
+    let (mut error_counts, mut entries, mut right, mut signed) = (0.0, 0.0, 0.0, 0.0);
+    for (bin, (_, predicted)) in bins.zip(&predicted) {
+        for ((&measured, &predicted), &rest) in
+            bin.mean_counts.iter().zip(predicted).zip(&recording.no_contact_median_counts)
+        {
+            error_counts += (predicted - measured).abs();
+            entries += 1.0;
+            if (measured - rest).abs() > SIGNED_COUNTS {
+                signed += 1.0;
+                right += f64::from((measured - rest) * (predicted - rest) > 0.0);
             }
         }
-        self.press(towards_t, high_m)
     }
+    let mut plate = plate(model, recording)?;
+    let towards_t = direction_t(model.attitude.pitch_rad, model.attitude.roll_rad);
+    let mut pressure_pa =
+        |force_n| plate.press_to(&towards_t, force_n).ok().map(|(load, _)| load.pressure_pa);
+    let (one, four, eight) = (pressure_pa(1.0)?, pressure_pa(4.0)?, pressure_pa(8.0)?);
+    (entries > 0.0).then(|| Residual {
+        mean_error_counts: error_counts / entries,
+        right_sign: right / f64::max(signed, 1.0),
+        saturation: (eight - four) / 4.0 / one,
+    })
+}
 
-    /// Mean counts over the rolls of `attitude`, by three-point Gauss–Hermite quadrature.
-    ///
-    /// # Errors
-    /// See [`Skin::press`].
-    pub fn mean_counts(
-        &mut self,
-        attitude: &Attitude,
-        normal_force_n: f64,
-    ) -> Result<[f64; ELECTRODES], PressError> {
-        let off_rad = 3f64.sqrt() * attitude.roll_sd_rad;
-        let mut mean = [0.0; ELECTRODES];
-        for (off_rad, weight) in [(-off_rad, 1.0 / 6.0), (0.0, 2.0 / 3.0), (off_rad, 1.0 / 6.0)] {
-            let towards_t = direction_t(attitude.pitch_rad, attitude.roll_rad + off_rad);
-            let (_, counts) = self.press_to(&towards_t, normal_force_n)?;
-            mean.iter_mut().zip(counts).for_each(|(mean, counts)| *mean += weight * counts);
+/// The model near `start` that agrees best with `recording`, with its residual.
+///
+/// Minimises mean error + 100 × part of wrong signs + penalty on a pressure that does not
+/// saturate, by a compass search: each parameter in turn takes a step either way if that
+/// helps; when none does, all steps are halved. Deterministic.
+pub fn fit(start: &Model, recording: &Recording, free: Free) -> Option<(Model, Residual)> {
+    let cost = |residual: &Residual| {
+        residual.mean_error_counts
+            + 100.0 * (1.0 - residual.right_sign)
+            + SATURATION_COUNTS * (residual.saturation - SATURATED).max(0.0)
+    };
+    let mut best = (start.clone(), residual(start, recording)?);
+    let mut part = 1.0;
+    while part >= FINEST {
+        let mut moved = false;
+        for knob in knobs(free) {
+            for step in [part, -part] {
+                let mut model = best.0.clone();
+                knob(&mut model, step);
+                if let Some(residual) = residual(&model, recording)
+                    && cost(&residual) < cost(&best.1)
+                {
+                    best = (model, residual);
+                    moved = true;
+                    break;
+                }
+            }
         }
-        Ok(mean)
+        if !moved {
+            part *= 0.5;
+        }
+    }
+    Some(best)
+}
+
+/// One parameter each: moves it by a part of its first step.
+fn knobs(free: Free) -> &'static [fn(&mut Model, f64)] {
+    const KNOBS: [fn(&mut Model, f64); 7] = [
+        |model, step| model.attitude.pitch_rad += 0.1 * step,
+        |model, step| model.attitude.roll_rad += 0.1 * step,
+        |model, step| {
+            let sd_rad = &mut model.attitude.roll_sd_rad;
+            *sd_rad = (*sd_rad + 0.1 * step).max(0.0);
+        },
+        |model, step| model.skin.flatten_pa_m *= (0.7 * step).exp(),
+        |model, step| model.skin.inflate_pa_m *= (0.7 * step).exp(),
+        |model, step| model.skin.core_pa_m *= step.exp(),
+        |model, step| model.electrodes.spread_m *= (0.3 * step).exp(),
+    ];
+    match free {
+        Free::Attitude => &KNOBS[..3],
+        Free::Constants => &KNOBS,
     }
 }
 
-/// The direction out of the finger that faces the plate, in `T`.
-pub fn direction_t(pitch_rad: f64, roll_rad: f64) -> Vector3<f64> {
-    let (sin, cos) = pitch_rad.sin_cos();
-    Vector3::new(sin, cos * roll_rad.sin(), -cos * roll_rad.cos())
+fn plate(model: &Model, recording: &Recording) -> Option<Plate> {
+    let baseline_counts = recording.no_contact_median_counts;
+    let electrodes = ElectrodesEffect { baseline_counts, ..model.electrodes.clone() };
+    Plate::new(&model.skin, model.cavity_pa_m3, &electrodes)
 }

@@ -16,6 +16,8 @@ pub(super) struct Touch {
     pub sample: usize,
     pub section_m2: f64,
     pub gap_m: f64,
+    /// Whether the column stands in the fluid; a dry one feels no pressure and displaces nothing.
+    pub wet: bool,
     /// Negative where only a bulging skin would reach the object.
     pub indentation_m: f64,
     /// Normal of the object, towards the finger, in `T`.
@@ -27,7 +29,7 @@ pub(super) struct Touch {
 
 /// The pressure p ≥ 0 with p = K Σ Aᵢ uᵢ(p), in Pa, and every touch's response to it.
 ///
-/// The other columns, of `free_m2` together, are free. The volume falls with the pressure, so
+/// The other wet columns, of `free_m2` together, are free. The volume falls with the pressure, so
 /// there is one root; a Newton step that leaves the bracket is replaced by a bisection.
 pub(super) fn balance(
     touches: &mut [Touch],
@@ -39,7 +41,11 @@ pub(super) fn balance(
         let mut volume_m3 = -pressure_pa / column.inflate_pa_m * free_m2;
         let mut softness = free_m2 / column.inflate_pa_m;
         for touch in touches.iter_mut() {
-            touch.response = column.respond(touch.indentation_m, touch.gap_m, pressure_pa);
+            let felt_pa = if touch.wet { pressure_pa } else { 0.0 };
+            touch.response = column.respond(touch.indentation_m, touch.gap_m, felt_pa);
+            if !touch.wet {
+                continue;
+            }
             volume_m3 += touch.section_m2 * touch.response.inward_m;
             softness += touch.section_m2 * touch.response.softness_m_pa;
         }

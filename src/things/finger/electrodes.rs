@@ -48,7 +48,7 @@ impl Default for ElectrodesEffect {
     fn default() -> Self {
         Self {
             baseline_counts: table::BASELINES_COUNTS,
-            spread_m: 1.5e-3,
+            spread_m: 2.1e-3,
             exponent: 1.0,
             noise: 0.75,
             drift_counts: 3.0,
@@ -121,7 +121,13 @@ impl Electrodes {
     }
 
     /// What the converter makes of ideal counts, with `drift_counts` on top.
-    pub(super) fn convert(&self, i: usize, ideal_counts: f64, drift_counts: f64, rng: &mut impl Rng) -> f64 {
+    pub(super) fn convert(
+        &self,
+        i: usize,
+        ideal_counts: f64,
+        drift_counts: f64,
+        rng: &mut impl Rng,
+    ) -> f64 {
         let effect = &self.effect;
         let mut counts = ideal_counts + drift_counts;
         if effect.noise > 0.0 {

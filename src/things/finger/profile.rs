@@ -49,6 +49,9 @@ pub struct Layers {
     pub skin_m: f64,
     /// Thickness of the fluid under the skin.
     pub gap_m: f64,
+    /// Whether fluid flows there: not on the back, where the nail holds the skin (chosen: above
+    /// the axis).
+    pub wet: bool,
 }
 
 impl Profile {
@@ -77,7 +80,7 @@ impl Profile {
         if !self.shaped {
             let outer_m = self.radius_m;
             let gap_m = (outer_m - skin_m - CORE_M * scale).max(film_m);
-            return Layers { outer_m, skin_m, gap_m };
+            return Layers { outer_m, skin_m, gap_m, wet: true };
         }
         let off_m = x_m / scale - BULGE_X_M;
         let bulge_m = (BULGE_M - BULGE_FALL_PER_M * off_m * off_m).max(0.0);
@@ -92,7 +95,7 @@ impl Profile {
             }
         }
         let gap_m = (outer_m - SKIN_M - core_m).max(FILM_M) * scale;
-        Layers { outer_m: outer_m * scale, skin_m, gap_m }
+        Layers { outer_m: outer_m * scale, skin_m, gap_m, wet: d.z <= 0.0 }
     }
 
     /// Where the outer skin is over the capsule's point at height `x_m` and angle `turn` from −z

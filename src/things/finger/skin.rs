@@ -43,10 +43,10 @@ impl Default for SkinEffect {
     fn default() -> Self {
         Self {
             samples: 500,
-            modulus_pa: 0.5e6,
-            flatten_pa_m: 1.0e7,
-            inflate_pa_m: 6.0e7,
-            core_pa_m: 1.0e9,
+            modulus_pa: 1.552e6,
+            flatten_pa_m: 4.0e6,
+            inflate_pa_m: 5.5e7,
+            core_pa_m: 1.6e9,
         }
     }
 }
@@ -68,6 +68,8 @@ impl Checked for SkinEffect {
 pub struct Skin {
     samples: Vec<Sample>,
     sections_m2: Vec<f64>,
+    /// Section of all columns that stand in the fluid.
+    wet_m2: f64,
     patches: Vec<Patch>,
     whole: Ball,
     column: Column,
@@ -115,12 +117,16 @@ impl Skin {
         let mut patches = Vec::new();
         let mut first = 0;
         for group in samples.chunk_by(|a, b| patch(a) == patch(b)) {
-            patches
-                .push(Patch { range: first..first + group.len(), ball: Ball::around(group, bulge_m) });
+            patches.push(Patch {
+                range: first..first + group.len(),
+                ball: Ball::around(group, bulge_m),
+            });
             first += group.len();
         }
         let skin_m = samples.first().map_or(1.0, |sample| sample.layers.skin_m);
+        let wet = samples.iter().filter(|sample| sample.layers.wet);
         Self {
+            wet_m2: wet.map(Sample::section_m2).sum(),
             sections_m2: samples.iter().map(Sample::section_m2).collect(),
             whole: Ball::around(&samples, bulge_m),
             column: Column {
@@ -204,6 +210,7 @@ impl Skin {
                         sample: i,
                         section_m2: self.sections_m2[i],
                         gap_m: sample.layers.gap_m,
+                        wet: sample.layers.wet,
                         indentation_m: outer_m - hit.distance_m,
                         normal_t: x_wt.rotation.inverse_transform_vector(&facing),
                         cosine: slope.abs().max(FLATTEST),
@@ -216,12 +223,14 @@ impl Skin {
 
     /// Finds the pressure and adds up what the columns do.
     fn balance(&self, pressed: &mut Pressed) -> Load {
-        let met_m2: f64 = pressed.touches.iter().map(|touch| touch.section_m2).sum();
-        let free_m2 = self.sections_m2.iter().sum::<f64>() - met_m2;
+        let wet = pressed.touches.iter().filter(|touch| touch.wet);
+        let free_m2 = self.wet_m2 - wet.map(|touch| touch.section_m2).sum::<f64>();
         let pressure_pa =
             cavity::balance(&mut pressed.touches, &self.column, free_m2, self.cavity_pa_m3);
         let free = self.column.respond(f64::NEG_INFINITY, 0.0, pressure_pa);
-        pressed.inward_m.fill(free.inward_m);
+        for (inward_m, sample) in pressed.inward_m.iter_mut().zip(&self.samples) {
+            *inward_m = if sample.layers.wet { free.inward_m } else { 0.0 };
+        }
         pressed.indentation_m.fill(0.0);
         let mut load = Load { pressure_pa, ..Load::default() };
         load.energy_j = free.energy_j_m2 * free_m2;
@@ -235,7 +244,9 @@ impl Skin {
             pressed.inward_m[touch.sample] = response.inward_m;
             pressed.indentation_m[touch.sample] = touch.indentation_m.max(0.0);
             load.energy_j += response.energy_j_m2 * touch.section_m2;
-            load.displaced_m3 += response.inward_m.max(0.0) * touch.section_m2;
+            if sample.layers.wet {
+                load.displaced_m3 += response.inward_m.max(0.0) * touch.section_m2;
+            }
             if response.stress_pa <= 0.0 {
                 continue;
             }
