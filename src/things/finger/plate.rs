@@ -100,33 +100,27 @@ impl Plate {
         towards_t: &Vector3<f64>,
         height_m: f64,
     ) -> Result<(Load, [f64; ELECTRODES]), PressError> {
-        let turn = Rotation3::rotation_between(towards_t, &-Vector3::z()).unwrap_or_else(|| {
-            Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
-        });
-        let x_wt = Isometry3::from_parts(
-            Vector3::new(0.0, 0.0, height_m).into(),
-            UnitQuaternion::from_rotation_matrix(&turn),
-        );
-        let load = self.skin.press(&self.bvh, &x_wt, &mut self.pressed)?;
+        let load = self.skin.press(&self.bvh, &pose(towards_t, height_m), &mut self.pressed)?;
         Ok((load, self.electrodes.counts(&self.pressed.inward_m, 1.0)))
     }
 
-    /// The same at a given normal force.
+    /// The height at which the plate takes a normal force.
     ///
     /// # Errors
     /// See [`Skin::press`].
-    pub fn press_to(
+    pub fn height_m(
         &mut self,
         towards_t: &Vector3<f64>,
         normal_force_n: f64,
-    ) -> Result<(Load, [f64; ELECTRODES]), PressError> {
-        let profile_m = self.skin.samples().iter().map(|s| s.point().coords.dot(towards_t));
-        let mut high_m = profile_m.fold(0.0, f64::max);
+    ) -> Result<f64, PressError> {
+        let reach_m = self.skin.samples().iter().map(|s| s.point().coords.dot(towards_t));
+        let mut high_m = reach_m.fold(0.0, f64::max);
         let mut low_m = 0.0;
         for _ in 0..HALVINGS {
             let middle_m = 0.5 * (low_m + high_m);
-            let pushed_n = match self.press(towards_t, middle_m) {
-                Ok((load, _)) => -load.force_n.dot(towards_t),
+            let load = self.skin.press(&self.bvh, &pose(towards_t, middle_m), &mut self.pressed);
+            let pushed_n = match load {
+                Ok(load) => -load.force_n.dot(towards_t),
                 Err(PressError::Inside) => f64::INFINITY,
                 Err(error) => return Err(error),
             };
@@ -136,7 +130,20 @@ impl Plate {
                 high_m = middle_m;
             }
         }
-        self.press(towards_t, high_m)
+        Ok(high_m)
+    }
+
+    /// Load and ideal counts at a given normal force.
+    ///
+    /// # Errors
+    /// See [`Skin::press`].
+    pub fn press_to(
+        &mut self,
+        towards_t: &Vector3<f64>,
+        normal_force_n: f64,
+    ) -> Result<(Load, [f64; ELECTRODES]), PressError> {
+        let height_m = self.height_m(towards_t, normal_force_n)?;
+        self.press(towards_t, height_m)
     }
 
     /// Mean counts over the rolls of `attitude`, by three-point Gauss–Hermite quadrature.
@@ -163,4 +170,12 @@ impl Plate {
 pub fn direction_t(pitch_rad: f64, roll_rad: f64) -> Vector3<f64> {
     let (sin, cos) = pitch_rad.sin_cos();
     Vector3::new(sin, cos * roll_rad.sin(), -cos * roll_rad.cos())
+}
+
+/// Pose of `T` over a plate in the plane z = 0 of `W` that `towards_t` faces.
+pub fn pose(towards_t: &Vector3<f64>, height_m: f64) -> Isometry3<f64> {
+    let turn = Rotation3::rotation_between(towards_t, &-Vector3::z())
+        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+    let origin_w = Vector3::new(0.0, 0.0, height_m);
+    Isometry3::from_parts(origin_w.into(), UnitQuaternion::from_rotation_matrix(&turn))
 }
