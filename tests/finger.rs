@@ -127,8 +127,8 @@ fn a_dry_capsule_on_a_plane_obeys_winkler_and_converges() {
             });
             errors.iter().sum::<f64>() / errors.len() as f64
         };
-        let (coarse, fine) = (error(1000), error(64_000));
-        let order = (coarse / fine).ln() / 64f64.ln();
+        let (coarse, fine) = (error(250), error(64_000));
+        let order = (coarse / fine).ln() / 256f64.ln();
         println!("error {coarse:.2e} to {fine:.2e}, order {order:.2} in the samples");
         assert!(fine < 0.01 && order > 0.5, "{coarse} {fine} {order}");
     }

@@ -7,8 +7,10 @@ use std::f64::consts::TAU;
 /// Golden section of a turn: successive points never line up.
 const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 
-/// Step of the central differences over the skin, as a part of the radius and in radians.
-const STEP: f64 = 1e-4;
+/// Step of the central differences over the skin: along it as a part of the samples' distance, which
+/// near the apex is where the profile bends; around it in radians.
+const STEP: f64 = 0.05;
+const STEP_RAD: f64 = 1e-4;
 
 /// One point of the skin with the ray from the axis through it, in `T`.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,18 +47,14 @@ impl Sample {
 pub fn spread(profile: &Profile, count: usize) -> Vec<Sample> {
     let (length_m, radius_m) = (profile.length_m, profile.radius_m);
     let cell_m = (length_m + radius_m) / count as f64;
-    let step_m = STEP * radius_m;
+    let step_m = STEP * cell_m;
     (0..count)
         .map(|i| {
             let x_m = -length_m + (i as f64 + 0.5) * cell_m;
             let turn = TAU * (i as f64 * GOLDEN_TURN).fract();
-            let at = |dx: f64, dturn: f64| {
-                let x_m = (x_m + dx).clamp(-length_m, radius_m);
-                profile.skin_t(x_m, turn + dturn)
-            };
-            let step_m = step_m.min(0.5 * cell_m);
+            let at = |dx_m: f64, dturn: f64| profile.skin_t(x_m + dx_m, turn + dturn);
             let along: Vector3<f64> = (at(step_m, 0.0) - at(-step_m, 0.0)) / (2.0 * step_m);
-            let around: Vector3<f64> = (at(0.0, STEP) - at(0.0, -STEP)) / (2.0 * STEP);
+            let around = (at(0.0, STEP_RAD) - at(0.0, -STEP_RAD)) / (2.0 * STEP_RAD);
             let (start, direction) = profile.ray(x_m, turn);
             let stretched = around.cross(&along);
             let normal = UnitVector3::try_new(stretched, 0.0).unwrap_or(direction);
