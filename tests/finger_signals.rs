@@ -202,7 +202,7 @@ fn channels_are_sampled_in_the_order_of_the_slots() {
     assert_eq!([38, 40, 42].map(channel), [Channel::Pdc, Channel::Tac, Channel::Tdc]);
     assert!((0..22).all(|i| channel(2 * i + 1) == Channel::Pac(i)));
     // While the pressure rises, PDC of a skewed frame is read before its end, E1 long before.
-    let sinking = |t: f64| height(8.6e-3 - 0.02 * t);
+    let sinking = |t: f64| height(8.1e-3 - 0.01 * t);
     let ideal = frames(&quiet(), 1, 50, sinking);
     let timing = Some(palpate::things::finger::timing::TimingEffect { batch_frames: 1 });
     let skewed = frames(&Effects { timing, ..quiet() }, 1, 50, sinking);
@@ -224,7 +224,7 @@ fn vibration_sees_changes_of_pressure_and_forgets_its_level() {
     let vibration =
         palpate::things::finger::fluid::VibrationEffect { noise_counts: 0.0, ..Default::default() };
     effects.fluid.as_mut().unwrap().vibration = Some(vibration);
-    let pressed = frames(&effects, 1, 1000, |t| height(if t < 0.2 { 8.5e-3 } else { 8.2e-3 }));
+    let pressed = frames(&effects, 1, 1000, |t| height(if t < 0.2 { 8.2e-3 } else { 7.9e-3 }));
     let swing = |frame: &Frame| {
         frame.pac_counts.unwrap().iter().map(|counts| (counts - 2028.0).abs()).fold(0.0, f64::max)
     };
@@ -266,7 +266,6 @@ fn contact_is_found_after_enough_frames_and_lost_likewise() {
         .collect();
     assert_eq!(changes.len(), 2, "{changes:?}");
     assert!((changes[0] - 0.325).abs() < 0.01 && (changes[1] - 0.625).abs() < 0.01, "{changes:?}");
-    assert_eq!(locate(&tare, &felt[10]).map(|_| ()), locate(&tare, &felt[10]).map(|_| ()));
     assert_eq!(Tare::of(&[]), Tare { electrode_counts: None, pdc_counts: None });
 }
 

@@ -51,7 +51,7 @@ impl Default for ThermalEffect {
             finger_c: 31.0,
             object_c: 22.0,
             time_constant_s: 30.0,
-            half_area_m2: 4e-4,
+            half_area_m2: 1e-3,
             conductivity_per_k: 0.02,
             tac_baseline_counts: 2053.0,
             tdc_noise_counts: 0.4,
