@@ -176,6 +176,11 @@ impl MeshBvh {
         touched
     }
 
+    /// Whether the mesh reaches into `capsule`.
+    pub fn enters(&self, capsule: &Capsule) -> bool {
+        self.overlap(capsule).is_some()
+    }
+
     /// Whether `p` sees only back faces along the six axes: it is inside a closed mesh, or deep
     /// in one with few holes.
     pub fn surrounds(&self, p: &Point3<f64>) -> bool {

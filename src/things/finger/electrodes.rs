@@ -3,6 +3,7 @@
 use super::frame::ELECTRODES;
 use super::noise::normal;
 use super::samples::Sample;
+use super::skin::Pressed;
 use super::table;
 use crate::ground::config::{Checked, Rules};
 use rand::Rng;
@@ -103,19 +104,19 @@ impl Electrodes {
             let gap: f64 = near.iter().map(|&(i, weight)| weight * samples[i].layers.gap_m).sum();
             near.into_iter().map(|(i, weight)| (i, weight / gap)).collect()
         });
-        Self {
-            z0_ohm: effect.baseline_counts.map(|counts| impedance_ohm(counts)),
-            weights,
-            effect: effect.clone(),
-        }
+        Self { z0_ohm: effect.baseline_counts.map(impedance_ohm), weights, effect: effect.clone() }
     }
 
-    /// Ideal counts when the skin moved in by `inward_m` at each sample and the fluid conducts
-    /// `conductivity` times as well as at rest.
-    pub fn counts(&self, inward_m: &[f64], conductivity: f64) -> [f64; ELECTRODES] {
+    /// Ideal counts over a pressed skin when the fluid conducts `conductivity` times as well as at
+    /// rest.
+    pub fn counts(&self, pressed: &Pressed, conductivity: f64) -> [f64; ELECTRODES] {
+        // An untouched skin is the usual case and needs no sums.
+        let moved = |weights: &[(usize, f64)]| match pressed.is_resting() {
+            true => 0.0,
+            false => weights.iter().map(|&(i, weight)| weight * pressed.inward_m[i]).sum(),
+        };
         std::array::from_fn(|i| {
-            let closed: f64 =
-                self.weights[i].iter().map(|&(sample, weight)| weight * inward_m[sample]).sum();
+            let closed = moved(&self.weights[i]);
             let gap = (1.0 - closed).max(FILM);
             counts(self.z0_ohm[i] / (gap.powf(self.effect.exponent) * conductivity))
         })

@@ -101,7 +101,7 @@ impl Plate {
         height_m: f64,
     ) -> Result<(Load, [f64; ELECTRODES]), PressError> {
         let load = self.skin.press(&self.bvh, &pose(towards_t, height_m), &mut self.pressed)?;
-        Ok((load, self.electrodes.counts(&self.pressed.inward_m, 1.0)))
+        Ok((load, self.electrodes.counts(&self.pressed, 1.0)))
     }
 
     /// The height at which the plate takes a normal force.

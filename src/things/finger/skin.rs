@@ -7,6 +7,7 @@ use super::profile::Profile;
 use super::samples::{Sample, spread};
 use crate::ground::config::{Checked, Rules};
 use crate::ground::geometry::bvh::MeshBvh;
+use crate::ground::geometry::sweep::Capsule;
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -21,7 +22,11 @@ const BULGE: f64 = 0.1;
 
 /// The samples are culled in this many slabs along the finger times sectors around it (chosen).
 const SLABS: usize = 8;
-const SECTORS: usize = 6;
+const SECTORS: usize = 8;
+
+/// As long as nothing enters this part of the hull's radius around the axis, rays start there
+/// instead of on the axis (chosen: inside the core).
+const INNER: f64 = 0.5;
 
 /// Table `[skin]`: an elastic foundation over the exact mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,6 +80,7 @@ pub struct Skin {
     wet_m2: f64,
     patches: Vec<Patch>,
     whole: Ball,
+    inner: Capsule,
     column: Column,
     bulge_m: f64,
     /// Pressure per displaced volume, in Pa/m³; 0 without fluid.
@@ -85,7 +91,9 @@ pub struct Skin {
 #[derive(Clone, Debug)]
 struct Patch {
     range: Range<usize>,
-    ball: Ball,
+    /// Around rays from the axis, and around rays from the inner capsule.
+    from_axis: Ball,
+    from_inner: Ball,
 }
 
 #[derive(Clone, Debug)]
@@ -104,6 +112,13 @@ pub struct Pressed {
     pub indentation_m: Vec<f64>,
 }
 
+impl Pressed {
+    /// Whether no ray met anything: the skin is untouched and the fluid at rest.
+    pub fn is_resting(&self) -> bool {
+        self.touches.is_empty()
+    }
+}
+
 impl Skin {
     /// A skin of this shape; `cavity_pa_m3` is the stiffness of the fluid, 0 for a dry finger.
     pub fn new(profile: &Profile, effect: &SkinEffect, cavity_pa_m3: f64) -> Self {
@@ -117,12 +132,18 @@ impl Skin {
         };
         samples.sort_by_key(patch);
         let bulge_m = if cavity_pa_m3 > 0.0 { BULGE * profile.radius_m } else { 0.0 };
+        let inner = Capsule {
+            p0_w: Point3::origin(),
+            p1_w: Point3::new(-profile.length_m, 0.0, 0.0),
+            radius_m: INNER * profile.radius_m,
+        };
         let mut patches = Vec::new();
         let mut first = 0;
         for group in samples.chunk_by(|a, b| patch(a) == patch(b)) {
             patches.push(Patch {
                 range: first..first + group.len(),
-                ball: Ball::around(group, bulge_m),
+                from_axis: Ball::around(group, 0.0, bulge_m),
+                from_inner: Ball::around(group, inner.radius_m, bulge_m),
             });
             first += group.len();
         }
@@ -131,7 +152,8 @@ impl Skin {
         Self {
             wet_m2: wet.map(Sample::section_m2).sum(),
             sections_m2: samples.iter().map(Sample::section_m2).collect(),
-            whole: Ball::around(&samples, bulge_m),
+            whole: Ball::around(&samples, 0.0, bulge_m),
+            inner,
             column: Column {
                 skin_pa_m: effect.modulus_pa / skin_m,
                 flatten_pa_m: effect.flatten_pa_m,
@@ -183,12 +205,12 @@ impl Skin {
         if bvh.surrounds(&x_wt.translation.vector.into()) {
             return Err(PressError::Inside);
         }
-        let resting = pressed.touches.is_empty();
+        let resting = pressed.is_resting();
         pressed.touches.clear();
         if self.whole.meets(bvh, x_wt) {
             self.meet(bvh, x_wt, &mut pressed.touches);
         }
-        if pressed.touches.is_empty() {
+        if pressed.is_resting() {
             if !resting {
                 pressed.inward_m.fill(0.0);
                 pressed.indentation_m.fill(0.0);
@@ -200,12 +222,20 @@ impl Skin {
 
     /// Collects the rays that meet the object.
     fn meet(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, touches: &mut Vec<Touch>) {
-        for patch in self.patches.iter().filter(|patch| patch.ball.meets(bvh, x_wt)) {
+        let Capsule { p0_w, p1_w, radius_m } = self.inner;
+        let deep = bvh.enters(&Capsule { p0_w: x_wt * p0_w, p1_w: x_wt * p1_w, radius_m });
+        let skipped_m = if deep { 0.0 } else { radius_m };
+        let near = self.patches.iter().filter(|patch| {
+            let ball = if deep { &patch.from_axis } else { &patch.from_inner };
+            ball.meets(bvh, x_wt)
+        });
+        for patch in near {
             for i in patch.range.clone() {
                 let sample = &self.samples[i];
                 let outer_m = sample.layers.outer_m;
                 let direction_w = x_wt.rotation * sample.direction;
-                let hit = bvh.ray(&(x_wt * sample.start), &direction_w, outer_m + self.bulge_m);
+                let start_w = x_wt * sample.start + direction_w.scale(skipped_m);
+                let hit = bvh.ray(&start_w, &direction_w, outer_m + self.bulge_m - skipped_m);
                 if let Some(hit) = hit {
                     let slope = hit.normal.dot(&direction_w);
                     let facing = hit.normal * -slope.signum();
@@ -214,7 +244,7 @@ impl Skin {
                         section_m2: self.sections_m2[i],
                         gap_m: sample.layers.gap_m,
                         wet: sample.layers.wet,
-                        indentation_m: outer_m - hit.distance_m,
+                        indentation_m: outer_m - skipped_m - hit.distance_m,
                         normal_t: x_wt.rotation.inverse_transform_vector(&facing),
                         cosine: slope.abs().max(FLATTEST),
                         response: Default::default(),
@@ -274,11 +304,13 @@ impl Skin {
 }
 
 impl Ball {
-    fn around(samples: &[Sample], bulge_m: f64) -> Self {
+    /// Around the rays of `samples`, from `from_m` off the axis to `bulge_m` above the skin.
+    fn around(samples: &[Sample], from_m: f64, bulge_m: f64) -> Self {
         let ends = || {
-            samples
-                .iter()
-                .flat_map(|sample| [sample.start, sample.point() + sample.direction.scale(bulge_m)])
+            samples.iter().flat_map(|sample| {
+                let to_m = sample.layers.outer_m + bulge_m;
+                [from_m, to_m].map(|at_m| sample.start + sample.direction.scale(at_m))
+            })
         };
         let sum: Vector3<f64> = ends().map(|end| end.coords).sum();
         let centre = Point3::from(sum / ends().count().max(1) as f64);

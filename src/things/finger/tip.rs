@@ -210,7 +210,7 @@ impl Feel {
             conductivity = heat.conductivity(thermal);
         }
         if let (Some(electrodes), Some(pressed)) = (&tip.electrodes, &self.pressed) {
-            signals.electrode_counts = electrodes.counts(&pressed.inward_m, conductivity);
+            signals.electrode_counts = electrodes.counts(pressed, conductivity);
         }
         signals
     }
