@@ -344,10 +344,7 @@ fn bad_numbers_and_a_finger_inside_are_errors_that_leave_the_state() {
 #[test]
 fn two_contacts_at_once_squeeze_the_finger_evenly() {
     let skin = biotac(2000, CAVITY_PA_M3);
-    let slab = |low: f64| {
-        let corners = box_corners(point(-0.1, low, -0.1), point(0.1, low + 0.05, 0.1));
-        corners
-    };
+    let slab = |low: f64| box_corners(point(-0.1, low, -0.1), point(0.1, low + 0.05, 0.1));
     let vertices = [slab(0.0065), slab(-0.0565)].concat();
     let triangles: Vec<_> =
         BOX.iter().copied().chain(BOX.map(|triangle| triangle.map(|vertex| vertex + 8))).collect();

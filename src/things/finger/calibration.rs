@@ -147,15 +147,20 @@ fn knobs(free: Free) -> &'static [fn(&mut Model, f64)] {
             let sd_rad = &mut model.attitude.roll_sd_rad;
             *sd_rad = (*sd_rad + 0.1 * step).max(0.0);
         },
-        |model, step| model.skin.flatten_pa_m *= (0.7 * step).exp(),
-        |model, step| model.skin.inflate_pa_m *= (0.7 * step).exp(),
-        |model, step| model.skin.core_pa_m *= step.exp(),
+        |model, step| stretch(&mut model.skin.flatten_pa_m, 0.7 * step),
+        |model, step| stretch(&mut model.skin.inflate_pa_m, 0.7 * step),
+        |model, step| stretch(&mut model.skin.core_pa_m, step),
         |model, step| model.electrodes.spread_m *= (0.3 * step).exp(),
     ];
     match free {
         Free::Attitude => &KNOBS[..3],
         Free::Constants => &KNOBS,
     }
+}
+
+/// Multiplies a stiffness by eˢ, within what a scene may hold.
+fn stretch(stiffness_pa_m: &mut f64, s: f64) {
+    *stiffness_pa_m = (*stiffness_pa_m * s.exp()).clamp(1e5, 1e12);
 }
 
 fn plate(model: &Model, recording: &Recording) -> Option<Plate> {
