@@ -13,7 +13,6 @@ use palpate::things::finger::column::Column;
 use palpate::things::finger::load::PressError;
 use palpate::things::finger::plate::direction_t;
 use palpate::things::finger::profile::Profile;
-use palpate::things::finger::samples::spread;
 use palpate::things::finger::skin::{Skin, SkinEffect};
 use palpate::things::finger::{Effects, Feel, FeelError, Finger, Fingertip, Load, Motion};
 use proptest::prelude::*;
@@ -43,43 +42,6 @@ fn press(skin: &Skin, bvh: &MeshBvh, x_wt: &Isometry3<f64>) -> Load {
 #[track_caller]
 fn near(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance, "found {found}, expected {expected}");
-}
-
-#[test]
-fn areas_of_the_samples_add_up_to_the_skin() {
-    let finger = Finger::default();
-    let (r, l) = (finger.radius_m, finger.length_m);
-    let area = |profile: &Profile, count| -> f64 {
-        spread(profile, count).iter().map(|sample| sample.area_m2).sum()
-    };
-    near(area(&Profile::capsule(&finger), 500), 2.0 * PI * r * (l + r), 1e-8);
-    let profile = Profile::biotac(&finger);
-    near(area(&profile, 500) / area(&profile, 200_000), 1.0, 0.005);
-    for sample in spread(&profile, 500) {
-        assert!(sample.normal.dot(&sample.direction) > 0.5, "{sample:?}");
-    }
-}
-
-#[test]
-fn the_profile_has_the_measures_of_the_sensor() {
-    let profile = Profile::biotac(&Finger::default());
-    let outer_mm = |x_mm: f64, x: f64, y: f64, z: f64| {
-        profile.layers(x_mm * 1e-3, &Vector3::new(x, y, z).normalize()).outer_m * 1e3
-    };
-    near(outer_mm(-6.0, 0.0, 1.0, 0.0), 7.02, 0.03);
-    near(outer_mm(-7.0, 0.0, 0.0, -1.0), 8.31, 0.03);
-    near(outer_mm(0.0, 0.0, 0.0, -1.0), 8.02, 0.03);
-    near(outer_mm(0.0, 0.5, 0.0, -0.866), 8.30, 0.05);
-    near(outer_mm(0.0, 1.0, 0.0, -1.0), 8.72, 0.05);
-    near(outer_mm(0.0, 1.0, 0.0, 0.0), 6.65, 0.03);
-    let gap_mm = |x_mm: f64, degrees: f64| {
-        let (sin, cos) = f64::to_radians(degrees).sin_cos();
-        profile.layers(x_mm * 1e-3, &Vector3::new(0.0, sin, -cos)).gap_m * 1e3
-    };
-    near(gap_mm(-2.8, 0.0), 1.54, 0.05);
-    near(gap_mm(-13.6, 0.0), 1.35, 0.05);
-    near(gap_mm(-6.2, 44.0), 1.22, 0.05);
-    near(gap_mm(-8.0, 77.3), 0.58, 0.05);
 }
 
 /// Stiffness of a dry column until its gap closes.

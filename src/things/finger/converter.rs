@@ -180,13 +180,13 @@ impl Converter {
             let frame_s = SLOTS as f64 / SLOTS_HZ;
             self.drift_counts = electrodes.drifted(self.drift_counts, frame_s, rng);
         }
-        if self.ready == KEPT {
+        let batch = parts.timing.map_or(1, |timing| timing.batch_frames);
+        if self.queue.len() >= KEPT + batch {
             self.queue.pop_front();
-            self.ready -= 1;
+            self.ready = self.ready.saturating_sub(1);
         }
         self.queue.push_back(std::mem::take(&mut self.frame));
         (self.slot, self.frames) = (0, self.frames + 1);
-        let batch = parts.timing.map_or(1, |timing| timing.batch_frames);
         if self.queue.len() - self.ready >= batch {
             self.ready = self.queue.len();
         }

@@ -47,7 +47,7 @@ pub struct SkinEffect {
 impl Default for SkinEffect {
     /// Modulus: NVlabs/biotac_sim. The three stiffnesses: fitted by `calibration` to the
     /// MiaoLi/syntouchcontact recordings of sensor F2 on a flat plate, 106 counts of mean error.
-    /// They lie in a flat valley: half or twice a value costs a few counts.
+    /// They lie in a flat valley: half or twice a value costs 1 to 3 counts.
     fn default() -> Self {
         Self {
             samples: 500,
