@@ -56,7 +56,8 @@ pub struct Residual {
 pub enum Free {
     /// Only how the hand held the finger: a test of the constants.
     Attitude,
-    /// Also the stiffnesses and the electrodes' spread.
+    /// Then also the stiffnesses against flattening and of the core, and the electrodes' spread.
+    /// Counts alone do not tell the stiffness against inflation: ten times less fits as well.
     Constants,
 }
 
@@ -107,8 +108,13 @@ pub fn residual(model: &Model, recording: &Recording) -> Option<Residual> {
 ///
 /// Minimises mean error + 100 × part of wrong signs + penalty on a pressure that does not
 /// saturate, by a compass search: each parameter in turn takes a step either way if that
-/// helps; when none does, all steps are halved. Deterministic.
+/// helps; when none does, all steps are halved. Deterministic. Constants are set free only once
+/// the attitude fits, or they would make up for it.
 pub fn fit(start: &Model, recording: &Recording, free: Free) -> Option<(Model, Residual)> {
+    let start = match free {
+        Free::Attitude => start,
+        Free::Constants => &fit(start, recording, Free::Attitude)?.0,
+    };
     let cost = |residual: &Residual| {
         residual.mean_error_counts
             + 100.0 * (1.0 - residual.right_sign)
@@ -140,7 +146,7 @@ pub fn fit(start: &Model, recording: &Recording, free: Free) -> Option<(Model, R
 
 /// One parameter each: moves it by a part of its first step.
 fn knobs(free: Free) -> &'static [fn(&mut Model, f64)] {
-    const KNOBS: [fn(&mut Model, f64); 7] = [
+    const KNOBS: [fn(&mut Model, f64); 6] = [
         |model, step| model.attitude.pitch_rad += 0.1 * step,
         |model, step| model.attitude.roll_rad += 0.1 * step,
         |model, step| {
@@ -148,7 +154,6 @@ fn knobs(free: Free) -> &'static [fn(&mut Model, f64)] {
             *sd_rad = (*sd_rad + 0.1 * step).max(0.0);
         },
         |model, step| stretch(&mut model.skin.flatten_pa_m, 0.7 * step),
-        |model, step| stretch(&mut model.skin.inflate_pa_m, 0.7 * step),
         |model, step| stretch(&mut model.skin.core_pa_m, step),
         |model, step| model.electrodes.spread_m *= (0.3 * step).exp(),
     ];

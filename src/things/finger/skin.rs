@@ -45,16 +45,17 @@ pub struct SkinEffect {
 }
 
 impl Default for SkinEffect {
-    /// Modulus: NVlabs/biotac_sim. The three stiffnesses: fitted by `calibration` to the
-    /// MiaoLi/syntouchcontact recordings of sensor F2 on a flat plate, 106 counts of mean error.
-    /// They lie in a flat valley: half or twice a value costs 1 to 3 counts.
+    /// Modulus E: NVlabs/biotac_sim. Inflation: that of a thin-walled tube, E t / R², with the skin's
+    /// thickness t = 1.6 mm and the sides' radius R = 7 mm. Flattening and core: fitted by
+    /// `calibration` to the MiaoLi/syntouchcontact recordings of sensor F2 on a flat plate. The fit
+    /// is flat: half or twice a value costs a few counts.
     fn default() -> Self {
         Self {
             samples: 500,
             modulus_pa: 1.552e6,
-            flatten_pa_m: 4.2e6,
-            inflate_pa_m: 3.5e7,
-            core_pa_m: 7.5e8,
+            flatten_pa_m: 3.5e6,
+            inflate_pa_m: 5.07e7,
+            core_pa_m: 1.4e9,
         }
     }
 }
