@@ -1,5 +1,6 @@
 //! The command line.
 
+mod calibrate;
 mod report;
 mod run;
 mod show;
@@ -35,6 +36,8 @@ enum Command {
     Report(report::Args),
     /// Say what a mesh, scene, experiment or run folder holds.
     Show(show::Args),
+    /// Fit the finger's constants to recordings of it on a flat plate.
+    Calibrate(calibrate::Args),
 }
 
 /// How a command ended, if it did not fail.
@@ -57,6 +60,7 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Show(args) => show::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
     };
     match outcome {
         Ok(Ending::Done) => ExitCode::SUCCESS,

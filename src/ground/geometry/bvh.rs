@@ -158,6 +158,42 @@ impl MeshBvh {
         ClosestHit { distance_m: squared.sqrt(), point, triangle }
     }
 
+    /// Whether the mesh comes within `radius_m` of `centre`.
+    pub fn touches(&self, centre: &Point3<f64>, radius_m: f64) -> bool {
+        let from = centre - self.centre;
+        let mut touched = false;
+        let reach = (radius_m * radius_m).next_up();
+        self.visit(
+            reach,
+            |node| node.distance_squared(&from, &from),
+            |triangle, limit| {
+                let point = nearest_on_triangle(centre, &self.corners(triangle));
+                touched |= (point - centre).norm_squared() < limit;
+                // One is enough: nothing lies under the new limit.
+                if touched { f64::NEG_INFINITY } else { limit }
+            },
+        );
+        touched
+    }
+
+    /// Whether the mesh reaches into `capsule`.
+    pub fn enters(&self, capsule: &Capsule) -> bool {
+        self.overlap(capsule).is_some()
+    }
+
+    /// Whether `p` sees only back faces along the six axes: it is inside a closed mesh, or deep
+    /// in one with few holes.
+    pub fn surrounds(&self, p: &Point3<f64>) -> bool {
+        let from = p - self.centre;
+        if Box3::of(self.bvh.nodes[0].aabb()).distance_squared(&from, &from) > 0.0 {
+            return false;
+        }
+        [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()]
+            .into_iter()
+            .flat_map(|axis| [axis, -axis])
+            .all(|axis| self.ray(p, &axis, f64::MAX).is_some_and(|hit| hit.normal.dot(&axis) > 0.0))
+    }
+
     /// First contact of a capsule that travels along `direction` by at most `max_travel_m`: the
     /// least travel at which the distance from axis to mesh is no more than the radius. If that
     /// is so from the start, the contact is the point of the mesh nearest to the axis.

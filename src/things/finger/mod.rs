@@ -1,7 +1,36 @@
-//! The finger: its rigid hull, and the tactile frame that a sensor in it sends.
+//! The finger: its rigid hull, its soft skin, and the tactile frame that a sensor in it sends.
+//!
+//! `profile`, `samples` and `table` say where skin, fluid and electrodes of a BioTac are. `column`
+//! is the law of one column of skin over fluid over core, `cavity` couples columns by the fluid's
+//! pressure, `skin` presses them against a mesh. `electrodes`, `fluid`, `thermal`, `friction` and
+//! `timing` are the effects; `tip` puts together those a scene names. `contact_point` reads a frame
+//! back; `plate` presses the finger on a flat plate, `calibration` fits the constants to recordings of it.
 
+pub mod calibration;
+mod cavity;
+pub mod column;
+pub mod contact_point;
+mod converter;
+pub mod effects;
+pub mod electrodes;
+pub mod fluid;
 pub mod frame;
+pub mod friction;
 pub mod hull;
+pub mod load;
+mod noise;
+pub mod plate;
+pub mod profile;
+pub mod samples;
+pub mod skin;
+pub mod table;
+pub mod thermal;
+pub mod timing;
+pub mod tip;
 
+pub use contact_point::{Detection, Detector, PointOfContact, Tare};
+pub use effects::Effects;
 pub use frame::Frame;
 pub use hull::Finger;
+pub use load::Load;
+pub use tip::{Feel, FeelError, Fingertip, Motion};

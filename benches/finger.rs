@@ -1,0 +1,54 @@
+//! What a step of the soft fingertip costs on the bird's 48 200 triangles.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use nalgebra::{Isometry3, Point3, Translation3, UnitVector3, Vector3};
+use palpate::ground::geometry::sweep::Capsule;
+use palpate::ground::seed::stream;
+use palpate::things::finger::skin::SkinEffect;
+use palpate::things::finger::{Effects, Feel, Fingertip, Motion};
+use palpate::world::world::Shape;
+use palpate::world::{Scene, World};
+use std::hint::black_box;
+use std::path::Path;
+
+fn finger(c: &mut Criterion) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
+    let Some(world) = Scene::load(&path, &[]).ok().and_then(|scene| World::build(scene).ok())
+    else {
+        return;
+    };
+    let Shape::Mesh { bvh, .. } = world.shape() else { return };
+    // The pad faces the object: −z of T along −y of W, the tip up.
+    let pad = nalgebra::UnitQuaternion::from_rotation_matrix(
+        &nalgebra::Rotation3::from_basis_unchecked(&[Vector3::z(), Vector3::x(), Vector3::y()]),
+    );
+    let at = |y: f64| Motion::at(Isometry3::from_parts(Translation3::new(0.013, y, 0.487), pad));
+    let (low, high) = bvh.mesh().bounds();
+    let start = Capsule::sphere(Point3::new(0.013, high.y + 0.05, 0.487), 8.0e-3);
+    let down = UnitVector3::new_unchecked(-Vector3::y());
+    let Some(hit) = bvh.sweep(&start, &down, 1.0) else { return };
+    let touching_m = start.p0_w.y - hit.travel_m;
+    let skin = Effects { skin: Some(SkinEffect::default()), ..Effects::default() };
+    let wet = Effects { fluid: Some(Default::default()), ..skin.clone() };
+    for (name, effects) in [("skin", skin), ("skin and fluid", wet), ("everything", Effects::all())]
+    {
+        let tip = Fingertip::new(&world.scene().finger, &effects);
+        let mut feel = Feel::new(&tip, &stream(1, 0, "finger"));
+        let mut group = c.benchmark_group(format!("fingertip, {name}"));
+        let far = [("1 mm away", 1e-3), ("5 cm away", 0.05)];
+        for (place, gap_m) in [("1 mm deep", -1e-3), ("2 mm deep", -2e-3)].into_iter().chain(far) {
+            let motion = at(touching_m + gap_m);
+            if let Ok(load) = feel.step(&tip, bvh, &motion, 1e-3) {
+                println!("{place}: {:.2} N", load.force_n.norm());
+            }
+            group.bench_function(place, |b| {
+                b.iter(|| feel.step(&tip, bvh, black_box(&motion), 1e-3));
+            });
+        }
+        group.finish();
+    }
+    println!("the object is {:.0} mm high", 1e3 * (high - low).z);
+}
+
+criterion_group!(benches, finger);
+criterion_main!(benches);

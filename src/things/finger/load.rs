@@ -1,0 +1,40 @@
+//! What an object does to the finger.
+
+use nalgebra::{Point3, Vector3};
+use thiserror::Error;
+
+/// The contact in one pose, in `T`; all zero without one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Load {
+    /// Force on the finger.
+    pub force_n: Vector3<f64>,
+    /// Torque on the finger about the origin of `T`.
+    pub torque_nm: Vector3<f64>,
+    /// Centre of pressure: mean of the points touched, weighted by force.
+    pub centre_t: Point3<f64>,
+    /// Mean outward normal of the object, weighted by force.
+    pub normal_t: Vector3<f64>,
+    /// Deepest indentation of the skin.
+    pub indentation_max_m: f64,
+    /// Area of the object under load.
+    pub area_m2: f64,
+    /// Fluid volume pushed aside.
+    pub displaced_m3: f64,
+    /// Fluid pressure above rest.
+    pub pressure_pa: f64,
+    /// Energy stored in skin and fluid.
+    pub energy_j: f64,
+    /// Whether the gap is closed somewhere: the core carries load.
+    pub on_core: bool,
+}
+
+/// Why a pose has no load.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum PressError {
+    /// A number in the pose is NaN or infinite.
+    #[error("the pose is not finite")]
+    NotFinite,
+    /// The object encloses the origin of `T`: the finger is farther in than its skin is thick.
+    #[error("the fingertip's centre is inside the object")]
+    Inside,
+}

@@ -1,0 +1,64 @@
+//! When a BioTac samples which channel, and when its frames arrive.
+
+use super::frame::ELECTRODES;
+use crate::ground::config::{Checked, Rules};
+use serde::{Deserialize, Serialize};
+
+/// Slots of a frame (SynTouch QuickStart guide): E1, PAC, E2, PAC, … E19, PAC, PDC, PAC, TAC, PAC, TDC, PAC.
+pub const SLOTS: usize = 44;
+
+/// Slots per second (same).
+pub const SLOTS_HZ: f64 = 4400.0;
+
+/// Table `[timing]`: channels are sampled one after the other and frames arrive in batches.
+/// Without it a frame is sampled at once, every 10 ms, and arrives then.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TimingEffect {
+    /// Frames that arrive together, when the last of them is complete.
+    pub batch_frames: usize,
+}
+
+impl Default for TimingEffect {
+    /// SynTouch C library manual: 5 frames, 50 ms.
+    fn default() -> Self {
+        Self { batch_frames: 5 }
+    }
+}
+
+impl Checked for TimingEffect {
+    fn check(&self, rules: &mut Rules) {
+        rules.require(
+            "batch_frames",
+            self.batch_frames,
+            (1..=100).contains(&self.batch_frames),
+            || "1 to 100".into(),
+        );
+    }
+}
+
+/// What a slot samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// An electrode; E1 is 0.
+    Electrode(usize),
+    /// Dynamic pressure; the first in a frame is 0.
+    Pac(usize),
+    /// Static pressure.
+    Pdc,
+    /// Change of temperature.
+    Tac,
+    /// Temperature.
+    Tdc,
+}
+
+/// The channel of a slot, 0 to 43.
+pub fn channel(slot: usize) -> Channel {
+    match slot / 2 {
+        pair if slot % 2 == 1 => Channel::Pac(pair),
+        pair if pair < ELECTRODES => Channel::Electrode(pair),
+        19 => Channel::Pdc,
+        20 => Channel::Tac,
+        _ => Channel::Tdc,
+    }
+}

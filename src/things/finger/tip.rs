@@ -1,0 +1,217 @@
+//! The fingertip, put together from the effects a scene names.
+
+use super::converter::{Converter, Parts, Signals};
+use super::effects::Effects;
+use super::electrodes::Electrodes;
+use super::fluid::FluidEffect;
+use super::frame::Frame;
+use super::friction::{Bristle, FrictionEffect};
+use super::hull::Finger;
+use super::load::{Load, PressError};
+use super::profile::Profile;
+use super::skin::{Pressed, Skin};
+use super::thermal::{Heat, ThermalEffect};
+use super::timing::TimingEffect;
+use crate::ground::geometry::bvh::MeshBvh;
+use nalgebra::{Isometry3, Vector3};
+use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
+
+/// Longest step: beyond it a frame's signals would be mostly interpolated (chosen).
+const LONGEST_STEP_S: f64 = 1.0;
+
+/// What never changes about a fingertip; shared by trials.
+#[derive(Clone, Debug)]
+pub struct Fingertip {
+    skin: Option<Skin>,
+    electrodes: Option<Electrodes>,
+    fluid: Option<FluidEffect>,
+    thermal: Option<ThermalEffect>,
+    friction: Option<FrictionEffect>,
+    timing: Option<TimingEffect>,
+    sends_frames: bool,
+}
+
+impl Fingertip {
+    /// A BioTac in the finger's size.
+    pub fn new(finger: &Finger, effects: &Effects) -> Self {
+        let profile = Profile::biotac(finger);
+        let cavity_pa_m3 = effects.fluid.as_ref().map_or(0.0, |fluid| fluid.stiffness_pa_m3);
+        let skin = effects.skin.as_ref().map(|skin| Skin::new(&profile, skin, cavity_pa_m3));
+        let electrodes = (effects.electrodes.as_ref().zip(skin.as_ref()))
+            .map(|(effect, skin)| Electrodes::new(effect, skin.samples(), profile.scale()));
+        Self {
+            skin,
+            electrodes,
+            fluid: effects.fluid.clone(),
+            thermal: effects.thermal.clone(),
+            friction: effects.friction.clone(),
+            timing: effects.timing.clone(),
+            sends_frames: effects.sends_frames(),
+        }
+    }
+
+    /// Its skin.
+    pub fn skin(&self) -> Option<&Skin> {
+        self.skin.as_ref()
+    }
+
+    /// Its electrodes.
+    pub fn electrodes(&self) -> Option<&Electrodes> {
+        self.electrodes.as_ref()
+    }
+
+    fn parts(&self) -> Parts<'_> {
+        Parts {
+            electrodes: self.electrodes.as_ref(),
+            fluid: self.fluid.as_ref(),
+            thermal: self.thermal.as_ref(),
+            timing: self.timing.as_ref(),
+        }
+    }
+}
+
+/// How the fingertip stands and moves in `W`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Pose of `T`.
+    pub x_wt: Isometry3<f64>,
+    /// Velocity of the origin of `T`, in m/s.
+    pub linear_w: Vector3<f64>,
+    /// Angular velocity of `T`, in rad/s.
+    pub angular_w: Vector3<f64>,
+}
+
+impl Motion {
+    /// Standing still.
+    pub fn at(x_wt: Isometry3<f64>) -> Self {
+        Self { x_wt, linear_w: Vector3::zeros(), angular_w: Vector3::zeros() }
+    }
+
+    fn is_finite(&self) -> bool {
+        let numbers = [&self.linear_w, &self.angular_w, &self.x_wt.translation.vector];
+        numbers.iter().all(|vector| vector.iter().all(|number| number.is_finite()))
+            && self.x_wt.rotation.coords.iter().all(|number| number.is_finite())
+    }
+}
+
+/// Why a step was refused; the trial's state is as before.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum FeelError {
+    /// A number is NaN or infinite, or the step is negative or longer than a second.
+    #[error("at {time_s} s: a step of {dt_s} s with {motion:?} is not finite")]
+    NotFinite {
+        /// Since the start of the trial.
+        time_s: f64,
+        /// The step.
+        dt_s: f64,
+        /// What it was asked with.
+        motion: Box<Motion>,
+    },
+    /// The object encloses the fingertip's centre.
+    #[error("at {time_s} s: the fingertip's centre is inside the object with {motion:?}")]
+    Inside {
+        /// Since the start of the trial.
+        time_s: f64,
+        /// What it was asked with.
+        motion: Box<Motion>,
+    },
+}
+
+/// What one fingertip feels during one trial.
+#[derive(Clone, Debug)]
+pub struct Feel {
+    time_s: f64,
+    pressed: Option<Pressed>,
+    bristle: Option<Bristle>,
+    heat: Option<Heat>,
+    converter: Option<Converter>,
+}
+
+impl Feel {
+    /// At the start of a trial, untouched; `rng` is the only randomness.
+    pub fn new(tip: &Fingertip, rng: &ChaCha8Rng) -> Self {
+        let mut feel = Self {
+            time_s: 0.0,
+            pressed: tip.skin.as_ref().map(Skin::relaxed),
+            bristle: tip.friction.as_ref().map(|_| Bristle::default()),
+            heat: tip.thermal.as_ref().map(Heat::new),
+            converter: None,
+        };
+        if tip.sends_frames {
+            let untouched = feel.signals(tip, 0.0);
+            feel.converter = Some(Converter::new(&tip.parts(), untouched, rng));
+        }
+        feel
+    }
+
+    /// Since the start of the trial.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// The skin in its last pose.
+    pub fn pressed(&self) -> Option<&Pressed> {
+        self.pressed.as_ref()
+    }
+
+    /// Goes on by `dt_s`, to `motion` at its end, against an object that stands in `W`.
+    ///
+    /// # Errors
+    /// If a number is not finite or the finger's centre is inside the object.
+    pub fn step(
+        &mut self,
+        tip: &Fingertip,
+        object: &MeshBvh,
+        motion: &Motion,
+        dt_s: f64,
+    ) -> Result<Load, FeelError> {
+        let time_s = self.time_s;
+        if !motion.is_finite() || !(0.0..=LONGEST_STEP_S).contains(&dt_s) {
+            return Err(FeelError::NotFinite { time_s, dt_s, motion: Box::new(*motion) });
+        }
+        let mut load = match (&tip.skin, &mut self.pressed) {
+            (Some(skin), Some(pressed)) => {
+                skin.press(object, &motion.x_wt, pressed).map_err(|error| match error {
+                    PressError::NotFinite => {
+                        FeelError::NotFinite { time_s, dt_s, motion: Box::new(*motion) }
+                    }
+                    PressError::Inside => FeelError::Inside { time_s, motion: Box::new(*motion) },
+                })?
+            }
+            _ => Load::default(),
+        };
+        self.time_s += dt_s;
+        if let (Some(friction), Some(bristle)) = (&tip.friction, &mut self.bristle) {
+            let velocity = [&motion.linear_w, &motion.angular_w];
+            bristle.step(friction, &motion.x_wt, velocity, dt_s, &mut load);
+        }
+        if let (Some(thermal), Some(heat)) = (&tip.thermal, &mut self.heat) {
+            heat.step(thermal, load.area_m2, dt_s);
+        }
+        let signals = self.converter.is_some().then(|| self.signals(tip, load.pressure_pa));
+        if let (Some(converter), Some(signals)) = (&mut self.converter, signals) {
+            converter.advance(&tip.parts(), self.time_s, &signals);
+        }
+        Ok(load)
+    }
+
+    /// The oldest tactile frame that has arrived and was not asked for yet.
+    pub fn frame(&mut self) -> Option<Frame> {
+        self.converter.as_mut()?.frame()
+    }
+
+    fn signals(&self, tip: &Fingertip, pressure_pa: f64) -> Signals {
+        let mut signals = Signals { pressure_pa, ..Signals::default() };
+        let mut conductivity = 1.0;
+        if let (Some(thermal), Some(heat)) = (&tip.thermal, &self.heat) {
+            signals.temperature_c = heat.temperature_c;
+            signals.warming_c_s = heat.warming_c_s();
+            conductivity = heat.conductivity(thermal);
+        }
+        if let (Some(electrodes), Some(pressed)) = (&tip.electrodes, &self.pressed) {
+            signals.electrode_counts = electrodes.counts(pressed, conductivity);
+        }
+        signals
+    }
+}
