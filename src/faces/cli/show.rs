@@ -92,7 +92,7 @@ fn scene(args: &Args) -> anyhow::Result<String> {
     if let Shape::Mesh { report, .. } = world.shape() {
         text += &format!("{report}\n");
     }
-    if let Some(model) = mjcf::scene(&world) {
+    if let Some(model) = mjcf::scene(&world, mjcf::Mode::Picture) {
         text += &compiled(&model);
         if let Some(path) = &args.mjcf {
             store::write_whole(path, &model)?;
