@@ -40,11 +40,7 @@ impl Finger {
     /// the object.
     pub fn attitude_w(&self) -> UnitQuaternion<f64> {
         let (up, forward) = self.pitch_deg.to_radians().sin_cos();
-        let axes = [
-            Vector3::new(0.0, -forward, up),
-            Vector3::x(),
-            Vector3::new(0.0, up, forward),
-        ];
+        let axes = [Vector3::new(0.0, -forward, up), Vector3::x(), Vector3::new(0.0, up, forward)];
         let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
         UnitQuaternion::from_rotation_matrix(&rotation)
     }

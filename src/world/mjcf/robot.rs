@@ -64,9 +64,5 @@ fn tool(finger: &Finger, chain: &Chain) -> String {
 
 fn pose(x: &Isometry3<f64>) -> String {
     let q = x.rotation.quaternion();
-    format!(
-        r#"pos="{}" quat="{}""#,
-        list(x.translation.vector.iter()),
-        list([q.w, q.i, q.j, q.k])
-    )
+    format!(r#"pos="{}" quat="{}""#, list(x.translation.vector.iter()), list([q.w, q.i, q.j, q.k]))
 }
