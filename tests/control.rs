@@ -82,7 +82,7 @@ proptest! {
         drive(&chain, q, 300, |t| Goal {
             x_wt,
             // Changes its sign every 0.2 s.
-            twist: Vector6::from(twist) * if (t / 0.2) as usize % 2 == 0 { 1.0 } else { -1.0 },
+            twist: Vector6::from(twist) * (-1.0_f64).powi((t / 0.2) as i32),
         });
     }
 }
