@@ -1,5 +1,7 @@
 //! MuJoCo as a library: compiling models, and the plant that steps one.
 
+#[cfg(feature = "render")]
+pub mod picture;
 mod plant;
 mod servo;
 

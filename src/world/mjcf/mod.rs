@@ -32,7 +32,7 @@ pub fn scene(world: &World, mode: Mode) -> Option<String> {
     let mesh = world.mesh()?;
     let chain = world.chain()?;
     let shown = mode == Mode::Picture;
-    let scenery = if shown { scenery::scenery(mesh) } else { String::new() };
+    let scenery = if shown { scenery::scenery(mesh, &chain) } else { String::new() };
     let step_s = match mode {
         Mode::Picture => PICTURE_STEP_S,
         Mode::Dynamic { step_s } => step_s,
