@@ -180,20 +180,28 @@ mod mujoco {
         }
     }
 
-    /// A proportional servo alone sags 6 degrees here.
+    /// At zero command against gravity: from the start, and after a motion that changes the load.
+    /// With a proportional servo alone the arm sags 6 degrees in this time.
     #[test]
     fn servos_do_not_sag() {
         for arm in [Some(arm(Links::C)), Some(ArmSettings::default()), None] {
             let (mut plant, home) = plant(arm);
-            let rest = vec![0.0; home.len()];
-            let mut worst: f64 = 0.0;
-            for _ in 0..2500 {
-                plant.step(&rest, &Wrench::default()).unwrap();
-                let off = plant.q().iter().zip(&home).map(|(q, home)| (q - home).abs());
-                worst = worst.max(off.fold(0.0, f64::max));
+            let (rest, idle) = (vec![0.0; home.len()], Wrench::default());
+            for speed in [0.0, 0.2] {
+                for _ in 0..500 {
+                    plant.step(&vec![speed; home.len()], &idle).unwrap();
+                }
+                for _ in 0..100 {
+                    plant.step(&rest, &idle).unwrap();
+                }
+                let start = plant.q().to_vec();
+                for _ in 0..2500 {
+                    plant.step(&rest, &idle).unwrap();
+                    let sag = plant.q().iter().zip(&start).map(|(q, start)| (q - start).abs());
+                    let sag = sag.fold(0.0, f64::max);
+                    assert!(sag < 0.1_f64.to_radians(), "{sag}");
+                }
             }
-            println!("sag {} deg", worst.to_degrees());
-            assert!(worst < 0.1_f64.to_radians(), "{worst}");
         }
     }
 
@@ -206,7 +214,6 @@ mod mujoco {
         }
         let off = plant.q().iter().zip(&home).map(|(q, home)| (q - home).abs());
         let off = off.fold(0.0, f64::max);
-        println!("pushed {} deg", off.to_degrees());
         assert!(off < 0.05_f64.to_radians(), "{off}");
     }
 
@@ -224,31 +231,38 @@ mod mujoco {
                 let error = plant.qdot().iter().map(|qdot| (qdot - command).abs());
                 worst = worst.max(error.fold(0.0, f64::max));
             }
-            println!("sine: {worst}");
             assert!(worst < 0.03, "{worst}");
         }
     }
 
-    /// Held against more than it can give, the integral must not grow; let go, it must not
-    /// swing back further than it was pushed.
+    /// Held against more than they can give, the servos' integrals must not grow; let go, the
+    /// joints must come to rest where they were let go, without swinging back or chattering.
     #[test]
-    fn a_saturated_servo_does_not_wind_up() {
-        let (mut plant, _) = plant(Some(ArmSettings::default()));
-        // 20 N m about the flange's axis; W2 gives 14.5.
-        let twist = Wrench { torque_nm: Vector3::new(20.0, 0.0, 0.0), ..Default::default() };
-        for _ in 0..25 {
-            plant.step(&[0.0; 7], &twist).unwrap();
+    fn saturated_servos_neither_wind_up_nor_chatter() {
+        let twist = Vector3::new(20.0, 0.0, 0.0);
+        for (force_n, torque_nm, arm) in [
+            (Vector3::zeros(), twist, Some(ArmSettings::default())),
+            (Vector3::new(-500.0, 200.0, 300.0), Vector3::zeros(), Some(ArmSettings::default())),
+            (Vector3::new(-500.0, 200.0, 300.0), Vector3::zeros(), Some(arm(Links::A))),
+            (Vector3::new(-500.0, 300.0, 400.0), Vector3::zeros(), None),
+        ] {
+            let (mut plant, home) = plant(arm);
+            let rest = vec![0.0; home.len()];
+            let mut most: f64 = 0.0;
+            for _ in 0..25 {
+                plant.step(&rest, &Wrench { force_n, torque_nm }).unwrap();
+                most = most.max(plant.motors().iter().fold(0.0, |most, nm| nm.abs().max(most)));
+            }
+            let pushed = plant.q().to_vec();
+            for _ in 0..1000 {
+                plant.step(&rest, &Wrench::default()).unwrap();
+            }
+            let moved = plant.q().iter().zip(&pushed).map(|(q, pushed)| (q - pushed).abs());
+            let moved = moved.fold(0.0, f64::max);
+            let speed = plant.qdot().iter().fold(0.0_f64, |most, qdot| qdot.abs().max(most));
+            assert!(speed < 1e-4, "{speed}");
+            assert!(moved < 0.3, "{moved}");
         }
-        let pushed = plant.q()[6];
-        assert!((plant.motors()[6].abs() - 14.5).abs() < 1e-9);
-        let mut span = [f64::INFINITY, f64::NEG_INFINITY];
-        for _ in 0..1000 {
-            plant.step(&[0.0; 7], &Wrench::default()).unwrap();
-            span = [span[0].min(plant.q()[6]), span[1].max(plant.q()[6])];
-        }
-        println!("pushed {pushed}, then {span:?}, speed {}", plant.qdot()[6]);
-        assert!(plant.qdot()[6].abs() < 1e-3);
-        assert!(span[0] > -pushed.abs() && span[1] < 2.0 * pushed.abs());
     }
 
     #[test]

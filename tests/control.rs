@@ -118,27 +118,35 @@ fn the_wrist_passes_its_singularity() {
         twist[3] = if rate * t < 0.6 { rate } else { 0.0 };
         Goal { x_wt, twist }
     });
-    println!("wrist: damping {damping}, off {off}");
     assert!(off < 1e-3, "{off}");
 }
 
-/// S1 near its limit, and the goal turns further about its axis.
+/// In towards the base until E1, which alone shortens the arm, is at its limit, and out again.
 #[test]
-fn redundant_joints_take_over_at_a_limit() {
+fn a_goal_beyond_a_joints_limit_is_met_again_on_its_way_back() {
     let chain = arm();
-    let mut q = chain.home;
-    q[0] = chain.joints[0].q_limits[0] + 0.05;
-    let start = chain.forward(&q);
-    // Away on a circle about the base, further towards the limit of S1 by 0.15 rad.
-    let (last, _, off) = drive(&chain, q, 3000, |t| {
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -(0.05 * t).min(0.15));
-        Goal::still(Isometry3::from_parts(
-            (turn * start.translation.vector).into(),
-            turn * start.rotation,
-        ))
-    });
-    println!("limit: off {off}, S1 {}", last[0].to_degrees());
-    assert!(off < 1e-3, "{off}");
+    let home = chain.forward(&chain.home);
+    let path = |t: f64| (0.08 * t).min(0.8 - 0.08 * t).max(0.0);
+    let goal = |t: f64| {
+        let mut twist = Vector6::zeros();
+        twist.y = if t > 10.0 { 0.0 } else { 0.08 * (5.0 - t).signum() };
+        Goal { x_wt: Translation3::new(0.0, path(t), 0.0) * home, twist }
+    };
+    let (inside, _, away) = drive(&chain, chain.home, 1250, goal);
+    assert!(away > 0.05, "{away}");
+    assert!(chain.joints[3].q_limits[1] - inside[3] < 0.05, "{}", inside[3].to_degrees());
+    let (_, _, off) = drive(&chain, chain.home, 5000, goal);
+    assert!(off < 1e-4, "{off}");
+}
+
+/// Upright, all axes lie in one plane and no direction along the arm is left.
+#[test]
+fn the_arm_leaves_its_upright_posture() {
+    let chain = arm();
+    let home = chain.forward(&chain.home);
+    let (_, damping, off) = drive(&chain, Joints::zeros(), 5000, |_| Goal::still(home));
+    assert!(damping > 0.99, "{damping}");
+    assert!(off < 1e-4, "{off}");
 }
 
 #[test]
@@ -181,7 +189,6 @@ fn the_null_space_brings_the_elbow_home_while_the_tip_stands() {
     q = drive(&odd, q, 2000, |_| Goal::still(start)).0;
     let away = (q - chain.home).norm();
     let (back, _, off) = drive(&chain, q, 4000, |_| Goal::still(start));
-    println!("null space: {away} -> {}", (back - chain.home).norm());
     assert!(away > 0.2 && (back - chain.home).norm() < 0.02);
     assert!(off < 1e-4, "{off}");
 }
@@ -275,7 +282,6 @@ fn postures_are_found_wherever_the_arm_can_be() {
             found += 1;
         }
     }
-    println!("{found} of 200 postures found");
     assert!(found > 190, "{found}");
 }
 
@@ -336,7 +342,6 @@ mod mujoco {
                 behind = behind.max(off.y.abs());
                 turned = turned.max(plant.tip().rotation.angle_to(&start.rotation));
             }
-            println!("aside {aside:.2e} m, behind {behind:.2e} m, turned {turned:.2e} rad");
             assert!(aside < 2e-4, "{aside}");
         }
     }
