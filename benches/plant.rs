@@ -43,17 +43,27 @@ fn main() -> anyhow::Result<()> {
         let mut bare = MjData::new(Arc::clone(&model));
         bare.qpos_mut().copy_from_slice(home);
         bare.forward();
-        for i in 0..n {
-            bare.ctrl_mut()[i] = bare.qfrc_bias()[i] / model.actuator_gainprm()[i][0];
-        }
+        let hold: Vec<f64> =
+            (0..n).map(|i| bare.qfrc_bias()[i] / model.actuator_gainprm()[i][0]).collect();
         let mut controller = Controller::new(chain.clone(), 0.004)?;
         let goal = Goal::still(chain.forward(&chain.home));
-        let command = vec![0.0; n];
+        let mut command = vec![0.0; n];
+        // Both swing at 0.5 Hz, so that friction is at work.
+        let mut ticks = [0; 2];
+        let mut swing = |side: usize| {
+            ticks[side] += 1;
+            0.1 * (std::f64::consts::PI * 0.002 * f64::from(ticks[side])).sin()
+        };
         let mut best = [f64::INFINITY; 3];
         for _ in 0..TURNS {
             let times = [
-                microseconds(|| bare.step()),
                 microseconds(|| {
+                    let speed = swing(0);
+                    bare.ctrl_mut().iter_mut().zip(&hold).for_each(|(u, hold)| *u = hold + speed);
+                    bare.step();
+                }),
+                microseconds(|| {
+                    command.fill(swing(1));
                     let _ = black_box(plant.step(&command, &Wrench::default()));
                     black_box((plant.tip(), plant.tip_twist(), plant.mount()));
                 }),

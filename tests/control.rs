@@ -118,6 +118,7 @@ fn the_wrist_passes_its_singularity() {
         twist[3] = if rate * t < 0.6 { rate } else { 0.0 };
         Goal { x_wt, twist }
     });
+    assert!(damping > 0.3, "{damping}");
     assert!(off < 1e-3, "{off}");
 }
 
