@@ -24,6 +24,11 @@ fn microseconds(mut run: impl FnMut()) -> f64 {
     start.elapsed().as_secs_f64() * 1e6 / f64::from(STEPS)
 }
 
+fn step(plant: &mut Plant, command: &[f64]) {
+    let _ = black_box(plant.step(command, &Wrench::default()));
+    black_box((plant.tip(), plant.tip_twist(), plant.mount()));
+}
+
 fn main() -> anyhow::Result<()> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
     for (name, arm) in [("PA-10", Some(ArmSettings::default())), ("stage", None)] {
@@ -43,41 +48,38 @@ fn main() -> anyhow::Result<()> {
         let mut bare = MjData::new(Arc::clone(&model));
         bare.qpos_mut().copy_from_slice(home);
         bare.forward();
-        let hold: Vec<f64> =
-            (0..n).map(|i| bare.qfrc_bias()[i] / model.actuator_gainprm()[i][0]).collect();
+        for i in 0..n {
+            bare.ctrl_mut()[i] = bare.qfrc_bias()[i] / model.actuator_gainprm()[i][0];
+        }
         let mut controller = Controller::new(chain.clone(), 0.004)?;
         let goal = Goal::still(chain.forward(&chain.home));
         let mut command = vec![0.0; n];
-        // Both swing at 0.5 Hz, so that friction is at work.
-        let mut ticks = [0; 2];
-        let mut swing = |side: usize| {
-            ticks[side] += 1;
-            0.1 * (std::f64::consts::PI * 0.002 * f64::from(ticks[side])).sin()
-        };
-        let mut best = [f64::INFINITY; 3];
+        let mut ticks = 0;
+        let mut best = [f64::INFINITY; 4];
         for _ in 0..TURNS {
+            plant.reset(home)?;
             let times = [
+                microseconds(|| bare.step()),
+                microseconds(|| step(&mut plant, &command)),
                 microseconds(|| {
-                    let speed = swing(0);
-                    bare.ctrl_mut().iter_mut().zip(&hold).for_each(|(u, hold)| *u = hold + speed);
-                    bare.step();
-                }),
-                microseconds(|| {
-                    command.fill(swing(1));
-                    let _ = black_box(plant.step(&command, &Wrench::default()));
-                    black_box((plant.tip(), plant.tip_twist(), plant.mount()));
+                    ticks += 1;
+                    // At 0.5 Hz.
+                    let phase = std::f64::consts::PI * 0.002 * f64::from(ticks);
+                    command.fill(0.1 * phase.sin());
+                    step(&mut plant, &command);
                 }),
                 microseconds(|| {
                     let _ = black_box(controller.step(black_box(home), &goal));
                 }),
             ];
+            command.fill(0.0);
             best.iter_mut().zip(times).for_each(|(best, time)| *best = best.min(time));
         }
-        let [bare, plant, control] = best;
+        let [bare, rest, moving, control] = best;
         println!(
-            "{name}: mj_step {bare:.2} us, plant with all readings {plant:.2} us ({:.0} %), \
-             controller {control:.2} us",
-            100.0 * bare / plant
+            "{name} at rest: mj_step {bare:.2} us, plant with all readings {rest:.2} us ({:.0} %); \
+             moving: plant {moving:.2} us; controller {control:.2} us",
+            100.0 * bare / rest
         );
     }
     Ok(())

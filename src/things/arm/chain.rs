@@ -77,7 +77,7 @@ impl Chain {
         fits.then(|| Joints::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0)))
     }
 
-    /// Joint limits as the smallest and the largest positions.
+    /// `q` with every joint moved into its limits.
     pub fn clamp(&self, q: &Joints) -> Joints {
         let mut clamped = *q;
         for (joint, q) in self.joints.iter().zip(clamped.iter_mut()) {
