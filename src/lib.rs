@@ -8,10 +8,10 @@
 //! |---|---|---|
 //! | 6 | `faces` | command line, figures, report page |
 //! | 5 | `trials` | experiment, trial, runner, store, metrics |
-//! | 4 | `conduct` | probe (one touch), planner, belief |
+//! | 4 | `conduct` | probe (one touch), planner, belief, arm control |
 //! | 3 | `bodies` | what is commanded and read: simulators, recordings, the real arm |
 //! | 2 | `world` | scene, its configuration, its MuJoCo model |
-//! | 1 | `things` | finger |
+//! | 1 | `things` | arm, finger |
 //! | 0 | `ground` | geometry, Gaussian process, optimisers, seeds |
 //!
 //! # Units and frames

@@ -79,13 +79,13 @@ fn the_mesh_and_its_formula_give_the_same_heights() {
 fn the_generated_model_names_the_object_the_board_and_the_finger() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
     let world = World::build(Scene::load(&path, &[]).unwrap()).unwrap();
-    let text = mjcf::scene(&world).unwrap();
-    for name in ["object", "board", "finger"] {
+    let text = mjcf::scene(&world, mjcf::Mode::Picture).unwrap();
+    for name in ["object", "board", "finger", "floor", "mount", "tip"] {
         assert!(text.contains(&format!("name=\"{name}\"")), "{name}");
     }
     let toy = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/toy.toml");
     let toy = World::build(Scene::load(&toy, &[]).unwrap()).unwrap();
-    assert!(mjcf::scene(&toy).is_none());
+    assert!(mjcf::scene(&toy, mjcf::Mode::Picture).is_none());
 }
 
 #[test]
@@ -96,8 +96,8 @@ fn mujoco_compiles_the_generated_model() {
     for (name, vertices) in [("container", 21_559), ("bird", 24_102)] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
         let world = World::build(Scene::load(&path, &[]).unwrap()).unwrap();
-        let model = mujoco::compile(&mjcf::scene(&world).unwrap()).unwrap();
-        assert_eq!((model.ngeom(), model.nmeshvert()), (3, vertices), "{name}");
+        let model = mujoco::compile(&mjcf::scene(&world, mjcf::Mode::Picture).unwrap()).unwrap();
+        assert_eq!((model.ngeom(), model.nmeshvert()), (5, vertices), "{name}");
     }
     assert!(mujoco::compile("<mujoco><worldbody><geom/></worldbody></mujoco>").is_err());
 }

@@ -1,5 +1,6 @@
 //! Floor 4: one touch, the belief after it, and where to touch next.
 
 pub mod belief;
+pub mod control;
 pub mod planner;
 pub mod probe;

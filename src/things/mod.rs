@@ -1,3 +1,4 @@
-//! Floor 1: the finger.
+//! Floor 1: the arm and the finger.
 
+pub mod arm;
 pub mod finger;

@@ -4,6 +4,7 @@ use super::function::Function;
 use super::zone::Zone;
 use crate::ground::config::{Checked, ConfigError, Loader, Rules};
 use crate::ground::geometry::surfaces;
+use crate::things::arm::ArmSettings;
 use crate::things::finger::Finger;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
@@ -26,6 +27,9 @@ pub struct Scene {
     /// The finger; a `function` is touched without one.
     #[serde(default)]
     pub finger: Finger,
+    /// The arm that carries the finger; without one, a stage of three slides does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arm: Option<ArmSettings>,
 }
 
 /// How faithfully a touch is carried out, cheapest first.
@@ -138,6 +142,9 @@ impl Checked for Scene {
                     "no object: body = \"function\" touches a curve".into()
                 });
                 let flat = self.zone.z_m.is_none();
+                rules.require("arm", "(given)", self.arm.is_none(), || {
+                    "no arm: body = \"function\" is touched by none".into()
+                });
                 rules.require("zone.z_m", "(given)", flat, || {
                     "no z_m: the surface of body = \"function\" is a curve over x".into()
                 });
@@ -153,6 +160,13 @@ impl Checked for Scene {
         }
         if let Some(object) = &self.object {
             rules.table("object", object);
+        }
+        if let Some(arm) = &self.arm {
+            rules.table("arm", arm);
+            let clear = arm.mount_m >= self.finger.length_m;
+            rules.require("arm.mount_m", arm.mount_m, clear, || {
+                format!("at least finger.length_m, {} m", self.finger.length_m)
+            });
         }
     }
 }

@@ -6,8 +6,10 @@ use crate::ground::geometry::bvh::MeshBvh;
 use crate::ground::geometry::error::MeshError;
 use crate::ground::geometry::implicit::Implicit;
 use crate::ground::geometry::import::import;
+use crate::ground::geometry::mesh::Mesh;
 use crate::ground::geometry::report::MeshReport;
 use crate::ground::geometry::surfaces;
+use crate::things::arm::{Chain, stage::stage};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use thiserror::Error;
 
@@ -87,6 +89,29 @@ impl World {
     /// What is touched.
     pub fn shape(&self) -> &Shape {
         &self.shape
+    }
+
+    /// The object in `W`, or none for a function.
+    pub fn mesh(&self) -> Option<&Mesh> {
+        match &self.shape {
+            Shape::Function(_) => None,
+            Shape::Mesh { bvh, .. } => Some(bvh.mesh()),
+        }
+    }
+
+    /// What carries the finger: the scene's arm, or a stage whose home is in front of the zone's
+    /// middle, clear of the object. None for a function.
+    pub fn chain(&self) -> Option<Chain> {
+        let (_, high) = self.mesh()?.bounds();
+        let Scene { arm, finger, zone, .. } = &self.scene;
+        Some(arm.as_ref().map_or_else(
+            || {
+                let mut home = zone.point(&zone.at(&[0.5, 0.5]), 0.0);
+                home.y = high.y + CLEARANCE_M + finger.radius_m;
+                stage(home, finger.attitude_w())
+            },
+            |arm| arm.chain(),
+        ))
     }
 
     /// True height above the datum at `place`: the first surface met along −y, or none.

@@ -18,6 +18,7 @@ Examples:
   palpate show models/bird.glb
   palpate show my-part.obj --unit mm
   palpate show scenes/container.toml --mjcf container.xml    for MuJoCo's own viewer
+  palpate show scenes/container.toml --png container.png     a picture of it
   palpate show experiments/toy.toml --set seed=1             every setting, defaults included
   palpate show runs/toy")]
 pub(super) struct Args {
@@ -32,13 +33,18 @@ pub(super) struct Args {
     /// Write a scene as MJCF, the format of MuJoCo.
     #[arg(long, value_name = "FILE")]
     mjcf: Option<PathBuf>,
+    /// Draw a scene (needs a build with `--features render`).
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let extension = args.path.extension().and_then(|extension| extension.to_str());
     let is_scene = extension == Some("toml") && !is_experiment(&args.path);
-    if args.mjcf.is_some() && !is_scene {
-        bail!("--mjcf goes with a scene (.toml), and {} is none", args.path.display());
+    for (option, given) in [("--mjcf", args.mjcf.is_some()), ("--png", args.png.is_some())] {
+        if given && !is_scene {
+            bail!("{option} goes with a scene (.toml), and {} is none", args.path.display());
+        }
     }
     if !args.path.exists() {
         bail!("{}: no such file or folder", args.path.display());
@@ -92,14 +98,18 @@ fn scene(args: &Args) -> anyhow::Result<String> {
     if let Shape::Mesh { report, .. } = world.shape() {
         text += &format!("{report}\n");
     }
-    if let Some(model) = mjcf::scene(&world) {
+    if let Some(model) = mjcf::scene(&world, mjcf::Mode::Picture) {
         text += &compiled(&model);
         if let Some(path) = &args.mjcf {
             store::write_whole(path, &model)?;
             text += &format!("\nMJCF: {}", path.display());
         }
-    } else if args.mjcf.is_some() {
-        bail!("this scene has no mesh, so there is nothing to write as MJCF");
+        if let Some(path) = &args.png {
+            draw(&model, path)?;
+            text += &format!("\npicture: {}", path.display());
+        }
+    } else if args.mjcf.is_some() || args.png.is_some() {
+        bail!("this scene has no mesh, so there is nothing to write as MJCF or to draw");
     }
     Ok(text)
 }
@@ -122,4 +132,16 @@ fn compiled(mjcf: &str) -> String {
 #[cfg(not(feature = "mujoco"))]
 fn compiled(_: &str) -> String {
     "this build is without MuJoCo (feature `mujoco`)".into()
+}
+
+#[cfg(feature = "render")]
+fn draw(mjcf: &str, path: &Path) -> anyhow::Result<()> {
+    use crate::bodies::mujoco;
+    let model = mujoco::compile(mjcf)?;
+    Ok(mujoco::picture::picture(&model, "whole", path)?)
+}
+
+#[cfg(not(feature = "render"))]
+fn draw(_: &str, _: &Path) -> anyhow::Result<()> {
+    bail!("this build cannot draw: build it with --features render")
 }

@@ -1,7 +1,7 @@
 //! The fingertip's outer skin as a rigid hull: a cylinder closed by a hemisphere.
 
 use crate::ground::config::{Checked, Rules};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Shape and attitude of the finger.
@@ -34,6 +34,15 @@ impl Finger {
     pub fn axis_w(&self) -> Vector3<f64> {
         let (up, forward) = self.pitch_deg.to_radians().sin_cos();
         Vector3::new(0.0, forward, -up) * self.length_m
+    }
+
+    /// Attitude of `T` in `W`: +x distal, towards -y and up by the pitch; the pad, -z, towards
+    /// the object.
+    pub fn attitude_w(&self) -> UnitQuaternion<f64> {
+        let (up, forward) = self.pitch_deg.to_radians().sin_cos();
+        let axes = [Vector3::new(0.0, -forward, up), Vector3::x(), Vector3::new(0.0, up, forward)];
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
+        UnitQuaternion::from_rotation_matrix(&rotation)
     }
 }
 

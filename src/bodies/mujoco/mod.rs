@@ -1,0 +1,54 @@
+//! MuJoCo as a library: compiling models, and the plant that steps one.
+
+#[cfg(feature = "render")]
+pub mod picture;
+mod plant;
+mod servo;
+
+pub use plant::Plant;
+
+use mujoco_rs::error::MjModelError;
+use mujoco_rs::wrappers::MjModel;
+use mujoco_rs::wrappers::mj_logging::{log_config, set_log_config};
+use std::sync::Once;
+use thiserror::Error;
+
+/// A model that cannot be used.
+#[derive(Debug, Error)]
+pub enum ModelError {
+    /// MuJoCo refused it.
+    #[error("MuJoCo refuses the scene: {cause}")]
+    Refused {
+        /// What it says.
+        cause: MjModelError,
+    },
+    /// It is not a robot with a finger.
+    #[error("the MuJoCo model lacks {part}")]
+    Lacks {
+        /// What is missing.
+        part: &'static str,
+    },
+    /// There is no memory for its state.
+    #[error("no memory for the state of the MuJoCo model")]
+    Memory,
+}
+
+/// Version of the linked library.
+pub fn version() -> &'static str {
+    mujoco_rs::mujoco_version()
+}
+
+/// Compiles a model.
+///
+/// # Errors
+/// If MuJoCo refuses it.
+pub fn compile(mjcf: &str) -> Result<MjModel, ModelError> {
+    static QUIET: Once = Once::new();
+    QUIET.call_once(|| {
+        // A diverging trial is a fault in its row, not a line in MUJOCO_LOG.TXT.
+        let quiet = log_config().with_logto_console(false).with_logto_file(false);
+        // SAFETY: no thread can use MuJoCo yet, because every model is compiled here.
+        unsafe { set_log_config(quiet) };
+    });
+    MjModel::from_xml_string(mjcf).map_err(|cause| ModelError::Refused { cause })
+}

@@ -1,0 +1,64 @@
+//! A picture of a model, drawn off-screen through EGL: no window and no display is needed.
+
+use mujoco_rs::renderer::{MjRenderer, RendererError, png::Compression};
+use mujoco_rs::wrappers::mj_data::MjData;
+use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
+use mujoco_rs::wrappers::mj_visualization::MjvCamera;
+use std::io;
+use std::path::Path;
+use thiserror::Error;
+
+/// Why there is no picture.
+#[derive(Debug, Error)]
+pub enum PictureError {
+    /// The model has no such camera.
+    #[error("the model has no camera \"{camera}\"")]
+    Camera {
+        /// Its name.
+        camera: String,
+    },
+    /// There is no memory for the model's state.
+    #[error("no memory for the state of the MuJoCo model")]
+    Memory,
+    /// OpenGL cannot be used.
+    #[error("cannot draw: {cause}; this needs EGL (Debian: libegl1 and libgl1-mesa-dri)")]
+    Draw {
+        /// What it says.
+        cause: RendererError,
+    },
+    /// The file cannot be written.
+    #[error("cannot write the picture: {cause}")]
+    Write {
+        /// What the system says.
+        cause: io::Error,
+    },
+}
+
+/// Draws `model` at its first keyframe, or at q = 0 without one, as `camera` sees it, and writes
+/// it to `path` as PNG in the size of the model's off-screen buffer.
+///
+/// # Errors
+/// If the camera is unknown, EGL is missing or the file cannot be written.
+pub fn picture(model: &MjModel, camera: &str, path: &Path) -> Result<(), PictureError> {
+    let id = model
+        .name_to_id(MjtObjBase::mjOBJ_CAMERA, camera)
+        .ok_or_else(|| PictureError::Camera { camera: camera.into() })?;
+    let draw = |cause| PictureError::Draw { cause };
+    let mut data = MjData::try_new(model).map_err(|_| PictureError::Memory)?;
+    if model.nkey() > 0 {
+        // Key 0 exists.
+        let _ = data.reset_keyframe(0);
+    }
+    data.forward();
+    let mut renderer = MjRenderer::builder()
+        .camera(MjvCamera::new_fixed(id))
+        .png_compression(Compression::Balanced)
+        .build(model)
+        .map_err(draw)?;
+    renderer.sync_data(&mut data).map_err(draw)?;
+    renderer.render().map_err(draw)?;
+    renderer.save_rgb(path).map_err(|cause| match cause {
+        RendererError::IoError(cause) => PictureError::Write { cause },
+        cause => PictureError::Draw { cause },
+    })
+}

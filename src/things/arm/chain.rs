@@ -1,0 +1,124 @@
+//! A serial chain: where its tip is and how it moves.
+
+use nalgebra::{Isometry3, SMatrix, SVector, Translation3, UnitQuaternion, UnitVector3, Vector3};
+
+/// Most joints of a chain.
+pub const MAX_JOINTS: usize = 7;
+
+/// One number per joint, rad or m and their rates; entries beyond the chain's joints are zero.
+pub type Joints = SVector<f64, MAX_JOINTS>;
+
+/// Geometric Jacobian in `W` at the origin of `T`: rows 0 to 2 linear, rows 3 to 5 angular
+/// velocity per joint velocity. Columns beyond the chain's joints are zero.
+pub type Jacobian = SMatrix<f64, 6, MAX_JOINTS>;
+
+/// How a joint moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Turns about its axis, rad.
+    Revolute,
+    /// Slides along its axis, m.
+    Prismatic,
+}
+
+/// A joint. Positions are rad where it turns and m where it slides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// The manufacturer's name; joints are matched by name, never by number.
+    pub name: &'static str,
+    /// How it moves.
+    pub kind: Kind,
+    /// Its origin in the frame of the joint before it; all frames are parallel at q = 0.
+    pub origin_m: Vector3<f64>,
+    /// Its axis in the same frame.
+    pub axis: UnitVector3<f64>,
+    /// Smallest and largest position.
+    pub q_limits: [f64; 2],
+    /// Largest speed, rad/s or m/s.
+    pub qdot_limit: f64,
+    /// Largest acceleration, rad/s² or m/s².
+    pub qddot_limit: f64,
+}
+
+impl Joint {
+    /// Pose of the joint's moved frame in the frame before it.
+    fn motion(&self, q: f64) -> Isometry3<f64> {
+        match self.kind {
+            Kind::Revolute => Isometry3::from_parts(
+                Translation3::from(self.origin_m),
+                UnitQuaternion::from_axis_angle(&self.axis, q),
+            ),
+            Kind::Prismatic => {
+                Isometry3::from(Translation3::from(self.origin_m + self.axis.scale(q)))
+            }
+        }
+    }
+}
+
+/// Joints from the base to the fingertip `T`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain {
+    /// Pose of the base in `W`.
+    pub base: Isometry3<f64>,
+    /// At most [`MAX_JOINTS`], from the base on; more are ignored.
+    pub joints: Vec<Joint>,
+    /// Pose of the flange in the last joint's frame.
+    pub flange: Isometry3<f64>,
+    /// Pose of `T` in the flange's frame.
+    pub tool: Isometry3<f64>,
+    /// The posture to start from and to prefer.
+    pub home: Joints,
+}
+
+impl Chain {
+    /// Joint positions from a slice of the chain's length, or none if its length differs.
+    pub fn joints_from(&self, q: &[f64]) -> Option<Joints> {
+        let fits = q.len() == self.joints.len() && q.len() <= MAX_JOINTS;
+        fits.then(|| Joints::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0)))
+    }
+
+    /// `q` with every joint moved into its limits.
+    pub fn clamp(&self, q: &Joints) -> Joints {
+        let mut clamped = *q;
+        for (joint, q) in self.joints.iter().zip(clamped.iter_mut()) {
+            *q = q.max(joint.q_limits[0]).min(joint.q_limits[1]);
+        }
+        clamped
+    }
+
+    /// Whether any joint turns; a chain of slides alone cannot change its attitude.
+    pub fn turns(&self) -> bool {
+        self.joints.iter().any(|joint| joint.kind == Kind::Revolute)
+    }
+
+    /// Forward kinematics, the pose of `T` in `W`:
+    /// `X_WT = X_WB · Π X_i(q_i) · X_flange · X_tool`.
+    pub fn forward(&self, q: &Joints) -> Isometry3<f64> {
+        let moved = self.joints.iter().zip(q.iter());
+        moved.fold(self.base, |x, (joint, &q)| x * joint.motion(q)) * self.flange * self.tool
+    }
+
+    /// [`forward`](Self::forward) with the geometric Jacobian: column i is
+    /// `[a × (p_T − p_i); a]` where joint i turns and `[a; 0]` where it slides, with its axis a
+    /// and origin p_i in `W` (Siciliano et al. 2009, Robotics, Eq. 3.30).
+    pub fn jacobian(&self, q: &Joints) -> (Isometry3<f64>, Jacobian) {
+        let x_wt = self.forward(q);
+        let mut jacobian = Jacobian::zeros();
+        let mut x = self.base;
+        for ((joint, &q), mut column) in
+            self.joints.iter().zip(q.iter()).zip(jacobian.column_iter_mut())
+        {
+            let axis = x.rotation * joint.axis.into_inner();
+            x *= joint.motion(q);
+            let (linear, angular) = match joint.kind {
+                Kind::Revolute => {
+                    (axis.cross(&(x_wt.translation.vector - x.translation.vector)), axis)
+                }
+                Kind::Prismatic => (axis, Vector3::zeros()),
+            };
+            column.fixed_rows_mut::<3>(0).copy_from(&linear);
+            column.fixed_rows_mut::<3>(3).copy_from(&angular);
+        }
+        (x_wt, jacobian)
+    }
+}

@@ -1,0 +1,65 @@
+//! Scene → MJCF, the text a MuJoCo model is compiled from. Numbers are SI, in `W`.
+
+mod robot;
+mod scenery;
+
+use super::world::World;
+use std::fmt::{Display, Write};
+
+/// Time step of a model that is only looked at; chosen, the period of the PA-10's servo.
+const PICTURE_STEP_S: f64 = 0.002;
+
+/// What a model is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mode {
+    /// To look at: everything in the scene.
+    Picture,
+    /// To step: what moves and nothing else. Shapes would cost time at every step and touch
+    /// nothing; contact is the skin's matter, not MuJoCo's.
+    Dynamic {
+        /// Time step; the servos' gains are chosen for 2 ms and less.
+        step_s: f64,
+    },
+}
+
+/// The scene as MJCF: the arm or stage at its home (keyframe `home`) with the finger on it, the
+/// force/torque sensor at the site `mount` and `T` at the site `tip`; in a picture also the
+/// object at its pose on a vertical board, the floor, a camera and lights. None for a scene
+/// without a mesh.
+///
+/// Nothing collides: MuJoCo would collide the object's convex hull.
+pub fn scene(world: &World, mode: Mode) -> Option<String> {
+    let mesh = world.mesh()?;
+    let chain = world.chain()?;
+    let shown = mode == Mode::Picture;
+    let scenery = if shown { scenery::scenery(mesh, &chain) } else { String::new() };
+    let step_s = match mode {
+        Mode::Picture => PICTURE_STEP_S,
+        Mode::Dynamic { step_s } => step_s,
+    };
+    let mut text = String::new();
+    // Writing to a String cannot fail. A diverging state must be seen, not reset in silence.
+    let _ = write!(
+        text,
+        r#"<mujoco model="palpate">
+{robot}
+  <compiler discardvisual="{discard}"/>
+  <option timestep="{step_s}"><flag autoreset="disable"/></option>
+  <sensor>
+    <force name="force" site="mount"/>
+    <torque name="torque" site="mount"/>
+  </sensor>
+  <keyframe><key name="home" qpos="{home}"/></keyframe>
+{scenery}</mujoco>
+"#,
+        robot = robot::robot(world.scene(), &chain),
+        discard = !shown,
+        home = list(chain.home.iter().take(chain.joints.len())),
+    );
+    Some(text)
+}
+
+fn list<T: Display>(numbers: impl IntoIterator<Item = T>) -> String {
+    let texts: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();
+    texts.join(" ")
+}
