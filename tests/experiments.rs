@@ -3,7 +3,7 @@
 
 use palpate::conduct::planner;
 use palpate::trials::experiment::Experiment;
-use palpate::trials::metrics::Truth;
+use palpate::trials::truth::Truth;
 use palpate::trials::row::TrialRow;
 use palpate::trials::summary::{self, Point};
 use palpate::trials::trial;

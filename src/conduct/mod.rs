@@ -3,3 +3,4 @@
 pub mod belief;
 pub mod planner;
 pub mod probe;
+pub mod reach;

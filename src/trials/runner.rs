@@ -1,7 +1,7 @@
 //! Trials × planners on all cores.
 
 use super::experiment::Experiment;
-use super::metrics::Truth;
+use super::truth::Truth;
 use super::row::TrialRow;
 use super::store::{RunFolder, StoreError};
 use super::trial;

@@ -1,7 +1,7 @@
 //! Algorithm 1 of Yi et al. 2016: touch, fit, plan, again.
 
 use super::experiment::Experiment;
-use super::metrics::Truth;
+use super::truth::Truth;
 use super::row::{TouchRow, TrialRow};
 use crate::conduct::belief::Belief;
 use crate::conduct::planner::{self, Plan, uniform};

@@ -3,7 +3,7 @@
 use super::{Ending, print};
 use crate::faces::report;
 use crate::trials::experiment::Experiment;
-use crate::trials::metrics::Truth;
+use crate::trials::truth::Truth;
 use crate::trials::runner;
 use crate::trials::store::{Manifest, Run, RunFolder};
 use crate::world::World;

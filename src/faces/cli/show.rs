@@ -4,7 +4,7 @@ use super::{Ending, print};
 use crate::faces::report;
 use crate::ground::geometry::import::import;
 use crate::trials::experiment::Experiment;
-use crate::trials::metrics::Truth;
+use crate::trials::truth::Truth;
 use crate::trials::store::{self, Run};
 use crate::world::scene::Unit;
 use crate::world::world::{Shape, World};
