@@ -69,8 +69,10 @@ impl Calibration {
         self.nlpd += 0.5 * (std::f64::consts::TAU * variance).ln() + 0.5 * error * error / variance;
     }
 
+    /// To four decimals: the rows keep one after every touch.
     fn mean(&self, sum: f64) -> Option<f64> {
-        (self.count > 0.0).then(|| sum / self.count).filter(|mean| mean.is_finite())
+        let mean = (1e4 * sum / self.count).round() / 1e4;
+        mean.is_finite().then_some(mean)
     }
 }
 

@@ -53,7 +53,7 @@ pub struct Events {
     pub failures: usize,
     /// Touches that met nothing.
     pub misses: usize,
-    /// Plans that fell back because the belief was sure everywhere.
+    /// Plans that fell back because the belief was sure of the best place.
     pub collapsed: usize,
     /// Plans that fell back because they repeated a target.
     pub repeated: usize,

@@ -22,7 +22,7 @@ struct Measure {
     other: Option<fn(&Point) -> f64>,
 }
 
-const MEASURES: [Measure; 4] = [
+const MEASURES: [Measure; 6] = [
     Measure {
         title: "correlation R (Eq. 5), mean",
         is_log: false,
@@ -48,6 +48,20 @@ const MEASURES: [Measure; 4] = [
         title: "RMSE in the outer tenth of the zone (mm): median",
         is_log: true,
         value: |point| Some(MM.per_m * point.edge_rmse_median_m?),
+        error: |_| None,
+        other: None,
+    },
+    Measure {
+        title: "share of the truth in the 95 % band, mean",
+        is_log: false,
+        value: |point| point.coverage_mean,
+        error: |_| None,
+        other: None,
+    },
+    Measure {
+        title: "lateral travel (m), mean",
+        is_log: false,
+        value: |point| Some(point.path_mean_m),
         error: |_| None,
         other: None,
     },
