@@ -19,11 +19,7 @@ const PER_SIDE_MAX: f64 = 128.0;
 
 /// Whether the finger, sent to some target in the zone, can touch the surface at each of `places`
 /// with the true height above the datum in `heights_m`; a place without a surface is none.
-pub fn is_reachable(
-    world: &World,
-    places: &[Vec<f64>],
-    heights_m: &[Option<f64>],
-) -> Vec<bool> {
+pub fn is_reachable(world: &World, places: &[Vec<f64>], heights_m: &[Option<f64>]) -> Vec<bool> {
     if world.scene().body == Body::Function {
         return heights_m.iter().map(Option::is_some).collect();
     }

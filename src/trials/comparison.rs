@@ -73,8 +73,7 @@ pub fn paired(
         })
     };
     let theirs: std::collections::HashMap<u32, f64> = values(baseline).collect();
-    let pairs: Vec<(f64, f64)> = values(planner)
-        .filter_map(|(trial, error)| Some((error, *theirs.get(&trial)?)))
-        .collect();
+    let pairs: Vec<(f64, f64)> =
+        values(planner).filter_map(|(trial, error)| Some((error, *theirs.get(&trial)?))).collect();
     Paired::new(&pairs, experiment.seed)
 }

@@ -49,11 +49,7 @@ pub fn median_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
     bootstrap(values, seed, |sample| middle(sample).unwrap_or(f64::NAN))
 }
 
-fn bootstrap(
-    values: &[f64],
-    seed: u64,
-    statistic: impl Fn(&mut [f64]) -> f64,
-) -> Option<[f64; 2]> {
+fn bootstrap(values: &[f64], seed: u64, statistic: impl Fn(&mut [f64]) -> f64) -> Option<[f64; 2]> {
     if values.len() < 2 {
         return None;
     }

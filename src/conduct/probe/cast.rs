@@ -43,11 +43,8 @@ fn rest(world: &World, target: &[f64]) -> Option<(f64, SweepHit)> {
     let reach_m = scene.finger.radius_m + scene.finger.length_m + CLEARANCE_M;
     let mut tip = scene.zone.point(target, 0.0);
     tip.y = high.y + reach_m;
-    let hull = Capsule {
-        p0_w: tip,
-        p1_w: tip + scene.finger.axis_w(),
-        radius_m: scene.finger.radius_m,
-    };
+    let hull =
+        Capsule { p0_w: tip, p1_w: tip + scene.finger.axis_w(), radius_m: scene.finger.radius_m };
     let hit = bvh.sweep(&hull, &APPROACH_W, tip.y - low.y + reach_m)?;
     Some((tip.y - hit.travel_m, hit))
 }

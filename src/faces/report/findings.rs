@@ -78,11 +78,9 @@ fn needed(
 ) -> String {
     let told: Vec<String> = curves
         .iter()
-        .map(|(name, points)| {
-            match points.iter().rev().take_while(|point| is_met(point)).last() {
-                Some(point) => format!("{name} {}", point.touches),
-                None => format!("{name} not within {}", run.experiment.touches),
-            }
+        .map(|(name, points)| match points.iter().rev().take_while(|point| is_met(point)).last() {
+            Some(point) => format!("{name} {}", point.touches),
+            None => format!("{name} not within {}", run.experiment.touches),
         })
         .collect();
     format!("Touches needed for {goal}: {}.", told.join(", "))

@@ -60,7 +60,8 @@ fn summary_table(run: &Run) -> String {
         let points = curves.iter().flatten().filter(|point| point.touches == count);
         lines.extend(points.map(|point| line(&table::cells(point))));
     }
-    let note = format!("± is one standard error of the mean over {} trials.", run.experiment.trials);
+    let note =
+        format!("± is one standard error of the mean over {} trials.", run.experiment.trials);
     table_section("", &table::HEADER, &lines, &note)
 }
 

@@ -20,7 +20,10 @@ pub const HEADER: [&str; 8] = [
 
 /// A line for each planner and baseline; none if no baseline ran, or nothing else did.
 pub fn lines(run: &Run) -> Vec<[String; 8]> {
-    comparisons(&run.experiment, &run.rows).iter().map(|comparison| cells(run, comparison)).collect()
+    comparisons(&run.experiment, &run.rows)
+        .iter()
+        .map(|comparison| cells(run, comparison))
+        .collect()
 }
 
 /// What the columns are.

@@ -28,9 +28,8 @@ pub const MAXIMUM: &str = "#000000";
 
 /// Colours of planners that have none of their own: what is left of Okabe and Ito's, then others
 /// as dark.
-const SPARE: [&str; 8] = [
-    "#e69f00", "#56b4e9", "#000000", "#7a5195", "#8c6d31", "#667788", "#2f8f8f", "#b0305c",
-];
+const SPARE: [&str; 8] =
+    ["#e69f00", "#56b4e9", "#000000", "#7a5195", "#8c6d31", "#667788", "#2f8f8f", "#b0305c"];
 
 /// Planners with a colour of their own.
 const OWN: [&str; 3] = ["active", "random", "sobol"];

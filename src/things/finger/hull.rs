@@ -79,7 +79,8 @@ mod tests {
             let finger = Finger { pitch_deg, ..Finger::default() };
             let axis = finger.axis_w();
             for i in 0..400 {
-                let (dx, dz) = (0.01 * (f64::from(i) * 0.7).sin(), 0.03 * (f64::from(i) * 1.3).sin());
+                let (dx, dz) =
+                    (0.01 * (f64::from(i) * 0.7).sin(), 0.03 * (f64::from(i) * 1.3).sin());
                 let spheres = (0..=20_000).filter_map(|k| {
                     let s = f64::from(k) / 20_000.0;
                     let depth2 = finger.radius_m.powi(2) - dx * dx - (dz - s * axis.z).powi(2);
@@ -87,7 +88,9 @@ mod tests {
                 });
                 let twin = spheres.reduce(f64::min);
                 match (finger.front_m(dx, dz), twin) {
-                    (Some(front), Some(twin)) => assert!((front - twin).abs() < 1e-6, "{front} {twin}"),
+                    (Some(front), Some(twin)) => {
+                        assert!((front - twin).abs() < 1e-6, "{front} {twin}")
+                    }
                     (front, twin) => assert_eq!(front, twin, "{pitch_deg} {dx} {dz}"),
                 }
             }

@@ -11,8 +11,8 @@ pub use error::StoreError;
 
 use self::error::io_error;
 use crate::trials::experiment::Experiment;
-use crate::trials::truth::Truth;
 use crate::trials::row::TrialRow;
+use crate::trials::truth::Truth;
 use crate::world::Zone;
 use serde::Serialize;
 use std::fs::{self, File, OpenOptions, TryLockError};
