@@ -8,7 +8,7 @@ mod integrated_variance;
 mod pi;
 mod random;
 mod search;
-mod settings;
+pub mod settings;
 mod slope;
 mod sobol;
 mod travel;
