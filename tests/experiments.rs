@@ -131,3 +131,26 @@ fn toy_travel_never_stalls_and_goes_shorter_ways() {
         }
     }
 }
+
+/// A prior mean and a prior on the length scales that know nothing of the toy: their median is the
+/// geometric middle of the range. Nowhere worse than random by more than the standard error, and
+/// found by touch 21.
+#[test]
+fn toy_slope_with_generic_priors_is_never_behind_random_and_found_by_touch_21() {
+    let sets = [
+        "planners=[\"slope\", \"random\"]",
+        "gp.mean=\"constant\"",
+        "gp.prior.length_scale={median=0.07, spread=2}",
+    ];
+    let (experiment, rows) = run("toy.toml", &sets);
+    let slope = summary::curve(&experiment, &rows, "slope");
+    let random = summary::curve(&experiment, &rows, "random");
+    for (slope, random) in slope.iter().zip(&random) {
+        let error = slope.r_se.unwrap().hypot(random.r_se.unwrap());
+        let behind = random.r_mean - slope.r_mean;
+        assert!(behind <= error, "{}: {behind} ± {error}", slope.touches);
+        if slope.touches >= 21 {
+            assert!(slope.r_mean >= 0.99, "{}: {}", slope.touches, slope.r_mean);
+        }
+    }
+}

@@ -88,7 +88,8 @@ fn scene(args: &Args) -> anyhow::Result<String> {
     if let (Some(low), Some(high)) = (heights().reduce(f64::min), heights().reduce(f64::max)) {
         text += &format!(", heights {:.2} to {:.2} mm above the datum", low * 1e3, high * 1e3);
     }
-    text.push('\n');
+    let reachable = truth.is_reachable.iter().filter(|&&is_reachable| is_reachable).count();
+    text += &format!("; the finger can touch {reachable} of them\n");
     if let Shape::Mesh { report, .. } = world.shape() {
         text += &format!("{report}\n");
     }
