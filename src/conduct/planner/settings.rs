@@ -84,8 +84,8 @@ pub struct TravelSettings {
 }
 
 impl Default for TravelSettings {
-    /// Chosen: of eight pairs, the shortest way on the bird to the error of `active`'s 120 touches,
-    /// in no more touches (10 trials).
+    /// Chosen: of six pairs, the shortest way on the bird to the error of `active`'s 120 touches
+    /// (10 trials).
     fn default() -> Self {
         Self { touch: 0.1, floor: 0.2 }
     }
