@@ -3,10 +3,10 @@
 
 use palpate::conduct::planner;
 use palpate::trials::experiment::Experiment;
-use palpate::trials::metrics::Truth;
 use palpate::trials::row::TrialRow;
 use palpate::trials::summary::{self, Point};
 use palpate::trials::trial;
+use palpate::trials::truth::Truth;
 use palpate::world::World;
 use rayon::prelude::*;
 use std::path::Path;
@@ -113,5 +113,44 @@ fn targets_past_the_object_are_missed_once_and_not_asked_for_again() {
         }
         let last = row.touches.last().unwrap().metrics.unwrap();
         assert!(last.rmse_m < 0.004, "{}", last.rmse_m);
+    }
+}
+
+/// Every toy trial goes on to the end, at less than three quarters of the way.
+#[test]
+fn toy_travel_never_stalls_and_goes_shorter_ways() {
+    let (experiment, rows) = run("toy.toml", &["planners=[\"active\", \"travel\"]"]);
+    let path = |planner| after(&experiment, &rows, planner, 50).path_mean_m;
+    assert!(path("travel") < 0.75 * path("active"), "{} {}", path("travel"), path("active"));
+    for row in summary::of(&rows, "travel") {
+        let r = row.touches.last().unwrap().metrics.unwrap().r;
+        assert!(r > 0.99, "trial {} ends at {r}", row.trial);
+        for (i, touch) in row.touches.iter().enumerate() {
+            let again = |earlier: &&palpate::trials::row::TouchRow| earlier.target == touch.target;
+            assert!(row.touches[..i].iter().find(again).is_none(), "trial {}, {i}", row.trial);
+        }
+    }
+}
+
+/// A prior mean and a prior on the length scales that know nothing of the toy: its median is the
+/// geometric middle of the default range, whose ends lie two standard deviations away. Nowhere
+/// worse than random by more than the standard error, and found by touch 21.
+#[test]
+fn toy_slope_with_generic_priors_is_never_behind_random_and_found_by_touch_21() {
+    let sets = [
+        "planners=[\"slope\", \"random\"]",
+        "gp.mean=\"constant\"",
+        "gp.prior.length_scale={median=0.07, spread=4}",
+    ];
+    let (experiment, rows) = run("toy.toml", &sets);
+    let slope = summary::curve(&experiment, &rows, "slope");
+    let random = summary::curve(&experiment, &rows, "random");
+    for (slope, random) in slope.iter().zip(&random) {
+        let error = slope.r_se.unwrap().hypot(random.r_se.unwrap());
+        let behind = random.r_mean - slope.r_mean;
+        assert!(behind <= error, "{}: {behind} ± {error}", slope.touches);
+        if slope.touches >= 21 {
+            assert!(slope.r_mean >= 0.99, "{}: {}", slope.touches, slope.r_mean);
+        }
     }
 }

@@ -5,8 +5,11 @@ use nalgebra::{Point3, Vector3};
 use palpate::conduct::belief::{Belief, GpSettings};
 use palpate::conduct::planner::{self, PLANNERS, PlanningSettings, Stall};
 use palpate::conduct::probe::{Contact, Touch};
+use palpate::ground::gp::Posterior;
+use palpate::ground::gp::kernel::SquaredExponential;
 use palpate::ground::gp::posterior::Scratch;
-use palpate::ground::seed;
+use palpate::ground::gp::reduction::Reduction;
+use palpate::ground::{normal, seed};
 use palpate::world::Zone;
 use rand::RngExt;
 
@@ -98,7 +101,7 @@ fn a_belief_without_any_contact_still_plans() {
     for entry in PLANNERS {
         let mut belief = Belief::new(SQUARE, GpSettings::default());
         let mut planner = make(entry.name, &SQUARE);
-        let mut targets: Vec<Vec<f64>> = vec![SQUARE.at(&[0.5, 0.5])];
+        let mut targets: Vec<Vec<f64>> = vec![SQUARE.at(&[0.4, 0.7])];
         belief.observe(&targets[0], &Touch::Miss);
         for _ in 0..30 {
             belief.refit().unwrap();
@@ -108,5 +111,188 @@ fn a_belief_without_any_contact_still_plans() {
             belief.observe(&target, &Touch::Miss);
             targets.push(target);
         }
+    }
+}
+
+/// The slow twin takes the candidate in and looks at every reference again.
+#[test]
+fn reduction_is_what_a_refit_with_the_candidate_finds() {
+    for (zone, noisy) in [(&LINE, false), (&SQUARE, true)] {
+        for trial in 0..5 {
+            let belief = belief(zone, trial, 6 + 9 * trial as usize, if noisy { 2 } else { 99 });
+            let posterior = belief.explorable().unwrap();
+            let references = zone.grid(9);
+            let reduction = Reduction::new(posterior, references.iter().map(Vec::as_slice));
+            let mut scratch = Scratch::default();
+            let mut rng = seed::stream(5, trial, "candidates");
+            for _ in 0..20 {
+                let place = planner::uniform(zone, &mut rng);
+                let mut observations = posterior.observations().clone();
+                observations.push(&place, 0.0);
+                let hyperparameters = posterior.hyperparameters().clone();
+                let signal2 = hyperparameters.signal_sd.powi(2);
+                let kernel = &SquaredExponential;
+                let after = Posterior::new(kernel, hyperparameters, observations).unwrap();
+                let falls = references.iter().map(|at| {
+                    posterior.variance(at, &mut scratch) - after.variance(at, &mut scratch)
+                });
+                let twin = falls.sum::<f64>() / references.len() as f64;
+                let found = reduction.at(&place, &mut scratch);
+                assert!((found - twin).abs() < 1e-7 * signal2, "{found} {twin}");
+            }
+        }
+    }
+}
+
+#[test]
+fn mean_gradient_is_its_central_difference() {
+    for zone in [&LINE, &SQUARE] {
+        let belief = belief(zone, 2, 25, 3);
+        let surface = belief.surface().unwrap();
+        let mut scratch = Scratch::default();
+        let mut rng = seed::stream(5, 0, "places");
+        for _ in 0..50 {
+            let place = planner::uniform(zone, &mut rng);
+            let mut gradient = vec![0.0; zone.dimension()];
+            let mean = surface.mean_gradient(&place, &mut gradient, &mut scratch);
+            assert_eq!(mean, surface.mean(&place, &mut scratch));
+            for (axis, extent) in zone.extents_m().iter().enumerate() {
+                let mut at = |step: f64| {
+                    let mut beside = place.clone();
+                    beside[axis] += step;
+                    surface.mean(&beside, &mut scratch)
+                };
+                let step = 1e-6 * extent;
+                let twin = (at(step) - at(-step)) / (2.0 * step);
+                let scale = surface.hyperparameters().signal_sd / extent;
+                assert!((gradient[axis] - twin).abs() < 1e-5 * scale, "{gradient:?} {twin}");
+            }
+        }
+    }
+}
+
+/// What a place is worth.
+type Formula<'a> = Box<dyn Fn(&[f64], &mut Scratch) -> f64 + 'a>;
+
+/// A planner's plan against a dense grid of its formula, written out again.
+fn finds(name: &str, formula: impl for<'a> Fn(&'a Belief, &[Vec<f64>]) -> Formula<'a>) {
+    for (zone, per_side) in [(&LINE, 1001), (&SQUARE, 61)] {
+        for trial in 0..8 {
+            let belief = belief(zone, trial, 6 + 3 * trial as usize, 3);
+            let plan = make(name, zone).plan(&belief);
+            if plan.stall.is_some() {
+                continue;
+            }
+            let mut scratch = Scratch::default();
+            let grid = zone.grid(per_side);
+            let worth = formula(&belief, &grid);
+            let values: Vec<f64> = grid.iter().map(|place| worth(place, &mut scratch)).collect();
+            let best = values.iter().copied().fold(f64::MIN, f64::max);
+            let worst = values.iter().copied().fold(f64::MAX, f64::min);
+            let share = (worth(&plan.target, &mut scratch) - worst) / (best - worst);
+            assert!(share > 0.97, "{name}, {} d, {trial}: {share}", zone.dimension());
+        }
+    }
+}
+
+fn mean_sd(belief: &Belief, place: &[f64], scratch: &mut Scratch) -> (f64, f64) {
+    let mean = belief.surface().unwrap().mean(place, scratch);
+    (mean, belief.explorable_variance(place, &mut [], scratch).sqrt())
+}
+
+fn goal(belief: &Belief) -> f64 {
+    let surface = belief.surface().unwrap();
+    let heights = surface.observations().heights().iter().copied();
+    heights.fold(f64::MIN, f64::max) + 0.01 * surface.hyperparameters().signal_sd
+}
+
+#[test]
+fn ucb_finds_the_highest_upper_bound() {
+    finds("ucb", |belief, _| {
+        Box::new(|place, scratch| {
+            let (mean, sd) = mean_sd(belief, place, scratch);
+            mean + 2.0 * sd
+        })
+    });
+}
+
+#[test]
+fn pi_finds_the_most_probable_improvement() {
+    finds("pi", |belief, _| {
+        let goal = goal(belief);
+        Box::new(move |place, scratch| {
+            let (mean, sd) = mean_sd(belief, place, scratch);
+            normal::cumulative((mean - goal) / sd)
+        })
+    });
+}
+
+#[test]
+fn ei_finds_the_largest_expected_improvement() {
+    finds("ei", |belief, _| {
+        let goal = goal(belief);
+        Box::new(move |place, scratch| {
+            let (mean, sd) = mean_sd(belief, place, scratch);
+            let z = (mean - goal) / sd;
+            sd * (normal::density(z) + z * normal::cumulative(z))
+        })
+    });
+}
+
+#[test]
+fn slope_finds_the_unsure_and_steep() {
+    finds("slope", |belief, grid| {
+        let slope = |place: &[f64], scratch: &mut Scratch| {
+            let mut gradient = [0.0; 2];
+            belief.surface().unwrap().mean_gradient(place, &mut gradient, scratch);
+            gradient[0].hypot(gradient[1])
+        };
+        let mut scratch = Scratch::default();
+        let sum: f64 = grid.iter().map(|place| slope(place, &mut scratch)).sum();
+        let mean = sum / grid.len() as f64;
+        Box::new(move |place, scratch| {
+            mean_sd(belief, place, scratch).1 * (1.0 + slope(place, scratch) / mean)
+        })
+    });
+}
+
+#[test]
+fn integrated_variance_finds_the_largest_fall() {
+    finds("integrated_variance", |belief, grid| {
+        let places = grid.iter().step_by(7).map(Vec::as_slice);
+        let reduction = Reduction::new(belief.explorable().unwrap(), places);
+        Box::new(move |place, scratch| reduction.at(place, scratch))
+    });
+}
+
+#[test]
+fn travel_goes_to_nearer_places_that_are_still_unsure() {
+    let (mut nearer, mut plans) = (0, 0);
+    for trial in 0..20 {
+        let belief = belief(&SQUARE, trial, 12 + trial as usize, 99);
+        let last = belief.targets().last().unwrap();
+        let [travel, active] = ["travel", "active"].map(|name| make(name, &SQUARE).plan(&belief));
+        let away = |plan: &planner::Plan| SQUARE.distance(last, &plan.target);
+        plans += 1;
+        nearer += usize::from(away(&travel) <= away(&active) + 1e-9);
+        let share = travel.sd_m.unwrap() / active.sd_m.unwrap();
+        assert!(share > 0.15, "{trial}: {share} of the largest deviation");
+    }
+    assert!(nearer * 10 >= plans * 9, "{nearer} of {plans}");
+}
+
+/// Counted in one dimension, and without repeats in two.
+#[test]
+fn grid_goes_from_coarse_to_fine() {
+    let belief = Belief::new(LINE, GpSettings::default());
+    let mut grid = make("grid", &LINE);
+    let places: Vec<f64> = (0..9).map(|_| grid.plan(&belief).target[0]).collect();
+    assert_eq!(places, [-2.0, 2.0, 0.0, -1.0, 1.0, -1.5, 0.5, -0.5, 1.5]);
+    let belief = Belief::new(SQUARE, GpSettings::default());
+    let mut grid = make("grid", &SQUARE);
+    let places: Vec<Vec<f64>> = (0..289).map(|_| grid.plan(&belief).target).collect();
+    for place in SQUARE.grid(17) {
+        let same = |other: &&Vec<f64>| SQUARE.distance(&place, other) < 1e-9;
+        assert_eq!(places.iter().filter(same).count(), 1, "{place:?}");
     }
 }

@@ -6,9 +6,10 @@ use palpate::ground::gp::fit::Fit;
 use palpate::ground::gp::kernel::Hyperparameters;
 use palpate::ground::optimize::Stop;
 use palpate::trials::experiment::Experiment;
-use palpate::trials::metrics::{Metrics, Truth};
+use palpate::trials::metrics::Metrics;
 use palpate::trials::row::{TouchRow, TrialRow};
 use palpate::trials::store::Run;
+use palpate::trials::truth::Truth;
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::{Options, Tree};
 use std::collections::BTreeMap;
@@ -59,7 +60,8 @@ fn run(text: &str) -> Run {
     let zone = &experiment.scene.zone;
     let places = zone.grid(experiment.grid as usize);
     let heights_m = places.iter().map(|place| height_m(place)).collect();
-    let truth = Truth::new(zone, places, heights_m);
+    let is_reachable = vec![true; places.len()];
+    let truth = Truth::new(zone, places, heights_m, is_reachable);
     let rows = (0..experiment.trials)
         .flat_map(|trial| experiment.planners.iter().map(move |planner| (trial, planner)))
         .map(|(trial, planner)| row(&experiment, trial, planner))
@@ -96,6 +98,10 @@ fn touch(experiment: &Experiment, trial: u32, count: u32) -> TouchRow {
         rmse_m: error_m,
         max_error_m: error_m,
         edge_rmse_m: Some(2.0 * error_m),
+        reachable_rmse_m: Some(error_m),
+        unreachable_rmse_m: None,
+        coverage: Some(0.9),
+        nlpd: Some(-3.0),
     };
     let is_fitted = count >= experiment.initial_touches;
     TouchRow {

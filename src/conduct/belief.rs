@@ -218,20 +218,26 @@ impl Belief {
         self.surface.as_ref()
     }
 
+    /// What a further touch would start from: the posterior, given also that targets missed, or
+    /// contacted elsewhere, are no news. Its variance counts; its mean means nothing.
+    pub fn explorable(&self) -> Option<&Posterior> {
+        self.explored.as_ref().or(self.surface.as_ref())
+    }
+
     /// Every target asked for so far.
     pub fn targets(&self) -> &[Vec<f64>] {
         &self.targets
     }
 
-    /// Variance that a touch asked for at `place` could still remove, with its gradient: the
-    /// posterior variance, given also that targets missed, or contacted elsewhere, are no news.
+    /// Variance of [`explorable`](Self::explorable) at `place`, what a touch asked for there could
+    /// still remove, with its gradient unless that is empty; NaN before the first fit.
     pub fn explorable_variance(
         &self,
         place: &[f64],
         gradient: &mut [f64],
         scratch: &mut Scratch,
     ) -> f64 {
-        match self.explored.as_ref().or(self.surface.as_ref()) {
+        match self.explorable() {
             Some(posterior) if gradient.is_empty() => posterior.variance(place, scratch),
             Some(posterior) => posterior.variance_gradient(place, gradient, scratch),
             None => f64::NAN,

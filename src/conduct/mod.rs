@@ -4,3 +4,4 @@ pub mod belief;
 pub mod control;
 pub mod planner;
 pub mod probe;
+pub mod reach;

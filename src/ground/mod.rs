@@ -3,6 +3,7 @@
 pub mod config;
 pub mod geometry;
 pub mod gp;
+pub mod normal;
 pub mod optimize;
 pub mod seed;
 pub mod simd;

@@ -1,23 +1,9 @@
-//! How near the belief's mean is to the true surface.
+//! How near a belief is to the true surface.
 
-use crate::ground::gp::Posterior;
-use crate::ground::gp::posterior::Scratch;
-use crate::world::{World, Zone};
+use crate::ground::normal::BAND_95;
 use serde::{Deserialize, Serialize};
 
-/// True heights on the test grid of an experiment.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Truth {
-    /// The test places.
-    pub places: Vec<Vec<f64>>,
-    /// The true height at each, above the zone's datum; none where the zone looks past the
-    /// object.
-    pub heights_m: Vec<Option<f64>>,
-    /// Whether each lies in the outer tenth of the zone.
-    pub is_edge: Vec<bool>,
-}
-
-/// Agreement of the belief's mean with the truth on the grid.
+/// Agreement of a belief with the truth on the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
     /// Eq. 5 of Yi et al. 2016: Σ f·f̂ / sqrt(Σ f² · Σ f̂²). Not centred: a constant scores
@@ -31,50 +17,69 @@ pub struct Metrics {
     pub max_error_m: f64,
     /// Root mean square error in the outer tenth of the zone; none where no surface is there.
     pub edge_rmse_m: Option<f64>,
+    /// Root mean square error where the finger can touch the surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reachable_rmse_m: Option<f64>,
+    /// Root mean square error where it cannot.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unreachable_rmse_m: Option<f64>,
+    /// Share of the truth that lies within 1.96 standard deviations of the mean. The variance is
+    /// that of a touch, σ² + noise²: the noise stands for what a smooth surface cannot follow,
+    /// and that is part of the truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coverage: Option<f64>,
+    /// Mean negative log density of the true heights (in m) under the same normal distributions,
+    /// ½·ln(2π·s²) + ½·error²/s² with s² = σ² + noise²; lower is better.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nlpd: Option<f64>,
 }
 
-impl Truth {
-    /// Reads the world's surface on a grid of `per_side` places along each side of the zone.
-    pub fn sample(world: &World, per_side: usize) -> Self {
-        let places = world.scene().zone.grid(per_side);
-        let heights_m = places.iter().map(|place| world.true_height_m(place)).collect();
-        Self::new(&world.scene().zone, places, heights_m)
+/// Running sum of squared errors.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Errors {
+    count: f64,
+    squares: f64,
+}
+
+impl Errors {
+    pub(super) fn add(&mut self, error: f64) {
+        self.count += 1.0;
+        self.squares += error * error;
     }
 
-    /// From recorded heights.
-    pub fn new(zone: &Zone, places: Vec<Vec<f64>>, heights_m: Vec<Option<f64>>) -> Self {
-        let is_edge = places.iter().map(|place| zone.is_edge(place)).collect();
-        Self { places, heights_m, is_edge }
+    fn rmse(&self) -> Option<f64> {
+        (self.count > 0.0).then(|| (self.squares / self.count).sqrt())
+    }
+}
+
+/// Running sums of how errors compare with their believed variance.
+#[derive(Default)]
+pub(super) struct Calibration {
+    count: f64,
+    inside: f64,
+    nlpd: f64,
+}
+
+impl Calibration {
+    pub(super) fn add(&mut self, error: f64, variance: f64) {
+        // A belief without any noise may be sure to the last bit.
+        let variance = variance.max(f64::MIN_POSITIVE);
+        self.count += 1.0;
+        self.inside += f64::from(u8::from(error.abs() <= BAND_95 * variance.sqrt()));
+        self.nlpd += 0.5 * (std::f64::consts::TAU * variance).ln() + 0.5 * error * error / variance;
     }
 
-    /// How many test places have a surface.
-    pub fn count(&self) -> usize {
-        self.heights_m.iter().flatten().count()
-    }
-
-    /// Compares a belief's mean with the truth wherever there is a surface.
-    pub fn compare(&self, belief: &Posterior) -> Metrics {
-        let mut sums = Sums::default();
-        let mut edge = Sums::default();
-        let mut scratch = Scratch::default();
-        for ((place, height), &is_edge) in
-            self.places.iter().zip(&self.heights_m).zip(&self.is_edge)
-        {
-            let Some(truth) = *height else { continue };
-            let mean = belief.mean(place, &mut scratch);
-            sums.add(truth, mean);
-            if is_edge {
-                edge.add(truth, mean);
-            }
-        }
-        sums.metrics((edge.count > 0.0).then(|| edge.rmse()))
+    /// To four decimals: the rows keep one after every touch.
+    fn mean(&self, sum: f64) -> Option<f64> {
+        let mean = (1e4 * sum / self.count).round() / 1e4;
+        mean.is_finite().then_some(mean)
     }
 }
 
 /// Running sums of true heights f and believed heights g. The centred ones are updated by
 /// Welford's rule: a large common offset must not cancel what little the heights vary.
 #[derive(Default)]
-struct Sums {
+pub(super) struct Sums {
     count: f64,
     ff: f64,
     gg: f64,
@@ -84,12 +89,12 @@ struct Sums {
     spread_f: f64,
     spread_g: f64,
     covariance: f64,
-    error2: f64,
+    errors: Errors,
     max_error: f64,
 }
 
 impl Sums {
-    fn add(&mut self, f: f64, g: f64) {
+    pub(super) fn add(&mut self, f: f64, g: f64) {
         self.count += 1.0;
         self.ff += f * f;
         self.gg += g * g;
@@ -100,15 +105,16 @@ impl Sums {
         self.spread_f += from_f * (f - self.mean_f);
         self.spread_g += from_g * (g - self.mean_g);
         self.covariance += from_f * (g - self.mean_g);
-        self.error2 += (f - g) * (f - g);
+        self.errors.add(f - g);
         self.max_error = self.max_error.max((f - g).abs());
     }
 
-    fn rmse(&self) -> f64 {
-        (self.error2 / self.count).sqrt()
-    }
-
-    fn metrics(&self, edge_rmse_m: Option<f64>) -> Metrics {
+    /// Everything, given the errors at the edge and where the finger reaches and does not.
+    pub(super) fn metrics(
+        &self,
+        [edge, reachable, unreachable]: [Errors; 3],
+        calibration: Calibration,
+    ) -> Metrics {
         // A spread of rounding errors is none.
         let spread = |spread: f64, square: f64| {
             if spread > 1e3 * f64::EPSILON * f64::EPSILON * square { spread } else { 0.0 }
@@ -117,9 +123,13 @@ impl Sums {
         Metrics {
             r: ratio(self.fg, (self.ff * self.gg).sqrt()),
             centred_r: ratio(self.covariance, spreads.sqrt()),
-            rmse_m: self.rmse(),
+            rmse_m: self.errors.rmse().unwrap_or(f64::NAN),
             max_error_m: self.max_error,
-            edge_rmse_m,
+            edge_rmse_m: edge.rmse(),
+            reachable_rmse_m: reachable.rmse(),
+            unreachable_rmse_m: unreachable.rmse(),
+            coverage: calibration.mean(calibration.inside),
+            nlpd: calibration.mean(calibration.nlpd),
         }
     }
 }
@@ -136,7 +146,7 @@ mod tests {
     fn compare(pairs: &[(f64, f64)]) -> Metrics {
         let mut sums = Sums::default();
         pairs.iter().for_each(|&(truth, mean)| sums.add(truth, mean));
-        sums.metrics(None)
+        sums.metrics([Errors::default(); 3], Calibration::default())
     }
 
     /// Half of the toy is 1 and the other half has mean 1 and mean square 1.5, so a constant
@@ -179,5 +189,29 @@ mod tests {
     fn a_zero_belief_scores_zero_not_nan() {
         let zero = compare(&[(1.0, 0.0), (2.0, 0.0)]);
         assert_eq!((zero.r, zero.centred_r), (0.0, 0.0));
+    }
+
+    /// Errors that are drawn from the believed distribution lie in its band 95 times in a hundred,
+    /// and their mean negative log density is the distribution's entropy ½·ln(2πe·s²).
+    #[test]
+    fn honest_errors_are_covered_and_score_the_entropy() {
+        let sd: f64 = 1e-3;
+        let mut calibration = Calibration::default();
+        let count = 20_000;
+        for i in 0..count {
+            // Quantiles of the normal distribution, by bisection.
+            let share = (f64::from(i) + 0.5) / f64::from(count);
+            let (mut low, mut high) = (-9.0, 9.0);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                let is_below = crate::ground::normal::cumulative(middle) < share;
+                if is_below { low = middle } else { high = middle }
+            }
+            calibration.add(sd * low, sd * sd);
+        }
+        let coverage = calibration.mean(calibration.inside).unwrap();
+        assert!((coverage - 0.95).abs() < 1e-9, "{coverage}");
+        let entropy = 0.5 * (std::f64::consts::TAU * std::f64::consts::E * sd * sd).ln();
+        assert!((calibration.mean(calibration.nlpd).unwrap() - entropy).abs() < 1e-3);
     }
 }

@@ -1,9 +1,12 @@
 //! Floor 5: experiments, their trials, and the folder their results lie in.
 
+pub mod comparison;
 pub mod experiment;
 pub mod metrics;
 pub mod row;
 pub mod runner;
+pub mod statistics;
 pub mod store;
 pub mod summary;
 pub mod trial;
+pub mod truth;

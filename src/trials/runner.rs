@@ -1,10 +1,10 @@
 //! Trials × planners on all cores.
 
 use super::experiment::Experiment;
-use super::metrics::Truth;
 use super::row::TrialRow;
 use super::store::{RunFolder, StoreError};
 use super::trial;
+use super::truth::Truth;
 use crate::conduct::planner;
 use crate::ground::optimize;
 use crate::world::World;

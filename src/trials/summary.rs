@@ -3,6 +3,7 @@
 use super::experiment::Experiment;
 use super::metrics::Metrics;
 use super::row::{TouchRow, TrialRow};
+use super::statistics::{mean, mean_and_error, median};
 use crate::conduct::planner::Stall;
 use serde::Serialize;
 
@@ -31,6 +32,16 @@ pub struct Point {
     pub rmse_median_m: f64,
     /// Median root mean square error in the outer tenth of the zone.
     pub edge_rmse_median_m: Option<f64>,
+    /// Median root mean square error where the finger can touch the surface.
+    pub reachable_rmse_median_m: Option<f64>,
+    /// Median root mean square error where it cannot.
+    pub unreachable_rmse_median_m: Option<f64>,
+    /// Mean share of the truth inside the 95 % band.
+    pub coverage_mean: Option<f64>,
+    /// Mean negative log predictive density.
+    pub nlpd_mean: Option<f64>,
+    /// Mean lateral travel from target to target since the first.
+    pub path_mean_m: f64,
 }
 
 /// What happened to one planner's trials besides their errors.
@@ -42,42 +53,29 @@ pub struct Events {
     pub failures: usize,
     /// Touches that met nothing.
     pub misses: usize,
-    /// Plans that fell back because the belief was sure everywhere.
+    /// Plans that fell back because the belief was sure of the best place.
     pub collapsed: usize,
     /// Plans that fell back because they repeated a target.
     pub repeated: usize,
-}
-
-/// A mean with its standard error, which a single value does not have.
-pub fn mean_and_error(values: &[f64]) -> (f64, Option<f64>) {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    let error = (values.len() > 1).then(|| (squares / (count - 1.0) / count).sqrt());
-    (mean, error)
-}
-
-/// The middle value, or the mean of the two middle ones; none of nothing.
-pub fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let upper = *sorted.get(sorted.len() / 2)?;
-    let lower = *sorted.get((sorted.len() - 1) / 2)?;
-    Some(0.5 * (lower + upper))
 }
 
 /// The curve of one planner, from its first fit to its last touch.
 pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<Point> {
     (experiment.initial_touches..=experiment.touches)
         .filter_map(|touches| {
-            let metrics: Vec<&Metrics> = of(rows, planner)
-                .filter_map(|row| row.touches.get(touches as usize - 1)?.metrics.as_ref())
+            let trials: Vec<(&TrialRow, &Metrics)> = of(rows, planner)
+                .filter_map(|row| {
+                    Some((row, row.touches.get(touches as usize - 1)?.metrics.as_ref()?))
+                })
                 .collect();
             let pick = |get: fn(&Metrics) -> f64| -> Vec<f64> {
-                metrics.iter().map(|metrics| get(metrics)).collect()
+                trials.iter().map(|(_, metrics)| get(metrics)).collect()
             };
-            let edges: Vec<f64> =
-                metrics.iter().filter_map(|metrics| metrics.edge_rmse_m).collect();
+            let pick_some = |get: fn(&Metrics) -> Option<f64>| -> Vec<f64> {
+                trials.iter().filter_map(|(_, metrics)| get(metrics)).collect()
+            };
+            let mean_of = |values: Vec<f64>| (!values.is_empty()).then(|| mean(&values));
+            let paths: Vec<f64> = trials.iter().map(|(row, _)| path_m(row, touches)).collect();
             let rmse = pick(|metrics| metrics.rmse_m);
             let (r_mean, r_se) = mean_and_error(&pick(|metrics| metrics.r));
             let (centred_r_mean, centred_r_se) = mean_and_error(&pick(|metrics| metrics.centred_r));
@@ -85,7 +83,7 @@ pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<P
             Some(Point {
                 planner: planner.into(),
                 touches,
-                trials: metrics.len(),
+                trials: trials.len(),
                 r_mean,
                 r_se,
                 centred_r_mean,
@@ -93,10 +91,26 @@ pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<P
                 rmse_mean_m,
                 rmse_se_m,
                 rmse_median_m: median(&rmse)?,
-                edge_rmse_median_m: median(&edges),
+                edge_rmse_median_m: median(&pick_some(|metrics| metrics.edge_rmse_m)),
+                reachable_rmse_median_m: median(&pick_some(|metrics| metrics.reachable_rmse_m)),
+                unreachable_rmse_median_m: median(&pick_some(|metrics| metrics.unreachable_rmse_m)),
+                coverage_mean: mean_of(pick_some(|metrics| metrics.coverage)),
+                nlpd_mean: mean_of(pick_some(|metrics| metrics.nlpd)),
+                path_mean_m: mean(&paths),
             })
         })
         .collect()
+}
+
+/// Lateral travel of the finger over its first `touches` targets, in straight lines.
+pub fn path_m(row: &TrialRow, touches: u32) -> f64 {
+    let targets = row.touches.iter().take(touches as usize).map(|touch| &touch.target);
+    let steps = targets.clone().zip(targets.skip(1));
+    let lengths = steps.map(|(from, to)| {
+        let squares = from.iter().zip(to).map(|(from, to)| (to - from).powi(2));
+        squares.sum::<f64>().sqrt()
+    });
+    lengths.sum()
 }
 
 /// What happened to one planner's trials.
@@ -118,20 +132,4 @@ pub fn events(rows: &[TrialRow], planner: &str) -> Events {
 /// The rows of one planner.
 pub fn of<'a>(rows: &'a [TrialRow], planner: &'a str) -> impl Iterator<Item = &'a TrialRow> {
     rows.iter().filter(move |row| row.planner == planner)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn mean_error_and_median_are_the_textbooks() {
-        let (mean, error) = mean_and_error(&[1.0, 2.0, 3.0, 4.0]);
-        assert_eq!(mean, 2.5);
-        assert!((error.unwrap() - (5.0f64 / 3.0 / 4.0).sqrt()).abs() < 1e-15);
-        assert_eq!(mean_and_error(&[3.0]), (3.0, None));
-        assert_eq!(median(&[4.0, 1.0, 3.0]), Some(3.0));
-        assert_eq!(median(&[4.0, 1.0, 3.0, 2.0]), Some(2.5));
-        assert_eq!(median(&[]), None);
-    }
 }

@@ -1,8 +1,8 @@
 //! Algorithm 1 of Yi et al. 2016: touch, fit, plan, again.
 
 use super::experiment::Experiment;
-use super::metrics::Truth;
 use super::row::{TouchRow, TrialRow};
+use super::truth::Truth;
 use crate::conduct::belief::Belief;
 use crate::conduct::planner::{self, Plan, uniform};
 use crate::conduct::probe::{self, Touch};

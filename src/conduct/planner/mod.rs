@@ -1,14 +1,26 @@
 //! Where to touch next. A planner sees the belief and the zone and nothing else.
 
 mod active;
+mod ei;
+mod grid;
+mod improvement;
+mod integrated_variance;
+mod pi;
 mod random;
+mod search;
+pub mod settings;
+mod slope;
 mod sobol;
+mod travel;
+mod ucb;
+
+pub use settings::PlanningSettings;
 
 use super::belief::Belief;
-use crate::ground::config::{Checked, Rules};
 use crate::world::Zone;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use search::Search;
 use serde::{Deserialize, Serialize};
 
 /// A planner's choice.
@@ -28,7 +40,7 @@ pub struct Plan {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stall {
-    /// The belief is sure everywhere: where its maximum lies is rounding.
+    /// The belief is sure of the best place: that it is the best one is rounding.
     Collapsed,
     /// The same target as before would have been asked for again.
     Repeated,
@@ -38,30 +50,6 @@ pub enum Stall {
 pub trait Planner: Send {
     /// The next target, inside the zone.
     fn plan(&mut self, belief: &Belief) -> Plan;
-}
-
-/// How planners search.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PlanningSettings {
-    /// Evaluations of the acquisition function that DIRECT may spend on one plan.
-    pub direct_evaluations: u32,
-    /// Evaluations that L-BFGS may spend on refining it.
-    pub lbfgs_evaluations: u32,
-}
-
-impl Default for PlanningSettings {
-    /// Chosen: on a hundred touches more evaluations rarely find a larger variance.
-    fn default() -> Self {
-        Self { direct_evaluations: 500, lbfgs_evaluations: 50 }
-    }
-}
-
-impl Checked for PlanningSettings {
-    fn check(&self, rules: &mut Rules) {
-        rules.number("direct_evaluations", self.direct_evaluations.into(), 1.0..=1e6);
-        rules.number("lbfgs_evaluations", self.lbfgs_evaluations.into(), 1.0..=1e6);
-    }
 }
 
 /// A planner as an experiment file names it.
@@ -75,7 +63,18 @@ pub struct Entry {
 }
 
 /// Every planner; one line to add one.
-pub const PLANNERS: &[Entry] = &[active::ENTRY, random::ENTRY, sobol::ENTRY];
+pub const PLANNERS: &[Entry] = &[
+    active::ENTRY,
+    random::ENTRY,
+    sobol::ENTRY,
+    grid::ENTRY,
+    integrated_variance::ENTRY,
+    slope::ENTRY,
+    travel::ENTRY,
+    ucb::ENTRY,
+    pi::ENTRY,
+    ei::ENTRY,
+];
 
 /// The planner called `name`.
 pub fn by_name(name: &str) -> Option<&'static Entry> {

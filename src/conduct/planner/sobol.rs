@@ -21,10 +21,16 @@ struct Sobol {
 
 impl Planner for Sobol {
     fn plan(&mut self, _: &Belief) -> Plan {
-        let fractions: Vec<f64> = (0..self.zone.dimension())
-            .map(|axis| f64::from(sobol_burley::sample(self.index, axis as u32, self.seed)))
-            .collect();
+        let target = place(&self.zone, self.index, self.seed);
         self.index += 1;
-        Plan { target: self.zone.at(&fractions), sd_m: None, stall: None }
+        Plan { target, sd_m: None, stall: None }
     }
+}
+
+/// Place `index` of the sequence that `seed` scrambles.
+pub(super) fn place(zone: &Zone, index: u32, seed: u32) -> Vec<f64> {
+    let fractions: Vec<f64> = (0..zone.dimension())
+        .map(|axis| f64::from(sobol_burley::sample(index, axis as u32, seed)))
+        .collect();
+    zone.at(&fractions)
 }

@@ -3,6 +3,8 @@
 mod cast;
 mod function;
 
+pub use cast::rest_y_m;
+
 use crate::bodies::backend::Fault;
 use crate::world::World;
 use crate::world::scene::Body;

@@ -3,9 +3,9 @@
 use super::{Ending, print};
 use crate::faces::report;
 use crate::trials::experiment::Experiment;
-use crate::trials::metrics::Truth;
 use crate::trials::runner;
 use crate::trials::store::{Manifest, Run, RunFolder};
+use crate::trials::truth::Truth;
 use crate::world::World;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};

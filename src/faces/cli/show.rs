@@ -4,8 +4,8 @@ use super::{Ending, print};
 use crate::faces::report;
 use crate::ground::geometry::import::import;
 use crate::trials::experiment::Experiment;
-use crate::trials::metrics::Truth;
 use crate::trials::store::{self, Run};
+use crate::trials::truth::Truth;
 use crate::world::scene::Unit;
 use crate::world::world::{Shape, World};
 use crate::world::{Scene, mjcf};
@@ -94,7 +94,8 @@ fn scene(args: &Args) -> anyhow::Result<String> {
     if let (Some(low), Some(high)) = (heights().reduce(f64::min), heights().reduce(f64::max)) {
         text += &format!(", heights {:.2} to {:.2} mm above the datum", low * 1e3, high * 1e3);
     }
-    text.push('\n');
+    let reachable = truth.is_reachable.iter().filter(|&&is_reachable| is_reachable).count();
+    text += &format!("; the finger can touch {reachable} of them\n");
     if let Shape::Mesh { report, .. } = world.shape() {
         text += &format!("{report}\n");
     }

@@ -69,7 +69,7 @@ fn scores(run: &Run, curves: &[(&str, Vec<Point>)]) -> Option<String> {
     Some(format!("After {count} touches the mean R (Eq. 5) is: {}.", told.join("; ")))
 }
 
-/// After how many touches each planner first meets a goal.
+/// After how many touches each planner meets a goal, and keeps meeting it.
 fn needed(
     run: &Run,
     curves: &[(&str, Vec<Point>)],
@@ -78,7 +78,7 @@ fn needed(
 ) -> String {
     let told: Vec<String> = curves
         .iter()
-        .map(|(name, points)| match points.iter().find(|point| is_met(point)) {
+        .map(|(name, points)| match points.iter().rev().take_while(|point| is_met(point)).last() {
             Some(point) => format!("{name} {}", point.touches),
             None => format!("{name} not within {}", run.experiment.touches),
         })

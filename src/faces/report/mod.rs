@@ -6,6 +6,7 @@ pub mod figures;
 pub mod findings;
 pub mod heat;
 pub mod page;
+pub mod paired;
 pub mod png;
 pub mod relief;
 pub mod replay;

@@ -1,7 +1,7 @@
 //! The page of a run: one file that needs nothing beside it.
 
 use super::canvas::escape;
-use super::{Drawing, findings, table};
+use super::{Drawing, findings, paired, table};
 use crate::trials::store::Run;
 use crate::trials::summary;
 
@@ -36,9 +36,10 @@ pub fn html(
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{name} – Palpate</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <p class=\"kind\">Palpate run</p>\n<h1>{name}</h1>\n{question}\
-         <section>\n<h2>Found</h2>\n{}</section>\n{}{}{figures}{}{}</body>\n</html>\n",
+         <section>\n<h2>Found</h2>\n{}</section>\n{}{}{}{figures}{}{}</body>\n</html>\n",
         paragraph(&findings::sentences(run)),
         summary_table(run),
+        comparison_table(run),
         events(run),
         details("Every setting, defaults written out", settings)
             + &details("What ran it", manifest),
@@ -52,27 +53,38 @@ fn paragraph(sentences: &[String]) -> String {
 
 fn summary_table(run: &Run) -> String {
     let mut lines = String::new();
+    let curves: Vec<_> = (run.experiment.planners.iter())
+        .map(|planner| summary::curve(&run.experiment, &run.rows, planner))
+        .collect();
     for count in run.experiment.drawn_touch_counts() {
-        for planner in &run.experiment.planners {
-            let curve = summary::curve(&run.experiment, &run.rows, planner);
-            if let Some(point) = curve.iter().find(|point| point.touches == count) {
-                let cells: String = table::cells(point)
-                    .iter()
-                    .map(|cell| format!("<td>{}</td>", escape(cell)))
-                    .collect();
-                lines += &format!("<tr>{cells}</tr>\n");
-            }
-        }
+        let points = curves.iter().flatten().filter(|point| point.touches == count);
+        lines.extend(points.map(|point| line(&table::cells(point))));
     }
+    let note =
+        format!("± is one standard error of the mean over {} trials.", run.experiment.trials);
+    table_section("", &table::HEADER, &lines, &note)
+}
+
+fn comparison_table(run: &Run) -> String {
+    let lines: String = paired::lines(run).iter().map(|cells| line(cells)).collect();
+    table_section("<h2>Planner against planner</h2>\n", &paired::HEADER, &lines, &paired::note(run))
+}
+
+fn line(cells: &[String]) -> String {
+    let cells: String = cells.iter().map(|cell| format!("<td>{}</td>", escape(cell))).collect();
+    format!("<tr>{cells}</tr>\n")
+}
+
+/// A table; nothing if it has no lines.
+fn table_section(title: &str, header: &[&str], lines: &str, note: &str) -> String {
     if lines.is_empty() {
         return String::new();
     }
-    let head: String = table::HEADER.iter().map(|head| format!("<th>{head}</th>")).collect();
+    let head: String = header.iter().map(|head| format!("<th>{head}</th>")).collect();
     format!(
-        "<section>\n<div class=\"wide\"><table>\n<thead><tr>{head}</tr></thead>\n\
-         <tbody>\n{lines}</tbody>\n</table></div>\n\
-         <p class=\"note\">± is one standard error of the mean over {} trials.</p>\n</section>\n",
-        run.experiment.trials
+        "<section>\n{title}<div class=\"wide\"><table>\n<thead><tr>{head}</tr></thead>\n\
+         <tbody>\n{lines}</tbody>\n</table></div>\n<p class=\"note\">{}</p>\n</section>\n",
+        escape(note)
     )
 }
 

@@ -26,8 +26,13 @@ pub const LATER: &str = "#d00000";
 /// The place where the belief is least sure.
 pub const MAXIMUM: &str = "#000000";
 
-/// Colours of planners that have none of their own.
-const SPARE: [&str; 3] = ["#e69f00", "#56b4e9", "#000000"];
+/// Colours of planners that have none of their own: what is left of Okabe and Ito's, then others
+/// as dark.
+const SPARE: [&str; 8] =
+    ["#e69f00", "#56b4e9", "#000000", "#7a5195", "#8c6d31", "#667788", "#2f8f8f", "#b0305c"];
+
+/// Planners with a colour of their own.
+const OWN: [&str; 3] = ["active", "random", "sobol"];
 
 /// The colour of a planner; the paper's two keep theirs.
 pub fn planner(planners: &[String], name: &str) -> &'static str {
@@ -36,8 +41,9 @@ pub fn planner(planners: &[String], name: &str) -> &'static str {
         "random" => "#d55e00",
         "sobol" => "#cc79a7",
         _ => {
-            let index = planners.iter().position(|planner| planner == name).unwrap_or(0);
-            SPARE[index % SPARE.len()]
+            let is_spare = |planner: &&String| !OWN.contains(&planner.as_str());
+            let index = planners.iter().filter(is_spare).position(|planner| planner == name);
+            SPARE[index.unwrap_or(0) % SPARE.len()]
         }
     }
 }

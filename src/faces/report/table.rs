@@ -1,9 +1,62 @@
 //! The summary of a run as text and as CSV.
 
+use crate::trials::comparison::{self, BASELINES};
+use crate::trials::metrics::Metrics;
+use crate::trials::statistics::{Paired, median_interval};
 use crate::trials::store::Run;
 use crate::trials::summary::{self, Events, Point};
 use anyhow::Context;
+use serde::Serialize;
 use std::path::Path;
+
+/// What a line of `summary.csv` holds beside its point.
+#[derive(Default, Serialize)]
+struct Intervals {
+    /// 95 % bootstrap interval of the median root mean square error.
+    rmse_median_low_m: Option<f64>,
+    rmse_median_high_m: Option<f64>,
+    /// Mean difference of the root mean square error from that of `random` in the same trial, its
+    /// 95 % bootstrap interval, and the share of trials in which it is smaller.
+    rmse_minus_random_m: Option<f64>,
+    rmse_minus_random_low_m: Option<f64>,
+    rmse_minus_random_high_m: Option<f64>,
+    won_against_random: Option<f64>,
+    /// The same against `active`.
+    rmse_minus_active_m: Option<f64>,
+    rmse_minus_active_low_m: Option<f64>,
+    rmse_minus_active_high_m: Option<f64>,
+    won_against_active: Option<f64>,
+}
+
+impl Intervals {
+    fn new(run: &Run, point: &Point) -> Self {
+        let (experiment, rows) = (&run.experiment, &run.rows);
+        let errors: Vec<f64> = summary::of(rows, &point.planner)
+            .filter_map(|row| row.touches.get(point.touches as usize - 1)?.metrics)
+            .map(|metrics| metrics.rmse_m)
+            .collect();
+        let median = median_interval(&errors, experiment.seed);
+        let [random, active] = BASELINES.map(|baseline| {
+            let planners = [point.planner.as_str(), baseline];
+            let rmse = |metrics: &Metrics| Some(metrics.rmse_m);
+            comparison::paired(experiment, rows, planners, point.touches, rmse)
+                .filter(|_| point.planner != baseline)
+        });
+        let end = |paired: Option<Paired>, end: usize| Some(paired?.interval?[end]);
+        Self {
+            rmse_median_low_m: median.map(|[low, _]| low),
+            rmse_median_high_m: median.map(|[_, high]| high),
+            rmse_minus_random_m: random.map(|paired| paired.mean),
+            rmse_minus_random_low_m: end(random, 0),
+            rmse_minus_random_high_m: end(random, 1),
+            won_against_random: random.map(|paired| paired.won),
+            rmse_minus_active_m: active.map(|paired| paired.mean),
+            rmse_minus_active_low_m: end(active, 0),
+            rmse_minus_active_high_m: end(active, 1),
+            won_against_active: active.map(|paired| paired.won),
+        }
+    }
+}
 
 /// Writes `summary.csv`: a line per planner and touch count.
 ///
@@ -14,7 +67,7 @@ pub fn write_csv(run: &Run, folder: &Path) -> anyhow::Result<()> {
     let mut writer = csv::Writer::from_path(&path).with_context(|| path.display().to_string())?;
     for planner in &run.experiment.planners {
         for point in summary::curve(&run.experiment, &run.rows, planner) {
-            writer.serialize(point)?;
+            writer.serialize((&point, Intervals::new(run, &point)))?;
         }
     }
     writer.flush().with_context(|| path.display().to_string())
@@ -46,7 +99,7 @@ pub fn summary(run: &Run) -> String {
 }
 
 /// Column heads of the summary, here and on the page.
-pub const HEADER: [&str; 7] = [
+pub const HEADER: [&str; 10] = [
     "touches",
     "planner",
     "R (Eq. 5)",
@@ -54,10 +107,14 @@ pub const HEADER: [&str; 7] = [
     "mean RMSE mm",
     "median RMSE mm",
     "median edge RMSE mm",
+    "in 95 % band",
+    "NLPD",
+    "path m",
 ];
 
 /// A point as the cells of a table.
-pub fn cells(point: &Point) -> [String; 7] {
+pub fn cells(point: &Point) -> [String; 10] {
+    let or_dash = |text: Option<String>| text.unwrap_or("-".into());
     [
         point.touches.to_string(),
         point.planner.clone(),
@@ -65,7 +122,10 @@ pub fn cells(point: &Point) -> [String; 7] {
         with_error(point.centred_r_mean, point.centred_r_se, 4),
         with_error(1e3 * point.rmse_mean_m, point.rmse_se_m.map(|error| 1e3 * error), 3),
         format!("{:.3}", 1e3 * point.rmse_median_m),
-        point.edge_rmse_median_m.map_or("-".into(), |edge| format!("{:.3}", 1e3 * edge)),
+        or_dash(point.edge_rmse_median_m.map(|edge| format!("{:.3}", 1e3 * edge))),
+        or_dash(point.coverage_mean.map(|coverage| format!("{coverage:.3}"))),
+        or_dash(point.nlpd_mean.map(|nlpd| format!("{nlpd:.3}"))),
+        format!("{:.3}", point.path_mean_m),
     ]
 }
 
@@ -82,7 +142,7 @@ pub fn described(planner: &str, events: &Events) -> String {
         (events.misses, "touches met nothing"),
         (
             events.collapsed,
-            "plans went to a random place instead, because the belief was sure everywhere",
+            "plans went to a random place instead, because the belief was sure of the best one",
         ),
         (events.repeated, "plans went to a random place instead, because they repeated a target"),
     ];

@@ -2,7 +2,8 @@
 //!
 //! `kernel` says how alike two places are, `covariance` factors that of what was observed (whole
 //! in `dense`, row by row in `cholesky`), `posterior` predicts (Eq. 3 of Yi et al. 2016), `likelihood` scores
-//! hyperparameters and `fit` finds the best ones.
+//! hyperparameters, `fit` finds the best ones and `reduction` says what one more observation would
+//! tell.
 
 pub mod batch;
 pub mod cholesky;
@@ -17,6 +18,7 @@ pub mod observations;
 mod plain;
 pub mod posterior;
 pub mod range;
+pub mod reduction;
 mod search;
 
 pub use kernel::{Hyperparameters, Kernel};

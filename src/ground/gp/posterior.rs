@@ -11,8 +11,8 @@ use crate::ground::simd::{dot, widest};
 /// Buffers of a query, so that asking allocates nothing.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
-    slopes: Vec<f64>,
-    solved: Vec<f64>,
+    pub(super) slopes: Vec<f64>,
+    pub(super) solved: Vec<f64>,
 }
 
 /// The belief after the observations: mean and variance of the height at any place.
@@ -136,6 +136,23 @@ impl Posterior {
         (mean, correlations)
     }
 
+    /// As [`mean`](Self::mean), and writes its gradient with respect to the place.
+    pub fn mean_gradient(&self, place: &[f64], gradient: &mut [f64], scratch: &mut Scratch) -> f64 {
+        let lengths = &self.hyperparameters.length_scales;
+        let Scratch { solved, slopes } = scratch;
+        solved.resize(self.observations.len(), 0.0);
+        slopes.resize(self.observations.len(), 0.0);
+        self.observations.distances2(place.iter().copied(), lengths, 0, solved);
+        self.kernel.correlate_slope(solved, slopes);
+        for (axis, (slope, at)) in gradient.iter_mut().zip(place).enumerate() {
+            let column = self.observations.column(axis);
+            let terms = self.weights.iter().zip(slopes.iter()).zip(column);
+            let sum: f64 = terms.map(|((weight, slope), x)| weight * slope * (at - x)).sum();
+            *slope = 2.0 * sum / (lengths[axis] * lengths[axis]);
+        }
+        self.hyperparameters.mean + widest(|| dot(solved, &self.weights))
+    }
+
     /// Variance of the surface (without touch noise) k** − k*ᵀ·K⁻¹·k* at `place`, in [0, k**].
     pub fn variance(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
         scratch.solved.resize(self.observations.len(), 0.0);
@@ -166,6 +183,18 @@ impl Posterior {
             *slope = -4.0 * signal2 * sum / (lengths[axis] * lengths[axis]);
         }
         self.remaining(explained)
+    }
+
+    /// Writes L⁻¹·k*, and returns the share of the variance at `place` that is explained, its
+    /// square.
+    pub(super) fn whiten(&self, place: &[f64], out: &mut Vec<f64>) -> f64 {
+        out.resize(self.observations.len(), 0.0);
+        self.correlations(place, out);
+        self.factor.solve_lower(out)
+    }
+
+    pub(super) fn kernel(&self) -> &'static dyn Kernel {
+        self.kernel
     }
 
     pub(super) fn factor(&self) -> &Factor {

@@ -11,8 +11,8 @@ pub use error::StoreError;
 
 use self::error::io_error;
 use crate::trials::experiment::Experiment;
-use crate::trials::metrics::Truth;
 use crate::trials::row::TrialRow;
+use crate::trials::truth::Truth;
 use crate::world::Zone;
 use serde::Serialize;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -224,13 +224,13 @@ fn refuse_foreign(path: &Path) -> Result<(), StoreError> {
 fn surface(experiment: &Experiment, truth: &Truth) -> String {
     let mut text =
         String::from(if experiment.scene.zone.dimension() == 1 { "x_m" } else { "x_m,z_m" });
-    text += ",height_m\n";
-    for (place, height) in truth.places.iter().zip(&truth.heights_m) {
+    text += ",height_m,is_reachable\n";
+    for (i, place) in truth.places.iter().enumerate() {
         for coordinate in place {
             text += &format!("{coordinate},");
         }
-        text += &height.map_or(String::new(), |height| height.to_string());
-        text.push('\n');
+        let height = truth.heights_m[i].map_or(String::new(), |height| height.to_string());
+        text += &format!("{height},{}\n", u8::from(truth.is_reachable[i]));
     }
     text
 }
@@ -239,7 +239,7 @@ fn read_surface(path: &Path, zone: &Zone) -> Result<Truth, StoreError> {
     let bad =
         |line: usize, message: String| StoreError::BadRow { path: path.into(), line, message };
     let text = fs::read_to_string(path).map_err(io_error(path))?;
-    let (mut places, mut heights_m) = (Vec::new(), Vec::new());
+    let (mut places, mut heights_m, mut is_reachable) = (Vec::new(), Vec::new(), Vec::new());
     for (i, record) in csv::Reader::from_reader(text.as_bytes()).records().enumerate() {
         let record = record.map_err(|error| bad(i + 2, error.to_string()))?;
         let number = |field: &str| {
@@ -247,6 +247,7 @@ fn read_surface(path: &Path, zone: &Zone) -> Result<Truth, StoreError> {
             number.ok_or_else(|| bad(i + 2, format!("\"{field}\" is not a number")))
         };
         let mut fields = record.iter();
+        let reachable = fields.next_back().map(number).transpose()? == Some(1.0);
         let height =
             fields.next_back().filter(|field| !field.is_empty()).map(number).transpose()?;
         let place = fields.map(number).collect::<Result<Vec<f64>, _>>()?;
@@ -255,8 +256,9 @@ fn read_surface(path: &Path, zone: &Zone) -> Result<Truth, StoreError> {
         }
         places.push(place);
         heights_m.push(height);
+        is_reachable.push(reachable);
     }
-    Ok(Truth::new(zone, places, heights_m))
+    Ok(Truth::new(zone, places, heights_m, is_reachable))
 }
 
 /// Writes `name`, or, if the folder has it already, insists that it says the same.

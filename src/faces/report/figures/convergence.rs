@@ -19,10 +19,10 @@ struct Measure {
     /// Its standard error, for a band.
     error: fn(&Point) -> Option<f64>,
     /// A second, thin line.
-    other: Option<fn(&Point) -> f64>,
+    other: Option<fn(&Point) -> Option<f64>>,
 }
 
-const MEASURES: [Measure; 4] = [
+const MEASURES: [Measure; 7] = [
     Measure {
         title: "correlation R (Eq. 5), mean",
         is_log: false,
@@ -42,12 +42,35 @@ const MEASURES: [Measure; 4] = [
         is_log: true,
         value: |point| Some(MM.per_m * point.rmse_median_m),
         error: |_| None,
-        other: Some(|point| MM.per_m * point.rmse_mean_m),
+        other: Some(|point| Some(MM.per_m * point.rmse_mean_m)),
     },
     Measure {
         title: "RMSE in the outer tenth of the zone (mm): median",
         is_log: true,
         value: |point| Some(MM.per_m * point.edge_rmse_median_m?),
+        error: |_| None,
+        other: None,
+    },
+    Measure {
+        title: "median RMSE (mm) where the finger reaches, and where not (dotted)",
+        is_log: true,
+        value: |point| {
+            point.unreachable_rmse_median_m.and(point.reachable_rmse_median_m).map(|m| MM.per_m * m)
+        },
+        error: |_| None,
+        other: Some(|point| point.unreachable_rmse_median_m.map(|m| MM.per_m * m)),
+    },
+    Measure {
+        title: "share of the truth in the 95 % band, mean",
+        is_log: false,
+        value: |point| point.coverage_mean,
+        error: |_| None,
+        other: None,
+    },
+    Measure {
+        title: "lateral travel (m), mean",
+        is_log: false,
+        value: |point| Some(point.path_mean_m),
         error: |_| None,
         other: None,
     },
@@ -123,7 +146,7 @@ fn draw_measure(
     let values = points().filter_map(lowest).chain(points().filter_map(measure.value));
     let values = values.chain(constant);
     let y = match (measure.is_log, measure.other) {
-        (true, Some(other)) => Axis::log(values.chain(points().map(other))),
+        (true, Some(other)) => Axis::log(values.chain(points().filter_map(other))),
         (true, None) => Axis::log(values),
         (false, _) => Axis::around(values.chain([1.0]), 0.04, 5.0),
     };
@@ -170,7 +193,7 @@ fn draw_curve(
     }
     if let Some(other) = measure.other {
         let attributes = style::dashed(colour, 1.3, "1.5 3");
-        panel.curve(canvas, &over(&|point| Some(other(point))), &attributes);
+        panel.curve(canvas, &over(&other), &attributes);
     }
     panel.curve(canvas, &over(&measure.value), &style::stroke(colour, 2.0));
 }

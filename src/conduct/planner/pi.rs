@@ -1,0 +1,28 @@
+//! Seek the highest point by the probability of improvement (Kushner 1964).
+//!
+//! Φ(z) grows with z = (μ − best − margin) / σ, and z itself still tells places apart where Φ is
+//! 0 in floating point; so z is maximised.
+
+use super::{Belief, Entry, Plan, Planner, Search, improvement};
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "pi",
+    about: "seeks the highest point: probability of improvement",
+    make: |zone, settings, rng| Box::new(Pi { search: Search::new(zone, settings, rng) }),
+};
+
+struct Pi {
+    search: Search,
+}
+
+impl Planner for Pi {
+    fn plan(&mut self, belief: &Belief) -> Plan {
+        let Some(surface) = belief.surface() else { return self.search.anywhere() };
+        let goal = improvement::goal(surface, self.search.settings.pi.margin);
+        let score = self.search.differentiated(|place, scratch| {
+            let sd = belief.explorable_variance(place, &mut [], scratch).sqrt();
+            improvement::deviations(surface.mean(place, scratch), sd, goal)
+        });
+        self.search.plan(belief, score)
+    }
+}

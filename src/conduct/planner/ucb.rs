@@ -1,0 +1,25 @@
+//! Seek the highest point by its upper confidence bound (Srinivas et al. 2010): μ + κ·σ.
+
+use super::{Belief, Entry, Plan, Planner, Search};
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "ucb",
+    about: "seeks the highest point: upper confidence bound",
+    make: |zone, settings, rng| Box::new(Ucb { search: Search::new(zone, settings, rng) }),
+};
+
+struct Ucb {
+    search: Search,
+}
+
+impl Planner for Ucb {
+    fn plan(&mut self, belief: &Belief) -> Plan {
+        let Some(surface) = belief.surface() else { return self.search.anywhere() };
+        let sds = self.search.settings.ucb.sds;
+        let score = self.search.differentiated(|place, scratch| {
+            let sd = belief.explorable_variance(place, &mut [], scratch).sqrt();
+            surface.mean(place, scratch) + sds * sd
+        });
+        self.search.plan(belief, score)
+    }
+}
