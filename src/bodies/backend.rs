@@ -1,11 +1,13 @@
 //! One control tick of a body.
 
+use crate::things::arm::chain::MAX_JOINTS;
+use crate::things::arm::{Chain, Joints};
 use crate::things::finger::Frame;
 use nalgebra::{Point3, Vector3};
 use thiserror::Error;
 
 /// Joint velocities for the next tick.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Command {
     /// One entry per joint, in the order of [`Capabilities::joints`]: rad/s, or m/s where the
     /// joint slides.
@@ -13,7 +15,7 @@ pub struct Command {
 }
 
 /// What a body returns after a tick. Time stands in it and is never read from a clock.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reading {
     /// Since reset.
     pub time_s: f64,
@@ -23,9 +25,10 @@ pub struct Reading {
     pub qdot: Vec<f64>,
     /// What the force/torque sensor at the finger's mount says, if there is one.
     pub wrench: Option<Wrench>,
-    /// The newest tactile frame, if the finger has a sensor and one has arrived.
-    pub tactile: Option<Frame>,
-    /// Where the skin is loaded, in a scene without electrodes; a real body never knows it.
+    /// Tactile frames that arrived during the tick, oldest first.
+    pub frames: Vec<Frame>,
+    /// Where and how much the skin is loaded, in a scene that leaves out the sensor which would
+    /// tell; a real body never knows it.
     pub ideal: Option<IdealContact>,
     /// The command as it was really applied after limiting.
     pub applied: Command,
@@ -68,6 +71,36 @@ pub struct Capabilities {
     pub real_time: bool,
 }
 
+impl Capabilities {
+    /// Of a simulated `chain` with a tick of `period_s`.
+    pub fn of(chain: &Chain, period_s: f64) -> Self {
+        let joints = &chain.joints;
+        Self {
+            joints: joints.iter().map(|joint| joint.name.into()).collect(),
+            q_limits: joints.iter().map(|joint| joint.q_limits).collect(),
+            qdot_limits: joints.iter().map(|joint| joint.qdot_limit).collect(),
+            period_s,
+            resettable: true,
+            real_time: false,
+        }
+    }
+
+    /// The command as numbers, one for each joint.
+    ///
+    /// # Errors
+    /// [`Fault::Refused`] if one is missing, too many or not finite.
+    pub fn accept(&self, command: &Command) -> Result<Joints, Fault> {
+        let qdot = &command.qdot;
+        let fits = qdot.len() == self.joints.len()
+            && qdot.len() <= MAX_JOINTS
+            && qdot.iter().all(|value| value.is_finite());
+        match fits {
+            true => Ok(Joints::from_fn(|i, _| qdot.get(i).copied().unwrap_or(0.0))),
+            false => Err(Fault::Refused { values: qdot.clone() }),
+        }
+    }
+}
+
 /// Why a body or a touch could not go on. A fault is data: it reaches the trial's row.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum Fault {
@@ -84,6 +117,24 @@ pub enum Fault {
         time_s: f64,
         /// The state.
         state: Vec<f64>,
+    },
+    /// The fingertip's centre is inside the object: the skin no longer keeps them apart.
+    #[error("at {time_s} s the finger is inside the object, its tip at {p_wt:?}")]
+    Inside {
+        /// When.
+        time_s: f64,
+        /// The tip in `W`.
+        p_wt: [f64; 3],
+    },
+    /// A movement did not end in its time: its goal is out of reach, or something is in the way.
+    #[error("at {time_s} s the movement to {phase} has not ended; joints at {q:?}")]
+    Late {
+        /// Where it led.
+        phase: &'static str,
+        /// When.
+        time_s: f64,
+        /// Joint positions.
+        q: Vec<f64>,
     },
     /// The body stopped answering.
     #[error("no answer since {time_s} s")]
@@ -105,11 +156,12 @@ pub trait Backend: Send {
     ///
     /// # Errors
     /// If it cannot be reached or brought there.
-    fn reset(&mut self, seed: u64) -> Result<Reading, Fault>;
+    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault>;
 
-    /// Applies `command` for one period.
+    /// Applies `command` for one period. The reading stays the body's, so that a tick allocates
+    /// nothing.
     ///
     /// # Errors
     /// A fault ends the touch; the body is left at rest.
-    fn step(&mut self, command: &Command) -> Result<Reading, Fault>;
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault>;
 }

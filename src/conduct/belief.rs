@@ -132,7 +132,7 @@ impl Belief {
                 self.contacts.push(&place, contact.p_wc.y - self.zone.datum_y_m);
                 self.zone.distance(&place, target) <= REACHED_WITHIN
             }
-            Touch::Miss => false,
+            Touch::Miss | Touch::Overload => false,
         };
         if !reached {
             self.unreached.push(target.into());

@@ -24,8 +24,11 @@ pub struct TrialRow {
 pub struct TouchRow {
     /// Where the finger was sent: (x) or (x, z) in `W`.
     pub target: Vec<f64>,
-    /// The point of contact (x, y, z) in `W`; none for a miss.
+    /// The point of contact (x, y, z) in `W`; none for a miss or a touch broken off.
     pub contact: Option<[f64; 3]>,
+    /// Whether the touch was broken off: too much force, or no place in what the finger felt.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub overload: bool,
     /// Standard deviation that the planner saw at the target when it chose it, if it looked:
     /// the posterior's, given also that unreached targets are no news.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -53,6 +53,8 @@ pub struct Events {
     pub failures: usize,
     /// Touches that met nothing.
     pub misses: usize,
+    /// Touches broken off: too much force, or no place in what the finger felt.
+    pub overloads: usize,
     /// Plans that fell back because the belief was sure of the best place.
     pub collapsed: usize,
     /// Plans that fell back because they repeated a target.
@@ -122,7 +124,8 @@ pub fn events(rows: &[TrialRow], planner: &str) -> Events {
         };
         events.trials += 1;
         events.failures += usize::from(row.failure.is_some());
-        events.misses += count(|touch| touch.contact.is_none());
+        events.misses += count(|touch| touch.contact.is_none() && !touch.overload);
+        events.overloads += count(|touch| touch.overload);
         events.collapsed += count(|touch| touch.stall == Some(Stall::Collapsed));
         events.repeated += count(|touch| touch.stall == Some(Stall::Repeated));
     }

@@ -8,6 +8,7 @@ use crate::conduct::planner::{self, Plan, uniform};
 use crate::conduct::probe::{self, Touch};
 use crate::ground::seed;
 use crate::world::World;
+use rand::RngExt;
 use std::sync::Arc;
 
 /// Runs one trial of `planner` from start to end.
@@ -26,7 +27,13 @@ pub fn run(
     let zone = &world.scene().zone;
     let mut start = stream("initial touches");
     let mut planner = (planner.make)(zone, &experiment.planning, stream(planner.name));
-    let mut probe = probe::open(world);
+    let mut probe = match probe::open(world, stream("body").random()) {
+        Ok(probe) => probe,
+        Err(fault) => {
+            row.failure = Some(format!("before the first touch: {fault}"));
+            return row;
+        }
+    };
     let mut belief = Belief::new(zone.clone(), experiment.gp.clone());
     for count in 1..=experiment.touches {
         let plan = match count <= experiment.initial_touches {
@@ -50,8 +57,9 @@ pub fn run(
             target: plan.target,
             contact: match &touch {
                 Touch::Contact(contact) => Some(contact.p_wc.coords.into()),
-                Touch::Miss => None,
+                Touch::Miss | Touch::Overload => None,
             },
+            overload: touch == Touch::Overload,
             planned_sd_m: plan.sd_m,
             stall: plan.stall,
             fit: None,

@@ -1,11 +1,12 @@
 //! What there is: the object, the finger, the zone, and which body carries out a touch.
 
 use super::function::Function;
+use super::touch::TouchSettings;
 use super::zone::Zone;
 use crate::ground::config::{Checked, ConfigError, Loader, Rules};
 use crate::ground::geometry::surfaces;
 use crate::things::arm::ArmSettings;
-use crate::things::finger::Finger;
+use crate::things::finger::{Effects, Finger};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -30,6 +31,16 @@ pub struct Scene {
     /// The arm that carries the finger; without one, a stage of three slides does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmSettings>,
+    /// Optional physics of a body that feels, each a table of its own; the others leave it alone.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub effects: Effects,
+    /// How a touch is carried out by a body that moves.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub touch: TouchSettings,
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// How faithfully a touch is carried out, cheapest first.
@@ -40,6 +51,19 @@ pub enum Body {
     Function,
     /// The finger's hull is swept along −y to first contact on the exact mesh.
     Cast,
+    /// The soft finger is moved exactly as commanded and feels the exact mesh.
+    Kinematic,
+}
+
+impl Body {
+    /// As a scene file names it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Function => "function",
+            Self::Cast => "cast",
+            Self::Kinematic => "kinematic",
+        }
+    }
 }
 
 /// A mesh and where it stands.
@@ -149,15 +173,24 @@ impl Checked for Scene {
                     "no z_m: the surface of body = \"function\" is a curve over x".into()
                 });
             }
-            Body::Cast => {
+            Body::Cast | Body::Kinematic => {
+                let body = self.body.name();
                 rules.require("function", "(given)", self.function.is_none(), || {
-                    "no function: body = \"cast\" touches an object".into()
+                    format!("no function: body = \"{body}\" touches an object")
                 });
                 rules.require("object", "(none)", self.object.is_some(), || {
-                    "a table with a mesh, because body = \"cast\"".into()
+                    format!("a table with a mesh, because body = \"{body}\"")
                 });
             }
         }
+        rules.table("effects", &self.effects);
+        rules.table("touch", &self.touch);
+        let feels = self.body != Body::Kinematic || self.effects.skin.is_some();
+        rules.require("effects.skin", "(none)", feels, || {
+            "a table, because body = \"kinematic\" feels with a soft skin (a rigid finger is \
+             body = \"cast\")"
+                .into()
+        });
         if let Some(object) = &self.object {
             rules.table("object", object);
         }

@@ -10,6 +10,7 @@ use crate::ground::geometry::mesh::Mesh;
 use crate::ground::geometry::report::MeshReport;
 use crate::ground::geometry::surfaces;
 use crate::things::arm::{Chain, stage::stage};
+use crate::things::finger::Fingertip;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use thiserror::Error;
 
@@ -17,6 +18,7 @@ use thiserror::Error;
 pub struct World {
     scene: Scene,
     shape: Shape,
+    fingertip: Option<Fingertip>,
 }
 
 /// What is touched.
@@ -67,7 +69,7 @@ impl World {
             Body::Function => {
                 Shape::Function(scene.function.ok_or(WorldError::Missing { part: "function" })?)
             }
-            Body::Cast => {
+            Body::Cast | Body::Kinematic => {
                 let object = scene.object.as_ref().ok_or(WorldError::Missing { part: "object" })?;
                 let (mesh, report) = import(&object.mesh, object.unit.metres() * object.scale)?;
                 Shape::Mesh {
@@ -76,7 +78,9 @@ impl World {
                 }
             }
         };
-        let world = Self { scene, shape };
+        let fingertip =
+            (scene.effects.skin.is_some()).then(|| Fingertip::new(&scene.finger, &scene.effects));
+        let world = Self { scene, shape, fingertip };
         world.check_overlap()?;
         Ok(world)
     }
@@ -97,6 +101,11 @@ impl World {
             Shape::Function(_) => None,
             Shape::Mesh { bvh, .. } => Some(bvh.mesh()),
         }
+    }
+
+    /// The soft finger, if the scene has one.
+    pub fn fingertip(&self) -> Option<&Fingertip> {
+        self.fingertip.as_ref()
     }
 
     /// What carries the finger: the scene's arm, or a stage whose home is in front of the zone's

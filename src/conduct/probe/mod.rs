@@ -2,10 +2,12 @@
 
 mod cast;
 mod function;
+pub mod servo;
 
 pub use cast::rest_y_m;
 
 use crate::bodies::backend::Fault;
+use crate::bodies::kinematic::Kinematic;
 use crate::world::World;
 use crate::world::scene::Body;
 use nalgebra::{Point3, Vector3};
@@ -18,6 +20,8 @@ pub enum Touch {
     Contact(Contact),
     /// The finger travelled its whole way and met nothing.
     Miss,
+    /// Force or pressure rose above its limit, or the place of contact could not be told.
+    Overload,
 }
 
 /// Where a touch met the surface.
@@ -38,12 +42,20 @@ pub trait Probe: Send {
     fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault>;
 }
 
-/// The probe that the scene's body asks for.
-pub fn open(world: &Arc<World>) -> Box<dyn Probe> {
-    match world.scene().body {
-        Body::Function => Box::new(function::FunctionProbe::new(world.clone())),
-        Body::Cast => Box::new(cast::Cast::new(world.clone())),
-    }
+/// The probe that the scene's body asks for; `seed` is all the randomness of its sensors.
+///
+/// # Errors
+/// If the body cannot be brought to its start.
+pub fn open(world: &Arc<World>, seed: u64) -> Result<Box<dyn Probe>, Fault> {
+    let world = Arc::clone(world);
+    Ok(match world.scene().body {
+        Body::Function => Box::new(function::FunctionProbe::new(world)),
+        Body::Cast => Box::new(cast::Cast::new(world)),
+        Body::Kinematic => {
+            let body = Kinematic::new(&world).ok_or(Fault::Refused { values: Vec::new() })?;
+            Box::new(servo::Servo::new(world, Box::new(body), seed)?)
+        }
+    })
 }
 
 fn refuse_unless_finite(target: &[f64]) -> Result<(), Fault> {

@@ -140,6 +140,7 @@ pub fn described(planner: &str, events: &Events) -> String {
     let counts = [
         (events.failures, "failed trials"),
         (events.misses, "touches met nothing"),
+        (events.overloads, "touches were broken off: too much force, or no place was felt"),
         (
             events.collapsed,
             "plans went to a random place instead, because the belief was sure of the best one",

@@ -36,6 +36,12 @@ impl Finger {
         Vector3::new(0.0, forward, -up) * self.length_m
     }
 
+    /// Farthest that any part of the soft skin around the hemisphere's centre lies from it: the
+    /// pad's corner is 8.7 mm out where the sides are 7.0 (NVIDIA's FEM mesh).
+    pub fn bulge_m(&self) -> f64 {
+        8.75 / 7.0 * self.radius_m
+    }
+
     /// Attitude of `T` in `W`: +x distal, towards -y and up by the pitch; the pad, -z, towards
     /// the object.
     pub fn attitude_w(&self) -> UnitQuaternion<f64> {

@@ -1,0 +1,85 @@
+//! An arm or stage that moves exactly as commanded, carrying the soft finger.
+
+use super::backend::{Backend, Capabilities, Command, Fault, Reading};
+use super::sense::Sense;
+use crate::things::arm::{Chain, Joints};
+use crate::things::finger::{Load, Motion};
+use crate::world::World;
+use std::sync::Arc;
+
+/// No masses, no servo: joint positions are the sum of the velocities commanded.
+pub struct Kinematic {
+    chain: Chain,
+    capabilities: Capabilities,
+    sense: Sense,
+    q: Joints,
+    tick: u64,
+    reading: Reading,
+}
+
+impl Kinematic {
+    /// At the chain's home; none in a world without a soft finger.
+    pub fn new(world: &Arc<World>) -> Option<Self> {
+        let chain = world.chain()?;
+        let sense = Sense::new(Arc::clone(world), 0)?;
+        let capabilities = Capabilities::of(&chain, world.scene().touch.period_s);
+        let q = chain.home;
+        let mut body = Self { chain, capabilities, sense, q, tick: 0, reading: Reading::default() };
+        body.report(&Load::default(), &Joints::zeros());
+        Some(body)
+    }
+
+    fn time_s(&self) -> f64 {
+        self.tick as f64 * self.capabilities.period_s
+    }
+
+    fn report(&mut self, load: &Load, qdot: &Joints) {
+        let joints = self.chain.joints.len();
+        let copy = |to: &mut Vec<f64>, from: &Joints| {
+            to.clear();
+            to.extend(from.iter().take(joints));
+        };
+        self.reading.time_s = self.time_s();
+        copy(&mut self.reading.q, &self.q);
+        copy(&mut self.reading.qdot, qdot);
+        copy(&mut self.reading.applied.qdot, qdot);
+        self.sense.report(load, &mut self.reading);
+    }
+}
+
+impl Backend for Kinematic {
+    fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
+        self.sense.reset(seed);
+        self.q = self.chain.home;
+        self.tick = 0;
+        self.report(&Load::default(), &Joints::zeros());
+        Ok(&self.reading)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        let wanted = self.capabilities.accept(command)?;
+        let period_s = self.capabilities.period_s;
+        let mut qdot = wanted;
+        for (joint, qdot) in self.chain.joints.iter().zip(qdot.iter_mut()) {
+            *qdot = qdot.clamp(-joint.qdot_limit, joint.qdot_limit);
+        }
+        let q = self.chain.clamp(&(self.q + qdot * period_s));
+        let qdot = (q - self.q) / period_s;
+        let (x_wt, jacobian) = self.chain.jacobian(&q);
+        let twist = jacobian * qdot;
+        let motion = Motion {
+            x_wt,
+            linear_w: twist.fixed_rows::<3>(0).into(),
+            angular_w: twist.fixed_rows::<3>(3).into(),
+        };
+        let load = self.sense.step(&motion, period_s)?;
+        self.q = q;
+        self.tick += 1;
+        self.report(&load, &qdot);
+        Ok(&self.reading)
+    }
+}

@@ -1,0 +1,231 @@
+//! One touch by a body that moves and feels: travel, tare, approach, settle, read, retract.
+
+mod line;
+mod watch;
+
+use super::{Contact, Probe, Touch, refuse_unless_finite};
+use crate::bodies::backend::{Backend, Command, Fault, Reading};
+use crate::conduct::control::{ControlError, Controller, Goal};
+use crate::world::World;
+use crate::world::touch::TouchSettings;
+use crate::world::world::CLEARANCE_M;
+use line::Line;
+use nalgebra::{Isometry3, Vector3};
+use std::sync::Arc;
+use watch::{Alarm, Watch};
+
+/// A movement has arrived when the tip is this near to its end; chosen: below what a touch
+/// resolves.
+const ARRIVED_M: f64 = 5e-5;
+
+/// Drives any [`Backend`] through touches. The same code drives simulators, recordings and the
+/// real arm.
+pub struct Servo {
+    world: Arc<World>,
+    body: Box<dyn Backend>,
+    control: Controller,
+    settings: TouchSettings,
+    watch: Watch,
+    command: Command,
+    state: State,
+}
+
+/// What is kept of the last reading.
+#[derive(Default)]
+struct State {
+    time_s: f64,
+    q: Vec<f64>,
+}
+
+impl Servo {
+    /// Brings `body`, which moves the world's chain, to its start.
+    ///
+    /// # Errors
+    /// If the body cannot be brought there.
+    pub fn new(world: Arc<World>, mut body: Box<dyn Backend>, seed: u64) -> Result<Self, Fault> {
+        let chain = world.chain().ok_or(Fault::Refused { values: Vec::new() })?;
+        let settings = world.scene().touch.clone();
+        let joints = chain.joints.len();
+        let control = Controller::new(chain, body.capabilities().period_s).map_err(refused)?;
+        let mut state = State::default();
+        state.take(body.reset(seed)?);
+        Ok(Self {
+            watch: Watch::new(&settings),
+            command: Command { qdot: vec![0.0; joints] },
+            world,
+            body,
+            control,
+            settings,
+            state,
+        })
+    }
+
+    /// Time of the body since its start.
+    pub fn time_s(&self) -> f64 {
+        self.state.time_s
+    }
+
+    /// Pose of the fingertip by forward kinematics.
+    fn x_wt(&self) -> Isometry3<f64> {
+        let chain = self.control.chain();
+        chain.joints_from(&self.state.q).map_or(chain.base, |q| chain.forward(&q))
+    }
+
+    fn period_s(&self) -> f64 {
+        self.body.capabilities().period_s
+    }
+
+    /// One tick towards `goal`.
+    fn tick(&mut self, goal: &Goal) -> Result<(), Fault> {
+        let motion = self.control.step(&self.state.q, goal).map_err(refused)?;
+        self.command.qdot.iter_mut().zip(motion.qdot.iter()).for_each(|(to, from)| *to = *from);
+        let reading = self.body.step(&self.command)?;
+        self.watch.take(reading);
+        self.state.take(reading);
+        Ok(())
+    }
+
+    /// One tick that takes the speed away as fast as the limits allow.
+    fn brake(&mut self) -> Result<(), Fault> {
+        let qdot = self.control.halt(&self.state.q).map_err(refused)?;
+        self.command.qdot.iter_mut().zip(qdot.iter()).for_each(|(to, from)| *to = *from);
+        let reading = self.body.step(&self.command)?;
+        self.watch.take(reading);
+        self.state.take(reading);
+        Ok(())
+    }
+
+    /// Moves straight to `to`, until there or, if `alert`, until something is felt.
+    fn go(
+        &mut self,
+        phase: &'static str,
+        to: Isometry3<f64>,
+        speed_m_s: f64,
+        alert: bool,
+    ) -> Result<Option<Alarm>, Fault> {
+        let mut line = Line::new(self.x_wt().translation.vector, to, speed_m_s);
+        let deadline_s = self.state.time_s + line.patience_s();
+        let period_s = self.period_s();
+        loop {
+            let goal = line.advance(period_s);
+            self.tick(&goal)?;
+            if let Some(alarm) = self.watch.alarm().filter(|_| alert) {
+                return Ok(Some(alarm));
+            }
+            let away = self.x_wt().translation.vector - to.translation.vector;
+            if line.is_done() && away.norm() < ARRIVED_M {
+                return Ok(None);
+            }
+            if self.state.time_s > deadline_s {
+                let State { time_s, q } = &self.state;
+                return Err(Fault::Late { phase, time_s: *time_s, q: q.clone() });
+            }
+        }
+    }
+
+    /// Stands still until `count` more frames have arrived, or their time has passed in a body
+    /// without sensor.
+    fn rest(&mut self, count: usize) -> Result<Option<Alarm>, Fault> {
+        self.watch.forget();
+        let here = Goal::still(self.x_wt());
+        let until_s = self.state.time_s + count as f64 * FRAME_S;
+        let deadline_s = until_s + SILENCE_S;
+        while self.watch.frames().len() < count {
+            if !self.watch.has_sensor() && self.state.time_s >= until_s {
+                break;
+            }
+            if self.state.time_s > deadline_s {
+                return Err(Fault::Lost { time_s: self.watch.heard_s() });
+            }
+            self.tick(&here)?;
+            if self.watch.alarm() == Some(Alarm::Overload) {
+                return Ok(Some(Alarm::Overload));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The tip in front of the object, over `target`.
+    fn standoff(&self, target: &[f64]) -> Isometry3<f64> {
+        let scene = self.world.scene();
+        let mut p_wt = scene.zone.point(target, 0.0);
+        p_wt.y = self.extent_y().1 + scene.finger.bulge_m() + self.settings.standoff_m;
+        Isometry3::from_parts(p_wt.into(), scene.finger.attitude_w())
+    }
+
+    /// Smallest and largest y of the object.
+    fn extent_y(&self) -> (f64, f64) {
+        self.world.mesh().map_or((0.0, 0.0), |mesh| {
+            let (low, high) = mesh.bounds();
+            (low.y, high.y)
+        })
+    }
+
+    /// Presses on until the finger has settled and reads the contact.
+    fn read(&mut self) -> Result<Option<Contact>, Fault> {
+        let until_s = self.state.time_s + self.settings.settle_s;
+        while self.state.time_s < until_s {
+            self.brake()?;
+            if self.watch.alarm() == Some(Alarm::Overload) {
+                return Ok(None);
+            }
+        }
+        if self.rest(self.settings.frames)?.is_some() {
+            return Ok(None);
+        }
+        let x_wt = self.x_wt();
+        Ok(self.watch.contact(self.settings.point).map(|(p_tc, normal_t)| Contact {
+            p_wc: x_wt * p_tc,
+            normal_w: x_wt.rotation * normal_t,
+        }))
+    }
+}
+
+/// Time between tactile frames.
+const FRAME_S: f64 = 0.01;
+
+/// Silence of a sensor after which it counts as lost; chosen, ten batches of five frames.
+const SILENCE_S: f64 = 0.5;
+
+impl Probe for Servo {
+    /// The centre of the fingertip's hemisphere travels over the target and approaches along −y.
+    fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault> {
+        refuse_unless_finite(target)?;
+        let TouchSettings { travel_m_s, approach_m_s, frames, .. } = self.settings;
+        let above = self.standoff(target);
+        self.go("the stand-off", above, travel_m_s, false)?;
+        self.rest(frames)?;
+        self.watch.tare();
+        let mut below = above;
+        below.translation.y = self.extent_y().0 - self.world.scene().finger.radius_m - CLEARANCE_M;
+        let alarm = self.go("the object", below, approach_m_s, true)?;
+        let touch = match alarm {
+            None => Touch::Miss,
+            Some(Alarm::Overload) => Touch::Overload,
+            Some(Alarm::Contact) => self.read()?.map_or(Touch::Overload, Touch::Contact),
+        };
+        let here = self.x_wt().translation.vector;
+        let back = Isometry3::from_parts(
+            Vector3::new(here.x, above.translation.y, here.z).into(),
+            above.rotation,
+        );
+        self.go("the way back", back, travel_m_s, false)?;
+        Ok(touch)
+    }
+}
+
+impl State {
+    fn take(&mut self, reading: &Reading) {
+        self.time_s = reading.time_s;
+        self.q.clone_from(&reading.q);
+    }
+}
+
+fn refused(error: ControlError) -> Fault {
+    let values = match error {
+        ControlError::NotFinite => vec![f64::NAN],
+        ControlError::Joints { expected, found } => vec![expected as f64, found as f64],
+        ControlError::OutOfReach { distance_m, angle_rad } => vec![distance_m, angle_rad],
+    };
+    Fault::Refused { values }
+}

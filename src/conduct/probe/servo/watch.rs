@@ -1,0 +1,128 @@
+//! What the finger says while it moves: contact, too much force, and where.
+
+use crate::bodies::backend::{IdealContact, Reading};
+use crate::things::finger::contact_point::{self, Detector};
+use crate::things::finger::{Frame, Tare};
+use crate::world::touch::{Point, TouchSettings};
+use nalgebra::{Point3, Vector3};
+
+/// What ends an approach.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Alarm {
+    /// The object is felt.
+    Contact,
+    /// Force or pressure is above its limit.
+    Overload,
+}
+
+/// The readings of one touch, as far as they matter.
+pub(super) struct Watch {
+    settings: TouchSettings,
+    detector: Detector,
+    touching: bool,
+    tare: Option<Tare>,
+    /// Frames since [`forget`](Self::forget).
+    frames: Vec<Frame>,
+    has_sensor: bool,
+    heard_s: f64,
+    ideal: Option<IdealContact>,
+    force_n: f64,
+    force_at_rest_n: Vector3<f64>,
+    wrench_n: Vector3<f64>,
+}
+
+impl Watch {
+    pub(super) fn new(settings: &TouchSettings) -> Self {
+        Self {
+            settings: settings.clone(),
+            detector: Detector::new(settings.detection.clone()),
+            touching: false,
+            tare: None,
+            frames: Vec::new(),
+            has_sensor: false,
+            heard_s: 0.0,
+            ideal: None,
+            force_n: 0.0,
+            force_at_rest_n: Vector3::zeros(),
+            wrench_n: Vector3::zeros(),
+        }
+    }
+
+    /// Takes in what a tick brought.
+    pub(super) fn take(&mut self, reading: &Reading) {
+        for frame in &reading.frames {
+            self.has_sensor = true;
+            self.heard_s = reading.time_s;
+            if let Some(tare) = &self.tare {
+                self.touching = self.detector.update(tare, frame);
+            }
+            self.frames.push(frame.clone());
+        }
+        self.ideal = reading.ideal;
+        if let Some(wrench) = &reading.wrench {
+            self.wrench_n = wrench.force_n;
+        }
+        let ideal_n = reading.ideal.map_or(0.0, |ideal| ideal.force_n);
+        self.force_n = (self.wrench_n - self.force_at_rest_n).norm().max(ideal_n);
+    }
+
+    /// What is felt now.
+    pub(super) fn alarm(&self) -> Option<Alarm> {
+        let pressure = (self.tare.as_ref().and_then(|tare| tare.pdc_counts))
+            .zip(self.frames.last().and_then(|frame| frame.pdc_counts))
+            .map(|(rest, now)| now - rest);
+        if self.force_n > self.settings.force_limit_n
+            || pressure.is_some_and(|rise| rise > self.settings.pressure_limit_counts)
+        {
+            return Some(Alarm::Overload);
+        }
+        let felt = match pressure {
+            Some(_) => self.touching,
+            None => self.force_n > self.settings.detection_n,
+        };
+        felt.then_some(Alarm::Contact)
+    }
+
+    /// What was felt since [`forget`](Self::forget) is the rest.
+    pub(super) fn tare(&mut self) {
+        self.tare = Some(Tare::of(&self.frames));
+        self.detector = Detector::new(self.settings.detection.clone());
+        self.touching = false;
+        self.force_at_rest_n = self.wrench_n;
+    }
+
+    /// Drops the frames so far.
+    pub(super) fn forget(&mut self) {
+        self.frames.clear();
+    }
+
+    pub(super) fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    pub(super) fn has_sensor(&self) -> bool {
+        self.has_sensor
+    }
+
+    /// When the last frame came.
+    pub(super) fn heard_s(&self) -> f64 {
+        self.heard_s
+    }
+
+    /// The point of contact in `T` and the object's normal there, towards the finger: by Eq. 1
+    /// from the frames since [`forget`](Self::forget), or the exact one where there are no
+    /// electrodes.
+    pub(super) fn contact(&self, point: Point) -> Option<(Point3<f64>, Vector3<f64>)> {
+        if let Some(IdealContact { p_tc, normal_t, .. }) = self.ideal {
+            return Some((p_tc, normal_t));
+        }
+        let mean = Tare::of(&self.frames);
+        let mean = Frame { electrode_counts: mean.electrode_counts, ..Frame::default() };
+        let found = contact_point::locate(self.tare.as_ref()?, &mean)?;
+        let p_tc = match point {
+            Point::Skin => found.surface_t,
+            Point::Electrodes => found.centroid_t,
+        };
+        Some((p_tc, -found.normal_t))
+    }
+}
