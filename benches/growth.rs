@@ -60,6 +60,7 @@ fn measure() -> Vec<Curve> {
         signal_sd: 1.0,
         length_scales: vec![0.2, 0.4],
         noise_sd: 1e-3,
+        slope_noise_sd: 0.0,
         mean: 0.0,
     };
     let bounds = SearchBox {
@@ -68,6 +69,7 @@ fn measure() -> Vec<Curve> {
         noise_ratio: (1e-4, 1e-2).into(),
         signal_sd: (1e-3, 1e3).into(),
         noise_sd: None,
+        slope_noise_ratio: None,
     };
     let curve = |name, colour, expected| Curve { name, colour, expected, seconds: Vec::new() };
     let mut fit = curve("cold fit", "#0072b2", 3.0);

@@ -27,7 +27,13 @@ fn touches(count: usize) -> Observations {
 }
 
 fn hyperparameters() -> Hyperparameters {
-    Hyperparameters { signal_sd: 1.0, length_scales: vec![0.2, 0.4], noise_sd: 1e-3, mean: 0.0 }
+    Hyperparameters {
+        signal_sd: 1.0,
+        length_scales: vec![0.2, 0.4],
+        noise_sd: 1e-3,
+        slope_noise_sd: 0.0,
+        mean: 0.0,
+    }
 }
 
 fn gaussian_process(c: &mut Criterion) {
@@ -37,6 +43,7 @@ fn gaussian_process(c: &mut Criterion) {
         noise_ratio: (1e-4, 1e-2).into(),
         signal_sd: (1e-3, 1e3).into(),
         noise_sd: None,
+        slope_noise_ratio: None,
     };
     let mut group = c.benchmark_group("gp");
     for count in [20, 50, 200] {

@@ -2,8 +2,10 @@
 
 mod cast;
 mod function;
+mod swept;
 
 pub use cast::rest_y_m;
+pub use swept::Swept;
 
 use crate::bodies::backend::Fault;
 use crate::world::World;
@@ -36,6 +38,11 @@ pub trait Probe: Send {
     /// # Errors
     /// A fault of the body, or a target that is not finite.
     fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault>;
+
+    /// The space that the last touch found free; none if it is not known.
+    fn swept(&self) -> Option<Swept> {
+        None
+    }
 }
 
 /// The probe that the scene's body asks for.
