@@ -107,6 +107,8 @@ fn touch(experiment: &Experiment, trial: u32, count: u32) -> TouchRow {
     let is_fitted = count >= experiment.initial_touches;
     TouchRow {
         contact: height_m(&target).map(|height_m| zone.point(&target, height_m).coords.into()),
+        normal: None,
+        tip: None,
         target,
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),
         stall: None,

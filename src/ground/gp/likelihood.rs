@@ -169,7 +169,8 @@ impl<'a> Likelihood<'a> {
             for j in columns {
                 let weight = self.weights[j] / signal2;
                 let [on, inverse @ ..] = self.dense.inverse_column(j) else { return };
-                trace += (weight * self.weights[j] - on) * observations.height_noise2(j, noise);
+                trace +=
+                    (weight * self.weights[j] - on) * observations.height_noise2(j, 1.0.into());
                 let (slopes, others) = rest.split_at_mut(inverse.len());
                 rest = others;
                 let weights = &self.weights[j + 1..];
@@ -192,7 +193,8 @@ impl<'a> Likelihood<'a> {
                 }
             }
         }
-        by_noise.iter_mut().take(1).for_each(|by_noise| *by_noise = trace);
+        let by_height = noise.height * noise.height * trace;
+        by_noise.iter_mut().take(1).for_each(|by_noise| *by_noise = by_height);
     }
 
     /// The same where slopes were observed, pair of places by pair; and the slopes, counted per
