@@ -180,15 +180,18 @@ impl Belief {
         }
     }
 
-    /// The slopes that a normal means, if they are asked for, and how much noisier they are than those
-    /// of a surface square to the approach: an angle's error dθ is one of (1 + g²)·dθ in the slope
-    /// g = tan θ.
+    /// The slopes (g_x, g_z) = (−n_x, −n_z) / n_y that a normal n means, if they are asked for, and how
+    /// much noisier they are than those of a surface square to the approach.
+    ///
+    /// Of an error dθ of the normal, √(1 + g²)·dθ reaches the slope across the steepest way and
+    /// (1 + g²)·dθ that along it. The smaller is taken for both, chosen: with the larger, a curve as
+    /// steep as the toy is passed off as noise.
     fn slope(&self, normal_w: &Vector3<f64>) -> Option<(Vec<f64>, f64)> {
         let is_usable = self.settings.normals
             && self.kernel.has_slopes()
             && normal_w.y >= NORMAL_Y_MIN * normal_w.norm();
         let slopes = [-normal_w.x / normal_w.y, -normal_w.z / normal_w.y];
-        let noise = 1.0 + slopes.iter().map(|slope| slope * slope).sum::<f64>();
+        let noise = (1.0 + slopes.iter().map(|slope| slope * slope).sum::<f64>()).sqrt();
         is_usable.then(|| (slopes[..self.zone.dimension()].into(), noise))
     }
 
