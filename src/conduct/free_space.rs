@@ -2,20 +2,22 @@
 //!
 //! Where the belief's mean rises above what the finger has swept, the bound is taken in by assumed
 //! density filtering, expectation propagation's first pass (Minka 2001): at that place the normal
-//! belief N(μ, σ²) is cut off at the bound b, softened by the touch noise n, which leaves
+//! belief N(μ, σ²) is cut off at the bound b, softened by n, which leaves
 //! (Rasmussen & Williams 2006, Eq. 3.58, with z = (b − μ) / √(σ² + n²) and h = φ(z) / Φ(z))
 //!
 //! * mean μ − σ²·h / √(σ² + n²)
 //! * variance σ² − σ⁴·h·(z + h) / (σ² + n²)
 //!
 //! and the height with the noise that would have brought N(μ, σ²) there is observed. Mean and variance
-//! are then those of the cut distribution at that place, and follow from it elsewhere. Bounds that the
+//! are then those of the cut distribution at that place, and follow from it elsewhere; unless that noise
+//! were below n, which it then is: a belief that contradicts the bound by many standard deviations is
+//! wrong, and a sharp correction of it would swing elsewhere. Bounds that the
 //! mean keeps are left out, though they too would lower it a little; the fit of the hyperparameters
 //! does not see the bounds.
 
 use super::probe::Swept;
 use crate::ground::gp::posterior::Scratch;
-use crate::ground::gp::{Observation, Posterior};
+use crate::ground::gp::{Hyperparameters, Observation, Posterior};
 use crate::ground::normal;
 use crate::world::Zone;
 
@@ -25,6 +27,10 @@ const PER_SIDE: usize = 41;
 
 /// Places at which a belief is cut at most; chosen, a few for every touch that can still violate one.
 const CUTS_MAX: usize = 16;
+
+/// Least softness of a bound, as a fraction of the signal's standard deviation; chosen, the largest
+/// touch noise that is fitted by default.
+const SOFTNESS_MIN: f64 = 1e-2;
 
 /// The lowest bound so far, on a grid over the zone.
 pub(super) struct Ceiling {
@@ -49,10 +55,12 @@ impl Ceiling {
         }
     }
 
-    /// Cuts the belief where its mean is above the bound by more than the noise, where most first, at
+    /// Cuts the belief where its mean is above the bound by more than its softness, where most first,
+    /// at
     /// each place once.
     pub(super) fn cut(&self, belief: &mut Posterior) {
-        let noise_sd = belief.hyperparameters().noise_sd;
+        let &Hyperparameters { noise_sd, signal_sd, .. } = belief.hyperparameters();
+        let soft_sd = noise_sd.max(SOFTNESS_MIN * signal_sd);
         let mut scratch = Scratch::default();
         let mut bounds: Vec<(&[f64], f64)> = self.bounds().collect();
         for _ in 0..CUTS_MAX {
@@ -63,15 +71,15 @@ impl Ceiling {
             let Some((worst, largest)) = excesses.max_by(|a, b| a.1.total_cmp(&b.1)) else {
                 return;
             };
-            if largest <= noise_sd {
+            if largest <= soft_sd {
                 return;
             }
             let (place, height_m) = bounds.swap_remove(worst);
             let variance = belief.variance(place, &mut scratch);
-            let Some((height, sd)) = site(height_m + largest, variance, height_m, noise_sd) else {
+            let Some((height, sd)) = site(height_m + largest, variance, height_m, soft_sd) else {
                 continue;
             };
-            let cut = Observation { place, height, noise: sd / noise_sd, slope: None };
+            let cut = Observation { place, height, noise: sd.max(soft_sd) / noise_sd, slope: None };
             if belief.take_in(&cut).is_err() {
                 return;
             }
@@ -86,8 +94,8 @@ impl Ceiling {
 
 /// The observation (height, standard deviation) that takes N(μ, σ²) to its part below a bound;
 /// none where the belief is too sure to be moved.
-fn site(mean: f64, variance: f64, bound: f64, noise_sd: f64) -> Option<(f64, f64)> {
-    let spread = (variance + noise_sd * noise_sd).sqrt();
+fn site(mean: f64, variance: f64, bound: f64, soft_sd: f64) -> Option<(f64, f64)> {
+    let spread = (variance + soft_sd * soft_sd).sqrt();
     let z = (bound - mean) / spread;
     let h = normal::inverse_mills(z);
     let share = variance / (spread * spread);
