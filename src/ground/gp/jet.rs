@@ -114,8 +114,8 @@ impl Jet {
         let PairWeights { both, slopes, pairs } = weights;
         let pair = |d: usize, e: usize| pairs[d * dimension + e];
         let (mut bend, mut along, mut trace) = (0.0, 0.0, 0.0);
-        for d in 0..dimension {
-            along += slopes[d] * step(d);
+        for (d, slope) in slopes.iter().enumerate() {
+            along += slope * step(d);
             trace += pair(d, d);
             bend += (0..dimension).map(|e| pair(d, e) * step(d) * step(e)).sum::<f64>();
         }
