@@ -22,7 +22,14 @@ fn toy(x: f64) -> f64 {
 /// The ranges of noise and signal that a belief searches by default.
 fn search_box(mean: Mean, length_scales: Vec<Range>) -> SearchBox {
     let (noise_ratio, signal_sd) = ((1e-4, 1e-2).into(), (1e-3, 1e3).into());
-    SearchBox { mean, length_scales, noise_ratio, signal_sd, noise_sd: None }
+    SearchBox {
+        mean,
+        length_scales,
+        noise_ratio,
+        signal_sd,
+        noise_sd: None,
+        slope_noise_ratio: None,
+    }
 }
 
 /// The slow twin of a fit: the profiled likelihood on a dense grid over the same box.

@@ -38,6 +38,7 @@ impl Case {
             signal_sd: self.signal_sd,
             length_scales: self.length_scales.clone(),
             noise_sd: self.noise_sd,
+            slope_noise_sd: 0.0,
             mean: 0.0,
         }
     }
@@ -109,7 +110,13 @@ fn likelihood_and_gradient_keep_the_digits_the_condition_number_allows() {
 
 #[test]
 fn one_touch_gives_the_closed_form() {
-    let at = Hyperparameters { signal_sd: 2.0, length_scales: vec![0.5], noise_sd: 0.1, mean: 0.0 };
+    let at = Hyperparameters {
+        signal_sd: 2.0,
+        length_scales: vec![0.5],
+        noise_sd: 0.1,
+        slope_noise_sd: 0.0,
+        mean: 0.0,
+    };
     let ours = posterior(at, observations([(&[0.3][..], 1.5)]));
     let mut scratch = Scratch::default();
     for x in [-1.0, 0.3, 0.31, 4.0] {
@@ -122,7 +129,13 @@ fn one_touch_gives_the_closed_form() {
 
 #[test]
 fn coinciding_places_without_noise_need_jitter_and_say_so() {
-    let at = Hyperparameters { signal_sd: 1.0, length_scales: vec![1.0], noise_sd: 0.0, mean: 0.0 };
+    let at = Hyperparameters {
+        signal_sd: 1.0,
+        length_scales: vec![1.0],
+        noise_sd: 0.0,
+        slope_noise_sd: 0.0,
+        mean: 0.0,
+    };
     let twice = observations([(&[0.0][..], 1.0), (&[0.0][..], 1.0), (&[0.5][..], 0.0)]);
     let ours = posterior(at, twice);
     assert!(ours.jitter() > 0.0 && ours.jitter() < 1e-12, "{:e}", ours.jitter());
@@ -133,7 +146,13 @@ fn coinciding_places_without_noise_need_jitter_and_say_so() {
 fn any_belief() -> impl Strategy<Value = (Hyperparameters, Vec<([f64; 2], f64)>)> {
     let touch = ([-1.0..1.0f64, -1.0..1.0f64], -1.0..1.0f64);
     let at = (0.1..3.0f64, 0.1..2.0f64, 0.1..2.0f64, 1e-3..0.3f64).prop_map(|(s, a, b, ratio)| {
-        Hyperparameters { signal_sd: s, length_scales: vec![a, b], noise_sd: s * ratio, mean: 0.0 }
+        Hyperparameters {
+            signal_sd: s,
+            length_scales: vec![a, b],
+            noise_sd: s * ratio,
+            slope_noise_sd: 0.0,
+            mean: 0.0,
+        }
     });
     (at, proptest::collection::vec(touch, 1..25))
 }

@@ -39,6 +39,7 @@ fn search_box(touches: &Observations, side: f64, noisiest: f64) -> SearchBox {
         noise_ratio: (1e-4, noisiest).into(),
         signal_sd: (1e-3 * scale, 1e3 * scale).into(),
         noise_sd: None,
+        slope_noise_ratio: None,
     }
 }
 
@@ -204,6 +205,7 @@ fn a_thousand_additions_equal_one_factorisation() {
         signal_sd: 0.8,
         length_scales: vec![0.02],
         noise_sd: 0.05,
+        slope_noise_sd: 0.0,
         mean: 0.0,
     };
     let mut grown = Posterior::new(&KERNEL, at.clone(), Observations::new(1)).unwrap();

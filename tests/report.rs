@@ -84,6 +84,7 @@ fn touch(experiment: &Experiment, trial: u32, count: u32) -> TouchRow {
             signal_sd: 0.05,
             length_scales: zone.extents_m().iter().map(|side| 0.3 * side).collect(),
             noise_sd: 1e-4,
+            slope_noise_sd: 0.0,
             mean: 0.0,
         },
         log_likelihood: 0.0,
@@ -106,6 +107,8 @@ fn touch(experiment: &Experiment, trial: u32, count: u32) -> TouchRow {
     let is_fitted = count >= experiment.initial_touches;
     TouchRow {
         contact: height_m(&target).map(|height_m| zone.point(&target, height_m).coords.into()),
+        normal: None,
+        tip: None,
         target,
         overload: false,
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),

@@ -17,7 +17,13 @@ pub fn touches(count: usize) -> Observations {
 }
 
 pub fn hyperparameters() -> Hyperparameters {
-    Hyperparameters { signal_sd: 1.0, length_scales: vec![0.2, 0.4], noise_sd: 1e-3, mean: 0.0 }
+    Hyperparameters {
+        signal_sd: 1.0,
+        length_scales: vec![0.2, 0.4],
+        noise_sd: 1e-3,
+        slope_noise_sd: 0.0,
+        mean: 0.0,
+    }
 }
 
 /// The ranges that a belief searches by default.
@@ -28,5 +34,6 @@ pub fn search_box() -> SearchBox {
         noise_ratio: (1e-4, 1e-2).into(),
         signal_sd: (1e-3, 1e3).into(),
         noise_sd: None,
+        slope_noise_ratio: None,
     }
 }

@@ -1,13 +1,15 @@
 //! What is known after some touches: a Gaussian process over the zone, and where it is unsure.
 
-use super::probe::Touch;
+use super::free_space::Ceiling;
+use super::probe::{Swept, Touch};
 use crate::ground::config::{Checked, Rules};
 use crate::ground::gp::covariance::CovarianceError;
 use crate::ground::gp::fit::{Fit, SearchBox};
 use crate::ground::gp::kernel::{self, Hyperparameters, Kernel};
 use crate::ground::gp::posterior::{Posterior, Scratch};
-use crate::ground::gp::{LogNormal, Mean, Observations, Range};
+use crate::ground::gp::{LogNormal, Mean, Observation, Observations, Range, Slope};
 use crate::world::Zone;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// How the Gaussian process is fitted.
@@ -27,6 +29,13 @@ pub struct GpSettings {
     pub noise_sd_m: Option<f64>,
     /// Range of the signal's standard deviation, as a fraction of the heights' root mean square.
     pub signal: [f64; 2],
+    /// Whether contact normals are observed too, as slopes of the surface.
+    pub normals: bool,
+    /// Range of the slopes' noise, as a fraction of the signal's standard deviation over the zone's
+    /// shortest side.
+    pub slope_noise: [f64; 2],
+    /// Whether the surface is held below the space that the finger has swept.
+    pub free_space: bool,
     /// What the hyperparameters probably are.
     pub prior: Priors,
 }
@@ -50,7 +59,8 @@ impl Default for GpSettings {
     /// Chosen: no length scale beyond the zone, where the data cannot tell it from a constant;
     /// no noise so small that the covariance of a few hundred touches nears singularity, and
     /// none above a hundredth of the relief, or a curve not yet resolved passes for noise; a
-    /// signal range that never binds on heights that vary.
+    /// signal range that never binds on heights that vary; slopes from what a mesh's facets leave
+    /// of them to what says nothing.
     fn default() -> Self {
         Self {
             kernel: "squared_exponential".into(),
@@ -59,6 +69,9 @@ impl Default for GpSettings {
             noise: [1e-4, 1e-2],
             noise_sd_m: None,
             signal: [1e-3, 1e3],
+            normals: false,
+            slope_noise: [1e-2, 1e1],
+            free_space: false,
             prior: Priors::default(),
         }
     }
@@ -71,6 +84,16 @@ impl Checked for GpSettings {
         rules.interval("length_scale", self.length_scale, 1e-4..=1e3);
         rules.interval("noise", self.noise, 1e-7..=1e3);
         rules.interval("signal", self.signal, 1e-9..=1e9);
+        rules.interval("slope_noise", self.slope_noise, 1e-6..=1e6);
+        let has_slopes = kernel::by_name(&self.kernel).is_none_or(|kernel| kernel.has_slopes());
+        rules.require("normals", self.normals, !self.normals || has_slopes, || {
+            let smooth = kernel::KERNELS.iter().filter(|(_, kernel)| kernel.has_slopes());
+            let names: Vec<&str> = smooth.map(|(name, _)| *name).collect();
+            format!(
+                "a kernel whose surfaces have slopes that vary continuously: {}",
+                names.join(", ")
+            )
+        });
         if let Some(noise_sd_m) = self.noise_sd_m {
             rules.number("noise_sd_m", noise_sd_m, 1e-9..=1e3);
         }
@@ -92,12 +115,18 @@ impl Checked for GpSettings {
 /// unreached; chosen well above rounding, below any grid a figure shows.
 const REACHED_WITHIN: f64 = 1e-3;
 
+/// A normal whose y is smaller is dropped: the slope that follows from it is nearly infinite, and a
+/// small error of the normal changes its sign. Chosen, 87° from the approach.
+const NORMAL_Y_MIN: f64 = 0.05;
+
 /// The belief of one trial.
 pub struct Belief {
     zone: Zone,
     kernel: &'static dyn Kernel,
     settings: GpSettings,
     contacts: Observations,
+    /// What is known to be free, if that is asked for.
+    ceiling: Option<Ceiling>,
     targets: Vec<Vec<f64>>,
     unreached: Vec<Vec<f64>>,
     fit: Option<Fit>,
@@ -111,6 +140,7 @@ impl Belief {
     pub fn new(zone: Zone, settings: GpSettings) -> Self {
         let contacts = Observations::new(zone.dimension());
         Self {
+            ceiling: settings.free_space.then(|| Ceiling::new(&zone)),
             kernel: kernel::by_name(&settings.kernel).unwrap_or(&kernel::SquaredExponential),
             zone,
             settings,
@@ -129,7 +159,11 @@ impl Belief {
         let reached = match touch {
             Touch::Contact(contact) => {
                 let place = self.zone.place(&contact.p_wc);
-                self.contacts.push(&place, contact.p_wc.y - self.zone.datum_y_m);
+                let height = contact.p_wc.y - self.zone.datum_y_m;
+                let slope = self.slope(&contact.normal_w);
+                let slope =
+                    slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
+                self.contacts.take_in(&Observation { place: &place, height, noise: 1.0, slope });
                 self.zone.distance(&place, target) <= REACHED_WITHIN
             }
             Touch::Miss | Touch::Overload => false,
@@ -137,6 +171,28 @@ impl Belief {
         if !reached {
             self.unreached.push(target.into());
         }
+    }
+
+    /// Takes in what the touch swept, if free space is asked for.
+    pub fn observe_swept(&mut self, swept: &Swept) {
+        if let Some(ceiling) = &mut self.ceiling {
+            ceiling.lower(&self.zone, swept);
+        }
+    }
+
+    /// The slopes (g_x, g_z) = (−n_x, −n_z) / n_y that a normal n means, if they are asked for, and how
+    /// much noisier they are than those of a surface square to the approach.
+    ///
+    /// Of an error dθ of the normal, √(1 + g²)·dθ reaches the slope across the steepest way and
+    /// (1 + g²)·dθ that along it. The smaller is taken for both, chosen: with the larger, a curve as
+    /// steep as the toy is passed off as noise.
+    fn slope(&self, normal_w: &Vector3<f64>) -> Option<(Vec<f64>, f64)> {
+        let is_usable = self.settings.normals
+            && self.kernel.has_slopes()
+            && normal_w.y >= NORMAL_Y_MIN * normal_w.norm();
+        let slopes = [-normal_w.x / normal_w.y, -normal_w.z / normal_w.y];
+        let noise = (1.0 + slopes.iter().map(|slope| slope * slope).sum::<f64>()).sqrt();
+        is_usable.then(|| (slopes[..self.zone.dimension()].into(), noise))
     }
 
     /// Finds the most likely hyperparameters and conditions on all contacts.
@@ -164,7 +220,11 @@ impl Belief {
     }
 
     fn posterior(&self, hyperparameters: Hyperparameters) -> Result<Posterior, CovarianceError> {
-        Posterior::new(self.kernel, hyperparameters, self.contacts.clone())
+        let mut posterior = Posterior::new(self.kernel, hyperparameters, self.contacts.clone())?;
+        if let Some(ceiling) = &self.ceiling {
+            ceiling.cut(&mut posterior);
+        }
+        Ok(posterior)
     }
 
     /// Adds the unreached targets to what `surface` knows of its variance.
@@ -204,6 +264,11 @@ impl Belief {
                 })
                 .collect(),
             noise_ratio: Range { low: quietest, high: loudest, prior: prior.noise },
+            slope_noise_ratio: self.settings.normals.then(|| {
+                let shortest_m = extents_m.iter().copied().fold(f64::INFINITY, f64::min);
+                let [low, high] = self.settings.slope_noise.map(|noise| noise / shortest_m);
+                (low, high).into()
+            }),
             signal_sd: Range {
                 low: smallest * scale,
                 high: largest * scale,

@@ -2,6 +2,7 @@
 
 pub mod belief;
 pub mod control;
+mod free_space;
 pub mod planner;
 pub mod probe;
 pub mod reach;

@@ -29,6 +29,13 @@ pub struct TouchRow {
     /// Whether the touch was broken off: too much force, or no place in what the finger felt.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub overload: bool,
+    /// The contact's normal in `W`; written where the belief observes it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<[f64; 3]>,
+    /// The centre of the fingertip's hemisphere in `W` where the approach ended; written where the
+    /// belief observes what was swept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip: Option<[f64; 3]>,
     /// Standard deviation that the planner saw at the target when it chose it, if it looked:
     /// the posterior's, given also that unreached targets are no news.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -5,7 +5,7 @@ use super::row::{TouchRow, TrialRow};
 use super::truth::Truth;
 use crate::conduct::belief::Belief;
 use crate::conduct::planner::{self, Plan, uniform};
-use crate::conduct::probe::{self, Touch};
+use crate::conduct::probe::{self, Probe, Touch};
 use crate::ground::seed;
 use crate::world::World;
 use rand::RngExt;
@@ -21,19 +21,32 @@ pub fn run(
     planner: &planner::Entry,
     trial: u32,
 ) -> TrialRow {
+    let seed = seed::stream(experiment.seed, trial.into(), "body").random();
+    match probe::open(world, seed) {
+        Ok(mut probe) => run_with(experiment, &mut *probe, truth, planner, trial),
+        Err(fault) => TrialRow {
+            trial,
+            planner: planner.name.into(),
+            failure: Some(format!("before the first touch: {fault}")),
+            touches: Vec::new(),
+        },
+    }
+}
+
+/// As [`run`], with the touches of any `probe`.
+pub fn run_with(
+    experiment: &Experiment,
+    probe: &mut dyn Probe,
+    truth: &Truth,
+    planner: &planner::Entry,
+    trial: u32,
+) -> TrialRow {
     let mut row =
         TrialRow { trial, planner: planner.name.into(), failure: None, touches: Vec::new() };
     let stream = |purpose| seed::stream(experiment.seed, trial.into(), purpose);
-    let zone = &world.scene().zone;
+    let zone = &experiment.scene.zone;
     let mut start = stream("initial touches");
     let mut planner = (planner.make)(zone, &experiment.planning, stream(planner.name));
-    let mut probe = match probe::open(world, stream("body").random()) {
-        Ok(probe) => probe,
-        Err(fault) => {
-            row.failure = Some(format!("before the first touch: {fault}"));
-            return row;
-        }
-    };
     let mut belief = Belief::new(zone.clone(), experiment.gp.clone());
     for count in 1..=experiment.touches {
         let plan = match count <= experiment.initial_touches {
@@ -53,13 +66,20 @@ pub fn run(
             }
         };
         belief.observe(&plan.target, &touch);
+        let swept = probe.swept().filter(|_| experiment.gp.free_space);
+        swept.iter().for_each(|swept| belief.observe_swept(swept));
+        let contact = match &touch {
+            Touch::Contact(contact) => Some(contact),
+            Touch::Miss | Touch::Overload => None,
+        };
         let mut touch_row = TouchRow {
             target: plan.target,
-            contact: match &touch {
-                Touch::Contact(contact) => Some(contact.p_wc.coords.into()),
-                Touch::Miss | Touch::Overload => None,
-            },
+            contact: contact.map(|contact| contact.p_wc.coords.into()),
             overload: touch == Touch::Overload,
+            normal: contact
+                .filter(|_| experiment.gp.normals)
+                .map(|contact| contact.normal_w.into()),
+            tip: swept.map(|swept| swept.p_wt.coords.into()),
             planned_sd_m: plan.sd_m,
             stall: plan.stall,
             fit: None,

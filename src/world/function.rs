@@ -19,4 +19,12 @@ impl Function {
             Self::Toy => 1.0,
         }
     }
+
+    /// Slope at `x`; at a kink that of the side nearer to 0.
+    pub fn slope(self, x: f64) -> f64 {
+        match self {
+            Self::Toy if x.abs() <= 1.0 => 4.0 * PI * (4.0 * PI * x).cos(),
+            Self::Toy => 0.0,
+        }
+    }
 }

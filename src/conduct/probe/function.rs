@@ -3,6 +3,7 @@
 use super::{Contact, Probe, Touch, refuse_unless_finite};
 use crate::bodies::backend::Fault;
 use crate::world::World;
+use crate::world::world::Shape;
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -19,12 +20,12 @@ impl FunctionProbe {
 impl Probe for FunctionProbe {
     fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault> {
         refuse_unless_finite(target)?;
-        Ok(match self.world.true_height_m(target) {
-            Some(height_m) => Touch::Contact(Contact {
-                p_wc: self.world.scene().zone.point(target, height_m),
-                normal_w: Vector3::y(),
-            }),
-            None => Touch::Miss,
-        })
+        let (Shape::Function(function), Some(&x_m)) = (self.world.shape(), target.first()) else {
+            return Ok(Touch::Miss);
+        };
+        Ok(Touch::Contact(Contact {
+            p_wc: self.world.scene().zone.point(target, function.height_m(x_m)),
+            normal_w: Vector3::new(-function.slope(x_m), 1.0, 0.0).normalize(),
+        }))
     }
 }

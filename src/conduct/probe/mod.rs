@@ -3,8 +3,10 @@
 mod cast;
 mod function;
 pub mod servo;
+mod swept;
 
 pub use cast::rest_y_m;
+pub use swept::Swept;
 
 use crate::bodies::backend::Fault;
 use crate::bodies::kinematic::Kinematic;
@@ -40,6 +42,11 @@ pub trait Probe: Send {
     /// # Errors
     /// A fault of the body, or a target that is not finite.
     fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault>;
+
+    /// The space that the last touch found free; none if it is not known.
+    fn swept(&self) -> Option<Swept> {
+        None
+    }
 }
 
 /// The probe that the scene's body asks for; `seed` is all the randomness of its sensors.

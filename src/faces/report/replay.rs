@@ -1,7 +1,7 @@
 //! Beliefs as they were: a recorded trial's touches and hyperparameters, conditioned again.
 
 use crate::conduct::belief::Belief;
-use crate::conduct::probe::{Contact, Touch};
+use crate::conduct::probe::{Contact, Swept, Touch};
 use crate::ground::gp::Posterior;
 use crate::trials::metrics::Metrics;
 use crate::trials::row::{TouchRow, TrialRow};
@@ -49,6 +49,10 @@ impl<'a> Replay<'a> {
                 zone.dimension()
             );
             belief.observe(&touch.target, &met(touch));
+            if let Some(tip) = touch.tip {
+                let finger = experiment.scene.finger.clone();
+                belief.observe_swept(&Swept { finger, p_wt: Point3::from(tip) });
+            }
         }
         belief.condition(fit.hyperparameters.clone()).with_context(place)?;
         let Some(surface) = belief.surface().cloned() else { return Ok(None) };
@@ -110,8 +114,11 @@ pub fn digits(value: f64) -> String {
 
 fn met(touch: &TouchRow) -> Touch {
     match touch.contact {
-        // A belief takes in the point only; normals are not recorded.
-        Some(p_wc) => Touch::Contact(Contact { p_wc: Point3::from(p_wc), normal_w: Vector3::y() }),
+        // A normal that is not recorded was not observed.
+        Some(p_wc) => Touch::Contact(Contact {
+            p_wc: Point3::from(p_wc),
+            normal_w: touch.normal.map_or(Vector3::y(), Vector3::from),
+        }),
         None => Touch::Miss,
     }
 }

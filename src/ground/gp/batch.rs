@@ -22,7 +22,7 @@ impl Posterior {
     /// each like theirs but with a sixteenth of the memory read.
     pub fn predict<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<Prediction> {
         let mut places = places.into_iter().peekable();
-        let mut lanes = vec![[0.0; LANES]; self.observations().len()];
+        let mut lanes = vec![[0.0; LANES]; self.observations().order()];
         let mut scratch = Scratch::default();
         let mut predictions = Vec::new();
         while places.peek().is_some() {

@@ -77,6 +77,12 @@ impl Factor {
         Ok(())
     }
 
+    /// Takes the last rows and columns of A away, down to `order`.
+    pub fn truncate(&mut self, order: usize) {
+        self.order = self.order.min(order);
+        self.rows.truncate(start(self.order));
+    }
+
     /// Replaces b by L⁻¹·b and returns bᵀ·A⁻¹·b.
     pub fn solve_lower(&self, b: &mut [f64]) -> f64 {
         widest(SolveLower { rows: &self.rows, b })

@@ -1,5 +1,6 @@
 //! Correlations of all pairs of observations, many columns of their triangle at a time.
 
+use super::jet::Jet;
 use super::kernel::Kernel;
 use super::observations::Observations;
 use std::ops::Range;
@@ -28,6 +29,9 @@ pub(super) struct Correlations {
     length_scales: Vec<f64>,
     entries: Vec<f64>,
     slopes: Vec<f64>,
+    /// Buffers for observations with slopes.
+    pub(super) jet: Jet,
+    pub(super) row: Vec<f64>,
 }
 
 impl Correlations {

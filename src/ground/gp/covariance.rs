@@ -4,7 +4,7 @@ use super::cholesky::NotPositiveDefinite;
 use super::correlations::{Correlations, batches};
 use super::dense::Dense;
 use super::kernel::Kernel;
-use super::observations::Observations;
+use super::observations::{NoiseRatio, Observations};
 use thiserror::Error;
 
 /// Largest jitter tried, relative to the diagonal; beyond it the data contradict the kernel.
@@ -31,9 +31,9 @@ pub enum CovarianceError {
     },
 }
 
-/// Factors C + (noise_ratio² + jitter)·I, where C are the correlations, into `dense` with the
-/// smallest jitter of 0, 1e-15, 1e-14, … that works, and returns that jitter. `correlations` are
-/// the buffer, and skip what they hold already.
+/// Factors C + N + jitter·diag(C), where C are the correlations and N the noise, a diagonal, into
+/// `dense` with the smallest jitter of 0, 1e-15, 1e-14, … that works, and returns that jitter.
+/// `correlations` are the buffer, and skip what they hold already.
 ///
 /// # Errors
 /// If an observation is not finite, or even the largest jitter does not help.
@@ -42,7 +42,7 @@ pub(super) fn factor(
     kernel: &dyn Kernel,
     observations: &Observations,
     length_scales: &[f64],
-    noise_ratio: f64,
+    noise: NoiseRatio,
     correlations: &mut Correlations,
 ) -> Result<f64, CovarianceError> {
     if let Some(index) = observations.first_not_finite() {
@@ -51,19 +51,27 @@ pub(super) fn factor(
     let count = observations.len();
     let mut jitter = 0.0;
     loop {
-        let diagonal = 1.0 + noise_ratio * noise_ratio + jitter;
-        for columns in batches(count) {
-            let mut rest = correlations.of(kernel, observations, length_scales, &columns);
-            for j in columns {
-                if let [on, below @ ..] = dense.column_mut(j) {
-                    let (column, others) = rest.split_at(below.len());
-                    below.copy_from_slice(column);
-                    *on = diagonal;
-                    rest = others;
-                }
+        let largest = match observations.has_slopes() {
+            true => {
+                let buffer = &mut *correlations;
+                with_slopes(dense, kernel, observations, length_scales, (noise, jitter), buffer)
             }
-        }
-        match dense.factor(diagonal) {
+            false => {
+                for columns in batches(count) {
+                    let mut rest = correlations.of(kernel, observations, length_scales, &columns);
+                    for j in columns {
+                        if let [on, below @ ..] = dense.column_mut(j) {
+                            let (column, others) = rest.split_at(below.len());
+                            below.copy_from_slice(column);
+                            *on = 1.0 + observations.height_noise2(j, noise) + jitter;
+                            rest = others;
+                        }
+                    }
+                }
+                1.0 + noise.height * noise.height + jitter
+            }
+        };
+        match dense.factor(largest) {
             Ok(()) => return Ok(jitter),
             Err(cause) if jitter >= JITTER_MAX => {
                 return Err(CovarianceError::Indefinite { count, jitter, cause });
@@ -71,4 +79,35 @@ pub(super) fn factor(
             Err(_) => jitter = if jitter == 0.0 { 1e-15 } else { jitter * 10.0 },
         }
     }
+}
+
+/// Writes the covariance of heights and slopes, and returns the largest diagonal entry without the
+/// noise: a number of much noise must not make another's pivot look lost.
+fn with_slopes(
+    dense: &mut Dense,
+    kernel: &dyn Kernel,
+    observations: &Observations,
+    length_scales: &[f64],
+    (noise, jitter): (NoiseRatio, f64),
+    Correlations { jet, row, .. }: &mut Correlations,
+) -> f64 {
+    row.resize(observations.order(), 0.0);
+    let mut largest: f64 = 0.0;
+    for j in 0..observations.len() {
+        jet.look(kernel, observations, length_scales, observations.place(j), j);
+        let start = observations.start(j);
+        let row = &mut row[start..];
+        for number in 0..observations.start(j + 1) - start {
+            let axis = number.checked_sub(1);
+            jet.covariances(observations, length_scales, axis, row);
+            largest = largest.max(row[number]);
+            let noise2 = match axis {
+                None => observations.height_noise2(j, noise),
+                Some(axis) => observations.slope_noise2(j, noise, length_scales[axis]),
+            };
+            row[number] += noise2 + jitter * row[number];
+            dense.column_mut(start + number).copy_from_slice(&row[number..]);
+        }
+    }
+    largest
 }

@@ -2,7 +2,7 @@
 
 use super::kernel::{Hyperparameters, Kernel};
 use super::mean::Mean;
-use super::observations::Observations;
+use super::observations::{NoiseRatio, Observations};
 use super::range::Range;
 use super::search::Search;
 use crate::ground::optimize::Stop;
@@ -18,6 +18,9 @@ pub struct SearchBox {
     /// The noise, as a fraction of the signal's standard deviation. If the noise is known, what
     /// this range leaves of `signal_sd`.
     pub noise_ratio: Range,
+    /// The slopes' noise, as a fraction of the signal's standard deviation, per unit of the inputs;
+    /// none where no slopes are observed.
+    pub slope_noise_ratio: Option<Range>,
     /// The signal's standard deviation, in the unit of the heights.
     pub signal_sd: Range,
     /// The touch noise's standard deviation, if it is known and not to be fitted.
@@ -54,7 +57,7 @@ impl SearchBox {
     /// deterministically.
     ///
     /// The likelihood is profiled over signal_sd, which has a closed form, so the search runs
-    /// over (ln lengths, ln noise ratio) only. `last`, the fit before the newest touches, is one
+    /// over (ln lengths, ln noise ratio, ln slope noise ratio if there is one) only. `last`, the fit before the newest touches, is one
     /// more start, or, while the box need not be scanned again, the only one beside shorter
     /// lengths. With no observations, or if no covariance can be factored, the middle of the box
     /// is returned with [`Stop::Failed`].
@@ -71,10 +74,14 @@ impl SearchBox {
         let recent = last.filter(is_recent).filter(|_| count > SCAN_ALWAYS);
         if !observations.is_empty() {
             if let Some(last) = last {
-                search.climb(&log_parameters(&last.hyperparameters));
+                search.climb(&self.log_parameters(&last.hyperparameters));
             }
             match recent {
-                Some(last) => search.climb(&shorter(&last.hyperparameters, &lower, &upper)),
+                Some(last) => {
+                    let mut start = self.log_parameters(&last.hyperparameters);
+                    self.shorten(&mut start, &lower, &upper);
+                    search.climb(&start);
+                }
                 None => search.scan(),
             }
             search.cross_noise();
@@ -85,7 +92,7 @@ impl SearchBox {
         fit
     }
 
-    /// The ranges searched over: lengths, then noise ratio.
+    /// The ranges searched over: lengths, then noise ratio, then slope noise ratio.
     pub(super) fn ranges(&self) -> impl Iterator<Item = Range> {
         // A known noise and a range of the signal leave a range of their ratio.
         let noise_ratio = match self.noise_sd {
@@ -94,7 +101,7 @@ impl SearchBox {
             }
             None => self.noise_ratio,
         };
-        self.length_scales.iter().copied().chain([noise_ratio])
+        self.length_scales.iter().copied().chain([noise_ratio]).chain(self.slope_noise_ratio)
     }
 
     fn log_bounds(&self) -> (Vec<f64>, Vec<f64>) {
@@ -104,44 +111,58 @@ impl SearchBox {
     /// What is believed before any touch: the geometric middle of the box.
     fn prior(&self, lower: &[f64], upper: &[f64]) -> Fit {
         let middle: Vec<f64> = lower.iter().zip(upper).map(|(l, u)| 0.5 * (l + u)).collect();
-        let (length_scales, noise_ratio) = parameters(&middle);
+        let (length_scales, noise) = self.parameters(&middle);
         let signal_sd = match self.noise_sd {
-            Some(noise_sd) => noise_sd / noise_ratio,
+            Some(noise_sd) => noise_sd / noise.height,
             None => (self.signal_sd.low * self.signal_sd.high).sqrt(),
         };
         Fit {
-            hyperparameters: Hyperparameters {
-                signal_sd,
-                length_scales,
-                noise_sd: noise_ratio * signal_sd,
-                mean: 0.0,
-            },
+            hyperparameters: hyperparameters(signal_sd, length_scales, noise, 0.0),
             log_likelihood: 0.0,
             factorisations: 0,
             scanned_at: 0,
             stop: Stop::Failed,
         }
     }
-}
 
-/// Lengths and noise ratio from their logarithms.
-pub(super) fn parameters(logs: &[f64]) -> (Vec<f64>, f64) {
-    let mut lengths: Vec<f64> = logs.iter().map(|log| log.exp()).collect();
-    let noise_ratio = lengths.pop().unwrap_or(0.0);
-    (lengths, noise_ratio)
-}
-
-/// A third of the lengths and the middle noise: a start from which a fit that sits in a corner of
-/// its box finds out that new touches have shown a rougher surface.
-fn shorter(at: &Hyperparameters, lower: &[f64], upper: &[f64]) -> Vec<f64> {
-    let mut logs = log_parameters(at);
-    logs.iter_mut().for_each(|log| *log -= 3f64.ln());
-    if let (Some(noise), Some(lower), Some(upper)) = (logs.last_mut(), lower.last(), upper.last()) {
-        *noise = 0.5 * (lower + upper);
+    /// Lengths and noise ratios from their logarithms.
+    pub(super) fn parameters(&self, logs: &[f64]) -> (Vec<f64>, NoiseRatio) {
+        let mut lengths: Vec<f64> = logs.iter().map(|log| log.exp()).collect();
+        let noises = lengths.split_off(self.length_scales.len().min(logs.len()));
+        let noise = |i: usize| noises.get(i).copied().unwrap_or(0.0);
+        (lengths, NoiseRatio { height: noise(0), slope: noise(1) })
     }
-    logs
+
+    fn log_parameters(&self, at: &Hyperparameters) -> Vec<f64> {
+        let noise = at.noise_ratio();
+        let slope = self.slope_noise_ratio.map(|range| noise.slope.clamp(range.low, range.high));
+        let parameters = at.length_scales.iter().copied().chain([noise.height]).chain(slope);
+        parameters.map(f64::ln).collect()
+    }
+
+    /// Moves to a third of the lengths and the middle noises: a start from which a fit that sits in a
+    /// corner of its box finds out that new touches have shown a rougher surface.
+    fn shorten(&self, logs: &mut [f64], lower: &[f64], upper: &[f64]) {
+        let lengths = self.length_scales.len();
+        logs.iter_mut().take(lengths).for_each(|log| *log -= 3f64.ln());
+        for (noise, (lower, upper)) in logs.iter_mut().zip(lower.iter().zip(upper)).skip(lengths) {
+            *noise = 0.5 * (lower + upper);
+        }
+    }
 }
 
-fn log_parameters(at: &Hyperparameters) -> Vec<f64> {
-    at.length_scales.iter().copied().chain([at.noise_sd / at.signal_sd]).map(f64::ln).collect()
+/// From a search's parameters.
+pub(super) fn hyperparameters(
+    signal_sd: f64,
+    length_scales: Vec<f64>,
+    noise: NoiseRatio,
+    mean: f64,
+) -> Hyperparameters {
+    Hyperparameters {
+        signal_sd,
+        length_scales,
+        noise_sd: noise.height * signal_sd,
+        slope_noise_sd: noise.slope * signal_sd,
+        mean,
+    }
 }

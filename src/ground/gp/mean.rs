@@ -1,6 +1,7 @@
 //! The height a belief returns to away from all observations.
 
 use super::dense::Dense;
+use super::observations::Observations;
 use serde::{Deserialize, Serialize};
 
 /// How the prior mean is chosen in a fit.
@@ -17,9 +18,16 @@ pub enum Mean {
 }
 
 impl Mean {
-    /// The mean of `heights` whose covariance is proportional to the factored matrix;
-    /// `scratch` is overwritten.
-    pub(super) fn of(self, heights: &[f64], factored: &Dense, scratch: &mut Vec<f64>) -> f64 {
+    /// The mean of `observations` whose covariance is proportional to the factored matrix;
+    /// the buffers are overwritten.
+    pub(super) fn of(
+        self,
+        observations: &Observations,
+        length_scales: &[f64],
+        factored: &Dense,
+        [weights, observed]: [&mut Vec<f64>; 2],
+    ) -> f64 {
+        let heights = observations.heights();
         if heights.is_empty() {
             return 0.0;
         }
@@ -27,12 +35,12 @@ impl Mean {
             Self::Zero => 0.0,
             Self::Data => heights.iter().sum::<f64>() / heights.len() as f64,
             Self::Constant => {
-                scratch.clear();
-                scratch.resize(heights.len(), 1.0);
-                factored.solve_lower(scratch);
-                let ones: f64 = scratch.iter().map(|v| v * v).sum();
-                factored.solve_upper(scratch);
-                scratch.iter().zip(heights).map(|(weight, y)| weight * y).sum::<f64>() / ones
+                observations.ones(weights);
+                factored.solve_lower(weights);
+                let ones: f64 = weights.iter().map(|v| v * v).sum();
+                factored.solve_upper(weights);
+                observations.residuals(0.0, length_scales, observed);
+                weights.iter().zip(observed).map(|(weight, y)| weight * *y).sum::<f64>() / ones
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Gaussian-process regression with an exact posterior (Rasmussen & Williams 2006, ch. 2 and 5).
 //!
-//! `kernel` says how alike two places are, `covariance` factors that of what was observed (whole
+//! `kernel` says how alike two places are, `jet` what slopes say of heights, `covariance` factors that of what was observed (whole
 //! in `dense`, row by row in `cholesky`), `posterior` predicts (Eq. 3 of Yi et al. 2016), `likelihood` scores
 //! hyperparameters, `fit` finds the best ones and `reduction` says what one more observation would
 //! tell.
@@ -11,6 +11,7 @@ mod correlations;
 pub mod covariance;
 pub mod dense;
 pub mod fit;
+mod jet;
 pub mod kernel;
 pub mod likelihood;
 pub mod mean;
@@ -23,6 +24,6 @@ mod search;
 
 pub use kernel::{Hyperparameters, Kernel};
 pub use mean::Mean;
-pub use observations::Observations;
+pub use observations::{NoiseRatio, Observation, Observations, Slope};
 pub use posterior::Posterior;
 pub use range::{LogNormal, Range, Scale};

@@ -4,8 +4,9 @@ use super::cholesky::{Factor, NotPositiveDefinite};
 use super::correlations::Correlations;
 use super::covariance::{self, CovarianceError};
 use super::dense::Dense;
+use super::jet::Jet;
 use super::kernel::{Hyperparameters, Kernel};
-use super::observations::Observations;
+use super::observations::{Observation, Observations};
 use crate::ground::simd::{dot, widest};
 
 /// Buffers of a query, so that asking allocates nothing.
@@ -13,6 +14,8 @@ use crate::ground::simd::{dot, widest};
 pub struct Scratch {
     pub(super) slopes: Vec<f64>,
     pub(super) solved: Vec<f64>,
+    jet: Jet,
+    row: Vec<f64>,
 }
 
 /// The belief after the observations: mean and variance of the height at any place.
@@ -36,8 +39,8 @@ impl Posterior {
         hyperparameters: Hyperparameters,
         observations: Observations,
     ) -> Result<Self, CovarianceError> {
-        let mut dense = Dense::new(observations.len());
-        let noise_ratio = hyperparameters.noise_sd / hyperparameters.signal_sd;
+        let mut dense = Dense::new(observations.order());
+        let noise_ratio = hyperparameters.noise_ratio();
         let lengths = &hyperparameters.length_scales;
         let buffer = &mut Correlations::default();
         let jitter =
@@ -49,25 +52,50 @@ impl Posterior {
         Ok(new)
     }
 
-    /// Takes in one more observation without factoring again: n² operations. The
+    /// Takes in one more height without factoring again: n² operations. The
     /// hyperparameters stay.
     ///
     /// # Errors
     /// If the enlarged covariance is not positive definite; nothing is taken in then, and
     /// [`new`](Self::new) would find the jitter it needs.
     pub fn add(&mut self, place: &[f64], height: f64) -> Result<(), NotPositiveDefinite> {
-        self.append(place, height)?;
+        self.take_in(&Observation::height(place, height))
+    }
+
+    /// As [`add`](Self::add), of any observation.
+    ///
+    /// # Errors
+    /// As [`add`](Self::add).
+    pub fn take_in(&mut self, observation: &Observation) -> Result<(), NotPositiveDefinite> {
+        self.append(observation)?;
         self.weigh();
         Ok(())
     }
 
-    fn append(&mut self, place: &[f64], height: f64) -> Result<(), NotPositiveDefinite> {
-        let mut row = vec![0.0; self.observations.len()];
-        self.correlations(place, &mut row);
-        let noise_ratio = self.hyperparameters.noise_sd / self.hyperparameters.signal_sd;
-        row.push(1.0 + noise_ratio * noise_ratio + self.jitter);
-        self.factor.append(&row)?;
-        self.observations.push(place, height);
+    fn append(&mut self, observation: &Observation) -> Result<(), NotPositiveDefinite> {
+        let order = self.observations.order();
+        let noise = self.hyperparameters.noise_ratio();
+        let mut scratch = Scratch::default();
+        for number in 0..observation.order() {
+            let axis = number.checked_sub(1);
+            self.covariances(observation.place, axis, &mut scratch);
+            let row = &mut scratch.solved;
+            // Height and slopes of one place do not tell of each other.
+            row.resize(order + number, 0.0);
+            row.push(match axis {
+                None => 1.0 + observation.height_noise2(noise) + self.jitter,
+                Some(axis) => {
+                    let prior = self.kernel.slope_variance();
+                    let length = self.hyperparameters.length_scales[axis];
+                    prior + observation.slope_noise2(noise, length) + self.jitter * prior
+                }
+            });
+            if let Err(indefinite) = self.factor.append(row) {
+                self.factor.truncate(order);
+                return Err(indefinite);
+            }
+        }
+        self.observations.take_in(observation);
         Ok(())
     }
 
@@ -81,7 +109,11 @@ impl Posterior {
         places: impl Iterator<Item = &'a [f64]> + Clone,
     ) -> Result<Self, CovarianceError> {
         let mut visiting = self.clone();
-        if places.clone().try_for_each(|place| visiting.append(place, 0.0)).is_ok() {
+        if places
+            .clone()
+            .try_for_each(|place| visiting.append(&Observation::height(place, 0.0)))
+            .is_ok()
+        {
             return Ok(visiting);
         }
         let mut observations = self.observations.clone();
@@ -90,17 +122,42 @@ impl Posterior {
     }
 
     fn weigh(&mut self) {
-        self.weights.clear();
-        let mean = self.hyperparameters.mean;
-        self.weights.extend(self.observations.heights().iter().map(|y| y - mean));
+        let Hyperparameters { mean, length_scales, .. } = &self.hyperparameters;
+        self.observations.residuals(*mean, length_scales, &mut self.weights);
         self.factor.solve_lower(&mut self.weights);
         self.factor.solve_upper(&mut self.weights);
     }
 
-    fn correlations(&self, place: &[f64], out: &mut [f64]) {
+    /// Writes into `scratch.solved` the covariances of the height at `place`, or of its slope along
+    /// `axis` per length scale, with all that was observed; a slope's only if slopes were.
+    fn covariances(&self, place: &[f64], axis: Option<usize>, scratch: &mut Scratch) {
         let lengths = &self.hyperparameters.length_scales;
-        self.observations.distances2(place.iter().copied(), lengths, 0, out);
-        self.kernel.correlate(out);
+        let Scratch { solved, jet, .. } = scratch;
+        let at = place.iter().copied();
+        solved.resize(self.observations.order(), 0.0);
+        if self.observations.has_slopes() || axis.is_some() {
+            jet.look(self.kernel, &self.observations, lengths, at, 0);
+            jet.covariances(&self.observations, lengths, axis, solved);
+        } else {
+            self.observations.distances2(at, lengths, 0, solved);
+            self.kernel.correlate(solved);
+        }
+    }
+
+    /// Writes the gradient of Σ_i w_i·k(place, i), in units of the signal's variance, with respect to
+    /// the place looked at last by [`covariances`](Self::covariances).
+    fn gradient_with_slopes(
+        &self,
+        weights: &[f64],
+        (jet, row): (&Jet, &mut Vec<f64>),
+        gradient: &mut [f64],
+    ) {
+        let lengths = &self.hyperparameters.length_scales;
+        row.resize(self.observations.order(), 0.0);
+        for (axis, (slope, length)) in gradient.iter_mut().zip(lengths).enumerate() {
+            jet.covariances(&self.observations, lengths, Some(axis), row);
+            *slope = widest(|| dot(row, weights)) / length;
+        }
     }
 
     /// The hyperparameters it was made with.
@@ -129,9 +186,8 @@ impl Posterior {
         place: &[f64],
         scratch: &'a mut Scratch,
     ) -> (f64, &'a [f64]) {
-        let correlations = &mut scratch.solved;
-        correlations.resize(self.observations.len(), 0.0);
-        self.correlations(place, correlations);
+        self.covariances(place, None, scratch);
+        let correlations = &scratch.solved;
         let mean = self.hyperparameters.mean + widest(|| dot(correlations, &self.weights));
         (mean, correlations)
     }
@@ -139,7 +195,13 @@ impl Posterior {
     /// As [`mean`](Self::mean), and writes its gradient with respect to the place.
     pub fn mean_gradient(&self, place: &[f64], gradient: &mut [f64], scratch: &mut Scratch) -> f64 {
         let lengths = &self.hyperparameters.length_scales;
-        let Scratch { solved, slopes } = scratch;
+        if self.observations.has_slopes() {
+            self.covariances(place, None, scratch);
+            let Scratch { solved, jet, row, .. } = scratch;
+            self.gradient_with_slopes(&self.weights, (jet, row), gradient);
+            return self.hyperparameters.mean + widest(|| dot(solved, &self.weights));
+        }
+        let Scratch { solved, slopes, .. } = scratch;
         solved.resize(self.observations.len(), 0.0);
         slopes.resize(self.observations.len(), 0.0);
         self.observations.distances2(place.iter().copied(), lengths, 0, solved);
@@ -155,9 +217,7 @@ impl Posterior {
 
     /// Variance of the surface (without touch noise) k** − k*ᵀ·K⁻¹·k* at `place`, in [0, k**].
     pub fn variance(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
-        scratch.solved.resize(self.observations.len(), 0.0);
-        self.correlations(place, &mut scratch.solved);
-        self.remaining(self.factor.solve_lower(&mut scratch.solved))
+        self.remaining(self.whiten(place, scratch))
     }
 
     /// As [`variance`](Self::variance), and writes its gradient with respect to the place.
@@ -168,7 +228,16 @@ impl Posterior {
         scratch: &mut Scratch,
     ) -> f64 {
         let lengths = &self.hyperparameters.length_scales;
-        let Scratch { solved, slopes } = scratch;
+        if self.observations.has_slopes() {
+            let explained = self.whiten(place, scratch);
+            let Scratch { solved, jet, row, .. } = scratch;
+            self.factor.solve_upper(solved);
+            self.gradient_with_slopes(solved, (jet, row), gradient);
+            let signal2 = self.hyperparameters.signal_sd.powi(2);
+            gradient.iter_mut().for_each(|slope| *slope *= -2.0 * signal2);
+            return self.remaining(explained);
+        }
+        let Scratch { solved, slopes, .. } = scratch;
         solved.resize(self.observations.len(), 0.0);
         slopes.resize(self.observations.len(), 0.0);
         self.observations.distances2(place.iter().copied(), lengths, 0, solved);
@@ -185,12 +254,11 @@ impl Posterior {
         self.remaining(explained)
     }
 
-    /// Writes L⁻¹·k*, and returns the share of the variance at `place` that is explained, its
-    /// square.
-    pub(super) fn whiten(&self, place: &[f64], out: &mut Vec<f64>) -> f64 {
-        out.resize(self.observations.len(), 0.0);
-        self.correlations(place, out);
-        self.factor.solve_lower(out)
+    /// Writes L⁻¹·k* into `scratch.solved`, and returns the share of the variance at `place` that is
+    /// explained, its square.
+    pub(super) fn whiten(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
+        self.covariances(place, None, scratch);
+        self.factor.solve_lower(&mut scratch.solved)
     }
 
     pub(super) fn kernel(&self) -> &'static dyn Kernel {

@@ -21,7 +21,7 @@ impl<'a> Reduction<'a> {
         let mut scratch = Scratch::default();
         for place in references {
             places.push(place, 0.0);
-            posterior.whiten(place, &mut scratch.solved);
+            posterior.whiten(place, &mut scratch);
             whitened.extend_from_slice(&scratch.solved);
         }
         Self { posterior, references: places, whitened }
@@ -31,8 +31,8 @@ impl<'a> Reduction<'a> {
     /// (1/m)·Σ_r k(r, x)² / (σ²(x) + noise²) with the posterior covariance k and variance σ²:
     /// n² + n·m operations.
     pub fn at(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
-        let Scratch { solved, slopes: correlations } = scratch;
-        let explained = self.posterior.whiten(place, solved);
+        let explained = self.posterior.whiten(place, scratch);
+        let Scratch { solved, slopes: correlations, .. } = scratch;
         correlations.resize(self.references.len(), 0.0);
         let hyperparameters = self.posterior.hyperparameters();
         let lengths = &hyperparameters.length_scales;

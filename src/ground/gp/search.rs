@@ -1,8 +1,8 @@
 //! How the most likely hyperparameters are sought: a coarse scan finds the hills of the profiled
 //! likelihood, L-BFGS climbs those that may be the highest.
 
-use super::fit::{Fit, SearchBox, parameters};
-use super::kernel::{Hyperparameters, Kernel};
+use super::fit::{Fit, SearchBox, hyperparameters};
+use super::kernel::Kernel;
 use super::likelihood::Likelihood;
 use super::observations::Observations;
 use super::range::Scale;
@@ -21,7 +21,7 @@ const GAIN_MIN: f64 = 1e-6;
 /// higher one; chosen.
 const NEARLY_AS_LIKELY: f64 = 0.3;
 
-/// One search of a box, over (ln lengths, ln noise ratio).
+/// One search of a box, over (ln lengths, ln noise ratio, ln slope noise ratio if there is one).
 pub(super) struct Search<'a> {
     sought: &'a SearchBox,
     likelihood: Likelihood<'a>,
@@ -94,13 +94,15 @@ impl<'a> Search<'a> {
     /// as likely there: noise and lengths may trade, and leave two tops that differ little.
     pub(super) fn cross_noise(&mut self) {
         let Some(best) = &self.best else { return };
-        let (value, mut at) = (best.value, best.x.clone());
-        let Some(noise) = at.len().checked_sub(1) else { return };
-        for level in [self.bounds.lower[noise], self.bounds.upper[noise]] {
-            at[noise] = level;
-            let score = score(self.sought, &mut self.likelihood, &self.scale, &at, None);
-            if score > value - NEARLY_AS_LIKELY {
-                self.climb(&at);
+        let (value, top) = (best.value, best.x.clone());
+        for noise in self.sought.length_scales.len()..top.len() {
+            for level in [self.bounds.lower[noise], self.bounds.upper[noise]] {
+                let mut at = top.clone();
+                at[noise] = level;
+                let score = score(self.sought, &mut self.likelihood, &self.scale, &at, None);
+                if score > value - NEARLY_AS_LIKELY {
+                    self.climb(&at);
+                }
             }
         }
     }
@@ -108,16 +110,10 @@ impl<'a> Search<'a> {
     /// The fit at the highest top; none if no covariance could be factored.
     pub(super) fn conclude(&mut self) -> Option<Fit> {
         let best = self.best.as_ref().filter(|best| best.value > f64::MIN)?;
-        let (length_scales, noise_ratio) = parameters(&best.x);
-        let profile = self.likelihood.profile(&length_scales, noise_ratio, &self.scale, None);
-        let profile = profile.ok()?;
+        let (length_scales, noise) = self.sought.parameters(&best.x);
+        let profile = self.likelihood.profile(&length_scales, noise, &self.scale, None).ok()?;
         Some(Fit {
-            hyperparameters: Hyperparameters {
-                signal_sd: profile.signal_sd,
-                length_scales,
-                noise_sd: noise_ratio * profile.signal_sd,
-                mean: profile.mean,
-            },
+            hyperparameters: hyperparameters(profile.signal_sd, length_scales, noise, profile.mean),
             log_likelihood: profile.log_likelihood,
             factorisations: 0,
             scanned_at: 0,
@@ -135,7 +131,7 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    /// Grid points per parameter, the noise last.
+    /// Grid points per parameter, the noises last.
     fn levels(&self) -> Vec<usize> {
         let lengths = self.sought.length_scales.len();
         let per_length = match lengths {
@@ -144,7 +140,7 @@ impl<'a> Search<'a> {
             _ => 5,
         };
         let mut levels = vec![per_length; lengths];
-        levels.push(NOISE_LEVELS);
+        levels.resize(self.bounds.lower.len(), NOISE_LEVELS);
         levels
     }
 }
@@ -158,8 +154,8 @@ fn score(
     x: &[f64],
     mut gradient: Option<&mut [f64]>,
 ) -> f64 {
-    let (lengths, noise_ratio) = parameters(x);
-    let profile = likelihood.profile(&lengths, noise_ratio, scale, gradient.as_deref_mut());
+    let (lengths, noise) = sought.parameters(x);
+    let profile = likelihood.profile(&lengths, noise, scale, gradient.as_deref_mut());
     let Ok(profile) = profile else { return f64::NAN };
     let mut score = profile.log_likelihood + scale.log_prior(profile.signal_sd);
     for (i, (range, &log)) in sought.ranges().zip(x).enumerate() {

@@ -3,7 +3,7 @@
 mod line;
 mod watch;
 
-use super::{Contact, Probe, Touch, refuse_unless_finite};
+use super::{Contact, Probe, Swept, Touch, refuse_unless_finite};
 use crate::bodies::backend::{Backend, Command, Fault, Reading};
 use crate::conduct::control::{ControlError, Controller, Goal};
 use crate::things::arm::Joints;
@@ -29,6 +29,7 @@ pub struct Servo {
     watch: Watch,
     command: Command,
     state: State,
+    swept: Option<Swept>,
 }
 
 /// What is kept of the last reading.
@@ -58,6 +59,7 @@ impl Servo {
             control,
             settings,
             state,
+            swept: None,
         })
     }
 
@@ -183,6 +185,9 @@ impl Servo {
     }
 }
 
+/// Depth to which the object may be in the skin before the finger stops; chosen: the fluid's gap.
+const GIVES_WAY_M: f64 = 1.5e-3;
+
 /// Time between tactile frames.
 const FRAME_S: f64 = 0.01;
 
@@ -202,6 +207,9 @@ impl Probe for Servo {
         let mut below = above;
         below.translation.y = self.extent_y().0 - self.world.scene().finger.radius_m - CLEARANCE_M;
         let alarm = self.go("the object", below, approach_m_s, true)?;
+        let reached = self.x_wt().translation.vector + Vector3::y() * GIVES_WAY_M;
+        let finger = self.world.scene().finger.clone();
+        self.swept = Some(Swept { finger, p_wt: reached.into() });
         let touch = match alarm {
             None => Touch::Miss,
             Some(Alarm::Overload) => Touch::Overload,
@@ -214,6 +222,10 @@ impl Probe for Servo {
         );
         self.go("the way back", back, travel_m_s, false)?;
         Ok(touch)
+    }
+
+    fn swept(&self) -> Option<Swept> {
+        self.swept.clone()
     }
 }
 

@@ -28,6 +28,15 @@ impl Radial for Matern52 {
         let correlation = bounded((1.0 + s + s * s / 3.0) * decay);
         (correlation, bounded(-5.0 / 6.0 * (1.0 + s) * decay))
     }
+
+    const HAS_SLOPES: bool = true;
+
+    #[inline(always)]
+    fn curvatures(r2: f64) -> (f64, f64) {
+        let s = (5.0 * r2).sqrt();
+        let decay = exp_of_negative(-s);
+        (25.0 / 12.0 * decay, -125.0 / 24.0 * decay / s.max(f64::MIN_POSITIVE.sqrt()))
+    }
 }
 
 /// 0 where ∞·0 gave NaN: at distances whose square overflows.

@@ -13,4 +13,12 @@ impl Radial for SquaredExponential {
         let correlation = exp_of_negative(-0.5 * r2);
         (correlation, -0.5 * correlation)
     }
+
+    const HAS_SLOPES: bool = true;
+
+    #[inline(always)]
+    fn curvatures(r2: f64) -> (f64, f64) {
+        let correlation = exp_of_negative(-0.5 * r2);
+        (0.25 * correlation, -0.125 * correlation)
+    }
 }

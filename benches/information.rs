@@ -1,0 +1,163 @@
+//! What a touch tells beside its height: contact normals and swept free space, each against the
+//! same trials without, with exact contacts and with the errors of an estimate from electrodes.
+//!
+//! `cargo bench --bench information -- toy container bird` prints a table of each; a number after a name
+//! is its trials, and `exact` or `estimated` leaves the other contacts out.
+
+use nalgebra::{Rotation3, Unit, Vector3};
+use palpate::bodies::backend::Fault;
+use palpate::conduct::planner;
+use palpate::conduct::probe::{self, Contact, Probe, Swept, Touch};
+use palpate::ground::seed;
+use palpate::trials::experiment::Experiment;
+use palpate::trials::metrics::Metrics;
+use palpate::trials::row::TrialRow;
+use palpate::trials::statistics::{Paired, median, touches_to_reach};
+use palpate::trials::trial;
+use palpate::trials::truth::Truth;
+use palpate::world::World;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Tilt about either tangent, normal about 0: with two of them the median angle is 1.177 times this,
+/// 17°, as published estimates of the contact normal have.
+const TILT_RAD: f64 = 0.252;
+/// Error of each coordinate of the contact; chosen.
+const PLACE_SD_M: f64 = 1e-3;
+
+/// A probe whose contacts are estimates.
+struct Estimating {
+    exact: Box<dyn Probe>,
+    rng: ChaCha8Rng,
+}
+
+impl Estimating {
+    /// Box–Muller.
+    fn normal(&mut self) -> f64 {
+        let [a, b]: [f64; 2] = [self.rng.random(), self.rng.random()];
+        (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+    }
+
+    fn normals(&mut self) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| self.normal())
+    }
+}
+
+impl Probe for Estimating {
+    fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault> {
+        let touch = self.exact.touch(target)?;
+        let (moved, turned) = (PLACE_SD_M * self.normals(), TILT_RAD * self.normals());
+        Ok(match touch {
+            none @ (Touch::Miss | Touch::Overload) => none,
+            Touch::Contact(Contact { p_wc, normal_w }) => {
+                let tangent = turned - normal_w * turned.dot(&normal_w);
+                let (axis, angle) = Unit::new_and_get(tangent);
+                let normal_w = Rotation3::from_axis_angle(&axis, angle) * normal_w;
+                Touch::Contact(Contact { p_wc: p_wc + moved, normal_w })
+            }
+        })
+    }
+
+    fn swept(&self) -> Option<Swept> {
+        self.exact.swept()
+    }
+}
+
+/// Name and settings of each belief; the first is what the others are held against.
+const BELIEFS: [(&str, &[&str]); 4] = [
+    ("heights", &[]),
+    ("normals", &["gp.normals=true"]),
+    ("free space", &["gp.free_space=true"]),
+    ("both", &["gp.normals=true", "gp.free_space=true"]),
+];
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
+    for (i, name) in words.iter().enumerate() {
+        if name.parse::<u32>().is_ok() || ["exact", "estimated"].contains(&name.as_str()) {
+            continue;
+        }
+        let trials = words.get(i + 1).and_then(|word| word.parse().ok()).unwrap_or(4);
+        println!(
+            "\n| {name} | contacts | belief | final RMSE | outer tenth | against heights | touches | covered | s |"
+        );
+        println!("|---|---|---|---|---|---|---|---|---|");
+        let contacts = [("exact", true), ("estimated", false)];
+        let asked = |(word, _): &&(&str, bool)| words.iter().any(|other| other == word);
+        let all = contacts.iter().filter(asked).count() == 0;
+        for &(_, is_exact) in contacts.iter().filter(|contact| all || asked(contact)) {
+            for planner in ["active", "slope"] {
+                compare(name, trials, is_exact, planner);
+            }
+        }
+    }
+}
+
+fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
+    let mut baseline: Option<Vec<TrialRow>> = None;
+    for (belief, settings) in BELIEFS {
+        let mut sets: Vec<String> = settings.iter().map(|set| set.to_string()).collect();
+        // A millimetre is more than the default hundredth of the relief.
+        if !is_exact {
+            sets.push("gp.noise=[1e-4, 0.3]".into());
+        }
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("experiments/{name}.toml"));
+        let Ok(experiment) = Experiment::load(&path, &sets) else { return eprintln!("no {name}") };
+        if experiment.scene.object.is_none() && settings.contains(&"gp.free_space=true") {
+            continue;
+        }
+        let Ok(world) = World::build(experiment.scene.clone()).map(Arc::new) else { return };
+        let truth = Truth::sample(&world, experiment.grid as usize);
+        let Some(entry) = planner::by_name(planner) else { return };
+        let begun = Instant::now();
+        let rows: Vec<TrialRow> = (0..trials)
+            .map(|number| {
+                let exact = probe::open(&world, 1).unwrap();
+                let rng = seed::stream(experiment.seed, number.into(), "estimates");
+                let mut estimating = Estimating { exact: probe::open(&world, 1).unwrap(), rng };
+                let mut exact = exact;
+                let probe: &mut dyn Probe = if is_exact { &mut *exact } else { &mut estimating };
+                trial::run_with(&experiment, probe, &truth, entry, number)
+            })
+            .collect();
+        let seconds = begun.elapsed().as_secs_f64() / f64::from(trials);
+        let failed = rows.iter().filter(|row| row.failure.is_some()).count();
+        let unit = if experiment.scene.object.is_some() { 1e3 } else { 1.0 };
+        let heights = baseline.get_or_insert_with(|| rows.clone());
+        let rmse = |metrics: &Metrics| unit * metrics.rmse_m;
+        let curve = |rows: &[TrialRow]| -> Vec<(u32, f64)> {
+            (experiment.initial_touches..=experiment.touches)
+                .filter_map(|count| Some((count, median(&after(rows, count, rmse))?)))
+                .collect()
+        };
+        let goal = curve(heights).last().map_or(f64::NAN, |last| last.1);
+        let reached = touches_to_reach(&curve(&rows), goal);
+        let finals = after(&rows, experiment.touches, rmse);
+        let edges = after(&rows, experiment.touches, |m| unit * m.edge_rmse_m.unwrap_or(f64::NAN));
+        let covered = after(&rows, experiment.touches, |m| m.coverage.unwrap_or(f64::NAN));
+        let pairs: Vec<(f64, f64)> =
+            finals.iter().copied().zip(after(heights, experiment.touches, rmse)).collect();
+        let against = Paired::new(&pairs, experiment.seed).map_or(String::new(), |paired| {
+            let [low, high] = paired.interval.unwrap_or([f64::NAN; 2]);
+            format!("{:+.3} [{low:+.3}, {high:+.3}]", paired.mean)
+        });
+        println!(
+            "| {planner} | {} | {belief} | {:.3} | {:.3} | {against} | {} | {:.2} | {seconds:.2} |{}",
+            if is_exact { "exact" } else { "estimated" },
+            median(&finals).unwrap_or(f64::NAN),
+            median(&edges).unwrap_or(f64::NAN),
+            reached.map_or("–".into(), |count| count.to_string()),
+            median(&covered).unwrap_or(f64::NAN),
+            if failed > 0 { format!(" {failed} failed") } else { String::new() },
+        );
+    }
+}
+
+/// A measure of every trial after `count` touches.
+fn after(rows: &[TrialRow], count: u32, measure: impl Fn(&Metrics) -> f64) -> Vec<f64> {
+    let touches = rows.iter().filter_map(|row| row.touches.get(count as usize - 1));
+    touches.filter_map(|touch| touch.metrics.as_ref().map(&measure)).collect()
+}
