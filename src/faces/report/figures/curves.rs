@@ -73,7 +73,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
 /// Room for the truth and every drawn touch, and nearly as much again for the bands.
 pub(super) fn height_axis(run: &Run) -> Option<Axis> {
     let per_m = Length::of(&run.experiment.scene.zone).per_m;
-    Axis::around(replay::heights_m(run).map(|height_m| height_m * per_m), 0.4, 5.0)
+    let heights_m = replay::heights_m(run, run.experiment.drawn_planners());
+    Axis::around(heights_m.map(|height_m| height_m * per_m), 0.4, 5.0)
 }
 
 fn draw_legend(canvas: &mut Canvas, run: &Run) {

@@ -85,7 +85,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
 /// What is drawn: the zone, and heights around the truth and the drawn touches; none in 1-D.
 fn space(run: &Run) -> Option<Space> {
     let zone = &run.experiment.scene.zone;
-    let (low, high) = Axis::around(replay::heights_m(run), 0.08, 5.0)?.range();
+    let (low, high) =
+        Axis::around(replay::heights_m(run, run.experiment.drawn_planners()), 0.08, 5.0)?.range();
     Some(Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: [low, high] })
 }
 
