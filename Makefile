@@ -10,7 +10,7 @@ PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementat
 FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
 PALPATE := target/release/palpate
 
-.PHONY: demo test lint bench growth bench-peers setup tools clean
+.PHONY: demo test page-test lint bench growth bench-peers setup tools clean
 
 demo: setup
 	cargo build --release --locked
@@ -18,6 +18,10 @@ demo: setup
 
 test: setup
 	cargo test --locked
+
+# The report page in a browser; fails where there is no Chromium.
+page-test: setup
+	PALPATE_PAGE_TEST=1 cargo test --locked --test page
 
 lint: setup
 	cargo fmt --check

@@ -17,7 +17,7 @@ use serde::Serialize;
 /// page.
 const PLACES_MAX: [usize; 2] = [301, 41];
 /// Most bytes that all frames may take; chosen to keep a page below three megabytes.
-const BYTES_MAX: usize = 1_500_000;
+const BYTES_MAX: usize = 1_600_000;
 /// Bytes of one place in one frame: two for the mean, two for the deviation, in base 64.
 const BYTES_OF_PLACE: usize = 6;
 /// Room above and below the heights of a curve, for its bands, and of a surface; chosen.
