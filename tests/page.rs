@@ -29,8 +29,7 @@ function fingerprint() {
 }
 async function after(name, act) {
   act();
-  // Drawn with the next frame of the screen, which may be late.
-  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  await pause(50);
   write(`${name} | ${fingerprint()} | ${explorer.querySelector("output").textContent}`);
 }
 const click = (selector) => () => explorer.querySelector(selector)?.click();
@@ -54,6 +53,9 @@ const key = (key) => () => explorer.querySelector("canvas").dispatchEvent(new Ke
 })();
 "#;
 
+/// A browser without a screen runs its clock ahead of its frames, so drawing waits for the clock.
+const CLOCK: &str = "<script>window.requestAnimationFrame = (draw) => setTimeout(draw);</script>";
+
 fn browser() -> Option<PathBuf> {
     let folders = std::env::var_os("PATH")?;
     std::env::split_paths(&folders)
@@ -67,6 +69,7 @@ fn acts(browser: &Path, settings: &str) -> Vec<[String; 3]> {
     let path = folder.path().join("report.html");
     report::write(&run(settings), folder.path()).unwrap();
     let page = fs::read_to_string(&path).unwrap();
+    let page = page.replace("<head>", &format!("<head>{CLOCK}"));
     fs::write(&path, page.replace("</body>", &format!("<script>{{{DRIVER}}}</script></body>")))
         .unwrap();
     let output = Command::new(browser)

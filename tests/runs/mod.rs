@@ -64,14 +64,17 @@ pub fn run(text: &str) -> Run {
 }
 
 fn row(experiment: &Experiment, trial: u32, planner: &str) -> TrialRow {
-    let touches = (1..=experiment.touches).map(|count| touch(experiment, trial, count)).collect();
+    let touches =
+        (1..=experiment.touches).map(|count| touch(experiment, (trial, planner), count)).collect();
     TrialRow { trial, planner: planner.into(), failure: None, touches }
 }
 
-fn touch(experiment: &Experiment, trial: u32, count: u32) -> TouchRow {
+fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> TouchRow {
     let zone = &experiment.scene.zone;
     // Multiples of two irrational numbers spread evenly over the zone.
-    let step = f64::from(count + 100 * trial);
+    let is_initial = count <= experiment.initial_touches;
+    let shift = if is_initial { 0.0 } else { 0.37 * f64::from(planner.as_bytes()[0]) };
+    let step = f64::from(count + 100 * trial) + shift;
     let target = zone.at(&[(0.618 * step).fract(), (0.755 * step).fract()]);
     let fit = Fit {
         hyperparameters: Hyperparameters {
