@@ -11,6 +11,8 @@ pub mod paired;
 pub mod png;
 pub mod relief;
 pub mod replay;
+pub mod scan;
+pub mod sheet;
 pub mod style;
 pub mod table;
 

@@ -82,7 +82,7 @@ impl View {
     }
 
     /// How near the viewer a point is, in pixels.
-    fn nearness(&self, point: [f64; 3]) -> f64 {
+    pub fn nearness(&self, point: [f64; 3]) -> f64 {
         self.scale * self.stretched(point).dot(&self.toward)
     }
 
@@ -176,8 +176,8 @@ fn face(view: &View, corners: &[[f64; 3]], axis: &Axis) -> Face {
     }
 }
 
-/// Brightness of a matt face, 0..1.
-fn brightness(normal: Vector3<f64>) -> f64 {
+/// Brightness of a matt face of this unit normal (x, height, z), 0..1.
+pub fn brightness(normal: Vector3<f64>) -> f64 {
     AMBIENT + (1.0 - AMBIENT) * normal.dot(&LIGHT.normalize()).max(0.0)
 }
 

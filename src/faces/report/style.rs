@@ -105,6 +105,11 @@ pub fn deviation(fraction: f64) -> String {
     hex(between(&DEVIATION, fraction))
 }
 
+/// The same as red, green and blue.
+pub fn deviation_rgb(fraction: f64) -> [u8; 3] {
+    between(&DEVIATION, fraction).map(|channel| channel.round() as u8)
+}
+
 /// Colour of a height, 0..1 of the range, under light of strength 0..1.
 pub fn height(fraction: f64, light: f64) -> String {
     hex(between(&HEIGHT, fraction).map(|channel| channel * light))

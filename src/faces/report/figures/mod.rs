@@ -5,6 +5,8 @@ mod convergence;
 mod curves;
 mod surfaces;
 
+pub use surfaces::FIGURE as SURFACES;
+
 use super::axes::Sample;
 use super::style::LATER;
 use crate::trials::store::Run;
