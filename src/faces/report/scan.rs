@@ -11,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 
 const PANEL: (f64, f64) = (430.0, 480.0);
 const FOOT_PX: f64 = 64.0;
-/// Places along each side of the object, and of the zone's rim; more would not show.
+/// Places along each side of the zone's rim; more would not show.
 const PLACES: usize = 90;
 
 /// The object on the left with the zone's rim on it, the points of contact on the right, as SVG;
@@ -26,21 +26,23 @@ pub fn picture(
     let height_m = |y: f64| y - zone.datum_y_m;
     let felt = || points.iter().map(|(point, _)| height_m(point.y));
     let (low, high) = mesh.bounds();
-    let front = Zone { x_m: [low.x, high.x], z_m: Some([low.z, high.z]), ..zone.clone() };
-    let places = front.grid(PLACES);
-    let heights: Vec<Option<f64>> = places.iter().map(|at| world.true_height_m(at)).collect();
-    let whole = Axis::around(heights.iter().flatten().copied(), 0.0, 5.0)?.range();
+    // Out to whole units, so that the ends of the axes are short to read.
+    let around = |low: f64, high: f64| {
+        [(low * unit.per_m).floor() / unit.per_m, (high * unit.per_m).ceil() / unit.per_m]
+    };
     let inside = Axis::around(felt(), 0.04, 5.0)?;
 
     let mut canvas = Canvas::new(2.0 * PANEL.0, PANEL.1 + FOOT_PX);
     let area =
         |column: f64| Area { left: column * PANEL.0, top: 8.0, width: PANEL.0, height: PANEL.1 };
-    let space = Space { x_m: front.x_m, z_m: front.z_m?, height_m: whole.into() };
+    let space = Space {
+        x_m: around(low.x, high.x),
+        z_m: around(low.z, high.z),
+        height_m: [height_m(low.y), height_m(high.y)],
+    };
     let sheet = Sheet::new(unit, area(0.0), space);
     sheet.frame(&mut canvas, "the object, and the zone on it", "");
-    let xs: Vec<f64> = places.iter().take(PLACES).map(|place| place[0]).collect();
-    let zs: Vec<f64> = places.iter().step_by(PLACES).map(|place| place[1]).collect();
-    Relief::new(&sheet.view, &xs, &zs, &heights, &inside).draw(&mut canvas);
+    Relief::of_mesh(&sheet.view, mesh, zone.datum_y_m, &inside).draw(&mut canvas);
     for side in rim(zone) {
         let on_surface = side.iter().map(|place| {
             world.true_height_m(place).map(|height| sheet.view.at([place[0], height, place[1]]))
