@@ -153,14 +153,15 @@ impl Relief {
 
     /// Draws it, far faces first.
     pub fn draw(&self, canvas: &mut Canvas) {
-        for face in &self.faces {
-            let colour = &face.colour;
-            let corners: Vec<String> = face.outline.iter().map(|&corner| pair(corner)).collect();
-            let data = format!("M{}z", corners.join("L"));
-            // A rim in the face's own colour closes the hairlines between faces.
-            canvas
-                .outline(&data, &format!(r#"fill="{colour}" stroke="{colour}" stroke-width=".7""#));
-        }
+        // A rim in the face's own colour closes the hairlines between faces.
+        let shared = r#"fill="currentColor" stroke="currentColor" stroke-width=".7""#;
+        canvas.grouped(shared, |canvas| {
+            for Face { outline, colour, .. } in &self.faces {
+                let corners: Vec<String> = outline.iter().map(|&corner| pair(corner)).collect();
+                let data = format!("M{}z", corners.join("L"));
+                canvas.outline(&data, &format!(r#"color="{colour}""#));
+            }
+        });
     }
 
     /// Whether the relief hides a point that lies on it or behind it.

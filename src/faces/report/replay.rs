@@ -70,7 +70,9 @@ impl<'a> Replay<'a> {
     /// Its agreement with the truth, in words.
     pub fn score(&self) -> String {
         self.metrics.map_or(String::new(), |metrics| {
-            format!("R {:.4}, RMSE {} mm", metrics.r, digits(1e3 * metrics.rmse_m))
+            let centred = format!("{:.4}", metrics.centred_r).replace('-', "−");
+            let rmse_mm = digits(1e3 * metrics.rmse_m);
+            format!("R {:.4}, centred {centred}, RMSE {rmse_mm} mm", metrics.r)
         })
     }
 }

@@ -209,12 +209,9 @@ fn belief(
 ) -> anyhow::Result<Option<Belief>> {
     let Some(replay) = Replay::new(run, planner, touches)? else { return Ok(None) };
     let predictions = replay.surface.predict(places.iter().copied());
-    let centred = replay.metrics.map_or(String::new(), |metrics| {
-        format!(", centred R {:.4}", metrics.centred_r).replace('-', "−")
-    });
     Ok(Some(Belief {
         touches,
-        score: replay.score() + &centred,
+        score: replay.score(),
         means_m: predictions.iter().map(|prediction| prediction.mean).collect(),
         deviations_m: predictions.iter().map(|prediction| prediction.variance.sqrt()).collect(),
     }))
