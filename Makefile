@@ -19,6 +19,8 @@ demo: setup
 # Every experiment of the paper: what docs/paper.md is written from.
 paper: setup
 	cargo build --release --locked
+	$(PALPATE) scan scenes/container.toml
+	$(PALPATE) scan scenes/bird.toml
 	for experiment in experiments/paper/*.toml; do $(PALPATE) run $$experiment || exit; done
 
 test: setup

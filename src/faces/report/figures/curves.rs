@@ -25,7 +25,7 @@ fn caption(run: &Run) -> String {
 const STEPS: usize = 300;
 /// Half-width of a 95 % band in standard deviations.
 const BAND_SD: f64 = 1.96;
-const MARGIN: (f64, f64) = (72.0, 72.0);
+const MARGIN: (f64, f64) = (72.0, 80.0);
 const PANEL: (f64, f64) = (236.0, 188.0);
 const GAP: (f64, f64) = (22.0, 68.0);
 
