@@ -1,5 +1,6 @@
 //! What the explorer shows: beliefs on a grid after many touch counts, in few bytes.
 
+use super::code::Code;
 use crate::faces::report::axes::{self, Axis, Length};
 use crate::faces::report::relief::Space;
 use crate::faces::report::replay::{self, Replay};
@@ -8,8 +9,6 @@ use crate::trials::row::TouchRow;
 use crate::trials::store::Run;
 use crate::world::Zone;
 use anyhow::ensure;
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 use serde::Serialize;
 
@@ -143,7 +142,15 @@ pub(super) fn data(run: &Run) -> anyhow::Result<Option<Data>> {
             .iter()
             .map(|touch| contact(zone, touch, unit))
             .collect(),
-        frames: read.iter().map(|belief| code.frame(belief)).collect(),
+        frames: read
+            .iter()
+            .map(|belief| Frame {
+                touches: belief.touches,
+                score: belief.score.clone(),
+                mean: code.heights(belief.means_m.iter().copied()),
+                deviation: code.deviations(&belief.deviations_m),
+            })
+            .collect(),
     });
     Ok(Some(Data {
         unit: unit.symbol,
@@ -228,39 +235,4 @@ fn contact(zone: &Zone, touch: &TouchRow, unit: Length) -> (f64, Option<f64>, Op
 /// A number with no more digits than show.
 fn short(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
-}
-
-/// How heights and deviations are written: sixteen bits each, the lower eight first.
-struct Code {
-    height_m: [f64; 2],
-    deviation_m: [f64; 2],
-}
-
-impl Code {
-    fn frame(&self, belief: &Belief) -> Frame {
-        let [least, most] = self.deviation_m;
-        let range = (most / least).ln();
-        let share = |deviation_m: f64| (deviation_m / least).ln() / range;
-        Frame {
-            touches: belief.touches,
-            score: belief.score.clone(),
-            mean: self.heights(belief.means_m.iter().copied()),
-            deviation: encode(belief.deviations_m.iter().copied().map(share)),
-        }
-    }
-
-    /// A height that is not finite counts as none.
-    fn heights(&self, heights_m: impl Iterator<Item = f64>) -> String {
-        let [low, high] = self.height_m;
-        encode(heights_m.map(|height_m| (height_m - low) / (high - low)))
-    }
-}
-
-/// Numbers from 0 to 1; the highest code stands for none.
-fn encode(shares: impl Iterator<Item = f64>) -> String {
-    let code = |share: f64| match share.is_nan() {
-        true => u16::MAX,
-        false => (65534.0 * share.clamp(0.0, 1.0)).round() as u16,
-    };
-    STANDARD.encode(shares.flat_map(|share| code(share).to_le_bytes()).collect::<Vec<u8>>())
 }

@@ -3,6 +3,7 @@
 //! It is drawn by a few hundred lines of script of our own. A plotting library would add three to
 //! four megabytes to every page, and still leave the touches behind a surface to be told apart.
 
+mod code;
 mod frames;
 
 use super::canvas::escape;

@@ -5,7 +5,7 @@
 function reliefView(canvas) {
   // From where it is seen at first, and where light falls from: as in the printed figures. More of
   // it comes from everywhere, so that colours can be read on a slope.
-  const turn = { azimuth: 38, elevation: 24 };
+  const turn = { azimuth: 38, elevation: 24, isDragged: false };
   const [LIGHT, AMBIENT, DIRECT] = [unit([0.45, 0.7, 0.55]), 0.5, 0.62];
   const { x: xs, z: zs, stretch } = data;
   const [columns, count] = [xs.length, xs.length * zs.length];
@@ -96,7 +96,7 @@ function reliefView(canvas) {
 
   // One triangle: each property is a plane over the canvas.
   function fill({ depth, pixels }, corners, width, height, a, b, c) {
-    const [xs, ys] = corners;
+    const [xs, ys, nearness] = corners;
     const [ux, uy, vx, vy] = [xs[b] - xs[a], ys[b] - ys[a], xs[c] - xs[a], ys[c] - ys[a]];
     const area = ux * vy - vx * uy;
     if (!(Math.abs(area) > 1e-9) || Number.isNaN(corners[4][a] + corners[4][b] + corners[4][c])) return;
@@ -112,13 +112,14 @@ function reliefView(canvas) {
         const [px, py] = [x - xs[a], y - ys[a]];
         const [s, t] = [(px * vy - vx * py) / area, (ux * py - px * uy) / area];
         if (s < -1e-6 || t < -1e-6 || s + t > 1 + 1e-6) continue;
-        for (let axis = 2; axis < 8; axis++) {
+        const pixel = y * width + x;
+        const near = nearness[a] + s * (nearness[b] - nearness[a]) + t * (nearness[c] - nearness[a]);
+        if (near <= depth[pixel]) continue;
+        depth[pixel] = near;
+        for (let axis = 3; axis < 8; axis++) {
           const property = corners[axis];
           value[axis] = property[a] + s * (property[b] - property[a]) + t * (property[c] - property[a]);
         }
-        const pixel = y * width + x;
-        if (value[2] <= depth[pixel]) continue;
-        depth[pixel] = value[2];
         // A line of equal height is as thin on a slope as on the flat.
         const off = Math.abs(value[4] / contourStep - Math.round(value[4] / contourStep)) * contourStep;
         const isLine = off < 0.8 * gradient;
@@ -216,8 +217,9 @@ function reliefView(canvas) {
       error: (k) => frame.mean[k] - data.truth[k],
     }[state.colour];
     const project = projection(width, height);
-    // Four pixels are painted for one of an ordinary screen, which smooths the rims.
-    const dense = Math.max(ratio, 2);
+    // Four pixels are painted for one of an ordinary screen, which smooths the rims; while it is
+    // dragged, one.
+    const dense = turn.isDragged ? 1 : Math.max(ratio, 2);
     const [wide, tall] = [Math.round(width * dense), Math.round(height * dense)];
     const fine = (...point) => project(...point).map((part, axis) => (axis < 2 ? part * dense : part));
     const layer = paint(frame.mean, (k) => colour(scale, scale.at(shown(k))), fine, wide, tall);
@@ -241,9 +243,16 @@ function reliefView(canvas) {
     turn.elevation = Math.min(Math.max(turn.elevation + up, -30), 85);
     window.draw();
   }
-  canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+  canvas.addEventListener("pointerdown", (event) => {
+    turn.isDragged = true;
+    canvas.setPointerCapture(event.pointerId);
+  });
   canvas.addEventListener("pointermove", (event) => {
-    if (event.buttons) turnBy(-0.4 * event.movementX, 0.4 * event.movementY);
+    if (turn.isDragged) turnBy(-0.4 * event.movementX, 0.4 * event.movementY);
+  });
+  canvas.addEventListener("lostpointercapture", () => {
+    turn.isDragged = false;
+    turnBy(0, 0);
   });
   canvas.addEventListener("keydown", (event) => {
     const by = { ArrowLeft: [5, 0], ArrowRight: [-5, 0], ArrowUp: [0, 5], ArrowDown: [0, -5] }[event.key];
