@@ -10,14 +10,25 @@ PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementat
 FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
 PALPATE := target/release/palpate
 
-.PHONY: demo test lint bench contacts growth bench-peers setup tools clean
+.PHONY: demo paper test page-test lint bench contacts growth bench-peers setup tools clean
 
 demo: setup
 	cargo build --release --locked
 	$(PALPATE) run experiments/demo.toml
 
+# Every experiment of the paper: what docs/paper.md is written from.
+paper: setup
+	cargo build --release --locked
+	$(PALPATE) scan scenes/container.toml
+	$(PALPATE) scan scenes/bird.toml
+	for experiment in experiments/paper/*.toml; do $(PALPATE) run $$experiment || exit; done
+
 test: setup
 	cargo test --locked
+
+# The report page in a browser; fails where there is no Chromium.
+page-test: setup
+	PALPATE_PAGE_TEST=1 cargo test --locked --test page
 
 lint: setup
 	cargo fmt --check

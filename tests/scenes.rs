@@ -27,8 +27,8 @@ fn every_shipped_scene_can_be_built() {
 
 #[test]
 fn every_shipped_experiment_loads_and_its_saved_form_means_the_same() {
-    let experiments = shipped("experiments");
-    assert!(experiments.len() >= 4);
+    let experiments = [shipped("experiments"), shipped("experiments/paper")].concat();
+    assert!(experiments.len() >= 12);
     let folder = TempDir::new().unwrap();
     for path in experiments {
         let experiment = Experiment::load(&path, &[]).unwrap();

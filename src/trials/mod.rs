@@ -5,6 +5,7 @@ pub mod experiment;
 pub mod metrics;
 pub mod row;
 pub mod runner;
+pub mod scan;
 pub mod statistics;
 pub mod store;
 pub mod summary;

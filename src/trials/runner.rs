@@ -75,10 +75,7 @@ pub fn run(
     progress: &(dyn Fn(&TrialRow) + Sync),
 ) -> Result<usize, RunError> {
     let jobs = jobs(experiment, done);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|error| RunError::Threads { threads, message: error.to_string() })?;
+    let pool = pool(threads)?;
     let finished = Mutex::new((folder, 0));
     // Handed out one by one, so that rows finish about in order and an interrupted run has
     // whole pairs.
@@ -98,6 +95,17 @@ pub fn run(
     .map_err(|error: StoreError| RunError::Store(error))?;
     let (_, count) = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok(count)
+}
+
+/// Threads of its own for a piece of work; 0 means all cores.
+///
+/// # Errors
+/// If they cannot be started.
+pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, RunError> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| RunError::Threads { threads, message: error.to_string() })
 }
 
 /// Runs one trial; a planner's or probe's panic becomes the trial's failure, so that one fault

@@ -10,6 +10,10 @@ use std::path::PathBuf;
 
 /// Fit the finger's constants to recordings of it on a flat plate.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate calibrate tests/data/biotac_flat_plate.json
+  palpate calibrate tests/data/biotac_flat_plate.json --attitude-only")]
 pub struct Args {
     /// The recordings, as in tests/data/biotac_flat_plate.json.
     recordings: PathBuf,

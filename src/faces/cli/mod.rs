@@ -1,8 +1,11 @@
 //! The command line.
 
 mod calibrate;
+mod export;
+mod progress;
 mod report;
 mod run;
+mod scan;
 mod show;
 
 use crate::conduct::planner::PLANNERS;
@@ -24,6 +27,8 @@ Examples:
   palpate run experiments/bird.toml --set trials=4 --set planners='[\"active\"]'
   palpate report runs/toy                   draw the figures again, without running
   palpate show my-part.obj --unit mm        check a mesh before exploring it
+  palpate scan scenes/bird.toml             touch the whole zone, write a point cloud
+  palpate export runs/bird --planner active --out bird.ply
 
 Exit codes: 0 done, 2 could not (the message says why), 130 interrupted; run the same command \
 again to continue.";
@@ -36,6 +41,10 @@ enum Command {
     Report(report::Args),
     /// Say what a mesh, scene, experiment or run folder holds.
     Show(show::Args),
+    /// Touch a grid of targets, and write the points of contact as a cloud.
+    Scan(scan::Args),
+    /// Write a belief of a run as a mesh.
+    Export(export::Args),
     /// Fit the finger's constants to recordings of it on a flat plate.
     Calibrate(calibrate::Args),
 }
@@ -60,6 +69,8 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Show(args) => show::run(&args),
+        Command::Scan(args) => scan::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
     };
     match outcome {

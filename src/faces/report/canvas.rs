@@ -170,6 +170,13 @@ impl Canvas {
         ));
     }
 
+    /// Draws with attributes that everything drawn shares.
+    pub fn grouped(&mut self, attributes: &str, draw: impl FnOnce(&mut Self)) {
+        self.push(&format!("<g {attributes}>"));
+        draw(self);
+        self.push("</g>");
+    }
+
     /// Draws with everything outside `area` cut off.
     pub fn clipped(&mut self, area: Area, draw: impl FnOnce(&mut Self)) {
         let [left, top] = [area.left, area.top].map(number);

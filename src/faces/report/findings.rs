@@ -63,7 +63,8 @@ fn scores(run: &Run, curves: &[(&str, Vec<Point>)]) -> Option<String> {
             let edge = point.edge_rmse_median_m.map_or(String::new(), |edge_m| {
                 format!(", {} mm in the outer tenth of the zone", digits(MM.per_m * edge_m))
             });
-            Some(format!("{name} {r} (median RMSE {rmse} mm{edge})"))
+            let centred = with_error(point.centred_r_mean, point.centred_r_se, 4);
+            Some(format!("{name} {r} (centred {centred}, median RMSE {rmse} mm{edge})"))
         })
         .collect();
     Some(format!("After {count} touches the mean R (Eq. 5) is: {}.", told.join("; ")))

@@ -2,6 +2,7 @@
 
 pub mod axes;
 pub mod canvas;
+pub mod explorer;
 pub mod figures;
 pub mod findings;
 pub mod heat;
@@ -10,6 +11,8 @@ pub mod paired;
 pub mod png;
 pub mod relief;
 pub mod replay;
+pub mod scan;
+pub mod sheet;
 pub mod style;
 pub mod table;
 
@@ -45,7 +48,8 @@ pub fn write(run: &Run, folder: &Path) -> anyhow::Result<()> {
     }
     let text = |name| fs::read_to_string(folder.join(name)).ok();
     let (settings, manifest) = (text(RESOLVED), text(MANIFEST));
-    let html = page::html(run, &drawings, settings.as_deref(), manifest.as_deref());
+    let explorer = explorer::section(run)?;
+    let html = page::html(run, &drawings, &explorer, settings.as_deref(), manifest.as_deref());
     Ok(write_whole(&folder.join("report.html"), &html)?)
 }
 

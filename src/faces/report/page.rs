@@ -17,11 +17,12 @@ const RAW: &[(&str, &str)] = &[
 /// Failures told one by one; more are only counted.
 const FAILURES_TOLD: usize = 10;
 
-/// The page as HTML; `settings` and `manifest` are the texts of the files of that name, if
-/// they are there.
+/// The page as HTML; `explorer` is its moving part, `settings` and `manifest` are the texts of the
+/// files of that name, if they are there.
 pub fn html(
     run: &Run,
     drawings: &[Drawing],
+    explorer: &str,
     settings: Option<&str>,
     manifest: Option<&str>,
 ) -> String {
@@ -36,7 +37,7 @@ pub fn html(
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{name} – Palpate</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <p class=\"kind\">Palpate run</p>\n<h1>{name}</h1>\n{question}\
-         <section>\n<h2>Found</h2>\n{}</section>\n{}{}{}{figures}{}{}</body>\n</html>\n",
+         <section>\n<h2>Found</h2>\n{}</section>\n{}{}{}{explorer}{figures}{}{}</body>\n</html>\n",
         paragraph(&findings::sentences(run)),
         summary_table(run),
         comparison_table(run),

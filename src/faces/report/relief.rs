@@ -1,8 +1,9 @@
-//! A height field as a shaded relief: orthographic view, painter's algorithm.
+//! A height field or a mesh as a shaded relief: orthographic view, painter's algorithm.
 
 use super::axes::Axis;
 use super::canvas::{Area, Canvas, Point, pair};
 use super::style;
+use crate::ground::geometry::mesh::Mesh;
 use nalgebra::Vector3;
 
 /// From where every relief is seen, chosen so that neither side of a bulge hides much: turned
@@ -82,7 +83,7 @@ impl View {
     }
 
     /// How near the viewer a point is, in pixels.
-    fn nearness(&self, point: [f64; 3]) -> f64 {
+    pub fn nearness(&self, point: [f64; 3]) -> f64 {
         self.scale * self.stretched(point).dot(&self.toward)
     }
 
@@ -126,24 +127,41 @@ impl Relief {
                     around.into_iter().filter_map(|(i, j)| corner(i, j)).collect();
                 // Three of four still make a face, which smooths the outline of an object.
                 if corners.len() >= 3 {
-                    faces.push(face(view, &corners, axis));
+                    faces.push(face(view, &corners, normal(view, &corners), axis));
                 }
             }
         }
+        Self::sorted(faces)
+    }
+
+    /// The triangles of a mesh that face the viewer; heights are measured from a datum.
+    pub fn of_mesh(view: &View, mesh: &Mesh, datum_y_m: f64, axis: &Axis) -> Self {
+        let seen = mesh.iter_corners().filter_map(|corners| {
+            let [a, b, c] = corners.map(|p_w| [p_w.x, p_w.y - datum_y_m, p_w.z]);
+            let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+            // A sound mesh has no triangle without an area.
+            (normal.dot(&view.toward) > 0.0)
+                .then(|| face(view, &[a, b, c], normal.normalize(), axis))
+        });
+        Self::sorted(seen.collect())
+    }
+
+    fn sorted(mut faces: Vec<Face>) -> Self {
         faces.sort_by(|a, b| a.nearness.total_cmp(&b.nearness));
         Self { faces }
     }
 
     /// Draws it, far faces first.
     pub fn draw(&self, canvas: &mut Canvas) {
-        for face in &self.faces {
-            let colour = &face.colour;
-            let corners: Vec<String> = face.outline.iter().map(|&corner| pair(corner)).collect();
-            let data = format!("M{}z", corners.join("L"));
-            // A rim in the face's own colour closes the hairlines between faces.
-            canvas
-                .outline(&data, &format!(r#"fill="{colour}" stroke="{colour}" stroke-width=".7""#));
-        }
+        // A rim in the face's own colour closes the hairlines between faces.
+        let shared = r#"fill="currentColor" stroke="currentColor" stroke-width=".7""#;
+        canvas.grouped(shared, |canvas| {
+            for Face { outline, colour, .. } in &self.faces {
+                let corners: Vec<String> = outline.iter().map(|&corner| pair(corner)).collect();
+                let data = format!("M{}z", corners.join("L"));
+                canvas.outline(&data, &format!(r#"color="{colour}""#));
+            }
+        });
     }
 
     /// Whether the relief hides a point that lies on it or behind it.
@@ -156,9 +174,8 @@ impl Relief {
     }
 }
 
-fn face(view: &View, corners: &[[f64; 3]], axis: &Axis) -> Face {
-    let count = corners.len() as f64;
-    let mean_height = corners.iter().map(|corner| corner[1]).sum::<f64>() / count;
+/// Unit normal of a height field's face, towards the front.
+fn normal(view: &View, corners: &[[f64; 3]]) -> Vector3<f64> {
     let [first, second, third] =
         [corners[0], corners[1], corners[corners.len() - 1]].map(|corner| view.stretched(corner));
     let opposite = view.stretched(corners[2]);
@@ -168,7 +185,12 @@ fn face(view: &View, corners: &[[f64; 3]], axis: &Axis) -> Face {
         _ => (second - first, third - first),
     };
     let normal = along.cross(&across).try_normalize(0.0).unwrap_or_else(Vector3::y);
-    let normal = if normal.y < 0.0 { -normal } else { normal };
+    if normal.y < 0.0 { -normal } else { normal }
+}
+
+fn face(view: &View, corners: &[[f64; 3]], normal: Vector3<f64>, axis: &Axis) -> Face {
+    let count = corners.len() as f64;
+    let mean_height = corners.iter().map(|corner| corner[1]).sum::<f64>() / count;
     Face {
         outline: corners.iter().map(|&corner| view.at(corner)).collect(),
         nearness: corners.iter().map(|&corner| view.nearness(corner)).sum::<f64>() / count,
@@ -176,8 +198,8 @@ fn face(view: &View, corners: &[[f64; 3]], axis: &Axis) -> Face {
     }
 }
 
-/// Brightness of a matt face, 0..1.
-fn brightness(normal: Vector3<f64>) -> f64 {
+/// Brightness of a matt face of this unit normal (x, height, z), 0..1.
+pub fn brightness(normal: Vector3<f64>) -> f64 {
     AMBIENT + (1.0 - AMBIENT) * normal.dot(&LIGHT.normalize()).max(0.0)
 }
 

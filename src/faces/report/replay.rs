@@ -74,7 +74,9 @@ impl<'a> Replay<'a> {
     /// Its agreement with the truth, in words.
     pub fn score(&self) -> String {
         self.metrics.map_or(String::new(), |metrics| {
-            format!("R {:.4}, RMSE {} mm", metrics.r, digits(1e3 * metrics.rmse_m))
+            let centred = format!("{:.4}", metrics.centred_r).replace('-', "−");
+            let rmse_mm = digits(1e3 * metrics.rmse_m);
+            format!("R {:.4}, centred {centred}, RMSE {rmse_mm} mm", metrics.r)
         })
     }
 }
@@ -91,14 +93,17 @@ pub fn contact(zone: &Zone, touch: &TouchRow) -> Option<(Vec<f64>, f64)> {
     Some((zone.place(&p_wc), p_wc.y - zone.datum_y_m))
 }
 
-/// Every height that a drawing of beliefs should have room for: true ones and touched ones.
-pub fn heights_m(run: &Run) -> impl Iterator<Item = f64> {
-    let planners = run.experiment.drawn_planners();
+/// Every height that a drawing of beliefs of `planners` should have room for: true ones and
+/// touched ones.
+pub fn heights_m<'a>(
+    run: &'a Run,
+    planners: impl IntoIterator<Item = &'a str>,
+) -> impl Iterator<Item = f64> {
     let touched = planners
         .into_iter()
-        .filter_map(|planner| row(run, planner))
+        .filter_map(move |planner| row(run, planner))
         .flat_map(|row| &row.touches)
-        .filter_map(|touch| Some(contact(&run.experiment.scene.zone, touch)?.1));
+        .filter_map(move |touch| Some(contact(&run.experiment.scene.zone, touch)?.1));
     run.truth.heights_m.iter().flatten().copied().chain(touched)
 }
 

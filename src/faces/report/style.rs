@@ -19,6 +19,8 @@ pub const GRID: &str = "#e4e4e4";
 pub const PAPER: &str = "#ffffff";
 /// The true surface.
 pub const TRUTH: &str = "#009e73";
+/// The same as red, green and blue.
+pub const TRUTH_RGB: [f64; 3] = [0.0, 158.0, 115.0];
 /// Touches that every planner starts with.
 pub const INITIAL: &str = "#0046c8";
 /// Touches that a planner chose.
@@ -66,7 +68,7 @@ pub fn fill(colour: &str, opacity: f64) -> String {
 }
 
 /// Viridis, dark to light.
-const DEVIATION: [[f64; 3]; 9] = [
+pub const DEVIATION: [[f64; 3]; 9] = [
     [68.0, 1.0, 84.0],
     [71.0, 44.0, 122.0],
     [59.0, 81.0, 139.0],
@@ -79,7 +81,7 @@ const DEVIATION: [[f64; 3]; 9] = [
 ];
 
 /// Slate to cream: pale enough for blue and red points to stand out under shading.
-const HEIGHT: [[f64; 3]; 5] = [
+pub const HEIGHT: [[f64; 3]; 5] = [
     [104.0, 134.0, 158.0],
     [150.0, 178.0, 184.0],
     [196.0, 211.0, 196.0],
@@ -87,9 +89,25 @@ const HEIGHT: [[f64; 3]; 5] = [
     [252.0, 238.0, 190.0],
 ];
 
+/// ColorBrewer's PuOr: too low, right, too high; neither end is the colour of a touch.
+pub const ERROR: [[f64; 3]; 7] = [
+    [84.0, 39.0, 136.0],
+    [153.0, 142.0, 195.0],
+    [216.0, 218.0, 235.0],
+    [247.0, 247.0, 247.0],
+    [254.0, 224.0, 182.0],
+    [241.0, 163.0, 64.0],
+    [179.0, 88.0, 6.0],
+];
+
 /// Colour of a standard deviation, 0..1 of the largest.
 pub fn deviation(fraction: f64) -> String {
     hex(between(&DEVIATION, fraction))
+}
+
+/// The same as red, green and blue.
+pub fn deviation_rgb(fraction: f64) -> [u8; 3] {
+    between(&DEVIATION, fraction).map(|channel| channel.round() as u8)
 }
 
 /// Colour of a height, 0..1 of the range, under light of strength 0..1.

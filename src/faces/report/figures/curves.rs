@@ -2,9 +2,9 @@
 
 use super::{Figure, miss_entry};
 use crate::faces::report::axes::{Axis, Length, Panel, Sample, legend};
-use crate::faces::report::canvas::{Area, Canvas};
+use crate::faces::report::canvas::{Anchor, Area, Canvas};
 use crate::faces::report::replay::{self, Replay};
-use crate::faces::report::style::{self, INITIAL, INK, LATER, TRUTH};
+use crate::faces::report::style::{self, FAINT_INK, INITIAL, INK, LATER, SMALL_PX, TEXT_PX, TRUTH};
 use crate::ground::gp::Posterior;
 use crate::ground::gp::posterior::Scratch;
 use crate::trials::store::Run;
@@ -25,7 +25,7 @@ fn caption(run: &Run) -> String {
 const STEPS: usize = 300;
 /// Half-width of a 95 % band in standard deviations.
 const BAND_SD: f64 = 1.96;
-const MARGIN: (f64, f64) = (72.0, 66.0);
+const MARGIN: (f64, f64) = (72.0, 80.0);
 const PANEL: (f64, f64) = (236.0, 188.0);
 const GAP: (f64, f64) = (22.0, 68.0);
 
@@ -52,15 +52,19 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             let [low, high] = zone.x_m.map(|x| x * unit.per_m);
             let panel = Panel { area, x: Axis::linear(low, high, 5.0), y: y.clone() };
             let replay = Replay::new(run, planner, count)?;
-            let title = match &replay {
-                Some(replay) => format!("{count} touches: {}", replay.score()),
-                None => format!("{count} touches: not reached in this trial"),
+            let score = match &replay {
+                Some(replay) => replay.score(),
+                None => "not reached in this trial".into(),
             };
             let is_last_row = row + 1 == planners.len();
             panel.frame(&mut canvas);
             let x_label = if is_last_row { format!("x ({})", unit.symbol) } else { String::new() };
             let y_label = format!("{planner}: height ({})", unit.symbol);
-            panel.label(&mut canvas, &title, &x_label, if column == 0 { &y_label } else { "" });
+            let above = [area.centre()[0], area.top - 24.0];
+            canvas.text(above, &format!("{count} touches"), TEXT_PX, Anchor::Middle);
+            let above = [above[0], area.top - 8.0];
+            canvas.coloured_text(above, &score, SMALL_PX, Anchor::Middle, FAINT_INK);
+            panel.label(&mut canvas, "", &x_label, if column == 0 { &y_label } else { "" });
             if let Some(replay) = replay {
                 let colour = style::planner(&run.experiment.planners, planner);
                 draw_belief(&mut canvas, &panel, run, &replay, colour);
@@ -73,7 +77,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
 /// Room for the truth and every drawn touch, and nearly as much again for the bands.
 pub(super) fn height_axis(run: &Run) -> Option<Axis> {
     let per_m = Length::of(&run.experiment.scene.zone).per_m;
-    Axis::around(replay::heights_m(run).map(|height_m| height_m * per_m), 0.4, 5.0)
+    let heights_m = replay::heights_m(run, run.experiment.drawn_planners());
+    Axis::around(heights_m.map(|height_m| height_m * per_m), 0.4, 5.0)
 }
 
 fn draw_legend(canvas: &mut Canvas, run: &Run) {

@@ -6,6 +6,8 @@ mod curves;
 mod surfaces;
 mod targets;
 
+pub use surfaces::FIGURE as SURFACES;
+
 use super::axes::Sample;
 use super::style::LATER;
 use crate::trials::store::Run;

@@ -1,17 +1,19 @@
 //! Beliefs of a surface after some touches, Figs. 5 and 7 of Yi et al. 2016.
 
 use super::{Figure, miss_entry};
-use crate::faces::report::axes::{self, Axis, Length, Sample, colour_bar, legend};
-use crate::faces::report::canvas::{Anchor, Area, Canvas, Point};
-use crate::faces::report::relief::{Relief, Space, View};
+use crate::faces::report::axes::{Axis, Length, Sample, colour_bar, legend};
+use crate::faces::report::canvas::{Area, Canvas, Point};
+use crate::faces::report::relief::{Relief, Space};
 use crate::faces::report::replay::{self, Replay};
-use crate::faces::report::style::{self, FAINT_INK, INITIAL, LATER, PAPER, SMALL_PX, TEXT_PX};
+use crate::faces::report::sheet::Sheet;
+use crate::faces::report::style::{self, INITIAL, LATER, PAPER};
 use crate::ground::gp::posterior::Scratch;
 use crate::trials::row::TouchRow;
 use crate::trials::store::Run;
 use anyhow::ensure;
 
-pub(super) const FIGURE: Figure = Figure { name: "surfaces", caption, draw };
+/// Beliefs beside the true surface.
+pub const FIGURE: Figure = Figure { name: "surfaces", caption, draw };
 
 fn caption(run: &Run) -> String {
     let stretch = space(run).map_or(1.0, |space| space.stretch());
@@ -31,7 +33,6 @@ fn caption(run: &Run) -> String {
 const FACES: usize = 40;
 const MARGIN: (f64, f64) = (24.0, 44.0);
 const PANEL: (f64, f64) = (252.0, 316.0);
-const TITLE_PX: f64 = 42.0;
 const FOOT_PX: f64 = 62.0;
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
@@ -41,6 +42,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         return Ok(None);
     }
     let grid = Grid::new(run)?;
+    let unit = Length::of(&run.experiment.scene.zone);
     let (columns, rows) = (counts.len() as f64 + 1.0, planners.len() as f64);
     let (width, height) = (columns * PANEL.0, MARGIN.1 + rows * PANEL.1 + FOOT_PX);
     let mut canvas = Canvas::new(width + 2.0 * MARGIN.0, height);
@@ -55,7 +57,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let axis = Axis::linear(low, high, 5.0);
     for (row, planner) in planners.iter().enumerate() {
         for (column, &count) in counts.iter().enumerate() {
-            let sheet = Sheet::new(run, area(row as f64, column), space);
+            let sheet = Sheet::new(unit, area(row as f64, column), space);
             let replay = Replay::new(run, planner, count)?;
             let score = match &replay {
                 Some(replay) => replay.score(),
@@ -69,12 +71,12 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
                 let relief = Relief::new(&sheet.view, &grid.xs, &grid.zs, &heights, &axis);
                 relief.draw(&mut canvas);
                 for (touch, is_initial) in replay.marks() {
-                    sheet.mark(&mut canvas, run, &relief, touch, is_initial);
+                    mark(&sheet, &mut canvas, run, &relief, (touch, is_initial));
                 }
             }
         }
     }
-    let sheet = Sheet::new(run, area(0.5 * (rows - 1.0), counts.len()), space);
+    let sheet = Sheet::new(unit, area(0.5 * (rows - 1.0), counts.len()), space);
     sheet.frame(&mut canvas, "true object", "");
     let heights = grid.heights(|_, height| Some(height));
     Relief::new(&sheet.view, &grid.xs, &grid.zs, &heights, &axis).draw(&mut canvas);
@@ -85,7 +87,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
 /// What is drawn: the zone, and heights around the truth and the drawn touches; none in 1-D.
 fn space(run: &Run) -> Option<Space> {
     let zone = &run.experiment.scene.zone;
-    let (low, high) = Axis::around(replay::heights_m(run), 0.08, 5.0)?.range();
+    let (low, high) =
+        Axis::around(replay::heights_m(run, run.experiment.drawn_planners()), 0.08, 5.0)?.range();
     Some(Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: [low, high] })
 }
 
@@ -123,79 +126,28 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// A panel.
-struct Sheet {
-    area: Area,
-    space: Space,
-    view: View,
-    unit: Length,
-}
-
-impl Sheet {
-    fn new(run: &Run, area: Area, space: Space) -> Self {
-        let inner = Area {
-            left: area.left + 24.0,
-            top: area.top + TITLE_PX,
-            width: area.width - 42.0,
-            height: area.height - TITLE_PX - 30.0,
-        };
-        let view = View::new(space, inner);
-        Self { area, space, view, unit: Length::of(&run.experiment.scene.zone) }
-    }
-
-    /// Title, the zone behind the object, and the ends of its axes.
-    fn frame(&self, canvas: &mut Canvas, title: &str, score: &str) {
-        let middle = self.area.centre()[0];
-        let top = self.area.top;
-        canvas.text([middle, top + 14.0], title, TEXT_PX, Anchor::Middle);
-        canvas.coloured_text([middle, top + 31.0], score, SMALL_PX, Anchor::Middle, FAINT_INK);
-        let Space { x_m: [x0, x1], z_m: [z0, z1], height_m: [back, front] } = self.space;
-        let corner = |x, height, z| self.view.at([x, height, z]);
-        let stroke = style::stroke("#9a9a9a", 0.9);
-        let back_wall = [[x0, z0], [x1, z0], [x1, z1], [x0, z1]];
-        canvas.polygon(back_wall.map(|[x, z]| corner(x, back, z)), &stroke);
-        let floor = [[x0, back], [x1, back], [x1, front], [x0, front]];
-        canvas.polygon(floor.map(|[x, height]| corner(x, height, z0)), &stroke);
-        let label = |canvas: &mut Canvas, at: Point, words: &str, shift: Point, anchor| {
-            let at = [at[0] + shift[0], at[1] + shift[1]];
-            canvas.coloured_text(at, words, SMALL_PX, anchor, FAINT_INK);
-        };
-        let number = |value_m: f64| axes::rounded(value_m * self.unit.per_m);
-        for x in [x0, x1] {
-            label(canvas, corner(x, front, z0), &number(x), [-2.0, 14.0], Anchor::Middle);
+/// A touch: a point where it met the surface, hollow if that is hidden; a diamond at the
+/// back where it met nothing.
+fn mark(
+    sheet: &Sheet,
+    canvas: &mut Canvas,
+    run: &Run,
+    relief: &Relief,
+    (touch, is_initial): (&TouchRow, bool),
+) {
+    let colour = if is_initial { INITIAL } else { LATER };
+    match replay::contact(&run.experiment.scene.zone, touch) {
+        Some((place, height)) => {
+            let point = [place[0], height, place[1]];
+            let attributes = match relief.hides(&sheet.view, point) {
+                true => hidden(colour),
+                false => visible(colour),
+            };
+            canvas.circle(sheet.view.at(point), 3.1, &attributes);
         }
-        let words = format!("x ({})", self.unit.symbol);
-        label(canvas, corner(0.5 * (x0 + x1), front, z0), &words, [-6.0, 19.0], Anchor::Middle);
-        for z in [z0, z1] {
-            label(canvas, corner(x1, back, z), &number(z), [-5.0, 4.0], Anchor::End);
-        }
-        label(canvas, corner(x1, back, 0.5 * (z0 + z1)), "z", [-8.0, 4.0], Anchor::End);
-    }
-
-    /// A touch: a point where it met the surface, hollow if that is hidden; a diamond at the
-    /// back where it met nothing.
-    fn mark(
-        &self,
-        canvas: &mut Canvas,
-        run: &Run,
-        relief: &Relief,
-        touch: &TouchRow,
-        is_initial: bool,
-    ) {
-        let colour = if is_initial { INITIAL } else { LATER };
-        match replay::contact(&run.experiment.scene.zone, touch) {
-            Some((place, height)) => {
-                let point = [place[0], height, place[1]];
-                let attributes = match relief.hides(&self.view, point) {
-                    true => hidden(colour),
-                    false => visible(colour),
-                };
-                canvas.circle(self.view.at(point), 3.1, &attributes);
-            }
-            None => {
-                let at = [touch.target[0], self.space.height_m[0], touch.target[1]];
-                canvas.diamond(self.view.at(at), &style::stroke(colour, 1.3));
-            }
+        None => {
+            let at = [touch.target[0], sheet.space.height_m[0], touch.target[1]];
+            canvas.diamond(sheet.view.at(at), &style::stroke(colour, 1.3));
         }
     }
 }

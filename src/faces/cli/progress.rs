@@ -1,0 +1,43 @@
+//! What a long command shows while it works, and how it is stopped.
+
+use anyhow::Context;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The first Ctrl-C asks to stop, the second ends the program at once.
+pub(super) fn stop_on_interrupt(stop: Arc<AtomicBool>, what: &'static str) -> anyhow::Result<()> {
+    let handler = move || {
+        if stop.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        eprintln!("stopping after the {what} in hand; Ctrl-C again to stop at once");
+    };
+    ctrlc::set_handler(handler).context("cannot listen for Ctrl-C")
+}
+
+/// A bar of `total` pieces, named by `what` they are; `done` were there before.
+pub(super) fn progress_bar(name: &str, what: &'static str, total: u64, done: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
+    let template = "{prefix} {wide_bar} {pos}/{len} {msg}, {elapsed} gone, {eta} left";
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar.set_prefix(name.to_owned());
+    bar.set_message(what);
+    bar.set_position(done);
+    bar.reset_eta();
+    bar
+}
+
+/// Moves the bar; where no terminal shows it, says so in a line for each tenth.
+pub(super) fn step(bar: &ProgressBar) {
+    bar.inc(1);
+    let (position, total) = (bar.position(), bar.length().unwrap_or(0));
+    let tenth = |count: u64| count * 10 / total.max(1);
+    if !std::io::stderr().is_terminal() && tenth(position) > tenth(position - 1) {
+        let (name, what) = (bar.prefix(), bar.message());
+        eprintln!("{name}: {position} of {total} {what}, {:.0?} left", bar.eta());
+    }
+}

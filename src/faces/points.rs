@@ -1,0 +1,85 @@
+//! Points with normals, and triangles between them, as files that other programs open.
+
+use nalgebra::{Point3, Vector3};
+use std::fmt::Write;
+
+/// Points in `W`, in metres; joined to a surface or not.
+#[derive(Default)]
+pub struct Points {
+    /// What the file says of itself, a line each.
+    pub comments: Vec<String>,
+    /// The points with their unit normals.
+    pub points: Vec<(Point3<f64>, Vector3<f64>)>,
+    /// How sure each is: its standard deviation in m, and a colour that shows it. As many as
+    /// points, or none.
+    pub deviations: Vec<(f64, [u8; 3])>,
+    /// Triangles, counter-clockwise seen from outside.
+    pub triangles: Vec<[usize; 3]>,
+}
+
+impl Points {
+    /// As PLY: `x y z nx ny nz`, and with deviations `red green blue sigma_m`.
+    pub fn ply(&self) -> String {
+        let mut text = String::from("ply\nformat ascii 1.0\n");
+        for comment in &self.comments {
+            let _ = writeln!(text, "comment {comment}");
+        }
+        let _ = writeln!(text, "element vertex {}", self.points.len());
+        for property in ["x", "y", "z", "nx", "ny", "nz"] {
+            let _ = writeln!(text, "property float {property}");
+        }
+        if !self.deviations.is_empty() {
+            text += "property uchar red\nproperty uchar green\nproperty uchar blue\n\
+                     property float sigma_m\n";
+        }
+        if !self.triangles.is_empty() {
+            let count = self.triangles.len();
+            let _ = writeln!(text, "element face {count}\nproperty list uchar int vertex_indices");
+        }
+        text += "end_header\n";
+        for (i, (point, normal)) in self.points.iter().enumerate() {
+            text += &format!("{} {}", numbers(&point.coords), numbers(normal));
+            if let Some((deviation_m, [red, green, blue])) = self.deviations.get(i) {
+                let _ = write!(text, " {red} {green} {blue} {deviation_m:.3e}");
+            }
+            text.push('\n');
+        }
+        for [a, b, c] in &self.triangles {
+            let _ = writeln!(text, "3 {a} {b} {c}");
+        }
+        text
+    }
+
+    /// As OBJ, which knows no properties: the colour follows the coordinates, as most programs
+    /// read it, and the deviation stands in a comment.
+    pub fn obj(&self) -> String {
+        let mut text = String::new();
+        for comment in &self.comments {
+            let _ = writeln!(text, "# {comment}");
+        }
+        if !self.deviations.is_empty() {
+            text += "# v: x y z red green blue; the comment below it is sigma_m\n";
+        }
+        for (i, (point, _)) in self.points.iter().enumerate() {
+            let _ = write!(text, "v {}", numbers(&point.coords));
+            if let Some((deviation_m, colour)) = self.deviations.get(i) {
+                let [red, green, blue] = colour.map(|channel| f64::from(channel) / 255.0);
+                let _ = write!(text, " {red:.3} {green:.3} {blue:.3}\n# {deviation_m:.3e}");
+            }
+            text.push('\n');
+        }
+        for (_, normal) in &self.points {
+            let _ = writeln!(text, "vn {}", numbers(normal));
+        }
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|vertex| vertex + 1);
+            let _ = writeln!(text, "f {a}//{a} {b}//{b} {c}//{c}");
+        }
+        text
+    }
+}
+
+/// To a tenth of a micrometre.
+fn numbers(v: &Vector3<f64>) -> String {
+    format!("{:.7} {:.7} {:.7}", v.x, v.y, v.z)
+}

@@ -1,0 +1,105 @@
+// A curve with its 95 % band, and its standard deviation below.
+"use strict";
+
+function curveView(canvas) {
+  const BAND_SD = 1.96;
+  const [LEFT, RIGHT, TOP, GAP, BOTTOM] = [62, 16, 14, 34, 46];
+  const { x: xs, unit } = data;
+
+  // A frame with ticks; returns where a value lies in it.
+  function panel(context, left, top, width, height, [x0, x1], [y0, y1], words) {
+    const at = (x, y) => [left + width * (x - x0) / (x1 - x0), top + height * (y1 - y) / (y1 - y0)];
+    context.lineWidth = 1;
+    context.strokeStyle = "#e4e4e4";
+    context.fillStyle = "#333";
+    context.beginPath();
+    context.textAlign = "center";
+    for (const x of roundNumbers(x0, x1, 8)) {
+      context.moveTo(at(x, y0)[0], top);
+      context.lineTo(at(x, y0)[0], top + height);
+      context.fillText(label(x), at(x, y0)[0], top + height + 16);
+    }
+    context.textAlign = "right";
+    for (const y of roundNumbers(y0, y1, height / 50)) {
+      context.moveTo(left, at(x0, y)[1]);
+      context.lineTo(left + width, at(x0, y)[1]);
+      context.fillText(label(y), left - 7, at(x0, y)[1] + 4);
+    }
+    context.stroke();
+    context.strokeStyle = "#666";
+    context.strokeRect(left, top, width, height);
+    context.save();
+    context.translate(left - 46, top + height / 2);
+    context.rotate(-Math.PI / 2);
+    context.textAlign = "center";
+    context.fillText(`${words} (${unit})`, 0, 0);
+    context.restore();
+    return at;
+  }
+
+  function path(context, points) {
+    context.beginPath();
+    for (const point of points) if (!Number.isNaN(point[1])) context.lineTo(...point);
+  }
+
+  function curve(context, at, values, ink, width) {
+    path(context, xs.map((x, i) => at(x, values[i])));
+    context.strokeStyle = ink;
+    context.lineWidth = width;
+    context.stroke();
+  }
+
+  function within(context, left, top, width, height, draw) {
+    context.save();
+    context.beginPath();
+    context.rect(left, top, width, height);
+    context.clip();
+    draw();
+    context.restore();
+  }
+
+  function drawTouches(context, at, frame, planner) {
+    const shown = data.planners[planner].contacts.slice(0, frame.touches);
+    shown.forEach(([x, h], i) => {
+      const [left, top] = at(x, h === null ? data.space[0] : h);
+      const arm = i === shown.length - 1 ? 6 : 4;
+      for (const [ink, width] of [["#fff", 4.5], [i < data.initial_touches ? data.colours.initial : data.colours.later, 2]]) {
+        context.strokeStyle = ink;
+        context.lineWidth = width;
+        context.beginPath();
+        context.moveTo(left - arm, top - arm);
+        context.lineTo(left + arm, top + arm);
+        context.moveTo(left - arm, top + arm);
+        context.lineTo(left + arm, top - arm);
+        context.stroke();
+      }
+    });
+  }
+
+  return (state) => {
+    const { context, width, height } = pen(canvas);
+    const frame = frameOf(state);
+    const ink = data.planners[state.planner].colour;
+    const inner = width - LEFT - RIGHT;
+    const tall = 0.7 * (height - TOP - GAP - BOTTOM);
+    const short = height - TOP - GAP - BOTTOM - tall;
+    const sides = [xs[0], xs[xs.length - 1]];
+    const at = panel(context, LEFT, TOP, inner, tall, sides, data.space, "height");
+    within(context, LEFT, TOP, inner, tall, () => {
+      const rim = (sign) => xs.map((x, i) => at(x, frame.mean[i] + sign * BAND_SD * frame.deviation[i]));
+      path(context, [...rim(1), ...rim(-1).reverse()]);
+      context.fillStyle = ink + "38";
+      context.fill();
+      if (state.truth) curve(context, at, data.truth, `rgb(${data.colours.truth})`, 2.5);
+      curve(context, at, frame.mean, "#222", 1.8);
+      drawTouches(context, at, frame, state.planner);
+    });
+    const below = TOP + tall + GAP;
+    const most = 1.05 * data.deviation_range[1];
+    const low = panel(context, LEFT, below, inner, short, sides, [0, most], "σ");
+    within(context, LEFT, below, inner, short, () => curve(context, low, frame.deviation, ink, 2));
+    context.fillStyle = "#333";
+    context.textAlign = "center";
+    context.fillText(`x (${unit})`, LEFT + inner / 2, height - 8);
+  };
+}

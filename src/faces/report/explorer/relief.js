@@ -1,0 +1,264 @@
+// A height field in three dimensions. Every pixel is coloured here against a depth buffer: that
+// needs neither WebGL nor a library, and looks the same on every machine.
+"use strict";
+
+function reliefView(canvas) {
+  // From where it is seen at first, and where light falls from: as in the printed figures. More of
+  // it comes from everywhere, so that colours can be read on a slope.
+  const turn = { azimuth: 38, elevation: 24, isDragged: false };
+  const [LIGHT, AMBIENT, DIRECT] = [unit([0.45, 0.7, 0.55]), 0.5, 0.62];
+  const { x: xs, z: zs, stretch } = data;
+  const [columns, count] = [xs.length, xs.length * zs.length];
+  const [low, high] = data.space;
+  const ends = [[xs[0], xs[columns - 1]], [low, high], [zs[0], zs[zs.length - 1]]];
+  const middle = ends.map(([a, b]) => (a + b) / 2);
+  const sides = ends.map(([a, b]) => b - a);
+  const contours = roundNumbers(low, high, 10);
+  const contourStep = contours[1] - contours[0];
+  const scales = { height: heightScale(), deviation: deviationScale(), error: errorScale() };
+  const size = Math.hypot(sides[0], sides[1] * stretch, sides[2]);
+
+  function unit(v) {
+    const length = Math.hypot(...v);
+    return v.map((part) => part / length);
+  }
+
+  // Each colour scale: its stops, where a value lies from 0 to 1, values to label, words.
+  function heightScale() {
+    const at = (value) => (value - low) / (high - low);
+    return { stops: data.colours.height, at, ticks: roundNumbers(low, high, 6), words: "height" };
+  }
+  function deviationScale() {
+    const [least, most] = data.deviation_range;
+    const at = (value) => Math.log(value / least) / Math.log(most / least);
+    const ticks = [];
+    for (let power = -6; power < 7; power++) ticks.push(...[1, 3].map((digit) => digit * 10 ** power));
+    return { stops: data.colours.deviation, at, ticks, words: "standard deviation σ" };
+  }
+  // Finer towards zero, so that early and late errors are told apart on one scale.
+  function errorScale() {
+    const limit = 0.5 * (high - low);
+    const fine = (value) => Math.asinh(value / (0.03 * limit));
+    const at = (value) => 0.5 + 0.5 * fine(value) / fine(limit);
+    const powers = [0.01, 0.1, 1, 10, 100].filter((power) => power > 0.02 * limit && power <= limit);
+    const ticks = [...powers.flatMap((power) => [-3 * power, -power, power, 3 * power]), 0];
+    return { stops: data.colours.error, at, ticks, words: "error: belief too low | too high" };
+  }
+
+  function colour({ stops }, fraction) {
+    if (Number.isNaN(fraction)) return [205, 205, 205];
+    const place = Math.min(Math.max(fraction, 0), 1) * (stops.length - 1);
+    const below = Math.min(Math.floor(place), stops.length - 2);
+    return stops[below].map((from, i) => from + (place - below) * (stops[below + 1][i] - from));
+  }
+
+  // How space lies on the canvas now: orthographic, of one size from wherever it is seen.
+  function projection(width, height) {
+    const [a, e] = [turn.azimuth, turn.elevation].map((degrees) => degrees * Math.PI / 180);
+    const [sa, ca, se, ce] = [Math.sin(a), Math.cos(a), Math.sin(e), Math.cos(e)];
+    const scale = Math.min((width - 190) / (0.8 * sides[0] + 0.62 * sides[1] * stretch),
+      (height - 130) / (0.25 * sides[0] + 0.32 * sides[1] * stretch + 0.91 * sides[2]));
+    return (x, h, z) => {
+      const [dx, dh, dz] = [x - middle[0], (h - middle[1]) * stretch, z - middle[2]];
+      return [
+        width / 2 + scale * (sa * dh - ca * dx),
+        height / 2 - 26 - scale * (ce * dz - se * (sa * dx + ca * dh)),
+        ce * (sa * dx + ca * dh) + se * dz,
+      ];
+    };
+  }
+
+  // Colours and depths of a height field; `tint` gives the colour of a place.
+  function paint(field, tint, project, width, height) {
+    const layer = { depth: new Float32Array(width * height).fill(-Infinity), pixels: new Uint8ClampedArray(4 * width * height) };
+    // Per corner: x, y and depth on the canvas, light, height, red, green, blue.
+    const corners = Array.from({ length: 8 }, () => new Float32Array(count));
+    const at = (i, j) => field[Math.min(Math.max(j, 0), zs.length - 1) * columns + Math.min(Math.max(i, 0), columns - 1)];
+    const [stepX, stepZ] = [sides[0] / (columns - 1), sides[2] / (zs.length - 1)];
+    for (let k = 0; k < count; k++) {
+      const [i, j] = [k % columns, Math.floor(k / columns)];
+      const h = Math.min(Math.max(field[k], low), high);
+      const slope = (a, b, step) => (Number.isNaN(a - b) ? 0 : stretch * (a - b) / (2 * step));
+      const normal = unit([-slope(at(i + 1, j), at(i - 1, j), stepX), 1, -slope(at(i, j + 1), at(i, j - 1), stepZ)]);
+      const facing = normal.reduce((sum, part, axis) => sum + part * LIGHT[axis], 0);
+      const values = [...project(xs[i], h, zs[j]), Math.min(AMBIENT + DIRECT * Math.max(facing, 0), 1), h, ...tint(k)];
+      values.forEach((value, axis) => { corners[axis][k] = value; });
+    }
+    for (let j = 1; j < zs.length; j++) {
+      for (let i = 1; i < columns; i++) {
+        const [a, b, c, d] = [(j - 1) * columns + i - 1, (j - 1) * columns + i, j * columns + i, j * columns + i - 1];
+        fill(layer, corners, width, height, a, b, c);
+        fill(layer, corners, width, height, a, c, d);
+      }
+    }
+    return layer;
+  }
+
+  // One triangle: each property is a plane over the canvas.
+  function fill({ depth, pixels }, corners, width, height, a, b, c) {
+    const [xs, ys, nearness] = corners;
+    const [ux, uy, vx, vy] = [xs[b] - xs[a], ys[b] - ys[a], xs[c] - xs[a], ys[c] - ys[a]];
+    const area = ux * vy - vx * uy;
+    if (!(Math.abs(area) > 1e-9) || Number.isNaN(corners[4][a] + corners[4][b] + corners[4][c])) return;
+    const value = new Array(8);
+    const [left, right] = [Math.max(Math.ceil(Math.min(xs[a], xs[b], xs[c])), 0), Math.min(Math.floor(Math.max(xs[a], xs[b], xs[c])), width - 1)];
+    const [top, bottom] = [Math.max(Math.ceil(Math.min(ys[a], ys[b], ys[c])), 0), Math.min(Math.floor(Math.max(ys[a], ys[b], ys[c])), height - 1)];
+    const heightAt = corners[4];
+    const gradient = Math.hypot(
+      (heightAt[b] - heightAt[a]) * vy - (heightAt[c] - heightAt[a]) * uy,
+      (heightAt[c] - heightAt[a]) * ux - (heightAt[b] - heightAt[a]) * vx) / Math.abs(area);
+    for (let y = top; y <= bottom; y++) {
+      for (let x = left; x <= right; x++) {
+        const [px, py] = [x - xs[a], y - ys[a]];
+        const [s, t] = [(px * vy - vx * py) / area, (ux * py - px * uy) / area];
+        if (s < -1e-6 || t < -1e-6 || s + t > 1 + 1e-6) continue;
+        const pixel = y * width + x;
+        const near = nearness[a] + s * (nearness[b] - nearness[a]) + t * (nearness[c] - nearness[a]);
+        if (near <= depth[pixel]) continue;
+        depth[pixel] = near;
+        for (let axis = 3; axis < 8; axis++) {
+          const property = corners[axis];
+          value[axis] = property[a] + s * (property[b] - property[a]) + t * (property[c] - property[a]);
+        }
+        // A line of equal height is as thin on a slope as on the flat.
+        const off = Math.abs(value[4] / contourStep - Math.round(value[4] / contourStep)) * contourStep;
+        const isLine = off < 0.8 * gradient;
+        const light = value[3] * (isLine ? 0.8 : 1);
+        for (let channel = 0; channel < 3; channel++) pixels[4 * pixel + channel] = value[5 + channel] * light;
+        pixels[4 * pixel + 3] = 255;
+      }
+    }
+  }
+
+  // Lays the true surface over the belief where it stands out of it.
+  function overlay(belief, truth) {
+    const lift = 0.003 * size;
+    for (let pixel = 0; pixel < belief.depth.length; pixel++) {
+      if (!(truth.depth[pixel] > belief.depth[pixel] + lift)) continue;
+      const share = belief.pixels[4 * pixel + 3] ? 0.72 : 1;
+      for (let channel = 0; channel < 3; channel++) {
+        const index = 4 * pixel + channel;
+        belief.pixels[index] += share * (truth.pixels[index] - belief.pixels[index]);
+      }
+      belief.pixels[4 * pixel + 3] = 255;
+    }
+  }
+
+  function line(context, points) {
+    context.beginPath();
+    points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
+    context.stroke();
+  }
+
+  // The zone behind the surface and the floor below it, with the ends of their axes.
+  function drawSpace(context, project) {
+    const [[x0, x1], [h0, h1], [z0, z1]] = ends;
+    context.strokeStyle = "#b4b4b4";
+    context.lineWidth = 1;
+    line(context, [[x0, z0], [x1, z0], [x1, z1], [x0, z1], [x0, z0]].map(([x, z]) => project(x, h0, z)));
+    line(context, [[x0, h0], [x0, h1], [x1, h1], [x1, h0]].map(([x, h]) => project(x, h, z0)));
+    context.fillStyle = "#555";
+    const write = (text, [x, y], dx, dy, align) => {
+      context.textAlign = align;
+      context.fillText(text, x + dx, y + dy);
+    };
+    for (const x of roundNumbers(x0, x1, 4)) write(label(x), project(x, h1, z0), 0, 16, "center");
+    for (const z of roundNumbers(z0, z1, 5)) write(label(z), project(x1, h0, z), -8, 4, "right");
+    write(`x (${data.unit})`, project((x0 + x1) / 2, h1, z0), 26, 38, "center");
+    write(`z (${data.unit})`, project(x1, h0, z1), -8, -14, "right");
+  }
+
+  function drawColours(context, width, height, scale) {
+    const [left, top, length] = [width / 2 - 160, height - 44, 320];
+    for (let i = 0; i < length; i++) {
+      context.fillStyle = `rgb(${colour(scale, i / (length - 1)).map(Math.round)})`;
+      context.fillRect(left + i, top, 1.5, 12);
+    }
+    context.fillStyle = "#333";
+    context.textAlign = "right";
+    context.fillText(`${scale.words} (${data.unit})`, left - 12, top + 11);
+    context.textAlign = "center";
+    for (const tick of scale.ticks) {
+      const fraction = scale.at(tick);
+      if (fraction < -1e-9 || fraction > 1 + 1e-9) continue;
+      context.fillRect(left + fraction * length - 0.5, top + 12, 1, 4);
+      context.fillText(label(tick), left + fraction * length, top + 29);
+    }
+  }
+
+  // Touches so far: full in front of the surface, hollow behind it, a diamond for a miss.
+  function drawTouches(context, project, frame, planner, isHidden) {
+    const shown = data.planners[planner].contacts.slice(0, frame.touches);
+    shown.forEach(([x, h, z], i) => {
+      const ink = i < data.initial_touches ? data.colours.initial : data.colours.later;
+      const point = project(x, h === null ? low : Math.min(Math.max(h, low), high), z);
+      const isFull = h !== null && !isHidden(point);
+      context.beginPath();
+      if (h === null) {
+        [[-5, 0], [0, -5], [5, 0], [0, 5], [-5, 0]].forEach(([dx, dy]) => context.lineTo(point[0] + dx, point[1] + dy));
+      } else {
+        context.arc(point[0], point[1], i === shown.length - 1 ? 6 : 4, 0, 7);
+      }
+      context.fillStyle = isFull ? ink : "rgba(255, 255, 255, .35)";
+      context.strokeStyle = isFull ? "#fff" : ink;
+      context.lineWidth = 1.3;
+      if (h !== null) context.fill();
+      context.stroke();
+    });
+  }
+
+  function draw(state) {
+    const { context, width, height, ratio } = pen(canvas);
+    const frame = frameOf(state);
+    const scale = scales[state.colour];
+    const shown = {
+      height: (k) => frame.mean[k],
+      deviation: (k) => frame.deviation[k],
+      error: (k) => frame.mean[k] - data.truth[k],
+    }[state.colour];
+    const project = projection(width, height);
+    // Four pixels are painted for one of an ordinary screen, which smooths the rims; while it is
+    // dragged, one.
+    const dense = turn.isDragged ? 1 : Math.max(ratio, 2);
+    const [wide, tall] = [Math.round(width * dense), Math.round(height * dense)];
+    const fine = (...point) => project(...point).map((part, axis) => (axis < 2 ? part * dense : part));
+    const layer = paint(frame.mean, (k) => colour(scale, scale.at(shown(k))), fine, wide, tall);
+    if (state.truth) overlay(layer, paint(data.truth, () => data.colours.truth, fine, wide, tall));
+    const sheet = document.createElement("canvas");
+    [sheet.width, sheet.height] = [wide, tall];
+    sheet.getContext("2d").putImageData(new ImageData(layer.pixels, wide, tall), 0, 0);
+    drawSpace(context, project);
+    context.drawImage(sheet, 0, 0, width, height);
+    const isHidden = ([x, y, depth]) => {
+      const pixel = Math.round(y * dense) * wide + Math.round(x * dense);
+      return layer.depth[pixel] > depth + 0.02 * size;
+    };
+    drawTouches(context, project, frame, state.planner, isHidden);
+    drawColours(context, width, height, scale);
+  }
+
+  // Turning keeps the front in front: the object's back was never touched.
+  function turnBy(right, up) {
+    turn.azimuth = Math.min(Math.max(turn.azimuth + right, -80), 80);
+    turn.elevation = Math.min(Math.max(turn.elevation + up, -30), 85);
+    window.draw();
+  }
+  canvas.addEventListener("pointerdown", (event) => {
+    turn.isDragged = true;
+    canvas.setPointerCapture(event.pointerId);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    if (turn.isDragged) turnBy(-0.4 * event.movementX, 0.4 * event.movementY);
+  });
+  canvas.addEventListener("lostpointercapture", () => {
+    turn.isDragged = false;
+    turnBy(0, 0);
+  });
+  canvas.addEventListener("keydown", (event) => {
+    const by = { ArrowLeft: [5, 0], ArrowRight: [-5, 0], ArrowUp: [0, 5], ArrowDown: [0, -5] }[event.key];
+    if (!by) return;
+    event.preventDefault();
+    turnBy(...by);
+  });
+  return draw;
+}
