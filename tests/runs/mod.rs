@@ -81,6 +81,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
             signal_sd: 0.05,
             length_scales: zone.extents_m().iter().map(|side| 0.3 * side).collect(),
             noise_sd: 1e-4,
+            slope_noise_sd: 0.0,
             mean: 0.0,
         },
         log_likelihood: 0.0,
