@@ -3,7 +3,7 @@
 use crate::things::arm::chain::MAX_JOINTS;
 use crate::things::arm::{Chain, Joints};
 use crate::things::finger::Frame;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use thiserror::Error;
 
 /// Joint velocities for the next tick.
@@ -41,6 +41,16 @@ pub struct Wrench {
     pub force_n: Vector3<f64>,
     /// Torque about the origin of `T`.
     pub torque_nm: Vector3<f64>,
+}
+
+impl Wrench {
+    /// The same load, given in a frame A about its origin, in a frame B about B's origin; `x_ba` is
+    /// the pose of A in B.
+    pub fn moved(&self, x_ba: &Isometry3<f64>) -> Self {
+        let force_n = x_ba.rotation * self.force_n;
+        let lever = x_ba.translation.vector.cross(&force_n);
+        Self { force_n, torque_nm: x_ba.rotation * self.torque_nm + lever }
+    }
 }
 
 /// A contact as a simulator knows it: exact.

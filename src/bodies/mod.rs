@@ -5,3 +5,4 @@ pub mod kinematic;
 #[cfg(feature = "mujoco")]
 pub mod mujoco;
 pub mod sense;
+pub mod stand;

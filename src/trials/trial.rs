@@ -3,20 +3,19 @@
 use super::experiment::Experiment;
 use super::row::{TouchRow, TrialRow};
 use super::truth::Truth;
+use crate::bodies::stand::Stand;
 use crate::conduct::belief::Belief;
 use crate::conduct::planner::{self, Plan, uniform};
 use crate::conduct::probe::{self, Touch};
 use crate::ground::seed;
-use crate::world::World;
 use rand::RngExt;
-use std::sync::Arc;
 
 /// Runs one trial of `planner` from start to end.
 ///
 /// Its row depends on the experiment, the trial's number and the planner only.
 pub fn run(
     experiment: &Experiment,
-    world: &Arc<World>,
+    stand: &Stand,
     truth: &Truth,
     planner: &planner::Entry,
     trial: u32,
@@ -24,10 +23,10 @@ pub fn run(
     let mut row =
         TrialRow { trial, planner: planner.name.into(), failure: None, touches: Vec::new() };
     let stream = |purpose| seed::stream(experiment.seed, trial.into(), purpose);
-    let zone = &world.scene().zone;
+    let zone = &stand.world().scene().zone;
     let mut start = stream("initial touches");
     let mut planner = (planner.make)(zone, &experiment.planning, stream(planner.name));
-    let mut probe = match probe::open(world, stream("body").random()) {
+    let mut probe = match probe::open(stand, stream("body").random()) {
         Ok(probe) => probe,
         Err(fault) => {
             row.failure = Some(format!("before the first touch: {fault}"));

@@ -7,8 +7,8 @@ use crate::things::arm::{Joints, chain::MAX_JOINTS};
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 use nalgebra::{
-    Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3,
-    Vector6,
+    DMatrix, Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion,
+    Vector3, Vector6,
 };
 use std::sync::Arc;
 
@@ -21,8 +21,8 @@ pub struct Plant {
     /// The site of `T` and the body it is on.
     tip: usize,
     finger: usize,
-    /// Pose of `T` in the sensor's frame.
-    x_mt: Isometry3<f64>,
+    /// Pose of the sensor in `T`.
+    x_tm: Isometry3<f64>,
 }
 
 impl Plant {
@@ -61,9 +61,9 @@ impl Plant {
                 UnitQuaternion::new_normalize(Quaternion::new(w, i, j, k)),
             )
         };
-        let x_mt = local(mount).inv_mul(&local(tip));
+        let x_tm = local(tip).inv_mul(&local(mount));
         let data = MjData::try_new(Arc::clone(&model)).map_err(|_| ModelError::Memory)?;
-        Ok(Self { data, servo: Servo::new(kv, limit), tip, finger, x_mt })
+        Ok(Self { data, servo: Servo::new(kv, limit), tip, finger, x_tm })
     }
 
     /// Puts the arm at rest at `q`, its servos holding its weight, at time 0.
@@ -153,16 +153,27 @@ impl Plant {
         Vector6::new(x, y, z, rx, ry, rz)
     }
 
+    /// The smallest mass with which `T` yields to a push at the present posture, over all
+    /// directions: one over the largest eigenvalue of `J M⁻¹ Jᵀ`.
+    pub fn tip_mass_kg(&self) -> f64 {
+        let n = self.q().len();
+        let mut inertia = vec![0.0; n * n];
+        let whole = self.data.full_m(&mut inertia).is_ok();
+        let (linear, _) = self.data.jac_site(true, false, self.tip);
+        let jacobian = DMatrix::from_row_slice(3, n, &linear);
+        let solved = DMatrix::from_row_slice(n, n, &inertia).cholesky().filter(|_| whole);
+        let mobility = solved.map(|inertia| &jacobian * inertia.solve(&jacobian.transpose()));
+        mobility.map_or(0.0, |mobility| 1.0 / mobility.symmetric_eigenvalues().max())
+    }
+
     /// What the force/torque sensor measured during the last step, carried over to `T` about its
     /// origin: the load of everything beyond it, so the wrench on the fingertip plus the weight
     /// and inertia of adapter and finger.
     pub fn mount(&self) -> Wrench {
         let [fx, fy, fz, tx, ty, tz] = *self.data.sensordata() else { return Wrench::default() };
         // MuJoCo gives what the link does to the finger; the sensor feels the opposite.
-        let (force, torque) = (-Vector3::new(fx, fy, fz), -Vector3::new(tx, ty, tz));
-        let torque = torque - self.x_mt.translation.vector.cross(&force);
-        let r_tm = self.x_mt.rotation.inverse();
-        Wrench { force_n: r_tm * force, torque_nm: r_tm * torque }
+        let (force_n, torque_nm) = (-Vector3::new(fx, fy, fz), -Vector3::new(tx, ty, tz));
+        Wrench { force_n, torque_nm }.moved(&self.x_tm)
     }
 
     fn accept(&self, values: &[f64]) -> Result<(), Fault> {

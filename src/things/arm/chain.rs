@@ -77,6 +77,11 @@ impl Chain {
         fits.then(|| Joints::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0)))
     }
 
+    /// The home posture, one number per joint.
+    pub fn start(&self) -> &[f64] {
+        self.home.as_slice().get(..self.joints.len()).unwrap_or_default()
+    }
+
     /// `q` with every joint moved into its limits.
     pub fn clamp(&self, q: &Joints) -> Joints {
         let mut clamped = *q;

@@ -27,8 +27,10 @@ pub(super) struct Watch {
     heard_s: f64,
     ideal: Option<IdealContact>,
     force_n: f64,
+    /// Mean of the force while at rest.
     force_at_rest_n: Vector3<f64>,
-    wrench_n: Vector3<f64>,
+    /// Sum and count of the forces since [`forget`](Self::forget).
+    forces: (Vector3<f64>, f64),
 }
 
 impl Watch {
@@ -44,7 +46,7 @@ impl Watch {
             ideal: None,
             force_n: 0.0,
             force_at_rest_n: Vector3::zeros(),
-            wrench_n: Vector3::zeros(),
+            forces: (Vector3::zeros(), 0.0),
         }
     }
 
@@ -59,11 +61,14 @@ impl Watch {
             self.frames.push(frame.clone());
         }
         self.ideal = reading.ideal;
-        if let Some(wrench) = &reading.wrench {
-            self.wrench_n = wrench.force_n;
-        }
-        let ideal_n = reading.ideal.map_or(0.0, |ideal| ideal.force_n);
-        self.force_n = (self.wrench_n - self.force_at_rest_n).norm().max(ideal_n);
+        self.force_n = match &reading.wrench {
+            Some(wrench) => {
+                self.forces.0 += wrench.force_n;
+                self.forces.1 += 1.0;
+                (wrench.force_n - self.force_at_rest_n).norm()
+            }
+            None => reading.ideal.map_or(0.0, |ideal| ideal.force_n),
+        };
     }
 
     /// What is felt now.
@@ -88,12 +93,13 @@ impl Watch {
         self.tare = Some(Tare::of(&self.frames));
         self.detector = Detector::new(self.settings.detection.clone());
         self.touching = false;
-        self.force_at_rest_n = self.wrench_n;
+        self.force_at_rest_n = self.forces.0 / self.forces.1.max(1.0);
     }
 
-    /// Drops the frames so far.
+    /// Drops the frames and forces so far.
     pub(super) fn forget(&mut self) {
         self.frames.clear();
+        self.forces = (Vector3::zeros(), 0.0);
     }
 
     pub(super) fn frames(&self) -> &[Frame] {
