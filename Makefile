@@ -10,7 +10,7 @@ PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementat
 FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
 PALPATE := target/release/palpate
 
-.PHONY: demo test lint bench growth bench-peers setup tools clean
+.PHONY: demo test lint bench contacts growth bench-peers setup tools clean
 
 demo: setup
 	cargo build --release --locked
@@ -27,6 +27,10 @@ lint: setup
 
 bench: setup
 	cargo bench --locked --bench kernels
+
+# How far the electrodes' point of contact lies from the exact one.
+contacts: setup
+	cargo bench --locked --bench contacts
 
 # How the cost grows with the number of touches; draws docs/growth.svg.
 growth: setup

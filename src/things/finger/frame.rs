@@ -25,3 +25,15 @@ pub struct Frame {
     /// Change of temperature (TAC).
     pub tac_counts: Option<f64>,
 }
+
+impl Frame {
+    /// Whether every count is a number.
+    pub fn is_finite(&self) -> bool {
+        let Self { electrode_counts, pac_counts, .. } = self;
+        let singles = [self.pdc_counts, self.tdc_counts, self.tac_counts];
+        let all = (singles.iter().flatten())
+            .chain(electrode_counts.iter().flatten())
+            .chain(pac_counts.iter().flatten());
+        all.copied().all(f64::is_finite)
+    }
+}

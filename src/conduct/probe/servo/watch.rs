@@ -23,8 +23,7 @@ pub(super) struct Watch {
     tare: Option<Tare>,
     /// Frames since [`forget`](Self::forget).
     frames: Vec<Frame>,
-    has_sensor: bool,
-    heard_s: f64,
+    heard_s: Option<f64>,
     ideal: Option<IdealContact>,
     force_n: f64,
     /// Mean of the force while at rest.
@@ -41,8 +40,7 @@ impl Watch {
             touching: false,
             tare: None,
             frames: Vec::new(),
-            has_sensor: false,
-            heard_s: 0.0,
+            heard_s: None,
             ideal: None,
             force_n: 0.0,
             force_at_rest_n: Vector3::zeros(),
@@ -52,9 +50,8 @@ impl Watch {
 
     /// Takes in what a tick brought.
     pub(super) fn take(&mut self, reading: &Reading) {
-        for frame in &reading.frames {
-            self.has_sensor = true;
-            self.heard_s = reading.time_s;
+        for frame in reading.frames.iter().filter(|frame| frame.is_finite()) {
+            self.heard_s = Some(reading.time_s);
             if let Some(tare) = &self.tare {
                 self.touching = self.detector.update(tare, frame);
             }
@@ -106,12 +103,8 @@ impl Watch {
         &self.frames
     }
 
-    pub(super) fn has_sensor(&self) -> bool {
-        self.has_sensor
-    }
-
-    /// When the last frame came.
-    pub(super) fn heard_s(&self) -> f64 {
+    /// When the last frame without a NaN came; none from a body without sensor.
+    pub(super) fn heard_s(&self) -> Option<f64> {
         self.heard_s
     }
 
