@@ -105,6 +105,7 @@ fn touch(experiment: &Experiment, trial: u32, count: u32) -> TouchRow {
     };
     let is_fitted = count >= experiment.initial_touches;
     TouchRow {
+        overload: false,
         contact: height_m(&target).map(|height_m| zone.point(&target, height_m).coords.into()),
         target,
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),

@@ -26,8 +26,8 @@ pub(super) struct Watch {
     heard_s: Option<f64>,
     ideal: Option<IdealContact>,
     force_n: f64,
-    /// Mean of the force while at rest.
-    force_at_rest_n: Vector3<f64>,
+    /// Mean of the sensor's force while at rest: its bias and the finger's weight.
+    force_at_rest_n: Option<Vector3<f64>>,
     /// Sum and count of the forces since [`forget`](Self::forget).
     forces: (Vector3<f64>, f64),
 }
@@ -43,7 +43,7 @@ impl Watch {
             heard_s: None,
             ideal: None,
             force_n: 0.0,
-            force_at_rest_n: Vector3::zeros(),
+            force_at_rest_n: None,
             forces: (Vector3::zeros(), 0.0),
         }
     }
@@ -62,7 +62,7 @@ impl Watch {
             Some(wrench) => {
                 self.forces.0 += wrench.force_n;
                 self.forces.1 += 1.0;
-                (wrench.force_n - self.force_at_rest_n).norm()
+                self.force_at_rest_n.map_or(0.0, |rest_n| (wrench.force_n - rest_n).norm())
             }
             None => reading.ideal.map_or(0.0, |ideal| ideal.force_n),
         };
@@ -90,7 +90,7 @@ impl Watch {
         self.tare = Some(Tare::of(&self.frames));
         self.detector = Detector::new(self.settings.detection.clone());
         self.touching = false;
-        self.force_at_rest_n = self.forces.0 / self.forces.1.max(1.0);
+        self.force_at_rest_n = (self.forces.1 > 0.0).then(|| self.forces.0 / self.forces.1);
     }
 
     /// Drops the frames and forces so far.
