@@ -1,6 +1,7 @@
 //! What the trials of an experiment share: the world, and what is compiled from it once.
 
 use super::backend::{Backend, Fault};
+use super::delay::Delayed;
 use super::kinematic::Kinematic;
 #[cfg(feature = "mujoco")]
 use super::mujoco;
@@ -72,7 +73,11 @@ impl Stand {
             #[cfg(not(feature = "mujoco"))]
             Body::Dynamic => return Err(unusable()),
         };
-        Ok(Some(body))
+        let timing = self.world.scene().effects.timing.as_ref();
+        Ok(Some(match timing.map_or(0.0, |timing| timing.control_delay_s) {
+            delay_s if delay_s > 0.0 => Box::new(Delayed::new(body, delay_s)),
+            _ => body,
+        }))
     }
 }
 

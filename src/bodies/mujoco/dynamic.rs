@@ -1,4 +1,4 @@
-//! An arm or stage with masses, servos and friction, carrying the soft finger.
+//! An arm or stage with masses, servos and friction, carrying the finger.
 
 use super::{ModelError, Plant, compile};
 use crate::bodies::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
@@ -16,12 +16,13 @@ use std::sync::Arc;
 const BEYOND: f64 = 0.2;
 const FASTER: f64 = 5.0;
 
-/// A [`Plant`] whose fingertip carries the skin.
+/// A [`Plant`] whose fingertip carries the skin, if the scene has one.
 pub struct Dynamic {
     chain: Chain,
     capabilities: Capabilities,
     plant: Plant,
-    sense: Sense,
+    /// None for a finger without skin, which MuJoCo lets collide.
+    sense: Option<Sense>,
     wrench: Wrench,
     steps: u32,
     tick: u64,
@@ -49,7 +50,7 @@ impl Dynamic {
         let mut body = Self {
             capabilities: Capabilities::of(&chain, period_s),
             plant: Plant::new(Arc::clone(model)).ok()?,
-            sense: Sense::new(Arc::clone(world), 0)?,
+            sense: Sense::new(Arc::clone(world), 0),
             wrench: Wrench::default(),
             steps: scene.solver.steps(period_s)?,
             tick: 0,
@@ -77,13 +78,14 @@ impl Dynamic {
     fn advance(&mut self) -> Result<(), Fault> {
         let step_s = self.plant.step_s();
         self.plant.step(&self.reading.applied.qdot, &self.wrench)?;
+        let Some(sense) = &mut self.sense else { return Ok(()) };
         let twist = self.plant.tip_twist();
         let motion = Motion {
             x_wt: self.plant.tip(),
             linear_w: twist.fixed_rows::<3>(0).into(),
             angular_w: twist.fixed_rows::<3>(3).into(),
         };
-        self.wrench = self.sense.step(&motion, step_s)?;
+        self.wrench = sense.step(&motion, step_s)?;
         Ok(())
     }
 
@@ -107,7 +109,10 @@ impl Dynamic {
         reading.q.extend_from_slice(plant.q());
         reading.qdot.clear();
         reading.qdot.extend_from_slice(plant.qdot());
-        self.sense.report(&plant.mount(), self.capabilities.period_s, reading);
+        match &mut self.sense {
+            Some(sense) => sense.report(&plant.mount(), self.capabilities.period_s, reading),
+            None => reading.ideal = plant.contact(),
+        }
     }
 }
 
@@ -119,7 +124,9 @@ impl Backend for Dynamic {
     fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
         let joints = self.chain.joints.len();
         self.plant.reset(self.chain.start())?;
-        self.sense.reset(seed);
+        if let Some(sense) = &mut self.sense {
+            sense.reset(seed);
+        }
         (self.wrench, self.tick) = (Wrench::default(), 0);
         self.reading.applied.qdot.clear();
         self.reading.applied.qdot.resize(joints, 0.0);

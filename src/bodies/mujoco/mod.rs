@@ -5,6 +5,7 @@ mod dynamic;
 pub mod picture;
 mod plant;
 mod servo;
+mod touch;
 
 pub use dynamic::Dynamic;
 pub use plant::Plant;

@@ -2,7 +2,8 @@
 
 use super::ModelError;
 use super::servo::Servo;
-use crate::bodies::backend::{Fault, Wrench};
+use super::touch;
+use crate::bodies::backend::{Fault, IdealContact, Wrench};
 use crate::things::arm::{Joints, chain::MAX_JOINTS};
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
@@ -14,7 +15,7 @@ use std::sync::Arc;
 
 /// A compiled model of [`mjcf::scene`](crate::world::mjcf::scene), shared, and one state of it.
 ///
-/// It knows nothing of skin or object: the caller gives the wrench on the fingertip.
+/// It knows nothing of skin: the caller gives the wrench on the fingertip.
 pub struct Plant {
     data: MjData<Arc<MjModel>>,
     servo: Servo,
@@ -23,6 +24,7 @@ pub struct Plant {
     finger: usize,
     /// Pose of the sensor in `T`.
     x_tm: Isometry3<f64>,
+    contact: Option<IdealContact>,
 }
 
 impl Plant {
@@ -63,7 +65,7 @@ impl Plant {
         };
         let x_tm = local(tip).inv_mul(&local(mount));
         let data = MjData::try_new(Arc::clone(&model)).map_err(|_| ModelError::Memory)?;
-        Ok(Self { data, servo: Servo::new(kv, limit), tip, finger, x_tm })
+        Ok(Self { data, servo: Servo::new(kv, limit), tip, finger, x_tm, contact: None })
     }
 
     /// Puts the arm at rest at `q`, its servos holding its weight, at time 0.
@@ -73,6 +75,7 @@ impl Plant {
     pub fn reset(&mut self, q: &[f64]) -> Result<(), Fault> {
         self.accept(q)?;
         self.data.reset();
+        self.contact = None;
         self.data.qpos_mut().copy_from_slice(q);
         self.data.forward();
         self.servo.hold(self.data.qfrc_bias());
@@ -109,6 +112,7 @@ impl Plant {
         // In this order positions and velocities are those after the step; `mj_step` would leave
         // those before it.
         self.data.step2();
+        self.contact = touch::contact(&self.data, &x_wt);
         self.data.step1();
         self.check()
     }
@@ -136,6 +140,11 @@ impl Plant {
     /// What the motors gave during the last step, N·m or N.
     pub fn motors(&self) -> &[f64] {
         self.data.actuator_force()
+    }
+
+    /// What MuJoCo's contacts did to the finger during the last step, for a finger without skin.
+    pub fn contact(&self) -> Option<IdealContact> {
+        self.contact
     }
 
     /// Pose of `T` in `W`.
