@@ -58,7 +58,7 @@ pub(super) fn relief(world: &World) -> Option<[String; 2]> {
     Some([asset, geom])
 }
 
-/// Attributes of the two geoms that collide: without friction, as stiff as a step of 2 ms bears
-/// (a time constant of two steps).
+/// Attributes of the two geoms that collide: without friction, yielding as mount and gears of an
+/// arm would: an arm that has to stop at once would be stopped by force (chosen).
 pub(super) const CONTACT: &str =
-    r#"contype="1" conaffinity="1" condim="1" solref=".004 1" solimp=".95 .99 .0001""#;
+    r#"contype="1" conaffinity="1" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
