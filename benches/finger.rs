@@ -30,6 +30,15 @@ fn finger(c: &mut Criterion) {
     let touching_m = start.p0_w.y - hit.travel_m;
     let skin = Effects { skin: Some(SkinEffect::default()), ..Effects::default() };
     let wet = Effects { fluid: Some(Default::default()), ..skin.clone() };
+    // What a scene with a skin and nothing else should cost: the skin itself.
+    let bare = Fingertip::new(&world.scene().finger, &skin);
+    if let Some(bare) = bare.skin() {
+        let mut pressed = bare.relaxed();
+        let motion = at(touching_m - 1e-3);
+        c.bench_function("skin alone, 1 mm deep", |b| {
+            b.iter(|| bare.press(bvh, black_box(&motion.x_wt), &mut pressed));
+        });
+    }
     for (name, effects) in [("skin", skin), ("skin and fluid", wet), ("everything", Effects::all())]
     {
         let tip = Fingertip::new(&world.scene().finger, &effects);

@@ -3,19 +3,18 @@
 //! Prints a table with measured exponents and the share of this machine's own matrix
 //! multiplication, and draws `docs/growth.svg` and `.png`. One thread.
 
+mod common;
+
+use common::{KERNEL, hyperparameters, search_box, touches};
 use palpate::faces::report::axes::{Axis, Panel, Sample, legend};
 use palpate::faces::report::canvas::{Area, Canvas};
 use palpate::faces::report::{png, style};
-use palpate::ground::gp::fit::SearchBox;
-use palpate::ground::gp::kernel::{Hyperparameters, SquaredExponential};
 use palpate::ground::gp::likelihood::Likelihood;
 use palpate::ground::gp::posterior::Scratch;
-use palpate::ground::gp::{Mean, Observations, Posterior};
+use palpate::ground::gp::{Mean, Posterior};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
-
-static KERNEL: SquaredExponential = SquaredExponential;
 
 const COUNTS: [usize; 9] = [10, 25, 50, 100, 200, 400, 1000, 2000, 4000];
 
@@ -29,16 +28,6 @@ struct Curve {
     /// The power of n that its operations grow with.
     expected: f64,
     seconds: Vec<(f64, f64)>,
-}
-
-/// `count` touches of a smooth surface over a unit square, spread by a low-discrepancy walk.
-fn touches(count: usize) -> Observations {
-    let mut touches = Observations::new(2);
-    for i in 0..count {
-        let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
-        touches.push(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
-    }
-    touches
 }
 
 /// Seconds of one call: the least of three rounds that last some ten milliseconds each.
@@ -56,19 +45,7 @@ fn seconds(mut work: impl FnMut()) -> f64 {
 }
 
 fn measure() -> Vec<Curve> {
-    let at = Hyperparameters {
-        signal_sd: 1.0,
-        length_scales: vec![0.2, 0.4],
-        noise_sd: 1e-3,
-        mean: 0.0,
-    };
-    let bounds = SearchBox {
-        mean: Mean::Zero,
-        length_scales: vec![(0.005, 1.0).into(); 2],
-        noise_ratio: (1e-4, 1e-2).into(),
-        signal_sd: (1e-3, 1e3).into(),
-        noise_sd: None,
-    };
+    let (at, bounds) = (hyperparameters(), search_box());
     let curve = |name, colour, expected| Curve { name, colour, expected, seconds: Vec::new() };
     let mut fit = curve("cold fit", "#0072b2", 3.0);
     let mut likelihood = curve("likelihood with gradient", "#d55e00", 3.0);

@@ -1,44 +1,23 @@
 //! What one trial spends its time on, piece by piece.
 
+mod common;
+
+use common::{KERNEL, hyperparameters, search_box, touches};
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate::bodies::stand::Stand;
 use palpate::conduct::probe;
-use palpate::ground::gp::fit::SearchBox;
-use palpate::ground::gp::kernel::{Hyperparameters, SquaredExponential};
 use palpate::ground::gp::likelihood::Likelihood;
 use palpate::ground::gp::posterior::Scratch;
-use palpate::ground::gp::{Mean, Observations, Posterior};
+use palpate::ground::gp::{Mean, Posterior};
 use palpate::world::world::Shape;
 use palpate::world::{Scene, World};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
 
-static KERNEL: SquaredExponential = SquaredExponential;
-
-/// `count` touches of a smooth surface over a unit square, spread by a low-discrepancy walk.
-fn touches(count: usize) -> Observations {
-    let mut touches = Observations::new(2);
-    for i in 0..count {
-        let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
-        touches.push(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
-    }
-    touches
-}
-
-fn hyperparameters() -> Hyperparameters {
-    Hyperparameters { signal_sd: 1.0, length_scales: vec![0.2, 0.4], noise_sd: 1e-3, mean: 0.0 }
-}
-
 fn gaussian_process(c: &mut Criterion) {
-    let bounds = SearchBox {
-        mean: Mean::Zero,
-        length_scales: vec![(0.005, 1.0).into(); 2],
-        noise_ratio: (1e-4, 1e-2).into(),
-        signal_sd: (1e-3, 1e3).into(),
-        noise_sd: None,
-    };
+    let bounds = search_box();
     let mut group = c.benchmark_group("gp");
     for count in [20, 50, 200] {
         group.bench_with_input(

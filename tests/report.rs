@@ -105,9 +105,9 @@ fn touch(experiment: &Experiment, trial: u32, count: u32) -> TouchRow {
     };
     let is_fitted = count >= experiment.initial_touches;
     TouchRow {
-        overload: false,
         contact: height_m(&target).map(|height_m| zone.point(&target, height_m).coords.into()),
         target,
+        overload: false,
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),
         stall: None,
         fit: is_fitted.then_some(fit),
@@ -139,8 +139,8 @@ fn text<'a>(files: &'a BTreeMap<String, Vec<u8>>, name: &str) -> &'a str {
 #[test]
 fn figures_are_whole() {
     for (settings, names) in [
-        (CURVE, ["acquisition", "convergence", "curves"]),
-        (SURFACE, ["acquisition", "convergence", "surfaces"]),
+        (CURVE, ["acquisition", "convergence", "curves"].as_slice()),
+        (SURFACE, &["acquisition", "convergence", "surfaces", "targets"]),
     ] {
         let files = drawn(&run(settings));
         let svgs: Vec<&str> = files.keys().filter_map(|name| name.strip_suffix(".svg")).collect();

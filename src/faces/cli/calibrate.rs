@@ -51,10 +51,16 @@ pub fn run(args: &Args) -> anyhow::Result<Ending> {
                 electrodes: Some(model.electrodes),
                 ..Effects::default()
             };
-            print(&format!("\n{}", toml::to_string(&effects)?))?;
+            print(&format!("\n{}", toml::to_string(&Tables { effects })?))?;
         }
     }
     Ok(Ending::Done)
+}
+
+/// As they stand in a scene.
+#[derive(serde::Serialize)]
+struct Tables {
+    effects: Effects,
 }
 
 fn line(residual: &Residual) -> String {

@@ -4,6 +4,7 @@ mod acquisition;
 mod convergence;
 mod curves;
 mod surfaces;
+mod targets;
 
 use super::axes::Sample;
 use super::style::LATER;
@@ -21,7 +22,7 @@ pub struct Figure {
 
 /// Every figure in the order of the page; one line to add one.
 pub const FIGURES: &[Figure] =
-    &[convergence::FIGURE, curves::FIGURE, surfaces::FIGURE, acquisition::FIGURE];
+    &[convergence::FIGURE, curves::FIGURE, surfaces::FIGURE, targets::FIGURE, acquisition::FIGURE];
 
 /// What a legend says of touches that met nothing, if there are any.
 fn miss_entry(run: &Run) -> Option<(Sample, &'static str)> {

@@ -1,0 +1,32 @@
+//! What benches of the Gaussian process are made of.
+
+use palpate::ground::gp::fit::SearchBox;
+use palpate::ground::gp::kernel::{Hyperparameters, SquaredExponential};
+use palpate::ground::gp::{Mean, Observations};
+
+pub static KERNEL: SquaredExponential = SquaredExponential;
+
+/// `count` touches of a smooth surface over a unit square, spread by a low-discrepancy walk.
+pub fn touches(count: usize) -> Observations {
+    let mut touches = Observations::new(2);
+    for i in 0..count {
+        let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
+        touches.push(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
+    }
+    touches
+}
+
+pub fn hyperparameters() -> Hyperparameters {
+    Hyperparameters { signal_sd: 1.0, length_scales: vec![0.2, 0.4], noise_sd: 1e-3, mean: 0.0 }
+}
+
+/// The ranges that a belief searches by default.
+pub fn search_box() -> SearchBox {
+    SearchBox {
+        mean: Mean::Zero,
+        length_scales: vec![(0.005, 1.0).into(); 2],
+        noise_ratio: (1e-4, 1e-2).into(),
+        signal_sd: (1e-3, 1e3).into(),
+        noise_sd: None,
+    }
+}
