@@ -38,6 +38,8 @@ lint: setup
 
 bench: setup
 	cargo bench --locked --bench kernels
+	cargo bench --locked --bench plant
+	cargo bench --locked --bench dynamic
 
 # How far the electrodes' point of contact lies from the exact one.
 contacts: setup

@@ -6,6 +6,7 @@
 
 use nalgebra::{Rotation3, Unit, Vector3};
 use palpate::bodies::backend::Fault;
+use palpate::bodies::stand::Stand;
 use palpate::conduct::planner;
 use palpate::conduct::probe::{self, Contact, Probe, Swept, Touch};
 use palpate::ground::seed;
@@ -110,14 +111,15 @@ fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
             continue;
         }
         let Ok(world) = World::build(experiment.scene.clone()).map(Arc::new) else { return };
-        let truth = Truth::sample(&world, experiment.grid as usize);
+        let Ok(stand) = Stand::new(world) else { return };
+        let truth = Truth::sample(stand.world(), experiment.grid as usize);
         let Some(entry) = planner::by_name(planner) else { return };
         let begun = Instant::now();
         let rows: Vec<TrialRow> = (0..trials)
             .map(|number| {
-                let exact = probe::open(&world, 1).unwrap();
+                let exact = probe::open(&stand, 1).unwrap();
                 let rng = seed::stream(experiment.seed, number.into(), "estimates");
-                let mut estimating = Estimating { exact: probe::open(&world, 1).unwrap(), rng };
+                let mut estimating = Estimating { exact: probe::open(&stand, 1).unwrap(), rng };
                 let mut exact = exact;
                 let probe: &mut dyn Probe = if is_exact { &mut *exact } else { &mut estimating };
                 trial::run_with(&experiment, probe, &truth, entry, number)

@@ -5,6 +5,7 @@ mod common;
 use common::{KERNEL, hyperparameters, search_box, touches};
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{Point3, UnitVector3, Vector3};
+use palpate::bodies::stand::Stand;
 use palpate::conduct::probe;
 use palpate::ground::gp::likelihood::Likelihood;
 use palpate::ground::gp::posterior::Scratch;
@@ -65,7 +66,8 @@ fn contact(c: &mut Criterion) {
         return;
     };
     let world = Arc::new(world);
-    let mut probe = probe::open(&world, 1).unwrap();
+    let stand = Stand::new(Arc::clone(&world)).ok();
+    let Some(mut probe) = stand.and_then(|stand| probe::open(&stand, 0).ok()) else { return };
     group.bench_function("touch", |b| b.iter(|| probe.touch(black_box(&[0.013, 0.487]))));
     if let Shape::Mesh { bvh, .. } = world.shape() {
         let origin = Point3::new(0.013, -0.5, 0.487);

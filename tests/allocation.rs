@@ -73,3 +73,25 @@ fn the_plant_allocates_nothing() {
     });
     assert_eq!(count, 0);
 }
+
+#[test]
+#[cfg(feature = "mujoco")]
+fn a_tick_of_the_dynamic_body_allocates_nothing() {
+    use palpate::bodies::backend::Command;
+    use palpate::bodies::stand::Stand;
+    use palpate::world::{Scene, World};
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_pa10.toml");
+    let sets = ["effects.wrench={}".into(), "effects.timing={}".into()];
+    let world = World::build(Scene::load(&path, &sets).unwrap()).unwrap();
+    let mut body = Stand::new(world.into()).unwrap().body().unwrap().unwrap();
+    let command = Command { qdot: vec![0.02; 7] };
+    body.reset(1).unwrap();
+    // The first frames size the reading.
+    (0..100).for_each(|_| assert!(body.step(&command).is_ok()));
+    let count = asked(|| {
+        for _ in 0..400 {
+            body.step(&command).unwrap();
+        }
+    });
+    assert_eq!(count, 0);
+}

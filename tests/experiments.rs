@@ -1,6 +1,7 @@
 //! What the shipped experiments must show, run whole or cut down in trials.
 #![cfg(feature = "nlopt")]
 
+use palpate::bodies::stand::Stand;
 use palpate::conduct::planner;
 use palpate::trials::experiment::Experiment;
 use palpate::trials::row::TrialRow;
@@ -18,12 +19,13 @@ fn run(name: &str, sets: &[&str]) -> (Experiment, Vec<TrialRow>) {
     let experiment = Experiment::load(&path, &sets).unwrap();
     let world = Arc::new(World::build(experiment.scene.clone()).unwrap());
     let truth = Truth::sample(&world, experiment.grid as usize);
+    let stand = Stand::new(world).unwrap();
     let rows: Vec<TrialRow> = (0..experiment.trials)
         .into_par_iter()
         .flat_map_iter(|trial| {
-            let (experiment, world, truth) = (&experiment, &world, &truth);
+            let (experiment, stand, truth) = (&experiment, &stand, &truth);
             experiment.planners.iter().map(move |name| {
-                trial::run(experiment, world, truth, planner::by_name(name).unwrap(), trial)
+                trial::run(experiment, stand, truth, planner::by_name(name).unwrap(), trial)
             })
         })
         .collect();

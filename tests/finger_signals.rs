@@ -204,7 +204,10 @@ fn channels_are_sampled_in_the_order_of_the_slots() {
     // While the pressure rises, PDC of a skewed frame is read before its end, E1 long before.
     let sinking = |t: f64| height(8.1e-3 - 0.01 * t);
     let ideal = frames(&quiet(), 1, 50, sinking);
-    let timing = Some(palpate::things::finger::timing::TimingEffect { batch_frames: 1 });
+    let timing = Some(palpate::things::finger::timing::TimingEffect {
+        batch_frames: 1,
+        ..Default::default()
+    });
     let skewed = frames(&Effects { timing, ..quiet() }, 1, 50, sinking);
     for pair in ideal.windows(2).zip(&skewed[1..]).skip(1) {
         let ([before, now], skewed) = (pair.0, pair.1) else { unreachable!() };

@@ -1,6 +1,7 @@
 //! Fits reach the global maximum of the likelihood.
 #![cfg(feature = "nlopt")]
 
+use palpate::bodies::stand::Stand;
 use palpate::conduct::planner;
 use palpate::ground::gp::fit::SearchBox;
 use palpate::ground::gp::kernel::SquaredExponential;
@@ -60,11 +61,12 @@ fn fits_of_the_toys_trials_reach_the_global_maximum() {
     let experiment = Experiment::load(&root.join("experiments/toy.toml"), &[]).unwrap();
     let world = Arc::new(World::build(experiment.scene.clone()).unwrap());
     let truth = Truth::sample(&world, experiment.grid as usize);
+    let stand = Stand::new(world).unwrap();
     let bounds = search_box(Mean::Zero, vec![(0.02, 4.0).into()]);
     let (mut fits, mut warm, mut cold) = (0, 0, 0);
     for (number, name) in [(0, "active"), (1, "active"), (2, "active"), (3, "random")] {
         let planner = planner::by_name(name).unwrap();
-        let row = trial::run(&experiment, &world, &truth, planner, number);
+        let row = trial::run(&experiment, &stand, &truth, planner, number);
         let mut touches = Observations::new(1);
         for touch in &row.touches {
             let [x, y, _] = touch.contact.unwrap();

@@ -2,6 +2,7 @@
 #![cfg(feature = "nlopt")]
 
 use nalgebra::{Point3, Vector3};
+use palpate::bodies::stand::Stand;
 use palpate::conduct::belief::{Belief, GpSettings};
 use palpate::conduct::planner;
 use palpate::conduct::probe::{self, Contact, Swept, Touch};
@@ -29,7 +30,8 @@ fn run(name: &str, sets: &[&str], number: u32) -> (Experiment, Truth, TrialRow) 
     let world = Arc::new(World::build(experiment.scene.clone()).unwrap());
     let truth = Truth::sample(&world, experiment.grid as usize);
     let active = planner::by_name("active").unwrap();
-    let row = trial::run(&experiment, &world, &truth, active, number);
+    let row =
+        trial::run(&experiment, &Stand::new(Arc::clone(&world)).unwrap(), &truth, active, number);
     assert_eq!(row.failure, None);
     (experiment, truth, row)
 }
@@ -42,7 +44,7 @@ fn the_surface_is_below_what_the_finger_has_swept() {
         let world = Arc::new(World::build(experiment.scene.clone()).unwrap());
         let truth = Truth::sample(&world, 21);
         let zone = &world.scene().zone;
-        let mut probe = probe::open(&world, 1).unwrap();
+        let mut probe = probe::open(&Stand::new(Arc::clone(&world)).unwrap(), 1).unwrap();
         assert_eq!(probe.swept(), None);
         let mut rng = seed::stream(1, 0, "targets");
         let (mut bounded, mut tight) = (0, 0);
@@ -132,7 +134,8 @@ fn the_toys_normals_are_its_slopes() {
     let world = Arc::new(World::build(experiment.scene).unwrap());
     for i in 0..50 {
         let x = -1.973 + 0.08 * f64::from(i);
-        let touch = probe::open(&world, 1).unwrap().touch(&[x]).unwrap();
+        let touch =
+            probe::open(&Stand::new(Arc::clone(&world)).unwrap(), 1).unwrap().touch(&[x]).unwrap();
         let Touch::Contact(Contact { normal_w, .. }) = touch else { panic!("missed") };
         let [above, below] = [1e-6, -1e-6].map(|by| world.true_height_m(&[x + by]).unwrap());
         assert!((-normal_w.x / normal_w.y - (above - below) / 2e-6).abs() < 1e-6, "{x}");

@@ -1,6 +1,7 @@
 //! One touch: the finger's hull against the exact mesh, and the analytic curve.
 
-use palpate::conduct::probe::{self, Contact, Touch};
+use palpate::bodies::stand::Stand;
+use palpate::conduct::probe::{self, Contact, Probe, Touch};
 use palpate::ground::geometry::sweep::Capsule;
 use palpate::world::world::{APPROACH_W, Shape};
 use palpate::world::{Scene, World};
@@ -14,10 +15,14 @@ fn world(name: &str, sets: &[&str]) -> Arc<World> {
     Arc::new(World::build(Scene::load(&path, &sets).unwrap()).unwrap())
 }
 
+fn open(world: &Arc<World>) -> Box<dyn Probe> {
+    probe::open(&Stand::new(Arc::clone(world)).unwrap(), 0).unwrap()
+}
+
 fn contact(world: &Arc<World>, target: &[f64]) -> Contact {
-    match probe::open(world, 1).unwrap().touch(target).unwrap() {
+    match open(world).touch(target).unwrap() {
         Touch::Contact(contact) => contact,
-        Touch::Miss | Touch::Overload => panic!("{target:?} was missed"),
+        other => panic!("{target:?}: {other:?}"),
     }
 }
 
@@ -63,9 +68,9 @@ fn a_thin_probe_finds_the_nose_that_the_finger_cannot_enter_beside() {
 
 #[test]
 fn past_the_object_the_finger_meets_nothing() {
-    assert_eq!(probe::open(&BIRD, 1).unwrap().touch(&[0.3, 0.5]), Ok(Touch::Miss));
-    assert!(probe::open(&BIRD, 1).unwrap().touch(&[f64::NAN, 0.5]).is_err());
-    assert!(probe::open(&BIRD, 1).unwrap().touch(&[0.0, f64::INFINITY]).is_err());
+    assert_eq!(open(&BIRD).touch(&[0.3, 0.5]), Ok(Touch::Miss));
+    assert!(open(&BIRD).touch(&[f64::NAN, 0.5]).is_err());
+    assert!(open(&BIRD).touch(&[0.0, f64::INFINITY]).is_err());
 }
 
 proptest! {

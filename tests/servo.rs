@@ -2,6 +2,7 @@
 
 use palpate::bodies::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::bodies::kinematic::Kinematic;
+use palpate::bodies::stand::Stand;
 use palpate::conduct::probe::servo::Servo;
 use palpate::conduct::probe::{self, Contact, Probe, Touch};
 use palpate::world::world::Shape;
@@ -15,8 +16,12 @@ fn world(name: &str, sets: &[&str]) -> Arc<World> {
     Arc::new(World::build(Scene::load(&path, &sets).unwrap()).unwrap())
 }
 
+fn stand(world: &Arc<World>, seed: u64) -> Box<dyn Probe> {
+    probe::open(&Stand::new(Arc::clone(world)).unwrap(), seed).unwrap()
+}
+
 fn touch(world: &Arc<World>, seed: u64, target: &[f64]) -> Result<Touch, Fault> {
-    probe::open(world, seed).unwrap().touch(target)
+    stand(world, seed).touch(target)
 }
 
 fn contact(touch: Touch) -> Contact {
@@ -71,7 +76,7 @@ fn an_arm_carries_the_finger_to_the_same_contacts_as_the_stage() {
 fn a_trial_repeats_to_the_bit_and_its_noise_is_the_seeds() {
     let world = world("container_finger.toml", &[]);
     let run = |seed| {
-        let mut probe = probe::open(&world, seed).unwrap();
+        let mut probe = stand(&world, seed);
         let targets = world.scene().zone.grid(3).into_iter().take(4);
         targets.map(|target| probe.touch(&target).unwrap()).collect::<Vec<_>>()
     };
@@ -186,7 +191,7 @@ fn every_command_keeps_the_limits_of_speed_and_acceleration() {
     let world = world("bird_finger.toml", &[]);
     let (_, commands) = broken(&world, |_, _| {});
     let chain = world.chain().unwrap();
-    let period_s = world.scene().touch.period_s;
+    let period_s = world.scene().period_s();
     let mut before = vec![0.0; 3];
     for command in &commands {
         for ((joint, now), before) in chain.joints.iter().zip(command).zip(&before) {

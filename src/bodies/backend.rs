@@ -3,11 +3,12 @@
 use crate::things::arm::chain::MAX_JOINTS;
 use crate::things::arm::{Chain, Joints};
 use crate::things::finger::Frame;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Joint velocities for the next tick.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Command {
     /// One entry per joint, in the order of [`Capabilities::joints`]: rad/s, or m/s where the
     /// joint slides.
@@ -15,7 +16,7 @@ pub struct Command {
 }
 
 /// What a body returns after a tick. Time stands in it and is never read from a clock.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Reading {
     /// Since reset.
     pub time_s: f64,
@@ -35,7 +36,7 @@ pub struct Reading {
 }
 
 /// Force and torque of the object on the finger, in the fingertip's frame `T` about its origin.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wrench {
     /// Force.
     pub force_n: Vector3<f64>,
@@ -43,8 +44,18 @@ pub struct Wrench {
     pub torque_nm: Vector3<f64>,
 }
 
+impl Wrench {
+    /// The same load, given in a frame A about its origin, in a frame B about B's origin; `x_ba` is
+    /// the pose of A in B.
+    pub fn moved(&self, x_ba: &Isometry3<f64>) -> Self {
+        let force_n = x_ba.rotation * self.force_n;
+        let lever = x_ba.translation.vector.cross(&force_n);
+        Self { force_n, torque_nm: x_ba.rotation * self.torque_nm + lever }
+    }
+}
+
 /// A contact as a simulator knows it: exact.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IdealContact {
     /// Centre of pressure on the skin, in `T`.
     pub p_tc: Point3<f64>,
@@ -55,7 +66,7 @@ pub struct IdealContact {
 }
 
 /// What a body can do, known before it is connected.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Capabilities {
     /// Joint names; commands and readings follow their order.
     pub joints: Vec<String>,
@@ -135,6 +146,14 @@ pub enum Fault {
         time_s: f64,
         /// Joint positions.
         q: Vec<f64>,
+    },
+    /// A recording cannot be written: what cannot be kept is not done.
+    #[error("the recording fails at {time_s} s: {message}")]
+    Unrecorded {
+        /// When.
+        time_s: f64,
+        /// What the system says.
+        message: String,
     },
     /// The body stopped answering.
     #[error("no answer since {time_s} s")]

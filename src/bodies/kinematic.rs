@@ -1,9 +1,9 @@
 //! An arm or stage that moves exactly as commanded, carrying the soft finger.
 
-use super::backend::{Backend, Capabilities, Command, Fault, Reading};
+use super::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
 use super::sense::Sense;
 use crate::things::arm::{Chain, Joints};
-use crate::things::finger::{Load, Motion};
+use crate::things::finger::Motion;
 use crate::world::World;
 use std::sync::Arc;
 
@@ -22,10 +22,10 @@ impl Kinematic {
     pub fn new(world: &Arc<World>) -> Option<Self> {
         let chain = world.chain()?;
         let sense = Sense::new(Arc::clone(world), 0)?;
-        let capabilities = Capabilities::of(&chain, world.scene().touch.period_s);
+        let capabilities = Capabilities::of(&chain, world.scene().period_s());
         let q = chain.home;
         let mut body = Self { chain, capabilities, sense, q, tick: 0, reading: Reading::default() };
-        body.report(&Load::default(), &Joints::zeros());
+        body.report(&Wrench::default(), &Joints::zeros());
         Some(body)
     }
 
@@ -33,7 +33,7 @@ impl Kinematic {
         self.tick as f64 * self.capabilities.period_s
     }
 
-    fn report(&mut self, load: &Load, qdot: &Joints) {
+    fn report(&mut self, load: &Wrench, qdot: &Joints) {
         let joints = self.chain.joints.len();
         let copy = |to: &mut Vec<f64>, from: &Joints| {
             to.clear();
@@ -43,7 +43,7 @@ impl Kinematic {
         copy(&mut self.reading.q, &self.q);
         copy(&mut self.reading.qdot, qdot);
         copy(&mut self.reading.applied.qdot, qdot);
-        self.sense.report(load, &mut self.reading);
+        self.sense.report(load, self.capabilities.period_s, &mut self.reading);
     }
 }
 
@@ -56,7 +56,7 @@ impl Backend for Kinematic {
         self.sense.reset(seed);
         self.q = self.chain.home;
         self.tick = 0;
-        self.report(&Load::default(), &Joints::zeros());
+        self.report(&Wrench::default(), &Joints::zeros());
         Ok(&self.reading)
     }
 

@@ -1,10 +1,13 @@
 //! What the simulated finger feels of the scene's object, for every simulated body.
 
-use super::backend::{Fault, IdealContact, Reading};
+use super::backend::{Fault, IdealContact, Reading, Wrench};
 use crate::ground::seed;
+use crate::things::finger::registration::Registration;
+use crate::things::finger::wrench::Gauge;
 use crate::things::finger::{Feel, FeelError, Fingertip, Load, Motion};
 use crate::world::World;
 use crate::world::world::Shape;
+use nalgebra::{Isometry3, Vector6};
 use std::sync::Arc;
 
 /// Forces below this have no place; far below any that is detected (chosen).
@@ -13,56 +16,111 @@ const LEAST_FORCE_N: f64 = 1e-6;
 /// The finger's state during one trial.
 pub struct Sense {
     world: Arc<World>,
-    feel: Feel,
+    /// Pose of `T` in the frame of the force/torque sensor.
+    x_mt: Isometry3<f64>,
+    trial: Trial,
+    load: Load,
     /// Whether the fluid tells of contact and the electrodes of its place.
     has_sensor: bool,
+}
+
+/// What a trial's seed decides.
+struct Trial {
+    feel: Feel,
+    gauge: Option<Gauge>,
+    /// Pose of the finger's own `T` in that of the kinematics.
+    finger: Isometry3<f64>,
+    /// From where the object is to where it is believed to be, in `W`.
+    object: Isometry3<f64>,
 }
 
 impl Sense {
     /// Untouched; none in a world without a soft finger.
     pub fn new(world: Arc<World>, seed: u64) -> Option<Self> {
-        let feel = feel(world.fingertip()?, seed);
         let effects = &world.scene().effects;
-        let has_sensor = effects.fluid.is_some() && effects.electrodes.is_some();
-        Some(Self { world, feel, has_sensor })
+        Some(Self {
+            x_mt: world.chain()?.tool,
+            trial: Trial::new(&world, world.fingertip()?, seed),
+            load: Load::default(),
+            has_sensor: effects.fluid.is_some() && effects.electrodes.is_some(),
+            world,
+        })
     }
 
     /// Forgets everything.
     pub fn reset(&mut self, seed: u64) {
         if let Some(tip) = self.world.fingertip() {
-            self.feel = feel(tip, seed);
+            self.trial = Trial::new(&self.world, tip, seed);
+            self.load = Load::default();
         }
     }
 
-    /// Goes on by `dt_s`, to `motion` at its end; what the object does to the finger.
+    /// Goes on by `dt_s`, to `motion` at its end; what the object does to the finger then, in `T`.
     ///
     /// # Errors
     /// [`Fault::Diverged`] if the motion is not finite, [`Fault::Inside`] if the object encloses
     /// the tip.
-    pub fn step(&mut self, motion: &Motion, dt_s: f64) -> Result<Load, Fault> {
+    pub fn step(&mut self, motion: &Motion, dt_s: f64) -> Result<Wrench, Fault> {
         let (Some(tip), Shape::Mesh { bvh, .. }) = (self.world.fingertip(), self.world.shape())
         else {
-            return Ok(Load::default());
+            return Ok(Wrench::default());
         };
-        self.feel.step(tip, bvh, motion, dt_s).map_err(fault)
+        let Trial { feel, finger, object, .. } = &mut self.trial;
+        let aside_w = motion.x_wt.rotation * finger.translation.vector;
+        let motion = Motion {
+            x_wt: *object * motion.x_wt * *finger,
+            linear_w: object.rotation * (motion.linear_w + motion.angular_w.cross(&aside_w)),
+            angular_w: object.rotation * motion.angular_w,
+        };
+        self.load = feel.step(tip, bvh, &motion, dt_s).map_err(fault)?;
+        let wrench = Wrench { force_n: self.load.force_n, torque_nm: self.load.torque_nm };
+        Ok(wrench.moved(finger))
     }
 
-    /// Writes into `reading` what a control tick brought: the frames that arrived, and `load`
-    /// where no sensor tells it.
-    pub fn report(&mut self, load: &Load, reading: &mut Reading) {
+    /// Writes into `reading` what a control tick of `period_s` brought: the frames that arrived, what
+    /// a force/torque sensor under the load `mount` (in `T`) says, and the load where no sensor
+    /// tells it.
+    pub fn report(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
         reading.frames.clear();
-        reading.frames.extend(std::iter::from_fn(|| self.feel.frame()));
-        let force_n = load.force_n.norm();
+        reading.frames.extend(std::iter::from_fn(|| self.trial.feel.frame()));
+        let effect = self.world.scene().effects.wrench.as_ref();
+        reading.wrench = self.trial.gauge.as_mut().zip(effect).map(|(gauge, effect)| {
+            let Wrench { force_n: f, torque_nm: t } = mount.moved(&self.x_mt);
+            let said = gauge.read(effect, &Vector6::new(f.x, f.y, f.z, t.x, t.y, t.z), period_s);
+            let said = Wrench {
+                force_n: said.fixed_rows::<3>(0).into(),
+                torque_nm: said.fixed_rows::<3>(3).into(),
+            };
+            said.moved(&self.x_mt.inverse())
+        });
+        let force_n = self.load.force_n.norm();
         reading.ideal = (!self.has_sensor && force_n > LEAST_FORCE_N).then_some(IdealContact {
-            p_tc: load.centre_t,
-            normal_t: load.normal_t,
+            p_tc: self.load.centre_t,
+            normal_t: self.load.normal_t,
             force_n,
         });
     }
 }
 
-fn feel(tip: &Fingertip, seed: u64) -> Feel {
-    Feel::new(tip, &seed::stream(seed, 0, "finger"))
+impl Trial {
+    fn new(world: &World, tip: &Fingertip, seed: u64) -> Self {
+        let stream = |purpose| seed::stream(seed, 0, purpose);
+        let scene = world.scene();
+        let effects = &scene.effects;
+        let mut trial = Self {
+            feel: Feel::new(tip, &stream("finger")),
+            gauge: effects.wrench.as_ref().map(|effect| Gauge::new(effect, stream("wrench"))),
+            finger: Isometry3::identity(),
+            object: Isometry3::identity(),
+        };
+        if let (Some(effect), Some(object)) = (&effects.registration, &scene.object) {
+            let error = Registration::new(effect, &mut stream("registration"));
+            let x_wo = object.x_wo();
+            trial.finger = error.finger;
+            trial.object = x_wo * error.object.inverse() * x_wo.inverse();
+        }
+        trial
+    }
 }
 
 fn fault(error: FeelError) -> Fault {

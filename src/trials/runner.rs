@@ -5,14 +5,14 @@ use super::row::TrialRow;
 use super::store::{RunFolder, StoreError};
 use super::trial;
 use super::truth::Truth;
+use crate::bodies::stand::Stand;
 use crate::conduct::planner;
 use crate::ground::optimize;
-use crate::world::World;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
 
 /// Why an experiment could not be run.
@@ -67,7 +67,7 @@ pub fn check(truth: &Truth) -> Result<(), RunError> {
 /// If a row cannot be stored, or threads cannot be started.
 pub fn run(
     experiment: &Experiment,
-    world: &Arc<World>,
+    stand: &Stand,
     truth: &Truth,
     (folder, done): (&mut RunFolder, &[TrialRow]),
     threads: usize,
@@ -84,7 +84,7 @@ pub fn run(
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let row = run_caught(experiment, world, truth, planner, trial);
+            let row = run_caught(experiment, stand, truth, planner, trial);
             let mut finished = finished.lock().unwrap_or_else(PoisonError::into_inner);
             finished.0.append(&row)?;
             finished.1 += 1;
@@ -112,12 +112,12 @@ pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, RunError> {
 /// in somebody's code does not lose the others' work.
 fn run_caught(
     experiment: &Experiment,
-    world: &Arc<World>,
+    stand: &Stand,
     truth: &Truth,
     planner: &'static planner::Entry,
     trial: u32,
 ) -> TrialRow {
-    let run = || trial::run(experiment, world, truth, planner, trial);
+    let run = || trial::run(experiment, stand, truth, planner, trial);
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");

@@ -2,10 +2,10 @@
 
 use super::runner::{RunError, pool};
 use crate::bodies::backend::Fault;
+use crate::bodies::stand::Stand;
 use crate::conduct::probe::{self, Touch};
-use crate::world::{World, Zone};
+use crate::world::Zone;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// One touch of a scan.
@@ -37,19 +37,19 @@ pub fn default_grid(zone: &Zone) -> [usize; 2] {
 /// # Errors
 /// If threads cannot be started.
 pub fn scan(
-    world: &Arc<World>,
+    stand: &Stand,
     [columns, rows]: [usize; 2],
     threads: usize,
     stop: &AtomicBool,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Option<Vec<Felt>>, RunError> {
-    let zone = &world.scene().zone;
+    let zone = &stand.world().scene().zone;
     let share = |i: usize, count: usize| i as f64 / (count.max(2) - 1) as f64;
     let row = |j: usize| {
         if stop.load(Ordering::Relaxed) {
             return None;
         }
-        let mut probe = probe::open(world, j as u64);
+        let mut probe = probe::open(stand, j as u64);
         let felt = (0..columns).map(|i| {
             let target = zone.at(&[share(i, columns), share(j, rows)]);
             let touch = match &mut probe {

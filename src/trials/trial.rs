@@ -3,26 +3,25 @@
 use super::experiment::Experiment;
 use super::row::{TouchRow, TrialRow};
 use super::truth::Truth;
+use crate::bodies::stand::Stand;
 use crate::conduct::belief::Belief;
 use crate::conduct::planner::{self, Plan, uniform};
 use crate::conduct::probe::{self, Probe, Touch};
 use crate::ground::seed;
-use crate::world::World;
 use rand::RngExt;
-use std::sync::Arc;
 
 /// Runs one trial of `planner` from start to end.
 ///
 /// Its row depends on the experiment, the trial's number and the planner only.
 pub fn run(
     experiment: &Experiment,
-    world: &Arc<World>,
+    stand: &Stand,
     truth: &Truth,
     planner: &planner::Entry,
     trial: u32,
 ) -> TrialRow {
     let seed = seed::stream(experiment.seed, trial.into(), "body").random();
-    match probe::open(world, seed) {
+    match probe::open(stand, seed) {
         Ok(mut probe) => run_with(experiment, &mut *probe, truth, planner, trial),
         Err(fault) => TrialRow {
             trial,

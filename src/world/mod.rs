@@ -3,6 +3,7 @@
 pub mod function;
 pub mod mjcf;
 pub mod scene;
+pub mod solver;
 pub mod touch;
 #[allow(clippy::module_inception)]
 pub mod world;

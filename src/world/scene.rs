@@ -1,6 +1,7 @@
 //! What there is: the object, the finger, the zone, and which body carries out a touch.
 
 use super::function::Function;
+use super::solver::SolverSettings;
 use super::touch::TouchSettings;
 use super::zone::Zone;
 use crate::ground::config::{Checked, ConfigError, Loader, Rules};
@@ -34,10 +35,17 @@ pub struct Scene {
     /// Optional physics of a body that feels, each a table of its own; the others leave it alone.
     #[serde(default, skip_serializing_if = "is_default")]
     pub effects: Effects,
+    /// How a `dynamic` body is integrated.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub solver: SolverSettings,
     /// How a touch is carried out by a body that moves.
     #[serde(default, skip_serializing_if = "is_default")]
     pub touch: TouchSettings,
 }
+
+/// A force must stand this many standard deviations of its noise above it to say contact: an approach
+/// is a thousand readings (chosen).
+const SDS_OF_CONTACT: f64 = 5.0;
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
@@ -53,6 +61,8 @@ pub enum Body {
     Cast,
     /// The soft finger is moved exactly as commanded and feels the exact mesh.
     Kinematic,
+    /// Masses, gravity, friction and velocity servos carry the finger, in MuJoCo.
+    Dynamic,
 }
 
 impl Body {
@@ -62,6 +72,7 @@ impl Body {
             Self::Function => "function",
             Self::Cast => "cast",
             Self::Kinematic => "kinematic",
+            Self::Dynamic => "dynamic",
         }
     }
 }
@@ -173,7 +184,7 @@ impl Checked for Scene {
                     "no z_m: the surface of body = \"function\" is a curve over x".into()
                 });
             }
-            Body::Cast | Body::Kinematic => {
+            Body::Cast | Body::Kinematic | Body::Dynamic => {
                 let body = self.body.name();
                 rules.require("function", "(given)", self.function.is_none(), || {
                     format!("no function: body = \"{body}\" touches an object")
@@ -185,12 +196,30 @@ impl Checked for Scene {
         }
         rules.table("effects", &self.effects);
         rules.table("touch", &self.touch);
+        rules.table("solver", &self.solver);
+        if self.body == Body::Dynamic {
+            let (period_s, step_s) = (self.period_s(), self.solver.step_s);
+            let whole = self.solver.steps(period_s).is_some();
+            rules.require("touch.period_s", period_s, whole, || {
+                format!("a whole number of steps of solver.step_s = {step_s} s")
+            });
+        }
         let feels = self.body != Body::Kinematic || self.effects.skin.is_some();
         rules.require("effects.skin", "(none)", feels, || {
             "a table, because body = \"kinematic\" feels with a soft skin (a rigid finger is \
              body = \"cast\")"
                 .into()
         });
+        if let (Some(wrench), None) = (&self.effects.wrench, &self.effects.fluid) {
+            let least_n = SDS_OF_CONTACT * wrench.noise_max_n();
+            let told = self.touch.detection_n >= least_n;
+            rules.require("touch.detection_n", self.touch.detection_n, told, || {
+                format!(
+                    "at least {least_n} N, {SDS_OF_CONTACT} standard deviations of effects.wrench, \
+                     because no fluid says contact"
+                )
+            });
+        }
         if let Some(object) = &self.object {
             rules.table("object", object);
         }
@@ -205,6 +234,16 @@ impl Checked for Scene {
 }
 
 impl Scene {
+    /// Duration of one control tick: the scene's, or the body's own. That of a simulated arm is
+    /// the cycle of the PA-10's servo driver (`hydro`, Orca robotics); a body without inertia needs
+    /// no more than a tick for each tactile frame.
+    pub fn period_s(&self) -> f64 {
+        self.touch.period_s.unwrap_or(match self.body {
+            Body::Dynamic => 0.002,
+            Body::Function | Body::Cast | Body::Kinematic => 0.01,
+        })
+    }
+
     /// Reads a scene file and applies `--set` assignments.
     ///
     /// # Errors

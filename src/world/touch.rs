@@ -9,8 +9,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TouchSettings {
-    /// Duration of one control tick.
-    pub period_s: f64,
+    /// Duration of one control tick; left out, that of the body:
+    /// [`Scene::period_s`](super::Scene::period_s).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period_s: Option<f64>,
     /// Speed of travel in front of the object, and of the way back.
     pub travel_m_s: f64,
     /// Speed of the approach along −y.
@@ -45,11 +47,11 @@ pub enum Point {
 }
 
 impl Default for TouchSettings {
-    /// Chosen, but for the detection: a tick for each tactile frame, an approach slow enough that
+    /// Chosen, but for the detection: an approach slow enough that
     /// the skin is pressed by less than a millimetre before the pressure has spoken.
     fn default() -> Self {
         Self {
-            period_s: 0.01,
+            period_s: None,
             travel_m_s: 0.1,
             approach_m_s: 0.02,
             standoff_m: 0.01,
@@ -66,7 +68,9 @@ impl Default for TouchSettings {
 
 impl Checked for TouchSettings {
     fn check(&self, rules: &mut Rules) {
-        rules.number("period_s", self.period_s, 1e-4..=0.1);
+        if let Some(period_s) = self.period_s {
+            rules.number("period_s", period_s, 1e-4..=0.1);
+        }
         rules.number("travel_m_s", self.travel_m_s, 1e-4..=1.0);
         rules.number("approach_m_s", self.approach_m_s, 1e-4..=1.0);
         rules.number("standoff_m", self.standoff_m, 1e-4..=1.0);

@@ -69,7 +69,7 @@ impl World {
             Body::Function => {
                 Shape::Function(scene.function.ok_or(WorldError::Missing { part: "function" })?)
             }
-            Body::Cast | Body::Kinematic => {
+            Body::Cast | Body::Kinematic | Body::Dynamic => {
                 let object = scene.object.as_ref().ok_or(WorldError::Missing { part: "object" })?;
                 let (mesh, report) = import(&object.mesh, object.unit.metres() * object.scale)?;
                 Shape::Mesh {

@@ -1,10 +1,13 @@
 //! MuJoCo as a library: compiling models, and the plant that steps one.
 
+mod dynamic;
 #[cfg(feature = "render")]
 pub mod picture;
 mod plant;
 mod servo;
+mod touch;
 
+pub use dynamic::Dynamic;
 pub use plant::Plant;
 
 use mujoco_rs::error::MjModelError;
@@ -27,6 +30,24 @@ pub enum ModelError {
     Lacks {
         /// What is missing.
         part: &'static str,
+    },
+    /// The skin is too stiff for the time step.
+    #[error(
+        "solver.step_s = {step_s} is too long: up to {force_n} N (touch.force_limit_n) the skin is as stiff \
+         as {stiffness_n_m:.0} N/m and the fingertip as light as {mass_kg:.3} kg, which needs \
+         at most {limit_s:.2e} s"
+    )]
+    Stiff {
+        /// The scene's step.
+        step_s: f64,
+        /// Largest force of a touch.
+        force_n: f64,
+        /// Largest stiffness of the skin up to that force.
+        stiffness_n_m: f64,
+        /// Smallest mass that the fingertip moves with.
+        mass_kg: f64,
+        /// The longest step that is accepted.
+        limit_s: f64,
     },
     /// There is no memory for its state.
     #[error("no memory for the state of the MuJoCo model")]

@@ -2,27 +2,29 @@
 
 use super::ModelError;
 use super::servo::Servo;
-use crate::bodies::backend::{Fault, Wrench};
+use super::touch;
+use crate::bodies::backend::{Fault, IdealContact, Wrench};
 use crate::things::arm::{Joints, chain::MAX_JOINTS};
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 use nalgebra::{
-    Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3,
-    Vector6,
+    DMatrix, Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion,
+    Vector3, Vector6,
 };
 use std::sync::Arc;
 
 /// A compiled model of [`mjcf::scene`](crate::world::mjcf::scene), shared, and one state of it.
 ///
-/// It knows nothing of skin or object: the caller gives the wrench on the fingertip.
+/// It knows nothing of skin: the caller gives the wrench on the fingertip.
 pub struct Plant {
     data: MjData<Arc<MjModel>>,
     servo: Servo,
     /// The site of `T` and the body it is on.
     tip: usize,
     finger: usize,
-    /// Pose of `T` in the sensor's frame.
-    x_mt: Isometry3<f64>,
+    /// Pose of the sensor in `T`.
+    x_tm: Isometry3<f64>,
+    contact: Option<IdealContact>,
 }
 
 impl Plant {
@@ -61,9 +63,9 @@ impl Plant {
                 UnitQuaternion::new_normalize(Quaternion::new(w, i, j, k)),
             )
         };
-        let x_mt = local(mount).inv_mul(&local(tip));
+        let x_tm = local(tip).inv_mul(&local(mount));
         let data = MjData::try_new(Arc::clone(&model)).map_err(|_| ModelError::Memory)?;
-        Ok(Self { data, servo: Servo::new(kv, limit), tip, finger, x_mt })
+        Ok(Self { data, servo: Servo::new(kv, limit), tip, finger, x_tm, contact: None })
     }
 
     /// Puts the arm at rest at `q`, its servos holding its weight, at time 0.
@@ -73,6 +75,7 @@ impl Plant {
     pub fn reset(&mut self, q: &[f64]) -> Result<(), Fault> {
         self.accept(q)?;
         self.data.reset();
+        self.contact = None;
         self.data.qpos_mut().copy_from_slice(q);
         self.data.forward();
         self.servo.hold(self.data.qfrc_bias());
@@ -109,6 +112,7 @@ impl Plant {
         // In this order positions and velocities are those after the step; `mj_step` would leave
         // those before it.
         self.data.step2();
+        self.contact = touch::contact(&self.data, &x_wt);
         self.data.step1();
         self.check()
     }
@@ -138,6 +142,11 @@ impl Plant {
         self.data.actuator_force()
     }
 
+    /// What MuJoCo's contacts did to the finger during the last step, for a finger without skin.
+    pub fn contact(&self) -> Option<IdealContact> {
+        self.contact
+    }
+
     /// Pose of `T` in `W`.
     pub fn tip(&self) -> Isometry3<f64> {
         let p = Point3::from(self.data.site_xpos()[self.tip]);
@@ -153,16 +162,27 @@ impl Plant {
         Vector6::new(x, y, z, rx, ry, rz)
     }
 
+    /// The smallest mass with which `T` yields to a push at the present posture, over all
+    /// directions: one over the largest eigenvalue of `J M⁻¹ Jᵀ`.
+    pub fn tip_mass_kg(&self) -> f64 {
+        let n = self.q().len();
+        let mut inertia = vec![0.0; n * n];
+        let whole = self.data.full_m(&mut inertia).is_ok();
+        let (linear, _) = self.data.jac_site(true, false, self.tip);
+        let jacobian = DMatrix::from_row_slice(3, n, &linear);
+        let solved = DMatrix::from_row_slice(n, n, &inertia).cholesky().filter(|_| whole);
+        let mobility = solved.map(|inertia| &jacobian * inertia.solve(&jacobian.transpose()));
+        mobility.map_or(0.0, |mobility| 1.0 / mobility.symmetric_eigenvalues().max())
+    }
+
     /// What the force/torque sensor measured during the last step, carried over to `T` about its
     /// origin: the load of everything beyond it, so the wrench on the fingertip plus the weight
     /// and inertia of adapter and finger.
     pub fn mount(&self) -> Wrench {
         let [fx, fy, fz, tx, ty, tz] = *self.data.sensordata() else { return Wrench::default() };
         // MuJoCo gives what the link does to the finger; the sensor feels the opposite.
-        let (force, torque) = (-Vector3::new(fx, fy, fz), -Vector3::new(tx, ty, tz));
-        let torque = torque - self.x_mt.translation.vector.cross(&force);
-        let r_tm = self.x_mt.rotation.inverse();
-        Wrench { force_n: r_tm * force, torque_nm: r_tm * torque }
+        let (force_n, torque_nm) = (-Vector3::new(fx, fy, fz), -Vector3::new(tx, ty, tz));
+        Wrench { force_n, torque_nm }.moved(&self.x_tm)
     }
 
     fn accept(&self, values: &[f64]) -> Result<(), Fault> {

@@ -1,6 +1,6 @@
 //! Speed, acceleration and position limits of the joints.
 
-use crate::things::arm::{Chain, Joint, Joints};
+use crate::things::arm::{Chain, Joints};
 
 /// `wanted` within the limits, `before` having been commanded in the period before.
 ///
@@ -17,7 +17,7 @@ pub(super) fn limited(
     let joints = || chain.joints.iter().enumerate().take(q.len());
     let mut scale: f64 = 1.0;
     for (i, joint) in joints() {
-        let allowed = fastest(joint, q[i], wanted[i], period_s);
+        let allowed = joint.fastest(q[i], wanted[i], period_s);
         if wanted[i].abs() > allowed {
             scale = scale.min(allowed / wanted[i].abs());
         }
@@ -32,19 +32,9 @@ pub(super) fn limited(
     }
     let mut qdot = before + change * part;
     for (i, joint) in joints() {
-        let allowed = fastest(joint, q[i], qdot[i], period_s);
+        let allowed = joint.fastest(q[i], qdot[i], period_s);
         let step = joint.qddot_limit * period_s;
         qdot[i] = qdot[i].max(-allowed).min(allowed).max(before[i] - step).min(before[i] + step);
     }
     qdot
-}
-
-/// Largest speed in the direction of `qdot` from which the joint still stops before its limit:
-/// `v² / 2a + v · period = distance`.
-fn fastest(joint: &Joint, q: f64, qdot: f64, period_s: f64) -> f64 {
-    let [low, high] = joint.q_limits;
-    let distance = if qdot > 0.0 { high - q } else { q - low };
-    let a = joint.qddot_limit;
-    let stops = a * ((period_s * period_s + 2.0 * distance.max(0.0) / a).sqrt() - period_s);
-    stops.min(joint.qdot_limit)
 }

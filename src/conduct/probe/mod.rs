@@ -9,8 +9,7 @@ pub use cast::rest_y_m;
 pub use swept::Swept;
 
 use crate::bodies::backend::Fault;
-use crate::bodies::kinematic::Kinematic;
-use crate::world::World;
+use crate::bodies::stand::Stand;
 use crate::world::scene::Body;
 use nalgebra::{Point3, Vector3};
 use std::sync::Arc;
@@ -53,15 +52,14 @@ pub trait Probe: Send {
 ///
 /// # Errors
 /// If the body cannot be brought to its start.
-pub fn open(world: &Arc<World>, seed: u64) -> Result<Box<dyn Probe>, Fault> {
-    let world = Arc::clone(world);
+pub fn open(stand: &Stand, seed: u64) -> Result<Box<dyn Probe>, Fault> {
+    let world = Arc::clone(stand.world());
+    if let Some(body) = stand.body()? {
+        return Ok(Box::new(servo::Servo::new(world, body, seed)?));
+    }
     Ok(match world.scene().body {
         Body::Function => Box::new(function::FunctionProbe::new(world)),
-        Body::Cast => Box::new(cast::Cast::new(world)),
-        Body::Kinematic => {
-            let body = Kinematic::new(&world).ok_or(Fault::Refused { values: Vec::new() })?;
-            Box::new(servo::Servo::new(world, Box::new(body), seed)?)
-        }
+        _ => Box::new(cast::Cast::new(world)),
     })
 }
 

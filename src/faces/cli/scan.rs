@@ -2,6 +2,7 @@
 
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::{Ending, print};
+use crate::bodies::stand::Stand;
 use crate::conduct::probe::Touch;
 use crate::faces::points::Points;
 use crate::faces::report::{png, scan as drawing};
@@ -60,7 +61,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_interrupt(stop.clone(), "rows")?;
     let bar = progress_bar(&name, "rows", grid[1] as u64, 0);
-    let felt = scan::scan(&world, grid, args.threads.into(), &stop, &|| step(&bar))?;
+    let stand = Stand::new(Arc::clone(&world))?;
+    let felt = scan::scan(&stand, grid, args.threads.into(), &stop, &|| step(&bar))?;
     bar.finish_and_clear();
     let Some(felt) = felt else { return Ok(Ending::Interrupted) };
 

@@ -41,6 +41,16 @@ pub struct Joint {
 }
 
 impl Joint {
+    /// Largest speed in the direction of `qdot` from which the joint still stops before its limit,
+    /// commanded once in a period: `v² / 2a + v · period = distance`.
+    pub fn fastest(&self, q: f64, qdot: f64, period_s: f64) -> f64 {
+        let [low, high] = self.q_limits;
+        let distance = if qdot > 0.0 { high - q } else { q - low };
+        let a = self.qddot_limit;
+        let stops = a * ((period_s * period_s + 2.0 * distance.max(0.0) / a).sqrt() - period_s);
+        stops.min(self.qdot_limit)
+    }
+
     /// Pose of the joint's moved frame in the frame before it.
     fn motion(&self, q: f64) -> Isometry3<f64> {
         match self.kind {
@@ -75,6 +85,11 @@ impl Chain {
     pub fn joints_from(&self, q: &[f64]) -> Option<Joints> {
         let fits = q.len() == self.joints.len() && q.len() <= MAX_JOINTS;
         fits.then(|| Joints::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0)))
+    }
+
+    /// The home posture, one number per joint.
+    pub fn start(&self) -> &[f64] {
+        self.home.as_slice().get(..self.joints.len()).unwrap_or_default()
     }
 
     /// `q` with every joint moved into its limits.

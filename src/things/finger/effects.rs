@@ -3,9 +3,11 @@
 use super::electrodes::ElectrodesEffect;
 use super::fluid::FluidEffect;
 use super::friction::FrictionEffect;
+use super::registration::RegistrationEffect;
 use super::skin::SkinEffect;
 use super::thermal::ThermalEffect;
 use super::timing::TimingEffect;
+use super::wrench::WrenchEffect;
 use crate::ground::config::{Checked, Rules};
 use serde::{Deserialize, Serialize};
 
@@ -29,7 +31,13 @@ pub struct Effects {
     /// Tangential forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<FrictionEffect>,
-    /// Skew and latency of the tactile frames.
+    /// The force/torque sensor behind the finger.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wrench: Option<WrenchEffect>,
+    /// Errors of the finger's and the object's place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub registration: Option<RegistrationEffect>,
+    /// Skew and latency of the tactile frames, delay of commands.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timing: Option<TimingEffect>,
 }
@@ -43,6 +51,8 @@ impl Effects {
             electrodes: Some(ElectrodesEffect::default()),
             thermal: Some(ThermalEffect::default()),
             friction: Some(FrictionEffect::default()),
+            wrench: Some(WrenchEffect::default()),
+            registration: Some(RegistrationEffect::default()),
             timing: Some(TimingEffect::default()),
         }
     }
@@ -66,12 +76,16 @@ impl Checked for Effects {
         table(rules, "electrodes", &self.electrodes);
         table(rules, "thermal", &self.thermal);
         table(rules, "friction", &self.friction);
+        table(rules, "wrench", &self.wrench);
+        table(rules, "registration", &self.registration);
         table(rules, "timing", &self.timing);
         let named = [
             ("fluid", self.fluid.is_some()),
             ("electrodes", self.electrodes.is_some()),
             ("thermal", self.thermal.is_some()),
             ("friction", self.friction.is_some()),
+            ("wrench", self.wrench.is_some()),
+            ("registration", self.registration.is_some()),
         ];
         for (key, _) in named.into_iter().filter(|(_, given)| *given) {
             rules.require(key, "(given)", self.skin.is_some(), || {

@@ -4,7 +4,9 @@
 //! is the law of one column of skin over fluid over core, `cavity` couples columns by the fluid's
 //! pressure, `skin` presses them against a mesh. `electrodes`, `fluid`, `thermal`, `friction` and
 //! `timing` are the effects; `tip` puts together those a scene names. `contact_point` reads a frame
-//! back; `plate` presses the finger on a flat plate, `calibration` fits the constants to recordings of it.
+//! back; `wrench` is the force/torque sensor behind the finger, `registration` what is not where it is
+//! believed to be. `plate` presses the finger on a flat plate, `calibration` fits the constants to recordings of it, `stiffness`
+//! asks it how stiff the skin is.
 
 pub mod calibration;
 mod cavity;
@@ -21,12 +23,15 @@ pub mod load;
 mod noise;
 pub mod plate;
 pub mod profile;
+pub mod registration;
 pub mod samples;
 pub mod skin;
+pub mod stiffness;
 pub mod table;
 pub mod thermal;
 pub mod timing;
 pub mod tip;
+pub mod wrench;
 
 pub use contact_point::{Detection, Detector, PointOfContact, Tare};
 pub use effects::Effects;

@@ -81,13 +81,10 @@ impl Plate {
         electrodes: &ElectrodesEffect,
     ) -> Option<Self> {
         let profile = Profile::biotac(&Finger::default());
-        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-        let corners = corners.map(|(x, y)| Point3::new(PLATE_M * x, PLATE_M * y, 0.0));
-        let (mesh, _) = Mesh::new(&corners, &[[0, 1, 2], [0, 2, 3]]).ok()?;
         let skin = Skin::new(&profile, skin, cavity_pa_m3);
         let electrodes = Electrodes::new(electrodes, skin.samples(), profile.scale());
         let pressed = skin.relaxed();
-        Some(Self { skin, electrodes, bvh: MeshBvh::new(mesh), pressed })
+        Some(Self { skin, electrodes, bvh: flat()?, pressed })
     }
 
     /// Load and ideal counts with the plate across the direction `towards_t` and the origin of `T`
@@ -170,6 +167,14 @@ impl Plate {
 pub fn direction_t(pitch_rad: f64, roll_rad: f64) -> Vector3<f64> {
     let (sin, cos) = pitch_rad.sin_cos();
     Vector3::new(sin, cos * roll_rad.sin(), -cos * roll_rad.cos())
+}
+
+/// A plate in the plane z = 0.
+pub(super) fn flat() -> Option<MeshBvh> {
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    let corners = corners.map(|(x, y)| Point3::new(PLATE_M * x, PLATE_M * y, 0.0));
+    let (mesh, _) = Mesh::new(&corners, &[[0, 1, 2], [0, 2, 3]]).ok()?;
+    Some(MeshBvh::new(mesh))
 }
 
 /// Pose of `T` over a plate in the plane z = 0 of `W` that `towards_t` faces.

@@ -7,22 +7,29 @@ use serde::{Deserialize, Serialize};
 /// Slots of a frame (SynTouch QuickStart guide): E1, PAC, E2, PAC, … E19, PAC, PDC, PAC, TAC, PAC, TDC, PAC.
 pub const SLOTS: usize = 44;
 
+/// Longest delay of a command; chosen, far beyond what the controller stands.
+pub const DELAY_MAX_S: f64 = 1.0;
+
 /// Slots per second (same).
 pub const SLOTS_HZ: f64 = 4400.0;
 
-/// Table `[timing]`: channels are sampled one after the other and frames arrive in batches.
-/// Without it a frame is sampled at once, every 10 ms, and arrives then.
+/// Table `[timing]`: channels are sampled one after the other, frames arrive in batches, commands
+/// late. Without it a frame is sampled at once, every 10 ms, and arrives then, and a command holds
+/// from the tick on in which it is given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TimingEffect {
     /// Frames that arrive together, when the last of them is complete.
     pub batch_frames: usize,
+    /// From a command to its effect, rounded to whole control periods.
+    pub control_delay_s: f64,
 }
 
 impl Default for TimingEffect {
-    /// SynTouch C library manual: 5 frames, 50 ms.
+    /// Batch: SynTouch C library manual, 5 frames, 50 ms. Delay: chosen, a cycle of the PA-10's
+    /// servo driver.
     fn default() -> Self {
-        Self { batch_frames: 5 }
+        Self { batch_frames: 5, control_delay_s: 0.002 }
     }
 }
 
@@ -34,6 +41,7 @@ impl Checked for TimingEffect {
             (1..=100).contains(&self.batch_frames),
             || "1 to 100".into(),
         );
+        rules.number("control_delay_s", self.control_delay_s, 0.0..=DELAY_MAX_S);
     }
 }
 

@@ -1,8 +1,10 @@
 //! Scene → MJCF, the text a MuJoCo model is compiled from. Numbers are SI, in `W`.
 
+mod relief;
 mod robot;
 mod scenery;
 
+use super::scene::Body;
 use super::world::World;
 use std::fmt::{Display, Write};
 
@@ -14,8 +16,9 @@ const PICTURE_STEP_S: f64 = 0.002;
 pub enum Mode {
     /// To look at: everything in the scene.
     Picture,
-    /// To step: what moves and nothing else. Shapes would cost time at every step and touch
-    /// nothing; contact is the skin's matter, not MuJoCo's.
+    /// To step: what moves and nothing else. Shapes would cost time at every step, and contact is
+    /// the skin's matter, not MuJoCo's; only a finger without a skin meets the object as a height
+    /// field over the zone.
     Dynamic {
         /// Time step; the servos' gains are chosen for 2 ms and less.
         step_s: f64,
@@ -27,12 +30,17 @@ pub enum Mode {
 /// object at its pose on a vertical board, the floor, a camera and lights. None for a scene
 /// without a mesh.
 ///
-/// Nothing collides: MuJoCo would collide the object's convex hull.
+/// The object's mesh never collides: MuJoCo would collide its convex hull.
 pub fn scene(world: &World, mode: Mode) -> Option<String> {
     let mesh = world.mesh()?;
     let chain = world.chain()?;
     let shown = mode == Mode::Picture;
-    let scenery = if shown { scenery::scenery(mesh, &chain) } else { String::new() };
+    let collides = !shown && world.fingertip().is_none() && world.scene().body == Body::Dynamic;
+    let scenery = match shown {
+        true => scenery::scenery(mesh, &chain),
+        false if collides => relief::relief(world)?.concat(),
+        false => String::new(),
+    };
     let step_s = match mode {
         Mode::Picture => PICTURE_STEP_S,
         Mode::Dynamic { step_s } => step_s,
@@ -52,7 +60,7 @@ pub fn scene(world: &World, mode: Mode) -> Option<String> {
   <keyframe><key name="home" qpos="{home}"/></keyframe>
 {scenery}</mujoco>
 "#,
-        robot = robot::robot(world.scene(), &chain),
+        robot = robot::robot(world.scene(), &chain, collides),
         discard = !shown,
         home = list(chain.home.iter().take(chain.joints.len())),
     );

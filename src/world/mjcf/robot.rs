@@ -1,6 +1,7 @@
 //! The arm or the stage with the finger on it.
 
 use super::list;
+use super::relief::CONTACT;
 use crate::things::arm::{Chain, Links};
 use crate::things::finger::Finger;
 use crate::world::Scene;
@@ -13,8 +14,9 @@ const STAGE: &str = include_str!("../../../models/stage.xml");
 /// Mass of adapter and finger beyond the force/torque sensor; chosen.
 const TOOL_KG: f64 = 0.15;
 
-/// The robot's model without its outermost tags, with its base and its tool put in.
-pub(super) fn robot(scene: &Scene, chain: &Chain) -> String {
+/// The robot's model without its outermost tags, with its base and its tool put in; the finger's
+/// hull is met by the object if it `collides`.
+pub(super) fn robot(scene: &Scene, chain: &Chain, collides: bool) -> String {
     let model = match scene.arm.as_ref().map(|arm| arm.links) {
         Some(Links::C) => C,
         Some(Links::A) => A,
@@ -25,11 +27,11 @@ pub(super) fn robot(scene: &Scene, chain: &Chain) -> String {
     inner
         .map_or("", |(inner, _)| inner)
         .replace("<body name=\"base\"", &format!("<body name=\"base\" {}", pose(&chain.base)))
-        .replace("<!-- tool -->", &tool(&scene.finger, chain))
+        .replace("<!-- tool -->", &tool(&scene.finger, chain, if collides { CONTACT } else { "" }))
 }
 
 /// Adapter and finger as one body at the flange, where the force/torque sensor is.
-fn tool(finger: &Finger, chain: &Chain) -> String {
+fn tool(finger: &Finger, chain: &Chain, contact: &str) -> String {
     let mount_m = chain.tool.translation.vector.norm();
     let heel_m = (mount_m - finger.length_m).max(0.0);
     // A rod of the tool's mass and length, radius 10 mm: m/12 (3 r² + l²) across, m r²/2 along.
@@ -51,7 +53,7 @@ fn tool(finger: &Finger, chain: &Chain) -> String {
         r#"<body name="finger" {flange}>
           <inertial pos="0 0 {middle}" mass="{TOOL_KG}" diaginertia="{across} {across} {along}"/>
           {adapter}
-          <geom name="finger" {hull} size="{radius}" rgba=".2 .35 .6 1"/>
+          <geom name="finger" {hull} size="{radius}" rgba=".2 .35 .6 1" {contact}/>
           <site name="mount" size=".005" group="4"/>
           <site name="tip" size=".002" group="4" {tip}/>
         </body>"#,

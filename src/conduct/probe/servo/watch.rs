@@ -26,8 +26,10 @@ pub(super) struct Watch {
     heard_s: Option<f64>,
     ideal: Option<IdealContact>,
     force_n: f64,
-    force_at_rest_n: Vector3<f64>,
-    wrench_n: Vector3<f64>,
+    /// Mean of the sensor's force while at rest: its bias and the finger's weight.
+    force_at_rest_n: Option<Vector3<f64>>,
+    /// Sum and count of the forces since [`forget`](Self::forget).
+    forces: (Vector3<f64>, f64),
 }
 
 impl Watch {
@@ -41,8 +43,8 @@ impl Watch {
             heard_s: None,
             ideal: None,
             force_n: 0.0,
-            force_at_rest_n: Vector3::zeros(),
-            wrench_n: Vector3::zeros(),
+            force_at_rest_n: None,
+            forces: (Vector3::zeros(), 0.0),
         }
     }
 
@@ -56,11 +58,14 @@ impl Watch {
             self.frames.push(frame.clone());
         }
         self.ideal = reading.ideal;
-        if let Some(wrench) = &reading.wrench {
-            self.wrench_n = wrench.force_n;
-        }
-        let ideal_n = reading.ideal.map_or(0.0, |ideal| ideal.force_n);
-        self.force_n = (self.wrench_n - self.force_at_rest_n).norm().max(ideal_n);
+        self.force_n = match &reading.wrench {
+            Some(wrench) => {
+                self.forces.0 += wrench.force_n;
+                self.forces.1 += 1.0;
+                self.force_at_rest_n.map_or(0.0, |rest_n| (wrench.force_n - rest_n).norm())
+            }
+            None => reading.ideal.map_or(0.0, |ideal| ideal.force_n),
+        };
     }
 
     /// What is felt now.
@@ -85,12 +90,13 @@ impl Watch {
         self.tare = Some(Tare::of(&self.frames));
         self.detector = Detector::new(self.settings.detection.clone());
         self.touching = false;
-        self.force_at_rest_n = self.wrench_n;
+        self.force_at_rest_n = (self.forces.1 > 0.0).then(|| self.forces.0 / self.forces.1);
     }
 
-    /// Drops the frames so far.
+    /// Drops the frames and forces so far.
     pub(super) fn forget(&mut self) {
         self.frames.clear();
+        self.forces = (Vector3::zeros(), 0.0);
     }
 
     pub(super) fn frames(&self) -> &[Frame] {

@@ -1,0 +1,86 @@
+//! What the trials of an experiment share: the world, and what is compiled from it once.
+
+use super::backend::{Backend, Fault};
+use super::delay::Delayed;
+use super::kinematic::Kinematic;
+#[cfg(feature = "mujoco")]
+use super::mujoco;
+use crate::world::World;
+use crate::world::scene::Body;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// A world with everything ready to put bodies into it.
+#[derive(Clone)]
+pub struct Stand {
+    world: Arc<World>,
+    #[cfg(feature = "mujoco")]
+    model: Option<Arc<mujoco_rs::wrappers::MjModel>>,
+}
+
+/// A world that no body can be put into.
+#[derive(Debug, Error)]
+pub enum StandError {
+    /// Its physics cannot be simulated.
+    #[cfg(feature = "mujoco")]
+    #[error(transparent)]
+    Model(#[from] mujoco::ModelError),
+    /// This build lacks what the scene's body needs.
+    #[error("body = \"{body}\" needs a build with the feature `mujoco`")]
+    NotBuilt {
+        /// The body.
+        body: &'static str,
+    },
+}
+
+impl Stand {
+    /// Compiles what the scene's body needs.
+    ///
+    /// # Errors
+    /// If it cannot be simulated as the scene asks.
+    pub fn new(world: Arc<World>) -> Result<Self, StandError> {
+        #[cfg(feature = "mujoco")]
+        {
+            let moved = world.scene().body == Body::Dynamic;
+            let model = if moved { Some(mujoco::Dynamic::model(&world)?) } else { None };
+            Ok(Self { world, model })
+        }
+        #[cfg(not(feature = "mujoco"))]
+        match world.scene().body {
+            Body::Dynamic => Err(StandError::NotBuilt { body: Body::Dynamic.name() }),
+            _ => Ok(Self { world }),
+        }
+    }
+
+    /// The world.
+    pub fn world(&self) -> &Arc<World> {
+        &self.world
+    }
+
+    /// The simulated body that the scene asks for, at its start; none where a touch is no motion.
+    ///
+    /// # Errors
+    /// If there is no memory for its state.
+    pub fn body(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
+        let body: Box<dyn Backend> = match self.world.scene().body {
+            Body::Function | Body::Cast => return Ok(None),
+            Body::Kinematic => Box::new(Kinematic::new(&self.world).ok_or_else(unusable)?),
+            #[cfg(feature = "mujoco")]
+            Body::Dynamic => {
+                let model = self.model.as_ref().ok_or_else(unusable)?;
+                Box::new(mujoco::Dynamic::new(&self.world, model).ok_or_else(unusable)?)
+            }
+            #[cfg(not(feature = "mujoco"))]
+            Body::Dynamic => return Err(unusable()),
+        };
+        let timing = self.world.scene().effects.timing.as_ref();
+        Ok(Some(match timing.map_or(0.0, |timing| timing.control_delay_s) {
+            delay_s if delay_s > 0.0 => Box::new(Delayed::new(body, delay_s)),
+            _ => body,
+        }))
+    }
+}
+
+fn unusable() -> Fault {
+    Fault::Lost { time_s: 0.0 }
+}
