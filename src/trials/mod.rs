@@ -2,6 +2,7 @@
 
 pub mod comparison;
 pub mod experiment;
+pub mod fidelity;
 pub mod metrics;
 pub mod row;
 pub mod runner;

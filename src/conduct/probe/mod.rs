@@ -6,7 +6,7 @@ pub mod servo;
 
 pub use cast::rest_y_m;
 
-use crate::bodies::backend::Fault;
+use crate::bodies::backend::{Backend, Fault};
 use crate::bodies::kinematic::Kinematic;
 use crate::world::World;
 use crate::world::scene::Body;
@@ -42,19 +42,33 @@ pub trait Probe: Send {
     fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault>;
 }
 
+/// The body that the scene's touches move; none where they need no dynamics.
+///
+/// # Errors
+/// If the scene lacks what its body needs.
+pub fn body(world: &Arc<World>) -> Result<Option<Box<dyn Backend>>, Fault> {
+    Ok(match world.scene().body {
+        Body::Function | Body::Cast => None,
+        Body::Kinematic => {
+            let body = Kinematic::new(world).ok_or(Fault::Refused { values: Vec::new() })?;
+            Some(Box::new(body))
+        }
+    })
+}
+
 /// The probe that the scene's body asks for; `seed` is all the randomness of its sensors.
 ///
 /// # Errors
 /// If the body cannot be brought to its start.
 pub fn open(world: &Arc<World>, seed: u64) -> Result<Box<dyn Probe>, Fault> {
+    let body = body(world)?;
     let world = Arc::clone(world);
-    Ok(match world.scene().body {
-        Body::Function => Box::new(function::FunctionProbe::new(world)),
-        Body::Cast => Box::new(cast::Cast::new(world)),
-        Body::Kinematic => {
-            let body = Kinematic::new(&world).ok_or(Fault::Refused { values: Vec::new() })?;
-            Box::new(servo::Servo::new(world, Box::new(body), seed)?)
+    Ok(match body {
+        Some(body) => Box::new(servo::Servo::new(world, body, seed)?),
+        None if world.scene().body == Body::Function => {
+            Box::new(function::FunctionProbe::new(world))
         }
+        None => Box::new(cast::Cast::new(world)),
     })
 }
 

@@ -1,6 +1,10 @@
 //! The command line.
 
 mod calibrate;
+mod columns;
+mod effects;
+mod fidelity;
+mod progress;
 mod report;
 mod run;
 mod show;
@@ -24,6 +28,7 @@ Examples:
   palpate run experiments/bird.toml --set trials=4 --set planners='[\"active\"]'
   palpate report runs/toy                   draw the figures again, without running
   palpate show my-part.obj --unit mm        check a mesh before exploring it
+  palpate fidelity scenes/bird_finger.toml --tolerance 0.2mm
 
 Exit codes: 0 done, 2 could not (the message says why), 130 interrupted; run the same command \
 again to continue.";
@@ -36,6 +41,10 @@ enum Command {
     Report(report::Args),
     /// Say what a mesh, scene, experiment or run folder holds.
     Show(show::Args),
+    /// Show what accuracy costs: errors and time over a ladder of scenes.
+    Fidelity(fidelity::Args),
+    /// Show what each effect of a scene changes and costs.
+    Effects(effects::Args),
     /// Fit the finger's constants to recordings of it on a flat plate.
     Calibrate(calibrate::Args),
 }
@@ -60,6 +69,8 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Show(args) => show::run(&args),
+        Command::Fidelity(args) => fidelity::run(&args),
+        Command::Effects(args) => effects::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
     };
     match outcome {

@@ -1,5 +1,6 @@
 //! `palpate run`.
 
+use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::{Ending, print};
 use crate::faces::report;
 use crate::trials::experiment::Experiment;
@@ -8,11 +9,8 @@ use crate::trials::store::{Manifest, Run, RunFolder};
 use crate::trials::truth::Truth;
 use crate::world::World;
 use anyhow::Context;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 pub(super) const EXAMPLES: &str = "\
@@ -52,11 +50,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     runner::check(&truth)?;
     let manifest = manifest(&experiment);
     let (mut folder, done) = RunFolder::open(&path, &experiment, &truth, &manifest, args.fresh)?;
-    let stop = Arc::new(AtomicBool::new(false));
-    stop_on_interrupt(stop.clone())?;
+    let stop = stop_on_interrupt("trials")?;
 
     let total = u64::from(experiment.trials) * experiment.planners.len() as u64;
-    let bar = progress_bar(&experiment.name, total, done.len() as u64);
+    let bar = progress_bar(&experiment.name, "trials", total, done.len() as u64);
     let begun = Instant::now();
     let count = runner::run(
         &experiment,
@@ -124,37 +121,4 @@ fn cpu_features() -> Vec<&'static str> {
 #[cfg(not(target_arch = "x86_64"))]
 fn cpu_features() -> Vec<&'static str> {
     Vec::new()
-}
-
-/// The first Ctrl-C asks to stop, the second ends the program at once.
-fn stop_on_interrupt(stop: Arc<AtomicBool>) -> anyhow::Result<()> {
-    let handler = move || {
-        if stop.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-        eprintln!("stopping after the trials in hand; Ctrl-C again to stop at once");
-    };
-    ctrlc::set_handler(handler).context("cannot listen for Ctrl-C")
-}
-
-fn progress_bar(name: &str, total: u64, done: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
-    let template = "{prefix} {wide_bar} {pos}/{len} trials, {elapsed} gone, {eta} left";
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
-    bar.set_prefix(name.to_owned());
-    bar.set_position(done);
-    bar.reset_eta();
-    bar
-}
-
-/// Moves the bar; where no terminal shows it, says so in a line for each tenth.
-fn step(bar: &ProgressBar) {
-    bar.inc(1);
-    let (position, total) = (bar.position(), bar.length().unwrap_or(0));
-    let tenth = |count: u64| count * 10 / total.max(1);
-    if !std::io::stderr().is_terminal() && tenth(position) > tenth(position - 1) {
-        eprintln!("{}: {position} of {total} trials, {:.0?} left", bar.prefix(), bar.eta());
-    }
 }

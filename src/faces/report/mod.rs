@@ -7,6 +7,7 @@ pub mod findings;
 pub mod heat;
 pub mod page;
 pub mod paired;
+pub mod pareto;
 pub mod png;
 pub mod relief;
 pub mod replay;

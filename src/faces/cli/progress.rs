@@ -1,0 +1,48 @@
+//! How far a long command has come, and how it is stopped.
+
+use anyhow::Context;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A flag that the first Ctrl-C raises, to stop after the `pieces` of work in hand; the second
+/// ends the program at once.
+pub(super) fn stop_on_interrupt(pieces: &'static str) -> anyhow::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let raised = stop.clone();
+    let handler = move || {
+        if raised.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        eprintln!("stopping after the {pieces} in hand; Ctrl-C again to stop at once");
+    };
+    ctrlc::set_handler(handler).context("cannot listen for Ctrl-C")?;
+    Ok(stop)
+}
+
+/// A bar over `total` pieces of work.
+pub(super) fn progress_bar(name: &str, pieces: &str, total: u64, done: u64) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
+    let template =
+        format!("{{prefix}} {{wide_bar}} {{pos}}/{{len}} {pieces}, {{elapsed}} gone, {{eta}} left");
+    if let Ok(style) = ProgressStyle::with_template(&template) {
+        bar.set_style(style);
+    }
+    bar.set_prefix(name.to_owned());
+    bar.set_message(pieces.to_owned());
+    bar.set_position(done);
+    bar.reset_eta();
+    bar
+}
+
+/// Moves the bar; where no terminal shows it, says so in a line for each tenth.
+pub(super) fn step(bar: &ProgressBar) {
+    bar.inc(1);
+    let (position, total) = (bar.position(), bar.length().unwrap_or(0));
+    let tenth = |count: u64| count * 10 / total.max(1);
+    if !std::io::stderr().is_terminal() && tenth(position) > tenth(position - 1) {
+        let (name, pieces) = (bar.prefix(), bar.message());
+        eprintln!("{name}: {position} of {total} {pieces}, {:.0?} left", bar.eta());
+    }
+}
