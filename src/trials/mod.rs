@@ -8,6 +8,7 @@ pub mod row;
 pub mod runner;
 pub mod statistics;
 pub mod store;
+pub mod stress;
 pub mod summary;
 pub mod trial;
 pub mod truth;

@@ -11,6 +11,7 @@ pub mod pareto;
 pub mod png;
 pub mod relief;
 pub mod replay;
+pub mod severity;
 pub mod style;
 pub mod table;
 

@@ -10,6 +10,9 @@ pub const SLOTS: usize = 44;
 /// Slots per second (same).
 pub const SLOTS_HZ: f64 = 4400.0;
 
+/// Time between frames.
+pub const FRAME_S: f64 = SLOTS as f64 / SLOTS_HZ;
+
 /// Table `[timing]`: channels are sampled one after the other and frames arrive in batches.
 /// Without it a frame is sampled at once, every 10 ms, and arrives then.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -54,14 +54,22 @@ pub const RUNGS: &[Rung] = &[
     rung(Body::Kinematic, Senses::Full, 1000, 0.005),
     rung(Body::Kinematic, Senses::Full, 2000, 0.002),
     rung(Body::Kinematic, Senses::Full, 4000, 0.001),
-    rung(Body::Kinematic, Senses::Full, 8000, 0.001),
-    rung(Body::Kinematic, Senses::Full, 16000, 0.0005),
+    rung(Body::Kinematic, Senses::Full, 8000, 0.0005),
+    rung(Body::Kinematic, Senses::Full, 16000, 0.00025),
+    rung(Body::Kinematic, Senses::Full, 32000, 0.00025),
 ];
 
 /// Rungs that go to the reference in every direction at once: how far each is from the last
-/// says whether that can be trusted.
-pub const DIAGONAL: [(usize, f64); 6] =
-    [(500, 0.01), (1000, 0.005), (2000, 0.002), (4000, 0.001), (8000, 0.001), (16000, 0.0005)];
+/// says whether that can be trusted. It begins with ticks shorter than a tactile frame: ticks as
+/// long as a frame see every frame at the instant it is sampled, which flatters them.
+pub const DIAGONAL: [(usize, f64); 6] = [
+    (1000, 0.005),
+    (2000, 0.002),
+    (4000, 0.001),
+    (8000, 0.0005),
+    (16000, 0.00025),
+    (32000, 0.00025),
+];
 
 impl Rung {
     /// `scene` with this rung's changes; every other setting stays.
