@@ -86,7 +86,7 @@ fn contact(c: &mut Criterion) {
         return;
     };
     let world = Arc::new(world);
-    let mut probe = probe::open(&world);
+    let mut probe = probe::open(&world, 0).unwrap();
     group.bench_function("touch", |b| b.iter(|| probe.touch(black_box(&[0.013, 0.487]))));
     if let Shape::Mesh { bvh, .. } = world.shape() {
         let origin = Point3::new(0.013, -0.5, 0.487);

@@ -110,6 +110,7 @@ fn touch(experiment: &Experiment, trial: u32, count: u32) -> TouchRow {
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),
         stall: None,
         fit: is_fitted.then_some(fit),
+        overload: false,
         jitter: 0.0,
         metrics: is_fitted.then_some(metrics),
     }

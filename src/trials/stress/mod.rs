@@ -5,7 +5,9 @@
 
 mod arm;
 mod belief;
+mod bench;
 pub mod case;
+mod deed;
 mod press;
 mod sensor;
 mod shapes;

@@ -1,10 +1,9 @@
 //! The finger's law of force, driven pose by pose.
 
+use super::bench::{Bench, finite, on_bench, on_bench_of};
 use super::case::{Case, Outcome, all, hold};
-use super::solids::{mesh, wall};
-use crate::ground::geometry::bvh::MeshBvh;
 use crate::ground::seed;
-use crate::things::finger::{Effects, Feel, FeelError, Finger, Fingertip, Load, Motion};
+use crate::things::finger::{Effects, FeelError, Motion};
 use nalgebra::{Isometry3, Vector3};
 use rand::RngExt;
 
@@ -149,73 +148,6 @@ pub(super) const CASES: &[Case] = &[
 
 fn effects() -> Effects {
     Effects { timing: None, ..Effects::all() }
-}
-
-/// A finger over a wall, its tip pointing at it as in a touch.
-struct Bench {
-    tip: Fingertip,
-    wall: MeshBvh,
-    finger: Finger,
-    /// Distance of the tip's centre from the wall at which the skin just touches.
-    touching_m: f64,
-}
-
-impl Bench {
-    fn new(effects: &Effects, size: f64) -> Option<Self> {
-        let standard = Finger::default();
-        let finger = Finger {
-            radius_m: size * standard.radius_m,
-            length_m: size * standard.length_m,
-            ..standard
-        };
-        let wall = MeshBvh::new(mesh(wall(0.05 * size), [0.0; 3])?);
-        let mut bench =
-            Self { tip: Fingertip::new(&finger, effects), wall, finger, touching_m: 0.0 };
-        let skin = bench.tip.skin()?;
-        let rotation = bench.finger.attitude_w();
-        let lowest = skin.samples().iter().map(|sample| (rotation * sample.point()).y);
-        bench.touching_m = -lowest.fold(0.0, f64::min);
-        Some(bench)
-    }
-
-    fn at(&self, depth_m: f64, x_m: f64) -> Motion {
-        let p_wt = Vector3::new(x_m, self.touching_m - depth_m, 0.0);
-        Motion::at(Isometry3::from_parts(p_wt.into(), self.finger.attitude_w()))
-    }
-
-    fn feel(&self) -> Feel {
-        Feel::new(&self.tip, &seed::stream(0, 0, "finger"))
-    }
-
-    fn press(&self, feel: &mut Feel, motion: &Motion, dt_s: f64) -> Result<Load, FeelError> {
-        feel.step(&self.tip, &self.wall, motion, dt_s)
-    }
-
-    fn force_n(&self, depth_m: f64) -> Result<f64, FeelError> {
-        Ok(self.press(&mut self.feel(), &self.at(depth_m, 0.0), 0.01)?.force_n.norm())
-    }
-}
-
-fn on_bench(effects: &Effects, law: impl FnOnce(&Bench) -> Result<Outcome, FeelError>) -> Outcome {
-    on_bench_of(effects, 1.0, law)
-}
-
-fn on_bench_of(
-    effects: &Effects,
-    size: f64,
-    law: impl FnOnce(&Bench) -> Result<Outcome, FeelError>,
-) -> Outcome {
-    match Bench::new(effects, size) {
-        Some(bench) => law(&bench).unwrap_or_else(|fault| Outcome::Faulted(fault.to_string())),
-        None => Outcome::Wrong("no bench".into()),
-    }
-}
-
-fn finite(load: &Load) -> bool {
-    let vectors = [&load.force_n, &load.torque_nm, &load.normal_t, &load.centre_t.coords];
-    vectors.iter().all(|vector| vector.iter().all(|number| number.is_finite()))
-        && load.energy_j.is_finite()
-        && load.pressure_pa.is_finite()
 }
 
 /// Force grows with depth and pushes the finger away.

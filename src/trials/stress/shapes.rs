@@ -1,8 +1,9 @@
 //! Objects that are hard to touch, each touched as a scene touches.
 
 use super::case::{Case, Outcome, all, hold};
+use super::deed::{Deed, deed};
 use super::solids::{ball, block, both, mesh, needle, sheet, wall};
-use super::touch::{Deed, deed, scene};
+use super::touch::scene;
 use crate::ground::geometry::mesh::Mesh;
 use nalgebra::Point3;
 
@@ -48,13 +49,16 @@ pub(super) const CASES: &[Case] = &[
         (&[10.0, 100.0, 1e3, 1e4, 1e5], 5),
         slivers,
     ),
-    case(
-        "vertex",
-        "the normal jumps at the tip of a needle",
-        "half angle deg",
-        (&[60.0, 30.0, 10.0, 3.0, 1.0], 3),
-        |angle_deg, period_s| on(mesh(needle(angle_deg), [0.0; 3]), [0.0; 2], period_s, 1.0),
-    ),
+    Case {
+        known: "a needle thinner than the skin's points are apart passes between them: use more",
+        ..case(
+            "vertex",
+            "the normal jumps at the tip of a needle",
+            "half angle deg",
+            (&[60.0, 30.0, 10.0, 3.0, 1.0], 3),
+            |angle_deg, period_s| on(mesh(needle(angle_deg), [0.0; 3]), [0.0; 2], period_s, 1.0),
+        )
+    },
     case(
         "open border",
         "half of the finger is over the edge of a sheet that has no other side",
