@@ -15,9 +15,9 @@ fn world(name: &str, sets: &[&str]) -> Arc<World> {
 }
 
 fn contact(world: &Arc<World>, target: &[f64]) -> Contact {
-    match probe::open(world).touch(target).unwrap() {
+    match probe::open(world, 0).unwrap().touch(target).unwrap() {
         Touch::Contact(contact) => contact,
-        Touch::Miss => panic!("{target:?} was missed"),
+        other => panic!("{target:?}: {other:?}"),
     }
 }
 
@@ -63,9 +63,9 @@ fn a_thin_probe_finds_the_nose_that_the_finger_cannot_enter_beside() {
 
 #[test]
 fn past_the_object_the_finger_meets_nothing() {
-    assert_eq!(probe::open(&BIRD).touch(&[0.3, 0.5]), Ok(Touch::Miss));
-    assert!(probe::open(&BIRD).touch(&[f64::NAN, 0.5]).is_err());
-    assert!(probe::open(&BIRD).touch(&[0.0, f64::INFINITY]).is_err());
+    assert_eq!(probe::open(&BIRD, 0).unwrap().touch(&[0.3, 0.5]), Ok(Touch::Miss));
+    assert!(probe::open(&BIRD, 0).unwrap().touch(&[f64::NAN, 0.5]).is_err());
+    assert!(probe::open(&BIRD, 0).unwrap().touch(&[0.0, f64::INFINITY]).is_err());
 }
 
 proptest! {
