@@ -139,8 +139,8 @@ fn text<'a>(files: &'a BTreeMap<String, Vec<u8>>, name: &str) -> &'a str {
 #[test]
 fn figures_are_whole() {
     for (settings, names) in [
-        (CURVE, ["acquisition", "convergence", "curves"]),
-        (SURFACE, ["acquisition", "convergence", "surfaces"]),
+        (CURVE, &["acquisition", "convergence", "curves"][..]),
+        (SURFACE, &["acquisition", "convergence", "surfaces", "targets"]),
     ] {
         let files = drawn(&run(settings));
         let svgs: Vec<&str> = files.keys().filter_map(|name| name.strip_suffix(".svg")).collect();

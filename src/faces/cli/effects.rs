@@ -74,11 +74,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     }
     bar.finish_and_clear();
     let mut text = aligned(&lines);
-    if let Some(ratio) = bare_ratio(&scene, &base, 400)? {
+    if let Some((ratio, [low, high])) = bare_ratio(&scene, &base, 200)? {
+        let [ratio, low, high] = [ratio, low, high].map(|ratio| 100.0 * (ratio - 1.0));
         text += &format!(
-            "\na finger with every effect off but its skin takes {:+.2} % of the time of the skin \
-             alone\n",
-            100.0 * (ratio - 1.0)
+            "\na finger with every effect off but its skin takes {ratio:+.2} % [{low:+.2}, {high:+.2}] \
+             longer than the skin alone\n"
         );
     }
     print(&text)?;

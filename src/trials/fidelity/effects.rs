@@ -9,7 +9,7 @@ use crate::conduct::probe;
 use crate::ground::work;
 use crate::things::finger::{Effects, Feel};
 use crate::trials::experiment::Experiment;
-use crate::trials::statistics::{Paired, median};
+use crate::trials::statistics::{Paired, median, median_interval};
 use crate::trials::trial;
 use crate::trials::truth::Truth;
 use crate::world::world::Shape;
@@ -253,7 +253,11 @@ fn verdict(world: &Arc<World>, truth: &Truth, budget: Budget) -> Option<Paired> 
 ///
 /// # Errors
 /// If the scene cannot be built.
-pub fn bare_ratio(scene: &Scene, base: &Base, repeats: usize) -> Result<Option<f64>, OrderError> {
+pub fn bare_ratio(
+    scene: &Scene,
+    base: &Base,
+    repeats: usize,
+) -> Result<Option<(f64, [f64; 2])>, OrderError> {
     let mut scene = scene.clone();
     scene.effects = Effects { skin: scene.effects.skin.take(), ..Effects::default() };
     let world = World::build(scene)?;
@@ -269,7 +273,7 @@ pub fn bare_ratio(scene: &Scene, base: &Base, repeats: usize) -> Result<Option<f
         let mut taken_s = [0.0; 2];
         for k in [i % 2, (i + 1) % 2] {
             let begun = Instant::now();
-            for pose in &poses {
+            for pose in std::iter::repeat_n(&poses, PASSES).flatten() {
                 if k == 0 {
                     let _ = std::hint::black_box(skin.press(bvh, &pose.x_wt, &mut pressed));
                 } else {
@@ -280,5 +284,5 @@ pub fn bare_ratio(scene: &Scene, base: &Base, repeats: usize) -> Result<Option<f
         }
         ratios.push(taken_s[1] / taken_s[0]);
     }
-    Ok(median(&ratios))
+    Ok(median(&ratios).zip(median_interval(&ratios, 0)))
 }
