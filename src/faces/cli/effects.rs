@@ -77,8 +77,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     if let Some((ratio, [low, high])) = bare_ratio(&scene, &base, 200)? {
         let [ratio, low, high] = [ratio, low, high].map(|ratio| 100.0 * (ratio - 1.0));
         text += &format!(
-            "\na finger with every effect off but its skin takes {ratio:+.2} % [{low:+.2}, {high:+.2}] \
-             longer than the skin alone\n"
+            "\ntime of a finger with every effect off but its skin, against the skin alone: \
+             {ratio:+.2} % [{low:+.2}, {high:+.2}]\n"
         );
     }
     print(&text)?;
