@@ -2,6 +2,7 @@
 
 pub mod backend;
 pub mod delay;
+pub mod faults;
 pub mod kinematic;
 pub mod limits;
 #[cfg(feature = "mujoco")]

@@ -7,3 +7,4 @@ pub mod normal;
 pub mod optimize;
 pub mod seed;
 pub mod simd;
+pub mod work;

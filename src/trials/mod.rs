@@ -2,12 +2,14 @@
 
 pub mod comparison;
 pub mod experiment;
+pub mod fidelity;
 pub mod metrics;
 pub mod row;
 pub mod runner;
 pub mod scan;
 pub mod statistics;
 pub mod store;
+pub mod stress;
 pub mod summary;
 pub mod trial;
 pub mod truth;

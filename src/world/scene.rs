@@ -7,8 +7,9 @@ use super::zone::Zone;
 use crate::ground::config::{Checked, ConfigError, Loader, Rules};
 use crate::ground::geometry::surfaces;
 use crate::things::arm::ArmSettings;
+use crate::things::finger::profile::Profile;
 use crate::things::finger::{Effects, Finger};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -220,6 +221,16 @@ impl Checked for Scene {
                 )
             });
         }
+        if let Some(limit_m_s) = self.approach_limit_m_s() {
+            let approach_m_s = self.touch.approach_m_s;
+            rules.require("touch.approach_m_s", approach_m_s, approach_m_s <= limit_m_s, || {
+                format!(
+                    "at most {:.4}: with this period_s, detection.frames and timing a faster finger \
+                     is pressed past its skin before contact is told",
+                    (1e4 * limit_m_s).floor() / 1e4
+                )
+            });
+        }
         if let Some(object) = &self.object {
             rules.table("object", object);
         }
@@ -242,6 +253,20 @@ impl Scene {
             Body::Dynamic => 0.002,
             Body::Function | Body::Cast | Body::Kinematic => 0.01,
         })
+    }
+
+    /// Fastest approach at which contact is told before skin and fluid are used up in front of the
+    /// tip; none for a body that is not moved through contact.
+    pub fn approach_limit_m_s(&self) -> Option<f64> {
+        if self.body != Body::Kinematic || self.effects.skin.is_none() {
+            return None;
+        }
+        let ahead_t = self.finger.attitude_w().inverse() * -Vector3::y();
+        let layers = Profile::biotac(&self.finger).layers(0.0, &ahead_t);
+        let batch = self.effects.timing.as_ref().map_or(1, |timing| timing.batch_frames);
+        let told_by_frames = self.effects.fluid.is_some().then_some(batch);
+        let depth_m = layers.skin_m + layers.gap_m;
+        Some(self.touch.approach_limit_m_s(self.period_s(), told_by_frames, depth_m))
     }
 
     /// Reads a scene file and applies `--set` assignments.

@@ -3,6 +3,7 @@
 
 use crate::ground::config::{Checked, Rules};
 use crate::things::finger::contact_point::Detection;
+use crate::things::finger::timing::FRAME_S;
 use serde::{Deserialize, Serialize};
 
 /// Table `[touch]`.
@@ -63,6 +64,29 @@ impl Default for TouchSettings {
             pressure_limit_counts: 1500.0,
             point: Point::Skin,
         }
+    }
+}
+
+/// Fastest that a body takes speed away; the stage's largest acceleration.
+const BRAKE_M_S2: f64 = 1.0;
+
+impl TouchSettings {
+    /// Approach at which the finger comes to rest within `depth_m` of the first contact, when
+    /// contact is told by force, or by frames that arrive in batches of `batch`, with control ticks
+    /// of `period_s`.
+    ///
+    /// Contact begins just after a frame; then as many frames as must agree, the rest of their
+    /// batch, and the tick that brings them go by: v t + v² / 2a = depth.
+    pub fn approach_limit_m_s(&self, period_s: f64, batch: Option<usize>, depth_m: f64) -> f64 {
+        let wait_s = match batch {
+            Some(batch) => {
+                let frames = self.detection.frames as usize + batch.max(1) - 1;
+                frames as f64 * FRAME_S.max(period_s) + period_s
+            }
+            None => 2.0 * period_s,
+        };
+        let lost_m_s = BRAKE_M_S2 * wait_s;
+        (lost_m_s * lost_m_s + 2.0 * BRAKE_M_S2 * depth_m).sqrt() - lost_m_s
     }
 }
 

@@ -65,19 +65,21 @@ impl World {
     /// # Errors
     /// If the mesh is unusable or lies wholly outside the zone.
     pub fn build(scene: Scene) -> Result<Self, WorldError> {
-        let shape = match scene.body {
-            Body::Function => {
-                Shape::Function(scene.function.ok_or(WorldError::Missing { part: "function" })?)
-            }
-            Body::Cast | Body::Kinematic | Body::Dynamic => {
-                let object = scene.object.as_ref().ok_or(WorldError::Missing { part: "object" })?;
-                let (mesh, report) = import(&object.mesh, object.unit.metres() * object.scale)?;
-                Shape::Mesh {
-                    bvh: MeshBvh::new(mesh.transformed(&object.x_wo())),
-                    report: report.into(),
-                }
-            }
-        };
+        if scene.body == Body::Function {
+            let function = scene.function.ok_or(WorldError::Missing { part: "function" })?;
+            return Self::around(scene, Shape::Function(function));
+        }
+        let object = scene.object.as_ref().ok_or(WorldError::Missing { part: "object" })?;
+        let (mesh, report) = import(&object.mesh, object.unit.metres() * object.scale)?;
+        let bvh = MeshBvh::new(mesh.transformed(&object.x_wo()));
+        Self::around(scene, Shape::Mesh { bvh, report: report.into() })
+    }
+
+    /// Puts a scene around a shape that is there already, in place of the object it names.
+    ///
+    /// # Errors
+    /// If the shape lies wholly outside the zone.
+    pub fn around(scene: Scene, shape: Shape) -> Result<Self, WorldError> {
         let fingertip =
             (scene.effects.skin.is_some()).then(|| Fingertip::new(&scene.finger, &scene.effects));
         let world = Self { scene, shape, fingertip };
@@ -146,6 +148,14 @@ impl World {
                 distance_m.map(|distance| origin.y - distance - self.scene.zone.datum_y_m)
             }
         }
+    }
+
+    /// The point of the true surface nearest to `p_w`, if the object has an analytic one.
+    pub fn nearest_true_point(&self, p_w: &Point3<f64>) -> Option<Point3<f64>> {
+        let (surface, object) = self.analytic()?;
+        let x_wo = object.x_wo();
+        let local = x_wo.inverse_transform_point(p_w) / object.scale;
+        surface.project(local).map(|nearest| x_wo * (nearest * object.scale))
     }
 
     fn analytic(&self) -> Option<(&'static dyn Implicit, &Object)> {

@@ -1,12 +1,16 @@
 //! The command line.
 
 mod calibrate;
+mod columns;
+mod effects;
 mod export;
+mod fidelity;
 mod progress;
 mod report;
 mod run;
 mod scan;
 mod show;
+mod stress;
 
 use crate::conduct::planner::PLANNERS;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -29,8 +33,10 @@ Examples:
   palpate show my-part.obj --unit mm        check a mesh before exploring it
   palpate scan scenes/bird.toml             touch the whole zone, write a point cloud
   palpate export runs/bird --planner active --out bird.ply
+  palpate fidelity scenes/bird_finger.toml --tolerance 0.2mm
+  palpate stress                            hard cases until they break
 
-Exit codes: 0 done, 2 could not (the message says why), 130 interrupted; run the same command \
+Exit codes: 0 done, 1 a test failed, 2 could not (the message says why), 130 interrupted; run the same command \
 again to continue.";
 
 #[derive(Subcommand)]
@@ -45,6 +51,12 @@ enum Command {
     Scan(scan::Args),
     /// Write a belief of a run as a mesh.
     Export(export::Args),
+    /// Show what accuracy costs: errors and time over a ladder of scenes.
+    Fidelity(fidelity::Args),
+    /// Show what each effect of a scene changes and costs.
+    Effects(effects::Args),
+    /// Run hard cases at rising severity until they break.
+    Stress(stress::Args),
     /// Fit the finger's constants to recordings of it on a flat plate.
     Calibrate(calibrate::Args),
 }
@@ -52,6 +64,8 @@ enum Command {
 /// How a command ended, if it did not fail.
 enum Ending {
     Done,
+    /// What was tested did not hold.
+    Failed,
     Interrupted,
 }
 
@@ -71,10 +85,14 @@ pub fn main() -> ExitCode {
         Command::Show(args) => show::run(&args),
         Command::Scan(args) => scan::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Fidelity(args) => fidelity::run(&args),
+        Command::Effects(args) => effects::run(&args),
+        Command::Stress(args) => stress::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
     };
     match outcome {
         Ok(Ending::Done) => ExitCode::SUCCESS,
+        Ok(Ending::Failed) => ExitCode::FAILURE,
         Ok(Ending::Interrupted) => ExitCode::from(130),
         Err(error) => {
             eprintln!("error: {error:#}");

@@ -1,4 +1,4 @@
-//! What a long command shows while it works, and how it is stopped.
+//! How far a long command has come, and how it is stopped.
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -6,26 +6,31 @@ use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The first Ctrl-C asks to stop, the second ends the program at once.
-pub(super) fn stop_on_interrupt(stop: Arc<AtomicBool>, what: &'static str) -> anyhow::Result<()> {
+/// A flag that the first Ctrl-C raises, to stop after the `pieces` of work in hand; the second
+/// ends the program at once.
+pub(super) fn stop_on_interrupt(pieces: &'static str) -> anyhow::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let raised = stop.clone();
     let handler = move || {
-        if stop.swap(true, Ordering::Relaxed) {
+        if raised.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        eprintln!("stopping after the {what} in hand; Ctrl-C again to stop at once");
+        eprintln!("stopping after the {pieces} in hand; Ctrl-C again to stop at once");
     };
-    ctrlc::set_handler(handler).context("cannot listen for Ctrl-C")
+    ctrlc::set_handler(handler).context("cannot listen for Ctrl-C")?;
+    Ok(stop)
 }
 
-/// A bar of `total` pieces, named by `what` they are; `done` were there before.
-pub(super) fn progress_bar(name: &str, what: &'static str, total: u64, done: u64) -> ProgressBar {
+/// A bar over `total` pieces of work.
+pub(super) fn progress_bar(name: &str, pieces: &str, total: u64, done: u64) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
-    let template = "{prefix} {wide_bar} {pos}/{len} {msg}, {elapsed} gone, {eta} left";
-    if let Ok(style) = ProgressStyle::with_template(template) {
+    let template =
+        format!("{{prefix}} {{wide_bar}} {{pos}}/{{len}} {pieces}, {{elapsed}} gone, {{eta}} left");
+    if let Ok(style) = ProgressStyle::with_template(&template) {
         bar.set_style(style);
     }
     bar.set_prefix(name.to_owned());
-    bar.set_message(what);
+    bar.set_message(pieces.to_owned());
     bar.set_position(done);
     bar.reset_eta();
     bar
@@ -37,7 +42,7 @@ pub(super) fn step(bar: &ProgressBar) {
     let (position, total) = (bar.position(), bar.length().unwrap_or(0));
     let tenth = |count: u64| count * 10 / total.max(1);
     if !std::io::stderr().is_terminal() && tenth(position) > tenth(position - 1) {
-        let (name, what) = (bar.prefix(), bar.message());
-        eprintln!("{name}: {position} of {total} {what}, {:.0?} left", bar.eta());
+        let (name, pieces) = (bar.prefix(), bar.message());
+        eprintln!("{name}: {position} of {total} {pieces}, {:.0?} left", bar.eta());
     }
 }

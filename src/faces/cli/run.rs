@@ -12,7 +12,6 @@ use crate::world::World;
 use anyhow::Context;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 pub(super) const EXAMPLES: &str = "\
@@ -53,8 +52,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     runner::check(&truth)?;
     let manifest = manifest(&experiment);
     let (mut folder, done) = RunFolder::open(&path, &experiment, &truth, &manifest, args.fresh)?;
-    let stop = Arc::new(AtomicBool::new(false));
-    stop_on_interrupt(stop.clone(), "trials")?;
+    let stop = stop_on_interrupt("trials")?;
 
     let total = u64::from(experiment.trials) * experiment.planners.len() as u64;
     let bar = progress_bar(&experiment.name, "trials", total, done.len() as u64);

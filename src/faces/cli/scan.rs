@@ -12,7 +12,6 @@ use crate::world::{Scene, World};
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -58,8 +57,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let name = args.scene.file_stem().unwrap_or_default().to_string_lossy();
     let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(format!("{name}-scan")));
     let grid = args.grid.unwrap_or_else(|| scan::default_grid(&world.scene().zone));
-    let stop = Arc::new(AtomicBool::new(false));
-    stop_on_interrupt(stop.clone(), "rows")?;
+    let stop = stop_on_interrupt("rows")?;
     let bar = progress_bar(&name, "rows", grid[1] as u64, 0);
     let stand = Stand::new(Arc::clone(&world))?;
     let felt = scan::scan(&stand, grid, args.threads.into(), &stop, &|| step(&bar))?;

@@ -5,6 +5,7 @@ use super::fluid::{Filter, FluidEffect};
 use super::frame::{ELECTRODES, Frame, VIBRATIONS};
 use super::thermal::ThermalEffect;
 use super::timing::{Channel, SLOTS, SLOTS_HZ, TimingEffect, channel};
+use crate::ground::work::{self, Stage};
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 
@@ -82,6 +83,14 @@ impl Converter {
         }
     }
 
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let rngs = [&self.electrodes_rng, &self.fluid_rng, &self.thermal_rng];
+        rngs.into_iter().flatten().map(size_of_val).sum::<usize>()
+            + self.filter.as_ref().map_or(0, size_of_val)
+            + self.queue.capacity() * size_of::<Frame>()
+    }
+
     /// The oldest frame that has arrived.
     pub fn frame(&mut self) -> Option<Frame> {
         self.ready = self.ready.checked_sub(1)?;
@@ -129,6 +138,7 @@ impl Converter {
             && let (Some(vibration), Some(filter), Some(rng)) =
                 (&fluid.vibration, &mut self.filter, &mut self.fluid_rng)
         {
+            work::count(Stage::Vibration);
             let counts = filter.pac_counts((fluid, vibration), pressure_pa, 2.0 / SLOTS_HZ, rng);
             self.frame.pac_counts.get_or_insert([0.0; VIBRATIONS])[i] = counts;
         }
@@ -154,6 +164,7 @@ impl Converter {
             }
             Channel::Pdc => {
                 if let (Some(fluid), Some(rng)) = (parts.fluid, &mut self.fluid_rng) {
+                    work::count(Stage::Fluid);
                     let pressure_pa = mix(before.pressure_pa, now.pressure_pa, part);
                     frame.pdc_counts = Some(fluid.pdc_counts(pressure_pa, rng));
                 }
@@ -179,6 +190,9 @@ impl Converter {
         if let (Some(electrodes), Some(rng)) = (parts.electrodes, &mut self.electrodes_rng) {
             let frame_s = SLOTS as f64 / SLOTS_HZ;
             self.drift_counts = electrodes.drifted(self.drift_counts, frame_s, rng);
+        }
+        if parts.timing.is_some() {
+            work::count(Stage::Timing);
         }
         let batch = parts.timing.map_or(1, |timing| timing.batch_frames);
         if self.queue.len() >= KEPT + batch {

@@ -107,6 +107,12 @@ impl Electrodes {
         Self { z0_ohm: effect.baseline_counts.map(impedance_ohm), weights, effect: effect.clone() }
     }
 
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self)
+            + self.weights.iter().map(|near| size_of_val(near.as_slice())).sum::<usize>()
+    }
+
     /// Ideal counts over a pressed skin when the fluid conducts `conductivity` times as well as at
     /// rest.
     pub fn counts(&self, pressed: &Pressed, conductivity: f64) -> [f64; ELECTRODES] {

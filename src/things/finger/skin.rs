@@ -114,6 +114,12 @@ pub struct Pressed {
 }
 
 impl Pressed {
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        let numbers = self.inward_m.capacity() + self.indentation_m.capacity();
+        self.touches.capacity() * size_of::<Touch>() + numbers * size_of::<f64>()
+    }
+
     /// Whether no ray met anything: the skin is untouched and the fluid at rest.
     pub fn is_resting(&self) -> bool {
         self.touches.is_empty()
@@ -171,6 +177,12 @@ impl Skin {
     /// The points of the skin.
     pub fn samples(&self) -> &[Sample] {
         &self.samples
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        self.samples.len() * (size_of::<Sample>() + size_of::<f64>())
+            + self.patches.len() * size_of::<Patch>()
     }
 
     /// The law of a column.

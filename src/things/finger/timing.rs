@@ -13,6 +13,9 @@ pub const DELAY_MAX_S: f64 = 1.0;
 /// Slots per second (same).
 pub const SLOTS_HZ: f64 = 4400.0;
 
+/// Time between frames.
+pub const FRAME_S: f64 = SLOTS as f64 / SLOTS_HZ;
+
 /// Table `[timing]`: channels are sampled one after the other, frames arrive in batches, commands
 /// late. Without it a frame is sampled at once, every 10 ms, and arrives then, and a command holds
 /// from the tick on in which it is given.

@@ -13,6 +13,7 @@ use super::skin::{Pressed, Skin};
 use super::thermal::{Heat, ThermalEffect};
 use super::timing::TimingEffect;
 use crate::ground::geometry::bvh::MeshBvh;
+use crate::ground::work::{self, Stage};
 use nalgebra::{Isometry3, Vector3};
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
@@ -59,6 +60,12 @@ impl Fingertip {
     /// Its electrodes.
     pub fn electrodes(&self) -> Option<&Electrodes> {
         self.electrodes.as_ref()
+    }
+
+    /// Bytes held by skin and electrodes.
+    pub fn bytes(&self) -> usize {
+        let skin = self.skin.as_ref().map_or(0, |skin| skin.bytes());
+        skin + self.electrodes.as_ref().map_or(0, Electrodes::bytes)
     }
 
     fn parts(&self) -> Parts<'_> {
@@ -172,6 +179,7 @@ impl Feel {
         }
         let mut load = match (&tip.skin, &mut self.pressed) {
             (Some(skin), Some(pressed)) => {
+                work::count(Stage::Skin);
                 skin.press(object, &motion.x_wt, pressed).map_err(|error| match error {
                     PressError::NotFinite => {
                         FeelError::NotFinite { time_s, dt_s, motion: Box::new(*motion) }
@@ -183,10 +191,12 @@ impl Feel {
         };
         self.time_s += dt_s;
         if let (Some(friction), Some(bristle)) = (&tip.friction, &mut self.bristle) {
+            work::count(Stage::Friction);
             let velocity = [&motion.linear_w, &motion.angular_w];
             bristle.step(friction, &motion.x_wt, velocity, dt_s, &mut load);
         }
         if let (Some(thermal), Some(heat)) = (&tip.thermal, &mut self.heat) {
+            work::count(Stage::Thermal);
             heat.step(thermal, load.area_m2, dt_s);
         }
         let signals = self.converter.is_some().then(|| self.signals(tip, load.pressure_pa));
@@ -194,6 +204,14 @@ impl Feel {
             converter.advance(&tip.parts(), self.time_s, &signals);
         }
         Ok(load)
+    }
+
+    /// Bytes of this trial's state: what an effect that is off does not hold.
+    pub fn bytes(&self) -> usize {
+        let pressed = self.pressed.as_ref().map_or(0, Pressed::bytes);
+        let bristle = self.bristle.as_ref().map_or(0, size_of_val);
+        let heat = self.heat.as_ref().map_or(0, size_of_val);
+        pressed + bristle + heat + self.converter.as_ref().map_or(0, Converter::bytes)
     }
 
     /// The oldest tactile frame that has arrived and was not asked for yet.
@@ -210,6 +228,7 @@ impl Feel {
             conductivity = heat.conductivity(thermal);
         }
         if let (Some(electrodes), Some(pressed)) = (&tip.electrodes, &self.pressed) {
+            work::count(Stage::Electrodes);
             signals.electrode_counts = electrodes.counts(pressed, conductivity);
         }
         signals

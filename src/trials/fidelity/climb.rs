@@ -1,0 +1,97 @@
+//! The whole ladder: the reference first, then every rung against it.
+
+use super::felt::quiet;
+use super::ladder::{RUNGS, Rung};
+use super::measure::{Touches, surface_rmse_m, targets, touch_all};
+use super::order::{self, Order, OrderError};
+use super::row::{Row, row};
+use crate::trials::truth::Truth;
+use crate::world::{Scene, World};
+use std::sync::Arc;
+
+/// Test places along each side of the zone for the surface's error; chosen.
+const GRID: usize = 41;
+
+/// Rungs with their errors, and how these fall.
+pub struct Climb {
+    /// As in [`RUNGS`]; fewer if it was stopped.
+    pub rows: Vec<Row>,
+    /// In the time step and in the points of the skin.
+    pub orders: Vec<Order>,
+    /// Whether nobody stopped it.
+    pub finished: bool,
+}
+
+/// Every rung with `count` touches; sensors are quiet, so that what differs is the model.
+///
+/// `tick` is called after each of [`pieces`] and says whether to go on.
+///
+/// # Errors
+/// If a scene cannot be built or a body not be brought to its start.
+pub fn climb(
+    scene: &Scene,
+    count: usize,
+    seed: u64,
+    tick: &mut dyn FnMut() -> bool,
+) -> Result<Climb, OrderError> {
+    let targets = targets(scene, count, seed);
+    let mut climb = Climb { rows: Vec::new(), orders: Vec::new(), finished: false };
+    let mut reference: Option<Touches> = None;
+    let mut truth = None;
+    for rung in RUNGS.iter().rev() {
+        let world = Arc::new(World::build(quiet(&rung.apply(scene)))?);
+        let truth = truth.get_or_insert_with(|| Truth::sample(&world, GRID));
+        let Some(touches) = touch_all(&world, &targets, seed, tick)? else { return Ok(climb) };
+        let surface_m = surface_rmse_m(scene, &targets, &touches.contacts, truth);
+        let against = reference.as_ref().unwrap_or(&touches);
+        climb.rows.insert(0, row((*rung, &world), &touches, against, surface_m));
+        reference.get_or_insert(touches);
+    }
+    let Some(in_time) = order::in_time_step(scene, &targets, tick)? else { return Ok(climb) };
+    climb.orders.push(in_time);
+    let poses: Vec<_> = reference
+        .iter()
+        .flat_map(|touches| touches.felt.iter().flatten())
+        .map(|f| f.motion)
+        .collect();
+    climb.orders.push(order::in_samples(scene, &poses)?);
+    climb.finished = true;
+    Ok(climb)
+}
+
+/// How often [`climb`] calls `tick`.
+pub fn pieces(count: usize) -> usize {
+    count * (RUNGS.len() + order::PERIODS_S.len())
+}
+
+impl Climb {
+    /// The rungs that approach the reference in every direction at once.
+    pub fn diagonal(&self) -> impl Iterator<Item = &Row> {
+        self.rows.iter().filter(|row| row.rung.is_diagonal())
+    }
+
+    /// Whether each rung of the diagonal is nearer to the reference than the one before, in the
+    /// mean error of the force.
+    pub fn is_monotone(&self) -> bool {
+        let errors: Vec<f64> = self.diagonal().filter_map(|row| Some(row.force_n?.mean)).collect();
+        errors.is_sorted_by(|a, b| a >= b)
+    }
+
+    /// Rows that nothing cheaper beats by `error`; cheapest first.
+    pub fn front(&self, error: impl Fn(&Row) -> Option<f64>) -> Vec<&Row> {
+        let mut rows: Vec<&Row> = self.rows.iter().collect();
+        rows.sort_by(|a, b| a.wall_s.total_cmp(&b.wall_s));
+        let mut least = f64::INFINITY;
+        rows.retain(|row| {
+            let better = error(row).is_some_and(|error| error > 0.0 && error < least);
+            least = if better { error(row).unwrap_or(least) } else { least };
+            better
+        });
+        rows
+    }
+}
+
+/// Whether a rung is the one all others are compared with.
+pub fn is_reference(rung: &Rung) -> bool {
+    RUNGS.last() == Some(rung)
+}

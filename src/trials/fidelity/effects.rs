@@ -1,0 +1,293 @@
+//! What each effect changes and costs: one switched at a time, the rest of the scene as it is.
+
+use super::measure::{Touches, stand, touch_all};
+use super::order::OrderError;
+use super::row::{Spread, electrodes_apart};
+use crate::conduct::belief::GpSettings;
+use crate::conduct::planner::{self, PlanningSettings};
+use crate::conduct::probe;
+use crate::ground::work;
+use crate::things::finger::{Effects, Feel};
+use crate::trials::experiment::Experiment;
+use crate::trials::statistics::{Paired, median, median_interval};
+use crate::trials::trial;
+use crate::trials::truth::Truth;
+use crate::world::world::Shape;
+use crate::world::{Scene, World};
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// One effect that can be switched.
+pub struct Switch {
+    /// As in the scene.
+    pub name: &'static str,
+    /// Whether a scene has it.
+    pub is_on: fn(&Scene) -> bool,
+    /// Puts it in with its defaults, or takes it out.
+    pub set: fn(&mut Scene, bool),
+}
+
+macro_rules! table {
+    ($name:ident) => {
+        Switch {
+            name: stringify!($name),
+            is_on: |scene| scene.effects.$name.is_some(),
+            set: |scene, on| scene.effects.$name = on.then(Default::default),
+        }
+    };
+}
+
+/// Every effect; one line to add one.
+pub const SWITCHES: &[Switch] = &[
+    table!(fluid),
+    Switch {
+        name: "fluid.vibration",
+        is_on: |scene| scene.effects.fluid.as_ref().is_some_and(|fluid| fluid.vibration.is_some()),
+        set: |scene, on| {
+            if on {
+                scene.effects.fluid.get_or_insert_default();
+            }
+            if let Some(fluid) = &mut scene.effects.fluid {
+                fluid.vibration = on.then(Default::default);
+            }
+        },
+    },
+    table!(electrodes),
+    table!(thermal),
+    table!(friction),
+    table!(timing),
+    Switch {
+        name: "arm",
+        is_on: |scene| scene.arm.is_some(),
+        set: |scene, on| scene.arm = on.then(Default::default),
+    },
+];
+
+/// `scene` with one effect the other way round.
+pub fn switched(scene: &Scene, switch: &Switch) -> Scene {
+    let mut scene = scene.clone();
+    let on = !(switch.is_on)(&scene);
+    (switch.set)(&mut scene, on);
+    if !scene.effects.sends_frames() {
+        scene.effects.timing = None;
+    }
+    scene
+}
+
+/// What one effect does.
+pub struct Change {
+    /// The effect.
+    pub name: &'static str,
+    /// Whether the scene has it.
+    pub is_on: bool,
+    /// How far contacts move when it is switched, m.
+    pub shift_m: Option<Spread>,
+    /// Change of the force, N.
+    pub force_n: Option<Spread>,
+    /// Change of the electrodes, counts.
+    pub electrode_counts: Option<Spread>,
+    /// Wall time of a touch with it over that without: medians of paired, interleaved touches.
+    pub time_ratio: Option<f64>,
+    /// Bytes of a trial's state that it adds.
+    pub state_bytes: i64,
+    /// How often its stage runs in a touch, without it and with it, in a build that counts.
+    pub runs: Option<[u64; 2]>,
+    /// RMSE of `active` minus that of `random` in the same trials, without it and with it, m.
+    pub verdict: [Option<Paired>; 2],
+}
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Budget {
+    /// Interleaved pairs of touches that are timed.
+    pub pairs: usize,
+    /// Trials of each planner.
+    pub trials: u32,
+    /// Touches of a trial.
+    pub touches: u32,
+}
+
+/// Test places along each side of the zone; chosen.
+const GRID: usize = 31;
+
+/// The scene as it is, measured once.
+pub struct Base {
+    world: Arc<World>,
+    targets: Vec<Vec<f64>>,
+    touches: Touches,
+    truth: Truth,
+    verdict: Option<Paired>,
+}
+
+impl Base {
+    /// Touches `targets` and runs the trials; none if stopped.
+    ///
+    /// # Errors
+    /// If the scene cannot be built.
+    pub fn new(
+        scene: &Scene,
+        targets: Vec<Vec<f64>>,
+        budget: Budget,
+        tick: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<Self>, OrderError> {
+        let world = Arc::new(World::build(scene.clone())?);
+        let truth = Truth::sample(&world, GRID);
+        let Some(touches) = touch_all(&world, &targets, 0, &mut || true)? else { return Ok(None) };
+        let verdict = verdict(&world, &truth, budget);
+        Ok(tick().then_some(Self { world, targets, touches, truth, verdict }))
+    }
+
+    /// What `switch` does to it.
+    ///
+    /// # Errors
+    /// If the switched scene cannot be built.
+    pub fn change(&self, switch: &Switch, budget: Budget) -> Result<Change, OrderError> {
+        let is_on = (switch.is_on)(self.world.scene());
+        let world = Arc::new(World::build(switched(self.world.scene(), switch))?);
+        let touches = touch_all(&world, &self.targets, 0, &mut || true)?;
+        let contacts = touches.iter().flat_map(|touches| &touches.contacts);
+        let shifts: Vec<f64> = (self.touches.contacts.iter().zip(contacts))
+            .filter_map(|(a, b)| Some((a.as_ref()?.p_wc - b.as_ref()?.p_wc).norm()))
+            .collect();
+        let felt = |apart: &dyn Fn(&super::felt::Felt, &super::felt::Felt) -> Option<f64>| {
+            let felt = touches.iter().flat_map(|touches| &touches.felt);
+            let values: Vec<f64> = (self.touches.felt.iter().zip(felt))
+                .filter_map(|(a, b)| apart(a.as_ref()?, b.as_ref()?))
+                .collect();
+            Spread::of(&values)
+        };
+        let worlds = if is_on { [&world, &self.world] } else { [&self.world, &world] };
+        let other = verdict(&world, &self.truth, budget);
+        let [without, with] = worlds;
+        Ok(Change {
+            name: switch.name,
+            is_on,
+            shift_m: Spread::of(&shifts),
+            force_n: felt(&|a, b| Some((a.force_n - b.force_n).abs())),
+            electrode_counts: felt(&electrodes_apart),
+            time_ratio: time_ratio(without, with, &self.targets, budget.pairs)?,
+            state_bytes: state_bytes(with) - state_bytes(without),
+            runs: runs(switch.name, without, &self.targets)?
+                .zip(runs(switch.name, with, &self.targets)?)
+                .map(|(without, with)| [without, with]),
+            verdict: if is_on { [other, self.verdict] } else { [self.verdict, other] },
+        })
+    }
+}
+
+fn state_bytes(world: &World) -> i64 {
+    world.fingertip().map_or(0, |tip| {
+        Feel::new(tip, &crate::ground::seed::stream(0, 0, "finger")).bytes() as i64
+    })
+}
+
+/// How often the stage `name` runs in the first touch.
+fn runs(name: &str, world: &Arc<World>, targets: &[Vec<f64>]) -> Result<Option<u64>, OrderError> {
+    let name = name.rsplit('.').next().unwrap_or(name);
+    let stage = work::STAGES.iter().position(|(_, stage)| *stage == name);
+    let (Some(stage), Some(target)) = (stage, targets.first()) else { return Ok(None) };
+    let mut probe = probe::open(&stand(world)?, 0)?;
+    let before = work::counts();
+    let _ = probe.touch(target);
+    Ok(work::counts().zip(before).map(|(after, before)| after[stage] - before[stage]))
+}
+
+/// Interleaved, so that what else the machine does falls on both alike.
+fn time_ratio(
+    without: &Arc<World>,
+    with: &Arc<World>,
+    targets: &[Vec<f64>],
+    pairs: usize,
+) -> Result<Option<f64>, OrderError> {
+    let mut probes = [probe::open(&stand(without)?, 0)?, probe::open(&stand(with)?, 0)?];
+    let mut ratios = Vec::with_capacity(pairs);
+    for (i, target) in targets.iter().cycle().take(pairs).enumerate() {
+        let mut taken_s = [0.0; 2];
+        // Which goes first alternates: the second finds the caches warm.
+        for k in [i % 2, (i + 1) % 2] {
+            let begun = Instant::now();
+            let _ = std::hint::black_box(probes[k].touch(target));
+            taken_s[k] = begun.elapsed().as_secs_f64();
+        }
+        ratios.push(taken_s[1] / taken_s[0]);
+    }
+    Ok(median(&ratios))
+}
+
+/// `active` against `random` in the same trials.
+fn verdict(world: &Arc<World>, truth: &Truth, budget: Budget) -> Option<Paired> {
+    let stand = stand(world).ok()?;
+    let planners = [planner::by_name("active")?, planner::by_name("random")?];
+    if budget.trials == 0 || !crate::ground::optimize::BUILT {
+        return None;
+    }
+    let experiment = Experiment {
+        name: "effects".into(),
+        question: String::new(),
+        planners: planners.iter().map(|planner| planner.name.into()).collect(),
+        trials: budget.trials,
+        seed: 0,
+        initial_touches: 5.min(budget.touches),
+        touches: budget.touches,
+        grid: GRID as u32,
+        gp: GpSettings::default(),
+        planning: PlanningSettings::default(),
+        report: Default::default(),
+        scene: world.scene().clone(),
+    };
+    let pairs: Vec<(f64, f64)> = (0..budget.trials)
+        .into_par_iter()
+        .filter_map(|number| {
+            let [active, random] = planners.map(|planner| {
+                let row = trial::run(&experiment, &stand, truth, planner, number);
+                row.touches.last().and_then(|touch| Some(touch.metrics?.rmse_m))
+            });
+            active.zip(random)
+        })
+        .collect();
+    Paired::new(&pairs, 0)
+}
+
+/// Runs over all poses in one timed piece; chosen: some milliseconds.
+const PASSES: usize = 8;
+
+/// What a finger with every effect off but its skin costs beside a skin pressed with nothing
+/// around it: median ratio of interleaved runs over the poses of the scene's touches, and its 95 %
+/// interval.
+///
+/// # Errors
+/// If the scene cannot be built.
+pub fn bare_ratio(
+    scene: &Scene,
+    base: &Base,
+    repeats: usize,
+) -> Result<Option<(f64, [f64; 2])>, OrderError> {
+    let mut scene = scene.clone();
+    scene.effects = Effects { skin: scene.effects.skin.take(), ..Effects::default() };
+    let world = World::build(scene)?;
+    let (Some(tip), Shape::Mesh { bvh, .. }) = (world.fingertip(), world.shape()) else {
+        return Ok(None);
+    };
+    let Some(skin) = tip.skin() else { return Ok(None) };
+    let poses: Vec<_> = base.touches.felt.iter().flatten().map(|felt| felt.motion).collect();
+    let mut pressed = skin.relaxed();
+    let mut feel = Feel::new(tip, &crate::ground::seed::stream(0, 0, "finger"));
+    let mut ratios = Vec::new();
+    for i in 0..repeats {
+        let mut taken_s = [0.0; 2];
+        for k in [i % 2, (i + 1) % 2] {
+            let begun = Instant::now();
+            for pose in std::iter::repeat_n(&poses, PASSES).flatten() {
+                if k == 0 {
+                    let _ = std::hint::black_box(skin.press(bvh, &pose.x_wt, &mut pressed));
+                } else {
+                    let _ = std::hint::black_box(feel.step(tip, bvh, pose, 0.01));
+                }
+            }
+            taken_s[k] = begun.elapsed().as_secs_f64();
+        }
+        ratios.push(taken_s[1] / taken_s[0]);
+    }
+    Ok(median(&ratios).zip(median_interval(&ratios, 0)))
+}

@@ -1,0 +1,167 @@
+//! Touches with one scene: what they found, how the finger was loaded, and what they cost.
+
+use super::felt::{Felt, felt, quiet};
+use super::trace::Trace;
+use crate::bodies::backend::Fault;
+use crate::bodies::stand::Stand;
+use crate::conduct::belief::{Belief, GpSettings};
+use crate::conduct::planner::{self, PlanningSettings};
+use crate::conduct::probe::servo::Servo;
+use crate::conduct::probe::{self, Contact, Probe, Touch};
+use crate::ground::seed;
+use crate::trials::statistics::median;
+use crate::trials::truth::Truth;
+use crate::world::{Scene, World};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Touches are repeated until they have taken this long; chosen: far above the clock's grain.
+const LEAST_S: f64 = 0.02;
+
+/// Most repetitions of a touch; chosen.
+const REPEATS: u32 = 1000;
+
+/// What the touches of one scene brought.
+pub struct Touches {
+    /// What each touch found; none where it missed or faulted.
+    pub contacts: Vec<Option<Contact>>,
+    /// How the finger was loaded when it was read.
+    pub felt: Vec<Option<Felt>>,
+    /// Median wall time of a touch.
+    pub wall_s: f64,
+    /// Simulated time of a touch, in a body that has any.
+    pub simulated_s: Option<f64>,
+    /// Touches that ended in a fault, and the first of these.
+    pub faults: usize,
+    /// The first fault.
+    pub fault: Option<Fault>,
+}
+
+/// Evenly spread places of the scene's zone.
+pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Vec<f64>> {
+    let belief = Belief::new(scene.zone.clone(), GpSettings::default());
+    let sobol = planner::by_name("sobol").map(|entry| {
+        (entry.make)(&scene.zone, &PlanningSettings::default(), seed::stream(seed, 0, "targets"))
+    });
+    sobol
+        .map_or_else(Vec::new, |mut sobol| (0..count).map(|_| sobol.plan(&belief).target).collect())
+}
+
+/// What the body of `world` stands on.
+///
+/// # Errors
+/// [`Fault::Refused`] if it cannot be simulated as the scene asks.
+pub fn stand(world: &Arc<World>) -> Result<Stand, Fault> {
+    Stand::new(Arc::clone(world)).map_err(|_| Fault::Refused { values: Vec::new() })
+}
+
+/// Touches every target; `tick` is called after each and says whether to go on.
+///
+/// # Errors
+/// If the body cannot be brought to its start.
+pub fn touch_all(
+    world: &Arc<World>,
+    targets: &[Vec<f64>],
+    seed: u64,
+    tick: &mut dyn FnMut() -> bool,
+) -> Result<Option<Touches>, Fault> {
+    let stand = stand(world)?;
+    let hushed = quiet_world(world);
+    let mut ticks = None;
+    let mut traced: Box<dyn Probe> = match (stand.body()?, world.chain()) {
+        (Some(body), Some(chain)) => {
+            let (trace, log) = Trace::new(body, chain);
+            ticks = Some(log);
+            Box::new(Servo::new(Arc::clone(world), Box::new(trace), seed)?)
+        }
+        _ => probe::open(&stand, seed)?,
+    };
+    let mut timed = probe::open(&stand, seed)?;
+    let mut touches = Touches {
+        contacts: Vec::new(),
+        felt: Vec::new(),
+        wall_s: f64::NAN,
+        simulated_s: None,
+        faults: 0,
+        fault: None,
+    };
+    let (mut walls_s, mut simulated_s) = (Vec::new(), Vec::new());
+    for target in targets {
+        let contact = match traced.touch(target) {
+            Ok(Touch::Contact(contact)) => Some(contact),
+            Ok(Touch::Miss | Touch::Overload) => None,
+            Err(fault) => {
+                touches.faults += 1;
+                touches.fault.get_or_insert(fault);
+                None
+            }
+        };
+        if let Some(log) = ticks.as_ref().map(super::trace::Ticks::take) {
+            if let (Some(first), Some(last)) = (log.first(), log.last()) {
+                simulated_s.push(last.time_s - first.time_s);
+            }
+            touches.felt.push(contact.as_ref().and_then(|_| felt(&hushed, &log)));
+        } else {
+            touches.felt.push(None);
+        }
+        touches.contacts.push(contact);
+        walls_s.push(time(timed.as_mut(), target));
+        if !tick() {
+            return Ok(None);
+        }
+    }
+    touches.wall_s = median(&walls_s).unwrap_or(f64::NAN);
+    touches.simulated_s = median(&simulated_s);
+    Ok(Some(touches))
+}
+
+/// The world of the same scene without noise.
+fn quiet_world(world: &Arc<World>) -> Arc<World> {
+    let scene = quiet(world.scene());
+    match scene == *world.scene() {
+        true => Arc::clone(world),
+        false => World::build(scene).map_or_else(|_| Arc::clone(world), Arc::new),
+    }
+}
+
+/// Wall time of a touch: the mean over as many as take long enough to be measured.
+fn time(probe: &mut dyn Probe, target: &[f64]) -> f64 {
+    let begun = Instant::now();
+    let mut count = 0;
+    loop {
+        let _ = std::hint::black_box(probe.touch(target));
+        count += 1;
+        let taken_s = begun.elapsed().as_secs_f64();
+        if taken_s > LEAST_S || count >= REPEATS {
+            return taken_s / f64::from(count);
+        }
+    }
+}
+
+/// Bytes of a finger's skin, electrodes and one trial's memory of them. The mesh and its tree,
+/// which every rung shares, are left out.
+pub fn finger_bytes(world: &World) -> usize {
+    let Some(tip) = world.fingertip() else { return 0 };
+    let feel = crate::things::finger::Feel::new(tip, &seed::stream(0, 0, "finger"));
+    tip.bytes() + feel.bytes()
+}
+
+/// Root mean square error of the surface that a belief makes of these contacts; none where
+/// nothing can be fitted.
+pub fn surface_rmse_m(
+    scene: &Scene,
+    targets: &[Vec<f64>],
+    contacts: &[Option<Contact>],
+    truth: &Truth,
+) -> Option<f64> {
+    if !crate::ground::optimize::BUILT {
+        return None;
+    }
+    let mut belief = Belief::new(scene.zone.clone(), GpSettings::default());
+    for (target, contact) in targets.iter().zip(contacts) {
+        let touch = contact.clone().map_or(Touch::Miss, Touch::Contact);
+        belief.observe(target, &touch);
+    }
+    let (_, surface) = belief.refit().ok()?;
+    Some(truth.compare(surface).rmse_m)
+}

@@ -1,0 +1,16 @@
+//! What accuracy costs: the same touches over a ladder of scenes, from a cast to a fine skin
+//! at a fine time step.
+//!
+//! `ladder` names the scenes, `measure` touches with one of them, `trace` and `felt` say how the
+//! finger was loaded when it was read, `order` how fast the error falls with the resolution,
+//! `effects` what each piece of physics changes and costs.
+
+pub mod climb;
+pub mod effects;
+pub mod felt;
+pub mod ladder;
+pub mod measure;
+pub mod order;
+pub mod row;
+pub mod tolerance;
+pub mod trace;

@@ -1,0 +1,119 @@
+//! How fast the error falls with the resolution, everything else being held.
+
+use super::felt::quiet;
+use super::ladder::{Rung, Senses};
+use super::measure::{Touches, touch_all};
+use crate::bodies::backend::Fault;
+use crate::things::finger::Motion;
+use crate::trials::statistics::mean;
+use crate::world::scene::Body;
+use crate::world::world::{Shape, WorldError};
+use crate::world::{Scene, World};
+use std::sync::Arc;
+
+/// Time steps compared with the last, in seconds; chosen: a tactile frame twice over, and on.
+pub(super) const PERIODS_S: [f64; 6] = [0.02, 0.01, 0.005, 0.002, 0.001, 0.00025];
+
+/// Skins compared with the last.
+const SAMPLES: [usize; 8] = [60, 125, 250, 500, 1000, 2000, 8000, 32000];
+
+/// Points of the skin in the comparison of time steps; chosen: they cancel.
+const STEPPED_SAMPLES: usize = 250;
+
+/// How the mean error of the force falls.
+#[derive(Clone, Debug)]
+pub struct Order {
+    /// Of what.
+    pub name: &'static str,
+    /// Resolution (steps per second, or points) and mean error of the force, N.
+    pub errors: Vec<(f64, f64)>,
+    /// Minus the slope of the logarithm of the error over that of the resolution.
+    pub observed: f64,
+    /// What theory says.
+    pub expected: f64,
+}
+
+/// Why nothing can be said.
+#[derive(Debug, thiserror::Error)]
+pub enum OrderError {
+    /// A scene cannot be built.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// A body cannot be brought to its start.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+}
+
+impl Order {
+    fn new(name: &'static str, errors: Vec<(f64, f64)>, expected: f64) -> Self {
+        let logs: Vec<(f64, f64)> = (errors.iter())
+            .filter(|(_, error)| *error > 0.0)
+            .map(|(at, error)| (at.ln(), error.ln()))
+            .collect();
+        let (x, y): (Vec<f64>, Vec<f64>) = logs.iter().copied().unzip();
+        let (x0, y0) = (mean(&x), mean(&y));
+        let above: f64 = logs.iter().map(|(x, y)| (x - x0) * (y - y0)).sum();
+        let below: f64 = logs.iter().map(|(x, _)| (x - x0).powi(2)).sum();
+        Self { name, errors, observed: -above / below, expected }
+    }
+}
+
+/// In the time step: a dry finger stops up to a tick after the force that says contact, so the
+/// error of the force is of first order.
+///
+/// # Errors
+/// If the touches cannot be made.
+pub fn in_time_step(
+    scene: &Scene,
+    targets: &[Vec<f64>],
+    tick: &mut dyn FnMut() -> bool,
+) -> Result<Option<Order>, OrderError> {
+    let mut runs: Vec<(f64, Touches)> = Vec::new();
+    for period_s in PERIODS_S {
+        let (body, senses, samples) = (Body::Kinematic, Senses::Dry, STEPPED_SAMPLES);
+        let rung = Rung { body, senses, samples, period_s };
+        let world = Arc::new(World::build(quiet(&rung.apply(scene)))?);
+        match touch_all(&world, targets, 0, tick)? {
+            Some(touches) => runs.push((period_s, touches)),
+            None => return Ok(None),
+        }
+    }
+    let Some((_, finest)) = runs.pop() else { return Ok(None) };
+    let errors = runs.iter().map(|(period_s, touches)| {
+        let pairs = touches.felt.iter().zip(&finest.felt);
+        let apart: Vec<f64> = pairs
+            .filter_map(|(a, b)| Some((a.as_ref()?.force_n - b.as_ref()?.force_n).abs()))
+            .collect();
+        (1.0 / period_s, mean(&apart))
+    });
+    Ok(Some(Order::new("time step", errors.collect(), 1.0)))
+}
+
+/// In the points of the skin, pressed as in the poses given: a midpoint rule over an area has an
+/// error of the order of a cell's area, one over the number of points.
+///
+/// # Errors
+/// If a scene cannot be built.
+pub fn in_samples(scene: &Scene, poses: &[Motion]) -> Result<Order, OrderError> {
+    let mut forces: Vec<(usize, Vec<f64>)> = Vec::new();
+    for samples in SAMPLES {
+        let rung = Rung { body: Body::Kinematic, senses: Senses::Fluid, samples, period_s: 0.01 };
+        let world = World::build(rung.apply(scene))?;
+        let (Some(skin), Shape::Mesh { bvh, .. }) =
+            (world.fingertip().and_then(|tip| tip.skin()), world.shape())
+        else {
+            continue;
+        };
+        let mut pressed = skin.relaxed();
+        let force = |pose: &Motion| {
+            skin.press(bvh, &pose.x_wt, &mut pressed).map_or(f64::NAN, |load| load.force_n.norm())
+        };
+        forces.push((samples, poses.iter().map(force).collect()));
+    }
+    let finest = forces.pop().map_or_else(Vec::new, |(_, finest)| finest);
+    let errors = forces.iter().map(|(samples, forces)| {
+        let apart: Vec<f64> = forces.iter().zip(&finest).map(|(a, b)| (a - b).abs()).collect();
+        (*samples as f64, mean(&apart))
+    });
+    Ok(Order::new("points of the skin", errors.collect(), 1.0))
+}

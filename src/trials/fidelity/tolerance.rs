@@ -1,0 +1,71 @@
+//! An error that is good enough, and the cheapest rung that keeps within it.
+
+use super::climb::is_reference;
+use super::row::{Row, Spread};
+use std::fmt;
+use std::str::FromStr;
+
+/// The largest error that 95 % of the touches may have against the reference.
+#[derive(Clone, Copy, Debug)]
+pub struct Tolerance {
+    /// In the unit's own measure.
+    value: f64,
+    unit: Unit,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Unit {
+    name: &'static str,
+    /// SI units per unit.
+    size: f64,
+    error: fn(&Row) -> Option<Spread>,
+}
+
+/// What a tolerance may be given in, longest names first.
+const UNITS: [Unit; 4] = [
+    Unit { name: "counts", size: 1.0, error: |row| row.electrode_counts },
+    Unit { name: "mm", size: 1e-3, error: |row| row.off_reference_m },
+    Unit { name: "um", size: 1e-6, error: |row| row.off_reference_m },
+    Unit { name: "N", size: 1.0, error: |row| row.force_n },
+];
+
+impl FromStr for Tolerance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let text = text.trim();
+        let unit = UNITS.into_iter().find(|unit| text.ends_with(unit.name));
+        unit.and_then(|unit| {
+            let value: f64 = text.strip_suffix(unit.name)?.trim().parse().ok()?;
+            (value > 0.0 && value.is_finite()).then_some(Self { value, unit })
+        })
+        .ok_or_else(|| "a positive number with a unit: 0.2mm, 50um, 0.1N or 20counts".into())
+    }
+}
+
+impl fmt::Display for Tolerance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.value, self.unit.name)
+    }
+}
+
+impl Tolerance {
+    /// 95 % of a row's errors lie within this many of the tolerance's unit.
+    pub fn error(&self, row: &Row) -> Option<f64> {
+        (self.unit.error)(row).map(|spread| spread.p95 / self.unit.size)
+    }
+
+    /// The cheapest row within it; the reference, whose error is unknown, is left out.
+    pub fn cheapest<'a>(&self, rows: &'a [Row]) -> Option<&'a Row> {
+        rows.iter()
+            .filter(|row| !is_reference(&row.rung))
+            .filter(|row| self.error(row).is_some_and(|error| error <= self.value))
+            .min_by(|a, b| a.wall_s.total_cmp(&b.wall_s))
+    }
+
+    /// The smallest error of all rows but the reference.
+    pub fn least(&self, rows: &[Row]) -> Option<f64> {
+        let others = rows.iter().filter(|row| !is_reference(&row.rung));
+        others.filter_map(|row| self.error(row)).min_by(f64::total_cmp)
+    }
+}

@@ -1,0 +1,117 @@
+//! What the ladder and the switches of effects promise.
+
+use palpate::bodies::stand::Stand;
+use palpate::conduct::probe;
+use palpate::ground::work;
+use palpate::things::finger::{Effects, Feel};
+use palpate::trials::fidelity::effects::{SWITCHES, switched};
+use palpate::trials::fidelity::felt::quiet;
+use palpate::trials::fidelity::ladder::{DIAGONAL, RUNGS, Senses};
+use palpate::trials::fidelity::measure::{targets, touch_all};
+use palpate::trials::fidelity::order;
+use palpate::trials::fidelity::row::Spread;
+use palpate::trials::fidelity::tolerance::Tolerance;
+use palpate::world::{Scene, World};
+use std::path::Path;
+use std::sync::Arc;
+
+fn scene(sets: &[&str]) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
+    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
+    Scene::load(&path, &sets).unwrap()
+}
+
+#[test]
+fn every_rung_is_a_scene_that_can_be_built_and_saved() {
+    for rung in RUNGS {
+        let changed = rung.apply(&scene(&[]));
+        let text = toml::to_string(&changed).unwrap();
+        let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        assert_eq!(Scene::load(file.path(), &[]).unwrap(), changed, "{}", rung.name());
+        assert_eq!(rung.senses == Senses::None, changed.effects == Effects::default());
+    }
+    let on = RUNGS.iter().filter(|rung| rung.is_diagonal()).count();
+    assert_eq!(on, DIAGONAL.len());
+}
+
+#[test]
+fn the_error_falls_with_the_resolution_as_it_should() {
+    let scene = scene(&[]);
+    let targets = targets(&scene, 6, 0);
+    let order = order::in_time_step(&scene, &targets, &mut || true).unwrap().unwrap();
+    assert!((order.observed - order.expected).abs() < 0.4, "{order:?}");
+    let world = Arc::new(World::build(quiet(&scene)).unwrap());
+    let touches = touch_all(&world, &targets, 0, &mut || true).unwrap().unwrap();
+    let poses: Vec<_> = touches.felt.iter().flatten().map(|felt| felt.motion).collect();
+    assert_eq!(poses.len(), targets.len());
+    let order = order::in_samples(&scene, &poses).unwrap();
+    assert!((order.observed - order.expected).abs() < 0.5, "{order:?}");
+}
+
+#[test]
+fn an_effect_that_is_off_has_no_state_and_never_runs() {
+    let bare = scene(&["effects={skin={}}"]);
+    let bytes = |scene: &Scene| {
+        let world = World::build(scene.clone()).unwrap();
+        let rng = palpate::ground::seed::stream(0, 0, "test");
+        Feel::new(world.fingertip().unwrap(), &rng).bytes()
+    };
+    let runs = |scene: &Scene| {
+        let world = Arc::new(World::build(scene.clone()).unwrap());
+        let before = work::counts().unwrap();
+        probe::open(&Stand::new(std::sync::Arc::clone(&world)).unwrap(), 0)
+            .unwrap()
+            .touch(&[0.0, 0.5])
+            .unwrap();
+        let after = work::counts().unwrap();
+        std::array::from_fn::<u64, { work::STAGES.len() }, _>(|i| after[i] - before[i])
+    };
+    let [skin, others @ ..] = runs(&bare);
+    assert!(skin > 0);
+    assert!(others.iter().all(|runs| *runs == 0), "{others:?}");
+    for switch in SWITCHES.iter().filter(|switch| !["arm", "timing"].contains(&switch.name)) {
+        let with = switched(&bare, switch);
+        assert!((switch.is_on)(&with), "{}", switch.name);
+        assert!(bytes(&with) > bytes(&bare), "{}", switch.name);
+        let stage = work::STAGES.iter().position(|(_, name)| switch.name.ends_with(name)).unwrap();
+        assert!(runs(&with)[stage] > 0, "{}", switch.name);
+        assert_eq!(switched(&with, switch).effects.skin, bare.effects.skin);
+    }
+}
+
+#[test]
+fn a_tolerance_is_a_number_with_a_unit() {
+    for good in ["0.2mm", "50 um", "0.1N", "20counts"] {
+        assert!(good.parse::<Tolerance>().is_ok(), "{good}");
+    }
+    for bad in ["", "mm", "0.2", "-1mm", "nanN", "0N", "1kg", "infmm"] {
+        assert!(bad.parse::<Tolerance>().unwrap_err().contains("0.2mm"), "{bad}");
+    }
+}
+
+#[test]
+fn a_spread_is_that_of_its_values() {
+    let values: Vec<f64> = (0..=100).map(f64::from).collect();
+    let spread = Spread::of(&values).unwrap();
+    assert_eq!((spread.mean, spread.p95, spread.max), (50.0, 95.0, 100.0));
+    assert_eq!(Spread::of(&[f64::NAN]), None);
+}
+
+#[test]
+fn an_approach_that_would_press_past_the_skin_is_refused_with_its_limit() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
+    let load = |sets: &[&str]| {
+        Scene::load(&path, &sets.iter().map(|set| set.to_string()).collect::<Vec<_>>())
+    };
+    let error = load(&["touch.approach_m_s=0.5"]).unwrap_err().to_string();
+    let limit_m_s = scene(&[]).approach_limit_m_s().unwrap();
+    assert!(error.contains("touch.approach_m_s") && error.contains("at most 0.0"), "{error}");
+    assert!((0.03..0.12).contains(&limit_m_s), "{limit_m_s}");
+    let slower = format!("touch.approach_m_s={}", 0.999 * limit_m_s);
+    assert!(load(&[&slower]).is_ok());
+    // Coarser ticks and more frames leave less; a body that is not moved has no limit.
+    let coarser = scene(&["touch.period_s=0.02"]).approach_limit_m_s().unwrap();
+    assert!(coarser < limit_m_s);
+    assert!(load(&["touch.approach_m_s=0.5", "body=\"cast\""]).is_ok());
+}
