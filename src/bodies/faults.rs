@@ -65,8 +65,8 @@ impl Faults {
             }
             Failure::NanJoint => reading.q.iter_mut().take(1).for_each(|q| *q = f64::NAN),
             Failure::Frozen => {
-                if let Some(last) = &self.last {
-                    reading.frames.iter_mut().for_each(|frame| frame.clone_from(last));
+                for frame in &mut reading.frames {
+                    frame.clone_from(self.last.get_or_insert_with(|| frame.clone()));
                 }
             }
             Failure::Saturated => {

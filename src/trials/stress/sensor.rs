@@ -52,16 +52,13 @@ pub(super) const CASES: &[Case] = &[
             |ticks, p| broken(Failure::Late(ticks as usize), 0.0, p),
         )
     },
-    Case {
-        known: "every other pressure is a spike: three in a row pass for contact",
-        ..case(
-            "spikes of pressure",
-            "single values that look like contact or too much of it",
-            "share",
-            (&[0.0, 0.01, 0.1, 0.5, 1.0], 1),
-            |share, p| broken(Failure::Spikes(share), 0.0, p),
-        )
-    },
+    case(
+        "spikes of pressure",
+        "single values that look like contact or too much of it",
+        "share",
+        (&[0.0, 0.01, 0.1, 0.5, 1.0], 1),
+        |share, p| broken(Failure::Spikes(share), 0.0, p),
+    ),
     case(
         "weak joints",
         "the body does not follow its commands",
@@ -76,8 +73,8 @@ fn broken(failure: Failure, from_tick: f64, period_s: f64) -> Outcome {
     let Some(mesh) = mesh(wall(0.05), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
     let wrap = |body| Box::new(Faults::new(body, failure, from_tick as u64)) as Box<_>;
     // Electrodes too, so that nothing but the sensor tells of the contact; their centroid lies
-    // within a millimetre or two of it.
+    // within the 3 mm that a real BioTac is good for.
     let mut scene = scene(period_s);
     scene.effects.electrodes = Some(Default::default());
-    deed_with(scene, mesh, &[0.02, 0.01], wrap).on_surface(2e-3)
+    deed_with(scene, mesh, &[0.02, 0.01], wrap).on_surface(3e-3)
 }
