@@ -2,7 +2,7 @@
 //!
 //! A hand held the finger, so its attitude is unknown and is fitted with the constants; it says
 //! nothing about the sensor. Loads below 2 N are left out: few frames, and the counts at rest are
-//! from another session.
+//! recorded on another day.
 
 use super::electrodes::ElectrodesEffect;
 use super::frame::ELECTRODES;

@@ -51,6 +51,12 @@ pub const RUNGS: &[Rung] = &[
     rung(Body::Kinematic, Senses::Full, 500, 0.005),
     rung(Body::Kinematic, Senses::Full, 500, 0.002),
     rung(Body::Kinematic, Senses::Full, 500, 0.001),
+    #[cfg(feature = "mujoco")]
+    rung(Body::Dynamic, Senses::Full, 500, 0.002),
+    #[cfg(feature = "mujoco")]
+    rung(Body::Dynamic, Senses::Full, 500, 0.001),
+    #[cfg(feature = "mujoco")]
+    rung(Body::Dynamic, Senses::Full, 500, 0.0005),
     rung(Body::Kinematic, Senses::Full, 1000, 0.005),
     rung(Body::Kinematic, Senses::Full, 2000, 0.002),
     rung(Body::Kinematic, Senses::Full, 4000, 0.001),
@@ -77,6 +83,9 @@ impl Rung {
         let mut scene = scene.clone();
         scene.body = self.body;
         scene.touch.period_s = Some(self.period_s);
+        if self.body == Body::Dynamic {
+            scene.solver.step_s = self.period_s;
+        }
         let effects = &mut scene.effects;
         let [skin, fluid, electrodes] = match self.senses {
             Senses::None => [false; 3],
@@ -110,7 +119,9 @@ impl Rung {
 
     /// Whether it lies on the [`DIAGONAL`].
     pub fn is_diagonal(&self) -> bool {
-        self.senses == Senses::Full && DIAGONAL.contains(&(self.samples, self.period_s))
+        self.body == Body::Kinematic
+            && self.senses == Senses::Full
+            && DIAGONAL.contains(&(self.samples, self.period_s))
     }
 }
 
