@@ -70,12 +70,7 @@ impl Backend for Kinematic {
         let q = self.chain.clamp(&(self.q + qdot * period_s));
         let qdot = (q - self.q) / period_s;
         let (x_wt, jacobian) = self.chain.jacobian(&q);
-        let twist = jacobian * qdot;
-        let motion = Motion {
-            x_wt,
-            linear_w: twist.fixed_rows::<3>(0).into(),
-            angular_w: twist.fixed_rows::<3>(3).into(),
-        };
+        let motion = Motion::moving(x_wt, &(jacobian * qdot));
         let load = self.sense.step(&motion, period_s)?;
         self.q = q;
         self.tick += 1;

@@ -79,12 +79,7 @@ impl Dynamic {
         let step_s = self.plant.step_s();
         self.plant.step(&self.reading.applied.qdot, &self.wrench)?;
         let Some(sense) = &mut self.sense else { return Ok(()) };
-        let twist = self.plant.tip_twist();
-        let motion = Motion {
-            x_wt: self.plant.tip(),
-            linear_w: twist.fixed_rows::<3>(0).into(),
-            angular_w: twist.fixed_rows::<3>(3).into(),
-        };
+        let motion = Motion::moving(self.plant.tip(), &self.plant.tip_twist());
         self.wrench = sense.step(&motion, step_s)?;
         Ok(())
     }

@@ -14,7 +14,7 @@ use super::thermal::{Heat, ThermalEffect};
 use super::timing::TimingEffect;
 use crate::ground::geometry::bvh::MeshBvh;
 use crate::ground::work::{self, Stage};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Vector3, Vector6};
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
@@ -92,7 +92,13 @@ pub struct Motion {
 impl Motion {
     /// Standing still.
     pub fn at(x_wt: Isometry3<f64>) -> Self {
-        Self { x_wt, linear_w: Vector3::zeros(), angular_w: Vector3::zeros() }
+        Self::moving(x_wt, &Vector6::zeros())
+    }
+
+    /// At `x_wt` with a twist: linear velocity of the origin of `T`, then angular, in `W`.
+    pub fn moving(x_wt: Isometry3<f64>, twist: &Vector6<f64>) -> Self {
+        let [linear_w, angular_w] = [0, 3].map(|part| twist.fixed_rows::<3>(part).into());
+        Self { x_wt, linear_w, angular_w }
     }
 
     fn is_finite(&self) -> bool {

@@ -58,15 +58,8 @@ impl Backend for Trace {
         let joints = self.chain.joints_from(&reading.q).zip(self.chain.joints_from(&reading.qdot));
         if let Some((q, qdot)) = joints {
             let (x_wt, jacobian) = self.chain.jacobian(&q);
-            let twist = jacobian * qdot;
-            self.ticks.push(Tick {
-                time_s: reading.time_s,
-                motion: Motion {
-                    x_wt,
-                    linear_w: twist.fixed_rows::<3>(0).into(),
-                    angular_w: twist.fixed_rows::<3>(3).into(),
-                },
-            });
+            let motion = Motion::moving(x_wt, &(jacobian * qdot));
+            self.ticks.push(Tick { time_s: reading.time_s, motion });
         }
         Ok(reading)
     }

@@ -7,6 +7,7 @@ use super::{Contact, Probe, Swept, Touch, refuse_unless_finite};
 use crate::bodies::backend::{Backend, Command, Fault, Reading};
 use crate::conduct::control::{ControlError, Controller, Goal};
 use crate::things::arm::Joints;
+use crate::things::finger::timing::FRAME_S;
 use crate::world::World;
 use crate::world::touch::TouchSettings;
 use crate::world::world::CLEARANCE_M;
@@ -187,9 +188,6 @@ impl Servo {
 
 /// Depth to which the object may be in the skin before the finger stops; chosen: the fluid's gap.
 const GIVES_WAY_M: f64 = 1.5e-3;
-
-/// Time between tactile frames.
-const FRAME_S: f64 = 0.01;
 
 /// Silence of a sensor after which it counts as lost; chosen: three batches of five frames, in
 /// which an approach goes 3 mm.
