@@ -1,21 +1,11 @@
 //! The PA-10 carrying the finger where arms are weak.
 
-use super::case::{Case, Outcome};
+use super::case::{Case, Outcome, case};
 use super::deed::deed;
 use super::solids::{mesh, wall};
 use super::touch::scene;
 use crate::things::arm::ArmSettings;
 use crate::world::Scene;
-
-const fn case(
-    name: &'static str,
-    why: &'static str,
-    severity: &'static str,
-    (severities, holds): (&'static [f64], usize),
-    law: fn(f64, f64) -> Outcome,
-) -> Case {
-    Case { name, why, severity, severities, holds, known: "", timed: true, law }
-}
 
 pub(super) const CASES: &[Case] = &[
     case(
@@ -24,7 +14,8 @@ pub(super) const CASES: &[Case] = &[
         "distance m",
         (&[0.65, 0.75, 0.85, 0.95, 1.05, 1.2], 5),
         |distance_m, period_s| reach(period_s, [0.0, -distance_m, 0.5], ArmSettings::default()),
-    ),
+    )
+    .timed(),
     case(
         "wrist singularity",
         "two axes of the wrist fall into one on the way",
@@ -35,28 +26,32 @@ pub(super) const CASES: &[Case] = &[
             arm.home_deg[5] = -away_deg;
             reach(period_s, [0.0, -0.65, 0.5], arm)
         },
-    ),
+    )
+    .timed(),
     case(
         "joint limit",
         "the object stands where a joint ends",
         "to the side m",
         (&[0.0, 0.2, 0.4, 0.6, 0.8], 5),
         |x_m, period_s| reach(period_s, [x_m, -0.6, 0.5], ArmSettings::default()),
-    ),
+    )
+    .timed(),
     case(
         "close to the base",
         "the elbow folds until it ends, and at last home is inside the object",
         "distance m",
         (&[0.65, 0.6, 0.5, 0.4, 0.3, 0.2], 2),
         |distance_m, period_s| reach(period_s, [0.0, -distance_m, 0.5], ArmSettings::default()),
-    ),
+    )
+    .timed(),
     case(
         "high and low",
         "shoulder and wrist share what is left",
         "height m",
         (&[0.5, 0.3, 0.8, 0.1, 1.1], 5),
         |z_m, period_s| reach(period_s, [0.0, -0.6, z_m], ArmSettings::default()),
-    ),
+    )
+    .timed(),
     case(
         "base turned away",
         "the first joint starts at its limit",
@@ -66,7 +61,8 @@ pub(super) const CASES: &[Case] = &[
             let arm = ArmSettings { base_rotation_deg: [0.0, 0.0, deg], ..ArmSettings::default() };
             reach(period_s, [0.0, -0.65, 0.5], arm)
         },
-    ),
+    )
+    .timed(),
     case(
         "base far away",
         "kinematics a kilometre from the origin",
@@ -76,7 +72,8 @@ pub(super) const CASES: &[Case] = &[
             let arm = ArmSettings { base_position_m: [far_m, 0.0, 0.0], ..ArmSettings::default() };
             reach(period_s, [far_m, -0.65, 0.5], arm)
         },
-    ),
+    )
+    .timed(),
 ];
 
 /// The arm touches the middle of a small wall at `place_m`; out of reach, it says so.

@@ -1,6 +1,6 @@
 //! The Gaussian process on data that break others.
 
-use super::case::{Case, Outcome, all, hold};
+use super::case::{Case, Outcome, all, case, hold};
 use crate::ground::gp::fit::SearchBox;
 use crate::ground::gp::kernel::{Hyperparameters, SquaredExponential};
 use crate::ground::gp::posterior::Scratch;
@@ -8,16 +8,6 @@ use crate::ground::gp::{Mean, Observations, Posterior};
 use crate::ground::optimize::{self, Stop};
 
 static KERNEL: SquaredExponential = SquaredExponential;
-
-const fn case(
-    name: &'static str,
-    why: &'static str,
-    severity: &'static str,
-    (severities, holds): (&'static [f64], usize),
-    law: fn(f64, f64) -> Outcome,
-) -> Case {
-    Case { name, why, severity, severities, holds, known: "", timed: false, law }
-}
 
 pub(super) const CASES: &[Case] = &[
     case(

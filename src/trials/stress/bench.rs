@@ -93,3 +93,16 @@ pub(super) fn finite(load: &Load) -> bool {
         && load.energy_j.is_finite()
         && load.pressure_pa.is_finite()
 }
+
+/// Multiplies everything that makes the skin resist.
+pub(super) fn stiffen(effects: &mut Effects, times: f64) {
+    if let Some(skin) = &mut effects.skin {
+        let resists = [
+            &mut skin.modulus_pa,
+            &mut skin.flatten_pa_m,
+            &mut skin.inflate_pa_m,
+            &mut skin.core_pa_m,
+        ];
+        resists.into_iter().for_each(|constant| *constant *= times);
+    }
+}

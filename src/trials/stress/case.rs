@@ -52,7 +52,28 @@ pub struct Verdict {
     pub explained: bool,
 }
 
+/// A case that is never wrong without a fault and does not depend on the control period.
+pub(super) const fn case(
+    name: &'static str,
+    why: &'static str,
+    severity: &'static str,
+    (severities, holds): (&'static [f64], usize),
+    law: fn(f64, f64) -> Outcome,
+) -> Case {
+    Case { name, why, severity, severities, holds, known: "", timed: false, law }
+}
+
 impl Case {
+    /// The same, run at every control period.
+    pub(super) const fn timed(self) -> Self {
+        Self { timed: true, ..self }
+    }
+
+    /// The same, which beyond its severities may be wrong without a fault, and `why`.
+    pub(super) const fn known(self, why: &'static str) -> Self {
+        Self { known: why, ..self }
+    }
+
     /// Runs one severity; a panic breaks every law.
     pub fn run(&self, rank: usize, period_s: f64) -> Verdict {
         let severity = self.severities.get(rank).copied().unwrap_or(f64::NAN);

@@ -6,11 +6,10 @@ use crate::conduct::probe::servo::Servo;
 use crate::conduct::probe::{Contact, Probe, Touch};
 use crate::ground::geometry::bvh::MeshBvh;
 use crate::ground::geometry::mesh::Mesh;
-use crate::ground::geometry::report::MeshReport;
 use crate::trials::fidelity::felt::{Felt, felt};
 use crate::trials::fidelity::measure::stand;
 use crate::trials::fidelity::trace::{Tick, Trace};
-use crate::world::world::Shape;
+use crate::world::world::{Shape, WorldError};
 use crate::world::{Scene, World};
 use std::sync::Arc;
 
@@ -42,9 +41,8 @@ pub(super) fn deed_with(
     {
         return Deed::not_done(&format!("refused: approach faster than {limit_m_s:.4} m/s"));
     }
-    let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: Box::new(MeshReport::default()) };
-    let world = match World::around(scene, shape) {
-        Ok(world) => Arc::new(world),
+    let world = match around(scene, mesh) {
+        Ok(world) => world,
         Err(error) => return Deed::not_done(&error.to_string()),
     };
     let fault = Fault::Refused { values: Vec::new() };
@@ -60,6 +58,12 @@ pub(super) fn deed_with(
     // pose need no sensor.
     let felt = felt(&world, &ticks);
     Deed { touch, world: Some(world), felt, ticks, refused: None }
+}
+
+/// `scene` with `mesh` as its object.
+pub(super) fn around(scene: Scene, mesh: Mesh) -> Result<Arc<World>, WorldError> {
+    let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
+    World::around(scene, shape).map(Arc::new)
 }
 
 impl Deed {

@@ -1,149 +1,107 @@
 //! The finger's law of force, driven pose by pose.
 
-use super::bench::{Bench, finite, on_bench, on_bench_of};
-use super::case::{Case, Outcome, all, hold};
+use super::bench::{Bench, finite, on_bench, on_bench_of, stiffen};
+use super::case::{Case, Outcome, all, case, hold};
 use crate::ground::seed;
 use crate::things::finger::{Effects, FeelError, Motion};
 use nalgebra::{Isometry3, Vector3};
 use rand::RngExt;
 
 pub(super) const CASES: &[Case] = &[
-    Case {
-        name: "deep press",
-        why: "skin, fluid and core carry load one after the other",
-        severity: "depth mm",
-        severities: &[0.1, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 12.0],
-        holds: 6,
-        known: "",
-        timed: false,
-        law: deep,
-    },
-    Case {
-        name: "press and release",
-        why: "a force that depends on its past can give energy back",
-        severity: "steps",
-        severities: &[1000.0, 100.0, 20.0, 5.0, 2.0],
-        holds: 5,
-        known: "",
-        timed: false,
-        law: release,
-    },
-    Case {
-        name: "loop with friction",
-        why: "stick and slip around a closed path must not gain energy",
-        severity: "coefficient",
-        severities: &[0.0, 0.3, 0.8, 2.0, 10.0],
-        holds: 5,
-        known: "",
-        timed: true,
-        law: friction_loop,
-    },
-    Case {
-        name: "fast slip",
-        why: "a stiff bristle integrated in large steps blows up unless it is projected",
-        severity: "speed m/s",
-        severities: &[1e-3, 1.0, 1e3, 1e6, 1e12],
-        holds: 5,
-        known: "",
-        timed: true,
-        law: slip,
-    },
-    Case {
-        name: "long hold",
-        why: "rounding and filters may drift while nothing moves",
-        severity: "ticks",
-        severities: &[1e3, 1e4, 1e5, 1e6],
-        holds: 4,
-        known: "",
-        timed: false,
-        law: held,
-    },
-    Case {
-        name: "long and short ticks",
-        why: "heat and filters are exact for any tick, or they are not stable",
-        severity: "tick s",
-        severities: &[1e-2, 1e-6, 1e-12, 0.1, 1.0, 10.0],
-        holds: 5,
-        known: "",
-        timed: false,
-        law: ticks,
-    },
-    Case {
-        name: "any pose",
-        why: "poses no touch would have",
-        severity: "poses",
-        severities: &[100.0, 1000.0, 10000.0],
-        holds: 3,
-        known: "",
-        timed: false,
-        law: poses,
-    },
-    Case {
-        name: "numbers that are none",
-        why: "a NaN that passes once is in every later number",
-        severity: "component",
-        severities: &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0],
-        holds: 6,
-        known: "",
-        timed: false,
-        law: nan,
-    },
-    Case {
-        name: "stiff skin pressed",
-        why: "pressure and columns are coupled: the root is steep",
-        severity: "times stiffer",
-        severities: &[1.0, 10.0, 100.0, 1000.0, 1e6],
-        holds: 5,
-        known: "",
-        timed: false,
-        law: |times, _| laws_of(times, 1.0, &effects()),
-    },
-    Case {
-        name: "soft skin pressed",
-        why: "the gap closes at once and the stiff core carries all",
-        severity: "times softer",
-        severities: &[1.0, 10.0, 100.0, 1000.0, 1e6],
-        holds: 5,
-        known: "",
-        timed: false,
-        law: |times, _| laws_of(1.0 / times, 1.0, &effects()),
-    },
-    Case {
-        name: "stiff fluid",
-        why: "an incompressible fluid leaves a saddle point",
-        severity: "Pa/m3",
-        severities: &[1e13, 1e6, 1e16, 1e20, 1e25],
-        holds: 5,
-        known: "",
-        timed: false,
-        law: |stiffness_pa_m3, _| {
+    case(
+        "deep press",
+        "skin, fluid and core carry load one after the other",
+        "depth mm",
+        (&[0.1, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 12.0], 6),
+        deep,
+    ),
+    case(
+        "press and release",
+        "a force that depends on its past can give energy back",
+        "steps",
+        (&[1000.0, 100.0, 20.0, 5.0, 2.0], 5),
+        release,
+    ),
+    case(
+        "loop with friction",
+        "stick and slip around a closed path must not gain energy",
+        "coefficient",
+        (&[0.0, 0.3, 0.8, 2.0, 10.0], 5),
+        friction_loop,
+    )
+    .timed(),
+    case(
+        "fast slip",
+        "a stiff bristle integrated in large steps blows up unless it is projected",
+        "speed m/s",
+        (&[1e-3, 1.0, 1e3, 1e6, 1e12], 5),
+        slip,
+    )
+    .timed(),
+    case(
+        "long hold",
+        "rounding and filters may drift while nothing moves",
+        "ticks",
+        (&[1e3, 1e4, 1e5, 1e6], 4),
+        held,
+    ),
+    case(
+        "long and short ticks",
+        "heat and filters are exact for any tick, or they are not stable",
+        "tick s",
+        (&[1e-2, 1e-6, 1e-12, 0.1, 1.0, 10.0], 5),
+        ticks,
+    ),
+    case("any pose", "poses no touch would have", "poses", (&[100.0, 1000.0, 10000.0], 3), poses),
+    case(
+        "numbers that are none",
+        "a NaN that passes once is in every later number",
+        "component",
+        (&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0], 6),
+        nan,
+    ),
+    case(
+        "stiff skin pressed",
+        "pressure and columns are coupled: the root is steep",
+        "times stiffer",
+        (&[1.0, 10.0, 100.0, 1000.0, 1e6], 5),
+        |times, _| laws_of(times, 1.0, &effects()),
+    ),
+    case(
+        "soft skin pressed",
+        "the gap closes at once and the stiff core carries all",
+        "times softer",
+        (&[1.0, 10.0, 100.0, 1000.0, 1e6], 5),
+        |times, _| laws_of(1.0 / times, 1.0, &effects()),
+    ),
+    case(
+        "stiff fluid",
+        "an incompressible fluid leaves a saddle point",
+        "Pa/m3",
+        (&[1e13, 1e6, 1e16, 1e20, 1e25], 5),
+        |stiffness_pa_m3, _| {
             let mut effects = effects();
             if let Some(fluid) = &mut effects.fluid {
                 fluid.stiffness_pa_m3 = stiffness_pa_m3;
             }
             laws_of(1.0, 1.0, &effects)
         },
-    },
-    Case {
-        name: "few points",
-        why: "a contact smaller than a cell is missed or overrated",
-        severity: "points",
-        severities: &[2000.0, 1000.0, 500.0, 250.0, 125.0, 60.0, 10.0],
-        holds: 4,
-        known: "cells are larger than the contact: use 250 points or more",
-        timed: false,
-        law: few_points,
-    },
-    Case {
-        name: "size of the finger",
-        why: "constants in metres show when lengths scale",
-        severity: "times larger",
-        severities: &[1.0, 0.3, 0.1, 10.0, 100.0],
-        holds: 5,
-        known: "",
-        timed: false,
-        law: |times, _| laws_of(1.0, times, &effects()),
-    },
+    ),
+    case(
+        "few points",
+        "a contact smaller than a cell is missed or overrated",
+        "points",
+        (&[2000.0, 1000.0, 500.0, 250.0, 125.0, 60.0, 10.0], 4),
+        few_points,
+    )
+    .known("cells are larger than the contact: use 250 points or more"),
+    case(
+        "size of the finger",
+        "constants in metres show when lengths scale",
+        "times larger",
+        (&[1.0, 0.3, 0.1, 10.0, 100.0], 5),
+        |times, _| laws_of(1.0, times, &effects()),
+    ),
 ];
 
 fn effects() -> Effects {
@@ -336,12 +294,7 @@ fn nan(component: f64, _: f64) -> Outcome {
 /// A finger of other constants and size: finite, growing with depth, and repeating itself.
 fn laws_of(stiffer: f64, size: f64, effects: &Effects) -> Outcome {
     let mut effects = effects.clone();
-    if let Some(skin) = &mut effects.skin {
-        skin.modulus_pa *= stiffer;
-        skin.flatten_pa_m *= stiffer;
-        skin.inflate_pa_m *= stiffer;
-        skin.core_pa_m *= stiffer;
-    }
+    stiffen(&mut effects, stiffer);
     on_bench_of(&effects, size, |bench| {
         let mut before_n = 0.0;
         for depth_mm in [0.01, 0.1, 0.5, 1.0, 2.0, 3.0] {

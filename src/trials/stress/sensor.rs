@@ -1,20 +1,10 @@
 //! A sensor or a joint that fails in the middle of a touch.
 
-use super::case::{Case, Outcome};
+use super::case::{Case, Outcome, case};
 use super::deed::deed_with;
 use super::solids::{mesh, wall};
 use super::touch::scene;
 use crate::bodies::faults::{Failure, Faults};
-
-const fn case(
-    name: &'static str,
-    why: &'static str,
-    severity: &'static str,
-    (severities, holds): (&'static [f64], usize),
-    law: fn(f64, f64) -> Outcome,
-) -> Case {
-    Case { name, why, severity, severities, holds, known: "", timed: false, law }
-}
 
 /// Ticks after which a sensor fails: at rest, on the way, near contact, after the touch.
 const FROM: (&[f64], usize) = (&[1e6, 120.0, 60.0, 20.0, 3.0, 0.0], 1);
@@ -29,12 +19,10 @@ pub(super) const CASES: &[Case] = &[
     case("frozen sensor", "it says untouched for ever", "from tick", FROM, |from, p| {
         broken(Failure::Frozen, from, p)
     }),
-    Case {
-        known: "a sensor that saturates at once looks like contact: only another sensor can tell",
-        ..case("saturated sensor", "it says contact everywhere", "from tick", FROM, |from, p| {
-            broken(Failure::Saturated, from, p)
-        })
-    },
+    case("saturated sensor", "it says contact everywhere", "from tick", FROM, |from, p| {
+        broken(Failure::Saturated, from, p)
+    })
+    .known("a sensor that saturates at once looks like contact: only another sensor can tell"),
     case(
         "lost frames",
         "contact is told late or never",
@@ -42,16 +30,14 @@ pub(super) const CASES: &[Case] = &[
         (&[0.0, 0.1, 0.3, 0.6, 0.9, 1.0], 3),
         |share, p| broken(Failure::Lost(share), 0.0, p),
     ),
-    Case {
-        known: "frames later than touch.settle_s are of the way in: rest for longer",
-        ..case(
-            "delayed frames",
-            "the finger goes on meanwhile",
-            "ticks",
-            (&[0.0, 2.0, 5.0, 10.0, 20.0], 3),
-            |ticks, p| broken(Failure::Late(ticks as usize), 0.0, p),
-        )
-    },
+    case(
+        "delayed frames",
+        "the finger goes on meanwhile",
+        "ticks",
+        (&[0.0, 2.0, 5.0, 10.0, 20.0], 3),
+        |ticks, p| broken(Failure::Late(ticks as usize), 0.0, p),
+    )
+    .known("frames later than touch.settle_s are of the way in: rest for longer"),
     case(
         "spikes of pressure",
         "single values that look like contact or too much of it",

@@ -1,33 +1,21 @@
 //! Objects that are hard to touch, each touched as a scene touches.
 
-use super::case::{Case, Outcome, all, hold};
+use super::case::{Case, Outcome, all, case, hold};
 use super::deed::{Deed, deed};
 use super::solids::{ball, block, both, mesh, needle, sheet, wall};
 use super::touch::scene;
 use crate::ground::geometry::mesh::Mesh;
 use nalgebra::Point3;
 
-const fn case(
-    name: &'static str,
-    why: &'static str,
-    severity: &'static str,
-    (severities, holds): (&'static [f64], usize),
-    law: fn(f64, f64) -> Outcome,
-) -> Case {
-    Case { name, why, severity, severities, holds, known: "", timed: false, law }
-}
-
 pub(super) const CASES: &[Case] = &[
-    Case {
-        timed: true,
-        ..case(
-            "graze along an edge",
-            "the finger's flank meets less and less of the object",
-            "overlap mm",
-            (&[3.0, 1.0, 0.3, 0.1, 0.01, 1e-6], 6),
-            graze,
-        )
-    },
+    case(
+        "graze along an edge",
+        "the finger's flank meets less and less of the object",
+        "overlap mm",
+        (&[3.0, 1.0, 0.3, 0.1, 0.01, 1e-6], 6),
+        graze,
+    )
+    .timed(),
     case(
         "slot narrower than the finger",
         "two edges hold what one would let in",
@@ -49,16 +37,14 @@ pub(super) const CASES: &[Case] = &[
         (&[10.0, 100.0, 1e3, 1e4, 1e5], 5),
         slivers,
     ),
-    Case {
-        known: "a needle thinner than the skin's points are apart passes between them: use more",
-        ..case(
-            "vertex",
-            "the normal jumps at the tip of a needle",
-            "half angle deg",
-            (&[60.0, 30.0, 10.0, 3.0, 1.0], 3),
-            |angle_deg, period_s| on(mesh(needle(angle_deg), [0.0; 3]), [0.0; 2], period_s, 1.0),
-        )
-    },
+    case(
+        "vertex",
+        "the normal jumps at the tip of a needle",
+        "half angle deg",
+        (&[60.0, 30.0, 10.0, 3.0, 1.0], 3),
+        |angle_deg, period_s| on(mesh(needle(angle_deg), [0.0; 3]), [0.0; 2], period_s, 1.0),
+    )
+    .known("a needle thinner than the skin's points are apart passes between them: use more"),
     case(
         "open border",
         "half of the finger is over the edge of a sheet that has no other side",

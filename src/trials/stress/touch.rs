@@ -1,141 +1,117 @@
 //! Whole touches of a wall.
 
-use super::case::{Case, Outcome, hold};
-use super::deed::{Deed, deed};
+use super::bench::stiffen;
+use super::case::{Case, Outcome, case, hold};
+use super::deed::{Deed, around, deed};
 use super::solids::{mesh, wall};
 use crate::conduct::probe::{self, Contact, Touch};
-use crate::ground::geometry::bvh::MeshBvh;
 use crate::things::finger::timing::TimingEffect;
 use crate::things::finger::{Effects, Finger};
 use crate::trials::fidelity::felt::quiet;
 use crate::trials::fidelity::measure::stand;
 use crate::world::scene::Body;
 use crate::world::touch::TouchSettings;
-use crate::world::world::Shape;
-use crate::world::{Scene, World, Zone};
-use std::sync::Arc;
+use crate::world::{Scene, Zone};
 
 pub(super) const CASES: &[Case] = &[
-    Case {
-        name: "fast approach to a wall",
-        why: "the finger goes on while frames agree that there is contact",
-        severity: "m/s",
-        severities: &[0.005, 0.02, 0.04, 0.06, 0.1, 0.2, 0.5, 1.0],
-        holds: 3,
-        known: "",
-        timed: true,
-        law: |approach_m_s, period_s| {
+    case(
+        "fast approach to a wall",
+        "the finger goes on while frames agree that there is contact",
+        "m/s",
+        (&[0.005, 0.02, 0.04, 0.06, 0.1, 0.2, 0.5, 1.0], 3),
+        |approach_m_s, period_s| {
             let mut scene = scene(period_s);
             scene.touch.approach_m_s = approach_m_s;
             on_wall(scene)
         },
-    },
-    Case {
-        name: "stiff skin",
-        why: "force per tick of approach grows with the stiffness",
-        severity: "times stiffer",
-        severities: &[1.0, 3.0, 10.0, 100.0, 1000.0],
-        holds: 4,
-        known: "",
-        timed: true,
-        law: |times, period_s| on_wall(skin(period_s, times)),
-    },
-    Case {
-        name: "soft skin",
-        why: "pressure rises too late to tell of contact",
-        severity: "times softer",
-        severities: &[1.0, 3.0, 10.0, 100.0, 1000.0],
-        holds: 3,
-        known: "its pressure stays below the threshold: lower touch.detection.threshold_counts",
-        timed: true,
-        law: |times, period_s| on_wall(skin(period_s, 1.0 / times)),
-    },
-    Case {
-        name: "late frames",
-        why: "frames come in batches long after the contact",
-        severity: "frames a batch",
-        severities: &[1.0, 5.0, 10.0, 30.0, 100.0],
-        holds: 2,
-        known: "",
-        timed: true,
-        law: |batch, period_s| {
+    )
+    .timed(),
+    case(
+        "stiff skin",
+        "force per tick of approach grows with the stiffness",
+        "times stiffer",
+        (&[1.0, 3.0, 10.0, 100.0, 1000.0], 4),
+        |times, period_s| on_wall(skin(period_s, times)),
+    )
+    .timed(),
+    case(
+        "soft skin",
+        "pressure rises too late to tell of contact",
+        "times softer",
+        (&[1.0, 3.0, 10.0, 100.0, 1000.0], 3),
+        |times, period_s| on_wall(skin(period_s, 1.0 / times)),
+    )
+    .known("its pressure stays below the threshold: lower touch.detection.threshold_counts")
+    .timed(),
+    case(
+        "late frames",
+        "frames come in batches long after the contact",
+        "frames a batch",
+        (&[1.0, 5.0, 10.0, 30.0, 100.0], 2),
+        |batch, period_s| {
             let mut scene = scene(period_s);
             let batch_frames = batch as usize;
             scene.effects.timing = Some(TimingEffect { batch_frames, ..TimingEffect::default() });
             on_wall(scene)
         },
-    },
-    Case {
-        name: "patient detection",
-        why: "every frame that must agree is a frame of approach",
-        severity: "frames",
-        severities: &[1.0, 3.0, 6.0, 20.0, 100.0],
-        holds: 3,
-        known: "",
-        timed: true,
-        law: |frames, period_s| {
+    )
+    .timed(),
+    case(
+        "patient detection",
+        "every frame that must agree is a frame of approach",
+        "frames",
+        (&[1.0, 3.0, 6.0, 20.0, 100.0], 3),
+        |frames, period_s| {
             let mut scene = scene(period_s);
             scene.touch.detection.frames = frames as u32;
             on_wall(scene)
         },
-    },
-    Case {
-        name: "noisy pressure",
-        why: "noise passes for contact in the air",
-        severity: "times the noise",
-        severities: &[1.0, 3.0, 10.0, 30.0, 100.0],
-        holds: 2,
-        known: "noise above a third of the threshold passes for contact: raise touch.detection",
-        timed: false,
-        law: |times, period_s| {
+    )
+    .timed(),
+    case(
+        "noisy pressure",
+        "noise passes for contact in the air",
+        "times the noise",
+        (&[1.0, 3.0, 10.0, 30.0, 100.0], 2),
+        |times, period_s| {
             let mut scene = scene(period_s);
             scene.effects.fluid.get_or_insert_default().noise_counts *= times;
             on_wall(scene)
         },
-    },
-    Case {
-        name: "many touches",
-        why: "errors of the servo that add up from touch to touch",
-        severity: "touches",
-        severities: &[10.0, 100.0, 1000.0],
-        holds: 3,
-        known: "",
-        timed: false,
-        law: many,
-    },
-    Case {
-        name: "refined time step",
-        why: "a touch that changes with the period is not resolved",
-        severity: "times coarser",
-        severities: &[1.0, 2.0, 4.0, 8.0],
-        holds: 4,
-        known: "",
-        timed: false,
-        law: refined,
-    },
-    Case {
-        name: "too much force",
-        why: "the limit is passed within one tick",
-        severity: "limit counts",
-        severities: &[1500.0, 100.0, 10.0, 1.0],
-        holds: 4,
-        known: "",
-        timed: true,
-        law: |limit, period_s| {
+    )
+    .known("noise above a third of the threshold passes for contact: raise touch.detection"),
+    case(
+        "many touches",
+        "errors of the servo that add up from touch to touch",
+        "touches",
+        (&[10.0, 100.0, 1000.0], 3),
+        many,
+    ),
+    case(
+        "refined time step",
+        "a touch that changes with the period is not resolved",
+        "times coarser",
+        (&[1.0, 2.0, 4.0, 8.0], 4),
+        refined,
+    ),
+    case(
+        "too much force",
+        "the limit is passed within one tick",
+        "limit counts",
+        (&[1500.0, 100.0, 10.0, 1.0], 4),
+        |limit, period_s| {
             let mut scene = scene(period_s);
             scene.touch.pressure_limit_counts = limit;
             wall_deed(scene).on_surface_or_missed(1e-3)
         },
-    },
-    Case {
-        name: "target off the object",
-        why: "there is nothing to meet",
-        severity: "beside it mm",
-        severities: &[7.5, 20.0, 100.0],
-        holds: 3,
-        known: "",
-        timed: false,
-        law: |mm, period_s| {
+    )
+    .timed(),
+    case(
+        "target off the object",
+        "there is nothing to meet",
+        "beside it mm",
+        (&[7.5, 20.0, 100.0], 3),
+        |mm, period_s| {
             let mut scene = scene(period_s);
             scene.zone.x_m = [-0.2, 0.2];
             let Some(mesh) = mesh(wall(0.03), [0.0; 3]) else {
@@ -144,7 +120,7 @@ pub(super) const CASES: &[Case] = &[
             let deed = deed(scene, mesh, &[0.03 + 1e-3 * mm, 0.0]);
             hold(deed.touch == Ok(Touch::Miss), || format!("{:?}", deed.touch))
         },
-    },
+    ),
 ];
 
 /// A kinematic stage with a soft finger whose point of contact is exact, before an object near
@@ -167,11 +143,7 @@ pub(super) fn scene(period_s: f64) -> Scene {
 
 fn skin(period_s: f64, times: f64) -> Scene {
     let mut scene = scene(period_s);
-    let skin = scene.effects.skin.get_or_insert_default();
-    skin.modulus_pa *= times;
-    skin.flatten_pa_m *= times;
-    skin.inflate_pa_m *= times;
-    skin.core_pa_m *= times;
+    stiffen(&mut scene.effects, times);
     scene
 }
 
@@ -192,10 +164,7 @@ fn many(count: f64, period_s: f64) -> Outcome {
     let mut scene = quiet(&scene(period_s));
     scene.effects.skin.get_or_insert_default().samples = 125;
     let Some(mesh) = mesh(wall(0.05), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
-    let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
-    let Ok(world) = World::around(scene, shape).map(Arc::new) else {
-        return Outcome::Wrong("no world".into());
-    };
+    let Ok(world) = around(scene, mesh) else { return Outcome::Wrong("no world".into()) };
     let mut probe = match stand(&world).and_then(|stand| probe::open(&stand, 1)) {
         Ok(probe) => probe,
         Err(fault) => return Outcome::Faulted(fault.to_string()),
