@@ -2,8 +2,8 @@
 
 use super::felt::quiet;
 use super::ladder::{RUNGS, Rung};
-use super::measure::{Touches, surface_rmse_m, targets, touch_all};
-use super::order::{self, Order, OrderError};
+use super::measure::{MeasureError, Touches, surface_rmse_m, targets, touch_all};
+use super::order::{self, Order};
 use super::row::{Row, row};
 use crate::trials::truth::Truth;
 use crate::world::{Scene, World};
@@ -33,7 +33,7 @@ pub fn climb(
     count: usize,
     seed: u64,
     tick: &mut dyn FnMut() -> bool,
-) -> Result<Climb, OrderError> {
+) -> Result<Climb, MeasureError> {
     let targets = targets(scene, count, seed);
     let mut climb = Climb { rows: Vec::new(), orders: Vec::new(), finished: false };
     let mut reference: Option<Touches> = None;

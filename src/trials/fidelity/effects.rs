@@ -1,8 +1,8 @@
 //! What each effect changes and costs: one switched at a time, the rest of the scene as it is.
 
-use super::measure::{Touches, stand, touch_all};
-use super::order::OrderError;
+use super::measure::{MeasureError, Touches, touch_all};
 use super::row::{Spread, electrodes_apart};
+use crate::bodies::stand::Stand;
 use crate::conduct::belief::GpSettings;
 use crate::conduct::planner::{self, PlanningSettings};
 use crate::conduct::probe;
@@ -130,7 +130,7 @@ impl Base {
         targets: Vec<Vec<f64>>,
         budget: Budget,
         tick: &mut dyn FnMut() -> bool,
-    ) -> Result<Option<Self>, OrderError> {
+    ) -> Result<Option<Self>, MeasureError> {
         let world = Arc::new(World::build(scene.clone())?);
         let truth = Truth::sample(&world, GRID);
         let Some(touches) = touch_all(&world, &targets, 0, &mut || true)? else { return Ok(None) };
@@ -142,7 +142,7 @@ impl Base {
     ///
     /// # Errors
     /// If the switched scene cannot be built.
-    pub fn change(&self, switch: &Switch, budget: Budget) -> Result<Change, OrderError> {
+    pub fn change(&self, switch: &Switch, budget: Budget) -> Result<Change, MeasureError> {
         let is_on = (switch.is_on)(self.world.scene());
         let world = Arc::new(World::build(switched(self.world.scene(), switch))?);
         let touches = touch_all(&world, &self.targets, 0, &mut || true)?;
@@ -183,11 +183,11 @@ fn state_bytes(world: &World) -> i64 {
 }
 
 /// How often the stage `name` runs in the first touch.
-fn runs(name: &str, world: &Arc<World>, targets: &[Vec<f64>]) -> Result<Option<u64>, OrderError> {
+fn runs(name: &str, world: &Arc<World>, targets: &[Vec<f64>]) -> Result<Option<u64>, MeasureError> {
     let name = name.rsplit('.').next().unwrap_or(name);
     let stage = work::STAGES.iter().position(|(_, stage)| *stage == name);
     let (Some(stage), Some(target)) = (stage, targets.first()) else { return Ok(None) };
-    let mut probe = probe::open(&stand(world)?, 0)?;
+    let mut probe = probe::open(&Stand::new(Arc::clone(world))?, 0)?;
     let before = work::counts();
     let _ = probe.touch(target);
     Ok(work::counts().zip(before).map(|(after, before)| after[stage] - before[stage]))
@@ -199,8 +199,11 @@ fn time_ratio(
     with: &Arc<World>,
     targets: &[Vec<f64>],
     pairs: usize,
-) -> Result<Option<f64>, OrderError> {
-    let mut probes = [probe::open(&stand(without)?, 0)?, probe::open(&stand(with)?, 0)?];
+) -> Result<Option<f64>, MeasureError> {
+    let open = |world: &Arc<World>| -> Result<_, MeasureError> {
+        Ok(probe::open(&Stand::new(Arc::clone(world))?, 0)?)
+    };
+    let mut probes = [open(without)?, open(with)?];
     let mut ratios = Vec::with_capacity(pairs);
     for (i, target) in targets.iter().cycle().take(pairs).enumerate() {
         let mut taken_s = [0.0; 2];
@@ -217,7 +220,7 @@ fn time_ratio(
 
 /// `active` against `random` in the same trials.
 fn verdict(world: &Arc<World>, truth: &Truth, budget: Budget) -> Option<Paired> {
-    let stand = stand(world).ok()?;
+    let stand = Stand::new(Arc::clone(world)).ok()?;
     let planners = [planner::by_name("active")?, planner::by_name("random")?];
     if budget.trials == 0 || !crate::ground::optimize::BUILT {
         return None;
@@ -262,7 +265,7 @@ pub fn bare_ratio(
     scene: &Scene,
     base: &Base,
     repeats: usize,
-) -> Result<Option<(f64, [f64; 2])>, OrderError> {
+) -> Result<Option<(f64, [f64; 2])>, MeasureError> {
     let mut scene = scene.clone();
     scene.effects = Effects { skin: scene.effects.skin.take(), ..Effects::default() };
     let world = World::build(scene)?;

@@ -3,7 +3,7 @@
 use super::felt::{Felt, felt, quiet};
 use super::trace::Trace;
 use crate::bodies::backend::Fault;
-use crate::bodies::stand::Stand;
+use crate::bodies::stand::{Stand, StandError};
 use crate::conduct::belief::{Belief, GpSettings};
 use crate::conduct::planner::{self, PlanningSettings};
 use crate::conduct::probe::servo::Servo;
@@ -11,6 +11,7 @@ use crate::conduct::probe::{self, Contact, Probe, Touch};
 use crate::ground::seed;
 use crate::trials::statistics::median;
 use crate::trials::truth::Truth;
+use crate::world::world::WorldError;
 use crate::world::{Scene, World};
 use std::sync::Arc;
 use std::time::Instant;
@@ -47,12 +48,18 @@ pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Vec<f64>> {
         .map_or_else(Vec::new, |mut sobol| (0..count).map(|_| sobol.plan(&belief).target).collect())
 }
 
-/// What the body of `world` stands on.
-///
-/// # Errors
-/// [`Fault::Refused`] if it cannot be simulated as the scene asks.
-pub fn stand(world: &Arc<World>) -> Result<Stand, Fault> {
-    Stand::new(Arc::clone(world)).map_err(|_| Fault::Refused { values: Vec::new() })
+/// Why nothing can be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum MeasureError {
+    /// A scene cannot be built.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// Its body cannot be simulated as the scene asks.
+    #[error(transparent)]
+    Stand(#[from] StandError),
+    /// A body cannot be brought to its start.
+    #[error(transparent)]
+    Fault(#[from] Fault),
 }
 
 /// Touches every target; `tick` is called after each and says whether to go on.
@@ -64,8 +71,8 @@ pub fn touch_all(
     targets: &[Vec<f64>],
     seed: u64,
     tick: &mut dyn FnMut() -> bool,
-) -> Result<Option<Touches>, Fault> {
-    let stand = stand(world)?;
+) -> Result<Option<Touches>, MeasureError> {
+    let stand = Stand::new(Arc::clone(world))?;
     let hushed = quiet_world(world);
     let mut ticks = None;
     let mut traced: Box<dyn Probe> = match (stand.body()?, world.chain()) {

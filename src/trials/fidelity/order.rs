@@ -2,12 +2,11 @@
 
 use super::felt::quiet;
 use super::ladder::{Rung, Senses};
-use super::measure::{Touches, touch_all};
-use crate::bodies::backend::Fault;
+use super::measure::{MeasureError, Touches, touch_all};
 use crate::things::finger::Motion;
 use crate::trials::statistics::mean;
 use crate::world::scene::Body;
-use crate::world::world::{Shape, WorldError};
+use crate::world::world::Shape;
 use crate::world::{Scene, World};
 use std::sync::Arc;
 
@@ -33,17 +32,6 @@ pub struct Order {
     pub expected: f64,
 }
 
-/// Why nothing can be said.
-#[derive(Debug, thiserror::Error)]
-pub enum OrderError {
-    /// A scene cannot be built.
-    #[error(transparent)]
-    World(#[from] WorldError),
-    /// A body cannot be brought to its start.
-    #[error(transparent)]
-    Fault(#[from] Fault),
-}
-
 impl Order {
     fn new(name: &'static str, errors: Vec<(f64, f64)>, expected: f64) -> Self {
         let logs: Vec<(f64, f64)> = (errors.iter())
@@ -67,7 +55,7 @@ pub fn in_time_step(
     scene: &Scene,
     targets: &[Vec<f64>],
     tick: &mut dyn FnMut() -> bool,
-) -> Result<Option<Order>, OrderError> {
+) -> Result<Option<Order>, MeasureError> {
     let mut runs: Vec<(f64, Touches)> = Vec::new();
     for period_s in PERIODS_S {
         let (body, senses, samples) = (Body::Kinematic, Senses::Dry, STEPPED_SAMPLES);
@@ -94,7 +82,7 @@ pub fn in_time_step(
 ///
 /// # Errors
 /// If a scene cannot be built.
-pub fn in_samples(scene: &Scene, poses: &[Motion]) -> Result<Order, OrderError> {
+pub fn in_samples(scene: &Scene, poses: &[Motion]) -> Result<Order, MeasureError> {
     let mut forces: Vec<(usize, Vec<f64>)> = Vec::new();
     for samples in SAMPLES {
         let rung = Rung { body: Body::Kinematic, senses: Senses::Fluid, samples, period_s: 0.01 };

@@ -2,12 +2,12 @@
 
 use super::case::{Outcome, all, hold};
 use crate::bodies::backend::{Backend, Fault};
+use crate::bodies::stand::Stand;
 use crate::conduct::probe::servo::Servo;
 use crate::conduct::probe::{Contact, Probe, Touch};
 use crate::ground::geometry::bvh::MeshBvh;
 use crate::ground::geometry::mesh::Mesh;
 use crate::trials::fidelity::felt::{Felt, felt};
-use crate::trials::fidelity::measure::stand;
 use crate::trials::fidelity::trace::{Tick, Trace};
 use crate::world::world::{Shape, WorldError};
 use crate::world::{Scene, World};
@@ -45,10 +45,12 @@ pub(super) fn deed_with(
         Ok(world) => world,
         Err(error) => return Deed::not_done(&error.to_string()),
     };
-    let fault = Fault::Refused { values: Vec::new() };
-    let body = stand(&world).and_then(|stand| stand.body());
-    let (Ok(Some(body)), Some(chain)) = (body, world.chain()) else {
-        return Deed { touch: Err(fault), ..Deed::not_done("no body") };
+    let stand = match Stand::new(Arc::clone(&world)) {
+        Ok(stand) => stand,
+        Err(error) => return Deed::not_done(&error.to_string()),
+    };
+    let (Ok(Some(body)), Some(chain)) = (stand.body(), world.chain()) else {
+        return Deed::not_done("no body");
     };
     let (trace, ticks) = Trace::new(body, chain);
     let touch = Servo::new(Arc::clone(&world), wrap(Box::new(trace)), 1)

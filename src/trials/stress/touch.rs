@@ -4,11 +4,11 @@ use super::bench::stiffen;
 use super::case::{Case, Outcome, case, hold};
 use super::deed::{Deed, around, deed};
 use super::solids::{mesh, wall};
+use crate::bodies::stand::Stand;
 use crate::conduct::probe::{self, Contact, Touch};
 use crate::things::finger::timing::TimingEffect;
 use crate::things::finger::{Effects, Finger};
 use crate::trials::fidelity::felt::quiet;
-use crate::trials::fidelity::measure::stand;
 use crate::world::scene::Body;
 use crate::world::touch::TouchSettings;
 use crate::world::{Scene, Zone};
@@ -165,7 +165,11 @@ fn many(count: f64, period_s: f64) -> Outcome {
     scene.effects.skin.get_or_insert_default().samples = 125;
     let Some(mesh) = mesh(wall(0.05), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
     let Ok(world) = around(scene, mesh) else { return Outcome::Wrong("no world".into()) };
-    let mut probe = match stand(&world).and_then(|stand| probe::open(&stand, 1)) {
+    let stand = match Stand::new(world) {
+        Ok(stand) => stand,
+        Err(error) => return Outcome::Faulted(error.to_string()),
+    };
+    let mut probe = match probe::open(&stand, 1) {
         Ok(probe) => probe,
         Err(fault) => return Outcome::Faulted(fault.to_string()),
     };
