@@ -24,6 +24,8 @@ pub struct TouchSettings {
     pub detection: Detection,
     /// Force that says contact where no pressure is sensed.
     pub detection_n: f64,
+    /// How far beyond the place where contact was told the finger is held and read.
+    pub press_m: f64,
     /// Time the finger rests on the object before it is read.
     pub settle_s: f64,
     /// Tactile frames averaged, at rest before the approach and on the object.
@@ -58,6 +60,7 @@ impl Default for TouchSettings {
             standoff_m: 0.01,
             detection: Detection::default(),
             detection_n: 0.05,
+            press_m: 0.0,
             settle_s: 0.05,
             frames: 5,
             force_limit_n: 15.0,
@@ -100,6 +103,7 @@ impl Checked for TouchSettings {
         rules.number("standoff_m", self.standoff_m, 1e-4..=1.0);
         rules.table("detection", &self.detection);
         rules.number("detection_n", self.detection_n, 1e-3..=100.0);
+        rules.number("press_m", self.press_m, 0.0..=2e-3);
         rules.number("settle_s", self.settle_s, 0.0..=10.0);
         rules
             .require("frames", self.frames, (1..=100).contains(&self.frames), || "1 to 100".into());

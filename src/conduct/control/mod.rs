@@ -105,8 +105,7 @@ impl Controller {
     /// The command for the next period from measured joint positions, rad or m.
     ///
     /// # Errors
-    /// If a number is not finite or missing; what was commanded last still holds, and
-    /// [`halt`](Self::halt) ends it.
+    /// If a number is not finite or missing; what was commanded last still holds.
     pub fn step(&mut self, q: &[f64], goal: &Goal) -> Result<Motion, ControlError> {
         let q = positions(&self.chain, q)?;
         let (x_wt, jacobian) = self.chain.jacobian(&q);
@@ -115,17 +114,6 @@ impl Controller {
         let (wanted, damping) = task.solve().ok_or(ControlError::NotFinite)?;
         self.qdot = limits::limited(&self.chain, &q, &self.qdot, &wanted, self.period_s);
         Ok(Motion { qdot: self.qdot, damping, followed: task.followed(&self.qdot) })
-    }
-
-    /// The command that brings every joint to rest as fast as the limits allow, along the
-    /// direction it moves in.
-    ///
-    /// # Errors
-    /// If a position is not finite or missing.
-    pub fn halt(&mut self, q: &[f64]) -> Result<Joints, ControlError> {
-        let q = positions(&self.chain, q)?;
-        self.qdot = limits::limited(&self.chain, &q, &self.qdot, &Joints::zeros(), self.period_s);
-        Ok(self.qdot)
     }
 }
 

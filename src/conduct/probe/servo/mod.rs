@@ -6,7 +6,6 @@ mod watch;
 use super::{Contact, Probe, Swept, Touch, refuse_unless_finite};
 use crate::bodies::backend::{Backend, Command, Fault, Reading};
 use crate::conduct::control::{ControlError, Controller, Goal};
-use crate::things::arm::Joints;
 use crate::things::finger::timing::FRAME_S;
 use crate::world::World;
 use crate::world::touch::TouchSettings;
@@ -82,17 +81,7 @@ impl Servo {
     /// One tick towards `goal`.
     fn tick(&mut self, goal: &Goal) -> Result<(), Fault> {
         let motion = self.control.step(&self.state.q, goal).map_err(refused)?;
-        self.command(&motion.qdot)
-    }
-
-    /// One tick that takes the speed away as fast as the limits allow.
-    fn brake(&mut self) -> Result<(), Fault> {
-        let qdot = self.control.halt(&self.state.q).map_err(refused)?;
-        self.command(&qdot)
-    }
-
-    fn command(&mut self, qdot: &Joints) -> Result<(), Fault> {
-        self.command.qdot.iter_mut().zip(qdot.iter()).for_each(|(to, from)| *to = *from);
+        self.command.qdot.iter_mut().zip(motion.qdot.iter()).for_each(|(to, from)| *to = *from);
         let reading = self.body.step(&self.command)?;
         self.watch.take(reading);
         self.state.take(reading);
@@ -132,11 +121,11 @@ impl Servo {
         }
     }
 
-    /// Stands still until `count` more frames have arrived, or their time has passed in a body
-    /// without sensor.
-    fn rest(&mut self, count: usize) -> Result<Option<Alarm>, Fault> {
+    /// Stands still at `x_wt` until `count` more frames have arrived, or their time has passed in a
+    /// body without sensor.
+    fn rest(&mut self, x_wt: Isometry3<f64>, count: usize) -> Result<Option<Alarm>, Fault> {
         self.watch.forget();
-        let here = Goal::still(self.x_wt());
+        let here = Goal::still(x_wt);
         let until_s = self.state.time_s + count as f64 * FRAME_S;
         while self.watch.frames().len() < count {
             if self.watch.heard_s().is_none() && self.state.time_s >= until_s {
@@ -166,16 +155,19 @@ impl Servo {
         })
     }
 
-    /// Presses on until the finger has settled and reads the contact.
+    /// Stops, settles where contact was told, and reads it: what the finger overran while its
+    /// servos stopped it is taken back, so that the depth does not depend on them.
     fn read(&mut self) -> Result<Option<Contact>, Fault> {
         let until_s = self.state.time_s + self.settings.settle_s;
+        let mut held = self.x_wt();
+        held.translation.y -= self.settings.press_m;
         while self.state.time_s < until_s {
-            self.brake()?;
+            self.tick(&Goal::still(held))?;
             if self.watch.alarm() == Some(Alarm::Overload) {
                 return Ok(None);
             }
         }
-        if self.rest(self.settings.frames)?.is_some() {
+        if self.rest(held, self.settings.frames)?.is_some() {
             return Ok(None);
         }
         let x_wt = self.x_wt();
@@ -200,7 +192,7 @@ impl Probe for Servo {
         let TouchSettings { travel_m_s, approach_m_s, frames, .. } = self.settings;
         let above = self.standoff(target);
         self.go("the stand-off", above, travel_m_s, false)?;
-        self.rest(frames)?;
+        self.rest(above, frames)?;
         self.watch.tare();
         let mut below = above;
         below.translation.y = self.extent_y().0 - self.world.scene().finger.radius_m - CLEARANCE_M;
