@@ -6,12 +6,17 @@ use palpate::ground::work;
 use palpate::things::finger::{Effects, Feel};
 use palpate::trials::fidelity::effects::{SWITCHES, switched};
 use palpate::trials::fidelity::felt::quiet;
-use palpate::trials::fidelity::ladder::{DIAGONAL, RUNGS, Senses};
+use palpate::trials::fidelity::ladder::{DIAGONAL, RUNGS, is_diagonal};
 use palpate::trials::fidelity::measure::{targets, touch_all};
 use palpate::trials::fidelity::order;
+#[cfg(feature = "mujoco")]
+use palpate::trials::fidelity::press;
 use palpate::trials::fidelity::row::Spread;
+use palpate::trials::fidelity::rung::Senses;
 use palpate::trials::fidelity::tolerance::Tolerance;
+use palpate::world::collision::Collision;
 use palpate::world::{Scene, World};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -31,7 +36,9 @@ fn every_rung_is_a_scene_that_can_be_built_and_saved() {
         assert_eq!(Scene::load(file.path(), &[]).unwrap(), changed, "{}", rung.name());
         assert_eq!(rung.senses == Senses::None, changed.effects == Effects::default());
     }
-    let on = RUNGS.iter().filter(|rung| rung.is_diagonal()).count();
+    let names: BTreeSet<String> = RUNGS.iter().map(|rung| rung.name()).collect();
+    assert_eq!(names.len(), RUNGS.len());
+    let on = RUNGS.iter().filter(|rung| is_diagonal(rung)).count();
     assert_eq!(on, DIAGONAL.len());
 }
 
@@ -47,6 +54,33 @@ fn the_error_falls_with_the_resolution_as_it_should() {
     assert_eq!(poses.len(), targets.len());
     let order = order::in_samples(&scene, &poses).unwrap();
     assert!((order.observed - order.expected).abs() < 0.5, "{order:?}");
+}
+
+/// Explicit in the skin's force, semi-implicit in the joints: of first order. The bar tells it from an
+/// order of a half and of two.
+#[test]
+#[cfg(feature = "mujoco")]
+fn with_masses_the_error_in_contact_falls_with_the_step() {
+    for name in ["container", "bird"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}_finger.toml"));
+        let order = press::in_step(&Scene::load(&path, &[]).unwrap()).unwrap().unwrap();
+        println!("{order:?}");
+        assert!((order.observed - order.expected).abs() < 0.3, "{name}: {order:?}");
+        assert!(order.errors.is_sorted_by(|a, b| a.1 > b.1), "{name}: {order:?}");
+    }
+}
+
+/// What only a rigid finger has does not stay with a soft one, which would be refused.
+#[test]
+fn a_rigid_scene_leaves_its_geometry_to_rigid_rungs() {
+    let sets = ["body=\"dynamic\"", "effects={}", "solver={collision=\"sdf\", sdf={iterations=5}}"];
+    let rigid = scene(&sets);
+    for rung in RUNGS {
+        let changed = rung.apply(&rigid);
+        assert_eq!(changed.solver.collision, rung.collision, "{}", rung.name());
+        let searched = rung.collision == Some(Collision::Sdf);
+        assert_eq!(changed.solver.sdf.is_some(), searched, "{}", rung.name());
+    }
 }
 
 #[test]

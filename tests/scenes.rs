@@ -102,6 +102,43 @@ fn mujoco_compiles_the_generated_model() {
     assert!(mujoco::compile("<mujoco><worldbody><geom/></worldbody></mujoco>").is_err());
 }
 
+/// A setting that would change nothing, or be unstable, is refused with its key and what is allowed.
+#[test]
+fn solver_settings_that_mean_nothing_are_refused() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird_pa10.toml");
+    let load = |sets: &[&str]| {
+        Scene::load(&path, &sets.iter().map(|set| set.to_string()).collect::<Vec<_>>())
+    };
+    let (rigid, sdf) = ("effects={}", "solver.collision=\"sdf\"");
+    for (sets, words) in [
+        (&[sdf][..], ["solver.collision", "without skin"]),
+        (&["body=\"kinematic\"", sdf], ["solver.collision", "dynamic"]),
+        (&["body=\"cast\"", rigid, sdf], ["solver.collision", "dynamic"]),
+        (&[rigid, "solver.collision=\"box\""], ["solver.collision", "height_field"]),
+        (&[rigid, "solver.sdf={}"], ["solver.sdf", "collision = \"sdf\""]),
+        (&[rigid, sdf, "solver.sdf.iterations=0"], ["solver.sdf.iterations", "1 to 1000"]),
+        (&[rigid, sdf, "solver.sdf.initpoints=1001"], ["solver.sdf.initpoints", "1 to 1000"]),
+        (&["solver.integrator=\"heun\""], ["solver.integrator", "implicitfast"]),
+        (&["solver.integrator=\"euler\""], ["solver.step_s", "at most 0.001"]),
+        (&["solver.integrator=\"rk4\""], ["solver.step_s", "at most 0.001"]),
+    ] {
+        let error = load(sets).unwrap_err().to_string();
+        assert!(words.iter().all(|word| error.contains(word)), "{sets:?}: {error}");
+    }
+    for sets in [
+        &[rigid, sdf, "solver.sdf={iterations=5, initpoints=5}"][..],
+        &[rigid, "solver.collision=\"hull\""],
+        &[rigid, "solver.collision=\"height_field\""],
+        &["solver={step_s=0.001, integrator=\"rk4\"}"],
+    ] {
+        let scene = load(sets).unwrap();
+        let text = toml::to_string(&scene).unwrap();
+        let saved = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+        fs::write(saved.path(), text).unwrap();
+        assert_eq!(Scene::load(saved.path(), &[]).unwrap(), scene, "{sets:?}");
+    }
+}
+
 const EXPERIMENT: &str = include_str!("../experiments/toy.toml");
 const SCENE: &str = include_str!("../scenes/bird.toml");
 

@@ -1,5 +1,6 @@
 //! Floor 2: the scene and what never changes during a trial.
 
+pub mod collision;
 pub mod function;
 pub mod mjcf;
 pub mod scene;

@@ -204,6 +204,23 @@ impl Checked for Scene {
             rules.require("touch.period_s", period_s, whole, || {
                 format!("a whole number of steps of solver.step_s = {step_s} s")
             });
+            let longest_s = self.solver.longest_step_s();
+            let stable = self.arm.is_none() || step_s <= longest_s;
+            rules.require("solver.step_s", step_s, stable, || {
+                let integrator = self.solver.integrator.name();
+                format!(
+                    "at most {longest_s}: an arm's servos are too stiff for longer steps of \
+                         solver.integrator = \"{integrator}\""
+                )
+            });
+        }
+        if let Some(collision) = self.solver.collision {
+            let value = format!("\"{}\"", collision.name());
+            rules.require("solver.collision", value, self.collides(), || {
+                "no collision: only a finger without skin of body = \"dynamic\" collides in \
+                 MuJoCo; any other meets the exact mesh"
+                    .into()
+            });
         }
         let feels = self.body != Body::Kinematic || self.effects.skin.is_some();
         rules.require("effects.skin", "(none)", feels, || {
@@ -253,6 +270,12 @@ impl Scene {
             Body::Dynamic => 0.002,
             Body::Function | Body::Cast | Body::Kinematic => 0.01,
         })
+    }
+
+    /// Whether MuJoCo lets the finger collide with the object: it does where no skin says what the
+    /// object does to it.
+    pub fn collides(&self) -> bool {
+        self.body == Body::Dynamic && self.effects.skin.is_none()
     }
 
     /// Fastest approach at which contact is told before skin and fluid are used up in front of the

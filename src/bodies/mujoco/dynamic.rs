@@ -6,8 +6,9 @@ use crate::bodies::sense::Sense;
 use crate::things::arm::Chain;
 use crate::things::finger::{Motion, stiffness};
 use crate::world::World;
+use crate::world::collision::Collision;
 use crate::world::mjcf::{self, Mode};
-use crate::world::world::APPROACH_W;
+use crate::world::world::{APPROACH_W, Shape};
 use mujoco_rs::wrappers::MjModel;
 use std::sync::Arc;
 
@@ -33,9 +34,11 @@ impl Dynamic {
     /// The world's model, compiled once for all trials.
     ///
     /// # Errors
-    /// If MuJoCo refuses it, or the scene's time step is too long for its skin.
+    /// If MuJoCo refuses it, the scene's time step is too long for its skin, or the object has no
+    /// inside where the scene's collision needs one.
     pub fn model(world: &World) -> Result<Arc<MjModel>, ModelError> {
         let step_s = world.scene().solver.step_s;
+        check_inside(world)?;
         let text = mjcf::scene(world, Mode::Dynamic { step_s });
         let model = Arc::new(compile(&text.ok_or(ModelError::Lacks { part: "an object" })?)?);
         check_step(world, &model, step_s)?;
@@ -139,6 +142,16 @@ impl Backend for Dynamic {
         self.tick += 1;
         self.report();
         Ok(&self.reading)
+    }
+}
+
+/// Without an inside a distance has no sign.
+fn check_inside(world: &World) -> Result<(), ModelError> {
+    let Shape::Mesh { report, .. } = world.shape() else { return Ok(()) };
+    let edges = report.border_edges.count + report.non_manifold_edges.count;
+    match world.scene().solver.collision {
+        Some(Collision::Sdf) if edges > 0 => Err(ModelError::Open { edges }),
+        _ => Ok(()),
     }
 }
 

@@ -49,6 +49,15 @@ pub enum ModelError {
         /// The longest step that is accepted.
         limit_s: f64,
     },
+    /// The object has no inside.
+    #[error(
+        "solver.collision = \"sdf\" needs a closed mesh, but this one has {edges} edges that are not \
+         shared by two triangles"
+    )]
+    Open {
+        /// Border and non-manifold edges.
+        edges: usize,
+    },
     /// There is no memory for its state.
     #[error("no memory for the state of the MuJoCo model")]
     Memory,

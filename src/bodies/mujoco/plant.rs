@@ -6,7 +6,7 @@ use super::touch;
 use crate::bodies::backend::{Fault, IdealContact, Wrench};
 use crate::things::arm::{Joints, chain::MAX_JOINTS};
 use mujoco_rs::wrappers::mj_data::MjData;
-use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
+use mujoco_rs::wrappers::mj_model::{MjModel, MjtIntegrator, MjtObjBase};
 use nalgebra::{
     DMatrix, Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion,
     Vector3, Vector6,
@@ -24,6 +24,8 @@ pub struct Plant {
     finger: usize,
     /// Pose of the sensor in `T`.
     x_tm: Isometry3<f64>,
+    /// Whether a step evaluates the model in between.
+    staged: bool,
     contact: Option<IdealContact>,
 }
 
@@ -64,8 +66,9 @@ impl Plant {
             )
         };
         let x_tm = local(tip).inv_mul(&local(mount));
+        let staged = model.opt().integrator == MjtIntegrator::mjINT_RK4 as i32;
         let data = MjData::try_new(Arc::clone(&model)).map_err(|_| ModelError::Memory)?;
-        Ok(Self { data, servo: Servo::new(kv, limit), tip, finger, x_tm, contact: None })
+        Ok(Self { data, servo: Servo::new(kv, limit), tip, finger, x_tm, staged, contact: None })
     }
 
     /// Puts the arm at rest at `q`, its servos holding its weight, at time 0.
@@ -110,9 +113,12 @@ impl Plant {
         self.data.xfrc_applied_mut()[self.finger] =
             [force_w.x, force_w.y, force_w.z, torque_w.x, torque_w.y, torque_w.z];
         // In this order positions and velocities are those after the step; `mj_step` would leave
-        // those before it.
-        self.data.step2();
-        self.contact = touch::contact(&self.data, &x_wt);
+        // those before it. `mj_step2` cannot do Runge and Kutta's stages: it takes Euler's instead.
+        match self.staged {
+            true => self.data.step(),
+            false => self.data.step2(),
+        }
+        self.contact = touch::contact(&self.data, self.finger, &x_wt);
         self.data.step1();
         self.check()
     }

@@ -4,7 +4,9 @@ use super::columns::{aligned, cell, duration, write_csv, write_figure};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::{Ending, print};
 use crate::faces::report::pareto;
-use crate::trials::fidelity::climb::{self, Climb, climb, is_reference};
+use crate::trials::fidelity::climb::{self, Climb, climb};
+use crate::trials::fidelity::ladder::is_reference;
+use crate::trials::fidelity::order::{Order, Step};
 use crate::trials::fidelity::row::{Line, Row, Spread};
 use crate::trials::fidelity::tolerance::Tolerance;
 use crate::trials::store::write_whole;
@@ -61,11 +63,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     bar.finish_and_clear();
     let lines: Vec<Line> = climb.rows.iter().map(Line::from).collect();
     write_csv(&out.join("fidelity.csv"), &lines)?;
+    let steps: Vec<Step> = climb.orders.iter().flat_map(Order::steps).collect();
+    write_csv(&out.join("orders.csv"), &steps)?;
     if let Some(svg) = pareto::draw(&climb) {
         write_figure(&out.join("fidelity"), &svg)?;
     }
     print(&described(&climb))?;
-    print(&format!("table and figure in {}", out.display()))?;
+    print(&format!("tables and figure in {}", out.display()))?;
     if !climb.finished {
         return Ok(Ending::Interrupted);
     }

@@ -3,10 +3,12 @@
 use super::axes::{Axis, Panel, Sample, legend};
 use super::canvas::{Anchor, Area, Canvas};
 use super::style::{self, FAINT_INK, INK, PAPER, SMALL_PX};
-use crate::trials::fidelity::climb::{Climb, is_reference};
-use crate::trials::fidelity::ladder::Senses;
+use crate::trials::fidelity::climb::Climb;
+use crate::trials::fidelity::ladder::is_reference;
 use crate::trials::fidelity::order::Order;
+use crate::trials::fidelity::press;
 use crate::trials::fidelity::row::{Row, Spread};
+use crate::trials::fidelity::rung::Senses;
 
 /// Colours of what a rung simulates, as of Okabe and Ito.
 const GROUPS: [(Senses, &str, &str); 4] = [
@@ -26,15 +28,16 @@ const TOPS_PX: [f64; 2] = [66.0, 420.0];
 
 /// The figure; none without a row that differs from the reference.
 pub fn draw(climb: &Climb) -> Option<String> {
-    let mut canvas = Canvas::new(LEFT_PX + 2.0 * STEP_PX - 60.0, TOPS_PX[1] + PANEL_PX.1 + 54.0);
+    let mut canvas = Canvas::new(LEFT_PX + 3.0 * STEP_PX - 60.0, TOPS_PX[1] + PANEL_PX.1 + 54.0);
     let entries: Vec<_> = (GROUPS.iter())
         .map(|(_, colour, words)| (Sample::Circle(point(colour)), *words))
         .chain([(Sample::Line(style::dashed(INK, 1.3, "5 3")), "front")])
         .collect();
     legend(&mut canvas, [LEFT_PX, 20.0], &entries);
-    let measures: [(Measure, f64, &str); 2] = [
+    let measures: [(Measure, f64, &str); 3] = [
         (|row| row.off_reference_m, 1e-3, "contact off the reference's (mm)"),
         (|row| row.force_n, 1.0, "force off the reference's (N)"),
+        (|row| row.off_truth_m, 1e-3, "contact off the true surface (mm)"),
     ];
     for (column, (measure, unit, words)) in measures.into_iter().enumerate() {
         let panel_area = area(column, 0);
@@ -100,6 +103,7 @@ fn convergence(canvas: &mut Canvas, order: &Order, area: Area) {
     panel.frame(canvas);
     let across = match order.name {
         "time step" => "ticks per second",
+        press::NAME => "steps per second",
         name => name,
     };
     panel.label(canvas, "", across, "mean error of the force (N)");

@@ -1,10 +1,12 @@
 //! The whole ladder: the reference first, then every rung against it.
 
 use super::felt::quiet;
-use super::ladder::{RUNGS, Rung};
+use super::ladder::{RUNGS, is_diagonal};
 use super::measure::{MeasureError, Touches, surface_rmse_m, targets, touch_all};
 use super::order::{self, Order};
+use super::press;
 use super::row::{Row, row};
+use super::rung::Rung;
 use crate::trials::truth::Truth;
 use crate::world::{Scene, World};
 use std::sync::Arc;
@@ -14,15 +16,15 @@ const GRID: usize = 41;
 
 /// Rungs with their errors, and how these fall.
 pub struct Climb {
-    /// As in [`RUNGS`]; fewer if it was stopped.
+    /// Of the [`RUNGS`] that this build can simulate; fewer if it was stopped.
     pub rows: Vec<Row>,
-    /// In the time step and in the points of the skin.
+    /// In the time step, in the points of the skin, and in the step of a body with masses.
     pub orders: Vec<Order>,
     /// Whether nobody stopped it.
     pub finished: bool,
 }
 
-/// Every rung with `count` touches; sensors are quiet, so that what differs is the model.
+/// Every rung with `count` touches, or as many as it makes at most; sensors are quiet, so that what differs is the model.
 ///
 /// `tick` is called after each of [`pieces`] and says whether to go on.
 ///
@@ -38,11 +40,15 @@ pub fn climb(
     let mut climb = Climb { rows: Vec::new(), orders: Vec::new(), finished: false };
     let mut reference: Option<Touches> = None;
     let mut truth = None;
-    for rung in RUNGS.iter().rev() {
+    for rung in built().rev() {
+        let targets = &targets[..count.min(rung.targets)];
         let world = Arc::new(World::build(quiet(&rung.apply(scene)))?);
         let truth = truth.get_or_insert_with(|| Truth::sample(&world, GRID));
-        let Some(touches) = touch_all(&world, &targets, seed, tick)? else { return Ok(climb) };
-        let surface_m = surface_rmse_m(scene, &targets, &touches.contacts, truth);
+        let Some(touches) = touch_all(&world, targets, seed, tick)? else { return Ok(climb) };
+        // A belief of fewer touches is no worse than its physics.
+        let surface_m = (targets.len() == count)
+            .then(|| surface_rmse_m(scene, targets, &touches.contacts, truth))
+            .flatten();
         let against = reference.as_ref().unwrap_or(&touches);
         climb.rows.insert(0, row((*rung, &world), &touches, against, surface_m));
         reference.get_or_insert(touches);
@@ -55,19 +61,25 @@ pub fn climb(
         .map(|f| f.motion)
         .collect();
     climb.orders.push(order::in_samples(scene, &poses)?);
+    climb.orders.extend(press::in_step(scene)?);
     climb.finished = true;
     Ok(climb)
 }
 
 /// How often [`climb`] calls `tick`.
 pub fn pieces(count: usize) -> usize {
-    count * (RUNGS.len() + order::PERIODS_S.len())
+    let touches: usize = built().map(|rung| count.min(rung.targets)).sum();
+    touches + count * order::PERIODS_S.len()
+}
+
+fn built() -> impl DoubleEndedIterator<Item = &'static Rung> {
+    RUNGS.iter().filter(|rung| rung.is_built())
 }
 
 impl Climb {
     /// The rungs that approach the reference in every direction at once.
     pub fn diagonal(&self) -> impl Iterator<Item = &Row> {
-        self.rows.iter().filter(|row| row.rung.is_diagonal())
+        self.rows.iter().filter(|row| is_diagonal(&row.rung))
     }
 
     /// Whether each rung of the diagonal is nearer to the reference than the one before, in the
@@ -89,9 +101,4 @@ impl Climb {
         });
         rows
     }
-}
-
-/// Whether a rung is the one all others are compared with.
-pub fn is_reference(rung: &Rung) -> bool {
-    RUNGS.last() == Some(rung)
 }

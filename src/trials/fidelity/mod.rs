@@ -2,8 +2,8 @@
 //! at a fine time step.
 //!
 //! `ladder` names the scenes, `measure` touches with one of them, `trace` and `felt` say how the
-//! finger was loaded when it was read, `order` how fast the error falls with the resolution,
-//! `effects` what each piece of physics changes and costs.
+//! finger was loaded when it was read, `order` and `press` how fast the error falls with the
+//! resolution, `effects` what each piece of physics changes and costs.
 
 pub mod climb;
 pub mod effects;
@@ -11,6 +11,8 @@ pub mod felt;
 pub mod ladder;
 pub mod measure;
 pub mod order;
+pub mod press;
 pub mod row;
+pub mod rung;
 pub mod tolerance;
 pub mod trace;

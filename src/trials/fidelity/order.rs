@@ -1,13 +1,14 @@
 //! How fast the error falls with the resolution, everything else being held.
 
 use super::felt::quiet;
-use super::ladder::{Rung, Senses};
 use super::measure::{MeasureError, Touches, touch_all};
+use super::rung::{Rung, Senses};
 use crate::things::finger::Motion;
 use crate::trials::statistics::mean;
 use crate::world::scene::Body;
 use crate::world::world::Shape;
 use crate::world::{Scene, World};
+use serde::Serialize;
 use std::sync::Arc;
 
 /// Time steps compared with the last, in seconds; chosen: a stage takes 20 ms to stop from an
@@ -18,7 +19,7 @@ pub(super) const PERIODS_S: [f64; 5] = [0.005, 0.002, 0.001, 0.0005, 0.000125];
 const SAMPLES: [usize; 8] = [60, 125, 250, 500, 1000, 2000, 8000, 32000];
 
 /// Points of the skin in the comparison of time steps; chosen: they cancel.
-const STEPPED_SAMPLES: usize = 250;
+pub(super) const STEPPED_SAMPLES: usize = 250;
 
 /// How the mean error of the force falls.
 #[derive(Clone, Debug)]
@@ -34,7 +35,7 @@ pub struct Order {
 }
 
 impl Order {
-    fn new(name: &'static str, errors: Vec<(f64, f64)>, expected: f64) -> Self {
+    pub(super) fn new(name: &'static str, errors: Vec<(f64, f64)>, expected: f64) -> Self {
         let logs: Vec<(f64, f64)> = (errors.iter())
             .filter(|(_, error)| *error > 0.0)
             .map(|(at, error)| (at.ln(), error.ln()))
@@ -45,6 +46,27 @@ impl Order {
         let below: f64 = logs.iter().map(|(x, _)| (x - x0).powi(2)).sum();
         Self { name, errors, observed: -above / below, expected }
     }
+
+    /// Its lines of `orders.csv`.
+    pub fn steps(&self) -> impl Iterator<Item = Step> {
+        self.errors.iter().map(|(resolution, force_mean_n)| Step {
+            resolution_in: self.name,
+            resolution: *resolution,
+            force_mean_n: *force_mean_n,
+            order_observed: self.observed,
+            order_expected: self.expected,
+        })
+    }
+}
+
+/// A line of `orders.csv`: one resolution of an [`Order`].
+#[derive(Serialize)]
+pub struct Step {
+    resolution_in: &'static str,
+    resolution: f64,
+    force_mean_n: f64,
+    order_observed: f64,
+    order_expected: f64,
 }
 
 /// In the time step: a dry finger stops up to a tick after the force that says contact, so the
@@ -59,8 +81,7 @@ pub fn in_time_step(
 ) -> Result<Option<Order>, MeasureError> {
     let mut runs: Vec<(f64, Touches)> = Vec::new();
     for period_s in PERIODS_S {
-        let (body, senses, samples) = (Body::Kinematic, Senses::Dry, STEPPED_SAMPLES);
-        let rung = Rung { body, senses, samples, period_s };
+        let rung = Rung::new(Body::Kinematic, Senses::Dry, STEPPED_SAMPLES, period_s);
         let world = Arc::new(World::build(quiet(&rung.apply(scene)))?);
         match touch_all(&world, targets, 0, tick)? {
             Some(touches) => runs.push((period_s, touches)),
@@ -86,7 +107,7 @@ pub fn in_time_step(
 pub fn in_samples(scene: &Scene, poses: &[Motion]) -> Result<Order, MeasureError> {
     let mut forces: Vec<(usize, Vec<f64>)> = Vec::new();
     for samples in SAMPLES {
-        let rung = Rung { body: Body::Kinematic, senses: Senses::Fluid, samples, period_s: 0.01 };
+        let rung = Rung::new(Body::Kinematic, Senses::Fluid, samples, 0.01);
         let world = World::build(rung.apply(scene))?;
         let (Some(skin), Shape::Mesh { bvh, .. }) =
             (world.fingertip().and_then(|tip| tip.skin()), world.shape())

@@ -1,11 +1,13 @@
 //! A rung's row: its errors against the truth and the reference, and its price.
 
 use super::felt::Felt;
-use super::ladder::Rung;
 use super::measure::Touches;
+use super::rung::Rung;
 use crate::conduct::probe::Contact;
 use crate::trials::statistics::{mean, mean_interval};
 use crate::world::World;
+use crate::world::collision::Collision;
+use crate::world::scene::Body;
 use crate::world::world::Shape;
 use nalgebra::Point3;
 use serde::Serialize;
@@ -41,7 +43,9 @@ impl Spread {
 pub struct Row {
     /// Which.
     pub rung: Rung,
-    /// Touches that found something, of all.
+    /// Targets touched.
+    pub touches: usize,
+    /// Touches that found something.
     pub contacts: usize,
     /// Touches that ended in a fault.
     pub faults: usize,
@@ -85,6 +89,7 @@ pub fn row(
     };
     Row {
         rung,
+        touches: touches.contacts.len(),
         contacts: touches.contacts.iter().flatten().count(),
         faults: touches.faults,
         off_truth_m: Spread::of(&off),
@@ -124,6 +129,9 @@ pub struct Line {
     senses: &'static str,
     samples: usize,
     period_s: f64,
+    integrator: &'static str,
+    collision: Option<&'static str>,
+    touches: usize,
     contacts: usize,
     faults: usize,
     off_truth_mean_m: Option<f64>,
@@ -162,6 +170,9 @@ impl From<&Row> for Line {
             senses: rung.senses.name(),
             samples: rung.samples,
             period_s: rung.period_s,
+            integrator: if rung.body == Body::Dynamic { rung.integrator.name() } else { "" },
+            collision: rung.collision.map(Collision::name),
+            touches: row.touches,
             contacts: row.contacts,
             faults: row.faults,
             off_truth_mean_m: mean(*off_truth_m),

@@ -1,6 +1,6 @@
 //! An error that is good enough, and the cheapest rung that keeps within it.
 
-use super::climb::is_reference;
+use super::ladder::is_reference;
 use super::row::{Row, Spread};
 use std::fmt;
 use std::str::FromStr;

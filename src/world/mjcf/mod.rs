@@ -1,10 +1,14 @@
 //! Scene → MJCF, the text a MuJoCo model is compiled from. Numbers are SI, in `W`.
 
-mod relief;
+mod height_field;
+mod hull;
+mod mesh;
 mod robot;
 mod scenery;
+mod sdf;
 
-use super::scene::Body;
+use super::collision::Collision;
+use super::solver::Integrator;
 use super::world::World;
 use std::fmt::{Display, Write};
 
@@ -17,8 +21,8 @@ pub enum Mode {
     /// To look at: everything in the scene.
     Picture,
     /// To step: what moves and nothing else. Shapes would cost time at every step, and contact is
-    /// the skin's matter, not MuJoCo's; only a finger without a skin meets the object as a height
-    /// field over the zone.
+    /// the skin's matter, not MuJoCo's; only a finger without a skin meets the object, as the
+    /// scene's [`Collision`].
     Dynamic {
         /// Time step; the servos' gains are chosen for 2 ms and less.
         step_s: f64,
@@ -29,16 +33,14 @@ pub enum Mode {
 /// force/torque sensor at the site `mount` and `T` at the site `tip`; in a picture also the
 /// object at its pose on a vertical board, the floor, a camera and lights. None for a scene
 /// without a mesh.
-///
-/// The object's mesh never collides: MuJoCo would collide its convex hull.
 pub fn scene(world: &World, mode: Mode) -> Option<String> {
     let mesh = world.mesh()?;
     let chain = world.chain()?;
     let shown = mode == Mode::Picture;
-    let collides = !shown && world.fingertip().is_none() && world.scene().body == Body::Dynamic;
+    let collides = !shown && world.scene().collides();
     let scenery = match shown {
         true => scenery::scenery(mesh, &chain),
-        false if collides => relief::relief(world)?.concat(),
+        false if collides => obstacle(world)?,
         false => String::new(),
     };
     let step_s = match mode {
@@ -52,7 +54,7 @@ pub fn scene(world: &World, mode: Mode) -> Option<String> {
         r#"<mujoco model="palpate">
 {robot}
   <compiler discardvisual="{discard}"/>
-  <option timestep="{step_s}"><flag autoreset="disable"/></option>
+  <option timestep="{step_s}" integrator="{integrator}"><flag autoreset="disable"/></option>
   <sensor>
     <force name="force" site="mount"/>
     <torque name="torque" site="mount"/>
@@ -62,9 +64,34 @@ pub fn scene(world: &World, mode: Mode) -> Option<String> {
 "#,
         robot = robot::robot(world.scene(), &chain, collides),
         discard = !shown,
+        integrator = keyword(world.scene().solver.integrator),
         home = list(chain.home.iter().take(chain.joints.len())),
     );
     Some(text)
+}
+
+/// What collides with a finger without skin; one line and one file to add a geometry.
+fn obstacle(world: &World) -> Option<String> {
+    match world.scene().solver.collision.unwrap_or_default() {
+        Collision::HeightField => height_field::obstacle(world),
+        Collision::Hull => hull::obstacle(world),
+        Collision::Sdf => sdf::obstacle(world),
+    }
+}
+
+/// Attributes of the two geoms that collide: without friction, yielding as mount and gears of an
+/// arm would: an arm that has to stop at once would be stopped by force (chosen).
+const CONTACT: &str =
+    r#"contype="1" conaffinity="1" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
+
+/// As MJCF spells it.
+fn keyword(integrator: Integrator) -> &'static str {
+    match integrator {
+        Integrator::ImplicitFast => "implicitfast",
+        Integrator::Implicit => "implicit",
+        Integrator::Euler => "Euler",
+        Integrator::Rk4 => "RK4",
+    }
 }
 
 fn list<T: Display>(numbers: impl IntoIterator<Item = T>) -> String {

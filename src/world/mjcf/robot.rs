@@ -1,7 +1,6 @@
 //! The arm or the stage with the finger on it.
 
-use super::list;
-use super::relief::CONTACT;
+use super::{CONTACT, list};
 use crate::things::arm::{Chain, Links};
 use crate::things::finger::Finger;
 use crate::world::Scene;

@@ -1,10 +1,10 @@
 //! What stands around: the object on its board, the floor, the camera, the lights.
 
 use super::list;
+use super::mesh::asset;
 use crate::ground::geometry::mesh::Mesh;
 use crate::things::arm::Chain;
 use nalgebra::{Point3, Vector3};
-use std::fmt::Write;
 
 /// Thickness of the board that the object is fixed to.
 const BOARD_M: f64 = 0.02;
@@ -24,20 +24,12 @@ pub(super) fn scenery(mesh: &Mesh, chain: &Chain) -> String {
     let between = nalgebra::center(&foot, &middle) + Vector3::z() * (0.3 * (foot - middle).norm());
     let size = (foot - middle).norm() + 4.0 * half.norm();
     let whole = between + Vector3::new(1.15, 0.3, 0.4) * size;
-    let mut vertices = String::new();
-    for p in mesh.vertices() {
-        // Writing to a String cannot fail.
-        let _ = write!(vertices, "{} {} {} ", p.x, p.y, p.z);
-    }
-    let mut faces = String::new();
-    for [a, b, c] in mesh.triangles() {
-        let _ = write!(faces, "{a} {b} {c} ");
-    }
+    let asset = asset(mesh, "object");
     format!(
         r#"  <statistic center="{between}" extent="{size}"/>
   <visual><global offwidth="1280" offheight="960"/><quality shadowsize="8192" offsamples="8"/></visual>
   <asset>
-    <mesh name="object" inertia="shell" vertex="{vertices}" face="{faces}"/>
+    {asset}
     <texture name="sky" type="skybox" builtin="gradient" rgb1="1 1 1" rgb2=".6 .7 .8" width="64" height="64"/>
   </asset>
   <worldbody>

@@ -1,9 +1,7 @@
-//! The object as a height field over the zone, for a finger without a skin.
-//!
-//! MuJoCo collides a mesh as its convex hull, which fills every hollow. A height field is collided as
-//! it is, and a surface that is explored along one direction is one.
+//! The object as a height field over the zone: a surface that is explored along one direction is
+//! one, and MuJoCo collides it as it is.
 
-use super::list;
+use super::{CONTACT, list};
 use crate::world::World;
 use crate::world::world::{APPROACH_W, CLEARANCE_M, Shape};
 use nalgebra::Point3;
@@ -17,7 +15,7 @@ const GROUND_M: f64 = 0.01;
 
 /// Asset and geom of what the finger can meet from targets in the zone; places where −y meets
 /// nothing lie as low as the lowest that do.
-pub(super) fn relief(world: &World) -> Option<[String; 2]> {
+pub(super) fn obstacle(world: &World) -> Option<String> {
     let Shape::Mesh { bvh, .. } = world.shape() else { return None };
     let (low, high) = bvh.mesh().bounds();
     let scene = world.scene();
@@ -41,24 +39,15 @@ pub(super) fn relief(world: &World) -> Option<[String; 2]> {
     let values = heights.iter().map(|height| height.map_or(0.0, |y| (y - lowest) / rise_m));
     let half = |[low, high]: [f64; 2]| (high - low) / 2.0;
     let middle = |[low, high]: [f64; 2]| (high + low) / 2.0;
-    let asset = format!(
-        r#"  <asset><hfield name="relief" nrow="{PER_SIDE}" ncol="{PER_SIDE}" size="{} {} {rise_m} {GROUND_M}" elevation="{}"/></asset>
+    // Its rows run against z and its heights along y: turned by −90° about x.
+    Some(format!(
+        r#"  <asset><hfield name="object" nrow="{PER_SIDE}" ncol="{PER_SIDE}" size="{} {} {rise_m} {GROUND_M}" elevation="{}"/></asset>
+  <worldbody><geom name="object" type="hfield" hfield="object" pos="{} {lowest} {}" quat="1 -1 0 0" {CONTACT}/></worldbody>
 "#,
         half(x_m),
         half(z_m),
         list(values),
-    );
-    // Its rows run against z and its heights along y: turned by −90° about x.
-    let geom = format!(
-        r#"  <worldbody><geom name="relief" type="hfield" hfield="relief" pos="{} {lowest} {}" quat="1 -1 0 0" {CONTACT}/></worldbody>
-"#,
         middle(x_m),
         middle(z_m),
-    );
-    Some([asset, geom])
+    ))
 }
-
-/// Attributes of the two geoms that collide: without friction, yielding as mount and gears of an
-/// arm would: an arm that has to stop at once would be stopped by force (chosen).
-pub(super) const CONTACT: &str =
-    r#"contype="1" conaffinity="1" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;

@@ -1,0 +1,215 @@
+//! Contact by each geometry, on the bird: what a step of the PA-10 costs while its finger presses,
+//! and how far a rigid finger's contact is from the true, analytic surface.
+//!
+//! One run, one thread. The finger is lowered along −y without masses, so that only the geometry
+//! speaks; steps are timed with the whole body, and the best of several counts.
+
+use anyhow::{Context, ensure};
+use mujoco_rs::wrappers::mj_data::MjData;
+use nalgebra::{Isometry3, Point3};
+use palpate::bodies::backend::Command;
+use palpate::bodies::mujoco::Dynamic;
+use palpate::bodies::stand::Stand;
+use palpate::conduct::control::{Controller, Goal};
+use palpate::conduct::probe::{self, Touch};
+use palpate::trials::fidelity::measure;
+use palpate::trials::fidelity::row::Spread;
+use palpate::trials::statistics::median;
+use palpate::world::{Scene, World};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Places at which the finger is lowered, and those of them at which steps are timed.
+const PLACES: usize = 60;
+const TIMED: usize = 6;
+
+/// Steps of one measurement, and measurements of which the best counts.
+const STEPS: u32 = 50;
+const TURNS: usize = 10;
+
+/// How far the finger is pressed: into the skin, or against a geometry that hardly gives.
+const DEEP_M: f64 = 1e-3;
+const AGAINST_M: f64 = 5e-5;
+
+/// A place and where the centre of the fingertip's hemisphere comes to rest over it.
+struct Rest {
+    target: Vec<f64>,
+    y_m: f64,
+    p_wc: Point3<f64>,
+}
+
+fn main() -> anyhow::Result<()> {
+    let rigid = "effects={}";
+    let bodies = [
+        ("skin of 500 points", &["effects={skin={}}"][..]),
+        ("skin and fluid", &["effects={skin={}, fluid={}}"]),
+        ("SDF", &[rigid, "solver.collision=\"sdf\""]),
+        (
+            "SDF, 5 descents of 5 iterations",
+            &[rigid, "solver.collision=\"sdf\"", "solver.sdf={iterations=5, initpoints=5}"],
+        ),
+        ("height field", &[rigid]),
+        ("hull", &[rigid, "solver.collision=\"hull\""]),
+    ];
+    let cast = world(&["body=\"cast\"", rigid])?;
+    let truth: Vec<Rest> = (measure::targets(cast.scene(), PLACES, 0).into_iter())
+        .filter_map(|target| true_rest(&cast, target))
+        .collect();
+    let ours = exact(&cast, &truth)?;
+    println!(
+        "| contact | a step, µs | × the first | rests off, mm: median | 95 % | max \
+         | point off, mm: median | 95 % | max | steps in contact |\n|---|---|---|---|---|---|---|---|---|---|"
+    );
+    println!("| cast onto the mesh | – | – | {} | – |", errors(&cast, &truth, &ours));
+    let mut first_us = None;
+    for (name, sets) in bodies {
+        let dynamic = |arm: &[&str]| world(&[sets, arm, &["body=\"dynamic\""]].concat());
+        let on_arm = dynamic(&["arm={links=\"C\"}"])?;
+        let (rests, depth_m, words) = match on_arm.fingertip() {
+            Some(_) => (None, DEEP_M, "as cast | | | | |".into()),
+            None => {
+                let stage = dynamic(&[])?;
+                let rests = lowered(&stage, &truth)?;
+                let words = errors(&cast, &truth, &rests);
+                (Some(rests), AGAINST_M, words)
+            }
+        };
+        let (step_us, held) = step(&on_arm, rests.as_ref().unwrap_or(&ours), depth_m)?;
+        let ratio = step_us / *first_us.get_or_insert(step_us);
+        println!("| {name} | {step_us:.1} | {ratio:.2} | {words} | {:.0} % |", 100.0 * held);
+    }
+    println!("{} places", truth.len());
+    Ok(())
+}
+
+fn world(sets: &[&str]) -> anyhow::Result<Arc<World>> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird_finger.toml");
+    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
+    Ok(Arc::new(World::build(Scene::load(&path, &sets)?)?))
+}
+
+/// Median, 95 % and largest of how far the rests and the points of contact are from the truth.
+fn errors(world: &World, truth: &[Rest], found: &[Rest]) -> String {
+    let rests = truth.iter().zip(found).map(|(truth, found)| (truth.y_m - found.y_m).abs());
+    let points = found.iter().filter_map(|found| {
+        world.nearest_true_point(&found.p_wc).map(|nearest| (nearest - found.p_wc).norm())
+    });
+    let cells = |errors_m: Vec<f64>| {
+        let spread = Spread::of(&errors_m).unwrap_or_default();
+        let median = median(&errors_m).unwrap_or(f64::NAN);
+        [median, spread.p95, spread.max].map(|m| format!("{:.4}", 1e3 * m)).join(" | ")
+    };
+    format!("{} | {}", cells(rests.collect()), cells(points.collect()))
+}
+
+/// Where the hull rests on the analytic surface, by brute force: the highest that any place under
+/// it lifts it. None where there is no surface.
+fn true_rest(world: &World, target: Vec<f64>) -> Option<Rest> {
+    let scene = world.scene();
+    let lift = |dx_m: f64, dz_m: f64| {
+        let height_m = world.true_height_m(&[target[0] + dx_m, target[1] + dz_m])?;
+        let y_m = scene.zone.datum_y_m + height_m;
+        Some((y_m - scene.finger.front_m(dx_m, dz_m)?, dx_m, dz_m, y_m))
+    };
+    const SIDE: i32 = 40;
+    let reach_m = scene.finger.radius_m + scene.finger.length_m;
+    let (mut x_m, mut z_m, mut half_m) = (0.0, 0.0, reach_m);
+    let mut best = None;
+    while half_m > 1e-7 {
+        let step_m = half_m / f64::from(SIDE);
+        let around = (-SIDE..=SIDE).flat_map(|i| (-SIDE..=SIDE).map(move |k| (i, k)));
+        best = around
+            .filter_map(|(i, k)| lift(x_m + f64::from(i) * step_m, z_m + f64::from(k) * step_m))
+            .chain(best)
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        (_, x_m, z_m, _) = best?;
+        half_m = 4.0 * step_m;
+    }
+    let (y_m, dx_m, dz_m, on_y_m) = best?;
+    Some(Rest { y_m, p_wc: Point3::new(target[0] + dx_m, on_y_m, target[1] + dz_m), target })
+}
+
+/// Where the hull rests on the exact mesh.
+fn exact(cast: &Arc<World>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
+    let mut probe = probe::open(&Stand::new(Arc::clone(cast))?, 0)?;
+    let mut rest = |target: &Vec<f64>| {
+        let y_m = probe::rest_y_m(cast, target).context("a place without contact")?;
+        let Touch::Contact(contact) = probe.touch(target)? else { anyhow::bail!("a miss") };
+        Ok(Rest { target: target.clone(), y_m, p_wc: contact.p_wc })
+    };
+    truth.iter().map(|truth| rest(&truth.target)).collect()
+}
+
+/// Where MuJoCo first says contact when the finger is set down along −y on a stage.
+fn lowered(stage: &Arc<World>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
+    /// From above the highest that any geometry can lie, in steps, to below the lowest.
+    const ABOVE_M: f64 = 0.03;
+    const BELOW_M: f64 = -0.01;
+    const STEP_M: f64 = 2.5e-4;
+    let mut data = MjData::new(Dynamic::model(stage)?);
+    let mut deepest = |target: &[f64], y_m: f64| {
+        data.qpos_mut().copy_from_slice(&[target[0], y_m, target[1]]);
+        data.forward();
+        let contacts = data.contact().iter().filter(|contact| contact.dist <= 0.0);
+        let deepest = contacts.min_by(|a, b| a.dist.total_cmp(&b.dist));
+        deepest.map(|contact| Point3::from(contact.pos))
+    };
+    let mut rest = |truth: &Rest| {
+        let target = &truth.target;
+        let mut high_m = truth.y_m + ABOVE_M;
+        while deepest(target, high_m - STEP_M).is_none() {
+            high_m -= STEP_M;
+            ensure!(high_m > truth.y_m + BELOW_M, "no contact over {target:?}");
+        }
+        let mut low_m = high_m - STEP_M;
+        while high_m - low_m > 1e-7 {
+            let middle_m = 0.5 * (high_m + low_m);
+            match deepest(target, middle_m) {
+                Some(_) => low_m = middle_m,
+                None => high_m = middle_m,
+            }
+        }
+        let p_wc = deepest(target, low_m).context("contact was lost")?;
+        Ok(Rest { target: target.clone(), y_m: low_m, p_wc })
+    };
+    truth.iter().map(&mut rest).collect()
+}
+
+/// Median over some places of the time of a step, µs, while the PA-10 holds its finger `depth_m`
+/// beyond the rest, and the share of steps in which it feels anything.
+fn step(world: &Arc<World>, rests: &[Rest], depth_m: f64) -> anyhow::Result<(f64, f64)> {
+    let scene = world.scene();
+    let stand = Stand::new(Arc::clone(world))?;
+    let (mut times_us, mut held, mut all) = (Vec::new(), 0.0, 0.0);
+    for rest in rests.iter().step_by(rests.len() / TIMED) {
+        let mut body = stand.body()?.context("no body")?;
+        let mut reading = body.reset(0)?.clone();
+        let chain = world.chain().context("no chain")?;
+        let mut controller = Controller::new(chain, scene.period_s())?;
+        for (gap_m, duration_s) in [(2e-3, 3.0), (-depth_m, 1.0)] {
+            let mut p_wt = scene.zone.point(&rest.target, 0.0);
+            p_wt.y = rest.y_m + gap_m;
+            let goal = Goal::still(Isometry3::from_parts(p_wt.into(), scene.finger.attitude_w()));
+            let until_s = reading.time_s + duration_s;
+            while reading.time_s < until_s {
+                let motion = controller.step(&reading.q, &goal)?;
+                let qdot = motion.qdot.as_slice()[..reading.q.len()].to_vec();
+                reading.clone_from(body.step(&Command { qdot })?);
+            }
+        }
+        let command = Command { qdot: vec![0.0; reading.q.len()] };
+        let mut least_us = f64::INFINITY;
+        for _ in 0..TURNS {
+            let begun = Instant::now();
+            for _ in 0..STEPS {
+                let reading = body.step(&command)?;
+                held += if reading.ideal.is_some() { 1.0 } else { 0.0 };
+            }
+            least_us = least_us.min(begun.elapsed().as_secs_f64() * 1e6 / f64::from(STEPS));
+            all += f64::from(STEPS);
+        }
+        times_us.push(least_us);
+    }
+    Ok((median(&times_us).context("no place")?, held / all))
+}
