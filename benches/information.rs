@@ -1,5 +1,6 @@
 //! What a touch tells beside its height: contact normals and swept free space, each against the
-//! same trials without, with exact contacts and with the errors of an estimate from electrodes.
+//! same trials without, with the contacts of the experiment's body (`exact` where it is `cast`) and with
+//! the errors of an estimate added.
 //!
 //! `cargo bench --bench information -- toy container bird` prints a table of each; a number after a name
 //! is its trials, and `exact` or `estimated` leaves the other contacts out.
@@ -10,10 +11,12 @@ use palpate::bodies::stand::Stand;
 use palpate::conduct::planner;
 use palpate::conduct::probe::{self, Contact, Probe, Swept, Touch};
 use palpate::ground::seed;
+use palpate::trials::equal_error::{Estimate, equal_error};
 use palpate::trials::experiment::Experiment;
+use palpate::trials::measure::RMSE;
 use palpate::trials::metrics::Metrics;
 use palpate::trials::row::TrialRow;
-use palpate::trials::statistics::{Paired, median, touches_to_reach};
+use palpate::trials::statistics::{Paired, median};
 use palpate::trials::trial;
 use palpate::trials::truth::Truth;
 use palpate::world::World;
@@ -64,6 +67,10 @@ impl Probe for Estimating {
 
     fn swept(&self) -> Option<Swept> {
         self.exact.swept()
+    }
+
+    fn time_s(&self) -> Option<f64> {
+        self.exact.time_s()
     }
 }
 
@@ -117,12 +124,16 @@ fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
         let begun = Instant::now();
         let rows: Vec<TrialRow> = (0..trials)
             .map(|number| {
-                let exact = probe::open(&stand, 1).unwrap();
-                let rng = seed::stream(experiment.seed, number.into(), "estimates");
-                let mut estimating = Estimating { exact: probe::open(&stand, 1).unwrap(), rng };
-                let mut exact = exact;
-                let probe: &mut dyn Probe = if is_exact { &mut *exact } else { &mut estimating };
-                trial::run_with(&experiment, probe, &truth, entry, number)
+                let mut row = if is_exact {
+                    trial::run(&experiment, &stand, &truth, entry, number)
+                } else {
+                    let rng = seed::stream(experiment.seed, number.into(), "estimates");
+                    let exact = probe::open(&stand, number.into()).unwrap();
+                    let mut probe = Estimating { exact, rng };
+                    trial::run_with(&experiment, &mut probe, &truth, entry, number)
+                };
+                row.planner = belief.into();
+                row
             })
             .collect();
         let seconds = begun.elapsed().as_secs_f64() / f64::from(trials);
@@ -130,13 +141,11 @@ fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
         let unit = if experiment.scene.object.is_some() { 1e3 } else { 1.0 };
         let heights = baseline.get_or_insert_with(|| rows.clone());
         let rmse = |metrics: &Metrics| unit * metrics.rmse_m;
-        let curve = |rows: &[TrialRow]| -> Vec<(u32, f64)> {
-            (experiment.initial_touches..=experiment.touches)
-                .filter_map(|count| Some((count, median(&after(rows, count, rmse))?)))
-                .collect()
-        };
-        let goal = curve(heights).last().map_or(f64::NAN, |last| last.1);
-        let reached = touches_to_reach(&curve(&rows), goal);
+        let both: Vec<TrialRow> = heights.iter().chain(&rows).cloned().collect();
+        let equal = equal_error(&experiment, &both, [belief, BELIEFS[0].0], &RMSE);
+        let equal = equal.filter(|_| belief != BELIEFS[0].0).map_or(String::new(), |equal| {
+            format!("{} × {}", shown(&equal.touches, 0), shown(&equal.ratio, 2))
+        });
         let finals = after(&rows, experiment.touches, rmse);
         let edges = after(&rows, experiment.touches, |m| unit * m.edge_rmse_m.unwrap_or(f64::NAN));
         let covered = after(&rows, experiment.touches, |m| m.coverage.unwrap_or(f64::NAN));
@@ -147,15 +156,24 @@ fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
             format!("{:+.3} [{low:+.3}, {high:+.3}]", paired.mean)
         });
         println!(
-            "| {planner} | {} | {belief} | {:.3} | {:.3} | {against} | {} | {:.2} | {seconds:.2} |{}",
+            "| {planner} | {} | {belief} | {:.3} | {:.3} | {against} | {equal} | {:.2} | {seconds:.2} |{}",
             if is_exact { "exact" } else { "estimated" },
             median(&finals).unwrap_or(f64::NAN),
             median(&edges).unwrap_or(f64::NAN),
-            reached.map_or("–".into(), |count| count.to_string()),
             median(&covered).unwrap_or(f64::NAN),
             if failed > 0 { format!(" {failed} failed") } else { String::new() },
         );
     }
+}
+
+/// An estimate with its interval; a dash where the error is not reached.
+fn shown(estimate: &Estimate, decimals: usize) -> String {
+    let number = |value: f64| match value.is_finite() {
+        true => format!("{value:.decimals$}"),
+        false => "–".into(),
+    };
+    let [low, high] = estimate.interval.unwrap_or([f64::NAN; 2]);
+    format!("{} [{}, {}]", number(estimate.value), number(low), number(high))
 }
 
 /// A measure of every trial after `count` touches.
