@@ -1,9 +1,9 @@
 //! What a touch tells beside its height: contact normals and swept free space, each against the
-//! same trials without, with the contacts of the experiment's body (`exact` where it is `cast`) and with
-//! the errors of an estimate added.
+//! same trials without, with the body's own contacts (exact, or found by electrodes) and with the errors of
+//! an estimate added.
 //!
-//! `cargo bench --bench information -- toy container bird` prints a table of each; a number after a name
-//! is its trials, and `exact` or `estimated` leaves the other contacts out.
+//! `cargo bench --bench information -- toy container bird` prints a table of each experiment; a number
+//! after a name is its trials, and `own` or `estimated`, `active` or `slope` leaves the others out.
 
 use nalgebra::{Rotation3, Unit, Vector3};
 use palpate::bodies::backend::Fault;
@@ -82,10 +82,13 @@ const BELIEFS: [(&str, &[&str]); 4] = [
     ("both", &["gp.normals=true", "gp.free_space=true"]),
 ];
 
+/// Words that are no experiment: whose contacts, and which planner; neither said, both are meant.
+const WORDS: [&str; 4] = ["own", "estimated", "active", "slope"];
+
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
     for (i, name) in words.iter().enumerate() {
-        if name.parse::<u32>().is_ok() || ["exact", "estimated"].contains(&name.as_str()) {
+        if name.parse::<u32>().is_ok() || WORDS.contains(&name.as_str()) {
             continue;
         }
         let trials = words.get(i + 1).and_then(|word| word.parse().ok()).unwrap_or(4);
@@ -93,23 +96,25 @@ fn main() {
             "\n| {name} | contacts | belief | final RMSE | outer tenth | against heights | touches | covered | s |"
         );
         println!("|---|---|---|---|---|---|---|---|---|");
-        let contacts = [("exact", true), ("estimated", false)];
-        let asked = |(word, _): &&(&str, bool)| words.iter().any(|other| other == word);
-        let all = contacts.iter().filter(asked).count() == 0;
-        for &(_, is_exact) in contacts.iter().filter(|contact| all || asked(contact)) {
-            for planner in ["active", "slope"] {
-                compare(name, trials, is_exact, planner);
+        let is_asked = |group: &[&str], word: &str| {
+            let is_said = |word: &str| words.iter().any(|said| said == word);
+            is_said(word) || !group.iter().any(|word| is_said(word))
+        };
+        let [own, estimated, active, slope] = WORDS;
+        for contacts in [own, estimated].iter().filter(|word| is_asked(&[own, estimated], word)) {
+            for planner in [active, slope].iter().filter(|word| is_asked(&[active, slope], word)) {
+                compare(name, trials, *contacts == own, planner);
             }
         }
     }
 }
 
-fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
+fn compare(name: &str, trials: u32, is_own: bool, planner: &str) {
     let mut baseline: Option<Vec<TrialRow>> = None;
     for (belief, settings) in BELIEFS {
         let mut sets: Vec<String> = settings.iter().map(|set| set.to_string()).collect();
         // A millimetre is more than the default hundredth of the relief.
-        if !is_exact {
+        if !is_own {
             sets.push("gp.noise=[1e-4, 0.3]".into());
         }
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("experiments/{name}.toml"));
@@ -124,7 +129,7 @@ fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
         let begun = Instant::now();
         let rows: Vec<TrialRow> = (0..trials)
             .map(|number| {
-                let mut row = if is_exact {
+                let mut row = if is_own {
                     trial::run(&experiment, &stand, &truth, entry, number)
                 } else {
                     let rng = seed::stream(experiment.seed, number.into(), "estimates");
@@ -157,7 +162,11 @@ fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
         });
         println!(
             "| {planner} | {} | {belief} | {:.3} | {:.3} | {against} | {equal} | {:.2} | {seconds:.2} |{}",
-            if is_exact { "exact" } else { "estimated" },
+            match (is_own, experiment.scene.effects.electrodes.is_some()) {
+                (true, true) => "electrodes",
+                (true, false) => "exact",
+                (false, _) => "estimated",
+            },
             median(&finals).unwrap_or(f64::NAN),
             median(&edges).unwrap_or(f64::NAN),
             median(&covered).unwrap_or(f64::NAN),
