@@ -1,8 +1,9 @@
 //! What a touch tells beside its height: contact normals and swept free space, each against the
-//! same trials without, with exact contacts and with the errors of an estimate from electrodes.
+//! same trials without, with the body's own contacts (exact, or found by electrodes) and with the errors of
+//! an estimate added.
 //!
-//! `cargo bench --bench information -- toy container bird` prints a table of each; a number after a name
-//! is its trials, and `exact` or `estimated` leaves the other contacts out.
+//! `cargo bench --bench information -- toy container bird` prints a table of each experiment; a number
+//! after a name is its trials, and `own` or `estimated`, `active` or `slope` leaves the others out.
 
 use nalgebra::{Rotation3, Unit, Vector3};
 use palpate::bodies::backend::Fault;
@@ -10,10 +11,12 @@ use palpate::bodies::stand::Stand;
 use palpate::conduct::planner;
 use palpate::conduct::probe::{self, Contact, Probe, Swept, Touch};
 use palpate::ground::seed;
+use palpate::trials::equal_error::{Estimate, equal_error};
 use palpate::trials::experiment::Experiment;
+use palpate::trials::measure::RMSE;
 use palpate::trials::metrics::Metrics;
 use palpate::trials::row::TrialRow;
-use palpate::trials::statistics::{Paired, median, touches_to_reach};
+use palpate::trials::statistics::{Paired, median};
 use palpate::trials::trial;
 use palpate::trials::truth::Truth;
 use palpate::world::World;
@@ -65,6 +68,10 @@ impl Probe for Estimating {
     fn swept(&self) -> Option<Swept> {
         self.exact.swept()
     }
+
+    fn time_s(&self) -> Option<f64> {
+        self.exact.time_s()
+    }
 }
 
 /// Name and settings of each belief; the first is what the others are held against.
@@ -75,10 +82,13 @@ const BELIEFS: [(&str, &[&str]); 4] = [
     ("both", &["gp.normals=true", "gp.free_space=true"]),
 ];
 
+/// Words that are no experiment: whose contacts, and which planner; neither said, both are meant.
+const WORDS: [&str; 4] = ["own", "estimated", "active", "slope"];
+
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
     for (i, name) in words.iter().enumerate() {
-        if name.parse::<u32>().is_ok() || ["exact", "estimated"].contains(&name.as_str()) {
+        if name.parse::<u32>().is_ok() || WORDS.contains(&name.as_str()) {
             continue;
         }
         let trials = words.get(i + 1).and_then(|word| word.parse().ok()).unwrap_or(4);
@@ -86,23 +96,25 @@ fn main() {
             "\n| {name} | contacts | belief | final RMSE | outer tenth | against heights | touches | covered | s |"
         );
         println!("|---|---|---|---|---|---|---|---|---|");
-        let contacts = [("exact", true), ("estimated", false)];
-        let asked = |(word, _): &&(&str, bool)| words.iter().any(|other| other == word);
-        let all = contacts.iter().filter(asked).count() == 0;
-        for &(_, is_exact) in contacts.iter().filter(|contact| all || asked(contact)) {
-            for planner in ["active", "slope"] {
-                compare(name, trials, is_exact, planner);
+        let is_asked = |group: &[&str], word: &str| {
+            let is_said = |word: &str| words.iter().any(|said| said == word);
+            is_said(word) || !group.iter().any(|word| is_said(word))
+        };
+        let [own, estimated, active, slope] = WORDS;
+        for contacts in [own, estimated].iter().filter(|word| is_asked(&[own, estimated], word)) {
+            for planner in [active, slope].iter().filter(|word| is_asked(&[active, slope], word)) {
+                compare(name, trials, *contacts == own, planner);
             }
         }
     }
 }
 
-fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
+fn compare(name: &str, trials: u32, is_own: bool, planner: &str) {
     let mut baseline: Option<Vec<TrialRow>> = None;
     for (belief, settings) in BELIEFS {
         let mut sets: Vec<String> = settings.iter().map(|set| set.to_string()).collect();
         // A millimetre is more than the default hundredth of the relief.
-        if !is_exact {
+        if !is_own {
             sets.push("gp.noise=[1e-4, 0.3]".into());
         }
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("experiments/{name}.toml"));
@@ -117,12 +129,16 @@ fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
         let begun = Instant::now();
         let rows: Vec<TrialRow> = (0..trials)
             .map(|number| {
-                let exact = probe::open(&stand, 1).unwrap();
-                let rng = seed::stream(experiment.seed, number.into(), "estimates");
-                let mut estimating = Estimating { exact: probe::open(&stand, 1).unwrap(), rng };
-                let mut exact = exact;
-                let probe: &mut dyn Probe = if is_exact { &mut *exact } else { &mut estimating };
-                trial::run_with(&experiment, probe, &truth, entry, number)
+                let mut row = if is_own {
+                    trial::run(&experiment, &stand, &truth, entry, number)
+                } else {
+                    let rng = seed::stream(experiment.seed, number.into(), "estimates");
+                    let exact = probe::open(&stand, number.into()).unwrap();
+                    let mut probe = Estimating { exact, rng };
+                    trial::run_with(&experiment, &mut probe, &truth, entry, number)
+                };
+                row.planner = belief.into();
+                row
             })
             .collect();
         let seconds = begun.elapsed().as_secs_f64() / f64::from(trials);
@@ -130,13 +146,11 @@ fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
         let unit = if experiment.scene.object.is_some() { 1e3 } else { 1.0 };
         let heights = baseline.get_or_insert_with(|| rows.clone());
         let rmse = |metrics: &Metrics| unit * metrics.rmse_m;
-        let curve = |rows: &[TrialRow]| -> Vec<(u32, f64)> {
-            (experiment.initial_touches..=experiment.touches)
-                .filter_map(|count| Some((count, median(&after(rows, count, rmse))?)))
-                .collect()
-        };
-        let goal = curve(heights).last().map_or(f64::NAN, |last| last.1);
-        let reached = touches_to_reach(&curve(&rows), goal);
+        let both: Vec<TrialRow> = heights.iter().chain(&rows).cloned().collect();
+        let equal = equal_error(&experiment, &both, [belief, BELIEFS[0].0], &RMSE);
+        let equal = equal.filter(|_| belief != BELIEFS[0].0).map_or(String::new(), |equal| {
+            format!("{} × {}", shown(&equal.touches, 0), shown(&equal.ratio, 2))
+        });
         let finals = after(&rows, experiment.touches, rmse);
         let edges = after(&rows, experiment.touches, |m| unit * m.edge_rmse_m.unwrap_or(f64::NAN));
         let covered = after(&rows, experiment.touches, |m| m.coverage.unwrap_or(f64::NAN));
@@ -147,15 +161,28 @@ fn compare(name: &str, trials: u32, is_exact: bool, planner: &str) {
             format!("{:+.3} [{low:+.3}, {high:+.3}]", paired.mean)
         });
         println!(
-            "| {planner} | {} | {belief} | {:.3} | {:.3} | {against} | {} | {:.2} | {seconds:.2} |{}",
-            if is_exact { "exact" } else { "estimated" },
+            "| {planner} | {} | {belief} | {:.3} | {:.3} | {against} | {equal} | {:.2} | {seconds:.2} |{}",
+            match (is_own, experiment.scene.effects.electrodes.is_some()) {
+                (true, true) => "electrodes",
+                (true, false) => "exact",
+                (false, _) => "estimated",
+            },
             median(&finals).unwrap_or(f64::NAN),
             median(&edges).unwrap_or(f64::NAN),
-            reached.map_or("–".into(), |count| count.to_string()),
             median(&covered).unwrap_or(f64::NAN),
             if failed > 0 { format!(" {failed} failed") } else { String::new() },
         );
     }
+}
+
+/// An estimate with its interval; a dash where the error is not reached.
+fn shown(estimate: &Estimate, decimals: usize) -> String {
+    let number = |value: f64| match value.is_finite() {
+        true => format!("{value:.decimals$}"),
+        false => "–".into(),
+    };
+    let [low, high] = estimate.interval.unwrap_or([f64::NAN; 2]);
+    format!("{} [{}, {}]", number(estimate.value), number(low), number(high))
 }
 
 /// A measure of every trial after `count` touches.

@@ -4,6 +4,7 @@ mod runs;
 
 use palpate::faces::report::axes::Axis;
 use palpate::faces::report::{self, png};
+use palpate::trials::experiment::Claim;
 use palpate::trials::store::Run;
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::{Options, Tree};
@@ -143,4 +144,58 @@ fn ticks_are_round() {
     // No range, or hardly one, must not make endless labels.
     assert!(labels(Axis::linear(1.0, 1.0, 5.0)).len() < 10);
     assert!(labels(Axis::linear(0.0, 1e-320, 5.0)).len() < 10);
+}
+
+/// Twice the error of `active` at every count, so twice its touches; each table in words and as a file.
+#[test]
+fn planners_are_compared_in_every_measure_and_in_touches_to_equal_error() {
+    let mut run = run(SURFACE);
+    for row in run.rows.iter_mut().filter(|row| row.planner == "random") {
+        let metrics = row.touches.iter_mut().filter_map(|touch| touch.metrics.as_mut());
+        metrics.for_each(|metrics| metrics.rmse_m *= 2.0);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    report::write_tables(&run, folder.path()).unwrap();
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    let equal = read("equal_error.csv");
+    // 0.02 / count is twice 0.02 / 20 at 10, and random is never better than twice that.
+    assert!(
+        equal.contains("active,random,rmse_m,2,0.002,20.0,10.0,10.0,10.0,0.5,0.5,0.5"),
+        "{equal}"
+    );
+    assert!(equal.contains("random,active,rmse_m,2,0.001,20.0,,"), "{equal}");
+    let paired = read("comparison.csv");
+    assert!(paired.contains("active,random,rmse_m,2,-0.001,-0.001,-0.001,1.0"), "{paired}");
+    assert!(paired.contains("active,random,r,2,0.0,0.0,0.0,0.5"), "{paired}");
+    assert!(!paired.contains("time_s"), "{paired}");
+    let files = drawn(&run);
+    let page = text(&files, "report.html");
+    for words in
+        ["minus random", "largest error, mm", "lateral travel, m", "over 20 [over 20, over 20]"]
+    {
+        assert!(page.contains(words), "{words}");
+    }
+}
+
+/// What a publication says stands beside the same number here; after touches that do not occur it
+/// says nothing.
+#[test]
+fn claims_stand_beside_what_came_out() {
+    let mut run = run(SURFACE);
+    let claim = |touches, says: &str| Claim {
+        place: "Fig. 5".into(),
+        says: says.into(),
+        touches,
+        measures: vec!["rmse_m".into(), "length_scale_z_m".into()],
+    };
+    run.experiment.report.claims = vec![claim(10, "it is <accurate>"), claim(99, "it is nowhere")];
+    let files = drawn(&run);
+    let page = text(&files, "report.html");
+    assert!(
+        page.contains(
+            "it is &lt;accurate&gt;</td><td>10 touches</td><td>RMSE, mm</td><td>2.00</td>"
+        )
+    );
+    assert!(page.contains("<td>length scale along z, mm</td><td>42.0</td>"));
+    assert!(!page.contains("it is nowhere"));
 }

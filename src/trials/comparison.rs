@@ -1,61 +1,47 @@
 //! Each planner against a baseline, trial by trial: they share initial touches.
 
 use super::experiment::Experiment;
-use super::metrics::Metrics;
+use super::measure::{MEASURES, Measure};
 use super::row::TrialRow;
-use super::statistics::{Paired, touches_to_reach};
-use super::summary::{self, Point};
+use super::statistics::Paired;
+use super::summary;
+use std::collections::HashMap;
 
 /// Planners that the others are measured against, those that ran.
 pub const BASELINES: [&str; 2] = ["random", "active"];
 
-/// One planner against one baseline after the last touch.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Comparison {
+/// One measure of one planner against one baseline after the last touch.
+#[derive(Debug)]
+pub struct Comparison<'a> {
     /// Which planner.
-    pub planner: String,
+    pub planner: &'a str,
     /// Against which.
-    pub baseline: String,
-    /// Difference of the root mean square errors in m.
-    pub rmse: Option<Paired>,
-    /// Difference of those in the outer tenth of the zone.
-    pub edge_rmse: Option<Paired>,
-    /// Median error of the baseline after its last touch.
-    pub goal_m: f64,
-    /// Touches after which the planner's median error stays at or below that.
-    pub touches_to_goal: Option<u32>,
-    /// The baseline's own.
-    pub baseline_touches_to_goal: Option<u32>,
+    pub baseline: &'static str,
+    /// What is compared.
+    pub measure: &'static Measure,
+    /// How it differs.
+    pub paired: Paired,
 }
 
-/// Every planner against every baseline.
-pub fn comparisons(experiment: &Experiment, rows: &[TrialRow]) -> Vec<Comparison> {
-    let curve = |planner: &str| -> Vec<(u32, f64)> {
-        let points = summary::curve(experiment, rows, planner);
-        points.iter().map(|point: &Point| (point.touches, point.rmse_median_m)).collect()
-    };
-    let curves: Vec<_> = experiment.planners.iter().map(|name| (name, curve(name))).collect();
-    let of_baseline = |baseline: &str| {
-        let (_, baseline_curve) = curves.iter().find(|(name, _)| *name == baseline)?;
-        let goal_m = baseline_curve.last()?.1;
-        let others = curves.iter().filter(|(name, points)| *name != baseline && !points.is_empty());
-        let compared = others.map(|(planner, points)| {
-            let against = |measure: fn(&Metrics) -> Option<f64>| {
-                paired(experiment, rows, [planner, baseline], experiment.touches, measure)
-            };
-            Comparison {
-                planner: planner.to_string(),
-                baseline: baseline.into(),
-                rmse: against(|metrics| Some(metrics.rmse_m)),
-                edge_rmse: against(|metrics| metrics.edge_rmse_m),
-                goal_m,
-                touches_to_goal: touches_to_reach(points, goal_m),
-                baseline_touches_to_goal: touches_to_reach(baseline_curve, goal_m),
-            }
-        });
-        Some(compared.collect::<Vec<_>>())
-    };
-    BASELINES.into_iter().filter_map(of_baseline).flatten().collect()
+/// Every planner against every baseline in every measure that both have.
+pub fn comparisons<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<Comparison<'a>> {
+    let mut found = Vec::new();
+    for (planner, baseline) in pairs(experiment) {
+        for measure in &MEASURES {
+            let paired = paired(experiment, rows, [planner, baseline], experiment.touches, measure);
+            found.extend(paired.map(|paired| Comparison { planner, baseline, measure, paired }));
+        }
+    }
+    found
+}
+
+/// Every planner with every baseline that ran, baseline by baseline.
+pub fn pairs(experiment: &Experiment) -> impl Iterator<Item = (&str, &'static str)> {
+    let ran = |baseline: &&str| experiment.planners.iter().any(|planner| planner == baseline);
+    BASELINES.into_iter().filter(ran).flat_map(|baseline| {
+        let others = experiment.planners.iter().filter(move |planner| *planner != baseline);
+        others.map(move |planner| (planner.as_str(), baseline))
+    })
 }
 
 /// How a measure of the first planner differs from that of the second after `touches`.
@@ -64,16 +50,17 @@ pub fn paired(
     rows: &[TrialRow],
     [planner, baseline]: [&str; 2],
     touches: u32,
-    measure: impl Fn(&Metrics) -> Option<f64>,
+    measure: &Measure,
 ) -> Option<Paired> {
     let values = |planner| {
-        summary::of(rows, planner).filter_map(|row| {
-            let last = row.touches.get((touches as usize).checked_sub(1)?)?;
-            Some((row.trial, measure(last.metrics.as_ref()?)?))
-        })
+        summary::of(rows, planner).filter_map(|row| Some((row.trial, (measure.of)(row, touches)?)))
     };
-    let theirs: std::collections::HashMap<u32, f64> = values(baseline).collect();
+    let theirs: HashMap<u32, f64> = values(baseline).collect();
     let pairs: Vec<(f64, f64)> =
-        values(planner).filter_map(|(trial, error)| Some((error, *theirs.get(&trial)?))).collect();
-    Paired::new(&pairs, experiment.seed)
+        values(planner).filter_map(|(trial, value)| Some((value, *theirs.get(&trial)?))).collect();
+    let mut paired = Paired::new(&pairs, experiment.seed)?;
+    if measure.more_is_better {
+        paired.won = 1.0 - paired.won;
+    }
+    Some(paired)
 }

@@ -1,5 +1,6 @@
 //! What is run: planners × trials on one scene.
 
+use super::measure;
 use crate::conduct::belief::GpSettings;
 use crate::conduct::planner::{self, PlanningSettings};
 use crate::ground::config::{Checked, ConfigError, Loader, Rules};
@@ -53,6 +54,27 @@ pub struct ReportSettings {
     pub trial: u32,
     /// The planners whose beliefs are drawn, those that ran; none: all.
     pub planners: Vec<String>,
+    /// Touches of a baseline whose error the others are asked to reach; none: all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub goal_touches: Option<u32>,
+    /// What a publication says, to stand on the page beside what comes out here; those after touch
+    /// counts that occur.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub claims: Vec<Claim>,
+}
+
+/// What a publication says of an experiment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Claim {
+    /// Where: its figure or section.
+    pub place: String,
+    /// What, in words.
+    pub says: String,
+    /// The count of touches after which it can be seen.
+    pub touches: u32,
+    /// Names of the measures that show it.
+    pub measures: Vec<String>,
 }
 
 /// Most touches of a trial; a fit costs the cube of their number.
@@ -87,6 +109,12 @@ impl Experiment {
             true => self.planners.iter().map(String::as_str).collect(),
             false => chosen,
         }
+    }
+
+    /// Touches of a baseline whose error the others are asked to reach.
+    pub fn goal_touches(&self) -> u32 {
+        let goal = self.report.goal_touches.unwrap_or(self.touches);
+        goal.clamp(self.initial_touches, self.touches)
     }
 
     /// Touch counts after which beliefs are drawn.
@@ -143,6 +171,16 @@ impl Checked for Experiment {
         }
         for (i, name) in self.report.planners.iter().enumerate() {
             rules.one_of(&format!("report.planners[{i}]"), name, &known);
+        }
+        let goal = self.report.goal_touches.unwrap_or(self.touches);
+        rules.number("report.goal_touches", goal.into(), 1.0..=TOUCHES_MAX);
+        let measures: Vec<&str> = measure::all().map(|measure| measure.name).collect();
+        for (i, claim) in self.report.claims.iter().enumerate() {
+            let key = |field: &str| format!("report.claims[{i}].{field}");
+            rules.number(&key("touches"), claim.touches.into(), 1.0..=TOUCHES_MAX);
+            for (j, name) in claim.measures.iter().enumerate() {
+                rules.one_of(&key(&format!("measures[{j}]")), name, &measures);
+            }
         }
         let last = f64::from(self.trials.max(1) - 1);
         rules.number("report.trial", self.report.trial.into(), 0.0..=last);

@@ -1,8 +1,10 @@
 //! Floor 5: experiments, their trials, and the folder their results lie in.
 
 pub mod comparison;
+pub mod equal_error;
 pub mod experiment;
 pub mod fidelity;
+pub mod measure;
 pub mod metrics;
 pub mod row;
 pub mod runner;

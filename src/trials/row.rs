@@ -36,6 +36,9 @@ pub struct TouchRow {
     /// belief observes what was swept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip: Option<[f64; 3]>,
+    /// Time of the body at the touch's end, since its start; left out where a touch is no motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
     /// Standard deviation that the planner saw at the target when it chose it, if it looked:
     /// the posterior's, given also that unreached targets are no news.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -24,7 +24,7 @@ pub fn median(values: &[f64]) -> Option<f64> {
 }
 
 /// As [`median`], and reorders the values.
-fn middle(values: &mut [f64]) -> Option<f64> {
+pub(super) fn middle(values: &mut [f64]) -> Option<f64> {
     let half = values.len() / 2;
     if values.is_empty() {
         return None;
@@ -50,20 +50,36 @@ pub fn median_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
 }
 
 fn bootstrap(values: &[f64], seed: u64, statistic: impl Fn(&mut [f64]) -> f64) -> Option<[f64; 2]> {
-    if values.len() < 2 {
-        return None;
-    }
-    let mut rng = seed::stream(seed, 0, "bootstrap");
     let mut sample = vec![0.0; values.len()];
-    let mut found: Vec<f64> = (0..RESAMPLES)
+    let found = resampled(values.len(), seed, |indices| {
+        sample.iter_mut().zip(indices).for_each(|(to, &index)| *to = values[index]);
+        statistic(&mut sample)
+    });
+    (values.len() > 1).then(|| percentiles_95(found))
+}
+
+/// A statistic of every bootstrap sample: `count` indices below `count`, drawn with replacement.
+pub(super) fn resampled<T>(
+    count: usize,
+    seed: u64,
+    mut statistic: impl FnMut(&[usize]) -> T,
+) -> Vec<T> {
+    let mut rng = seed::stream(seed, 0, "bootstrap");
+    let mut indices = vec![0; count];
+    let samples = if count > 1 { RESAMPLES } else { 0 };
+    (0..samples)
         .map(|_| {
-            sample.fill_with(|| values[rng.random_range(0..values.len())]);
-            statistic(&mut sample)
+            indices.fill_with(|| rng.random_range(0..count));
+            statistic(&indices)
         })
-        .collect();
+        .collect()
+}
+
+/// The ends of the middle 95 % of `found`, which is not empty.
+pub(super) fn percentiles_95(mut found: Vec<f64>) -> [f64; 2] {
     found.sort_by(f64::total_cmp);
-    let cut = RESAMPLES / 40;
-    Some([found[cut], found[RESAMPLES - 1 - cut]])
+    let cut = found.len() / 40;
+    [found[cut], found[found.len() - 1 - cut]]
 }
 
 /// How one planner's errors differ from another's in the same trials.
@@ -99,12 +115,6 @@ impl Paired {
             won: wins / trials as f64,
         })
     }
-}
-
-/// The first count of a curve (count, error) from which the error stays at or below `goal`.
-pub fn touches_to_reach(curve: &[(u32, f64)], goal: f64) -> Option<u32> {
-    let met = curve.iter().rev().take_while(|(_, error)| *error <= goal);
-    met.last().map(|(count, _)| *count)
 }
 
 #[cfg(test)]
@@ -157,15 +167,5 @@ mod tests {
         let [low, high] = paired.interval.unwrap();
         assert!(low <= -0.25 && high >= -0.25 && low >= -1.0 && high <= 1.0);
         assert_eq!(Paired::new(&[], 1), None);
-    }
-
-    #[test]
-    fn a_goal_is_reached_where_the_error_stays_below_it() {
-        let curve = [(3, 5.0), (4, 1.0), (5, 3.0), (6, 2.0), (7, 1.5)];
-        assert_eq!(touches_to_reach(&curve, 2.0), Some(6));
-        assert_eq!(touches_to_reach(&curve, 5.0), Some(3));
-        assert_eq!(touches_to_reach(&curve, 1.0), None);
-        assert_eq!(touches_to_reach(&[], 1.0), None);
-        assert_eq!(touches_to_reach(&[(3, 1.0), (4, f64::NAN)], 1.0), None);
     }
 }

@@ -36,12 +36,16 @@ pub struct Point {
     pub reachable_rmse_median_m: Option<f64>,
     /// Median root mean square error where it cannot.
     pub unreachable_rmse_median_m: Option<f64>,
+    /// Median largest error.
+    pub max_error_median_m: Option<f64>,
     /// Mean share of the truth inside the 95 % band.
     pub coverage_mean: Option<f64>,
     /// Mean negative log predictive density.
     pub nlpd_mean: Option<f64>,
     /// Mean lateral travel from target to target since the first.
     pub path_mean_m: f64,
+    /// Mean time of the body; none where a touch is no motion.
+    pub time_mean_s: Option<f64>,
 }
 
 /// What happened to one planner's trials besides their errors.
@@ -78,6 +82,8 @@ pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<P
             };
             let mean_of = |values: Vec<f64>| (!values.is_empty()).then(|| mean(&values));
             let paths: Vec<f64> = trials.iter().map(|(row, _)| path_m(row, touches)).collect();
+            let times =
+                trials.iter().filter_map(|(row, _)| row.touches[touches as usize - 1].time_s);
             let rmse = pick(|metrics| metrics.rmse_m);
             let (r_mean, r_se) = mean_and_error(&pick(|metrics| metrics.r));
             let (centred_r_mean, centred_r_se) = mean_and_error(&pick(|metrics| metrics.centred_r));
@@ -96,9 +102,11 @@ pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<P
                 edge_rmse_median_m: median(&pick_some(|metrics| metrics.edge_rmse_m)),
                 reachable_rmse_median_m: median(&pick_some(|metrics| metrics.reachable_rmse_m)),
                 unreachable_rmse_median_m: median(&pick_some(|metrics| metrics.unreachable_rmse_m)),
+                max_error_median_m: median(&pick(|metrics| metrics.max_error_m)),
                 coverage_mean: mean_of(pick_some(|metrics| metrics.coverage)),
                 nlpd_mean: mean_of(pick_some(|metrics| metrics.nlpd)),
                 path_mean_m: mean(&paths),
+                time_mean_s: mean_of(times.collect()),
             })
         })
         .collect()

@@ -79,6 +79,7 @@ pub fn run_with(
                 .filter(|_| experiment.gp.normals)
                 .map(|contact| contact.normal_w.into()),
             tip: swept.map(|swept| swept.p_wt.coords.into()),
+            time_s: probe.time_s(),
             planned_sd_m: plan.sd_m,
             stall: plan.stall,
             fit: None,

@@ -108,6 +108,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
         overload: false,
         normal: None,
         tip: None,
+        time_s: None,
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),
         stall: None,
         fit: is_fitted.then_some(fit),

@@ -75,19 +75,15 @@ impl Default for SlopeSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TravelSettings {
-    /// Time of a touch without the travel to it, as the travel possible in that time, in units
-    /// of the zone's sides.
-    pub touch: f64,
-    /// Share of the largest standard deviation that a place should have; at 1 the planner is
-    /// nearly `active`.
-    pub floor: f64,
+    /// Touches planned together; with 1 the planner is `active`.
+    pub tour: u32,
 }
 
 impl Default for TravelSettings {
-    /// Chosen: of six pairs, the shortest way on the bird to the error of `active`'s 120 touches
-    /// (10 trials).
+    /// Chosen: of 10, 15 and 20 the one with the fewest touches to equal error on container and
+    /// bird, see `docs/paper.md`.
     fn default() -> Self {
-        Self { touch: 0.1, floor: 0.2 }
+        Self { tour: 15 }
     }
 }
 
@@ -128,8 +124,7 @@ impl Checked for PlanningSettings {
         let places = self.integrated_variance.places;
         rules.number("integrated_variance.places", places.into(), 1.0..=65536.0);
         rules.number("slope.weight", self.slope.weight, 0.0..=1e3);
-        rules.number("travel.touch", self.travel.touch, 1e-3..=1e3);
-        rules.number("travel.floor", self.travel.floor, 0.01..=1.0);
+        rules.number("travel.tour", self.travel.tour.into(), 1.0..=100.0);
         rules.number("ucb.sds", self.ucb.sds, 0.0..=1e3);
         rules.number("pi.margin", self.pi.margin, 0.0..=1e3);
         rules.number("ei.margin", self.ei.margin, 0.0..=1e3);

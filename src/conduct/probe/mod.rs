@@ -46,6 +46,11 @@ pub trait Probe: Send {
     fn swept(&self) -> Option<Swept> {
         None
     }
+
+    /// Time of the body since its start; none where a touch is no motion.
+    fn time_s(&self) -> Option<f64> {
+        None
+    }
 }
 
 /// The probe that the scene's body asks for; `seed` is all the randomness of its sensors.

@@ -59,6 +59,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         touch_counts: vec![touches],
         trial: args.trial,
         planners: vec![args.planner.clone()],
+        ..ReportSettings::default()
     };
     let replay = Replay::new(&run, &args.planner, touches)?
         .with_context(|| format!("{} had no fit after {touches} touches", args.planner))?;

@@ -14,7 +14,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let run = Run::read(&args.folder)?;
-    report::table::write_csv(&run, &args.folder)?;
+    report::write_tables(&run, &args.folder)?;
     report::write(&run, &args.folder)?;
     print(&format!(
         "{}\nreport: {}",

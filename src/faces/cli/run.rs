@@ -78,7 +78,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     if !done.is_empty() {
         text += &format!(", {} were there already", done.len());
     }
-    report::table::write_csv(&run, &path)?;
+    report::write_tables(&run, &path)?;
     if !finished {
         text += &format!(
             "\nstopped with {} of {total} trials in {}; the same command continues",

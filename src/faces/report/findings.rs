@@ -35,6 +35,7 @@ pub fn sentences(run: &Run) -> Vec<String> {
     let goal = format!("a mean R of {R_FOUND}{constant}");
     sentences.push(needed(run, &curves, &goal, |point| point.r_mean >= R_FOUND));
     sentences.extend(against_baseline(run, &curves));
+    sentences.push(honesty(&curves));
     sentences
 }
 
@@ -99,4 +100,22 @@ fn against_baseline(run: &Run, curves: &[(&str, Vec<Point>)]) -> Option<String> 
     );
     let is_met = |point: &Point| point.rmse_median_m <= last.rmse_median_m;
     (!others.is_empty()).then(|| needed(run, &others, &goal, is_met))
+}
+
+/// Shares of the truth that a 95 % band may hold and still count as honest; chosen.
+const HONEST: std::ops::RangeInclusive<f64> = 0.9..=0.98;
+
+/// Whether the beliefs know how far they are off after the last touch.
+fn honesty(curves: &[(&str, Vec<Point>)]) -> String {
+    let shares = curves.iter().filter_map(|(name, points)| {
+        let share = points.last()?.coverage_mean?;
+        let verdict = match share {
+            share if HONEST.contains(&share) => "",
+            share if share < *HONEST.start() => " (too sure)",
+            _ => " (too unsure)",
+        };
+        Some(format!("{name} {:.0} %{verdict}", 100.0 * share))
+    });
+    let shares: Vec<String> = shares.collect();
+    format!("Of the truth the 95 % band of the last belief holds: {}.", shares.join(", "))
 }

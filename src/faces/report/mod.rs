@@ -2,6 +2,8 @@
 
 pub mod axes;
 pub mod canvas;
+pub mod claims;
+pub mod equal;
 pub mod explorer;
 pub mod figures;
 pub mod findings;
@@ -32,6 +34,16 @@ pub struct Drawing {
     pub figure: &'static Figure,
     /// Its SVG.
     pub svg: String,
+}
+
+/// Writes the run's tables into its folder: `summary.csv`, `comparison.csv`, `equal_error.csv`.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write_tables(run: &Run, folder: &Path) -> anyhow::Result<()> {
+    table::write_csv(run, folder)?;
+    paired::write_csv(run, folder)?;
+    equal::write_csv(run, folder)
 }
 
 /// Draws everything into the run's folder: `figures/*.svg`, the same as `.png`, `report.html`.

@@ -1,7 +1,8 @@
 //! The page of a run: one file that needs nothing beside it.
 
 use super::canvas::escape;
-use super::{Drawing, findings, paired, table};
+use super::paired::Table;
+use super::{Drawing, claims, equal, findings, paired, table};
 use crate::trials::store::Run;
 use crate::trials::summary;
 
@@ -9,6 +10,8 @@ use crate::trials::summary;
 const RAW: &[(&str, &str)] = &[
     ("trials.jsonl", "a row per trial with every touch"),
     ("summary.csv", "the curves as a table"),
+    ("comparison.csv", "the planners against each other, every measure"),
+    ("equal_error.csv", "touches to equal error"),
     ("surface.csv", "the true surface on the test grid"),
     ("resolved.toml", "every setting; can be run again"),
     ("manifest.json", "what ran it"),
@@ -37,10 +40,11 @@ pub fn html(
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{name} – Palpate</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <p class=\"kind\">Palpate run</p>\n<h1>{name}</h1>\n{question}\
-         <section>\n<h2>Found</h2>\n{}</section>\n{}{}{}{explorer}{figures}{}{}</body>\n</html>\n",
+         <section>\n<h2>Found</h2>\n{}</section>\n{}{}{}{}{explorer}{figures}{}{}</body>\n</html>\n",
         paragraph(&findings::sentences(run)),
+        claims_table(run),
         summary_table(run),
-        comparison_table(run),
+        comparison_tables(run),
         events(run),
         details("Every setting, defaults written out", settings)
             + &details("What ran it", manifest),
@@ -50,6 +54,13 @@ pub fn html(
 
 fn paragraph(sentences: &[String]) -> String {
     format!("<p>{}</p>\n", escape(&sentences.join(" ")))
+}
+
+fn claims_table(run: &Run) -> String {
+    let body = claims::table(run).map(|table| table_body(&table, "told"));
+    body.map_or(String::new(), |body| {
+        section("<h2>The paper, and here</h2>\n", &body, claims::NOTE)
+    })
 }
 
 fn summary_table(run: &Run) -> String {
@@ -66,9 +77,23 @@ fn summary_table(run: &Run) -> String {
     table_section("", &table::HEADER, &lines, &note)
 }
 
-fn comparison_table(run: &Run) -> String {
-    let lines: String = paired::lines(run).iter().map(|cells| line(cells)).collect();
-    table_section("<h2>Planner against planner</h2>\n", &paired::HEADER, &lines, &paired::note(run))
+fn comparison_tables(run: &Run) -> String {
+    let against = (paired::tables(run), paired::note(run), "Planner against planner");
+    let equal = (equal::tables(run), equal::note(run), "Touches to equal error");
+    let section = |(tables, note, title): (Vec<Table>, String, &str)| {
+        let bodies: String = tables.iter().map(|table| table_body(table, "named")).collect();
+        match bodies.is_empty() {
+            true => String::new(),
+            false => section(&format!("<h2>{title}</h2>\n"), &bodies, &note),
+        }
+    };
+    section(equal) + &section(against)
+}
+
+fn table_body(table: &Table, class: &str) -> String {
+    let lines: String = table.lines.iter().map(|cells| line(cells)).collect();
+    let header: Vec<&str> = table.header.iter().map(String::as_str).collect();
+    marked_up(class, &header, &lines)
 }
 
 fn line(cells: &[String]) -> String {
@@ -78,14 +103,23 @@ fn line(cells: &[String]) -> String {
 
 /// A table; nothing if it has no lines.
 fn table_section(title: &str, header: &[&str], lines: &str, note: &str) -> String {
-    if lines.is_empty() {
-        return String::new();
+    match lines.is_empty() {
+        true => String::new(),
+        false => section(title, &marked_up("counted", header, lines), note),
     }
-    let head: String = header.iter().map(|head| format!("<th>{head}</th>")).collect();
+}
+
+fn section(title: &str, body: &str, note: &str) -> String {
+    format!("<section>\n{title}{body}<p class=\"note\">{}</p>\n</section>\n", escape(note))
+}
+
+/// A table whose words stand in its first column (`named`), its second (`counted`) or its first four
+/// (`told`).
+fn marked_up(class: &str, header: &[&str], lines: &str) -> String {
+    let head: String = header.iter().map(|head| format!("<th>{}</th>", escape(head))).collect();
     format!(
-        "<section>\n{title}<div class=\"wide\"><table>\n<thead><tr>{head}</tr></thead>\n\
-         <tbody>\n{lines}</tbody>\n</table></div>\n<p class=\"note\">{}</p>\n</section>\n",
-        escape(note)
+        "<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>{head}</tr></thead>\n\
+         <tbody>\n{lines}</tbody>\n</table></div>\n"
     )
 }
 
@@ -156,7 +190,9 @@ table { border-collapse: collapse; margin: 1.4rem 0 .4rem; font-size: .92rem;
   font-variant-numeric: tabular-nums; white-space: nowrap; }
 th { font-weight: 600; border-bottom: 1.5px solid #222; }
 th, td { padding: .28rem .9rem; text-align: right; }
-th:nth-child(2), td:nth-child(2) { text-align: left; }
+.counted :is(th, td):nth-child(2), .named :is(th, td):first-child,
+  .told :is(th, td):nth-child(-n+4) { text-align: left; }
+.told td:nth-child(2) { white-space: normal; min-width: 16rem; }
 tbody tr + tr td { border-top: 1px solid #eee; }
 figure { margin: 2.6rem 0 0; }
 figure > svg { display: block; width: 100%; height: auto; }

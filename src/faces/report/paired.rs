@@ -1,69 +1,112 @@
-//! The planners against their baselines, as a table of the page.
+//! The planners against their baselines, as tables of the page and as files.
 
-use super::axes::MM;
 use super::replay::digits;
-use crate::trials::comparison::{Comparison, comparisons};
-use crate::trials::statistics::Paired;
+use super::table::write_lines;
+use crate::trials::comparison::{BASELINES, Comparison, comparisons};
+use crate::trials::measure::{MEASURES, Measure};
 use crate::trials::store::Run;
+use serde::Serialize;
+use std::path::Path;
 
-/// Column heads.
-pub const HEADER: [&str; 8] = [
-    "against",
-    "planner",
-    "RMSE difference mm",
-    "trials won",
-    "edge RMSE difference mm",
-    "trials won",
-    "touches to its error",
-    "its own touches",
-];
+/// A table of the page.
+pub struct Table {
+    /// Column heads.
+    pub header: Vec<String>,
+    /// Its lines, a cell for each head.
+    pub lines: Vec<Vec<String>>,
+}
 
-/// A line for each planner and baseline; none if no baseline ran, or nothing else did.
-pub fn lines(run: &Run) -> Vec<[String; 8]> {
-    comparisons(&run.experiment, &run.rows)
-        .iter()
-        .map(|comparison| cells(run, comparison))
-        .collect()
+/// A table for each baseline that ran: a line for each measure, a column for each other planner.
+pub fn tables(run: &Run) -> Vec<Table> {
+    let found = comparisons(&run.experiment, &run.rows);
+    let table = |baseline: &str| {
+        let of_baseline: Vec<&Comparison> =
+            found.iter().filter(|comparison| comparison.baseline == baseline).collect();
+        let others: Vec<&String> = (run.experiment.planners.iter())
+            .filter(|name| of_baseline.iter().any(|comparison| comparison.planner == **name))
+            .collect();
+        let line = |measure: &Measure| -> Option<Vec<String>> {
+            let of = |planner: &str| {
+                let is_it = |comparison: &&&Comparison| {
+                    comparison.planner == planner && comparison.measure.name == measure.name
+                };
+                of_baseline.iter().find(is_it)
+            };
+            let cells = others.iter().map(|planner| of(planner).map_or("-".into(), |it| cell(it)));
+            others
+                .iter()
+                .any(|planner| of(planner).is_some())
+                .then(|| std::iter::once(titled(measure)).chain(cells).collect())
+        };
+        Table {
+            header: std::iter::once(format!("minus {baseline}"))
+                .chain(others.iter().map(|planner| planner.to_string()))
+                .collect(),
+            lines: MEASURES.iter().filter_map(line).collect(),
+        }
+    };
+    BASELINES.into_iter().map(table).filter(|table| !table.lines.is_empty()).collect()
 }
 
 /// What the columns are.
 pub fn note(run: &Run) -> String {
     format!(
-        "Differences after {} touches in the same trial, negative where the planner is nearer the \
-         truth than the one it is held against: mean, and its 95 % bootstrap interval. A difference \
-         whose interval contains 0 is not established. Touches to its error: the first count from \
-         which the planner\u{2019}s median RMSE stays at or below the other\u{2019}s last one.",
+        "Differences after {} touches in the same trial: mean, its 95 % bootstrap interval, and the \
+         share of trials in which the planner is better; better is more for the correlations, less \
+         for all else. A difference whose interval contains 0 is not established.",
         run.experiment.touches
     )
 }
 
-fn cells(run: &Run, comparison: &Comparison) -> [String; 8] {
-    let difference = |paired: &Option<Paired>| paired.as_ref().map_or("-".into(), described);
-    let won = |paired: &Option<Paired>| {
-        paired.map_or("-".into(), |paired| format!("{:.0} %", 100.0 * paired.won))
-    };
-    let touches = |count: Option<u32>| {
-        count.map_or(format!("over {}", run.experiment.touches), |count| count.to_string())
-    };
-    [
-        comparison.baseline.clone(),
-        comparison.planner.clone(),
-        difference(&comparison.rmse),
-        won(&comparison.rmse),
-        difference(&comparison.edge_rmse),
-        won(&comparison.edge_rmse),
-        touches(comparison.touches_to_goal),
-        touches(comparison.baseline_touches_to_goal),
-    ]
+/// A line of `comparison.csv`.
+#[derive(Serialize)]
+struct Line<'a> {
+    planner: &'a str,
+    baseline: &'a str,
+    measure: &'a str,
+    trials: usize,
+    difference: f64,
+    difference_low: Option<f64>,
+    difference_high: Option<f64>,
+    won: f64,
 }
 
-fn described(paired: &Paired) -> String {
-    let mm = |metres: f64| {
-        let sign = if metres < 0.0 { "\u{2212}" } else { "" };
-        format!("{sign}{}", digits(MM.per_m * metres.abs()))
-    };
-    match paired.interval {
-        Some([low, high]) => format!("{} [{}, {}]", mm(paired.mean), mm(low), mm(high)),
-        None => mm(paired.mean),
+/// Writes `comparison.csv`: a line per planner, baseline and measure after the last touch.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_csv(run: &Run, folder: &Path) -> anyhow::Result<()> {
+    let found = comparisons(&run.experiment, &run.rows);
+    let lines = found.iter().map(|Comparison { planner, baseline, measure, paired }| Line {
+        planner,
+        baseline,
+        measure: measure.name,
+        trials: paired.trials,
+        difference: paired.mean,
+        difference_low: paired.interval.map(|[low, _]| low),
+        difference_high: paired.interval.map(|[_, high]| high),
+        won: paired.won,
+    });
+    write_lines(&folder.join("comparison.csv"), lines)
+}
+
+/// A measure with its unit.
+pub(super) fn titled(measure: &Measure) -> String {
+    match measure.shown_in.0 {
+        "" => measure.title.into(),
+        unit => format!("{}, {unit}", measure.title),
     }
+}
+
+fn cell(comparison: &Comparison) -> String {
+    let shown = |value: f64| {
+        let value = comparison.measure.shown_in.1 * value;
+        let sign = if value < 0.0 { "\u{2212}" } else { "" };
+        format!("{sign}{}", digits(value.abs()))
+    };
+    let paired = &comparison.paired;
+    let interval = paired
+        .interval
+        .map_or(String::new(), |[low, high]| format!(" [{}, {}]", shown(low), shown(high)));
+    format!("{}{interval}, {:.0} %", shown(paired.mean), 100.0 * paired.won)
 }

@@ -1,7 +1,7 @@
 //! The summary of a run as text and as CSV.
 
 use crate::trials::comparison::{self, BASELINES};
-use crate::trials::metrics::Metrics;
+use crate::trials::measure::RMSE;
 use crate::trials::statistics::{Paired, median_interval};
 use crate::trials::store::Run;
 use crate::trials::summary::{self, Events, Point};
@@ -38,8 +38,7 @@ impl Intervals {
         let median = median_interval(&errors, experiment.seed);
         let [random, active] = BASELINES.map(|baseline| {
             let planners = [point.planner.as_str(), baseline];
-            let rmse = |metrics: &Metrics| Some(metrics.rmse_m);
-            comparison::paired(experiment, rows, planners, point.touches, rmse)
+            comparison::paired(experiment, rows, planners, point.touches, &RMSE)
                 .filter(|_| point.planner != baseline)
         });
         let end = |paired: Option<Paired>, end: usize| Some(paired?.interval?[end]);
@@ -63,14 +62,29 @@ impl Intervals {
 /// # Errors
 /// If it cannot be written.
 pub fn write_csv(run: &Run, folder: &Path) -> anyhow::Result<()> {
-    let path = folder.join("summary.csv");
-    let mut writer = csv::Writer::from_path(&path).with_context(|| path.display().to_string())?;
-    for planner in &run.experiment.planners {
-        for point in summary::curve(&run.experiment, &run.rows, planner) {
-            writer.serialize((&point, Intervals::new(run, &point)))?;
-        }
+    let curve = |planner| summary::curve(&run.experiment, &run.rows, planner);
+    let points = run.experiment.planners.iter().flat_map(|planner| curve(planner));
+    let lines = points.map(|point| {
+        let intervals = Intervals::new(run, &point);
+        (point, intervals)
+    });
+    write_lines(&folder.join("summary.csv"), lines)
+}
+
+/// Writes lines as CSV.
+///
+/// # Errors
+/// If they cannot be written.
+pub(super) fn write_lines<T: Serialize>(
+    path: &Path,
+    lines: impl Iterator<Item = T>,
+) -> anyhow::Result<()> {
+    let place = || path.display().to_string();
+    let mut writer = csv::Writer::from_path(path).with_context(place)?;
+    for line in lines {
+        writer.serialize(line).with_context(place)?;
     }
-    writer.flush().with_context(|| path.display().to_string())
+    writer.flush().with_context(place)
 }
 
 /// One line per planner and drawn touch count, then what else happened.
@@ -99,7 +113,7 @@ pub fn summary(run: &Run) -> String {
 }
 
 /// Column heads of the summary, here and on the page.
-pub const HEADER: [&str; 10] = [
+pub const HEADER: [&str; 12] = [
     "touches",
     "planner",
     "R (Eq. 5)",
@@ -107,13 +121,15 @@ pub const HEADER: [&str; 10] = [
     "mean RMSE mm",
     "median RMSE mm",
     "median edge RMSE mm",
+    "median largest error mm",
     "in 95 % band",
     "NLPD",
     "path m",
+    "time s",
 ];
 
 /// A point as the cells of a table.
-pub fn cells(point: &Point) -> [String; 10] {
+pub fn cells(point: &Point) -> [String; 12] {
     let or_dash = |text: Option<String>| text.unwrap_or("-".into());
     [
         point.touches.to_string(),
@@ -123,9 +139,11 @@ pub fn cells(point: &Point) -> [String; 10] {
         with_error(1e3 * point.rmse_mean_m, point.rmse_se_m.map(|error| 1e3 * error), 3),
         format!("{:.3}", 1e3 * point.rmse_median_m),
         or_dash(point.edge_rmse_median_m.map(|edge| format!("{:.3}", 1e3 * edge))),
+        or_dash(point.max_error_median_m.map(|error| format!("{:.2}", 1e3 * error))),
         or_dash(point.coverage_mean.map(|coverage| format!("{coverage:.3}"))),
         or_dash(point.nlpd_mean.map(|nlpd| format!("{nlpd:.3}"))),
         format!("{:.3}", point.path_mean_m),
+        or_dash(point.time_mean_s.map(|time| format!("{time:.1}"))),
     ]
 }
 

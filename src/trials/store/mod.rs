@@ -199,7 +199,9 @@ fn sign(path: &Path, manifest: &Manifest) -> Result<(), StoreError> {
 
 /// Removes what an earlier run wrote, the mark of a run's folder last.
 fn clear(path: &Path) -> Result<(), StoreError> {
-    for name in ["report.html", "summary.csv", MANIFEST, SURFACE] {
+    for name in
+        ["report.html", "summary.csv", "comparison.csv", "equal_error.csv", MANIFEST, SURFACE]
+    {
         remove(&path.join(name), |file| fs::remove_file(file))?;
     }
     // Figures are drawn again; others' files beside them are not ours to remove.

@@ -63,11 +63,6 @@ impl Servo {
         })
     }
 
-    /// Time of the body since its start.
-    pub fn time_s(&self) -> f64 {
-        self.state.time_s
-    }
-
     /// Pose of the fingertip by forward kinematics.
     fn x_wt(&self) -> Isometry3<f64> {
         let chain = self.control.chain();
@@ -216,6 +211,10 @@ impl Probe for Servo {
 
     fn swept(&self) -> Option<Swept> {
         self.swept.clone()
+    }
+
+    fn time_s(&self) -> Option<f64> {
+        Some(self.state.time_s)
     }
 }
 
