@@ -112,19 +112,18 @@ fn true_rest(world: &World, target: Vec<f64>) -> Option<Rest> {
         let y_m = scene.zone.datum_y_m + height_m;
         Some((y_m - scene.finger.front_m(dx_m, dz_m)?, dx_m, dz_m, y_m))
     };
-    const SIDE: i32 = 40;
     let reach_m = scene.finger.radius_m + scene.finger.length_m;
     let (mut x_m, mut z_m, mut half_m) = (0.0, 0.0, reach_m);
-    let mut best = None;
-    while half_m > 1e-7 {
-        let step_m = half_m / f64::from(SIDE);
-        let around = (-SIDE..=SIDE).flat_map(|i| (-SIDE..=SIDE).map(move |k| (i, k)));
+    let (mut best, mut side) = (None, 40);
+    while half_m > 1e-6 {
+        let step_m = half_m / f64::from(side);
+        let around = (-side..=side).flat_map(|i| (-side..=side).map(move |k| (i, k)));
         best = around
             .filter_map(|(i, k)| lift(x_m + f64::from(i) * step_m, z_m + f64::from(k) * step_m))
             .chain(best)
             .max_by(|a, b| a.0.total_cmp(&b.0));
         (_, x_m, z_m, _) = best?;
-        half_m = 4.0 * step_m;
+        (half_m, side) = (3.0 * step_m, 9);
     }
     let (y_m, dx_m, dz_m, on_y_m) = best?;
     Some(Rest { y_m, p_wc: Point3::new(target[0] + dx_m, on_y_m, target[1] + dz_m), target })
