@@ -40,6 +40,7 @@ bench: setup
 	cargo bench --locked --bench kernels
 	cargo bench --locked --bench plant
 	cargo bench --locked --bench dynamic
+	cargo bench --locked --bench flex
 
 # How far the electrodes' point of contact lies from the exact one.
 contacts: setup

@@ -211,6 +211,10 @@ impl Checked for Scene {
              body = \"cast\")"
                 .into()
         });
+        let stepped = self.body == Body::Dynamic || self.effects.flex.is_none();
+        rules.require("effects.flex", "(given)", stepped, || {
+            "no flex: only body = \"dynamic\" is stepped by MuJoCo".into()
+        });
         if let (Some(wrench), None) = (&self.effects.wrench, &self.effects.fluid) {
             let least_n = SDS_OF_CONTACT * wrench.noise_max_n();
             let told = self.touch.detection_n >= least_n;

@@ -1,8 +1,11 @@
 //! Scene → MJCF, the text a MuJoCo model is compiled from. Numbers are SI, in `W`.
 
+mod flex;
 mod relief;
 mod robot;
 mod scenery;
+
+pub use flex::flex;
 
 use super::scene::Body;
 use super::world::World;
