@@ -156,14 +156,16 @@ impl Flex {
     fn advance(&mut self, x_wt: &Isometry3<f64>) -> Result<(), Fault> {
         self.lay_planes(x_wt)?;
         self.data.step();
-        let largest = |values: &[f64]| values.iter().map(|value| value.abs()).fold(0.0, f64::max);
-        let (moved_m, speed_m_s) = (largest(self.data.qpos()), largest(self.data.qvel()));
+        let (moved, speeds) = (self.data.qpos(), self.data.qvel());
         let warned = self.data.warning().iter().any(|warning| warning.number > 0);
-        // A comparison with NaN is false. No node gets across the finger.
-        if !warned && moved_m < self.world.scene().finger.radius_m {
+        // No node gets across the finger; NaN is not below anything.
+        let across_m = self.world.scene().finger.radius_m;
+        if !warned && moved.iter().all(|moved_m| moved_m.abs() < across_m) {
             return Ok(());
         }
-        Err(Fault::Diverged { time_s: self.time_s, state: vec![moved_m, speed_m_s] })
+        let largest = |values: &[f64]| values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let state = vec![largest(moved), largest(speeds)];
+        Err(Fault::Diverged { time_s: self.time_s, state })
     }
 
     /// What the last step brought.
