@@ -93,6 +93,8 @@ impl Rung {
             Senses::Fluid => [true, true, false],
             Senses::Full => [true; 3],
         };
+        // Rungs are resolutions of the foundation.
+        effects.flex = None;
         keep(&mut effects.skin, skin);
         keep(&mut effects.fluid, fluid);
         keep(&mut effects.electrodes, electrodes);
