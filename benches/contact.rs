@@ -146,7 +146,7 @@ fn lowered(stage: &Arc<World>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
     const ABOVE_M: f64 = 0.03;
     const BELOW_M: f64 = -0.01;
     const STEP_M: f64 = 2.5e-4;
-    let mut data = MjData::new(Dynamic::model(stage)?);
+    let mut data = MjData::new(Dynamic::models(stage)?.plant);
     let mut deepest = |target: &[f64], y_m: f64| {
         data.qpos_mut().copy_from_slice(&[target[0], y_m, target[1]]);
         data.forward();

@@ -170,7 +170,7 @@ fn jerkiest(integrator: Integrator, step_s: f64) -> f64 {
     let mut scene = scene("container_pa10.toml", &[]);
     (scene.solver.integrator, scene.solver.step_s) = (integrator, step_s);
     let world = World::build(scene).unwrap();
-    let mut plant = Plant::new(Dynamic::model(&world).unwrap()).unwrap();
+    let mut plant = Plant::new(Dynamic::models(&world).unwrap().plant).unwrap();
     let joints = world.chain().unwrap().joints;
     let mut dice = shapes::Dice(1);
     let mut most: f64 = 0.0;
@@ -200,7 +200,7 @@ fn jerkiest(integrator: Integrator, step_s: f64) -> f64 {
 fn explicit_steps_are_as_short_as_the_stiffest_servo_needs() {
     for links in ["arm={links=\"C\"}", "arm={links=\"A\"}"] {
         let world = World::build(scene("container_pa10.toml", &[links])).unwrap();
-        let model = Dynamic::model(&world).unwrap();
+        let model = Dynamic::models(&world).unwrap().plant;
         let joints = world.chain().unwrap().joints;
         let n = joints.len();
         let root = DVector::from_fn(n, |i, _| model.actuator_gainprm()[i][0].sqrt());

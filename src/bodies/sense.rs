@@ -13,9 +13,24 @@ use std::sync::Arc;
 /// Forces below this have no place; far below any that is detected (chosen).
 const LEAST_FORCE_N: f64 = 1e-6;
 
+/// A skin that is stepped in its own simulation: that of `[effects.flex]`.
+pub trait Shell: Send {
+    /// Brings it to rest, away from any object.
+    fn reset(&mut self);
+
+    /// Goes on by `dt_s`, to the pose `x_wt` at its end, against the object that stands in `W`: the
+    /// load on it, and how far it lies inwards at each point where it is read; none at rest.
+    ///
+    /// # Errors
+    /// [`Fault::Diverged`] with the largest displacement (m) and speed (m/s) of a node,
+    /// [`Fault::Inside`] if the object is where the skin does not yield.
+    fn step(&mut self, x_wt: &Isometry3<f64>, dt_s: f64) -> Result<(Load, &[f64]), Fault>;
+}
+
 /// The finger's state during one trial.
 pub struct Sense {
     world: Arc<World>,
+    shell: Option<Box<dyn Shell>>,
     /// Pose of `T` in the frame of the force/torque sensor.
     x_mt: Isometry3<f64>,
     trial: Trial,
@@ -41,14 +56,23 @@ impl Sense {
         Some(Self {
             x_mt: world.chain()?.tool,
             trial: Trial::new(&world, world.fingertip()?, seed),
+            shell: None,
             load: Load::default(),
             has_sensor: effects.fluid.is_some() && effects.electrodes.is_some(),
             world,
         })
     }
 
+    /// Puts a simulated skin on; without it the finger feels with its `[effects.skin]`.
+    pub fn wear(&mut self, shell: Box<dyn Shell>) {
+        self.shell = Some(shell);
+    }
+
     /// Forgets everything.
     pub fn reset(&mut self, seed: u64) {
+        if let Some(shell) = &mut self.shell {
+            shell.reset();
+        }
         if let Some(tip) = self.world.fingertip() {
             self.trial = Trial::new(&self.world, tip, seed);
             self.load = Load::default();
@@ -59,7 +83,7 @@ impl Sense {
     ///
     /// # Errors
     /// [`Fault::Diverged`] if the motion is not finite, [`Fault::Inside`] if the object encloses
-    /// the tip.
+    /// the tip; and those of the [`Shell`].
     pub fn step(&mut self, motion: &Motion, dt_s: f64) -> Result<Wrench, Fault> {
         let (Some(tip), Shape::Mesh { bvh, .. }) = (self.world.fingertip(), self.world.shape())
         else {
@@ -72,7 +96,11 @@ impl Sense {
             linear_w: object.rotation * (motion.linear_w + motion.angular_w.cross(&aside_w)),
             angular_w: object.rotation * motion.angular_w,
         };
-        self.load = feel.step(tip, bvh, &motion, dt_s).map_err(fault)?;
+        self.load = match &mut self.shell {
+            Some(shell) => feel.step_loaded(tip, shell.step(&motion.x_wt, dt_s)?, &motion, dt_s),
+            None => feel.step(tip, bvh, &motion, dt_s),
+        }
+        .map_err(fault)?;
         let wrench = Wrench { force_n: self.load.force_n, torque_nm: self.load.torque_nm };
         Ok(wrench.moved(finger))
     }

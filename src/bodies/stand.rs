@@ -15,7 +15,7 @@ use thiserror::Error;
 pub struct Stand {
     world: Arc<World>,
     #[cfg(feature = "mujoco")]
-    model: Option<Arc<mujoco_rs::wrappers::MjModel>>,
+    models: Option<mujoco::Models>,
 }
 
 /// A world that no body can be put into.
@@ -42,8 +42,8 @@ impl Stand {
         #[cfg(feature = "mujoco")]
         {
             let moved = world.scene().body == Body::Dynamic;
-            let model = if moved { Some(mujoco::Dynamic::model(&world)?) } else { None };
-            Ok(Self { world, model })
+            let models = if moved { Some(mujoco::Dynamic::models(&world)?) } else { None };
+            Ok(Self { world, models })
         }
         #[cfg(not(feature = "mujoco"))]
         match world.scene().body {
@@ -67,8 +67,8 @@ impl Stand {
             Body::Kinematic => Box::new(Kinematic::new(&self.world).ok_or_else(unusable)?),
             #[cfg(feature = "mujoco")]
             Body::Dynamic => {
-                let model = self.model.as_ref().ok_or_else(unusable)?;
-                Box::new(mujoco::Dynamic::new(&self.world, model).ok_or_else(unusable)?)
+                let models = self.models.as_ref().ok_or_else(unusable)?;
+                Box::new(mujoco::Dynamic::new(&self.world, models).ok_or_else(unusable)?)
             }
             #[cfg(not(feature = "mujoco"))]
             Body::Dynamic => return Err(unusable()),

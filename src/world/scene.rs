@@ -228,6 +228,10 @@ impl Checked for Scene {
              body = \"cast\")"
                 .into()
         });
+        let stepped = self.body == Body::Dynamic || self.effects.flex.is_none();
+        rules.require("effects.flex", "(given)", stepped, || {
+            "no flex: only body = \"dynamic\" is stepped by MuJoCo".into()
+        });
         if let (Some(wrench), None) = (&self.effects.wrench, &self.effects.fluid) {
             let least_n = SDS_OF_CONTACT * wrench.noise_max_n();
             let told = self.touch.detection_n >= least_n;
@@ -275,7 +279,7 @@ impl Scene {
     /// Whether MuJoCo lets the finger collide with the object: it does where no skin says what the
     /// object does to it.
     pub fn collides(&self) -> bool {
-        self.body == Body::Dynamic && self.effects.skin.is_none()
+        self.body == Body::Dynamic && !self.effects.is_soft()
     }
 
     /// Fastest approach at which contact is told before skin and fluid are used up in front of the

@@ -81,7 +81,7 @@ impl World {
     /// If the shape lies wholly outside the zone.
     pub fn around(scene: Scene, shape: Shape) -> Result<Self, WorldError> {
         let fingertip =
-            (scene.effects.skin.is_some()).then(|| Fingertip::new(&scene.finger, &scene.effects));
+            (scene.effects.is_soft()).then(|| Fingertip::new(&scene.finger, &scene.effects));
         let world = Self { scene, shape, fingertip };
         world.check_overlap()?;
         Ok(world)

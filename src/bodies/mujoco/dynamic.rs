@@ -1,6 +1,6 @@
 //! An arm or stage with masses, servos and friction, carrying the finger.
 
-use super::{ModelError, Plant, compile};
+use super::{Flex, ModelError, Plant, compile};
 use crate::bodies::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
 use crate::bodies::sense::Sense;
 use crate::things::arm::Chain;
@@ -30,30 +30,43 @@ pub struct Dynamic {
     reading: Reading,
 }
 
+/// What MuJoCo compiles of a world, once for all trials.
+#[derive(Clone)]
+pub struct Models {
+    /// The arm or stage.
+    pub plant: Arc<MjModel>,
+    /// The skin of `[effects.flex]`.
+    pub flex: Option<Arc<MjModel>>,
+}
+
 impl Dynamic {
-    /// The world's model, compiled once for all trials.
+    /// The world's models.
     ///
     /// # Errors
     /// If MuJoCo refuses it, the scene's time step is too long for its skin, or the object has no
     /// inside where the scene's collision needs one.
-    pub fn model(world: &World) -> Result<Arc<MjModel>, ModelError> {
+    pub fn models(world: &World) -> Result<Models, ModelError> {
         let step_s = world.scene().solver.step_s;
         check_inside(world)?;
         let text = mjcf::scene(world, Mode::Dynamic { step_s });
-        let model = Arc::new(compile(&text.ok_or(ModelError::Lacks { part: "an object" })?)?);
-        check_step(world, &model, step_s)?;
-        Ok(model)
+        let plant = Arc::new(compile(&text.ok_or(ModelError::Lacks { part: "an object" })?)?);
+        check_step(world, &plant, step_s)?;
+        Ok(Models { plant, flex: Flex::model(world)? })
     }
 
     /// At the chain's home; none without memory or in a world of another body.
-    pub fn new(world: &Arc<World>, model: &Arc<MjModel>) -> Option<Self> {
+    pub fn new(world: &Arc<World>, models: &Models) -> Option<Self> {
         let chain = world.chain()?;
         let scene = world.scene();
         let period_s = scene.period_s();
+        let mut sense = Sense::new(Arc::clone(world), 0);
+        if let (Some(sense), Some(model)) = (&mut sense, &models.flex) {
+            sense.wear(Box::new(Flex::new(Arc::clone(world), Arc::clone(model)).ok()?));
+        }
         let mut body = Self {
             capabilities: Capabilities::of(&chain, period_s),
-            plant: Plant::new(Arc::clone(model)).ok()?,
-            sense: Sense::new(Arc::clone(world), 0),
+            plant: Plant::new(Arc::clone(&models.plant)).ok()?,
+            sense,
             wrench: Wrench::default(),
             steps: scene.solver.steps(period_s)?,
             tick: 0,

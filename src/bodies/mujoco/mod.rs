@@ -1,13 +1,15 @@
-//! MuJoCo as a library: compiling models, and the plant that steps one.
+//! MuJoCo as a library: compiling models, the plant that steps one, and the shell of a skin.
 
 mod dynamic;
+mod flex;
 #[cfg(feature = "render")]
 pub mod picture;
 mod plant;
 mod servo;
 mod touch;
 
-pub use dynamic::Dynamic;
+pub use dynamic::{Dynamic, Models};
+pub use flex::Flex;
 pub use plant::Plant;
 
 use mujoco_rs::error::MjModelError;

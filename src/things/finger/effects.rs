@@ -1,6 +1,7 @@
 //! Which physics of the fingertip a scene names.
 
 use super::electrodes::ElectrodesEffect;
+use super::flex::FlexEffect;
 use super::fluid::FluidEffect;
 use super::friction::FrictionEffect;
 use super::registration::RegistrationEffect;
@@ -18,6 +19,9 @@ pub struct Effects {
     /// A soft skin; without it there is no load and no tactile frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<SkinEffect>,
+    /// A skin of finite elements instead of that one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flex: Option<FlexEffect>,
     /// Liquid under the skin and its pressure; without it the finger is dry and its skin's
     /// points do not know of each other.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -43,10 +47,11 @@ pub struct Effects {
 }
 
 impl Effects {
-    /// Every effect with its defaults.
+    /// Every effect with its defaults; of the two skins the cheap one.
     pub fn all() -> Self {
         Self {
             skin: Some(SkinEffect::default()),
+            flex: None,
             fluid: Some(FluidEffect { vibration: Some(Default::default()), ..Default::default() }),
             electrodes: Some(ElectrodesEffect::default()),
             thermal: Some(ThermalEffect::default()),
@@ -57,9 +62,14 @@ impl Effects {
         }
     }
 
+    /// Whether there is a skin of either kind.
+    pub fn is_soft(&self) -> bool {
+        self.skin.is_some() || self.flex.is_some()
+    }
+
     /// Whether a tactile frame has anything in it.
     pub fn sends_frames(&self) -> bool {
-        self.skin.is_some()
+        self.is_soft()
             && (self.fluid.is_some() || self.electrodes.is_some() || self.thermal.is_some())
     }
 }
@@ -72,6 +82,7 @@ impl Checked for Effects {
             }
         }
         table(rules, "skin", &self.skin);
+        table(rules, "flex", &self.flex);
         table(rules, "fluid", &self.fluid);
         table(rules, "electrodes", &self.electrodes);
         table(rules, "thermal", &self.thermal);
@@ -79,6 +90,8 @@ impl Checked for Effects {
         table(rules, "wrench", &self.wrench);
         table(rules, "registration", &self.registration);
         table(rules, "timing", &self.timing);
+        let one = self.skin.is_none() || self.flex.is_none();
+        rules.require("flex", "(given)", one, || "no [flex] beside a [skin]: one skin".into());
         let named = [
             ("fluid", self.fluid.is_some()),
             ("electrodes", self.electrodes.is_some()),
@@ -88,9 +101,8 @@ impl Checked for Effects {
             ("registration", self.registration.is_some()),
         ];
         for (key, _) in named.into_iter().filter(|(_, given)| *given) {
-            rules.require(key, "(given)", self.skin.is_some(), || {
-                format!("no [{key}] without a [skin]")
-            });
+            rules
+                .require(key, "(given)", self.is_soft(), || format!("no [{key}] without a [skin]"));
         }
         rules.require("timing", "(given)", self.timing.is_none() || self.sends_frames(), || {
             "no [timing] without [fluid], [electrodes] or [thermal]".into()

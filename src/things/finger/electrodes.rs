@@ -116,10 +116,18 @@ impl Electrodes {
     /// Ideal counts over a pressed skin when the fluid conducts `conductivity` times as well as at
     /// rest.
     pub fn counts(&self, pressed: &Pressed, conductivity: f64) -> [f64; ELECTRODES] {
+        self.counts_over(pressed.moved_m(), conductivity)
+    }
+
+    /// The same over samples whose skin moved inwards by `inward_m`, one each, or none at rest.
+    pub(super) fn counts_over(&self, inward_m: &[f64], conductivity: f64) -> [f64; ELECTRODES] {
         // An untouched skin is the usual case and needs no sums.
-        let moved = |weights: &[(usize, f64)]| match pressed.is_resting() {
+        let moved = |weights: &[(usize, f64)]| match inward_m.is_empty() {
             true => 0.0,
-            false => weights.iter().map(|&(i, weight)| weight * pressed.inward_m[i]).sum(),
+            false => {
+                let part = |&(i, weight): &(usize, f64)| Some(weight * inward_m.get(i)?);
+                weights.iter().filter_map(part).sum()
+            }
         };
         std::array::from_fn(|i| {
             let closed = moved(&self.weights[i]);

@@ -124,6 +124,11 @@ impl Pressed {
     pub fn is_resting(&self) -> bool {
         self.touches.is_empty()
     }
+
+    /// `inward_m`, or nothing while the skin rests.
+    pub fn moved_m(&self) -> &[f64] {
+        if self.is_resting() { &[] } else { &self.inward_m }
+    }
 }
 
 impl Skin {

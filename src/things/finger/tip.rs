@@ -7,9 +7,11 @@ use super::fluid::FluidEffect;
 use super::frame::Frame;
 use super::friction::{Bristle, FrictionEffect};
 use super::hull::Finger;
+use super::lattice::Lattice;
 use super::load::{Load, PressError};
 use super::profile::Profile;
-use super::skin::{Pressed, Skin};
+use super::samples::spread;
+use super::skin::{Pressed, Skin, SkinEffect};
 use super::thermal::{Heat, ThermalEffect};
 use super::timing::TimingEffect;
 use crate::ground::geometry::bvh::MeshBvh;
@@ -25,6 +27,7 @@ const LONGEST_STEP_S: f64 = 1.0;
 #[derive(Clone, Debug)]
 pub struct Fingertip {
     skin: Option<Skin>,
+    lattice: Option<Lattice>,
     electrodes: Option<Electrodes>,
     fluid: Option<FluidEffect>,
     thermal: Option<ThermalEffect>,
@@ -39,10 +42,17 @@ impl Fingertip {
         let profile = Profile::biotac(finger);
         let cavity_pa_m3 = effects.fluid.as_ref().map_or(0.0, |fluid| fluid.stiffness_pa_m3);
         let skin = effects.skin.as_ref().map(|skin| Skin::new(&profile, skin, cavity_pa_m3));
-        let electrodes = (effects.electrodes.as_ref().zip(skin.as_ref()))
-            .map(|(effect, skin)| Electrodes::new(effect, skin.samples(), profile.scale()));
+        // Electrodes sense a shell through as many points as a default skin has.
+        let shell = effects.flex.as_ref().map(|flex| {
+            let samples = spread(&profile, SkinEffect::default().samples);
+            (Lattice::new(&profile, flex, &samples), samples)
+        });
+        let samples = skin.as_ref().map(Skin::samples).or(shell.as_ref().map(|(_, all)| &all[..]));
+        let electrodes = (effects.electrodes.as_ref().zip(samples))
+            .map(|(effect, samples)| Electrodes::new(effect, samples, profile.scale()));
         Self {
             skin,
+            lattice: shell.map(|(lattice, _)| lattice),
             electrodes,
             fluid: effects.fluid.clone(),
             thermal: effects.thermal.clone(),
@@ -55,6 +65,11 @@ impl Fingertip {
     /// Its skin.
     pub fn skin(&self) -> Option<&Skin> {
         self.skin.as_ref()
+    }
+
+    /// Its skin as a shell.
+    pub fn lattice(&self) -> Option<&Lattice> {
+        self.lattice.as_ref()
     }
 
     /// Its electrodes.
@@ -136,6 +151,8 @@ pub enum FeelError {
 pub struct Feel {
     time_s: f64,
     pressed: Option<Pressed>,
+    /// How far a skin that is simulated elsewhere moved inwards at each sample; empty at rest.
+    shell_m: Vec<f64>,
     bristle: Option<Bristle>,
     heat: Option<Heat>,
     converter: Option<Converter>,
@@ -147,6 +164,7 @@ impl Feel {
         let mut feel = Self {
             time_s: 0.0,
             pressed: tip.skin.as_ref().map(Skin::relaxed),
+            shell_m: Vec::new(),
             bristle: tip.friction.as_ref().map(|_| Bristle::default()),
             heat: tip.thermal.as_ref().map(Heat::new),
             converter: None,
@@ -179,11 +197,9 @@ impl Feel {
         motion: &Motion,
         dt_s: f64,
     ) -> Result<Load, FeelError> {
+        self.accept(motion, dt_s)?;
         let time_s = self.time_s;
-        if !motion.is_finite() || !(0.0..=LONGEST_STEP_S).contains(&dt_s) {
-            return Err(FeelError::NotFinite { time_s, dt_s, motion: Box::new(*motion) });
-        }
-        let mut load = match (&tip.skin, &mut self.pressed) {
+        let load = match (&tip.skin, &mut self.pressed) {
             (Some(skin), Some(pressed)) => {
                 work::count(Stage::Skin);
                 skin.press(object, &motion.x_wt, pressed).map_err(|error| match error {
@@ -195,6 +211,37 @@ impl Feel {
             }
             _ => Load::default(),
         };
+        Ok(self.advance(tip, load, motion, dt_s))
+    }
+
+    /// The same for a skin that is simulated elsewhere: `load` is what the object does to it at the
+    /// end of the step, `inward_m` how far it then lies inwards at each sample of the
+    /// [`Lattice`]; empty at rest.
+    ///
+    /// # Errors
+    /// If a number is not finite.
+    pub fn step_loaded(
+        &mut self,
+        tip: &Fingertip,
+        (load, inward_m): (Load, &[f64]),
+        motion: &Motion,
+        dt_s: f64,
+    ) -> Result<Load, FeelError> {
+        self.accept(motion, dt_s)?;
+        self.shell_m.clear();
+        self.shell_m.extend_from_slice(inward_m);
+        Ok(self.advance(tip, load, motion, dt_s))
+    }
+
+    fn accept(&self, motion: &Motion, dt_s: f64) -> Result<(), FeelError> {
+        if motion.is_finite() && (0.0..=LONGEST_STEP_S).contains(&dt_s) {
+            return Ok(());
+        }
+        Err(FeelError::NotFinite { time_s: self.time_s, dt_s, motion: Box::new(*motion) })
+    }
+
+    /// What follows from the load on the skin.
+    fn advance(&mut self, tip: &Fingertip, mut load: Load, motion: &Motion, dt_s: f64) -> Load {
         self.time_s += dt_s;
         if let (Some(friction), Some(bristle)) = (&tip.friction, &mut self.bristle) {
             work::count(Stage::Friction);
@@ -209,7 +256,7 @@ impl Feel {
         if let (Some(converter), Some(signals)) = (&mut self.converter, signals) {
             converter.advance(&tip.parts(), self.time_s, &signals);
         }
-        Ok(load)
+        load
     }
 
     /// Bytes of this trial's state: what an effect that is off does not hold.
@@ -233,9 +280,10 @@ impl Feel {
             signals.warming_c_s = heat.warming_c_s();
             conductivity = heat.conductivity(thermal);
         }
-        if let (Some(electrodes), Some(pressed)) = (&tip.electrodes, &self.pressed) {
+        if let Some(electrodes) = &tip.electrodes {
             work::count(Stage::Electrodes);
-            signals.electrode_counts = electrodes.counts(pressed, conductivity);
+            let moved_m = self.pressed.as_ref().map_or(&self.shell_m[..], Pressed::moved_m);
+            signals.electrode_counts = electrodes.counts_over(moved_m, conductivity);
         }
         signals
     }

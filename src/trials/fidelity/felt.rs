@@ -46,10 +46,11 @@ pub fn quiet(scene: &Scene) -> Scene {
 }
 
 /// What the finger of a [`quiet`] world felt at the end of its rest on the object; none without
-/// a soft finger, or if it touched nothing.
+/// an elastic foundation, or if it touched nothing.
 pub fn felt(world: &World, ticks: &[Tick]) -> Option<Felt> {
     let (tip, Shape::Mesh { bvh, .. }) = (world.fingertip()?, world.shape()) else { return None };
     let y_m = |tick: &Tick| tick.motion.x_wt.translation.y;
+    tip.skin()?;
     let deepest_m = ticks.iter().map(y_m).fold(f64::INFINITY, f64::min);
     let last = ticks.iter().rposition(|tick| y_m(tick) <= deepest_m + STILL_M)?;
     let mut feel = Feel::new(tip, &seed::stream(0, 0, "finger"));

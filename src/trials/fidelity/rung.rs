@@ -94,6 +94,8 @@ impl Rung {
         }
         scene.touch.approach_m_s = self.approach_m_s.unwrap_or(scene.touch.approach_m_s);
         let effects = &mut scene.effects;
+        // Rungs are resolutions of the foundation.
+        effects.flex = None;
         let [skin, fluid, electrodes] = match self.senses {
             Senses::None => [false; 3],
             Senses::Dry => [true, false, false],

@@ -1,11 +1,14 @@
 //! Scene → MJCF, the text a MuJoCo model is compiled from. Numbers are SI, in `W`.
 
+mod flex;
 mod height_field;
 mod hull;
 mod mesh;
 mod robot;
 mod scenery;
 mod sdf;
+
+pub use flex::flex;
 
 use super::collision::Collision;
 use super::solver::Integrator;
