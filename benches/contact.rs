@@ -8,7 +8,7 @@ use anyhow::{Context, ensure};
 use mujoco_rs::wrappers::mj_data::MjData;
 use nalgebra::{Isometry3, Point3};
 use palpate::bodies::backend::Command;
-use palpate::bodies::mujoco::Dynamic;
+use palpate::bodies::mujoco::Models;
 use palpate::bodies::stand::Stand;
 use palpate::conduct::control::{Controller, Goal};
 use palpate::conduct::probe::{self, Touch};
@@ -146,7 +146,7 @@ fn lowered(stage: &Arc<World>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
     const ABOVE_M: f64 = 0.03;
     const BELOW_M: f64 = -0.01;
     const STEP_M: f64 = 2.5e-4;
-    let mut data = MjData::new(Dynamic::models(stage)?.plant);
+    let mut data = MjData::new(Models::new(stage)?.plant);
     let mut deepest = |target: &[f64], y_m: f64| {
         data.qpos_mut().copy_from_slice(&[target[0], y_m, target[1]]);
         data.forward();

@@ -7,7 +7,7 @@ mod shapes;
 use mujoco_rs::wrappers::mj_data::MjData;
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 use palpate::bodies::backend::{Command, Fault, Wrench};
-use palpate::bodies::mujoco::{Dynamic, Plant, compile};
+use palpate::bodies::mujoco::{Models, Plant, compile};
 use palpate::bodies::stand::Stand;
 use palpate::conduct::probe::{self, Contact, Touch};
 use palpate::ground::geometry::bvh::MeshBvh;
@@ -170,7 +170,7 @@ fn jerkiest(integrator: Integrator, step_s: f64) -> f64 {
     let mut scene = scene("container_pa10.toml", &[]);
     (scene.solver.integrator, scene.solver.step_s) = (integrator, step_s);
     let world = World::build(scene).unwrap();
-    let mut plant = Plant::new(Dynamic::models(&world).unwrap().plant).unwrap();
+    let mut plant = Plant::new(Models::new(&world).unwrap().plant).unwrap();
     let joints = world.chain().unwrap().joints;
     let mut dice = shapes::Dice(1);
     let mut most: f64 = 0.0;
@@ -200,7 +200,7 @@ fn jerkiest(integrator: Integrator, step_s: f64) -> f64 {
 fn explicit_steps_are_as_short_as_the_stiffest_servo_needs() {
     for links in ["arm={links=\"C\"}", "arm={links=\"A\"}"] {
         let world = World::build(scene("container_pa10.toml", &[links])).unwrap();
-        let model = Dynamic::models(&world).unwrap().plant;
+        let model = Models::new(&world).unwrap().plant;
         let joints = world.chain().unwrap().joints;
         let n = joints.len();
         let root = DVector::from_fn(n, |i, _| model.actuator_gainprm()[i][0].sqrt());

@@ -1,15 +1,11 @@
 //! An arm or stage with masses, servos and friction, carrying the finger.
 
-use super::{Flex, ModelError, Plant, compile};
+use super::{Flex, Models, Plant};
 use crate::bodies::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
 use crate::bodies::sense::Sense;
 use crate::things::arm::Chain;
-use crate::things::finger::{Motion, stiffness};
+use crate::things::finger::Motion;
 use crate::world::World;
-use crate::world::collision::Collision;
-use crate::world::mjcf::{self, Mode};
-use crate::world::world::{APPROACH_W, Shape};
-use mujoco_rs::wrappers::MjModel;
 use std::sync::Arc;
 
 /// A state counts as diverged this far beyond a joint's limits, rad or m (the stops stand 0.05 rad
@@ -30,35 +26,11 @@ pub struct Dynamic {
     reading: Reading,
 }
 
-/// What MuJoCo compiles of a world, once for all trials.
-#[derive(Clone)]
-pub struct Models {
-    /// The arm or stage.
-    pub plant: Arc<MjModel>,
-    /// The skin of `[effects.flex]`.
-    pub flex: Option<Arc<MjModel>>,
-}
-
 impl Dynamic {
-    /// The world's models.
-    ///
-    /// # Errors
-    /// If MuJoCo refuses it, the scene's time step is too long for its skin, or the object has no
-    /// inside where the scene's collision needs one.
-    pub fn models(world: &World) -> Result<Models, ModelError> {
-        let step_s = world.scene().solver.step_s;
-        check_inside(world)?;
-        let text = mjcf::scene(world, Mode::Dynamic { step_s });
-        let plant = Arc::new(compile(&text.ok_or(ModelError::Lacks { part: "an object" })?)?);
-        check_step(world, &plant, step_s)?;
-        Ok(Models { plant, flex: Flex::model(world)? })
-    }
-
     /// At the chain's home; none without memory or in a world of another body.
     pub fn new(world: &Arc<World>, models: &Models) -> Option<Self> {
         let chain = world.chain()?;
-        let scene = world.scene();
-        let period_s = scene.period_s();
+        let period_s = world.scene().period_s();
         let mut sense = Sense::new(Arc::clone(world), 0);
         if let (Some(sense), Some(model)) = (&mut sense, &models.flex) {
             sense.wear(Box::new(Flex::new(Arc::clone(world), Arc::clone(model)).ok()?));
@@ -68,7 +40,7 @@ impl Dynamic {
             plant: Plant::new(Arc::clone(&models.plant)).ok()?,
             sense,
             wrench: Wrench::default(),
-            steps: scene.solver.steps(period_s)?,
+            steps: (period_s / models.plant.opt().timestep).round() as u32,
             tick: 0,
             reading: Reading::default(),
             chain,
@@ -155,37 +127,5 @@ impl Backend for Dynamic {
         self.tick += 1;
         self.report();
         Ok(&self.reading)
-    }
-}
-
-/// Without an inside a distance has no sign.
-fn check_inside(world: &World) -> Result<(), ModelError> {
-    let Shape::Mesh { report, .. } = world.shape() else { return Ok(()) };
-    let edges = report.border_edges.count + report.non_manifold_edges.count;
-    match world.scene().solver.collision {
-        Some(Collision::Sdf) if edges > 0 => Err(ModelError::Open { edges }),
-        _ => Ok(()),
-    }
-}
-
-/// A force that is explicit in the position of a mass m is stable in steps below `2 √(m / k)`; half
-/// of that is accepted, because a hollow object presses more skin at once than the flat plate
-/// on which k is measured.
-fn check_step(world: &World, model: &Arc<MjModel>, step_s: f64) -> Result<(), ModelError> {
-    let scene = world.scene();
-    let (Some(skin), Some(chain)) = (world.fingertip().and_then(|tip| tip.skin()), world.chain())
-    else {
-        return Ok(());
-    };
-    let mut plant = Plant::new(Arc::clone(model))?;
-    plant.reset(chain.start()).map_err(|_| ModelError::Lacks { part: "a home" })?;
-    let mass_kg = plant.tip_mass_kg();
-    let towards_t = scene.finger.attitude_w().inverse_transform_vector(&APPROACH_W);
-    let force_n = scene.touch.force_limit_n;
-    let stiffness_n_m = stiffness::largest_n_m(skin, &towards_t, force_n);
-    let limit_s = (mass_kg / stiffness_n_m).sqrt();
-    match step_s <= limit_s {
-        true => Ok(()),
-        false => Err(ModelError::Stiff { step_s, force_n, stiffness_n_m, mass_kg, limit_s }),
     }
 }

@@ -23,6 +23,9 @@ use thiserror::Error;
 /// Longest step: beyond it a frame's signals would be mostly interpolated (chosen).
 const LONGEST_STEP_S: f64 = 1.0;
 
+/// No stage: what [`Feel::step`] leaves out.
+const NOTHING: usize = usize::MAX;
+
 /// What never changes about a fingertip; shared by trials.
 #[derive(Clone, Debug)]
 pub struct Fingertip {
@@ -170,7 +173,7 @@ impl Feel {
             converter: None,
         };
         if tip.sends_frames {
-            let untouched = feel.signals(tip, 0.0);
+            let untouched = feel.signals::<NOTHING>(tip, 0.0);
             feel.converter = Some(Converter::new(&tip.parts(), untouched, rng));
         }
         feel
@@ -197,6 +200,21 @@ impl Feel {
         motion: &Motion,
         dt_s: f64,
     ) -> Result<Load, FeelError> {
+        self.step_without::<NOTHING>(tip, object, motion, dt_s)
+    }
+
+    /// As [`step`](Self::step), in code from which the [`Stage`] numbered `OFF` is left out by the compiler:
+    /// what the switch of an effect that is off costs is measured against it.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step).
+    pub fn step_without<const OFF: usize>(
+        &mut self,
+        tip: &Fingertip,
+        object: &MeshBvh,
+        motion: &Motion,
+        dt_s: f64,
+    ) -> Result<Load, FeelError> {
         self.accept(motion, dt_s)?;
         let time_s = self.time_s;
         let load = match (&tip.skin, &mut self.pressed) {
@@ -211,7 +229,7 @@ impl Feel {
             }
             _ => Load::default(),
         };
-        Ok(self.advance(tip, load, motion, dt_s))
+        Ok(self.advance::<OFF>(tip, load, motion, dt_s))
     }
 
     /// The same for a skin that is simulated elsewhere: `load` is what the object does to it at the
@@ -230,7 +248,7 @@ impl Feel {
         self.accept(motion, dt_s)?;
         self.shell_m.clear();
         self.shell_m.extend_from_slice(inward_m);
-        Ok(self.advance(tip, load, motion, dt_s))
+        Ok(self.advance::<NOTHING>(tip, load, motion, dt_s))
     }
 
     fn accept(&self, motion: &Motion, dt_s: f64) -> Result<(), FeelError> {
@@ -241,20 +259,30 @@ impl Feel {
     }
 
     /// What follows from the load on the skin.
-    fn advance(&mut self, tip: &Fingertip, mut load: Load, motion: &Motion, dt_s: f64) -> Load {
+    fn advance<const OFF: usize>(
+        &mut self,
+        tip: &Fingertip,
+        mut load: Load,
+        motion: &Motion,
+        dt_s: f64,
+    ) -> Load {
         self.time_s += dt_s;
-        if let (Some(friction), Some(bristle)) = (&tip.friction, &mut self.bristle) {
+        if OFF != Stage::Friction as usize
+            && let (Some(friction), Some(bristle)) = (&tip.friction, &mut self.bristle)
+        {
             work::count(Stage::Friction);
             let velocity = [&motion.linear_w, &motion.angular_w];
             bristle.step(friction, &motion.x_wt, velocity, dt_s, &mut load);
         }
-        if let (Some(thermal), Some(heat)) = (&tip.thermal, &mut self.heat) {
+        if OFF != Stage::Thermal as usize
+            && let (Some(thermal), Some(heat)) = (&tip.thermal, &mut self.heat)
+        {
             work::count(Stage::Thermal);
             heat.step(thermal, load.area_m2, dt_s);
         }
-        let signals = self.converter.is_some().then(|| self.signals(tip, load.pressure_pa));
+        let signals = self.converter.is_some().then(|| self.signals::<OFF>(tip, load.pressure_pa));
         if let (Some(converter), Some(signals)) = (&mut self.converter, signals) {
-            converter.advance(&tip.parts(), self.time_s, &signals);
+            converter.advance::<OFF>(&tip.parts(), self.time_s, &signals);
         }
         load
     }
@@ -272,17 +300,21 @@ impl Feel {
         self.converter.as_mut()?.frame()
     }
 
-    fn signals(&self, tip: &Fingertip, pressure_pa: f64) -> Signals {
+    fn signals<const OFF: usize>(&self, tip: &Fingertip, pressure_pa: f64) -> Signals {
         let mut signals = Signals { pressure_pa, ..Signals::default() };
         let mut conductivity = 1.0;
-        if let (Some(thermal), Some(heat)) = (&tip.thermal, &self.heat) {
+        if OFF != Stage::Thermal as usize
+            && let (Some(thermal), Some(heat)) = (&tip.thermal, &self.heat)
+        {
             signals.temperature_c = heat.temperature_c;
             signals.warming_c_s = heat.warming_c_s();
             conductivity = heat.conductivity(thermal);
         }
-        if let Some(electrodes) = &tip.electrodes {
+        let moved_m = self.pressed.as_ref().map_or(&self.shell_m[..], Pressed::moved_m);
+        if OFF != Stage::Electrodes as usize
+            && let Some(electrodes) = &tip.electrodes
+        {
             work::count(Stage::Electrodes);
-            let moved_m = self.pressed.as_ref().map_or(&self.shell_m[..], Pressed::moved_m);
             signals.electrode_counts = electrodes.counts_over(moved_m, conductivity);
         }
         signals
