@@ -5,6 +5,7 @@ use palpate::bodies::delay::Delayed;
 use palpate::bodies::limits::Limited;
 use palpate::bodies::recorder::Recorder;
 use palpate::bodies::stand::Stand;
+use palpate::bodies::watched::Watched;
 use palpate::things::arm::Chain;
 use palpate::world::{Scene, World};
 use std::path::Path;
@@ -27,11 +28,12 @@ fn world(sets: &[&str]) -> Arc<World> {
 /// Puts a wrapper around a body.
 type Wrap = fn(Box<dyn Backend>, &Chain) -> Box<dyn Backend>;
 
-const WRAPS: [(&str, Wrap); 4] = [
+const WRAPS: [(&str, Wrap); 5] = [
     ("bare", |body, _| body),
     ("limited", |body, chain| Box::new(Limited::new(body, chain.clone()).unwrap())),
     ("recorded", |body, _| Box::new(Recorder::new(body, std::io::sink()))),
     ("delayed", |body, _| Box::new(Delayed::new(body, 0.03))),
+    ("watched", |body, _| Box::new(Watched::new(body, 100.0).0)),
 ];
 
 /// Shows `check` every body, each in every wrapper.
@@ -291,3 +293,28 @@ fn a_recording_that_cannot_be_written_is_a_fault() {
     let fault = (0..100).find_map(|_| recorder.step(&still).err()).unwrap();
     assert!(matches!(fault, Fault::Unrecorded { .. }), "{fault}");
 }
+
+/// Watching changes no reading and shows the last; the body is never ahead of the clock by more than
+/// the sleep it saves up, and it stops when nobody watches any more.
+#[test]
+fn a_watched_body_is_the_same_body_at_the_pace_of_the_clock() {
+    let stand = Stand::new(world(&[EFFECTS_DRY])).unwrap();
+    let mut bare = stand.body().unwrap().unwrap();
+    let (mut watched, sight) = Watched::new(stand.body().unwrap().unwrap(), 4.0);
+    let begun = std::time::Instant::now();
+    let readings = run(&mut watched, 3, 20);
+    // A machine that is busy only makes it later.
+    let last = readings.last().unwrap();
+    assert!(begun.elapsed().as_secs_f64() > last.time_s / 4.0 - 0.01);
+    assert!(bits(&run(bare.as_mut(), 3, 20)) == bits(&readings));
+    let seen = sight.seen();
+    assert_eq!((seen.time_s, &seen.q), (last.time_s, &last.q));
+    sight.mark(nalgebra::Point3::origin());
+    assert_eq!(sight.seen().marks_w.len(), 1);
+    sight.close();
+    let joints = watched.capabilities().joints.len();
+    let ended = watched.step(&motion(21, joints)).unwrap_err();
+    assert_eq!(ended, Fault::Stopped { time_s: last.time_s });
+}
+
+const EFFECTS_DRY: &str = "effects={skin={}}";

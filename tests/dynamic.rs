@@ -3,7 +3,8 @@
 
 use nalgebra::{Isometry3, Translation3};
 use palpate::bodies::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
-use palpate::bodies::stand::{Stand, StandError};
+use palpate::bodies::mujoco::{Dynamic, StepLimit};
+use palpate::bodies::stand::Stand;
 use palpate::conduct::control::{Controller, Goal};
 use palpate::conduct::probe::servo::Servo;
 use palpate::conduct::probe::{self, Contact, Probe, Touch};
@@ -227,16 +228,52 @@ fn a_finger_without_skin_finds_the_surface() {
     }
 }
 
+/// The limit is √(m / k). A skin whose every constant is 100 times larger bears 100 times the force at
+/// the same depth, so with the limit of force 100 times larger that of the step is a tenth.
 #[test]
-fn a_step_too_long_for_the_skin_is_refused_with_the_longest_that_is_not() {
-    let stiff = "effects={skin={modulus_pa=1e9, flatten_pa_m=1e12, core_pa_m=1e12}}";
-    let Err(error) = Stand::new(world("container_finger.toml", &[ARM, DYNAMIC, stiff])) else {
-        panic!("accepted")
+fn a_step_too_long_for_the_skin_is_divided_or_refused_with_the_longest_that_is_not() {
+    let soft = world("container_finger.toml", &[ARM, DYNAMIC, DRY]);
+    let stiffer = |times: f64| {
+        let mut scene = soft.scene().clone();
+        let skin = scene.effects.skin.as_mut().unwrap();
+        for constant in [
+            &mut skin.modulus_pa,
+            &mut skin.flatten_pa_m,
+            &mut skin.inflate_pa_m,
+            &mut skin.core_pa_m,
+        ] {
+            *constant *= times;
+        }
+        scene.touch.force_limit_n *= times;
+        let world = World::build(scene).unwrap();
+        (Dynamic::model(&world), world)
     };
-    let text = error.to_string();
-    assert!(matches!(error, StandError::Model(_)) && text.contains("at most 5.40e-4 s"), "{text}");
-    let short = "solver.step_s=0.0005";
-    assert!(Stand::new(world("container_finger.toml", &[ARM, DYNAMIC, stiff, short])).is_ok());
+    let limit = |times: f64| {
+        let (model, world) = stiffer(times);
+        StepLimit::of(&world, &model.unwrap().0).unwrap().unwrap()
+    };
+    let (one, hundred) = (limit(1.0), limit(100.0));
+    assert!((one.limit_s - (one.mass_kg / one.stiffness_n_m).sqrt()).abs() < 1e-12);
+    let times = one.limit_s / hundred.limit_s;
+    assert!((times - 10.0).abs() < 1e-3, "{times}");
+
+    let (model, world) = stiffer(1000.0);
+    let (model, substeps) = model.unwrap();
+    let substeps = substeps.unwrap();
+    let divided_s = model.opt().timestep;
+    assert!(divided_s <= substeps.limit.limit_s && 2.0 * divided_s > substeps.limit.limit_s);
+    assert_eq!(divided_s, 0.002 / f64::from(substeps.count));
+    let stand = Stand::new(Arc::new(world)).unwrap();
+    let text = stand.notice().unwrap();
+    let limit = format!("at most {:.2e} s", substeps.limit.limit_s);
+    assert!(text.contains("solver.step_s = 0.002 is divided") && text.contains(&limit), "{text}");
+
+    let text = stiffer(1e9).0.unwrap_err().to_string();
+    assert!(
+        text.contains("solver.step_s = 0.002 is too long") && text.contains("at most"),
+        "{text}"
+    );
+    assert_eq!(Stand::new(soft).unwrap().notice(), None);
 }
 
 #[test]

@@ -1,20 +1,22 @@
 //! Every hard case at the hardest severity that must hold.
 
-use palpate::trials::stress::{Outcome, cases};
+use palpate::trials::stress::{Axis, Case, Outcome, cases};
+use rayon::prelude::*;
 use std::collections::HashSet;
 
 #[test]
 fn every_case_holds_where_it_must_and_says_so_where_it_does_not() {
-    for case in cases() {
+    let cases: Vec<&Case> = cases().collect();
+    cases.par_iter().for_each(|case| {
         let nominal = case.holds.saturating_sub(1);
-        let verdict = case.run(nominal, 0.01);
+        let verdict = case.run(nominal, case.axis.nominal_s());
         let at = case.severities[nominal];
         assert!(
             verdict.explained,
             "{} at {at} {}: {:?}",
             case.name, case.severity, verdict.outcome
         );
-    }
+    });
 }
 
 #[test]
@@ -30,16 +32,24 @@ fn the_catalogue_is_complete() {
 
 #[test]
 fn a_panic_is_a_broken_law() {
-    let case = palpate::trials::stress::Case {
+    let case = Case {
         name: "panic",
         why: "it panics",
         severity: "times",
         severities: &[1.0],
         holds: 1,
         known: "",
-        timed: false,
+        axis: Axis::Nothing,
         law: |_, _| panic!("as it should"),
     };
     let verdict = case.run(0, 0.01);
     assert!(matches!(verdict.outcome, Outcome::Wrong(_)) && !verdict.explained);
+}
+
+/// Ten times is what a skin may be off its nominal stiffness without a thought for the time step.
+#[cfg(feature = "mujoco")]
+#[test]
+fn a_skin_ten_times_stiffer_keeps_the_force_at_rest_in_steps_as_given() {
+    let margin = palpate::trials::stress::hold::margin(0.002, false);
+    assert!(margin.times >= 10.0, "{margin:?}");
 }

@@ -155,6 +155,12 @@ pub enum Fault {
         /// What the system says.
         message: String,
     },
+    /// Whoever watched it had it stopped.
+    #[error("stopped at {time_s} s")]
+    Stopped {
+        /// When.
+        time_s: f64,
+    },
     /// The body stopped answering.
     #[error("no answer since {time_s} s")]
     Lost {

@@ -10,3 +10,4 @@ pub mod mujoco;
 pub mod recorder;
 pub mod sense;
 pub mod stand;
+pub mod watched;

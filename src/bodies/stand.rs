@@ -16,6 +16,7 @@ pub struct Stand {
     world: Arc<World>,
     #[cfg(feature = "mujoco")]
     model: Option<Arc<mujoco_rs::wrappers::MjModel>>,
+    notice: Option<String>,
 }
 
 /// A world that no body can be put into.
@@ -41,20 +42,28 @@ impl Stand {
     pub fn new(world: Arc<World>) -> Result<Self, StandError> {
         #[cfg(feature = "mujoco")]
         {
-            let moved = world.scene().body == Body::Dynamic;
-            let model = if moved { Some(mujoco::Dynamic::model(&world)?) } else { None };
-            Ok(Self { world, model })
+            if world.scene().body != Body::Dynamic {
+                return Ok(Self { world, model: None, notice: None });
+            }
+            let (model, substeps) = mujoco::Dynamic::model(&world)?;
+            let notice = substeps.map(|substeps| substeps.to_string());
+            Ok(Self { world, model: Some(model), notice })
         }
         #[cfg(not(feature = "mujoco"))]
         match world.scene().body {
             Body::Dynamic => Err(StandError::NotBuilt { body: Body::Dynamic.name() }),
-            _ => Ok(Self { world }),
+            _ => Ok(Self { world, notice: None }),
         }
     }
 
     /// The world.
     pub fn world(&self) -> &Arc<World> {
         &self.world
+    }
+
+    /// What is simulated otherwise than the scene asks, and why.
+    pub fn notice(&self) -> Option<&str> {
+        self.notice.as_deref()
     }
 
     /// The simulated body that the scene asks for, at its start; none where a touch is no motion.

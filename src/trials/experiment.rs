@@ -61,7 +61,29 @@ const TOUCHES_MAX: f64 = 2000.0;
 /// Most beliefs drawn side by side.
 const DRAWN_MAX: usize = 8;
 
+/// Test places along each side of the zone, if nobody says how many; chosen.
+const GRID: u32 = 31;
+
 impl Experiment {
+    /// `trials` trials of `touches` touches with each planner on `scene`, every other setting at its
+    /// default.
+    pub fn on(scene: &Scene, planners: &[&str], trials: u32, touches: u32) -> Self {
+        Self {
+            name: "scene".into(),
+            question: String::new(),
+            planners: planners.iter().map(|name| (*name).into()).collect(),
+            trials,
+            seed: 0,
+            initial_touches: 5.min(touches),
+            touches,
+            grid: GRID,
+            gp: GpSettings::default(),
+            planning: PlanningSettings::default(),
+            report: ReportSettings::default(),
+            scene: scene.clone(),
+        }
+    }
+
     /// Reads an experiment file with the scene it names, and applies `--set` assignments.
     ///
     /// # Errors

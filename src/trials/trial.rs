@@ -20,8 +20,7 @@ pub fn run(
     planner: &planner::Entry,
     trial: u32,
 ) -> TrialRow {
-    let seed = seed::stream(experiment.seed, trial.into(), "body").random();
-    match probe::open(stand, seed) {
+    match probe::open(stand, body_seed(experiment, trial)) {
         Ok(mut probe) => run_with(experiment, &mut *probe, truth, planner, trial),
         Err(fault) => TrialRow {
             trial,
@@ -30,6 +29,11 @@ pub fn run(
             touches: Vec::new(),
         },
     }
+}
+
+/// Seed of all the randomness of a trial's body.
+pub fn body_seed(experiment: &Experiment, trial: u32) -> u64 {
+    seed::stream(experiment.seed, trial.into(), "body").random()
 }
 
 /// As [`run`], with the touches of any `probe`.

@@ -1,13 +1,12 @@
 //! An arm or stage with masses, servos and friction, carrying the finger.
 
-use super::{ModelError, Plant, compile};
+use super::{ModelError, Plant, Substeps, compile};
 use crate::bodies::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
 use crate::bodies::sense::Sense;
 use crate::things::arm::Chain;
-use crate::things::finger::{Motion, stiffness};
+use crate::things::finger::Motion;
 use crate::world::World;
 use crate::world::mjcf::{self, Mode};
-use crate::world::world::APPROACH_W;
 use mujoco_rs::wrappers::MjModel;
 use std::sync::Arc;
 
@@ -30,29 +29,37 @@ pub struct Dynamic {
 }
 
 impl Dynamic {
-    /// The world's model, compiled once for all trials.
+    /// The world's model, compiled once for all trials, with the scene's time step; one that is too
+    /// long for the skin is divided, and how is said.
     ///
     /// # Errors
-    /// If MuJoCo refuses it, or the scene's time step is too long for its skin.
-    pub fn model(world: &World) -> Result<Arc<MjModel>, ModelError> {
+    /// If MuJoCo refuses it, or no step is short enough for its skin.
+    pub fn model(world: &World) -> Result<(Arc<MjModel>, Option<Substeps>), ModelError> {
         let step_s = world.scene().solver.step_s;
+        let model = Self::model_at(world, step_s)?;
+        let Some(substeps) = Substeps::needed(world, &model)? else { return Ok((model, None)) };
+        Ok((Self::model_at(world, step_s / f64::from(substeps.count))?, Some(substeps)))
+    }
+
+    /// The same with a time step of `step_s`, whatever the skin needs.
+    ///
+    /// # Errors
+    /// If MuJoCo refuses it.
+    pub fn model_at(world: &World, step_s: f64) -> Result<Arc<MjModel>, ModelError> {
         let text = mjcf::scene(world, Mode::Dynamic { step_s });
-        let model = Arc::new(compile(&text.ok_or(ModelError::Lacks { part: "an object" })?)?);
-        check_step(world, &model, step_s)?;
-        Ok(model)
+        compile(&text.ok_or(ModelError::Lacks { part: "an object" })?).map(Arc::new)
     }
 
     /// At the chain's home; none without memory or in a world of another body.
     pub fn new(world: &Arc<World>, model: &Arc<MjModel>) -> Option<Self> {
         let chain = world.chain()?;
-        let scene = world.scene();
-        let period_s = scene.period_s();
+        let period_s = world.scene().period_s();
         let mut body = Self {
             capabilities: Capabilities::of(&chain, period_s),
             plant: Plant::new(Arc::clone(model)).ok()?,
             sense: Sense::new(Arc::clone(world), 0),
             wrench: Wrench::default(),
-            steps: scene.solver.steps(period_s)?,
+            steps: (period_s / model.opt().timestep).round() as u32,
             tick: 0,
             reading: Reading::default(),
             chain,
@@ -139,27 +146,5 @@ impl Backend for Dynamic {
         self.tick += 1;
         self.report();
         Ok(&self.reading)
-    }
-}
-
-/// A force that is explicit in the position of a mass m is stable in steps below `2 √(m / k)`; half
-/// of that is accepted, because a hollow object presses more skin at once than the flat plate
-/// on which k is measured.
-fn check_step(world: &World, model: &Arc<MjModel>, step_s: f64) -> Result<(), ModelError> {
-    let scene = world.scene();
-    let (Some(skin), Some(chain)) = (world.fingertip().and_then(|tip| tip.skin()), world.chain())
-    else {
-        return Ok(());
-    };
-    let mut plant = Plant::new(Arc::clone(model))?;
-    plant.reset(chain.start()).map_err(|_| ModelError::Lacks { part: "a home" })?;
-    let mass_kg = plant.tip_mass_kg();
-    let towards_t = scene.finger.attitude_w().inverse_transform_vector(&APPROACH_W);
-    let force_n = scene.touch.force_limit_n;
-    let stiffness_n_m = stiffness::largest_n_m(skin, &towards_t, force_n);
-    let limit_s = (mass_kg / stiffness_n_m).sqrt();
-    match step_s <= limit_s {
-        true => Ok(()),
-        false => Err(ModelError::Stiff { step_s, force_n, stiffness_n_m, mass_kg, limit_s }),
     }
 }

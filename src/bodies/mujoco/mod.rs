@@ -5,10 +5,14 @@ mod dynamic;
 pub mod picture;
 mod plant;
 mod servo;
+mod substeps;
 mod touch;
+#[cfg(feature = "viewer")]
+pub mod window;
 
 pub use dynamic::Dynamic;
 pub use plant::Plant;
+pub use substeps::{StepLimit, Substeps};
 
 use mujoco_rs::error::MjModelError;
 use mujoco_rs::wrappers::MjModel;
@@ -31,23 +35,13 @@ pub enum ModelError {
         /// What is missing.
         part: &'static str,
     },
-    /// The skin is too stiff for the time step.
-    #[error(
-        "solver.step_s = {step_s} is too long: up to {force_n} N (touch.force_limit_n) the skin is as stiff \
-         as {stiffness_n_m:.0} N/m and the fingertip as light as {mass_kg:.3} kg, which needs \
-         at most {limit_s:.2e} s"
-    )]
+    /// The skin is too stiff for any time step.
+    #[error("solver.step_s = {step_s} is too long, and cannot be divided so finely: {limit}")]
     Stiff {
         /// The scene's step.
         step_s: f64,
-        /// Largest force of a touch.
-        force_n: f64,
-        /// Largest stiffness of the skin up to that force.
-        stiffness_n_m: f64,
-        /// Smallest mass that the fingertip moves with.
-        mass_kg: f64,
-        /// The longest step that is accepted.
-        limit_s: f64,
+        /// What limits it.
+        limit: StepLimit,
     },
     /// There is no memory for its state.
     #[error("no memory for the state of the MuJoCo model")]

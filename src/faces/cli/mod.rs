@@ -11,11 +11,15 @@ mod run;
 mod scan;
 mod show;
 mod stress;
+mod watch;
 
+use crate::bodies::stand::Stand;
 use crate::conduct::planner::PLANNERS;
+use crate::world::World;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::io::{self, Write};
 use std::process::ExitCode;
+use std::sync::Arc;
 
 /// A testbed for active touch: a robot finger explores an object it cannot see.
 #[derive(Parser)]
@@ -32,6 +36,7 @@ Examples:
   palpate report runs/toy                   draw the figures again, without running
   palpate show my-part.obj --unit mm        check a mesh before exploring it
   palpate scan scenes/bird.toml             touch the whole zone, write a point cloud
+  palpate watch scenes/bird_pa10.toml       watch a trial in a window
   palpate export runs/bird --planner active --out bird.ply
   palpate fidelity scenes/bird_finger.toml --tolerance 0.2mm
   palpate stress                            hard cases until they break
@@ -49,6 +54,8 @@ enum Command {
     Show(show::Args),
     /// Touch a grid of targets, and write the points of contact as a cloud.
     Scan(scan::Args),
+    /// Watch a trial in a window while it runs.
+    Watch(watch::Args),
     /// Write a belief of a run as a mesh.
     Export(export::Args),
     /// Show what accuracy costs: errors and time over a ladder of scenes.
@@ -84,6 +91,7 @@ pub fn main() -> ExitCode {
         Command::Report(args) => report::run(&args),
         Command::Show(args) => show::run(&args),
         Command::Scan(args) => scan::run(&args),
+        Command::Watch(args) => watch::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Fidelity(args) => fidelity::run(&args),
         Command::Effects(args) => effects::run(&args),
@@ -99,6 +107,13 @@ pub fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Makes a world ready for bodies, and says on standard error what is not simulated as its scene asks.
+fn stand(world: &Arc<World>) -> anyhow::Result<Stand> {
+    let stand = Stand::new(Arc::clone(world))?;
+    stand.notice().iter().for_each(|notice| eprintln!("note: {notice}"));
+    Ok(stand)
 }
 
 /// Prints to standard output; a reader who has gone away is no error.

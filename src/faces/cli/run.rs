@@ -1,8 +1,7 @@
 //! `palpate run`.
 
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::{Ending, print};
-use crate::bodies::stand::Stand;
+use super::{Ending, print, stand};
 use crate::faces::report;
 use crate::trials::experiment::Experiment;
 use crate::trials::runner;
@@ -47,7 +46,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let experiment = Experiment::load(&args.experiment, &args.set)?;
     let world = Arc::new(World::build(experiment.scene.clone())?);
     let truth = Truth::sample(&world, experiment.grid as usize);
-    let stand = Stand::new(world)?;
+    let stand = stand(&world)?;
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&experiment.name));
     runner::check(&truth)?;
     let manifest = manifest(&experiment);

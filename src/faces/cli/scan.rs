@@ -1,8 +1,7 @@
 //! `palpate scan`.
 
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::{Ending, print};
-use crate::bodies::stand::Stand;
+use super::{Ending, print, stand};
 use crate::conduct::probe::Touch;
 use crate::faces::points::Points;
 use crate::faces::report::{png, scan as drawing};
@@ -59,7 +58,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let grid = args.grid.unwrap_or_else(|| scan::default_grid(&world.scene().zone));
     let stop = stop_on_interrupt("rows")?;
     let bar = progress_bar(&name, "rows", grid[1] as u64, 0);
-    let stand = Stand::new(Arc::clone(&world))?;
+    let stand = stand(&world)?;
     let felt = scan::scan(&stand, grid, args.threads.into(), &stop, &|| step(&bar))?;
     bar.finish_and_clear();
     let Some(felt) = felt else { return Ok(Ending::Interrupted) };

@@ -73,7 +73,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
 }
 
 /// An experiment names planners, a scene does not; a file that is neither is read as a scene.
-fn is_experiment(path: &Path) -> bool {
+pub(super) fn is_experiment(path: &Path) -> bool {
     std::fs::read_to_string(path)
         .ok()
         .and_then(|text| text.parse::<toml::Table>().ok())

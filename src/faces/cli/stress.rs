@@ -17,6 +17,7 @@ Examples:
   palpate stress                          every case at every severity
   palpate stress \"narrow slot\"            one case; part of its name is enough
   palpate stress --list                   what there is, and why it is hard
+  palpate stress --margin                 how much stiffer the skin could be at the default time step
 
 A case is stable (its law held), faulted (it ended with a fault that gives time and state, or was
 refused), or wrong (a law was broken in silence). Exit code 1 if an outcome is not explained.")]
@@ -26,6 +27,9 @@ pub(super) struct Args {
     /// List the cases instead of running them.
     #[arg(long)]
     list: bool,
+    /// Only say how much stiffer the skin of a finger with masses could be.
+    #[arg(long, conflicts_with = "list")]
+    margin: bool,
     /// Threads; 0 means all cores.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
@@ -40,7 +44,8 @@ struct Line<'a> {
     case: &'a str,
     severity: f64,
     unit: &'a str,
-    period_s: f64,
+    axis: &'a str,
+    axis_s: f64,
     outcome: &'a str,
     explained: bool,
     words: &'a str,
@@ -61,20 +66,23 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         print(&aligned(&lines))?;
         return Ok(Ending::Done);
     }
+    if args.margin {
+        print(&margins())?;
+        return Ok(Ending::Done);
+    }
     let stop = stop_on_interrupt("runs")?;
     let jobs: Vec<(usize, usize, f64)> = (chosen.iter().enumerate())
         .flat_map(|(i, case)| {
             let ranks = 0..case.severities.len();
-            ranks.flat_map(move |rank| case.periods_s().iter().map(move |&p| (i, rank, p)))
+            ranks.flat_map(move |rank| case.axis.values_s().iter().map(move |&s| (i, rank, s)))
         })
         .collect();
     let bar = progress_bar("stress", "runs", jobs.len() as u64, 0);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.into()).build()?;
     let verdicts: Vec<Option<Verdict>> = pool.install(|| {
         (jobs.par_iter())
-            .map(|&(i, rank, period_s)| {
-                let verdict =
-                    (!stop.load(Ordering::Relaxed)).then(|| chosen[i].run(rank, period_s));
+            .map(|&(i, rank, axis_s)| {
+                let verdict = (!stop.load(Ordering::Relaxed)).then(|| chosen[i].run(rank, axis_s));
                 step(&bar);
                 verdict
             })
@@ -86,11 +94,42 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         ran[*i].1.extend(verdict);
     }
     report(&ran, args)?;
+    if args.case.is_none() && !stop.load(Ordering::Relaxed) {
+        print(&margins())?;
+    }
     if stop.load(Ordering::Relaxed) {
         return Ok(Ending::Interrupted);
     }
     let unexplained = ran.iter().flat_map(|(_, all)| all).filter(|v| !v.explained).count();
     Ok(if unexplained > 0 { Ending::Failed } else { Ending::Done })
+}
+
+/// How much stiffer the skin of the nominal scene could be at its time step.
+#[cfg(feature = "mujoco")]
+fn margins() -> String {
+    use crate::trials::stress::hold::{TOLERANCE, margin};
+    let step_s = crate::world::solver::SolverSettings::default().step_s;
+    let line = |how: &str, divided| {
+        let margin = margin(step_s, divided);
+        let beyond = margin.beyond.map_or("; no stiffer one was tried".into(), |(times, why)| {
+            format!("; at {times} x {why}")
+        });
+        format!("\n  {how}: {} x{beyond}", margin.times)
+    };
+    let mut text = format!(
+        "stiffness margin of the PA-10 with the default skin at a time step of {} ms, force at rest within {} % of \
+         a refined run:",
+        1e3 * step_s,
+        100.0 * TOLERANCE
+    );
+    text += &line("steps as given", false);
+    text += &line("steps divided where the skin needs it, as scenes are", true);
+    text
+}
+
+#[cfg(not(feature = "mujoco"))]
+fn margins() -> String {
+    "no stiffness margin: this build is without MuJoCo (feature `mujoco`)".into()
 }
 
 fn report(ran: &[Ran], args: &Args) -> anyhow::Result<()> {
@@ -105,11 +144,11 @@ fn report(ran: &[Ran], args: &Args) -> anyhow::Result<()> {
     table.extend(ran.iter().map(cells));
     let mut text = aligned(&table);
     for line in lines.iter().filter(|line| !line.explained) {
-        let Line { case, severity, unit, period_s, outcome, words, .. } = line;
+        let Line { case, severity, unit, axis_s, outcome, words, .. } = line;
         let severity = short(*severity);
         text += &format!(
             "\nUNEXPLAINED {case} at {severity} {unit}, {} ms: {outcome}: {words}",
-            1e3 * period_s
+            1e3 * axis_s
         );
     }
     print(&text)?;
@@ -122,7 +161,8 @@ fn line<'a>(case: &'a Case, verdict: &'a Verdict) -> Line<'a> {
         case: case.name,
         severity: case.severities[verdict.rank],
         unit: case.severity,
-        period_s: verdict.period_s,
+        axis: case.axis.name(),
+        axis_s: verdict.axis_s,
         outcome,
         explained: verdict.explained,
         words,

@@ -20,7 +20,8 @@ const COLOURS: [(&str, &str); 4] = [
     ("unexplained", "#d00000"),
 ];
 
-/// One line per case, one cell per severity, one stripe per period where the period matters.
+/// One line per case, one cell per severity, one stripe per control period or time step where that
+/// matters.
 pub fn draw(ran: &[Ran]) -> String {
     let columns = ran.iter().map(|(case, _)| case.severities.len()).max().unwrap_or(1);
     let width = LEFT_PX + columns as f64 * CELL_PX.0 + 20.0;
@@ -32,15 +33,15 @@ pub fn draw(ran: &[Ran]) -> String {
         canvas.text([x + 26.0, 22.5], words, TEXT_PX, Anchor::Start);
         x += 46.0 + 7.4 * words.chars().count() as f64;
     }
-    let note = "severity rises to the right; stripes in a cell: control periods 0.25, 1, 2, 5, 10, \
-                20 ms from left to right";
+    let note = "severity rises to the right; six stripes in a cell: control periods 0.25, 1, 2, 5, 10, \
+                20 ms; four: time steps 0.25, 0.5, 1, 2 ms";
     canvas.text([20.0, 45.0], note, SMALL_PX, Anchor::Start);
     for (line, (case, verdicts)) in ran.iter().enumerate() {
         let top = TOP_PX + line as f64 * (CELL_PX.1 + GAP_PX);
         canvas.text([LEFT_PX - 8.0, top + 12.5], case.name, SMALL_PX, Anchor::End);
-        let stripes = case.periods_s().len() as f64;
+        let stripes = case.axis.values_s().len() as f64;
         for verdict in verdicts {
-            let stripe = case.periods_s().iter().position(|&period_s| period_s == verdict.period_s);
+            let stripe = case.axis.values_s().iter().position(|&value_s| value_s == verdict.axis_s);
             let left = LEFT_PX + verdict.rank as f64 * CELL_PX.0;
             let wide = (CELL_PX.0 - 2.0) / stripes;
             let left = left + stripe.unwrap_or(0) as f64 * wide;

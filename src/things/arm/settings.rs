@@ -21,7 +21,12 @@ pub struct ArmSettings {
     pub home_deg: [f64; 7],
     /// From the flange along its axis to the origin of `T`.
     pub mount_m: f64,
+    /// Mass of adapter and finger, which a `dynamic` body moves.
+    pub tool_kg: f64,
 }
+
+/// Mass of adapter and finger beyond the force/torque sensor; chosen.
+pub const TOOL_KG: f64 = 0.15;
 
 impl Default for ArmSettings {
     /// Chosen: the base is `W`; at home the elbow is up and the finger points along -y, 45
@@ -34,6 +39,7 @@ impl Default for ArmSettings {
             base_rotation_deg: [0.0; 3],
             home_deg: [-90.0, 15.0, 0.0, 120.0, 0.0, -90.0, 0.0],
             mount_m: 0.12,
+            tool_kg: TOOL_KG,
         }
     }
 }
@@ -72,5 +78,6 @@ impl Checked for ArmSettings {
             rules.number(&format!("home_deg[{i}]"), home, low..=high);
         }
         rules.number("mount_m", self.mount_m, 0.01..=0.5);
+        rules.number("tool_kg", self.tool_kg, 1e-6..=100.0);
     }
 }

@@ -13,7 +13,9 @@ pub(super) const CASES: &[Case] = &[
         "at full reach no joint moves the tip outwards",
         "distance m",
         (&[0.65, 0.75, 0.85, 0.95, 1.05, 1.2], 5),
-        |distance_m, period_s| reach(period_s, [0.0, -distance_m, 0.5], ArmSettings::default()),
+        |distance_m, period_s| {
+            reach(scene(period_s), [0.0, -distance_m, 0.5], ArmSettings::default())
+        },
     )
     .timed(),
     case(
@@ -24,7 +26,7 @@ pub(super) const CASES: &[Case] = &[
         |away_deg, period_s| {
             let mut arm = ArmSettings::default();
             arm.home_deg[5] = -away_deg;
-            reach(period_s, [0.0, -0.65, 0.5], arm)
+            reach(scene(period_s), [0.0, -0.65, 0.5], arm)
         },
     )
     .timed(),
@@ -33,7 +35,7 @@ pub(super) const CASES: &[Case] = &[
         "the object stands where a joint ends",
         "to the side m",
         (&[0.0, 0.2, 0.4, 0.6, 0.8], 5),
-        |x_m, period_s| reach(period_s, [x_m, -0.6, 0.5], ArmSettings::default()),
+        |x_m, period_s| reach(scene(period_s), [x_m, -0.6, 0.5], ArmSettings::default()),
     )
     .timed(),
     case(
@@ -41,7 +43,9 @@ pub(super) const CASES: &[Case] = &[
         "the elbow folds until it ends, and at last home is inside the object",
         "distance m",
         (&[0.65, 0.6, 0.5, 0.4, 0.3, 0.2], 2),
-        |distance_m, period_s| reach(period_s, [0.0, -distance_m, 0.5], ArmSettings::default()),
+        |distance_m, period_s| {
+            reach(scene(period_s), [0.0, -distance_m, 0.5], ArmSettings::default())
+        },
     )
     .timed(),
     case(
@@ -49,7 +53,7 @@ pub(super) const CASES: &[Case] = &[
         "shoulder and wrist share what is left",
         "height m",
         (&[0.5, 0.3, 0.8, 0.1, 1.1], 5),
-        |z_m, period_s| reach(period_s, [0.0, -0.6, z_m], ArmSettings::default()),
+        |z_m, period_s| reach(scene(period_s), [0.0, -0.6, z_m], ArmSettings::default()),
     )
     .timed(),
     case(
@@ -59,7 +63,7 @@ pub(super) const CASES: &[Case] = &[
         (&[0.0, 30.0, 60.0, 87.0, 120.0], 5),
         |deg, period_s| {
             let arm = ArmSettings { base_rotation_deg: [0.0, 0.0, deg], ..ArmSettings::default() };
-            reach(period_s, [0.0, -0.65, 0.5], arm)
+            reach(scene(period_s), [0.0, -0.65, 0.5], arm)
         },
     )
     .timed(),
@@ -70,15 +74,14 @@ pub(super) const CASES: &[Case] = &[
         (&[0.0, 10.0, 100.0, 900.0], 4),
         |far_m, period_s| {
             let arm = ArmSettings { base_position_m: [far_m, 0.0, 0.0], ..ArmSettings::default() };
-            reach(period_s, [far_m, -0.65, 0.5], arm)
+            reach(scene(period_s), [far_m, -0.65, 0.5], arm)
         },
     )
     .timed(),
 ];
 
 /// The arm touches the middle of a small wall at `place_m`; out of reach, it says so.
-fn reach(period_s: f64, [x, y, z]: [f64; 3], arm: ArmSettings) -> Outcome {
-    let scene = scene(period_s);
+pub(super) fn reach(scene: Scene, [x, y, z]: [f64; 3], arm: ArmSettings) -> Outcome {
     let mut zone = scene.zone.clone();
     zone.x_m = [x - 0.03, x + 0.03];
     zone.z_m = Some([z - 0.03, z + 0.03]);

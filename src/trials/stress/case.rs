@@ -2,11 +2,44 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Control periods at which a case that depends on them is run.
-pub const PERIODS_S: [f64; 6] = [0.00025, 0.001, 0.002, 0.005, 0.01, 0.02];
+/// What is varied beside the severity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// Nothing; what moves does so at [`nominal_s`](Self::nominal_s).
+    Nothing,
+    /// The control period.
+    Period,
+    /// The time step of a body with masses.
+    Step,
+}
 
-/// The period of a case that does not depend on it, and of every case in the tests.
-pub const PERIOD_S: f64 = 0.01;
+impl Axis {
+    /// Its values.
+    pub fn values_s(self) -> &'static [f64] {
+        match self {
+            Self::Nothing => &[0.01],
+            Self::Period => &[0.00025, 0.001, 0.002, 0.005, 0.01, 0.02],
+            Self::Step => &[0.00025, 0.0005, 0.001, 0.002],
+        }
+    }
+
+    /// The value of a scene that says nothing, and of every case in the tests.
+    pub fn nominal_s(self) -> f64 {
+        match self {
+            Self::Nothing | Self::Period => 0.01,
+            Self::Step => 0.002,
+        }
+    }
+
+    /// As tables name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Nothing => "",
+            Self::Period => "control period",
+            Self::Step => "time step",
+        }
+    }
+}
 
 /// A hard case.
 pub struct Case {
@@ -22,9 +55,9 @@ pub struct Case {
     pub holds: usize,
     /// Why it may be wrong beyond these without a fault; empty if it may not.
     pub known: &'static str,
-    /// Whether the control period matters.
-    pub timed: bool,
-    /// Runs it at a severity and period.
+    /// What else matters.
+    pub axis: Axis,
+    /// Runs it at a severity and a value of the axis.
     pub law: fn(f64, f64) -> Outcome,
 }
 
@@ -44,15 +77,15 @@ pub enum Outcome {
 pub struct Verdict {
     /// Index among the case's severities.
     pub rank: usize,
-    /// Control period.
-    pub period_s: f64,
+    /// Value on the case's axis.
+    pub axis_s: f64,
     /// How it ended.
     pub outcome: Outcome,
     /// Whether it had to be so, or may.
     pub explained: bool,
 }
 
-/// A case that is never wrong without a fault and does not depend on the control period.
+/// A case that is never wrong without a fault and depends on no time.
 pub(super) const fn case(
     name: &'static str,
     why: &'static str,
@@ -60,13 +93,19 @@ pub(super) const fn case(
     (severities, holds): (&'static [f64], usize),
     law: fn(f64, f64) -> Outcome,
 ) -> Case {
-    Case { name, why, severity, severities, holds, known: "", timed: false, law }
+    Case { name, why, severity, severities, holds, known: "", axis: Axis::Nothing, law }
 }
 
 impl Case {
     /// The same, run at every control period.
     pub(super) const fn timed(self) -> Self {
-        Self { timed: true, ..self }
+        Self { axis: Axis::Period, ..self }
+    }
+
+    /// The same, run at every time step.
+    #[cfg(feature = "mujoco")]
+    pub(super) const fn stepped(self) -> Self {
+        Self { axis: Axis::Step, ..self }
     }
 
     /// The same, which beyond its severities may be wrong without a fault, and `why`.
@@ -75,21 +114,16 @@ impl Case {
     }
 
     /// Runs one severity; a panic breaks every law.
-    pub fn run(&self, rank: usize, period_s: f64) -> Verdict {
+    pub fn run(&self, rank: usize, axis_s: f64) -> Verdict {
         let severity = self.severities.get(rank).copied().unwrap_or(f64::NAN);
-        let outcome = catch_unwind(AssertUnwindSafe(|| (self.law)(severity, period_s)))
+        let outcome = catch_unwind(AssertUnwindSafe(|| (self.law)(severity, axis_s)))
             .unwrap_or_else(|_| Outcome::Wrong("panicked".into()));
         let explained = match &outcome {
             Outcome::Stable => true,
             Outcome::Faulted(_) => rank >= self.holds,
             Outcome::Wrong(_) => rank >= self.holds && !self.known.is_empty(),
         };
-        Verdict { rank, period_s, outcome, explained }
-    }
-
-    /// The periods it is run at.
-    pub fn periods_s(&self) -> &'static [f64] {
-        if self.timed { &PERIODS_S } else { &[PERIOD_S] }
+        Verdict { rank, axis_s, outcome, explained }
     }
 }
 

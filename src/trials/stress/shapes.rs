@@ -5,6 +5,7 @@ use super::deed::{Deed, deed};
 use super::solids::{ball, block, both, mesh, needle, sheet, wall};
 use super::touch::scene;
 use crate::ground::geometry::mesh::Mesh;
+use crate::world::Scene;
 use nalgebra::Point3;
 
 pub(super) const CASES: &[Case] = &[
@@ -13,7 +14,7 @@ pub(super) const CASES: &[Case] = &[
         "the finger's flank meets less and less of the object",
         "overlap mm",
         (&[3.0, 1.0, 0.3, 0.1, 0.01, 1e-6], 6),
-        graze,
+        |overlap_mm, period_s| graze(overlap_mm, scene(period_s)),
     )
     .timed(),
     case(
@@ -21,14 +22,14 @@ pub(super) const CASES: &[Case] = &[
         "two edges hold what one would let in",
         "width mm",
         (&[14.0, 10.0, 6.0, 3.0, 1.0, 0.1], 6),
-        slot,
+        |width_mm, period_s| slot(width_mm, scene(period_s)),
     ),
     case(
         "two contacts at once",
         "the centre of pressure of two places is on neither",
         "one lower by mm",
         (&[1.0, 0.3, 0.1, 0.01, 0.0], 5),
-        twins,
+        |lower_mm, period_s| twins(lower_mm, scene(period_s)),
     ),
     case(
         "slivers",
@@ -129,28 +130,33 @@ pub(super) const CASES: &[Case] = &[
 
 /// A contact no farther than `tolerance_mm` from the mesh, within the finger's laws.
 fn on(mesh: Option<Mesh>, target: [f64; 2], period_s: f64, tolerance_mm: f64) -> Outcome {
-    let Some(mesh) = mesh else { return Outcome::Wrong("no mesh".into()) };
-    deed(scene(period_s), mesh, &target).on_surface(1e-3 * tolerance_mm)
+    on_in(scene(period_s), mesh, target, tolerance_mm)
 }
 
-fn graze(overlap_mm: f64, period_s: f64) -> Outcome {
+/// The same in another scene.
+fn on_in(scene: Scene, mesh: Option<Mesh>, target: [f64; 2], tolerance_mm: f64) -> Outcome {
+    let Some(mesh) = mesh else { return Outcome::Wrong("no mesh".into()) };
+    deed(scene, mesh, &target).on_surface(1e-3 * tolerance_mm)
+}
+
+pub(super) fn graze(overlap_mm: f64, scene: Scene) -> Outcome {
     let Some(mesh) = mesh(wall(0.03), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
     // Whether so little is felt is the sensor's choice; what it must not do is feel it elsewhere.
-    deed(scene(period_s), mesh, &[0.037 - 1e-3 * overlap_mm, 0.0]).on_surface_or_missed(1e-3)
+    deed(scene, mesh, &[0.037 - 1e-3 * overlap_mm, 0.0]).on_surface_or_missed(1e-3)
 }
 
-fn slot(width_mm: f64, period_s: f64) -> Outcome {
+pub(super) fn slot(width_mm: f64, scene: Scene) -> Outcome {
     let half = 0.5e-3 * width_mm;
     let left = block([-0.03, -0.03, -0.03], [-half, 0.0, 0.03]);
     let right = block([half, -0.03, -0.03], [0.03, 0.0, 0.03]);
     // Held by both edges, the centre of pressure lies between them.
-    on(mesh(both(left, right), [0.0; 3]), [0.0; 2], period_s, 1.0 + 0.5 * width_mm)
+    on_in(scene, mesh(both(left, right), [0.0; 3]), [0.0; 2], 1.0 + 0.5 * width_mm)
 }
 
-fn twins(lower_mm: f64, period_s: f64) -> Outcome {
+pub(super) fn twins(lower_mm: f64, scene: Scene) -> Outcome {
     let [left, right] = [[-0.005, -0.01], [0.005, -0.01 - 1e-3 * lower_mm]]
         .map(|[x, y]| ball(Point3::new(x, y, 0.0), 0.004, 24));
-    on(mesh(both(left, right), [0.0; 3]), [0.0; 2], period_s, 5.5)
+    on_in(scene, mesh(both(left, right), [0.0; 3]), [0.0; 2], 5.5)
 }
 
 fn slivers(aspect: f64, period_s: f64) -> Outcome {

@@ -147,14 +147,14 @@ fn skin(period_s: f64, times: f64) -> Scene {
     scene
 }
 
-fn wall_deed(scene: Scene) -> Deed {
+pub(super) fn wall_deed(scene: Scene) -> Deed {
     match mesh(wall(0.05), [0.0; 3]) {
         Some(mesh) => deed(scene, mesh, &[0.0, 0.0]),
         None => Deed::not_done("no mesh"),
     }
 }
 
-fn on_wall(scene: Scene) -> Outcome {
+pub(super) fn on_wall(scene: Scene) -> Outcome {
     wall_deed(scene).on_surface(1e-3)
 }
 

@@ -2,6 +2,7 @@
 
 use super::list;
 use super::relief::CONTACT;
+use crate::things::arm::settings::TOOL_KG;
 use crate::things::arm::{Chain, Links};
 use crate::things::finger::Finger;
 use crate::world::Scene;
@@ -10,9 +11,6 @@ use nalgebra::Isometry3;
 const C: &str = include_str!("../../../models/pa10/c.xml");
 const A: &str = include_str!("../../../models/pa10/a.xml");
 const STAGE: &str = include_str!("../../../models/stage.xml");
-
-/// Mass of adapter and finger beyond the force/torque sensor; chosen.
-const TOOL_KG: f64 = 0.15;
 
 /// The robot's model without its outermost tags, with its base and its tool put in; the finger's
 /// hull is met by the object if it `collides`.
@@ -24,19 +22,21 @@ pub(super) fn robot(scene: &Scene, chain: &Chain, collides: bool) -> String {
     };
     let after_open = model.split_once("<mujoco").and_then(|(_, rest)| rest.split_once('>'));
     let inner = after_open.and_then(|(_, rest)| rest.split_once("</mujoco>"));
+    let tool_kg = scene.arm.as_ref().map_or(TOOL_KG, |arm| arm.tool_kg);
+    let contact = if collides { CONTACT } else { "" };
     inner
         .map_or("", |(inner, _)| inner)
         .replace("<body name=\"base\"", &format!("<body name=\"base\" {}", pose(&chain.base)))
-        .replace("<!-- tool -->", &tool(&scene.finger, chain, if collides { CONTACT } else { "" }))
+        .replace("<!-- tool -->", &tool(&scene.finger, tool_kg, chain, contact))
 }
 
 /// Adapter and finger as one body at the flange, where the force/torque sensor is.
-fn tool(finger: &Finger, chain: &Chain, contact: &str) -> String {
+fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, contact: &str) -> String {
     let mount_m = chain.tool.translation.vector.norm();
     let heel_m = (mount_m - finger.length_m).max(0.0);
     // A rod of the tool's mass and length, radius 10 mm: m/12 (3 r² + l²) across, m r²/2 along.
-    let (radius_m, along) = (0.01_f64, 0.5 * TOOL_KG * 0.01 * 0.01);
-    let across = TOOL_KG / 12.0 * (3.0 * radius_m * radius_m + mount_m * mount_m);
+    let (radius_m, along) = (0.01_f64, 0.5 * tool_kg * 0.01 * 0.01);
+    let across = tool_kg / 12.0 * (3.0 * radius_m * radius_m + mount_m * mount_m);
     // MuJoCo refuses a capsule without length.
     let hull = match finger.length_m > 1e-9 {
         true => format!(r#"type="capsule" fromto="0 0 {heel_m} 0 0 {mount_m}""#),
@@ -51,7 +51,7 @@ fn tool(finger: &Finger, chain: &Chain, contact: &str) -> String {
     };
     format!(
         r#"<body name="finger" {flange}>
-          <inertial pos="0 0 {middle}" mass="{TOOL_KG}" diaginertia="{across} {across} {along}"/>
+          <inertial pos="0 0 {middle}" mass="{tool_kg}" diaginertia="{across} {across} {along}"/>
           {adapter}
           <geom name="finger" {hull} size="{radius}" rgba=".2 .35 .6 1" {contact}/>
           <site name="mount" size=".005" group="4"/>
