@@ -49,6 +49,9 @@ fn the_error_falls_with_the_resolution_as_it_should() {
     assert!((order.observed - order.expected).abs() < 0.5, "{order:?}");
 }
 
+/// Effects that a stage of the finger's stands for and that a skin alone can be given.
+const WITH_STAGE: [&str; 5] = ["fluid", "fluid.vibration", "electrodes", "thermal", "friction"];
+
 #[test]
 fn an_effect_that_is_off_has_no_state_and_never_runs() {
     let bare = scene(&["effects={skin={}}"]);
@@ -70,7 +73,7 @@ fn an_effect_that_is_off_has_no_state_and_never_runs() {
     let [skin, others @ ..] = runs(&bare);
     assert!(skin > 0);
     assert!(others.iter().all(|runs| *runs == 0), "{others:?}");
-    for switch in SWITCHES.iter().filter(|switch| !["arm", "timing"].contains(&switch.name)) {
+    for switch in SWITCHES.iter().filter(|switch| WITH_STAGE.contains(&switch.name)) {
         let with = switched(&bare, switch);
         assert!((switch.is_on)(&with), "{}", switch.name);
         assert!(bytes(&with) > bytes(&bare), "{}", switch.name);
@@ -114,4 +117,59 @@ fn an_approach_that_would_press_past_the_skin_is_refused_with_its_limit() {
     let coarser = scene(&["touch.period_s=0.02"]).approach_limit_m_s().unwrap();
     assert!(coarser < limit_m_s);
     assert!(load(&["touch.approach_m_s=0.5", "body=\"cast\""]).is_ok());
+}
+
+/// The code that an effect is left out of does what the switch does when it is off, to the bit, so
+/// that comparing their times compares nothing else.
+#[test]
+fn without_a_stage_the_finger_feels_what_it_feels_with_the_stage_switched_off() {
+    use palpate::ground::work::Stage;
+    use palpate::things::finger::Motion;
+    use palpate::world::world::Shape;
+    let off = scene(&["effects.thermal={}", "effects.timing={}"]);
+    let world = World::build(off).unwrap();
+    let (tip, Shape::Mesh { bvh, .. }) = (world.fingertip().unwrap(), world.shape()) else {
+        panic!()
+    };
+    let rng = palpate::ground::seed::stream(0, 0, "test");
+    let (mut one, mut other) = (Feel::new(tip, &rng), Feel::new(tip, &rng));
+    let mut x_wt = world.chain().unwrap().forward(&world.chain().unwrap().home);
+    let mut pressed = 0;
+    for _ in 0..300 {
+        x_wt.translation.y -= 1e-4;
+        let motion = Motion::at(x_wt);
+        let a = one.step(tip, bvh, &motion, 0.01).unwrap();
+        let b =
+            other.step_without::<{ Stage::Friction as usize }>(tip, bvh, &motion, 0.01).unwrap();
+        assert_eq!(a, b);
+        assert_eq!(one.frame(), other.frame());
+        pressed += i32::from(a.force_n.norm() > 0.0);
+        if a.force_n.norm() > 5.0 {
+            break;
+        }
+    }
+    assert!(pressed > 3);
+    // And what is left out does not run.
+    let before = work::counts().unwrap();
+    other
+        .step_without::<{ Stage::Electrodes as usize }>(tip, bvh, &Motion::at(x_wt), 0.01)
+        .unwrap();
+    let after = work::counts().unwrap();
+    assert_eq!(before[Stage::Electrodes as usize], after[Stage::Electrodes as usize]);
+    assert!(before[Stage::Thermal as usize] < after[Stage::Thermal as usize]);
+}
+
+/// Every switch turns the other way and back.
+#[test]
+fn a_switch_is_what_it_says() {
+    let scene = scene(&[]);
+    for switch in SWITCHES {
+        let other = switched(&scene, switch);
+        assert_ne!((switch.is_on)(&scene), (switch.is_on)(&other), "{}", switch.name);
+        assert!(World::build(other).is_ok(), "{}", switch.name);
+    }
+    let names: Vec<_> = SWITCHES.iter().map(|switch| switch.name).collect();
+    for effect in ["skin", "wrench", "registration", "timing.control_delay_s"] {
+        assert!(names.contains(&effect), "{effect}");
+    }
 }

@@ -4,7 +4,7 @@ use super::backend::{Fault, IdealContact, Reading, Wrench};
 use crate::ground::seed;
 use crate::things::finger::registration::Registration;
 use crate::things::finger::wrench::Gauge;
-use crate::things::finger::{Feel, FeelError, Fingertip, Load, Motion};
+use crate::things::finger::{Feel, FeelError, Fingertip, Frame, Load, Motion};
 use crate::world::World;
 use crate::world::world::Shape;
 use nalgebra::{Isometry3, Vector6};
@@ -82,7 +82,7 @@ impl Sense {
     /// tells it.
     pub fn report(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
         reading.frames.clear();
-        reading.frames.extend(std::iter::from_fn(|| self.trial.feel.frame()));
+        reading.frames.extend(std::iter::from_fn(|| self.frame()));
         let effect = self.world.scene().effects.wrench.as_ref();
         reading.wrench = self.trial.gauge.as_mut().zip(effect).map(|(gauge, effect)| {
             let Wrench { force_n: f, torque_nm: t } = mount.moved(&self.x_mt);
@@ -93,12 +93,22 @@ impl Sense {
             };
             said.moved(&self.x_mt.inverse())
         });
+        reading.ideal = self.ideal();
+    }
+
+    /// The oldest tactile frame that has arrived and was not asked for yet.
+    pub fn frame(&mut self) -> Option<Frame> {
+        self.trial.feel.frame()
+    }
+
+    /// The load where no sensor tells it.
+    pub fn ideal(&self) -> Option<IdealContact> {
         let force_n = self.load.force_n.norm();
-        reading.ideal = (!self.has_sensor && force_n > LEAST_FORCE_N).then_some(IdealContact {
+        (!self.has_sensor && force_n > LEAST_FORCE_N).then_some(IdealContact {
             p_tc: self.load.centre_t,
             normal_t: self.load.normal_t,
             force_n,
-        });
+        })
     }
 }
 

@@ -3,8 +3,9 @@
 use super::columns::{aligned, cell};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::{Ending, print};
-use crate::trials::fidelity::effects::{Base, Budget, Change, SWITCHES, bare_ratio};
+use crate::trials::fidelity::effects::{Base, Budget, Change, SWITCHES};
 use crate::trials::fidelity::measure::targets;
+use crate::trials::fidelity::off::bare_ratio;
 use crate::trials::fidelity::row::Spread;
 use crate::trials::statistics::Paired;
 use crate::world::Scene;
@@ -74,7 +75,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     }
     bar.finish_and_clear();
     let mut text = aligned(&lines);
-    if let Some((ratio, [low, high])) = bare_ratio(&scene, &base, 200)? {
+    if let Some((ratio, [low, high])) = bare_ratio(&scene, &base.poses(), args.pairs.into())? {
         let [ratio, low, high] = [ratio, low, high].map(|ratio| 100.0 * (ratio - 1.0));
         text += &format!(
             "\ntime of a finger with every effect off but its skin, against the skin alone: \
@@ -85,7 +86,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     Ok(if finished { Ending::Done } else { Ending::Interrupted })
 }
 
-const HEADER: [&str; 10] = [
+const HEADER: [&str; 11] = [
     "effect",
     "here",
     "contact moves mm: mean",
@@ -93,12 +94,13 @@ const HEADER: [&str; 10] = [
     "force N",
     "electrodes counts",
     "time of a touch",
+    "off costs",
     "state bytes",
     "runs a touch off, on",
     "active - random RMSE mm off; on",
 ];
 
-fn cells(change: &Change) -> [String; 10] {
+fn cells(change: &Change) -> [String; 11] {
     let mean = |spread: Option<Spread>| spread.map(|spread| spread.mean);
     let verdicts = change.verdict.map(verdict);
     [
@@ -109,6 +111,10 @@ fn cells(change: &Change) -> [String; 10] {
         cell(mean(change.force_n), 4),
         cell(mean(change.electrode_counts), 1),
         change.time_ratio.map_or("-".into(), |ratio| format!("{:+.1} %", 100.0 * (ratio - 1.0))),
+        change.off_ratio.map_or("-".into(), |(ratio, [low, high])| {
+            let [ratio, low, high] = [ratio, low, high].map(|ratio| 100.0 * (ratio - 1.0));
+            format!("{ratio:+.2} % [{low:+.2}, {high:+.2}]")
+        }),
         format!("{:+}", change.state_bytes),
         change.runs.map_or("-".into(), |[off, on]| format!("{off}, {on}")),
         verdicts.join("; "),

@@ -98,8 +98,8 @@ impl Converter {
     }
 
     /// Samples every slot until `time_s`; signals between the last call and now are
-    /// interpolated.
-    pub fn advance(&mut self, parts: &Parts, time_s: f64, now: &Signals) {
+    /// interpolated. The [`Stage`] numbered `OFF` is left out by the compiler.
+    pub fn advance<const OFF: usize>(&mut self, parts: &Parts, time_s: f64, now: &Signals) {
         let (start_s, before) = (self.time_s, self.before);
         loop {
             let slots = self.frames * SLOTS as u64 + self.slot as u64 + 1;
@@ -108,33 +108,42 @@ impl Converter {
                 break;
             }
             let part = ((slot_s - start_s) / (time_s - start_s)).clamp(0.0, 1.0);
-            self.sample(parts, &before, now, if part.is_nan() { 1.0 } else { part });
+            self.sample::<OFF>(parts, &before, now, if part.is_nan() { 1.0 } else { part });
             self.slot += 1;
             if self.slot == SLOTS {
-                self.finish(parts, slot_s);
+                self.finish::<OFF>(parts, slot_s);
             }
         }
         (self.time_s, self.before) = (time_s, *now);
     }
 
-    fn sample(&mut self, parts: &Parts, before: &Signals, now: &Signals, part: f64) {
+    fn sample<const OFF: usize>(
+        &mut self,
+        parts: &Parts,
+        before: &Signals,
+        now: &Signals,
+        part: f64,
+    ) {
         let last = self.slot + 1 == SLOTS;
+        let skewed = OFF != Stage::Timing as usize && parts.timing.is_some();
         match channel(self.slot) {
             Channel::Pac(i) => {
-                self.pac(parts, i, mix(before.pressure_pa, now.pressure_pa, part));
-                if last && parts.timing.is_none() {
+                self.pac::<OFF>(parts, i, mix(before.pressure_pa, now.pressure_pa, part));
+                if last && !skewed {
                     for slot in (0..SLOTS).step_by(2) {
-                        self.convert(parts, channel(slot), before, now, part);
+                        self.convert::<OFF>(parts, channel(slot), before, now, part);
                     }
                 }
             }
-            slow if parts.timing.is_some() => self.convert(parts, slow, before, now, part),
+            slow if skewed => self.convert::<OFF>(parts, slow, before, now, part),
             _ => {}
         }
     }
 
-    fn pac(&mut self, parts: &Parts, i: usize, pressure_pa: f64) {
-        if let Some(fluid) = parts.fluid
+    fn pac<const OFF: usize>(&mut self, parts: &Parts, i: usize, pressure_pa: f64) {
+        if OFF != Stage::Vibration as usize
+            && OFF != Stage::Fluid as usize
+            && let Some(fluid) = parts.fluid
             && let (Some(vibration), Some(filter), Some(rng)) =
                 (&fluid.vibration, &mut self.filter, &mut self.fluid_rng)
         {
@@ -144,7 +153,7 @@ impl Converter {
         }
     }
 
-    fn convert(
+    fn convert<const OFF: usize>(
         &mut self,
         parts: &Parts,
         channel: Channel,
@@ -155,7 +164,9 @@ impl Converter {
         let frame = &mut self.frame;
         match channel {
             Channel::Electrode(i) => {
-                if let (Some(electrodes), Some(rng)) = (parts.electrodes, &mut self.electrodes_rng)
+                if OFF != Stage::Electrodes as usize
+                    && let (Some(electrodes), Some(rng)) =
+                        (parts.electrodes, &mut self.electrodes_rng)
                 {
                     let ideal = mix(before.electrode_counts[i], now.electrode_counts[i], part);
                     frame.electrode_counts.get_or_insert([0.0; ELECTRODES])[i] =
@@ -163,20 +174,26 @@ impl Converter {
                 }
             }
             Channel::Pdc => {
-                if let (Some(fluid), Some(rng)) = (parts.fluid, &mut self.fluid_rng) {
+                if OFF != Stage::Fluid as usize
+                    && let (Some(fluid), Some(rng)) = (parts.fluid, &mut self.fluid_rng)
+                {
                     work::count(Stage::Fluid);
                     let pressure_pa = mix(before.pressure_pa, now.pressure_pa, part);
                     frame.pdc_counts = Some(fluid.pdc_counts(pressure_pa, rng));
                 }
             }
             Channel::Tac => {
-                if let (Some(thermal), Some(rng)) = (parts.thermal, &mut self.thermal_rng) {
+                if OFF != Stage::Thermal as usize
+                    && let (Some(thermal), Some(rng)) = (parts.thermal, &mut self.thermal_rng)
+                {
                     let warming_c_s = mix(before.warming_c_s, now.warming_c_s, part);
                     frame.tac_counts = Some(thermal.tac_counts(warming_c_s, rng));
                 }
             }
             Channel::Tdc => {
-                if let (Some(thermal), Some(rng)) = (parts.thermal, &mut self.thermal_rng) {
+                if OFF != Stage::Thermal as usize
+                    && let (Some(thermal), Some(rng)) = (parts.thermal, &mut self.thermal_rng)
+                {
                     let temperature_c = mix(before.temperature_c, now.temperature_c, part);
                     frame.tdc_counts = Some(thermal.tdc_counts(temperature_c, rng));
                 }
@@ -185,16 +202,21 @@ impl Converter {
         }
     }
 
-    fn finish(&mut self, parts: &Parts, time_s: f64) {
+    fn finish<const OFF: usize>(&mut self, parts: &Parts, time_s: f64) {
         self.frame.time_s = time_s;
-        if let (Some(electrodes), Some(rng)) = (parts.electrodes, &mut self.electrodes_rng) {
+        if OFF != Stage::Electrodes as usize
+            && let (Some(electrodes), Some(rng)) = (parts.electrodes, &mut self.electrodes_rng)
+        {
             let frame_s = SLOTS as f64 / SLOTS_HZ;
             self.drift_counts = electrodes.drifted(self.drift_counts, frame_s, rng);
         }
-        if parts.timing.is_some() {
+        let mut batch = 1;
+        if OFF != Stage::Timing as usize
+            && let Some(timing) = parts.timing
+        {
             work::count(Stage::Timing);
+            batch = timing.batch_frames;
         }
-        let batch = parts.timing.map_or(1, |timing| timing.batch_frames);
         if self.queue.len() >= KEPT + batch {
             self.queue.pop_front();
             self.ready = self.ready.saturating_sub(1);

@@ -21,6 +21,9 @@ use thiserror::Error;
 /// Longest step: beyond it a frame's signals would be mostly interpolated (chosen).
 const LONGEST_STEP_S: f64 = 1.0;
 
+/// No stage: what [`Feel::step`] leaves out.
+const NOTHING: usize = usize::MAX;
+
 /// What never changes about a fingertip; shared by trials.
 #[derive(Clone, Debug)]
 pub struct Fingertip {
@@ -152,7 +155,7 @@ impl Feel {
             converter: None,
         };
         if tip.sends_frames {
-            let untouched = feel.signals(tip, 0.0);
+            let untouched = feel.signals::<NOTHING>(tip, 0.0);
             feel.converter = Some(Converter::new(&tip.parts(), untouched, rng));
         }
         feel
@@ -179,6 +182,21 @@ impl Feel {
         motion: &Motion,
         dt_s: f64,
     ) -> Result<Load, FeelError> {
+        self.step_without::<NOTHING>(tip, object, motion, dt_s)
+    }
+
+    /// As [`step`](Self::step), in code from which the [`Stage`] numbered `OFF` is left out by the compiler:
+    /// what the switch of an effect that is off costs is measured against it.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step).
+    pub fn step_without<const OFF: usize>(
+        &mut self,
+        tip: &Fingertip,
+        object: &MeshBvh,
+        motion: &Motion,
+        dt_s: f64,
+    ) -> Result<Load, FeelError> {
         let time_s = self.time_s;
         if !motion.is_finite() || !(0.0..=LONGEST_STEP_S).contains(&dt_s) {
             return Err(FeelError::NotFinite { time_s, dt_s, motion: Box::new(*motion) });
@@ -196,18 +214,22 @@ impl Feel {
             _ => Load::default(),
         };
         self.time_s += dt_s;
-        if let (Some(friction), Some(bristle)) = (&tip.friction, &mut self.bristle) {
+        if OFF != Stage::Friction as usize
+            && let (Some(friction), Some(bristle)) = (&tip.friction, &mut self.bristle)
+        {
             work::count(Stage::Friction);
             let velocity = [&motion.linear_w, &motion.angular_w];
             bristle.step(friction, &motion.x_wt, velocity, dt_s, &mut load);
         }
-        if let (Some(thermal), Some(heat)) = (&tip.thermal, &mut self.heat) {
+        if OFF != Stage::Thermal as usize
+            && let (Some(thermal), Some(heat)) = (&tip.thermal, &mut self.heat)
+        {
             work::count(Stage::Thermal);
             heat.step(thermal, load.area_m2, dt_s);
         }
-        let signals = self.converter.is_some().then(|| self.signals(tip, load.pressure_pa));
+        let signals = self.converter.is_some().then(|| self.signals::<OFF>(tip, load.pressure_pa));
         if let (Some(converter), Some(signals)) = (&mut self.converter, signals) {
-            converter.advance(&tip.parts(), self.time_s, &signals);
+            converter.advance::<OFF>(&tip.parts(), self.time_s, &signals);
         }
         Ok(load)
     }
@@ -225,15 +247,19 @@ impl Feel {
         self.converter.as_mut()?.frame()
     }
 
-    fn signals(&self, tip: &Fingertip, pressure_pa: f64) -> Signals {
+    fn signals<const OFF: usize>(&self, tip: &Fingertip, pressure_pa: f64) -> Signals {
         let mut signals = Signals { pressure_pa, ..Signals::default() };
         let mut conductivity = 1.0;
-        if let (Some(thermal), Some(heat)) = (&tip.thermal, &self.heat) {
+        if OFF != Stage::Thermal as usize
+            && let (Some(thermal), Some(heat)) = (&tip.thermal, &self.heat)
+        {
             signals.temperature_c = heat.temperature_c;
             signals.warming_c_s = heat.warming_c_s();
             conductivity = heat.conductivity(thermal);
         }
-        if let (Some(electrodes), Some(pressed)) = (&tip.electrodes, &self.pressed) {
+        if OFF != Stage::Electrodes as usize
+            && let (Some(electrodes), Some(pressed)) = (&tip.electrodes, &self.pressed)
+        {
             work::count(Stage::Electrodes);
             signals.electrode_counts = electrodes.counts(pressed, conductivity);
         }

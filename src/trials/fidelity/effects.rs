@@ -1,18 +1,19 @@
 //! What each effect changes and costs: one switched at a time, the rest of the scene as it is.
 
 use super::measure::{MeasureError, Touches, touch_all};
+use super::off;
 use super::row::{Spread, electrodes_apart};
 use crate::bodies::stand::Stand;
-use crate::conduct::belief::GpSettings;
-use crate::conduct::planner::{self, PlanningSettings};
+use crate::conduct::planner;
 use crate::conduct::probe;
 use crate::ground::work;
-use crate::things::finger::{Effects, Feel};
+use crate::things::finger::timing::TimingEffect;
+use crate::things::finger::{Effects, Feel, Motion};
 use crate::trials::experiment::Experiment;
-use crate::trials::statistics::{Paired, median, median_interval};
+use crate::trials::statistics::{Paired, median};
 use crate::trials::trial;
 use crate::trials::truth::Truth;
-use crate::world::world::Shape;
+use crate::world::scene::Body;
 use crate::world::{Scene, World};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -40,6 +41,17 @@ macro_rules! table {
 
 /// Every effect; one line to add one.
 pub const SWITCHES: &[Switch] = &[
+    Switch {
+        name: "skin",
+        is_on: |scene| scene.effects.skin.is_some(),
+        set: |scene, on| {
+            if on {
+                scene.effects.skin.get_or_insert_default();
+            } else {
+                (scene.effects, scene.body) = (Effects::default(), Body::Cast);
+            }
+        },
+    },
     table!(fluid),
     Switch {
         name: "fluid.vibration",
@@ -56,13 +68,38 @@ pub const SWITCHES: &[Switch] = &[
     table!(electrodes),
     table!(thermal),
     table!(friction),
+    table!(wrench),
+    table!(registration),
     table!(timing),
+    Switch {
+        name: "timing.control_delay_s",
+        is_on: |scene| {
+            scene.effects.timing.as_ref().is_some_and(|timing| timing.control_delay_s > 0.0)
+        },
+        set: |scene, on| match (&mut scene.effects.timing, on) {
+            (Some(timing), _) => timing.control_delay_s = if on { DELAY_S } else { 0.0 },
+            // Frames as without timing, as near as a table can say it: each alone.
+            (timing @ None, true) => {
+                *timing = Some(TimingEffect { batch_frames: 1, control_delay_s: DELAY_S });
+            }
+            (None, false) => {}
+        },
+    },
     Switch {
         name: "arm",
         is_on: |scene| scene.arm.is_some(),
         set: |scene, on| scene.arm = on.then(Default::default),
     },
+    #[cfg(feature = "mujoco")]
+    Switch {
+        name: "masses",
+        is_on: |scene| scene.body == Body::Dynamic,
+        set: |scene, on| scene.body = if on { Body::Dynamic } else { Body::Kinematic },
+    },
 ];
+
+/// A delay of commands that is more than a control tick of any body; chosen.
+const DELAY_S: f64 = 0.02;
 
 /// `scene` with one effect the other way round.
 pub fn switched(scene: &Scene, switch: &Switch) -> Scene {
@@ -93,6 +130,9 @@ pub struct Change {
     pub state_bytes: i64,
     /// How often its stage runs in a touch, without it and with it, in a build that counts.
     pub runs: Option<[u64; 2]>,
+    /// What the scene takes more without it than in code that does not have it: median ratio of paired
+    /// runs and its 95 % interval; none where what is off is not there at all.
+    pub off_ratio: Option<(f64, [f64; 2])>,
     /// RMSE of `active` minus that of `random` in the same trials, without it and with it, m.
     pub verdict: [Option<Paired>; 2],
 }
@@ -171,8 +211,16 @@ impl Base {
             runs: runs(switch.name, without, &self.targets)?
                 .zip(runs(switch.name, with, &self.targets)?)
                 .map(|(without, with)| [without, with]),
+            off_ratio: off::ratio(switch.name, without, &self.poses(), budget.pairs),
             verdict: if is_on { [other, self.verdict] } else { [self.verdict, other] },
         })
+    }
+}
+
+impl Base {
+    /// How the finger stood at the contacts.
+    pub fn poses(&self) -> Vec<Motion> {
+        self.touches.felt.iter().flatten().map(|felt| felt.motion).collect()
     }
 }
 
@@ -225,20 +273,8 @@ fn verdict(world: &Arc<World>, truth: &Truth, budget: Budget) -> Option<Paired> 
     if budget.trials == 0 || !crate::ground::optimize::BUILT {
         return None;
     }
-    let experiment = Experiment {
-        name: "effects".into(),
-        question: String::new(),
-        planners: planners.iter().map(|planner| planner.name.into()).collect(),
-        trials: budget.trials,
-        seed: 0,
-        initial_touches: 5.min(budget.touches),
-        touches: budget.touches,
-        grid: GRID as u32,
-        gp: GpSettings::default(),
-        planning: PlanningSettings::default(),
-        report: Default::default(),
-        scene: world.scene().clone(),
-    };
+    let names = planners.map(|planner| planner.name);
+    let experiment = Experiment::on(world.scene(), &names, budget.trials, budget.touches);
     let pairs: Vec<(f64, f64)> = (0..budget.trials)
         .into_par_iter()
         .filter_map(|number| {
@@ -250,47 +286,4 @@ fn verdict(world: &Arc<World>, truth: &Truth, budget: Budget) -> Option<Paired> 
         })
         .collect();
     Paired::new(&pairs, 0)
-}
-
-/// Runs over all poses in one timed piece; chosen: some milliseconds.
-const PASSES: usize = 8;
-
-/// What a finger with every effect off but its skin costs beside a skin pressed with nothing
-/// around it: median ratio of interleaved runs over the poses of the scene's touches, and its 95 %
-/// interval.
-///
-/// # Errors
-/// If the scene cannot be built.
-pub fn bare_ratio(
-    scene: &Scene,
-    base: &Base,
-    repeats: usize,
-) -> Result<Option<(f64, [f64; 2])>, MeasureError> {
-    let mut scene = scene.clone();
-    scene.effects = Effects { skin: scene.effects.skin.take(), ..Effects::default() };
-    let world = World::build(scene)?;
-    let (Some(tip), Shape::Mesh { bvh, .. }) = (world.fingertip(), world.shape()) else {
-        return Ok(None);
-    };
-    let Some(skin) = tip.skin() else { return Ok(None) };
-    let poses: Vec<_> = base.touches.felt.iter().flatten().map(|felt| felt.motion).collect();
-    let mut pressed = skin.relaxed();
-    let mut feel = Feel::new(tip, &crate::ground::seed::stream(0, 0, "finger"));
-    let mut ratios = Vec::new();
-    for i in 0..repeats {
-        let mut taken_s = [0.0; 2];
-        for k in [i % 2, (i + 1) % 2] {
-            let begun = Instant::now();
-            for pose in std::iter::repeat_n(&poses, PASSES).flatten() {
-                if k == 0 {
-                    let _ = std::hint::black_box(skin.press(bvh, &pose.x_wt, &mut pressed));
-                } else {
-                    let _ = std::hint::black_box(feel.step(tip, bvh, pose, 0.01));
-                }
-            }
-            taken_s[k] = begun.elapsed().as_secs_f64();
-        }
-        ratios.push(taken_s[1] / taken_s[0]);
-    }
-    Ok(median(&ratios).zip(median_interval(&ratios, 0)))
 }

@@ -3,13 +3,14 @@
 //!
 //! `ladder` names the scenes, `measure` touches with one of them, `trace` and `felt` say how the
 //! finger was loaded when it was read, `order` how fast the error falls with the resolution,
-//! `effects` what each piece of physics changes and costs.
+//! `effects` what each piece of physics changes and costs, `off` what it costs where it is off.
 
 pub mod climb;
 pub mod effects;
 pub mod felt;
 pub mod ladder;
 pub mod measure;
+pub mod off;
 pub mod order;
 pub mod row;
 pub mod tolerance;
