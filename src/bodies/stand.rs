@@ -5,6 +5,7 @@ use super::delay::Delayed;
 use super::kinematic::Kinematic;
 #[cfg(feature = "mujoco")]
 use super::mujoco;
+use super::sense::Shell;
 use crate::world::World;
 use crate::world::scene::Body;
 use std::sync::Arc;
@@ -64,6 +65,18 @@ impl Stand {
     /// What is simulated otherwise than the scene asks, and why.
     pub fn notice(&self) -> Option<&str> {
         self.notice.as_deref()
+    }
+
+    /// A skin of finite elements, at rest; none if the scene's finger has none.
+    ///
+    /// # Errors
+    /// If there is no memory for its state.
+    pub fn shell(&self) -> Result<Option<Box<dyn Shell>>, Fault> {
+        #[cfg(feature = "mujoco")]
+        if let Some(models) = &self.models {
+            return models.shell(&self.world).map_err(|_| unusable());
+        }
+        Ok(None)
     }
 
     /// The simulated body that the scene asks for, at its start; none where a touch is no motion.

@@ -1,6 +1,6 @@
 //! An arm or stage with masses, servos and friction, carrying the finger.
 
-use super::{Flex, Models, Plant};
+use super::{Models, Plant};
 use crate::bodies::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
 use crate::bodies::sense::Sense;
 use crate::things::arm::Chain;
@@ -32,8 +32,8 @@ impl Dynamic {
         let chain = world.chain()?;
         let period_s = world.scene().period_s();
         let mut sense = Sense::new(Arc::clone(world), 0);
-        if let (Some(sense), Some(model)) = (&mut sense, &models.flex) {
-            sense.wear(Box::new(Flex::new(Arc::clone(world), Arc::clone(model)).ok()?));
+        if let (Some(sense), Some(shell)) = (&mut sense, models.shell(world).ok()?) {
+            sense.wear(shell);
         }
         let mut body = Self {
             capabilities: Capabilities::of(&chain, period_s),

@@ -1,6 +1,7 @@
 //! What MuJoCo compiles of a world, once for all trials.
 
 use super::{Flex, ModelError, Substeps, compile};
+use crate::bodies::sense::Shell;
 use crate::world::World;
 use crate::world::collision::Collision;
 use crate::world::mjcf::{self, Mode};
@@ -47,6 +48,15 @@ impl Models {
         let text = mjcf::scene(world, Mode::Dynamic { step_s });
         let plant = Arc::new(compile(&text.ok_or(ModelError::Lacks { part: "an object" })?)?);
         Ok(Self { plant, flex: Flex::model(world)?, substeps: None })
+    }
+
+    /// The skin of `[effects.flex]`, at rest; none if the world has none.
+    ///
+    /// # Errors
+    /// If memory is short.
+    pub fn shell(&self, world: &Arc<World>) -> Result<Option<Box<dyn Shell>>, ModelError> {
+        let Some(model) = &self.flex else { return Ok(None) };
+        Ok(Some(Box::new(Flex::new(Arc::clone(world), Arc::clone(model))?)))
     }
 }
 

@@ -2,11 +2,12 @@
 //! noise.
 
 use super::trace::Tick;
+use crate::bodies::stand::Stand;
 use crate::ground::seed;
 use crate::things::finger::frame::ELECTRODES;
 use crate::things::finger::{Feel, Frame, Motion};
+use crate::world::Scene;
 use crate::world::world::Shape;
-use crate::world::{Scene, World};
 
 /// The finger still stands where it was deepest as long as it is within this; chosen: far above
 /// rounding, far below a tick of any approach.
@@ -46,11 +47,12 @@ pub fn quiet(scene: &Scene) -> Scene {
 }
 
 /// What the finger of a [`quiet`] world felt at the end of its rest on the object; none without
-/// an elastic foundation, or if it touched nothing.
-pub fn felt(world: &World, ticks: &[Tick]) -> Option<Felt> {
+/// a skin, or if it touched nothing.
+pub fn felt(stand: &Stand, ticks: &[Tick]) -> Option<Felt> {
+    let world = stand.world();
     let (tip, Shape::Mesh { bvh, .. }) = (world.fingertip()?, world.shape()) else { return None };
     let y_m = |tick: &Tick| tick.motion.x_wt.translation.y;
-    tip.skin()?;
+    let mut shell = stand.shell().ok()?;
     let deepest_m = ticks.iter().map(y_m).fold(f64::INFINITY, f64::min);
     let last = ticks.iter().rposition(|tick| y_m(tick) <= deepest_m + STILL_M)?;
     let mut feel = Feel::new(tip, &seed::stream(0, 0, "finger"));
@@ -60,7 +62,13 @@ pub fn felt(world: &World, ticks: &[Tick]) -> Option<Felt> {
     for tick in &ticks[..=last] {
         let dt_s = (tick.time_s - before_s).max(0.0);
         before_s = tick.time_s;
-        load = feel.step(tip, bvh, &tick.motion, dt_s).ok()?;
+        load = match &mut shell {
+            Some(shell) => {
+                let pressed = shell.step(&tick.motion.x_wt, dt_s).ok()?;
+                feel.step_loaded(tip, pressed, &tick.motion, dt_s).ok()?
+            }
+            None => feel.step(tip, bvh, &tick.motion, dt_s).ok()?,
+        };
         while let Some(frame) = feel.frame() {
             rest.get_or_insert_with(|| frame.clone());
             now = frame;

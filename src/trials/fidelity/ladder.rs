@@ -27,6 +27,11 @@ const fn rigid(collision: Collision) -> Rung {
     Rung { collision: Some(collision), approach_m_s: Some(RIGID_M_S), ..rung }
 }
 
+/// A skin of finite elements, so many along and around.
+const fn flex(cells: [usize; 2]) -> Rung {
+    Rung { flex: Some(cells), ..dynamic(0, 0.002).at(FEW) }
+}
+
 /// The ladder; one line to add a rung. The last is the reference.
 pub const RUNGS: &[Rung] = &[
     Rung::new(Body::Cast, Senses::None, 0, 0.01),
@@ -55,6 +60,8 @@ pub const RUNGS: &[Rung] = &[
     dynamic(500, 0.001).by(Integrator::Euler),
     dynamic(500, 0.001).by(Integrator::Rk4),
     dynamic(500, 0.0005),
+    flex([12, 8]),
+    flex([18, 12]),
     kinematic(Senses::Full, 1000, 0.005),
     kinematic(Senses::Full, 2000, 0.002),
     kinematic(Senses::Full, 4000, 0.001),

@@ -73,7 +73,7 @@ pub fn touch_all(
     tick: &mut dyn FnMut() -> bool,
 ) -> Result<Option<Touches>, MeasureError> {
     let stand = Stand::new(Arc::clone(world))?;
-    let hushed = quiet_world(world);
+    let hushed = hushed(&stand)?;
     let mut ticks = None;
     let mut traced: Box<dyn Probe> = match (stand.body()?, world.chain()) {
         (Some(body), Some(chain)) => {
@@ -122,12 +122,12 @@ pub fn touch_all(
     Ok(Some(touches))
 }
 
-/// The world of the same scene without noise.
-fn quiet_world(world: &Arc<World>) -> Arc<World> {
-    let scene = quiet(world.scene());
-    match scene == *world.scene() {
-        true => Arc::clone(world),
-        false => World::build(scene).map_or_else(|_| Arc::clone(world), Arc::new),
+/// The same scene without noise.
+fn hushed(stand: &Stand) -> Result<Stand, MeasureError> {
+    let scene = quiet(stand.world().scene());
+    match scene == *stand.world().scene() {
+        true => Ok(stand.clone()),
+        false => Ok(Stand::new(Arc::new(World::build(scene)?))?),
     }
 }
 

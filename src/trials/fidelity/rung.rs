@@ -1,5 +1,6 @@
 //! One rung: what it changes in a scene.
 
+use crate::things::finger::flex::FlexEffect;
 use crate::world::Scene;
 use crate::world::collision::Collision;
 use crate::world::scene::Body;
@@ -25,8 +26,10 @@ pub struct Rung {
     pub body: Body,
     /// What of the finger is simulated.
     pub senses: Senses,
-    /// Points of the skin; 0 for a rigid one.
+    /// Points of the skin's foundation; 0 for another skin.
     pub samples: usize,
+    /// Cells along and around of a skin of finite elements.
+    pub flex: Option<[usize; 2]>,
     /// Duration of a control tick, and of a step of a body with masses.
     pub period_s: f64,
     /// How a body with masses is integrated.
@@ -48,6 +51,7 @@ impl Rung {
             body,
             senses,
             samples,
+            flex: None,
             period_s,
             integrator: Integrator::ImplicitFast,
             collision: None,
@@ -94,15 +98,15 @@ impl Rung {
         }
         scene.touch.approach_m_s = self.approach_m_s.unwrap_or(scene.touch.approach_m_s);
         let effects = &mut scene.effects;
-        // Rungs are resolutions of the foundation.
-        effects.flex = None;
+        let flex = effects.flex.take().unwrap_or_default();
         let [skin, fluid, electrodes] = match self.senses {
             Senses::None => [false; 3],
             Senses::Dry => [true, false, false],
             Senses::Fluid => [true, true, false],
             Senses::Full => [true; 3],
         };
-        keep(&mut effects.skin, skin);
+        keep(&mut effects.skin, skin && self.flex.is_none());
+        effects.flex = self.flex.map(|[along, around]| FlexEffect { along, around, ..flex });
         keep(&mut effects.fluid, fluid);
         keep(&mut effects.electrodes, electrodes);
         if let Some(skin) = &mut effects.skin {
@@ -124,6 +128,7 @@ impl Rung {
             words.push(self.senses.name().into());
             words.extend(self.collision.map(|collision| collision.name().into()));
             words.extend((self.samples > 0).then(|| self.samples.to_string()));
+            words.extend(self.flex.map(|[along, around]| format!("flex {along} × {around}")));
             words.push(format!("{} ms", 1e3 * self.period_s));
         }
         if self.integrator != Integrator::default() {

@@ -58,7 +58,7 @@ pub(super) fn deed_with(
     let ticks = ticks.take();
     // The object is not in a file, so its world cannot be built again without noise; force and
     // pose need no sensor.
-    let felt = felt(&world, &ticks);
+    let felt = felt(&stand, &ticks);
     Deed { touch, world: Some(world), felt, ticks, refused: None }
 }
 

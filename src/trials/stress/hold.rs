@@ -47,7 +47,7 @@ pub(super) const CASES: &[Case] = &[
         (STIFF.0, 0),
         |times, step_s| at_peak(times, step_s, true),
     )
-    .known("how the servos stop the arm is of first order in the step: take solver.step_s = 0.00025")
+    .known("how the arm stops is of first order in the step: take solver.step_s = 0.00025")
     .stepped(),
     case(
         "long rest on a wall",
@@ -256,8 +256,8 @@ pub struct Margin {
 }
 
 /// Stiffnesses at which a margin is looked for.
-const TIMES: [f64; 13] =
-    [1.0, 2.0, 3.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
+const TIMES: [f64; 15] =
+    [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4, 1e5, 1e6];
 
 /// The margin of the PA-10 in steps of `step_s`, `divided` as a scene's are or as given. 0 times if
 /// not even the default skin is within.
