@@ -10,16 +10,17 @@ PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementat
 FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
 PALPATE := target/release/palpate
 
-.PHONY: demo paper paper-dynamic test page-test lint bench contacts growth bench-peers setup tools clean
+.PHONY: demo paper paper-dynamic paper-planners test page-test lint bench contacts growth bench-peers setup tools clean
 
 demo: setup
 	cargo build --release --locked
 	$(PALPATE) run experiments/demo.toml
 
-# Every experiment of the paper: what docs/paper.md is written from. `paper` needs minutes; with the
-# soft finger and the arm it takes longer.
+# What docs/paper.md is written from: the paper's experiments, the same with the soft finger and the
+# arm, and other planners beside its own.
+PLANNERS := $(wildcard experiments/paper/planners-*.toml)
 SOFT := $(wildcard experiments/paper/*-finger-*.toml experiments/paper/*-pa10-*.toml)
-RIGID := $(filter-out $(SOFT),$(wildcard experiments/paper/*.toml))
+RIGID := $(filter-out $(SOFT) $(PLANNERS),$(wildcard experiments/paper/*.toml))
 
 paper: setup
 	cargo build --release --locked
@@ -30,6 +31,10 @@ paper: setup
 paper-dynamic: setup
 	cargo build --release --locked
 	for experiment in $(SOFT); do $(PALPATE) run $$experiment || exit; done
+
+paper-planners: setup
+	cargo build --release --locked
+	for experiment in $(PLANNERS); do $(PALPATE) run $$experiment || exit; done
 
 test: setup
 	cargo test --locked
