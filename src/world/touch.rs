@@ -24,7 +24,8 @@ pub struct TouchSettings {
     pub detection: Detection,
     /// Force that says contact where no pressure is sensed.
     pub detection_n: f64,
-    /// How far beyond the place where contact was told the finger is held and read.
+    /// How far beyond the place where contact was told a soft finger is held and read; a rigid one
+    /// stays there.
     pub press_m: f64,
     /// Time the finger rests on the object before it is read.
     pub settle_s: f64,

@@ -113,6 +113,12 @@ fn cell(equal: &EqualError, most: u32) -> String {
             .map_or(String::new(), |[low, high]| format!(" [{}, {}]", shown(low), shown(high)));
         format!("{}{interval}", shown(estimate.value))
     };
+    // Without a count there is no ratio, and of its interval at most the lower end.
+    if !equal.touches.value.is_finite() {
+        let low = equal.touches.interval.map_or(f64::INFINITY, |[low, _]| low);
+        let some = if low.is_finite() { format!(", {low:.0} at least") } else { String::new() };
+        return format!("{}{some}", touches(f64::INFINITY, most));
+    }
     let ratio = |ratio: f64| if ratio.is_finite() { format!("{ratio:.2}") } else { "–".into() };
     format!(
         "{} \u{d7} {}; way \u{d7} {}",

@@ -8,14 +8,15 @@ use crate::trials::fidelity::ladder::is_reference;
 use crate::trials::fidelity::order::Order;
 use crate::trials::fidelity::press;
 use crate::trials::fidelity::row::{Row, Spread};
-use crate::trials::fidelity::rung::Senses;
+use crate::trials::fidelity::rung::{Rung, Senses};
 
-/// Colours of what a rung simulates, as of Okabe and Ito.
-const GROUPS: [(Senses, &str, &str); 4] = [
-    (Senses::None, "#000000", "rigid"),
-    (Senses::Dry, "#e69f00", "soft skin"),
-    (Senses::Fluid, "#56b4e9", "and fluid"),
-    (Senses::Full, "#0072b2", "and electrodes"),
+/// Whether a rung simulates this, its colour, as of Okabe and Ito, and its name; the first that fits.
+const GROUPS: [(fn(&Rung) -> bool, &str, &str); 5] = [
+    (|rung| rung.senses == Senses::None, "#000000", "rigid"),
+    (|rung| rung.senses == Senses::Dry, "#e69f00", "soft skin"),
+    (|rung| rung.senses == Senses::Fluid, "#56b4e9", "and fluid"),
+    (|rung| rung.flex.is_none(), "#0072b2", "and electrodes"),
+    (|_| true, "#cc79a7", "the same, of finite elements"),
 ];
 
 /// An error that is drawn over the time of a touch.
@@ -81,7 +82,7 @@ fn cost(
         let corners = front.iter().filter_map(|row| Some(at(row, error(row)?.mean)));
         canvas.line(corners, &style::dashed(INK, 1.3, "5 3"));
         for (row, spread) in &rows {
-            let group = GROUPS.iter().find(|(senses, ..)| *senses == row.rung.senses);
+            let group = GROUPS.iter().find(|(fits, ..)| fits(&row.rung));
             let colour = group.map_or(INK, |(_, colour, _)| colour);
             let [low, high] = spread.interval.map(|value| at(row, value.max(1e-9 * unit)));
             canvas.line([low, high], &style::stroke(colour, 1.2));

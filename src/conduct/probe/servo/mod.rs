@@ -155,7 +155,7 @@ impl Servo {
     fn read(&mut self) -> Result<Option<Contact>, Fault> {
         let until_s = self.state.time_s + self.settings.settle_s;
         let mut held = self.x_wt();
-        held.translation.y -= self.settings.press_m;
+        held.translation.y -= self.world.fingertip().map_or(0.0, |_| self.settings.press_m);
         while self.state.time_s < until_s {
             self.tick(&Goal::still(held))?;
             if self.watch.alarm() == Some(Alarm::Overload) {
