@@ -43,6 +43,11 @@ pub struct Sense {
 struct Trial {
     feel: Feel,
     gauge: Option<Gauge>,
+    misplaced: Option<Misplaced>,
+}
+
+/// Errors of registration.
+struct Misplaced {
     /// Pose of the finger's own `T` in that of the kinematics.
     finger: Isometry3<f64>,
     /// From where the object is to where it is believed to be, in `W`.
@@ -89,20 +94,15 @@ impl Sense {
         else {
             return Ok(Wrench::default());
         };
-        let Trial { feel, finger, object, .. } = &mut self.trial;
-        let aside_w = motion.x_wt.rotation * finger.translation.vector;
-        let motion = Motion {
-            x_wt: *object * motion.x_wt * *finger,
-            linear_w: object.rotation * (motion.linear_w + motion.angular_w.cross(&aside_w)),
-            angular_w: object.rotation * motion.angular_w,
-        };
+        let Trial { feel, misplaced, .. } = &mut self.trial;
+        let motion = misplaced.as_ref().map_or(*motion, |misplaced| misplaced.motion(motion));
         self.load = match &mut self.shell {
             Some(shell) => feel.step_loaded(tip, shell.step(&motion.x_wt, dt_s)?, &motion, dt_s),
             None => feel.step(tip, bvh, &motion, dt_s),
         }
         .map_err(fault)?;
         let wrench = Wrench { force_n: self.load.force_n, torque_nm: self.load.torque_nm };
-        Ok(wrench.moved(finger))
+        Ok(misplaced.as_ref().map_or(wrench, |misplaced| wrench.moved(&misplaced.finger)))
     }
 
     /// Writes into `reading` what a control tick of `period_s` brought: the frames that arrived, what
@@ -140,6 +140,19 @@ impl Sense {
     }
 }
 
+impl Misplaced {
+    /// How the finger moves before the object where that is believed to be.
+    fn motion(&self, motion: &Motion) -> Motion {
+        let Self { finger, object } = self;
+        let aside_w = motion.x_wt.rotation * finger.translation.vector;
+        Motion {
+            x_wt: object * motion.x_wt * finger,
+            linear_w: object.rotation * (motion.linear_w + motion.angular_w.cross(&aside_w)),
+            angular_w: object.rotation * motion.angular_w,
+        }
+    }
+}
+
 impl Trial {
     fn new(world: &World, tip: &Fingertip, seed: u64) -> Self {
         let stream = |purpose| seed::stream(seed, 0, purpose);
@@ -148,14 +161,15 @@ impl Trial {
         let mut trial = Self {
             feel: Feel::new(tip, &stream("finger")),
             gauge: effects.wrench.as_ref().map(|effect| Gauge::new(effect, stream("wrench"))),
-            finger: Isometry3::identity(),
-            object: Isometry3::identity(),
+            misplaced: None,
         };
         if let (Some(effect), Some(object)) = (&effects.registration, &scene.object) {
             let error = Registration::new(effect, &mut stream("registration"));
             let x_wo = object.x_wo();
-            trial.finger = error.finger;
-            trial.object = x_wo * error.object.inverse() * x_wo.inverse();
+            trial.misplaced = Some(Misplaced {
+                finger: error.finger,
+                object: x_wo * error.object.inverse() * x_wo.inverse(),
+            });
         }
         trial
     }
