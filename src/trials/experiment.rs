@@ -54,7 +54,8 @@ pub struct ReportSettings {
     pub trial: u32,
     /// The planners whose beliefs are drawn, those that ran; none: all.
     pub planners: Vec<String>,
-    /// Touches of a baseline whose error the others are asked to reach; none: all.
+    /// Touches of a baseline whose error the others are asked to reach, if it makes as many; none:
+    /// all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub goal_touches: Option<u32>,
     /// What a publication says, to stand on the page beside what comes out here; those after touch
