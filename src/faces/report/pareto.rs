@@ -10,8 +10,11 @@ use crate::trials::fidelity::press;
 use crate::trials::fidelity::row::{Row, Spread};
 use crate::trials::fidelity::rung::{Rung, Senses};
 
-/// Whether a rung simulates this, its colour, as of Okabe and Ito, and its name; the first that fits.
-const GROUPS: [(fn(&Rung) -> bool, &str, &str); 5] = [
+/// Whether a rung simulates this, its colour, as of Okabe and Ito, and its name.
+type Group = (fn(&Rung) -> bool, &'static str, &'static str);
+
+/// The first that fits counts.
+const GROUPS: [Group; 5] = [
     (|rung| rung.senses == Senses::None, "#000000", "rigid"),
     (|rung| rung.senses == Senses::Dry, "#e69f00", "soft skin"),
     (|rung| rung.senses == Senses::Fluid, "#56b4e9", "and fluid"),
