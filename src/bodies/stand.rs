@@ -17,7 +17,6 @@ pub struct Stand {
     world: Arc<World>,
     #[cfg(feature = "mujoco")]
     models: Option<mujoco::Models>,
-    notice: Option<String>,
 }
 
 /// A world that no body can be put into.
@@ -43,17 +42,14 @@ impl Stand {
     pub fn new(world: Arc<World>) -> Result<Self, StandError> {
         #[cfg(feature = "mujoco")]
         {
-            if world.scene().body != Body::Dynamic {
-                return Ok(Self { world, models: None, notice: None });
-            }
-            let models = mujoco::Models::new(&world)?;
-            let notice = models.substeps.map(|substeps| substeps.to_string());
-            Ok(Self { world, models: Some(models), notice })
+            let moved = world.scene().body == Body::Dynamic;
+            let models = if moved { Some(mujoco::Models::new(&world)?) } else { None };
+            Ok(Self { world, models })
         }
         #[cfg(not(feature = "mujoco"))]
         match world.scene().body {
             Body::Dynamic => Err(StandError::NotBuilt { body: Body::Dynamic.name() }),
-            _ => Ok(Self { world, notice: None }),
+            _ => Ok(Self { world }),
         }
     }
 
@@ -63,8 +59,12 @@ impl Stand {
     }
 
     /// What is simulated otherwise than the scene asks, and why.
-    pub fn notice(&self) -> Option<&str> {
-        self.notice.as_deref()
+    pub fn notice(&self) -> Option<String> {
+        #[cfg(feature = "mujoco")]
+        if let Some(models) = &self.models {
+            return models.substeps.map(|substeps| substeps.to_string());
+        }
+        None
     }
 
     /// A skin of finite elements, at rest; none if the scene's finger has none.
