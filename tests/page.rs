@@ -4,7 +4,7 @@
 
 mod runs;
 
-use palpate::faces::report;
+use palpate::faces::report::{self, Beside};
 use runs::{CURVE, SURFACE, run};
 use std::fs;
 use std::io::{self, Write};
@@ -67,7 +67,8 @@ fn browser() -> Option<PathBuf> {
 fn acts(browser: &Path, settings: &str) -> Vec<[String; 3]> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("report.html");
-    report::write(&run(settings), folder.path()).unwrap();
+    let run = run(settings);
+    report::write(&run, &Beside::of(&run), folder.path()).unwrap();
     let page = fs::read_to_string(&path).unwrap();
     let page = page.replace("<head>", &format!("<head>{CLOCK}"));
     fs::write(&path, page.replace("</body>", &format!("<script>{{{DRIVER}}}</script></body>")))

@@ -3,6 +3,7 @@
 use super::columns::{aligned, cell};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::{Ending, print};
+use crate::faces::report::paired::with_interval;
 use crate::trials::fidelity::effects::{Base, Budget, Change, SWITCHES};
 use crate::trials::fidelity::measure::targets;
 use crate::trials::fidelity::off::bare_ratio;
@@ -123,8 +124,5 @@ fn cells(change: &Change) -> [String; 11] {
 
 fn verdict(paired: Option<Paired>) -> String {
     let Some(paired) = paired else { return "-".into() };
-    let interval = paired
-        .interval
-        .map_or(String::new(), |[low, high]| format!(" [{:.2}, {:.2}]", 1e3 * low, 1e3 * high));
-    format!("{:.2}{interval}", 1e3 * paired.mean)
+    with_interval(paired.mean, paired.interval, &|m| format!("{:.2}", 1e3 * m))
 }

@@ -1,7 +1,7 @@
 //! `palpate report`.
 
 use super::{Ending, print};
-use crate::faces::report;
+use crate::faces::report::{self, Beside};
 use crate::trials::store::Run;
 use std::path::PathBuf;
 
@@ -14,8 +14,9 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let run = Run::read(&args.folder)?;
-    report::write_tables(&run, &args.folder)?;
-    report::write(&run, &args.folder)?;
+    let beside = Beside::of(&run);
+    report::write_tables(&run, &beside, &args.folder)?;
+    report::write(&run, &beside, &args.folder)?;
     print(&format!(
         "{}\nreport: {}",
         report::table::summary(&run),

@@ -2,7 +2,7 @@
 
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::{Ending, print, stand};
-use crate::faces::report;
+use crate::faces::report::{self, Beside};
 use crate::trials::experiment::Experiment;
 use crate::trials::runner;
 use crate::trials::store::{Manifest, Run, RunFolder};
@@ -77,7 +77,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     if !done.is_empty() {
         text += &format!(", {} were there already", done.len());
     }
-    report::write_tables(&run, &path)?;
+    let beside = Beside::of(&run);
+    report::write_tables(&run, &beside, &path)?;
     if !finished {
         text += &format!(
             "\nstopped with {} of {total} trials in {}; the same command continues",
@@ -87,7 +88,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     } else if args.no_report {
         text += &format!("\nrows and summary in {}", path.display());
     } else {
-        report::write(&run, &path).context("the rows are safe, but the report failed")?;
+        report::write(&run, &beside, &path).context("the rows are safe, but the report failed")?;
         text += &format!("\nreport: {}", path.join("report.html").display());
     }
     print(&text)?;

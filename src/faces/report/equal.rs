@@ -1,17 +1,16 @@
 //! Touches to equal error, as tables of the page and as a file.
 
-use super::paired::Table;
+use super::paired::{Table, with_interval};
 use super::replay::digits;
 use super::table::write_lines;
 use crate::trials::comparison::BASELINES;
-use crate::trials::equal_error::{ERRORS, EqualError, Estimate, equal_errors};
+use crate::trials::equal_error::{ERRORS, EqualError, Estimate};
 use crate::trials::store::Run;
 use serde::Serialize;
 use std::path::Path;
 
 /// A table for each baseline that ran: a line for each other planner, a column for each error.
-pub fn tables(run: &Run) -> Vec<Table> {
-    let found = equal_errors(&run.experiment, &run.rows);
+pub fn tables(run: &Run, found: &[EqualError]) -> Vec<Table> {
     let most = run.experiment.touches;
     let table = |baseline: &str| {
         let of_baseline: Vec<&EqualError> =
@@ -82,8 +81,7 @@ struct Line<'a> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn write_csv(run: &Run, folder: &Path) -> anyhow::Result<()> {
-    let found = equal_errors(&run.experiment, &run.rows);
+pub fn write_csv(found: &[EqualError], folder: &Path) -> anyhow::Result<()> {
     let finite = |value: f64| value.is_finite().then_some(value);
     let end = |estimate: &Estimate, end: usize| finite(estimate.interval?[end]);
     let lines = found.iter().map(|equal| Line {
@@ -108,10 +106,7 @@ pub fn write_csv(run: &Run, folder: &Path) -> anyhow::Result<()> {
 
 fn cell(equal: &EqualError, most: u32) -> String {
     let shown = |estimate: &Estimate, shown: &dyn Fn(f64) -> String| {
-        let interval = estimate.interval;
-        let interval = interval
-            .map_or(String::new(), |[low, high]| format!(" [{}, {}]", shown(low), shown(high)));
-        format!("{}{interval}", shown(estimate.value))
+        with_interval(estimate.value, estimate.interval, shown)
     };
     // Without a count there is no ratio, and of its interval at most the lower end.
     if !equal.touches.value.is_finite() {

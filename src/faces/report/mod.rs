@@ -22,6 +22,8 @@ pub mod table;
 
 pub use figures::{FIGURES, Figure};
 
+use crate::trials::comparison::{Comparison, comparisons};
+use crate::trials::equal_error::{EqualError, equal_errors};
 use crate::trials::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
 use anyhow::Context;
 use std::fs;
@@ -36,21 +38,40 @@ pub struct Drawing {
     pub svg: String,
 }
 
+/// The planners beside each other, found once for files and page: every bootstrap takes its time.
+pub struct Beside<'a> {
+    /// In every measure.
+    pub comparisons: Vec<Comparison<'a>>,
+    /// In touches to equal error.
+    pub equal_errors: Vec<EqualError<'a>>,
+}
+
+impl<'a> Beside<'a> {
+    /// Those of a run.
+    pub fn of(run: &'a Run) -> Self {
+        let Run { experiment, rows, .. } = run;
+        Self {
+            comparisons: comparisons(experiment, rows),
+            equal_errors: equal_errors(experiment, rows),
+        }
+    }
+}
+
 /// Writes the run's tables into its folder: `summary.csv`, `comparison.csv`, `equal_error.csv`.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn write_tables(run: &Run, folder: &Path) -> anyhow::Result<()> {
+pub fn write_tables(run: &Run, beside: &Beside, folder: &Path) -> anyhow::Result<()> {
     table::write_csv(run, folder)?;
-    paired::write_csv(run, folder)?;
-    equal::write_csv(run, folder)
+    paired::write_csv(&beside.comparisons, folder)?;
+    equal::write_csv(&beside.equal_errors, folder)
 }
 
 /// Draws everything into the run's folder: `figures/*.svg`, the same as `.png`, `report.html`.
 ///
 /// # Errors
 /// If the rows do not belong to the experiment, or a file cannot be written.
-pub fn write(run: &Run, folder: &Path) -> anyhow::Result<()> {
+pub fn write(run: &Run, beside: &Beside, folder: &Path) -> anyhow::Result<()> {
     let figures = folder.join(FIGURES_FOLDER);
     fs::create_dir_all(&figures).with_context(|| figures.display().to_string())?;
     let mut drawings = Vec::new();
@@ -63,7 +84,8 @@ pub fn write(run: &Run, folder: &Path) -> anyhow::Result<()> {
     let text = |name| fs::read_to_string(folder.join(name)).ok();
     let (settings, manifest) = (text(RESOLVED), text(MANIFEST));
     let explorer = explorer::section(run)?;
-    let html = page::html(run, &drawings, &explorer, settings.as_deref(), manifest.as_deref());
+    let files = [settings.as_deref(), manifest.as_deref()];
+    let html = page::html(run, beside, &drawings, &explorer, files);
     Ok(write_whole(&folder.join("report.html"), &html)?)
 }
 

@@ -2,7 +2,7 @@
 
 use super::canvas::escape;
 use super::paired::Table;
-use super::{Drawing, claims, equal, findings, paired, table};
+use super::{Beside, Drawing, claims, equal, findings, paired, table};
 use crate::trials::store::Run;
 use crate::trials::summary;
 
@@ -24,10 +24,10 @@ const FAILURES_TOLD: usize = 10;
 /// files of that name, if they are there.
 pub fn html(
     run: &Run,
+    beside: &Beside,
     drawings: &[Drawing],
     explorer: &str,
-    settings: Option<&str>,
-    manifest: Option<&str>,
+    [settings, manifest]: [Option<&str>; 2],
 ) -> String {
     let name = escape(&run.experiment.name);
     let question = match run.experiment.question.trim() {
@@ -44,7 +44,7 @@ pub fn html(
         paragraph(&findings::sentences(run)),
         claims_table(run),
         summary_table(run),
-        comparison_tables(run),
+        comparison_tables(run, beside),
         events(run),
         details("Every setting, defaults written out", settings)
             + &details("What ran it", manifest),
@@ -77,9 +77,10 @@ fn summary_table(run: &Run) -> String {
     table_section("", &table::HEADER, &lines, &note)
 }
 
-fn comparison_tables(run: &Run) -> String {
-    let against = (paired::tables(run), paired::note(run), "Planner against planner");
-    let equal = (equal::tables(run), equal::note(run), "Touches to equal error");
+fn comparison_tables(run: &Run, beside: &Beside) -> String {
+    let Beside { comparisons, equal_errors } = beside;
+    let against = (paired::tables(run, comparisons), paired::note(run), "Planner against planner");
+    let equal = (equal::tables(run, equal_errors), equal::note(run), "Touches to equal error");
     let section = |(tables, note, title): (Vec<Table>, String, &str)| {
         let bodies: String = tables.iter().map(|table| table_body(table, "named")).collect();
         match bodies.is_empty() {

@@ -2,7 +2,7 @@
 
 use super::replay::digits;
 use super::table::write_lines;
-use crate::trials::comparison::{BASELINES, Comparison, comparisons};
+use crate::trials::comparison::{BASELINES, Comparison};
 use crate::trials::measure::{MEASURES, Measure};
 use crate::trials::store::Run;
 use serde::Serialize;
@@ -17,8 +17,7 @@ pub struct Table {
 }
 
 /// A table for each baseline that ran: a line for each measure, a column for each other planner.
-pub fn tables(run: &Run) -> Vec<Table> {
-    let found = comparisons(&run.experiment, &run.rows);
+pub fn tables(run: &Run, found: &[Comparison]) -> Vec<Table> {
     let table = |baseline: &str| {
         let of_baseline: Vec<&Comparison> =
             found.iter().filter(|comparison| comparison.baseline == baseline).collect();
@@ -75,8 +74,7 @@ struct Line<'a> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn write_csv(run: &Run, folder: &Path) -> anyhow::Result<()> {
-    let found = comparisons(&run.experiment, &run.rows);
+pub fn write_csv(found: &[Comparison], folder: &Path) -> anyhow::Result<()> {
     let lines = found.iter().map(|Comparison { planner, baseline, measure, paired }| Line {
         planner,
         baseline,
@@ -105,8 +103,17 @@ fn cell(comparison: &Comparison) -> String {
         format!("{sign}{}", digits(value.abs()))
     };
     let paired = &comparison.paired;
-    let interval = paired
-        .interval
-        .map_or(String::new(), |[low, high]| format!(" [{}, {}]", shown(low), shown(high)));
-    format!("{}{interval}, {:.0} %", shown(paired.mean), 100.0 * paired.won)
+    let mean = with_interval(paired.mean, paired.interval, &shown);
+    format!("{mean}, {:.0} %", 100.0 * paired.won)
+}
+
+/// A number and its interval, if it has one.
+pub fn with_interval(
+    value: f64,
+    interval: Option<[f64; 2]>,
+    shown: &dyn Fn(f64) -> String,
+) -> String {
+    let interval =
+        interval.map_or(String::new(), |[low, high]| format!(" [{}, {}]", shown(low), shown(high)));
+    format!("{}{interval}", shown(value))
 }
