@@ -33,6 +33,8 @@ pub struct Flex {
     /// On every slide: what holds the shell in its own shape. MuJoCo's bending is that of a plate that
     /// is flat at rest, and linear, so this force makes it that of the shell.
     held_n: Vec<f64>,
+    /// What each free node stands for.
+    areas_m2: Vec<f64>,
     /// Largest distance of a point of the shell to its nearest node, plus half its thickness.
     reach_m: f64,
     /// Where the finger was last.
@@ -61,8 +63,9 @@ impl Flex {
     /// If `model` is not the shell of this world, or memory is short.
     pub fn new(world: Arc<World>, model: Arc<MjModel>) -> Result<Self, ModelError> {
         let lattice = lattice(&world).ok_or(ModelError::Lacks { part: "a shell" })?;
-        let free = lattice.nodes().iter().filter(|node| !node.clamped).count();
-        if model.nv() as usize != 3 * free || model.nmocap() as usize != free {
+        let free = lattice.nodes().iter().filter(|node| !node.clamped);
+        let areas_m2: Vec<f64> = free.map(|node| node.area_m2.norm()).collect();
+        if model.nv() as usize != 3 * areas_m2.len() || model.nmocap() as usize != areas_m2.len() {
             return Err(ModelError::Lacks { part: "a shell and planes for its nodes" });
         }
         let reach_m = reach_m(lattice);
@@ -72,6 +75,7 @@ impl Flex {
         let mut flex = Self {
             held_n: data.qfrc_spring().iter().map(|force_n| -force_n).collect(),
             nodes_m: vec![0.0; lattice.nodes().len()],
+            areas_m2,
             reach_m,
             data,
             x_wt: None,
@@ -180,7 +184,6 @@ impl Flex {
         lattice.inward_m(&self.nodes_m, &mut self.samples_m);
         let mut load = Load::default();
         let (mut moment, mut weight_n) = (Vector3::zeros(), 0.0);
-        let free: Vec<&Node> = lattice.nodes().iter().filter(|node| !node.clamped).collect();
         for (i, contact) in self.data.contact().iter().enumerate() {
             let normal_n = self.data.try_contact_force(i).map_or(0.0, |[normal_n, ..]| normal_n);
             if normal_n < LEAST_FORCE_N {
@@ -194,7 +197,7 @@ impl Flex {
             weight_n += normal_n;
             // Balls come before planes.
             let ball = contact.geom.into_iter().min().and_then(|id| usize::try_from(id).ok());
-            load.area_m2 += ball.and_then(|id| free.get(id)).map_or(0.0, |n| n.area_m2.norm());
+            load.area_m2 += ball.and_then(|id| self.areas_m2.get(id)).copied().unwrap_or(0.0);
         }
         if weight_n > 0.0 {
             load.centre_t = Point3::from(moment / weight_n);

@@ -2,12 +2,12 @@
 //!
 //! `profile`, `samples` and `table` say where skin, fluid and electrodes of a BioTac are. `column`
 //! is the law of one column of skin over fluid over core, `cavity` couples columns by the fluid's
-//! pressure, `skin` presses them against a mesh. `flex` and
-//! `lattice` are the skin as a shell instead. `electrodes`, `fluid`, `thermal`, `friction` and
-//! `timing` are the effects; `tip` puts together those a scene names. `contact_point` reads a frame
-//! back; `wrench` is the force/torque sensor behind the finger, `registration` what is not where it is
-//! believed to be. `plate` presses the finger on a flat plate, `calibration` fits the constants to recordings of it, `stiffness`
-//! asks it how stiff the skin is.
+//! pressure, `skin` presses them against a mesh. `flex` and `lattice` are the skin as a shell
+//! instead. `electrodes`, `fluid`, `thermal`, `friction` and `timing` are the effects; `tip` puts
+//! together those a scene names. `contact_point` reads a frame back; `wrench` is the force/torque
+//! sensor behind the finger, `registration` what is not where it is believed to be. `plate` presses
+//! the finger on a flat plate, `calibration` fits the constants to recordings of it, `stiffness` asks
+//! it how stiff the skin is.
 
 pub mod calibration;
 mod cavity;

@@ -24,7 +24,8 @@ pub struct Climb {
     pub finished: bool,
 }
 
-/// Every rung with `count` touches, or as many as it makes at most; sensors are quiet, so that what differs is the model.
+/// Every rung with `count` touches, or as many as it makes at most; sensors are quiet, so that what
+/// differs is the model.
 ///
 /// `tick` is called after each of [`pieces`] and says whether to go on.
 ///

@@ -5,8 +5,8 @@ use crate::world::collision::Collision;
 use crate::world::scene::Body;
 use crate::world::solver::Integrator;
 
-/// Targets of a rung of which a touch takes seconds: as a Sobol sequence begins with places all over the zone,
-/// these are; chosen.
+/// Targets of a rung of which a touch takes seconds; chosen: a Sobol sequence begins with places all
+/// over the zone.
 const FEW: usize = 8;
 
 /// Fastest approach of a rigid finger: stopped at once, it ends in an overload from about 5 mm/s on

@@ -205,8 +205,8 @@ struct Off {
     ripple: f64,
 }
 
-/// Presses the finger of a stage or an arm for `pressed_s`, its skin `times` stiffer. `divided` lets the time step be
-/// divided as a scene's is; else it is taken as given.
+/// Presses the finger of a stage or an arm for `pressed_s`, its skin `times` stiffer. `divided` lets
+/// the time step be divided as a scene's is; else it is taken as given.
 ///
 /// # Errors
 /// Why it is refused, or the fault with time and state.
