@@ -41,7 +41,7 @@ test: setup
 
 # The report page in a browser; fails where there is no Chromium.
 page-test: setup
-	PALPATE_PAGE_TEST=1 cargo test --locked --test page
+	PALPATE_PAGE_TEST=1 cargo test --locked --test suite page
 
 lint: setup
 	cargo fmt --check

@@ -7,15 +7,16 @@
 use anyhow::{Context, ensure};
 use mujoco_rs::wrappers::mj_data::MjData;
 use nalgebra::{Isometry3, Point3};
-use palpate::bodies::backend::Command;
-use palpate::bodies::mujoco::Models;
-use palpate::bodies::stand::Stand;
-use palpate::conduct::control::{Controller, Goal};
-use palpate::conduct::probe::{self, Touch};
-use palpate::trials::fidelity::measure;
-use palpate::trials::fidelity::row::Spread;
-use palpate::trials::statistics::median;
-use palpate::world::{Scene, World};
+use palpate::backend::backend::Command;
+use palpate::experiment::statistics::median;
+use palpate::explore::control::{Controller, Goal};
+use palpate::explore::probe::Touch;
+use palpate::sim::mujoco::Models;
+use palpate::sim::probe::rest_y_m;
+use palpate::sim::simulator::Simulator;
+use palpate::sim::{Environment, Scene};
+use palpate::study::fidelity::row::Spread;
+use palpate::study::fidelity::touches;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -52,8 +53,8 @@ fn main() -> anyhow::Result<()> {
         ("height field", &[rigid]),
         ("hull", &[rigid, "solver.collision=\"hull\""]),
     ];
-    let cast = world(&["body=\"cast\"", rigid])?;
-    let truth: Vec<Rest> = (measure::targets(cast.scene(), PLACES, 0).into_iter())
+    let cast = environment(&["body=\"cast\"", rigid])?;
+    let truth: Vec<Rest> = (touches::targets(cast.scene(), PLACES, 0).into_iter())
         .filter_map(|target| true_rest(&cast, target))
         .collect();
     let ours = exact(&cast, &truth)?;
@@ -64,7 +65,7 @@ fn main() -> anyhow::Result<()> {
     println!("| cast onto the mesh | – | – | {} | – |", errors(&cast, &truth, &ours));
     let mut first_us = None;
     for (name, sets) in bodies {
-        let dynamic = |arm: &[&str]| world(&[sets, arm, &["body=\"dynamic\""]].concat());
+        let dynamic = |arm: &[&str]| environment(&[sets, arm, &["body=\"dynamic\""]].concat());
         let on_arm = dynamic(&["arm={links=\"C\"}"])?;
         let (rests, depth_m, words) = match on_arm.fingertip() {
             Some(_) => (None, DEEP_M, "as cast | | | | |".into()),
@@ -83,17 +84,17 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn world(sets: &[&str]) -> anyhow::Result<Arc<World>> {
+fn environment(sets: &[&str]) -> anyhow::Result<Arc<Environment>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird_finger.toml");
     let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-    Ok(Arc::new(World::build(Scene::load(&path, &sets)?)?))
+    Ok(Arc::new(Environment::build(Scene::load(&path, &sets)?)?))
 }
 
 /// Median, 95 % and largest of how far the rests and the points of contact are from the truth.
-fn errors(world: &World, truth: &[Rest], found: &[Rest]) -> String {
+fn errors(environment: &Environment, truth: &[Rest], found: &[Rest]) -> String {
     let rests = truth.iter().zip(found).map(|(truth, found)| (truth.y_m - found.y_m).abs());
     let points = found.iter().filter_map(|found| {
-        world.nearest_true_point(&found.p_wc).map(|nearest| (nearest - found.p_wc).norm())
+        environment.nearest_true_point(&found.p_wc).map(|nearest| (nearest - found.p_wc).norm())
     });
     let cells = |errors_m: Vec<f64>| {
         let spread = Spread::of(&errors_m).unwrap_or_default();
@@ -105,10 +106,10 @@ fn errors(world: &World, truth: &[Rest], found: &[Rest]) -> String {
 
 /// Where the hull rests on the analytic surface, by brute force: the highest that any place under
 /// it lifts it. None where there is no surface.
-fn true_rest(world: &World, target: Vec<f64>) -> Option<Rest> {
-    let scene = world.scene();
+fn true_rest(environment: &Environment, target: Vec<f64>) -> Option<Rest> {
+    let scene = environment.scene();
     let lift = |dx_m: f64, dz_m: f64| {
-        let height_m = world.true_height_m(&[target[0] + dx_m, target[1] + dz_m])?;
+        let height_m = environment.true_height_m(&[target[0] + dx_m, target[1] + dz_m])?;
         let y_m = scene.zone.datum_y_m + height_m;
         Some((y_m - scene.finger.front_m(dx_m, dz_m)?, dx_m, dz_m, y_m))
     };
@@ -130,10 +131,10 @@ fn true_rest(world: &World, target: Vec<f64>) -> Option<Rest> {
 }
 
 /// Where the hull rests on the exact mesh.
-fn exact(cast: &Arc<World>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
-    let mut probe = probe::open(&Stand::new(Arc::clone(cast))?, 0)?;
+fn exact(cast: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
+    let mut probe = Simulator::new(Arc::clone(cast))?.probe(0)?;
     let mut rest = |target: &Vec<f64>| {
-        let y_m = probe::rest_y_m(cast, target).context("a place without contact")?;
+        let y_m = rest_y_m(cast, target).context("a place without contact")?;
         let Touch::Contact(contact) = probe.touch(target)? else { anyhow::bail!("a miss") };
         Ok(Rest { target: target.clone(), y_m, p_wc: contact.p_wc })
     };
@@ -141,7 +142,7 @@ fn exact(cast: &Arc<World>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
 }
 
 /// Where MuJoCo first says contact when the finger is set down along −y on a stage.
-fn lowered(stage: &Arc<World>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
+fn lowered(stage: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
     /// From above the highest that any geometry can lie, in steps, to below the lowest.
     const ABOVE_M: f64 = 0.03;
     const BELOW_M: f64 = -0.01;
@@ -177,14 +178,18 @@ fn lowered(stage: &Arc<World>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
 
 /// Median over some places of the time of a step, µs, while the PA-10 holds its finger `depth_m`
 /// beyond the rest, and the share of steps in which it feels anything.
-fn step(world: &Arc<World>, rests: &[Rest], depth_m: f64) -> anyhow::Result<(f64, f64)> {
-    let scene = world.scene();
-    let stand = Stand::new(Arc::clone(world))?;
+fn step(
+    environment: &Arc<Environment>,
+    rests: &[Rest],
+    depth_m: f64,
+) -> anyhow::Result<(f64, f64)> {
+    let scene = environment.scene();
+    let simulator = Simulator::new(Arc::clone(environment))?;
     let (mut times_us, mut held, mut all) = (Vec::new(), 0.0, 0.0);
     for rest in rests.iter().step_by(rests.len() / TIMED) {
-        let mut body = stand.body()?.context("no body")?;
+        let mut body = simulator.body()?.context("no body")?;
         let mut reading = body.reset(0)?.clone();
-        let chain = world.chain().context("no chain")?;
+        let chain = environment.chain().context("no chain")?;
         let mut controller = Controller::new(chain, scene.period_s())?;
         for (gap_m, duration_s) in [(2e-3, 3.0), (-depth_m, 1.0)] {
             let mut p_wt = scene.zone.point(&rest.target, 0.0);

@@ -1,19 +1,20 @@
 //! How far the electrodes' point of contact lies from the exact one, over shapes and attitudes:
 //! `make contacts`. Prints the table of `docs/finger.md`.
 
-#[path = "../tests/shapes/mod.rs"]
+#[path = "../tests/suite/common/shapes.rs"]
+#[allow(dead_code)]
 mod shapes;
 
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
-use palpate::ground::geometry::bvh::MeshBvh;
-use palpate::ground::geometry::mesh::Mesh;
-use palpate::ground::seed::stream;
-use palpate::things::finger::contact_point::locate;
-use palpate::things::finger::plate::direction_t;
-use palpate::things::finger::{
-    Detection, Detector, Effects, Feel, Finger, Fingertip, Frame, Motion, Tare,
-};
-use palpate::world::{Scene, World};
+use palpate::geometry::bvh::MeshBvh;
+use palpate::geometry::mesh::Mesh;
+use palpate::math::seed::stream;
+use palpate::robot::finger::TipMotion;
+use palpate::robot::finger::contact_point::locate;
+use palpate::robot::finger::{Detection, Detector, Finger, Frame, Tare};
+use palpate::sim::finger::plate::direction_t;
+use palpate::sim::finger::{Effects, Fingertip, FingertipState};
+use palpate::sim::{Environment, Scene};
 use shapes::{grid, point, sphere_mesh, square};
 use std::path::Path;
 
@@ -37,7 +38,7 @@ fn touch(
 ) -> Option<Error> {
     let turn = Rotation3::rotation_between(towards_t, &-Vector3::z())?;
     let turn = UnitQuaternion::from_rotation_matrix(&turn);
-    let mut feel = Feel::new(tip, &stream(1, 0, "finger"));
+    let mut feel = FingertipState::new(tip, &stream(1, 0, "finger"));
     let mut p_wt = over + Vector3::z() * 0.012;
     let (mut tare, mut frames) = (None, Vec::<Frame>::new());
     let mut detector = Detector::new(Detection::default());
@@ -46,7 +47,7 @@ fn touch(
         if tare.is_some() && pressed == 0 {
             p_wt.z -= APPROACH_M_S * TICK_S;
         }
-        let motion = Motion::at(Isometry3::from_parts(p_wt.into(), turn));
+        let motion = TipMotion::at(Isometry3::from_parts(p_wt.into(), turn));
         load = feel.step(tip, bvh, &motion, TICK_S).ok()?;
         while let Some(frame) = feel.frame() {
             if let Some(tare) = &tare {
@@ -129,8 +130,8 @@ fn main() {
     });
     report("edge of 90°", &tip, ridge, &[point(0.0, 0.0, 0.0), point(0.002, 0.0, 0.0)]);
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
-    let world = Scene::load(&path, &[]).ok().and_then(|scene| World::build(scene).ok());
-    if let Some(bird) = world.as_ref().and_then(World::mesh) {
+    let environment = Scene::load(&path, &[]).ok().and_then(|scene| Environment::build(scene).ok());
+    if let Some(bird) = environment.as_ref().and_then(Environment::mesh) {
         // The nose points along +y of W; here it points up, its tip at the origin.
         let up = Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::FRAC_PI_2);
         let turned = bird.transformed(&Isometry3::from_parts(

@@ -1,13 +1,15 @@
 //! What a touch of a dynamic body costs, and what of it each part does; one thread, best of several.
 
 use nalgebra::Isometry3;
-use palpate::bodies::backend::Command;
-use palpate::bodies::stand::Stand;
-use palpate::conduct::probe::servo::Servo;
-use palpate::conduct::probe::{self, Probe};
-use palpate::things::finger::{Feel, Motion};
-use palpate::world::world::Shape;
-use palpate::world::{Scene, World};
+use palpate::backend::backend::Command;
+use palpate::explore::probe::Probe;
+use palpate::explore::probe::servo::Servo;
+use palpate::robot::finger::TipMotion;
+use palpate::sim::environment::Shape;
+use palpate::sim::finger::FingertipState;
+use palpate::sim::probe::rest_y_m;
+use palpate::sim::simulator::Simulator;
+use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
@@ -31,13 +33,15 @@ fn main() -> anyhow::Result<()> {
     ] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
         let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-        let world = Arc::new(World::build(Scene::load(&path, &sets)?)?);
-        let stand = Stand::new(Arc::clone(&world))?;
-        let targets = world.scene().zone.grid(4);
+        let environment = Arc::new(Environment::build(Scene::load(&path, &sets)?)?);
+        let simulator = Simulator::new(Arc::clone(&environment))?;
+        let targets = environment.scene().zone.grid(4);
         let mut simulated_s = 0.0;
         let touches_s = best(|| {
-            let Ok(Some(body)) = stand.body() else { return f64::NAN };
-            let Ok(mut servo) = Servo::new(Arc::clone(&world), body, 1) else { return f64::NAN };
+            let Ok(Some(body)) = simulator.body() else { return f64::NAN };
+            let Ok(mut servo) = Servo::new(Arc::clone(&environment), body, 1) else {
+                return f64::NAN;
+            };
             let begun = Instant::now();
             for target in &targets {
                 let _ = servo.touch(target);
@@ -46,7 +50,7 @@ fn main() -> anyhow::Result<()> {
             begun.elapsed().as_secs_f64()
         });
         let free_us = best(|| {
-            let Ok(Some(mut body)) = stand.body() else { return f64::NAN };
+            let Ok(Some(mut body)) = simulator.body() else { return f64::NAN };
             let command = Command { qdot: vec![0.0; body.capabilities().joints.len()] };
             let begun = Instant::now();
             for _ in 0..2000 {
@@ -60,21 +64,22 @@ fn main() -> anyhow::Result<()> {
             simulated_s / targets.len() as f64,
             simulated_s / touches_s,
         );
-        let (Some(tip), Shape::Mesh { bvh, .. }) = (world.fingertip(), world.shape()) else {
+        let (Some(tip), Shape::Mesh { bvh, .. }) = (environment.fingertip(), environment.shape())
+        else {
             continue;
         };
-        let Some(rest_y_m) = probe::rest_y_m(&world, &[0.0, 0.5]) else { continue };
-        let mut feel = Feel::new(tip, &palpate::ground::seed::stream(1, 0, "finger"));
+        let Some(rest_y_m) = rest_y_m(&environment, &[0.0, 0.5]) else { continue };
+        let mut feel = FingertipState::new(tip, &palpate::math::seed::stream(1, 0, "finger"));
         for gap_mm in [-0.5, 0.5, 1.0, 2.0, 5.0, 20.0] {
             let mut x_wt = Isometry3::from_parts(
-                world.scene().zone.point(&[0.0, 0.5], 0.0).into(),
-                world.scene().finger.attitude_w(),
+                environment.scene().zone.point(&[0.0, 0.5], 0.0).into(),
+                environment.scene().finger.attitude_w(),
             );
             x_wt.translation.y = rest_y_m + 1e-3 * gap_mm;
             let feel_us = best(|| {
                 let begun = Instant::now();
                 for _ in 0..1000 {
-                    let _ = feel.step(tip, bvh, &Motion::at(x_wt), 0.002);
+                    let _ = feel.step(tip, bvh, &TipMotion::at(x_wt), 0.002);
                     while feel.frame().is_some() {}
                 }
                 begun.elapsed().as_secs_f64() * 1e3

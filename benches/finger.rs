@@ -2,27 +2,29 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Point3, Translation3, UnitVector3, Vector3};
-use palpate::ground::geometry::sweep::Capsule;
-use palpate::ground::seed::stream;
-use palpate::things::finger::skin::SkinEffect;
-use palpate::things::finger::{Effects, Feel, Fingertip, Motion};
-use palpate::world::world::Shape;
-use palpate::world::{Scene, World};
+use palpate::geometry::sweep::Capsule;
+use palpate::math::seed::stream;
+use palpate::robot::finger::TipMotion;
+use palpate::sim::environment::Shape;
+use palpate::sim::finger::skin::SkinEffect;
+use palpate::sim::finger::{Effects, Fingertip, FingertipState};
+use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
 use std::path::Path;
 
 fn finger(c: &mut Criterion) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
-    let Some(world) = Scene::load(&path, &[]).ok().and_then(|scene| World::build(scene).ok())
+    let Some(environment) =
+        Scene::load(&path, &[]).ok().and_then(|scene| Environment::build(scene).ok())
     else {
         return;
     };
-    let Shape::Mesh { bvh, .. } = world.shape() else { return };
+    let Shape::Mesh { bvh, .. } = environment.shape() else { return };
     // The pad faces the object: −z of T along −y of W, the tip up.
     let pad = nalgebra::UnitQuaternion::from_rotation_matrix(
         &nalgebra::Rotation3::from_basis_unchecked(&[Vector3::z(), Vector3::x(), Vector3::y()]),
     );
-    let at = |y: f64| Motion::at(Isometry3::from_parts(Translation3::new(0.013, y, 0.487), pad));
+    let at = |y: f64| TipMotion::at(Isometry3::from_parts(Translation3::new(0.013, y, 0.487), pad));
     let (low, high) = bvh.mesh().bounds();
     let start = Capsule::sphere(Point3::new(0.013, high.y + 0.05, 0.487), 8.0e-3);
     let down = UnitVector3::new_unchecked(-Vector3::y());
@@ -31,7 +33,7 @@ fn finger(c: &mut Criterion) {
     let skin = Effects { skin: Some(SkinEffect::default()), ..Effects::default() };
     let wet = Effects { fluid: Some(Default::default()), ..skin.clone() };
     // What a scene with a skin and nothing else should cost: the skin itself.
-    let bare = Fingertip::new(&world.scene().finger, &skin);
+    let bare = Fingertip::new(&environment.scene().finger, &skin);
     if let Some(bare) = bare.skin() {
         let mut pressed = bare.relaxed();
         let motion = at(touching_m - 1e-3);
@@ -41,8 +43,8 @@ fn finger(c: &mut Criterion) {
     }
     for (name, effects) in [("skin", skin), ("skin and fluid", wet), ("everything", Effects::all())]
     {
-        let tip = Fingertip::new(&world.scene().finger, &effects);
-        let mut feel = Feel::new(&tip, &stream(1, 0, "finger"));
+        let tip = Fingertip::new(&environment.scene().finger, &effects);
+        let mut feel = FingertipState::new(&tip, &stream(1, 0, "finger"));
         let mut group = c.benchmark_group(format!("fingertip, {name}"));
         let far = [("1 mm away", 1e-3), ("5 cm away", 0.05)];
         for (place, gap_m) in [("1 mm deep", -1e-3), ("2 mm deep", -2e-3)].into_iter().chain(far) {

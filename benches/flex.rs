@@ -1,15 +1,17 @@
 //! The skin as finite elements beside the elastic foundation: `cargo bench --bench flex`. Prints the
 //! table of `docs/dynamic.md`.
 
-#[path = "../tests/presses/mod.rs"]
+#[path = "../tests/suite/common/presses.rs"]
+#[allow(dead_code)]
 mod presses;
-#[path = "../tests/shapes/mod.rs"]
+#[path = "../tests/suite/common/shapes.rs"]
+#[allow(dead_code)]
 mod shapes;
 
 use nalgebra::Point3;
-use palpate::ground::geometry::mesh::Mesh;
-use palpate::things::finger::Effects;
-use presses::{Press, foundation, press, shell, wall, world};
+use palpate::geometry::mesh::Mesh;
+use palpate::sim::finger::Effects;
+use presses::{Press, environment, foundation, press, shell, wall};
 
 const DEPTHS_M: [f64; 2] = [0.5e-3, 1e-3];
 
@@ -25,9 +27,9 @@ fn skins() -> Vec<(String, Effects)> {
 fn report(shape: &str, mesh: &Mesh, pitch_deg: f64) {
     let mut finest: Option<Press> = None;
     for (name, effects) in skins() {
-        let world = world(effects, mesh.clone(), pitch_deg);
+        let environment = environment(effects, mesh.clone(), pitch_deg);
         let presses: Result<Vec<Press>, _> =
-            DEPTHS_M.iter().map(|&depth_m| press(&world, depth_m)).collect();
+            DEPTHS_M.iter().map(|&depth_m| press(&environment, depth_m)).collect();
         let mut presses = match presses {
             Ok(presses) => presses,
             Err(fault) => {

@@ -6,12 +6,12 @@
 mod common;
 
 use common::{KERNEL, hyperparameters, search_box, touches};
-use palpate::faces::report::axes::{Axis, Panel, Sample, legend};
-use palpate::faces::report::canvas::{Area, Canvas};
-use palpate::faces::report::{png, style};
-use palpate::ground::gp::likelihood::Likelihood;
-use palpate::ground::gp::posterior::Scratch;
-use palpate::ground::gp::{Mean, Posterior};
+use palpate::gp::likelihood::Likelihood;
+use palpate::gp::posterior::Scratch;
+use palpate::gp::{Mean, Posterior};
+use palpate::report::axes::{Axis, Panel, Sample, legend};
+use palpate::report::canvas::{Area, Canvas};
+use palpate::report::{png, style};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;

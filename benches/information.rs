@@ -6,20 +6,20 @@
 //! after a name is its trials, and `own` or `estimated`, `active` or `slope` leaves the others out.
 
 use nalgebra::{Rotation3, Unit, Vector3};
-use palpate::bodies::backend::Fault;
-use palpate::bodies::stand::Stand;
-use palpate::conduct::planner;
-use palpate::conduct::probe::{self, Contact, Probe, Swept, Touch};
-use palpate::ground::seed;
-use palpate::trials::equal_error::{Estimate, equal_error};
-use palpate::trials::experiment::Experiment;
-use palpate::trials::measure::RMSE;
-use palpate::trials::metrics::Metrics;
-use palpate::trials::row::TrialRow;
-use palpate::trials::statistics::{Paired, median};
-use palpate::trials::trial;
-use palpate::trials::truth::Truth;
-use palpate::world::World;
+use palpate::backend::backend::Fault;
+use palpate::experiment::equal_error::{Estimate, equal_error};
+use palpate::experiment::experiment::Experiment;
+use palpate::experiment::measure::RMSE;
+use palpate::experiment::metrics::Metrics;
+use palpate::experiment::row::TrialRow;
+use palpate::experiment::statistics::{Paired, median};
+use palpate::experiment::trial;
+use palpate::experiment::truth::Truth;
+use palpate::explore::planner;
+use palpate::explore::probe::{Contact, Probe, Swept, Touch};
+use palpate::math::seed;
+use palpate::sim::Environment;
+use palpate::sim::simulator::Simulator;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
@@ -122,18 +122,20 @@ fn compare(name: &str, trials: u32, is_own: bool, planner: &str) {
         if experiment.scene.object.is_none() && settings.contains(&"gp.free_space=true") {
             continue;
         }
-        let Ok(world) = World::build(experiment.scene.clone()).map(Arc::new) else { return };
-        let Ok(stand) = Stand::new(world) else { return };
-        let truth = Truth::sample(stand.world(), experiment.grid as usize);
+        let Ok(environment) = Environment::build(experiment.scene.clone()).map(Arc::new) else {
+            return;
+        };
+        let Ok(simulator) = Simulator::new(environment) else { return };
+        let truth = Truth::sample(simulator.environment(), experiment.grid as usize);
         let Some(entry) = planner::by_name(planner) else { return };
         let begun = Instant::now();
         let rows: Vec<TrialRow> = (0..trials)
             .map(|number| {
                 let mut row = if is_own {
-                    trial::run(&experiment, &stand, &truth, entry, number)
+                    trial::run(&experiment, &simulator, &truth, entry, number)
                 } else {
                     let rng = seed::stream(experiment.seed, number.into(), "estimates");
-                    let exact = probe::open(&stand, number.into()).unwrap();
+                    let exact = simulator.probe(number.into()).unwrap();
                     let mut probe = Estimating { exact, rng };
                     trial::run_with(&experiment, &mut probe, &truth, entry, number)
                 };

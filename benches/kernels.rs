@@ -5,13 +5,12 @@ mod common;
 use common::{KERNEL, hyperparameters, search_box, touches};
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{Point3, UnitVector3, Vector3};
-use palpate::bodies::stand::Stand;
-use palpate::conduct::probe;
-use palpate::ground::gp::likelihood::Likelihood;
-use palpate::ground::gp::posterior::Scratch;
-use palpate::ground::gp::{Mean, Posterior};
-use palpate::world::world::Shape;
-use palpate::world::{Scene, World};
+use palpate::gp::likelihood::Likelihood;
+use palpate::gp::posterior::Scratch;
+use palpate::gp::{Mean, Posterior};
+use palpate::sim::environment::Shape;
+use palpate::sim::simulator::Simulator;
+use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
@@ -61,15 +60,18 @@ fn gaussian_process(c: &mut Criterion) {
 fn contact(c: &mut Criterion) {
     let mut group = c.benchmark_group("bird, 48 200 triangles");
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
-    let Some(world) = Scene::load(&path, &[]).ok().and_then(|scene| World::build(scene).ok())
+    let Some(environment) =
+        Scene::load(&path, &[]).ok().and_then(|scene| Environment::build(scene).ok())
     else {
         return;
     };
-    let world = Arc::new(world);
-    let stand = Stand::new(Arc::clone(&world)).ok();
-    let Some(mut probe) = stand.and_then(|stand| probe::open(&stand, 0).ok()) else { return };
+    let environment = Arc::new(environment);
+    let simulator = Simulator::new(Arc::clone(&environment)).ok();
+    let Some(mut probe) = simulator.and_then(|simulator| simulator.probe(0).ok()) else {
+        return;
+    };
     group.bench_function("touch", |b| b.iter(|| probe.touch(black_box(&[0.013, 0.487]))));
-    if let Shape::Mesh { bvh, .. } = world.shape() {
+    if let Shape::Mesh { bvh, .. } = environment.shape() {
         let origin = Point3::new(0.013, -0.5, 0.487);
         let direction = UnitVector3::new_unchecked(-Vector3::y());
         group.bench_function("ray", |b| b.iter(|| bvh.ray(black_box(&origin), &direction, 1.0)));

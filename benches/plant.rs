@@ -4,12 +4,13 @@
 //! weighs on neither.
 
 use mujoco_rs::wrappers::mj_data::MjData;
-use palpate::bodies::backend::Wrench;
-use palpate::bodies::mujoco::{Plant, compile};
-use palpate::conduct::control::{Controller, Goal};
-use palpate::things::arm::ArmSettings;
-use palpate::world::mjcf::{self, Mode};
-use palpate::world::{Scene, World};
+use palpate::backend::backend::Wrench;
+use palpate::explore::control::{Controller, Goal};
+use palpate::robot::arm::ArmSettings;
+use palpate::sim::mjcf;
+use palpate::sim::mjcf::Mode;
+use palpate::sim::mujoco::{Plant, compile};
+use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
@@ -34,9 +35,9 @@ fn main() -> anyhow::Result<()> {
     for (name, arm) in [("PA-10", Some(ArmSettings::default())), ("stage", None)] {
         let mut scene = Scene::load(&path, &[])?;
         scene.arm = arm;
-        let world = World::build(scene)?;
+        let environment = Environment::build(scene)?;
         let (Some(chain), Some(text)) =
-            (world.chain(), mjcf::scene(&world, Mode::Dynamic { step_s: 0.002 }))
+            (environment.chain(), mjcf::scene(&environment, Mode::Dynamic { step_s: 0.002 }))
         else {
             anyhow::bail!("the scene has no mesh");
         };

@@ -1,4 +1,4 @@
-//! Makes the meshes in this folder from the analytic surfaces of `palpate::ground::geometry`.
+//! Makes the meshes in this folder from the analytic surfaces of `palpate::geometry`.
 //!
 //! `cargo run --release --example make_models` writes the same bytes each time and prints how far
 //! the triangles are from the surface. `SOURCE.md` describes the files.
@@ -11,8 +11,8 @@ use anyhow::{Context, Result};
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
 use nalgebra::{Point3, Vector3};
 use ndshape::{RuntimeShape, Shape};
-use palpate::ground::geometry::implicit::Implicit;
-use palpate::ground::geometry::surfaces;
+use palpate::geometry::implicit::Implicit;
+use palpate::geometry::surfaces;
 use serde_json::json;
 
 /// Edges whose middle is farther from the surface are split, metres. Chosen: the middle of an

@@ -21,10 +21,16 @@
 //! frame W, `X_WT` the pose of T in W; in code they are written `p_wc` and `x_wt`.
 #![warn(missing_docs)]
 
-pub mod bodies;
-pub mod conduct;
-pub mod faces;
-pub mod ground;
-pub mod things;
-pub mod trials;
-pub mod world;
+pub mod backend;
+pub mod cli;
+pub mod config;
+pub mod experiment;
+pub mod explore;
+pub mod geometry;
+pub mod gp;
+pub mod math;
+pub mod report;
+pub mod robot;
+pub mod sim;
+pub mod study;
+pub mod task;

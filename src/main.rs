@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    palpate::faces::cli::main()
+    palpate::cli::main()
 }

@@ -1,8 +1,8 @@
 //! What benches of the Gaussian process are made of.
 
-use palpate::ground::gp::fit::SearchBox;
-use palpate::ground::gp::kernel::{Hyperparameters, SquaredExponential};
-use palpate::ground::gp::{Mean, Observations};
+use palpate::gp::fit::SearchBox;
+use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
+use palpate::gp::{Mean, Observations};
 
 pub static KERNEL: SquaredExponential = SquaredExponential;
 

@@ -1,0 +1,134 @@
+//! A body whose sensors and joints fail, to test what drives it.
+
+use super::backend::{Backend, Capabilities, Command, Fault, Reading};
+use crate::math::seed;
+use crate::robot::finger::Frame;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use std::collections::VecDeque;
+
+/// How it fails, from a given tick on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Failure {
+    /// Pressure that is not a number.
+    NanPressure,
+    /// A joint position that is not a number.
+    NanJoint,
+    /// The last frame, again and again.
+    Frozen,
+    /// Every channel at the end of its range, 4095.
+    Saturated,
+    /// This share of the frames never arrives.
+    Lost(f64),
+    /// Frames arrive this many ticks late.
+    Late(usize),
+    /// This share of the pressures is off by up to the full range.
+    Spikes(f64),
+    /// Joints make only this share of the movement commanded.
+    Weak(f64),
+}
+
+/// Around another body.
+pub struct FaultInjector {
+    inner: Box<dyn Backend>,
+    failure: Failure,
+    from_tick: u64,
+    tick: u64,
+    rng: ChaCha8Rng,
+    held: VecDeque<(u64, Frame)>,
+    last: Option<Frame>,
+    reading: Reading,
+    command: Command,
+}
+
+impl FaultInjector {
+    /// `inner`, which fails after `from_tick` ticks.
+    pub fn new(inner: Box<dyn Backend>, failure: Failure, from_tick: u64) -> Self {
+        Self {
+            inner,
+            failure,
+            from_tick,
+            tick: 0,
+            rng: seed::stream(0, 0, "faults"),
+            held: VecDeque::new(),
+            last: None,
+            reading: Reading::default(),
+            command: Command::default(),
+        }
+    }
+
+    fn spoil(&mut self) {
+        let Self { reading, rng, .. } = self;
+        match self.failure {
+            Failure::NanPressure => {
+                reading.frames.iter_mut().for_each(|frame| frame.pdc_counts = Some(f64::NAN));
+            }
+            Failure::NanJoint => reading.q.iter_mut().take(1).for_each(|q| *q = f64::NAN),
+            Failure::Frozen => {
+                for frame in &mut reading.frames {
+                    frame.clone_from(self.last.get_or_insert_with(|| frame.clone()));
+                }
+            }
+            Failure::Saturated => {
+                for frame in &mut reading.frames {
+                    frame.pdc_counts = frame.pdc_counts.map(|_| FULL_COUNTS);
+                    frame.electrode_counts =
+                        frame.electrode_counts.map(|all| all.map(|_| FULL_COUNTS));
+                }
+            }
+            Failure::Lost(share) => reading.frames.retain(|_| rng.random::<f64>() >= share),
+            Failure::Late(ticks) => {
+                let due = self.tick + ticks as u64;
+                self.held.extend(reading.frames.drain(..).map(|frame| (due, frame)));
+                while let Some((_, frame)) = self.held.pop_front_if(|(due, _)| *due <= self.tick) {
+                    reading.frames.push(frame);
+                }
+            }
+            Failure::Spikes(share) => {
+                for frame in &mut reading.frames {
+                    if let Some(pdc) = &mut frame.pdc_counts
+                        && rng.random::<f64>() < share
+                    {
+                        *pdc = FULL_COUNTS * rng.random::<f64>();
+                    }
+                }
+            }
+            Failure::Weak(_) => {}
+        }
+    }
+}
+
+/// End of the converter's range.
+const FULL_COUNTS: f64 = 4095.0;
+
+impl Backend for FaultInjector {
+    fn capabilities(&self) -> &Capabilities {
+        self.inner.capabilities()
+    }
+
+    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
+        self.tick = 0;
+        self.rng = seed::stream(seed, 0, "faults");
+        self.held.clear();
+        self.last = None;
+        self.reading.clone_from(self.inner.reset(seed)?);
+        Ok(&self.reading)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        self.tick += 1;
+        let is_failing = self.tick > self.from_tick;
+        self.command.clone_from(command);
+        if let Failure::Weak(share) = self.failure
+            && is_failing
+        {
+            self.command.qdot.iter_mut().for_each(|qdot| *qdot *= share);
+        }
+        self.reading.clone_from(self.inner.step(&self.command)?);
+        match is_failing {
+            true => self.spoil(),
+            false => self.last = self.reading.frames.last().cloned().or(self.last.take()),
+        }
+        Ok(&self.reading)
+    }
+}

@@ -1,0 +1,55 @@
+//! Tables on the terminal and in CSV and figure files beside them.
+
+use crate::experiment::store::write_whole;
+use crate::report::png;
+use anyhow::Context;
+use serde::Serialize;
+use std::path::Path;
+
+/// Cells in aligned columns: the first to the left, the others to the right.
+pub(super) fn aligned<const N: usize>(lines: &[[String; N]]) -> String {
+    let widths: [usize; N] = std::array::from_fn(|column| {
+        lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0)
+    });
+    let mut text = String::new();
+    for line in lines {
+        let mut row = String::new();
+        for (column, (cell, width)) in line.iter().zip(widths).enumerate() {
+            row += &match column {
+                0 => format!("{cell:<width$}"),
+                _ => format!("  {cell:>width$}"),
+            };
+        }
+        text += row.trim_end();
+        text.push('\n');
+    }
+    text
+}
+
+/// A number, or a dash where there is none.
+pub(super) fn cell(value: Option<f64>, decimals: usize) -> String {
+    value.map_or("-".into(), |value| format!("{value:.decimals$}"))
+}
+
+/// A duration in the unit that suits it.
+pub(super) fn duration(s: f64) -> String {
+    match s {
+        s if s < 1e-3 => format!("{:.1} us", 1e6 * s),
+        s if s < 1.0 => format!("{:.2} ms", 1e3 * s),
+        s => format!("{s:.2} s"),
+    }
+}
+
+/// Writes lines as CSV.
+pub(super) fn write_csv<T: Serialize>(path: &Path, lines: &[T]) -> anyhow::Result<()> {
+    let mut writer = csv::Writer::from_path(path).with_context(|| path.display().to_string())?;
+    lines.iter().try_for_each(|line| writer.serialize(line))?;
+    writer.flush().with_context(|| path.display().to_string())
+}
+
+/// Writes a drawing as SVG and PNG.
+pub(super) fn write_figure(path: &Path, svg: &str) -> anyhow::Result<()> {
+    write_whole(&path.with_extension("svg"), svg)?;
+    let path = path.with_extension("png");
+    std::fs::write(&path, png::render(svg)?).with_context(|| path.display().to_string())
+}

@@ -1,0 +1,128 @@
+//! `palpate effects`.
+
+use super::columns::{aligned, cell};
+use super::progress::{progress_bar, step, stop_on_interrupt};
+use super::{Ending, print};
+use crate::experiment::statistics::Paired;
+use crate::report::paired::with_interval;
+use crate::sim::Scene;
+use crate::sim::scene::Body;
+use crate::study::effects::overhead::bare_ratio;
+use crate::study::effects::{Base, Budget, Change, SWITCHES};
+use crate::study::fidelity::row::Spread;
+use crate::study::fidelity::touches::targets;
+use anyhow::bail;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate effects scenes/bird_finger.toml
+  palpate effects scenes/bird_finger.toml --trials 0             touches and time only
+  palpate effects scenes/container_finger.toml --set effects.friction={}
+
+Each effect is switched alone, the rest of the scene being as it is. Times are paired and
+interleaved, so that what else the machine does falls on both sides alike.")]
+pub(super) struct Args {
+    /// Scene (TOML) with a body that feels.
+    scene: PathBuf,
+    /// Change one setting: a dotted key and a TOML value; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Touches compared.
+    #[arg(long, default_value_t = 16, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    touches: u16,
+    /// Pairs of touches that are timed.
+    #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
+    pairs: u16,
+    /// Trials of each planner; 0 leaves the planners out.
+    #[arg(long, default_value_t = 10, value_name = "N")]
+    trials: u16,
+    /// Touches of a trial.
+    #[arg(long, default_value_t = 30, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=500))]
+    trial_touches: u16,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let scene = Scene::load(&args.scene, &args.set)?;
+    if matches!(scene.body, Body::Function | Body::Cast) {
+        let (path, body) = (args.scene.display(), scene.body.name());
+        bail!("{path}: body = \"{body}\" has no effects; effects need body = \"kinematic\"");
+    }
+    let budget = Budget {
+        pairs: args.pairs.into(),
+        trials: args.trials.into(),
+        touches: args.trial_touches.into(),
+    };
+    let stop = stop_on_interrupt("effect")?;
+    let bar = progress_bar("effects", "effects", SWITCHES.len() as u64 + 1, 0);
+    let mut go_on = || {
+        step(&bar);
+        !stop.load(Ordering::Relaxed)
+    };
+    let targets = targets(&scene, args.touches.into(), 0);
+    let Some(base) = Base::new(&scene, targets, budget, &mut go_on)? else {
+        return Ok(Ending::Interrupted);
+    };
+    let mut lines = vec![HEADER.map(String::from)];
+    let mut finished = true;
+    for switch in SWITCHES {
+        lines.push(cells(&base.change(switch, budget)?));
+        if !go_on() {
+            finished = false;
+            break;
+        }
+    }
+    bar.finish_and_clear();
+    let mut text = aligned(&lines);
+    if let Some((ratio, [low, high])) = bare_ratio(&scene, &base.poses(), args.pairs.into())? {
+        let [ratio, low, high] = [ratio, low, high].map(|ratio| 100.0 * (ratio - 1.0));
+        text += &format!(
+            "\ntime of a finger with every effect off but its skin, against the skin alone: \
+             {ratio:+.2} % [{low:+.2}, {high:+.2}]\n"
+        );
+    }
+    print(&text)?;
+    Ok(if finished { Ending::Done } else { Ending::Interrupted })
+}
+
+const HEADER: [&str; 11] = [
+    "effect",
+    "here",
+    "contact moves mm: mean",
+    "95 %",
+    "force N",
+    "electrodes counts",
+    "time of a touch",
+    "off costs",
+    "state bytes",
+    "runs a touch off, on",
+    "active - random RMSE mm off; on",
+];
+
+fn cells(change: &Change) -> [String; 11] {
+    let mean = |spread: Option<Spread>| spread.map(|spread| spread.mean);
+    let verdicts = change.verdict.map(verdict);
+    [
+        change.name.into(),
+        if change.is_on { "on" } else { "off" }.into(),
+        cell(mean(change.shift_m).map(|m| 1e3 * m), 3),
+        cell(change.shift_m.map(|spread| 1e3 * spread.p95), 3),
+        cell(mean(change.force_n), 4),
+        cell(mean(change.electrode_counts), 1),
+        change.time_ratio.map_or("-".into(), |ratio| format!("{:+.1} %", 100.0 * (ratio - 1.0))),
+        change.off_ratio.map_or("-".into(), |(ratio, [low, high])| {
+            let [ratio, low, high] = [ratio, low, high].map(|ratio| 100.0 * (ratio - 1.0));
+            format!("{ratio:+.2} % [{low:+.2}, {high:+.2}]")
+        }),
+        format!("{:+}", change.state_bytes),
+        change.runs.map_or("-".into(), |[off, on]| format!("{off}, {on}")),
+        verdicts.join("; "),
+    ]
+}
+
+fn verdict(paired: Option<Paired>) -> String {
+    let Some(paired) = paired else { return "-".into() };
+    with_interval(paired.mean, paired.interval, &|m| format!("{:.2}", 1e3 * m))
+}

@@ -1,0 +1,153 @@
+//! `palpate export`.
+
+use super::{Ending, print};
+use crate::experiment::experiment::ReportSettings;
+use crate::experiment::store::{Run, write_whole};
+use crate::gp::posterior::Scratch;
+use crate::report::points::Points;
+use crate::report::replay::Replay;
+use crate::report::{figures, png, style};
+use anyhow::{Context, bail, ensure};
+use nalgebra::Vector3;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate export runs/bird --planner active --out bird.ply
+  palpate export runs/bird --planner random --trial 3 --touches 60 --out bird.obj
+
+Beside FILE.ply or FILE.obj stands FILE.svg and FILE.png, the belief beside the true surface. In a \
+PLY the standard deviation is the property `sigma_m`; in an OBJ it stands in a comment below its \
+vertex. Both are coloured by it, viridis from 0 to the largest.")]
+pub(super) struct Args {
+    /// A run's folder.
+    run: PathBuf,
+    /// Whose belief.
+    #[arg(long)]
+    planner: String,
+    /// Of which trial.
+    #[arg(long, default_value_t = 0)]
+    trial: u32,
+    /// After how many touches [default: all].
+    #[arg(long)]
+    touches: Option<u32>,
+    /// Where to: a .ply or .obj file.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Vertices along each side of the zone [default: the experiment's grid].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=2001))]
+    grid: Option<u16>,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let write: fn(&Points) -> String =
+        match args.out.extension().and_then(|extension| extension.to_str()) {
+            Some("ply") => Points::ply,
+            Some("obj") => Points::obj,
+            _ => bail!("--out {}: allowed is a file ending in .ply or .obj", args.out.display()),
+        };
+    let mut run = Run::read(&args.run)?;
+    ensure!(
+        run.experiment.scene.zone.dimension() == 2,
+        "{} explored a curve, which has no mesh; its figures show it",
+        args.run.display()
+    );
+    let touches = chosen(&run, args)?;
+    // The run's own figure of beliefs, of this one only.
+    run.experiment.report = ReportSettings {
+        touch_counts: vec![touches],
+        trial: args.trial,
+        planners: vec![args.planner.clone()],
+        ..ReportSettings::default()
+    };
+    let replay = Replay::new(&run, &args.planner, touches)?
+        .with_context(|| format!("{} had no fit after {touches} touches", args.planner))?;
+    let grid = args.grid.map_or(run.experiment.grid as usize, usize::from);
+    let mesh = mesh(&run, args, &replay, grid);
+    write_whole(&args.out, &write(&mesh))?;
+    if let Some(svg) = (figures::SURFACES.draw)(&run)? {
+        write_whole(&args.out.with_extension("svg"), &svg)?;
+        let path = args.out.with_extension("png");
+        std::fs::write(&path, png::render(&svg)?).with_context(|| path.display().to_string())?;
+    }
+    let largest_m = mesh.deviations.iter().map(|(sd_m, _)| *sd_m).fold(0.0, f64::max);
+    print(&format!(
+        "{}: {} vertices, {} triangles, sigma up to {:.3} mm; {}\npicture: {}",
+        args.out.display(),
+        mesh.points.len(),
+        mesh.triangles.len(),
+        1e3 * largest_m,
+        replay.score(),
+        args.out.with_extension("png").display()
+    ))?;
+    Ok(Ending::Done)
+}
+
+/// The touch count asked for, if the run has what is asked for.
+fn chosen(run: &Run, args: &Args) -> anyhow::Result<u32> {
+    let Args { planner, trial, .. } = args;
+    let planners = &run.experiment.planners;
+    ensure!(
+        planners.contains(planner),
+        "--planner {planner}: this run has {}",
+        planners.join(", ")
+    );
+    let rows = || run.rows.iter().filter(|row| row.planner == *planner);
+    let Some(row) = rows().find(|row| row.trial == *trial) else {
+        match (rows().map(|row| row.trial).min(), rows().map(|row| row.trial).max()) {
+            (Some(first), Some(last)) => {
+                bail!("--trial {trial}: {planner} has finished trials {first} to {last}")
+            }
+            _ => bail!("--trial {trial}: {planner} has finished no trial"),
+        }
+    };
+    let (first, last) = (run.experiment.initial_touches, row.touches.len() as u32);
+    let touches = args.touches.unwrap_or(last);
+    ensure!(
+        (first..=last).contains(&touches),
+        "--touches {touches}: trial {trial} of {planner} has beliefs after {first} to {last} touches"
+    );
+    Ok(touches)
+}
+
+/// The belief's mean as a surface in `W`.
+fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
+    let zone = &run.experiment.scene.zone;
+    let places = zone.grid(grid);
+    let predictions = replay.surface.predict(places.iter().map(Vec::as_slice));
+    let mut scratch = Scratch::default();
+    let mut slope = [0.0; 2];
+    let points = places.iter().zip(&predictions).map(|(place, prediction)| {
+        replay.surface.mean_gradient(place, &mut slope, &mut scratch);
+        let normal = Vector3::new(-slope[0], 1.0, -slope[1]).normalize();
+        (zone.point(place, prediction.mean), normal)
+    });
+    let points = points.collect();
+    let deviations_m: Vec<f64> = predictions.iter().map(|p| p.variance.sqrt()).collect();
+    let largest_m = deviations_m.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let colour = |deviation_m: f64| style::deviation_rgb(deviation_m / largest_m);
+    let corners = (1..grid).flat_map(|j| (1..grid).map(move |i| j * grid + i));
+    // Counter-clockwise seen from +y, whence the finger comes.
+    let triangles = corners.flat_map(|here| {
+        let [before, below, both] = [here - 1, here - grid, here - grid - 1];
+        [[both, before, here], [both, here, below]]
+    });
+    Points {
+        comments: vec![
+            format!(
+                "Palpate {}: belief of {} in trial {} of {} after {} touches",
+                env!("CARGO_PKG_VERSION"),
+                args.planner,
+                args.trial,
+                run.experiment.name,
+                replay.touches.len()
+            ),
+            "metres in the frame W of the robot's base: z up, touched along -y".into(),
+            "sigma_m: standard deviation of the height y".into(),
+        ],
+        points,
+        deviations: deviations_m.iter().map(|&sd_m| (sd_m, colour(sd_m))).collect(),
+        triangles: triangles.collect(),
+    }
+}

@@ -1,0 +1,164 @@
+//! `palpate fidelity`.
+
+use super::columns::{aligned, cell, duration, write_csv, write_figure};
+use super::progress::{progress_bar, step, stop_on_interrupt};
+use super::{Ending, print};
+use crate::experiment::store::write_whole;
+use crate::report::pareto;
+use crate::sim::Scene;
+use crate::study::fidelity::comparison;
+use crate::study::fidelity::comparison::{Climb, climb};
+use crate::study::fidelity::ladder::is_reference;
+use crate::study::fidelity::order::{Order, Step};
+use crate::study::fidelity::row::{Line, Row, Spread};
+use crate::study::fidelity::tolerance::Tolerance;
+use anyhow::{Context, bail};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate fidelity scenes/bird_finger.toml
+  palpate fidelity scenes/bird_finger.toml --tolerance 0.2mm    the cheapest scene that keeps to it
+  palpate fidelity scenes/container_finger.toml --touches 8 --out runs/quick
+
+The reference, the dearest rung, is touched first; what differs is the model, for sensor noise is
+switched off. A tolerance is held by 95 % of the touches against the reference: in mm or um of the
+point of contact, N of force, or counts of the electrodes. Ctrl-C keeps the rungs that are done.")]
+pub(super) struct Args {
+    /// Scene (TOML) with an object.
+    scene: PathBuf,
+    /// Change one setting: a dotted key and a TOML value; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Touches of each rung.
+    #[arg(long, default_value_t = 24, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=1000))]
+    touches: u16,
+    /// Root of the targets.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    seed: u64,
+    /// Name the cheapest rung within this error and write a scene that uses it.
+    #[arg(long, value_name = "0.2mm|0.1N|20counts")]
+    tolerance: Option<Tolerance>,
+    /// Folder for the results [default: runs/fidelity-SCENE].
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let scene = Scene::load(&args.scene, &args.set)?;
+    if scene.object.is_none() {
+        bail!("{}: a ladder needs a scene with an object to touch", args.scene.display());
+    }
+    let name = args.scene.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+    let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("runs/fidelity-{name}")));
+    std::fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
+    let count = usize::from(args.touches);
+    let stop = stop_on_interrupt("touches")?;
+    let bar = progress_bar("fidelity", "touches", comparison::pieces(count) as u64, 0);
+    let climb = climb(&scene, count, args.seed, &mut || {
+        step(&bar);
+        !stop.load(Ordering::Relaxed)
+    })?;
+    bar.finish_and_clear();
+    let lines: Vec<Line> = climb.rows.iter().map(Line::from).collect();
+    write_csv(&out.join("fidelity.csv"), &lines)?;
+    let steps: Vec<Step> = climb.orders.iter().flat_map(Order::steps).collect();
+    write_csv(&out.join("orders.csv"), &steps)?;
+    if let Some(svg) = pareto::draw(&climb) {
+        write_figure(&out.join("fidelity"), &svg)?;
+    }
+    print(&described(&climb))?;
+    print(&format!("tables and figure in {}", out.display()))?;
+    if !climb.finished {
+        return Ok(Ending::Interrupted);
+    }
+    match args.tolerance {
+        Some(tolerance) => choose(&scene, &climb, tolerance, &out),
+        None => Ok(Ending::Done),
+    }
+}
+
+fn choose(
+    scene: &Scene,
+    climb: &Climb,
+    tolerance: Tolerance,
+    out: &Path,
+) -> anyhow::Result<Ending> {
+    let Some(row) = tolerance.cheapest(&climb.rows) else {
+        let least = tolerance.least(&climb.rows);
+        bail!(
+            "no rung keeps within {tolerance}: 95 % of the touches of the best lie within {}",
+            cell(least, 4)
+        );
+    };
+    let path = out.join("chosen.toml");
+    let text = toml::to_string(&row.rung.apply(scene))?;
+    write_whole(&path, &text)?;
+    print(&format!(
+        "cheapest within {tolerance}: {}, {} a touch; scene: {}",
+        row.rung.name(),
+        duration(row.wall_s),
+        path.display()
+    ))?;
+    Ok(Ending::Done)
+}
+
+const HEADER: [&str; 11] = [
+    "rung",
+    "off truth mm: mean",
+    "95 %",
+    "max",
+    "off reference mm: mean",
+    "95 %",
+    "force N",
+    "electrodes counts",
+    "surface RMSE mm",
+    "a touch",
+    "x real time",
+];
+
+fn described(climb: &Climb) -> String {
+    let mut lines = vec![HEADER.map(String::from)];
+    lines.extend(climb.rows.iter().map(cells));
+    let mut text = aligned(&lines);
+    text += "\nTowards the reference, mean change of the force (N) and of the contact (mm):\n";
+    for row in climb.diagonal() {
+        let [force, contact] = [row.force_n, row.off_reference_m].map(|s| s.map(|s| s.mean));
+        let words = match is_reference(&row.rung) {
+            true => "the reference".into(),
+            false => format!("{}  {}", cell(force, 5), cell(contact.map(|m| 1e3 * m), 4)),
+        };
+        text += &format!("  {:<32} {words}\n", row.rung.name());
+    }
+    if climb.finished {
+        let words = if climb.is_monotone() { "shrinks" } else { "does NOT shrink" };
+        text += &format!("  it {words} at every step\n");
+    }
+    for order in &climb.orders {
+        text += &format!(
+            "order of convergence in the {}: {:.2} observed, {} expected\n",
+            order.name, order.observed, order.expected
+        );
+    }
+    text
+}
+
+fn cells(row: &Row) -> [String; 11] {
+    let mean = |spread: Option<Spread>, unit: f64| spread.map(|spread| spread.mean / unit);
+    let p95 = |spread: Option<Spread>, unit: f64| spread.map(|spread| spread.p95 / unit);
+    [
+        row.rung.name(),
+        cell(mean(row.off_truth_m, 1e-3), 3),
+        cell(p95(row.off_truth_m, 1e-3), 3),
+        cell(row.off_truth_m.map(|spread| spread.max / 1e-3), 3),
+        cell(mean(row.off_reference_m, 1e-3), 3),
+        cell(p95(row.off_reference_m, 1e-3), 3),
+        cell(mean(row.force_n, 1.0), 4),
+        cell(mean(row.electrode_counts, 1.0), 2),
+        cell(row.surface_rmse_m.map(|m| 1e3 * m), 3),
+        duration(row.wall_s),
+        cell(row.real_time_factor, 1),
+    ]
+}

@@ -1,0 +1,127 @@
+//! `palpate run`.
+
+use super::progress::{progress_bar, step, stop_on_interrupt};
+use super::{Ending, print, simulator};
+use crate::experiment::experiment::Experiment;
+use crate::experiment::runner;
+use crate::experiment::store::{Manifest, Run, RunFolder};
+use crate::experiment::truth::Truth;
+use crate::report;
+use crate::report::Beside;
+use crate::sim::Environment;
+use anyhow::Context;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  palpate run experiments/container.toml
+  palpate run experiments/toy.toml --out runs/noisy --set gp.noise='[0.01, 1]' --set trials=200
+  palpate run runs/toy/resolved.toml --out runs/again    the same run again, to the byte
+
+Press Ctrl-C to stop after the trials in hand; the same command continues where it stopped.";
+
+#[derive(clap::Args)]
+pub(super) struct Args {
+    /// Experiment file (TOML).
+    experiment: PathBuf,
+    /// Change one setting: a dotted key and a TOML value; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder for the results [default: runs/NAME].
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// Threads; 0 means all cores. Results do not depend on it.
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
+    /// Throw away what an earlier run left in the folder.
+    #[arg(long)]
+    fresh: bool,
+    /// Write rows and summary only, no figures.
+    #[arg(long)]
+    no_report: bool,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let experiment = Experiment::load(&args.experiment, &args.set)?;
+    let environment = Arc::new(Environment::build(experiment.scene.clone())?);
+    let truth = Truth::sample(&environment, experiment.grid as usize);
+    let simulator = simulator(&environment)?;
+    let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&experiment.name));
+    runner::check(&truth)?;
+    let manifest = manifest(&experiment);
+    let (mut folder, done) = RunFolder::open(&path, &experiment, &truth, &manifest, args.fresh)?;
+    let stop = stop_on_interrupt("trials")?;
+
+    let total = u64::from(experiment.trials) * experiment.planners.len() as u64;
+    let bar = progress_bar(&experiment.name, "trials", total, done.len() as u64);
+    let begun = Instant::now();
+    let count = runner::run(
+        &experiment,
+        &simulator,
+        &truth,
+        (&mut folder, &done),
+        args.threads.into(),
+        &stop,
+        &|_| step(&bar),
+    )?;
+    bar.finish_and_clear();
+    if count > 0 {
+        folder.sort(&experiment)?;
+    }
+
+    let run = Run::read(&path)?;
+    let finished = run.rows.len() as u64 == total;
+    let mut text = report::table::summary(&run);
+    text += &format!("\n{count} trials in {:.1} s", begun.elapsed().as_secs_f64());
+    if !done.is_empty() {
+        text += &format!(", {} were there already", done.len());
+    }
+    let beside = Beside::of(&run);
+    report::write_tables(&run, &beside, &path)?;
+    if !finished {
+        text += &format!(
+            "\nstopped with {} of {total} trials in {}; the same command continues",
+            run.rows.len(),
+            path.display()
+        );
+    } else if args.no_report {
+        text += &format!("\nrows and summary in {}", path.display());
+    } else {
+        report::write(&run, &beside, &path).context("the rows are safe, but the report failed")?;
+        text += &format!("\nreport: {}", path.join("report.html").display());
+    }
+    print(&text)?;
+    Ok(if finished { Ending::Done } else { Ending::Interrupted })
+}
+
+fn manifest(experiment: &Experiment) -> Manifest {
+    #[cfg(feature = "mujoco")]
+    let mujoco = Some(crate::sim::mujoco::version().to_owned());
+    #[cfg(not(feature = "mujoco"))]
+    let mujoco = None;
+    Manifest {
+        version: env!("CARGO_PKG_VERSION"),
+        commit: env!("PALPATE_COMMIT"),
+        mujoco,
+        platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
+        cpu_features: cpu_features(),
+        seed: experiment.seed,
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+fn cpu_features() -> Vec<&'static str> {
+    let features = [
+        ("avx2", is_x86_feature_detected!("avx2")),
+        ("fma", is_x86_feature_detected!("fma")),
+        ("avx512f", is_x86_feature_detected!("avx512f")),
+    ];
+    features.iter().filter(|(_, present)| *present).map(|(name, _)| *name).collect()
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn cpu_features() -> Vec<&'static str> {
+    Vec::new()
+}

@@ -1,0 +1,119 @@
+//! `palpate scan`.
+
+use super::progress::{progress_bar, step, stop_on_interrupt};
+use super::{Ending, print, simulator};
+use crate::experiment::scan;
+use crate::experiment::scan::ScanTouch;
+use crate::experiment::store::write_whole;
+use crate::explore::probe::Touch;
+use crate::report::points::Points;
+use crate::report::{png, scan as drawing};
+use crate::sim::{Environment, Scene};
+use anyhow::Context;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate scan scenes/container.toml
+  palpate scan scenes/bird.toml --grid 41x51 --out runs/bird-scan --set finger.radius_m=0.003
+
+Writes cloud.ply (points of contact with normals), cloud.csv (also targets that were missed), \
+scan.svg and scan.png (the object beside the cloud). Ctrl-C stops it without writing anything; the \
+files do not depend on the number of threads.")]
+pub(super) struct Args {
+    /// A scene (.toml) with an object.
+    scene: PathBuf,
+    /// Targets along x and along z [default: square cells, 81 along the longer side].
+    #[arg(long, value_name = "NxM", value_parser = grid)]
+    grid: Option<[usize; 2]>,
+    /// Change one setting of the scene; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder for the files [default: runs/SCENE-scan].
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// Threads; 0 means all cores.
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
+}
+
+/// Most targets along a side.
+const SIDE_MAX: usize = 2001;
+
+fn grid(text: &str) -> Result<[usize; 2], String> {
+    let side = |text: &str| text.parse().ok().filter(|side| (2..=SIDE_MAX).contains(side));
+    text.split_once('x')
+        .and_then(|(columns, rows)| Some([side(columns)?, side(rows)?]))
+        .ok_or(format!("allowed is NxM, as in 41x51, each 2 to {SIDE_MAX}"))
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let environment = Arc::new(Environment::build(Scene::load(&args.scene, &args.set)?)?);
+    let mesh = environment.mesh().with_context(|| {
+        format!("{} has no object, so there is no surface to scan", args.scene.display())
+    })?;
+    let name = args.scene.file_stem().unwrap_or_default().to_string_lossy();
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(format!("{name}-scan")));
+    let grid = args.grid.unwrap_or_else(|| scan::default_grid(&environment.scene().zone));
+    let stop = stop_on_interrupt("rows")?;
+    let bar = progress_bar(&name, "rows", grid[1] as u64, 0);
+    let simulator = simulator(&environment)?;
+    let felt = scan::scan(&simulator, grid, args.threads.into(), &stop, &|| step(&bar))?;
+    bar.finish_and_clear();
+    let Some(felt) = felt else { return Ok(Ending::Interrupted) };
+
+    let points = felt.iter().filter_map(|felt| match &felt.touch {
+        Ok(Touch::Contact(contact)) => Some((contact.p_wc, contact.normal_w)),
+        _ => None,
+    });
+    let [columns, rows] = grid;
+    let cloud = Points {
+        comments: vec![
+            format!(
+                "Palpate {}: {name} touched on a grid of {columns} x {rows}",
+                env!("CARGO_PKG_VERSION")
+            ),
+            "metres in the frame W of the robot's base: z up, touched along -y".into(),
+        ],
+        points: points.collect(),
+        ..Points::default()
+    };
+    std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    write_whole(&folder.join("cloud.ply"), &cloud.ply())?;
+    write_whole(&folder.join("cloud.csv"), &csv(&felt))?;
+    if let Some(svg) = drawing::picture(&environment, mesh, &cloud.points) {
+        write_whole(&folder.join("scan.svg"), &svg)?;
+        let path = folder.join("scan.png");
+        std::fs::write(&path, png::render(&svg)?).with_context(|| path.display().to_string())?;
+    }
+    let faults = felt.iter().filter(|felt| felt.touch.is_err()).count();
+    print(&format!(
+        "{name}: {} points of contact, {} misses, {faults} faults\nfolder: {}",
+        cloud.points.len(),
+        felt.len() - cloud.points.len() - faults,
+        folder.display()
+    ))?;
+    Ok(Ending::Done)
+}
+
+/// A line per target: where it was, how the touch ended, and the contact with its normal.
+fn csv(felt: &[ScanTouch]) -> String {
+    let mut text =
+        String::from("target_x_m,target_z_m,outcome,x_m,y_m,z_m,normal_x,normal_y,normal_z\n");
+    for ScanTouch { target, touch } in felt {
+        let place = target.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        let ending = match touch {
+            Ok(Touch::Contact(contact)) => {
+                let (p, n) = (contact.p_wc, contact.normal_w);
+                format!("contact,{},{},{},{},{},{}", p.x, p.y, p.z, n.x, n.y, n.z)
+            }
+            Ok(Touch::Miss) => "miss,,,,,,".into(),
+            Ok(Touch::Overload) => "overload,,,,,,".into(),
+            Err(fault) => format!("\"{fault}\",,,,,,"),
+        };
+        text += &format!("{place},{ending}\n");
+    }
+    text
+}

@@ -1,0 +1,185 @@
+//! `palpate watch`.
+
+use super::show::is_experiment;
+use super::{Ending, print, simulator};
+use crate::backend::backend::Fault;
+use crate::backend::watched::{Sight, Watched};
+use crate::experiment::experiment::Experiment;
+use crate::experiment::row::TrialRow;
+use crate::experiment::truth::Truth;
+use crate::experiment::{runner, trial};
+use crate::explore::planner;
+use crate::explore::planner::PLANNERS;
+use crate::explore::probe::servo::Servo;
+use crate::explore::probe::{Probe, Swept, Touch};
+use crate::sim::{Environment, Scene};
+use anyhow::{Context, bail};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate watch scenes/bird_pa10.toml
+  palpate watch experiments/container_pa10.toml --planner sobol --speed 5
+  palpate watch scenes/container_finger.toml --touches 20 --set effects.thermal={}
+
+Opens MuJoCo's viewer on a trial while it runs: arm, finger and object, and a small ball at every \
+contact found. Drag with the mouse to turn and move, F1 lists the keys, Control+Q or closing the \
+window ends the trial. Needs a build with `--features viewer`, and X11 or Wayland with OpenGL.")]
+pub(super) struct Args {
+    /// A scene or an experiment (.toml) whose body is `kinematic` or `dynamic`.
+    path: PathBuf,
+    /// Planner [default: the experiment's first, or active].
+    #[arg(long, value_name = "NAME")]
+    planner: Option<String>,
+    /// Touches of the trial [default: the experiment's, or 40].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=2000))]
+    touches: Option<u32>,
+    /// Which of the experiment's trials.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    trial: u32,
+    /// Simulated seconds in one of the clock, at most.
+    #[arg(long, default_value_t = 1.0, value_name = "X", value_parser = speed)]
+    speed: f64,
+    /// Change one setting; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+/// Touches if nobody says how many; chosen.
+const TOUCHES: u32 = 40;
+
+fn speed(text: &str) -> Result<f64, String> {
+    let speed = text.parse().ok().filter(|speed| (0.01..=100.0).contains(speed));
+    speed.ok_or("allowed is 0.01 to 100".into())
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let experiment = experiment(args)?;
+    let planner = planner(args, &experiment)?;
+    let environment = Arc::new(Environment::build(experiment.scene.clone())?);
+    let truth = Truth::sample(&environment, experiment.grid as usize);
+    runner::check(&truth)?;
+    let Some(body) = simulator(&environment)?.body()? else {
+        let (path, body) = (args.path.display(), experiment.scene.body.name());
+        bail!(
+            "{path}: body = \"{body}\" touches without moving; to be watched are \"kinematic\" and \
+             \"dynamic\""
+        );
+    };
+    let window = Window::open(&environment, &format!("Palpate: {}", args.path.display()))?;
+    let (body, sight) = Watched::new(body, args.speed);
+    let seed = trial::body_seed(&experiment, args.trial);
+    let servo = Servo::new(Arc::clone(&environment), Box::new(body), seed)?;
+    let mut probe = Told { servo, sight: sight.clone(), count: 0 };
+    let number = args.trial;
+    // The window has to be drawn by the main thread.
+    let worker = std::thread::spawn(move || {
+        let row = trial::run_with(&experiment, &mut probe, &truth, planner, number);
+        let _ = print(&ending(&row));
+    });
+    let drawn = show(window, &sight);
+    sight.close();
+    if worker.join().is_err() {
+        bail!("the trial panicked");
+    }
+    drawn.map(|()| Ending::Done)
+}
+
+fn experiment(args: &Args) -> anyhow::Result<Experiment> {
+    let mut experiment = match is_experiment(&args.path) {
+        true => Experiment::load(&args.path, &args.set)?,
+        false => Experiment::on(&Scene::load(&args.path, &args.set)?, &["active"], 1, TOUCHES),
+    };
+    if let Some(touches) = args.touches {
+        experiment.touches = touches;
+        experiment.initial_touches = experiment.initial_touches.min(touches);
+    }
+    Ok(experiment)
+}
+
+fn planner(args: &Args, experiment: &Experiment) -> anyhow::Result<&'static planner::Entry> {
+    let name = args.planner.as_ref().or(experiment.planners.first()).map_or("", String::as_str);
+    planner::by_name(name).with_context(|| {
+        let known: Vec<_> = PLANNERS.iter().map(|planner| planner.name).collect();
+        format!("--planner {name}: allowed are {}", known.join(", "))
+    })
+}
+
+/// A servo that says what each touch found.
+struct Told {
+    servo: Servo,
+    sight: Sight,
+    count: u32,
+}
+
+impl Probe for Told {
+    fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault> {
+        let touch = self.servo.touch(target)?;
+        self.count += 1;
+        let found = match &touch {
+            Touch::Contact(contact) => {
+                self.sight.mark(contact.p_wc);
+                let [x, y, z] = (contact.p_wc.coords * 1e3).into();
+                format!("contact at ({x:.1}, {y:.1}, {z:.1}) mm")
+            }
+            Touch::Miss => "met nothing".into(),
+            Touch::Overload => "too much force".into(),
+        };
+        let _ = print(&format!(
+            "{:8.2} s  touch {}: {found}",
+            self.time_s().unwrap_or_default(),
+            self.count
+        ));
+        Ok(touch)
+    }
+
+    fn swept(&self) -> Option<Swept> {
+        self.servo.swept()
+    }
+
+    fn time_s(&self) -> Option<f64> {
+        self.servo.time_s()
+    }
+}
+
+fn ending(row: &TrialRow) -> String {
+    let error = row.touches.last().and_then(|touch| touch.metrics).map(|metrics| metrics.rmse_m);
+    let error = error.map_or(String::new(), |m| format!(", RMSE {:.2} mm", 1e3 * m));
+    match &row.failure {
+        Some(failure) => format!("{} touches{error}; {failure}", row.touches.len()),
+        None => format!("{} touches{error}; close the window to end", row.touches.len()),
+    }
+}
+
+#[cfg(feature = "viewer")]
+use crate::sim::mujoco::window::Window;
+
+/// Draws until the window is closed.
+#[cfg(feature = "viewer")]
+fn show(mut window: Window, sight: &Sight) -> anyhow::Result<()> {
+    // As often as a screen is drawn.
+    const FRAME: std::time::Duration = std::time::Duration::from_millis(16);
+    while window.is_open() {
+        window.draw(&sight.seen())?;
+        std::thread::sleep(FRAME);
+    }
+    Ok(())
+}
+
+/// What a build without windows has in place of one.
+#[cfg(not(feature = "viewer"))]
+enum Window {}
+
+#[cfg(not(feature = "viewer"))]
+impl Window {
+    fn open(_: &Environment, _: &str) -> anyhow::Result<Self> {
+        bail!("this build has no window: build it with --features viewer")
+    }
+}
+
+#[cfg(not(feature = "viewer"))]
+fn show(window: Window, _: &Sight) -> anyhow::Result<()> {
+    match window {}
+}

@@ -1,0 +1,216 @@
+//! How many touches a planner needs for the error that another one has.
+//!
+//! The goal is the baseline's median error after some touches, the last ones unless the experiment
+//! says otherwise. A planner has met it from the first count on from which its own median stays at or
+//! below up to the goal's touches, or else from the first one after them at which it is. All of it,
+//! goal, counts, ways and their ratios, is found again in every sample of the trials, the same sample
+//! for both planners: that is what the intervals are of.
+
+use super::comparison::pairs;
+use super::experiment::Experiment;
+use super::measure::{EDGE_RMSE, Measure, REACHABLE_RMSE, RMSE};
+use super::row::TrialRow;
+use super::statistics::{middle, percentiles_95, resampled};
+use super::summary;
+use super::summary::path_m;
+use std::collections::BTreeMap;
+
+/// Errors that are compared.
+pub static ERRORS: [Measure; 3] = [RMSE, EDGE_RMSE, REACHABLE_RMSE];
+
+/// A number with its 95 % bootstrap interval, which a single trial does not have; infinite where the
+/// goal is not met.
+#[derive(Clone, Copy, Debug)]
+pub struct Estimate {
+    /// Of all trials.
+    pub value: f64,
+    /// 95 % of the samples lie in it.
+    pub interval: Option<[f64; 2]>,
+}
+
+/// The touches of one planner beside those of a baseline.
+#[derive(Debug)]
+pub struct EqualError<'a> {
+    /// Which planner.
+    pub planner: &'a str,
+    /// Whose error is the goal.
+    pub baseline: &'a str,
+    /// Which error.
+    pub measure: &'static Measure,
+    /// Trials that both finished.
+    pub trials: usize,
+    /// The baseline's median error after the goal's touches.
+    pub goal: f64,
+    /// Touches until the planner has met it.
+    pub touches: Estimate,
+    /// Touches until the baseline itself has.
+    pub baseline_touches: f64,
+    /// Ratio of the two counts.
+    pub ratio: Estimate,
+    /// Ratio of the median lateral ways after the initial touches until then.
+    pub path_ratio: Estimate,
+}
+
+/// Every planner against every baseline in every error that both have.
+pub fn equal_errors<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<EqualError<'a>> {
+    let mut found = Vec::new();
+    for (planner, baseline) in pairs(experiment) {
+        for measure in &ERRORS {
+            found.extend(equal_error(experiment, rows, [planner, baseline], measure));
+        }
+    }
+    found
+}
+
+/// One planner against another; none if no trial was finished by both.
+pub fn equal_error<'a>(
+    experiment: &Experiment,
+    rows: &[TrialRow],
+    [planner, baseline]: [&'a str; 2],
+    measure: &'static Measure,
+) -> Option<EqualError<'a>> {
+    let [ours, theirs] = [planner, baseline].map(|name| curves(experiment, rows, name, measure));
+    let pairs: Vec<[&Curve; 2]> =
+        ours.iter().filter_map(|(trial, curve)| Some([curve, theirs.get(trial)?])).collect();
+    let goal_index = (experiment.goal_touches() - experiment.initial_touches) as usize;
+    let mut buffer = Vec::new();
+    let everyone: Vec<usize> = (0..pairs.len()).collect();
+    let goal = sampled_median(&everyone, &mut buffer, |trial| pairs[trial][1].errors[goal_index])?;
+    let found = meet(&pairs, &everyone, goal_index, &mut buffer);
+    let samples = resampled(pairs.len(), experiment.seed, |sample| {
+        meet(&pairs, sample, goal_index, &mut buffer)
+    });
+    let first = f64::from(experiment.initial_touches);
+    let estimate = |of: &dyn Fn(&[Met; 2]) -> f64| Estimate {
+        value: of(&found),
+        interval: (!samples.is_empty()).then(|| percentiles_95(samples.iter().map(of).collect())),
+    };
+    Some(EqualError {
+        planner,
+        baseline,
+        measure,
+        trials: pairs.len(),
+        goal,
+        touches: estimate(&|[ours, _]| first + ours.after),
+        baseline_touches: first + found[1].after,
+        ratio: estimate(&|[ours, theirs]| (first + ours.after) / (first + theirs.after)),
+        path_ratio: estimate(&|[ours, theirs]| ours.path_m / theirs.path_m),
+    })
+}
+
+/// One trial after every count of touches from the last initial one on.
+struct Curve {
+    errors: Vec<f64>,
+    /// Lateral way since the last initial touch.
+    paths_m: Vec<f64>,
+}
+
+/// When the goal was met.
+#[derive(Clone, Copy)]
+struct Met {
+    /// Touches after the initial ones.
+    after: f64,
+    /// Median way over them.
+    path_m: f64,
+}
+
+/// The trials that have the error after every count.
+fn curves(
+    experiment: &Experiment,
+    rows: &[TrialRow],
+    planner: &str,
+    measure: &Measure,
+) -> BTreeMap<u32, Curve> {
+    let counts = experiment.initial_touches..=experiment.touches;
+    let curve = |row: &TrialRow| -> Option<Curve> {
+        let errors: Option<Vec<f64>> =
+            counts.clone().map(|count| (measure.of)(row, count)).collect();
+        let start_m = path_m(row, experiment.initial_touches);
+        let paths_m = counts.clone().map(|count| path_m(row, count) - start_m).collect();
+        Some(Curve { errors: errors?, paths_m })
+    };
+    summary::of(rows, planner).filter_map(|row| Some((row.trial, curve(row)?))).collect()
+}
+
+/// When the two of each pair meet the second's median error at `goal_index` in a sample of the pairs.
+fn meet(
+    pairs: &[[&Curve; 2]],
+    sample: &[usize],
+    goal_index: usize,
+    buffer: &mut Vec<f64>,
+) -> [Met; 2] {
+    let goal = sampled_median(sample, buffer, |trial| pairs[trial][1].errors[goal_index]);
+    let goal = goal.unwrap_or(f64::NAN);
+    let length = pairs.first().map_or(0, |[curve, _]| curve.errors.len());
+    [0, 1].map(|which| {
+        let mut is_met = |index: usize| {
+            sampled_median(sample, buffer, |trial| pairs[trial][which].errors[index])
+                .is_some_and(|error| error <= goal)
+        };
+        let met = match is_met(goal_index) {
+            true => (0..=goal_index).rev().take_while(|&index| is_met(index)).last(),
+            false => (goal_index + 1..length).find(|&index| is_met(index)),
+        };
+        let path = met.and_then(|index| {
+            sampled_median(sample, buffer, |trial| pairs[trial][which].paths_m[index])
+        });
+        Met {
+            after: met.map_or(f64::INFINITY, |index| index as f64),
+            path_m: path.unwrap_or(f64::INFINITY),
+        }
+    })
+}
+
+/// The median of a number over a sample of trials.
+fn sampled_median(
+    sample: &[usize],
+    buffer: &mut Vec<f64>,
+    of: impl Fn(usize) -> f64,
+) -> Option<f64> {
+    buffer.clear();
+    buffer.extend(sample.iter().map(|&trial| of(trial)));
+    middle(buffer)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Trials whose errors and ways are the same functions of the count, but for a factor.
+    fn trials(error: impl Fn(f64) -> f64, step_m: f64) -> Vec<Curve> {
+        (0..20)
+            .map(|trial| Curve {
+                errors: (0..41)
+                    .map(|i| (1.0 + 0.01 * f64::from(trial)) * error(f64::from(i)))
+                    .collect(),
+                paths_m: (0..41).map(|i| step_m * f64::from(i)).collect(),
+            })
+            .collect()
+    }
+
+    fn met(ours: &[Curve], theirs: &[Curve], goal_index: usize) -> [Met; 2] {
+        let pairs: Vec<[&Curve; 2]> = ours.iter().zip(theirs).map(Into::into).collect();
+        let sample: Vec<usize> = (0..pairs.len()).map(|i| i / 2).collect();
+        meet(&pairs, &sample, goal_index, &mut Vec::new())
+    }
+
+    /// Twice the rate is half the touches, whichever trials are sampled.
+    #[test]
+    fn twice_as_fast_needs_half_the_touches() {
+        let (fast, slow) = (trials(|n| (-0.2 * n).exp(), 3.0), trials(|n| (-0.1 * n).exp(), 1.0));
+        let [ours, theirs] = met(&fast, &slow, 40);
+        assert_eq!((ours.after, theirs.after), (20.0, 40.0));
+        assert_eq!((ours.path_m, theirs.path_m), (60.0, 40.0));
+        let [slower, itself] = met(&slow, &fast, 10);
+        assert_eq!((slower.after, itself.after), (20.0, 10.0));
+    }
+
+    #[test]
+    fn a_goal_is_met_where_the_error_stays_below_it() {
+        let steady = trials(|_| 2.0, 1.0);
+        let rising = trials(|n| if n < 30.0 { 1.0 } else { 1.0 + n }, 1.0);
+        assert_eq!(met(&rising, &steady, 40)[0].after, f64::INFINITY);
+        let wavy = trials(|n| if n == 7.0 { 5.0 } else { 1.0 }, 1.0);
+        assert_eq!(met(&wavy, &steady, 40)[0].after, 8.0);
+    }
+}

@@ -1,0 +1,16 @@
+//! Experiments, their trials, and the folder their results lie in.
+
+pub mod comparison;
+pub mod equal_error;
+#[allow(clippy::module_inception)]
+pub mod experiment;
+pub mod measure;
+pub mod metrics;
+pub mod row;
+pub mod runner;
+pub mod scan;
+pub mod statistics;
+pub mod store;
+pub mod summary;
+pub mod trial;
+pub mod truth;

@@ -1,0 +1,62 @@
+//! One line of `trials.jsonl`: everything a trial did.
+
+use super::metrics::Metrics;
+use crate::explore::planner::Stall;
+use crate::gp::fit::Fit;
+use serde::{Deserialize, Serialize};
+
+/// One trial of one planner. Holds no wall time, so that it is the same bytes on every run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrialRow {
+    /// Which trial; trials of the same number share initial touches.
+    pub trial: u32,
+    /// Which planner.
+    pub planner: String,
+    /// Why it ended before its last touch, if it did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+    /// Its touches in order.
+    pub touches: Vec<TouchRow>,
+}
+
+/// One touch and the belief after it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TouchRow {
+    /// Where the finger was sent: (x) or (x, z) in `W`.
+    pub target: Vec<f64>,
+    /// The point of contact (x, y, z) in `W`; none for a miss or a touch broken off.
+    pub contact: Option<[f64; 3]>,
+    /// Whether the touch was broken off: too much force, or no place in what the finger felt.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub overload: bool,
+    /// The contact's normal in `W`; written where the belief observes it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<[f64; 3]>,
+    /// The centre of the fingertip's hemisphere in `W` where the approach ended; written where the
+    /// belief observes what was swept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tip: Option<[f64; 3]>,
+    /// Time of the body at the touch's end, since its start; left out where a touch is no motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
+    /// Standard deviation that the planner saw at the target when it chose it, if it looked:
+    /// the posterior's, given also that unreached targets are no news.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub planned_sd_m: Option<f64>,
+    /// Why the planner's own rule could not decide.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stall: Option<Stall>,
+    /// The fit after this touch; none before the last initial touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<Fit>,
+    /// Jitter the covariance needed, relative to its diagonal; left out when none.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub jitter: f64,
+    /// The belief after this touch against the truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub metrics: Option<Metrics>,
+}
+
+fn is_zero(jitter: &f64) -> bool {
+    *jitter == 0.0
+}

@@ -1,0 +1,138 @@
+//! Trials × planners on all cores.
+
+use super::experiment::Experiment;
+use super::row::TrialRow;
+use super::store::{RunFolder, StoreError};
+use super::trial;
+use super::truth::Truth;
+use crate::explore::planner;
+use crate::math::optimize;
+use crate::sim::simulator::Simulator;
+use rayon::iter::{ParallelBridge, ParallelIterator};
+use std::collections::HashSet;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+use thiserror::Error;
+
+/// Why an experiment could not be run.
+#[derive(Debug, Error)]
+pub enum RunError {
+    /// Its folder is unusable.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// This build lacks what it needs.
+    #[error("this build has no optimisers; build with the feature `{feature}` to run experiments")]
+    NotBuilt {
+        /// The missing feature.
+        feature: &'static str,
+    },
+    /// No surface at any test place.
+    #[error("no place of the zone has a surface along -y: nothing to explore")]
+    NoSurface,
+    /// Threads could not be started.
+    #[error("cannot start {threads} threads: {message}")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// What the system says.
+        message: String,
+    },
+}
+
+/// One piece of work.
+type Job = (u32, &'static planner::Entry);
+
+/// Whether an experiment can be run at all.
+///
+/// # Errors
+/// If this build lacks what it needs, or the zone has no surface.
+pub fn check(truth: &Truth) -> Result<(), RunError> {
+    if !optimize::BUILT {
+        return Err(RunError::NotBuilt { feature: "nlopt" });
+    }
+    if truth.count() == 0 {
+        return Err(RunError::NoSurface);
+    }
+    Ok(())
+}
+
+/// Runs what `done` lacks and adds each row to `folder` as it finishes; returns how many trials
+/// it ran.
+///
+/// `progress` is called after each trial, from any thread. When `stop` becomes true, running
+/// trials are finished and no others begun. `threads` 0 means all cores.
+///
+/// # Errors
+/// If a row cannot be stored, or threads cannot be started.
+pub fn run(
+    experiment: &Experiment,
+    simulator: &Simulator,
+    truth: &Truth,
+    (folder, done): (&mut RunFolder, &[TrialRow]),
+    threads: usize,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(&TrialRow) + Sync),
+) -> Result<usize, RunError> {
+    let jobs = jobs(experiment, done);
+    let pool = pool(threads)?;
+    let finished = Mutex::new((folder, 0));
+    // Handed out one by one, so that rows finish about in order and an interrupted run has
+    // whole pairs.
+    pool.install(|| {
+        jobs.into_iter().par_bridge().try_for_each(|(trial, planner)| {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            let row = run_caught(experiment, simulator, truth, planner, trial);
+            let mut finished = finished.lock().unwrap_or_else(PoisonError::into_inner);
+            finished.0.append(&row)?;
+            finished.1 += 1;
+            progress(&row);
+            Ok(())
+        })
+    })
+    .map_err(|error: StoreError| RunError::Store(error))?;
+    let (_, count) = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
+    Ok(count)
+}
+
+/// Threads of its own for a piece of work; 0 means all cores.
+///
+/// # Errors
+/// If they cannot be started.
+pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, RunError> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| RunError::Threads { threads, message: error.to_string() })
+}
+
+/// Runs one trial; a planner's or probe's panic becomes the trial's failure, so that one fault
+/// in somebody's code does not lose the others' work.
+fn run_caught(
+    experiment: &Experiment,
+    simulator: &Simulator,
+    truth: &Truth,
+    planner: &'static planner::Entry,
+    trial: u32,
+) -> TrialRow {
+    let run = || trial::run(experiment, simulator, truth, planner, trial);
+    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
+        let words = panic.downcast_ref::<String>().map(String::as_str);
+        let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+        let failure = Some(format!("panicked: {words}"));
+        TrialRow { trial, planner: planner.name.into(), failure, touches: Vec::new() }
+    })
+}
+
+/// Every trial of every planner that `done` lacks, trial by trial.
+fn jobs(experiment: &Experiment, done: &[TrialRow]) -> Vec<Job> {
+    let done: HashSet<_> = done.iter().map(|row| (row.trial, row.planner.as_str())).collect();
+    let planners: Vec<_> =
+        experiment.planners.iter().filter_map(|name| planner::by_name(name)).collect();
+    (0..experiment.trials)
+        .flat_map(|trial| planners.iter().map(move |&planner| (trial, planner)))
+        .filter(|(trial, planner)| !done.contains(&(*trial, planner.name)))
+        .collect()
+}

@@ -1,0 +1,110 @@
+//! Algorithm 1 of Yi et al. 2016: touch, fit, plan, again.
+
+use super::experiment::Experiment;
+use super::row::{TouchRow, TrialRow};
+use super::truth::Truth;
+use crate::explore::belief::Belief;
+use crate::explore::planner;
+use crate::explore::planner::{Plan, uniform};
+use crate::explore::probe::{Probe, Touch};
+use crate::math::seed;
+use crate::sim::simulator::Simulator;
+use rand::RngExt;
+
+/// Runs one trial of `planner` from start to end.
+///
+/// Its row depends on the experiment, the trial's number and the planner only.
+pub fn run(
+    experiment: &Experiment,
+    simulator: &Simulator,
+    truth: &Truth,
+    planner: &planner::Entry,
+    trial: u32,
+) -> TrialRow {
+    match simulator.probe(body_seed(experiment, trial)) {
+        Ok(mut probe) => run_with(experiment, &mut *probe, truth, planner, trial),
+        Err(fault) => TrialRow {
+            trial,
+            planner: planner.name.into(),
+            failure: Some(format!("before the first touch: {fault}")),
+            touches: Vec::new(),
+        },
+    }
+}
+
+/// Seed of all the randomness of a trial's body.
+pub fn body_seed(experiment: &Experiment, trial: u32) -> u64 {
+    seed::stream(experiment.seed, trial.into(), "body").random()
+}
+
+/// As [`run`], with the touches of any `probe`.
+pub fn run_with(
+    experiment: &Experiment,
+    probe: &mut dyn Probe,
+    truth: &Truth,
+    planner: &planner::Entry,
+    trial: u32,
+) -> TrialRow {
+    let mut row =
+        TrialRow { trial, planner: planner.name.into(), failure: None, touches: Vec::new() };
+    let stream = |purpose| seed::stream(experiment.seed, trial.into(), purpose);
+    let zone = &experiment.scene.zone;
+    let mut start = stream("initial touches");
+    let mut planner = (planner.make)(zone, &experiment.planning, stream(planner.name));
+    let mut belief = Belief::new(zone.clone(), experiment.gp.clone());
+    for count in 1..=experiment.touches {
+        let plan = match count <= experiment.initial_touches {
+            true => Plan { target: uniform(zone, &mut start), sd_m: None, stall: None },
+            false => planner.plan(&belief),
+        };
+        if !zone.contains(&plan.target) {
+            let target = plan.target;
+            row.failure = Some(format!("touch {count}: planned at {target:?}, not in the zone"));
+            break;
+        }
+        let touch = match probe.touch(&plan.target) {
+            Ok(touch) => touch,
+            Err(fault) => {
+                row.failure = Some(format!("touch {count}: {fault}"));
+                break;
+            }
+        };
+        belief.observe(&plan.target, &touch);
+        let swept = probe.swept().filter(|_| experiment.gp.free_space);
+        swept.iter().for_each(|swept| belief.observe_swept(swept));
+        let contact = match &touch {
+            Touch::Contact(contact) => Some(contact),
+            Touch::Miss | Touch::Overload => None,
+        };
+        let mut touch_row = TouchRow {
+            target: plan.target,
+            contact: contact.map(|contact| contact.p_wc.coords.into()),
+            overload: touch == Touch::Overload,
+            normal: contact
+                .filter(|_| experiment.gp.normals)
+                .map(|contact| contact.normal_w.into()),
+            tip: swept.map(|swept| swept.p_wt.coords.into()),
+            time_s: probe.time_s(),
+            planned_sd_m: plan.sd_m,
+            stall: plan.stall,
+            fit: None,
+            jitter: 0.0,
+            metrics: None,
+        };
+        if count >= experiment.initial_touches {
+            match belief.refit() {
+                Ok((fit, surface)) => {
+                    touch_row.metrics = Some(truth.compare(surface));
+                    touch_row.fit = Some(fit.clone());
+                    touch_row.jitter = belief.jitter();
+                }
+                Err(error) => row.failure = Some(format!("fit after touch {count}: {error}")),
+            }
+        }
+        row.touches.push(touch_row);
+        if row.failure.is_some() {
+            break;
+        }
+    }
+    row
+}

@@ -1,0 +1,76 @@
+//! The true surface on the test grid of an experiment.
+
+use super::metrics::{Calibration, Errors, Metrics, Sums};
+use crate::gp::Posterior;
+use crate::gp::posterior::Scratch;
+use crate::sim::Environment;
+use crate::sim::reach;
+use crate::task::Zone;
+
+/// True heights on the test grid of an experiment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Truth {
+    /// The test places.
+    pub places: Vec<Vec<f64>>,
+    /// The true height at each, above the zone's datum; none where the zone looks past the
+    /// object.
+    pub heights_m: Vec<Option<f64>>,
+    /// Whether each lies in the outer tenth of the zone.
+    pub is_edge: Vec<bool>,
+    /// Whether some touch of the finger, asked for inside the zone, can meet the surface at each.
+    pub is_reachable: Vec<bool>,
+}
+
+/// The belief's variance is looked at in every so many places of the grid: it costs the square of
+/// the number of touches where the mean costs that number. Chosen.
+const CALIBRATED: usize = 4;
+
+impl Truth {
+    /// Reads the world's surface on a grid of `per_side` places along each side of the zone.
+    pub fn sample(environment: &Environment, per_side: usize) -> Self {
+        let places = environment.scene().zone.grid(per_side);
+        let heights_m: Vec<_> =
+            places.iter().map(|place| environment.true_height_m(place)).collect();
+        let is_reachable = reach::is_reachable(environment, &places, &heights_m);
+        Self::new(&environment.scene().zone, places, heights_m, is_reachable)
+    }
+
+    /// From recorded heights and reachabilities.
+    pub fn new(
+        zone: &Zone,
+        places: Vec<Vec<f64>>,
+        heights_m: Vec<Option<f64>>,
+        is_reachable: Vec<bool>,
+    ) -> Self {
+        let is_edge = places.iter().map(|place| zone.is_edge(place)).collect();
+        Self { places, heights_m, is_edge, is_reachable }
+    }
+
+    /// How many test places have a surface.
+    pub fn count(&self) -> usize {
+        self.heights_m.iter().flatten().count()
+    }
+
+    /// Compares a belief with the truth wherever there is a surface.
+    pub fn compare(&self, belief: &Posterior) -> Metrics {
+        let mut sums = Sums::default();
+        let [mut edge, mut reachable, mut unreachable] = [Errors::default(); 3];
+        let mut calibration = Calibration::default();
+        let mut scratch = Scratch::default();
+        let noise2 = belief.hyperparameters().noise_sd.powi(2);
+        for (i, place) in self.places.iter().enumerate() {
+            let Some(truth) = self.heights_m[i] else { continue };
+            let mean = belief.mean(place, &mut scratch);
+            sums.add(truth, mean);
+            if self.is_edge[i] {
+                edge.add(truth - mean);
+            }
+            let reached = if self.is_reachable[i] { &mut reachable } else { &mut unreachable };
+            reached.add(truth - mean);
+            if i % CALIBRATED == 0 {
+                calibration.add(truth - mean, belief.variance(place, &mut scratch) + noise2);
+            }
+        }
+        sums.metrics([edge, reachable, unreachable], calibration)
+    }
+}

@@ -1,0 +1,137 @@
+//! Space found free as an upper bound of the surface.
+//!
+//! Where the belief's mean rises above what the finger has swept, the bound is taken in by assumed
+//! density filtering, expectation propagation's first pass (Minka 2001): at that place the normal
+//! belief N(μ, σ²) is cut off at the bound b, softened by n, which leaves
+//! (Rasmussen & Williams 2006, Eq. 3.58, with z = (b − μ) / √(σ² + n²) and h = φ(z) / Φ(z))
+//!
+//! * mean μ − σ²·h / √(σ² + n²)
+//! * variance σ² − σ⁴·h·(z + h) / (σ² + n²)
+//!
+//! and the height with the noise that would have brought N(μ, σ²) there is observed. Mean and variance
+//! are then those of the cut distribution at that place, and follow from it elsewhere; unless that noise
+//! were below n, which it then is: a belief that contradicts the bound by many standard deviations is
+//! wrong, and a sharp correction of it would swing elsewhere. Bounds that the
+//! mean keeps are left out, though they too would lower it a little; the fit of the hyperparameters
+//! does not see the bounds.
+
+use super::probe::Swept;
+use crate::gp::posterior::Scratch;
+use crate::gp::{Hyperparameters, Observation, Posterior};
+use crate::math::normal;
+use crate::task::Zone;
+
+/// Places along each side at which the bound is kept; chosen, finer than a fingertip in any zone that
+/// takes more than a few touches.
+const PER_SIDE: usize = 41;
+
+/// Places at which a belief is cut at most; chosen, a few for every touch that can still violate one.
+const CUTS_MAX: usize = 16;
+
+/// Least softness of a bound, as a fraction of the signal's standard deviation; chosen, the largest
+/// touch noise that is fitted by default.
+const SOFTNESS_MIN: f64 = 1e-2;
+
+/// The lowest bound so far, on a grid over the zone.
+pub(super) struct Ceiling {
+    places: Vec<Vec<f64>>,
+    heights_m: Vec<f64>,
+}
+
+impl Ceiling {
+    /// Nothing is known to be free.
+    pub(super) fn new(zone: &Zone) -> Self {
+        let places = zone.grid(PER_SIDE);
+        Self { heights_m: vec![f64::INFINITY; places.len()], places }
+    }
+
+    /// Takes in what one touch swept.
+    pub(super) fn lower(&mut self, zone: &Zone, swept: &Swept) {
+        for (place, height_m) in self.places.iter().zip(&mut self.heights_m) {
+            let p_w = zone.point(place, 0.0);
+            if let Some(ceiling_y_m) = swept.ceiling_y_m(p_w.x, p_w.z) {
+                *height_m = height_m.min(ceiling_y_m - zone.datum_y_m);
+            }
+        }
+    }
+
+    /// Cuts the belief where its mean is above the bound by more than its softness, where most first,
+    /// at
+    /// each place once.
+    pub(super) fn cut(&self, belief: &mut Posterior) {
+        let &Hyperparameters { noise_sd, signal_sd, .. } = belief.hyperparameters();
+        let soft_sd = noise_sd.max(SOFTNESS_MIN * signal_sd);
+        let mut scratch = Scratch::default();
+        let mut bounds: Vec<(&[f64], f64)> = self.bounds().collect();
+        for _ in 0..CUTS_MAX {
+            let excess = |&(place, height_m): &(&[f64], f64), scratch: &mut Scratch| {
+                belief.mean(place, scratch) - height_m
+            };
+            let excesses = bounds.iter().map(|bound| excess(bound, &mut scratch)).enumerate();
+            let Some((worst, largest)) = excesses.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+                return;
+            };
+            if largest <= soft_sd {
+                return;
+            }
+            let (place, height_m) = bounds.swap_remove(worst);
+            let variance = belief.variance(place, &mut scratch);
+            let Some((height, sd)) = site(height_m + largest, variance, height_m, soft_sd) else {
+                continue;
+            };
+            let cut = Observation { place, height, noise: sd.max(soft_sd) / noise_sd, slope: None };
+            if belief.take_in(&cut).is_err() {
+                return;
+            }
+        }
+    }
+
+    fn bounds(&self) -> impl Iterator<Item = (&[f64], f64)> {
+        let all = self.places.iter().map(Vec::as_slice).zip(self.heights_m.iter().copied());
+        all.filter(|(_, height_m)| height_m.is_finite())
+    }
+}
+
+/// The observation (height, standard deviation) that takes N(μ, σ²) to its part below a bound;
+/// none where the belief is too sure to be moved.
+fn site(mean: f64, variance: f64, bound: f64, soft_sd: f64) -> Option<(f64, f64)> {
+    let spread = (variance + soft_sd * soft_sd).sqrt();
+    let z = (bound - mean) / spread;
+    let h = normal::inverse_mills(z);
+    let share = variance / (spread * spread);
+    let cut_mean = mean - variance * h / spread;
+    let cut_variance = variance * (1.0 - share * h * (z + h));
+    let precision = 1.0 / cut_variance - 1.0 / variance;
+    let height = (cut_mean / cut_variance - mean / variance) / precision;
+    let sd = precision.sqrt().recip();
+    (height.is_finite() && sd.is_finite()).then_some((height, sd))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The slow twin sums over the cut density.
+    #[test]
+    fn the_site_takes_a_normal_to_the_moments_of_its_cut() {
+        for (mean, variance, bound, noise) in
+            [(1.0, 0.25, 0.4, 0.1), (0.0, 1.0, -3.0, 0.2), (2.0, 0.01, 1.9, 1e-3)]
+        {
+            let sd = f64::sqrt(variance);
+            let mut sums = [0.0; 3];
+            for i in 0..400_000 {
+                let x = mean + sd * (-10.0 + f64::from(i) * 5e-5);
+                let weight =
+                    normal::density((x - mean) / sd) * normal::cumulative((bound - x) / noise);
+                [1.0, x, x * x].iter().zip(&mut sums).for_each(|(f, sum)| *sum += f * weight);
+            }
+            let twin_mean = sums[1] / sums[0];
+            let twin_variance = sums[2] / sums[0] - twin_mean * twin_mean;
+            let (height, site_sd) = site(mean, variance, bound, noise).unwrap();
+            let precision = 1.0 / variance + site_sd.powi(-2);
+            let ours = (mean / variance + height * site_sd.powi(-2)) / precision;
+            assert!((ours - twin_mean).abs() < 1e-6, "{ours} {twin_mean}");
+            assert!((1.0 / precision - twin_variance).abs() < 1e-5, "{twin_variance}");
+        }
+    }
+}

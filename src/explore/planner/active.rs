@@ -1,0 +1,27 @@
+//! Algorithm 1 of Yi et al. 2016: touch where the belief's standard deviation is largest.
+
+use super::{Belief, Entry, Plan, Planner, Search};
+use crate::gp::posterior::Scratch;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "active",
+    about: "largest posterior standard deviation, by DIRECT then L-BFGS (the paper's)",
+    make: |zone, settings, rng| Box::new(Active { search: Search::new(zone, settings, rng) }),
+};
+
+struct Active {
+    search: Search,
+}
+
+impl Planner for Active {
+    /// The variance has its maximum where its root has, and its gradient is finite everywhere.
+    fn plan(&mut self, belief: &Belief) -> Plan {
+        if belief.surface().is_none() {
+            return self.search.anywhere();
+        }
+        let mut scratch = Scratch::default();
+        self.search.plan(belief, |place, gradient| {
+            belief.explorable_variance(place, gradient, &mut scratch)
+        })
+    }
+}

@@ -1,0 +1,61 @@
+//! A lattice from coarse to fine: the corners, then the middles between them, and so on.
+//!
+//! Level k is the lattice of 2ᵏ + 1 places along each side, borders included, without those of
+//! the levels before; within a level, places come in bit-reversed (van der Corput) order, so that
+//! a trial may end at any touch. Each axis sees few distinct coordinates: a surface whose period
+//! the lattice shares is not seen until a finer level.
+
+use super::{Belief, Entry, Plan, Planner};
+use crate::task::Zone;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "grid",
+    about: "a lattice from coarse to fine, no model",
+    make: |zone, _, _| Box::new(Grid { zone: zone.clone(), level: 0, rest: lattice(zone, 0) }),
+};
+
+struct Grid {
+    zone: Zone,
+    level: u32,
+    /// What is left of this level, the next one last.
+    rest: Vec<Vec<f64>>,
+}
+
+/// Finest level: beyond the most touches that a trial may have, in one dimension as in two.
+const FINEST: u32 = 11;
+
+impl Planner for Grid {
+    fn plan(&mut self, _: &Belief) -> Plan {
+        let target = loop {
+            match self.rest.pop() {
+                Some(place) => break place,
+                None => {
+                    self.level = (self.level + 1) % (FINEST + 1);
+                    self.rest = lattice(&self.zone, self.level);
+                }
+            }
+        };
+        Plan { target, sd_m: None, stall: None }
+    }
+}
+
+/// The places that `level` adds, last to first.
+fn lattice(zone: &Zone, level: u32) -> Vec<Vec<f64>> {
+    let last = 1u32 << level;
+    let is_new = |node: &[u32]| level == 0 || node.iter().any(|index| index % 2 == 1);
+    let mut nodes: Vec<Vec<u32>> = match zone.dimension() {
+        1 => (0..=last).map(|x| vec![x]).collect(),
+        _ => (0..=last).flat_map(|z| (0..=last).map(move |x| vec![x, z])).collect(),
+    };
+    nodes.retain(|node| is_new(node));
+    nodes.sort_by_key(|node| std::cmp::Reverse(order(node)));
+    let fraction = |index: &u32| f64::from(*index) / f64::from(last);
+    nodes.iter().map(|node| zone.at(&node.iter().map(fraction).collect::<Vec<_>>())).collect()
+}
+
+/// The bits of a node's indices, those of all axes in turn, the smallest first.
+fn order(node: &[u32]) -> u64 {
+    (0..=FINEST).fold(0, |order, bit| {
+        node.iter().fold(order, |order, index| order << 1 | u64::from(index >> bit & 1))
+    })
+}

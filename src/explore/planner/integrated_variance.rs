@@ -1,0 +1,34 @@
+//! Touch where the variance of the whole surface falls most: the active learning of Cohn (1996),
+//! also called integrated variance reduction.
+
+use super::{Belief, Entry, Plan, Planner, Search, sobol};
+use crate::gp::reduction::Reduction;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "integrated_variance",
+    about: "largest fall of the variance over the whole zone (Cohn's active learning)",
+    make: |zone, settings, mut rng: ChaCha8Rng| {
+        let seed = rng.random();
+        let count = settings.integrated_variance.places;
+        let places = (0..count).map(|index| sobol::place(zone, index, seed)).collect();
+        Box::new(IntegratedVariance { places, search: Search::new(zone, settings, rng) })
+    },
+};
+
+struct IntegratedVariance {
+    /// Where the variance is looked at: a Sobol sequence, which has no period in common with a
+    /// surface's.
+    places: Vec<Vec<f64>>,
+    search: Search,
+}
+
+impl Planner for IntegratedVariance {
+    fn plan(&mut self, belief: &Belief) -> Plan {
+        let Some(posterior) = belief.explorable() else { return self.search.anywhere() };
+        let reduction = Reduction::new(posterior, self.places.iter().map(Vec::as_slice));
+        let score = self.search.differentiated(|place, scratch| reduction.at(place, scratch));
+        self.search.plan(belief, score)
+    }
+}

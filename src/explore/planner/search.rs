@@ -1,0 +1,164 @@
+//! Where an acquisition function is largest: DIRECT finds its hills, L-BFGS climbs them.
+
+use super::{Belief, Plan, PlanningSettings, Stall, uniform};
+use crate::gp::posterior::Scratch;
+use crate::math::optimize;
+use crate::math::optimize::Bounds;
+use crate::task::Zone;
+use rand_chacha::ChaCha8Rng;
+
+/// Two targets nearer than this, in units of the zone's sides, are the same touch; chosen.
+const SAME_TARGET: f64 = 1e-6;
+
+/// Below this fraction of the signal's standard deviation, the posterior's is the rounding error
+/// of a covariance with the least noise allowed; chosen.
+const LOST_IN_ROUNDING: f64 = 1e-5;
+
+/// Hills that L-BFGS climbs, see [`MARGIN`].
+const HILLS: usize = 8;
+
+/// DIRECT searches the zone with this fraction of its sides added all around, and what it asks
+/// outside is answered from the nearest place inside: it divides from the middles of rectangles
+/// and would reach the zone's border, where the variance often peaks, only in the limit. On 78
+/// beliefs of the bird, 200 evaluations and one climb came within 2 % of the maximum on a dense
+/// grid 23 times; with the margin and eight climbs 73 times, and 500 evaluations 76 times.
+const MARGIN: f64 = 0.1;
+
+/// Places nearer than this, in units of the zone's sides, are taken for the same hill; chosen.
+const SAME_HILL: f64 = 0.04;
+
+/// Step of a central difference in units of the zone's sides, near the cube root of the rounding
+/// error, where its own and the rounding error balance.
+const STEP: f64 = 1e-5;
+
+/// What all acquisition planners have in common.
+pub(super) struct Search {
+    pub(super) zone: Zone,
+    pub(super) settings: PlanningSettings,
+    rng: ChaCha8Rng,
+}
+
+impl Search {
+    pub(super) fn new(zone: &Zone, settings: &PlanningSettings, rng: ChaCha8Rng) -> Self {
+        Self { zone: zone.clone(), settings: settings.clone(), rng }
+    }
+
+    /// A random place, of a belief that knows nothing.
+    pub(super) fn anywhere(&mut self) -> Plan {
+        Plan { target: uniform(&self.zone, &mut self.rng), sd_m: None, stall: None }
+    }
+
+    /// The place where `score` is largest; `score` writes its gradient into its second argument
+    /// unless that is empty.
+    pub(super) fn plan(
+        &mut self,
+        belief: &Belief,
+        score: impl FnMut(&[f64], &mut [f64]) -> f64,
+    ) -> Plan {
+        let (_, place) = self.maximum(score);
+        self.conclude(belief, place)
+    }
+
+    /// Plans to touch `place`, or a random one if a touch there would tell nothing.
+    pub(super) fn conclude(&mut self, belief: &Belief, place: Vec<f64>) -> Plan {
+        let mut scratch = Scratch::default();
+        let mut variance = |place: &[f64]| belief.explorable_variance(place, &mut [], &mut scratch);
+        let stall = self.stall(belief, &place, variance(&place));
+        let target = if stall.is_none() { place } else { uniform(&self.zone, &mut self.rng) };
+        let sd_m = Some(variance(&target).sqrt());
+        Plan { target, sd_m, stall }
+    }
+
+    /// The largest value of `score` that was found, and its place.
+    pub(super) fn maximum(
+        &self,
+        mut score: impl FnMut(&[f64], &mut [f64]) -> f64,
+    ) -> (f64, Vec<f64>) {
+        let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
+        let (lower, upper) = self.corners(MARGIN);
+        let budget = self.settings.direct_evaluations;
+        optimize::direct(Bounds { lower: &lower, upper: &upper }, budget, |place| {
+            let place = self.clamped(place);
+            let value = score(&place, &mut []);
+            seen.push((value, place));
+            value
+        });
+        let (lower, upper) = self.corners(0.0);
+        let bounds = Bounds { lower: &lower, upper: &upper };
+        let mut best = (f64::MIN, self.zone.at(&vec![0.5; self.zone.dimension()]));
+        for start in self.hills(seen) {
+            let budget = self.settings.lbfgs_evaluations;
+            let top = optimize::lbfgs(bounds, &start, budget, &mut score);
+            if top.value > best.0 {
+                best = (top.value, top.x);
+            }
+        }
+        best
+    }
+
+    /// `score` with its gradient by central differences, one-sided at the zone's border.
+    pub(super) fn differentiated<S: Fn(&[f64], &mut Scratch) -> f64>(
+        &self,
+        score: S,
+    ) -> impl FnMut(&[f64], &mut [f64]) -> f64 + use<S> {
+        let sides: Vec<[f64; 2]> = self.zone.sides().collect();
+        let mut scratch = Scratch::default();
+        let mut beside = Vec::new();
+        move |place, gradient| {
+            for (axis, slope) in gradient.iter_mut().enumerate() {
+                let [low, high] = sides[axis];
+                let step = STEP * (high - low);
+                let ends = [(place[axis] - step).max(low), (place[axis] + step).min(high)];
+                let [before, after] = ends.map(|at| {
+                    beside.clear();
+                    beside.extend_from_slice(place);
+                    beside[axis] = at;
+                    score(&beside, &mut scratch)
+                });
+                *slope = (after - before) / (ends[1] - ends[0]);
+            }
+            score(place, &mut scratch)
+        }
+    }
+
+    /// Lowest and highest corner of the zone, moved out by `margin` of its sides.
+    fn corners(&self, margin: f64) -> (Vec<f64>, Vec<f64>) {
+        let moved = |[low, high]: [f64; 2]| {
+            let step = margin * (high - low);
+            (low - step, high + step)
+        };
+        self.zone.sides().map(moved).unzip()
+    }
+
+    fn clamped(&self, place: &[f64]) -> Vec<f64> {
+        place.iter().zip(self.zone.sides()).map(|(at, [low, high])| at.clamp(low, high)).collect()
+    }
+
+    /// The best places seen that are not next to a better one.
+    fn hills(&self, mut seen: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
+        seen.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut hills: Vec<Vec<f64>> = Vec::new();
+        for (_, place) in seen {
+            let is_apart = |hill: &Vec<f64>| self.zone.distance(hill, &place) > SAME_HILL;
+            if hills.iter().all(is_apart) {
+                hills.push(place);
+            }
+            if hills.len() == HILLS {
+                break;
+            }
+        }
+        hills
+    }
+
+    fn stall(&self, belief: &Belief, place: &[f64], variance: f64) -> Option<Stall> {
+        let lost_sd = LOST_IN_ROUNDING * belief.surface()?.hyperparameters().signal_sd;
+        let same = |target: &Vec<f64>| self.zone.distance(target, place) < SAME_TARGET;
+        if variance <= lost_sd * lost_sd {
+            Some(Stall::Collapsed)
+        } else if belief.targets().iter().any(same) {
+            Some(Stall::Repeated)
+        } else {
+            None
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! What the planners' rules depend on.
+
+use crate::config::{Checked, Rules};
+use serde::{Deserialize, Serialize};
+
+/// How planners search, and the settings of single ones under their names.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlanningSettings {
+    /// Evaluations of the acquisition function that DIRECT may spend on one plan.
+    pub direct_evaluations: u32,
+    /// Evaluations that L-BFGS may spend on refining it.
+    pub lbfgs_evaluations: u32,
+    /// Of `integrated_variance`.
+    pub integrated_variance: IntegratedVarianceSettings,
+    /// Of `slope`.
+    pub slope: SlopeSettings,
+    /// Of `travel`.
+    pub travel: TravelSettings,
+    /// Of `ucb`.
+    pub ucb: UcbSettings,
+    /// Of `pi`.
+    pub pi: ImprovementSettings,
+    /// Of `ei`.
+    pub ei: ImprovementSettings,
+}
+
+impl Default for PlanningSettings {
+    /// Chosen: on a hundred touches more evaluations rarely find a larger variance.
+    fn default() -> Self {
+        Self {
+            direct_evaluations: 500,
+            lbfgs_evaluations: 50,
+            integrated_variance: Default::default(),
+            slope: Default::default(),
+            travel: Default::default(),
+            ucb: Default::default(),
+            pi: Default::default(),
+            ei: Default::default(),
+        }
+    }
+}
+
+/// Settings of `integrated_variance`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct IntegratedVarianceSettings {
+    /// Places over which the variance is summed.
+    pub places: u32,
+}
+
+impl Default for IntegratedVarianceSettings {
+    /// Chosen: about as many as the hundred touches of a trial tell apart, twice over.
+    fn default() -> Self {
+        Self { places: 256 }
+    }
+}
+
+/// Settings of `slope`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SlopeSettings {
+    /// Weight of the slope; at 0 the planner is `active`.
+    pub weight: f64,
+}
+
+impl Default for SlopeSettings {
+    /// Chosen: a place of average slope counts double a flat one.
+    fn default() -> Self {
+        Self { weight: 1.0 }
+    }
+}
+
+/// Settings of `travel`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TravelSettings {
+    /// Touches planned together; with 1 the planner is `active`.
+    pub tour: u32,
+}
+
+impl Default for TravelSettings {
+    /// Chosen: of 10, 15 and 20 the one with the fewest touches to equal error on container and
+    /// bird, see `docs/paper.md`.
+    fn default() -> Self {
+        Self { tour: 15 }
+    }
+}
+
+/// Settings of `ucb`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct UcbSettings {
+    /// Standard deviations κ above the mean.
+    pub sds: f64,
+}
+
+impl Default for UcbSettings {
+    /// Chosen: about the upper end of the 95 % band.
+    fn default() -> Self {
+        Self { sds: 2.0 }
+    }
+}
+
+/// Settings of `pi` and `ei`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ImprovementSettings {
+    /// What a place must exceed the highest contact by, in standard deviations of the signal.
+    pub margin: f64,
+}
+
+impl Default for ImprovementSettings {
+    /// Lizotte 2008 finds 0.01 to work well in most cases.
+    fn default() -> Self {
+        Self { margin: 0.01 }
+    }
+}
+
+impl Checked for PlanningSettings {
+    fn check(&self, rules: &mut Rules) {
+        rules.number("direct_evaluations", self.direct_evaluations.into(), 1.0..=1e6);
+        rules.number("lbfgs_evaluations", self.lbfgs_evaluations.into(), 1.0..=1e6);
+        let places = self.integrated_variance.places;
+        rules.number("integrated_variance.places", places.into(), 1.0..=65536.0);
+        rules.number("slope.weight", self.slope.weight, 0.0..=1e3);
+        rules.number("travel.tour", self.travel.tour.into(), 1.0..=100.0);
+        rules.number("ucb.sds", self.ucb.sds, 0.0..=1e3);
+        rules.number("pi.margin", self.pi.margin, 0.0..=1e3);
+        rules.number("ei.margin", self.ei.margin, 0.0..=1e3);
+    }
+}

@@ -1,0 +1,49 @@
+//! Touch where the belief is unsure and steep: a smooth belief is most wrong at edges.
+//!
+//! α(x) = σ(x)·(1 + w·|∇μ(x)| / mean|∇μ|), the mean taken over the zone.
+
+use super::{Belief, Entry, Plan, Planner, Search, sobol};
+use crate::gp::Posterior;
+use crate::gp::posterior::Scratch;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "slope",
+    about: "standard deviation weighted by the slope of the posterior mean",
+    make: |zone, settings, rng| {
+        let places = (0..MEAN_PLACES).map(|index| sobol::place(zone, index, 0)).collect();
+        Box::new(Slope { places, search: Search::new(zone, settings, rng) })
+    },
+};
+
+/// Places over which the slope is averaged; chosen.
+const MEAN_PLACES: u32 = 256;
+
+struct Slope {
+    places: Vec<Vec<f64>>,
+    search: Search,
+}
+
+impl Planner for Slope {
+    fn plan(&mut self, belief: &Belief) -> Plan {
+        let Some(surface) = belief.surface() else { return self.search.anywhere() };
+        let mut scratch = Scratch::default();
+        let slopes = self.places.iter().map(|place| slope(surface, place, &mut scratch));
+        let mean = slopes.sum::<f64>() / self.places.len() as f64;
+        let weight = self.search.settings.slope.weight;
+        // A flat belief is steep nowhere.
+        let per_slope = if mean > 0.0 { weight / mean } else { 0.0 };
+        let score = self.search.differentiated(|place, scratch| {
+            let sd = belief.explorable_variance(place, &mut [], scratch).sqrt();
+            sd * (1.0 + per_slope * slope(surface, place, scratch))
+        });
+        self.search.plan(belief, score)
+    }
+}
+
+/// |∇μ| at `place`.
+fn slope(surface: &Posterior, place: &[f64], scratch: &mut Scratch) -> f64 {
+    // A zone has at most two coordinates.
+    let mut gradient = [0.0; 2];
+    surface.mean_gradient(place, &mut gradient, scratch);
+    gradient[0].hypot(gradient[1])
+}

@@ -1,0 +1,170 @@
+//! Lower bounds on distance and travel to a box: what lets a query skip most of a mesh.
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use obvhs::aabb::Aabb;
+
+use super::sweep::Capsule;
+
+/// A bound that would divide by a speed below this part of the capsule's is not worth its
+/// rounding.
+const MIN_SPEED: f64 = 1e-3;
+
+/// An axis-aligned box, in metres from the centre of the mesh.
+#[derive(Clone, Copy)]
+pub(super) struct Box3 {
+    pub low: Vector3<f64>,
+    pub high: Vector3<f64>,
+}
+
+impl Box3 {
+    #[inline]
+    pub fn of(aabb: &Aabb) -> Self {
+        let f64s = |corner: [f32; 3]| Vector3::from(corner.map(f64::from));
+        Self { low: f64s(aabb.min.into()), high: f64s(aabb.max.into()) }
+    }
+
+    #[inline]
+    pub fn around(corners: &[Point3<f64>; 3], centre: &Vector3<f64>) -> Self {
+        let [a, b, c] = corners;
+        Self { low: a.inf(b).inf(c).coords - centre, high: a.sup(b).sup(c).coords - centre }
+    }
+
+    /// Squared distance to the box from `low` to `high`, in m².
+    #[inline]
+    pub fn distance_squared(&self, low: &Point3<f64>, high: &Point3<f64>) -> f64 {
+        let gap = (self.low - high.coords).sup(&(low.coords - self.high));
+        gap.sup(&Vector3::zeros()).norm_squared()
+    }
+}
+
+/// What a box grows by, so that a capsule against the box is its end p0 against the grown box.
+pub(super) struct SweptBox {
+    low: Vector3<f64>,
+    high: Vector3<f64>,
+}
+
+impl SweptBox {
+    pub fn new(capsule: &Capsule) -> Self {
+        let draw = capsule.p0_w - capsule.p1_w;
+        let zero = Vector3::zeros();
+        Self {
+            low: draw.inf(&zero).add_scalar(-capsule.radius_m),
+            high: draw.sup(&zero).add_scalar(capsule.radius_m),
+        }
+    }
+
+    #[inline]
+    pub fn grown(&self, node: &Box3) -> Box3 {
+        Box3 { low: node.low + self.low, high: node.high + self.high }
+    }
+}
+
+/// The capsule drawn out along its axis without end, against the balls around boxes.
+pub(super) struct Tube {
+    start: Vector3<f64>,
+    axis: Vector3<f64>,
+    radius_m: f64,
+    /// The part of the direction across the axis, and one over its square; 0 if it is slow,
+    /// which makes every bound 0.
+    velocity: Vector3<f64>,
+    inverse_squared: f64,
+}
+
+impl Tube {
+    pub fn new(capsule: &Capsule, centre: &Vector3<f64>, direction: &UnitVector3<f64>) -> Self {
+        let axis = (capsule.p1_w - capsule.p0_w).try_normalize(0.0).unwrap_or_default();
+        let velocity = direction.into_inner() - axis * axis.dot(direction);
+        Self {
+            start: capsule.p0_w.coords - centre,
+            axis,
+            radius_m: capsule.radius_m,
+            velocity,
+            inverse_squared: if velocity.norm() < MIN_SPEED {
+                0.0
+            } else {
+                velocity.norm_squared().recip()
+            },
+        }
+    }
+
+    /// Travel until the tube touches the ball around a box, infinite if it never does.
+    #[inline]
+    pub fn enter_m(&self, node: &Box3) -> f64 {
+        let arm = self.start - (node.low + node.high) / 2.0;
+        let across = arm - self.axis * self.axis.dot(&arm);
+        let nearest_m = -across.dot(&self.velocity) * self.inverse_squared;
+        let miss_squared = (across + self.velocity * nearest_m).norm_squared();
+        let reach_m = self.radius_m + (node.high - node.low).norm() / 2.0;
+        let half_squared = (reach_m * reach_m - miss_squared) * self.inverse_squared;
+        if half_squared < 0.0 {
+            return f64::INFINITY;
+        }
+        nearest_m - half_squared.sqrt()
+    }
+}
+
+/// A moving plane ahead of the capsule, square to the normal of the best contact so far. What
+/// the plane does not reach, the capsule does not touch: behind a contact on a bulge this rules
+/// out at once all that the boxes, which are wider than the capsule, would let through.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Wall {
+    /// Against the capsule's motion, divided by the speed at which the plane advances.
+    normal: Vector3<f64>,
+    start_m: f64,
+}
+
+impl Wall {
+    pub fn new(
+        capsule: &Capsule,
+        centre: &Vector3<f64>,
+        direction: &UnitVector3<f64>,
+        normal: &Vector3<f64>,
+    ) -> Self {
+        let speed = -normal.dot(direction);
+        if speed < MIN_SPEED {
+            return Self::default();
+        }
+        let height = |end: Point3<f64>| normal.dot(&(end.coords - centre));
+        let start_m = height(capsule.p0_w).min(height(capsule.p1_w)) - capsule.radius_m;
+        Self { normal: normal / speed, start_m: start_m / speed }
+    }
+
+    /// Travel until the plane reaches the first of these points, from the centre of the mesh.
+    #[inline]
+    pub fn travel_to_m(&self, points: &[Point3<f64>; 3]) -> f64 {
+        let height = points.map(|point| self.normal.dot(&point.coords));
+        self.start_m - height[0].max(height[1]).max(height[2])
+    }
+
+    /// Travel until the plane reaches a box.
+    #[inline]
+    pub fn travel_m(&self, node: &Box3) -> f64 {
+        let (low, high) =
+            (self.normal.component_mul(&node.low), self.normal.component_mul(&node.high));
+        self.start_m - low.sup(&high).sum()
+    }
+}
+
+/// A ray prepared for boxes.
+pub(super) struct Slab {
+    origin: Vector3<f64>,
+    inverse: Vector3<f64>,
+}
+
+impl Slab {
+    pub fn new(origin: &Point3<f64>, direction: &UnitVector3<f64>) -> Self {
+        // Large but finite, so that an origin in the plane of a side gives 0, not NaN.
+        let inverse = direction.map(|x| if x.abs() < 1e-290 { 1e290 } else { 1.0 / x });
+        Self { origin: origin.coords, inverse }
+    }
+
+    /// Distance at which the ray enters a box, 0 from inside, infinite if it misses.
+    #[inline]
+    pub fn enter_m(&self, node: &Box3) -> f64 {
+        let low = (node.low - self.origin).component_mul(&self.inverse);
+        let high = (node.high - self.origin).component_mul(&self.inverse);
+        let (near, far) = (low.inf(&high), low.sup(&high));
+        let enter = near.x.max(near.y).max(near.z).max(0.0);
+        if enter <= far.x.min(far.y).min(far.z) { enter } else { f64::INFINITY }
+    }
+}

@@ -1,0 +1,215 @@
+//! Cholesky factor A = L·Lᵀ, stored by rows.
+//!
+//! Row i holds its i + 1 entries contiguously, so every inner loop is a dot product or a scaled
+//! addition of contiguous numbers, and a row can be appended without moving the others.
+
+use super::dense::Dense;
+use crate::math::simd::{dot, widest};
+use pulp::NullaryFnOnce;
+use thiserror::Error;
+
+/// The matrix is not positive definite in floating point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("pivot {index} is not positive")]
+pub struct NotPositiveDefinite {
+    /// Row at which it was seen.
+    pub index: usize,
+}
+
+/// A lower triangular factor of growing order.
+#[derive(Clone, Debug, Default)]
+pub struct Factor {
+    rows: Vec<f64>,
+    order: usize,
+}
+
+/// Start of row `i` in packed storage.
+#[inline(always)]
+fn start(i: usize) -> usize {
+    i * (i + 1) / 2
+}
+
+/// Row `i` of L: its first i + 1 entries.
+#[inline(always)]
+fn row(rows: &[f64], i: usize) -> &[f64] {
+    &rows[start(i)..start(i + 1)]
+}
+
+impl From<&Dense> for Factor {
+    /// Copies the lower triangle of a factored matrix.
+    fn from(dense: &Dense) -> Self {
+        let order = dense.order();
+        let mut rows = vec![0.0; start(order)];
+        for j in 0..order {
+            for (below, entry) in dense.column(j).iter().enumerate() {
+                rows[start(j + below) + j] = *entry;
+            }
+        }
+        Self { rows, order }
+    }
+}
+
+impl Factor {
+    /// Row `i` of L: its first i + 1 entries.
+    #[inline(always)]
+    pub(super) fn row(&self, i: usize) -> &[f64] {
+        row(&self.rows, i)
+    }
+
+    /// Adds one row and column to A: `row` holds the entries n, 0 to n. Costs n² operations.
+    ///
+    /// # Errors
+    /// If the enlarged matrix is not positive definite to within rounding; the factor is then
+    /// left as it was.
+    pub fn append(&mut self, row: &[f64]) -> Result<(), NotPositiveDefinite> {
+        let n = self.order;
+        let begin = self.rows.len();
+        self.rows.extend_from_slice(&row[..=n]);
+        let (done, new) = self.rows.split_at_mut(begin);
+        let pivot = new[n] - widest(SolveLower { rows: done, b: &mut new[..n] });
+        let is_kept = pivot > f64::EPSILON * row[n] && pivot.is_finite();
+        if !is_kept {
+            self.rows.truncate(begin);
+            return Err(NotPositiveDefinite { index: n });
+        }
+        new[n] = pivot.sqrt();
+        self.order += 1;
+        Ok(())
+    }
+
+    /// Takes the last rows and columns of A away, down to `order`.
+    pub fn truncate(&mut self, order: usize) {
+        self.order = self.order.min(order);
+        self.rows.truncate(start(self.order));
+    }
+
+    /// Replaces b by L⁻¹·b and returns bᵀ·A⁻¹·b.
+    pub fn solve_lower(&self, b: &mut [f64]) -> f64 {
+        widest(SolveLower { rows: &self.rows, b })
+    }
+
+    /// Replaces b by L⁻ᵀ·b.
+    pub fn solve_upper(&self, b: &mut [f64]) {
+        widest(SolveUpper { rows: &self.rows, b });
+    }
+}
+
+/// See [`Factor::solve_lower`].
+struct SolveLower<'a> {
+    rows: &'a [f64],
+    b: &'a mut [f64],
+}
+
+impl NullaryFnOnce for SolveLower<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let Self { rows, b } = self;
+        for i in 0..b.len() {
+            let row = row(rows, i);
+            b[i] = (b[i] - dot(&row[..i], &b[..i])) / row[i];
+        }
+        dot(b, b)
+    }
+}
+
+/// See [`Factor::solve_upper`].
+struct SolveUpper<'a> {
+    rows: &'a [f64],
+    b: &'a mut [f64],
+}
+
+impl NullaryFnOnce for SolveUpper<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { rows, b } = self;
+        for i in (0..b.len()).rev() {
+            let row = row(rows, i);
+            b[i] /= row[i];
+            let scale = b[i];
+            for (b, l) in b[..i].iter_mut().zip(row) {
+                *b -= scale * l;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    /// A well-conditioned symmetric matrix of order n.
+    fn matrix(n: usize) -> DMatrix<f64> {
+        let wave = DMatrix::from_fn(n, n, |i, j| ((i * 7 + j * 13) as f64).sin());
+        &wave * wave.transpose() + DMatrix::identity(n, n) * n as f64
+    }
+
+    fn appended(a: &DMatrix<f64>) -> Factor {
+        let mut factor = Factor::default();
+        for i in 0..a.nrows() {
+            let row: Vec<f64> = (0..=i).map(|j| a[(i, j)]).collect();
+            factor.append(&row).expect("positive definite");
+        }
+        factor
+    }
+
+    fn dense(a: &DMatrix<f64>) -> Dense {
+        let mut dense = Dense::new(a.nrows());
+        for j in 0..a.nrows() {
+            for (below, entry) in dense.column_mut(j).iter_mut().enumerate() {
+                *entry = a[(j + below, j)];
+            }
+        }
+        dense
+    }
+
+    #[test]
+    fn rows_one_by_one_and_blocks_at_once_agree_with_nalgebra() {
+        for n in 1..=70 {
+            let a = matrix(n);
+            let twin = a.clone().cholesky().expect("positive definite");
+            let ours = appended(&a);
+            let mut blocked = dense(&a);
+            blocked.factor(a.diagonal().max()).expect("positive definite");
+            let copied = Factor::from(&blocked);
+            let log_determinant: f64 = twin.l().diagonal().iter().map(|l| 2.0 * l.ln()).sum();
+            assert!((blocked.log_determinant() - log_determinant).abs() < 1e-11 * n as f64);
+            let b: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
+            for factor in [&ours, &copied] {
+                let mut x = b.clone();
+                factor.solve_lower(&mut x);
+                factor.solve_upper(&mut x);
+                let residual = &a * DVector::from_vec(x) - DVector::from_vec(b.clone());
+                assert!(residual.amax() < 1e-12, "{n}: {}", residual.amax());
+            }
+            let mut x = b.clone();
+            blocked.solve_lower(&mut x);
+            let square = dot(&x, &x);
+            blocked.solve_upper(&mut x);
+            assert!((square - x.iter().zip(&b).map(|(x, b)| x * b).sum::<f64>()).abs() < 1e-12);
+            blocked.invert();
+            let inverse = twin.inverse();
+            for j in 0..n {
+                for (below, entry) in blocked.inverse_column(j).iter().enumerate() {
+                    assert!((entry - inverse[(j + below, j)]).abs() < 1e-13);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_indefinite_row_is_refused_and_leaves_the_factor_whole() {
+        let mut ours = appended(&matrix(3));
+        let before = ours.rows.clone();
+        let refused = ours.append(&[1e6, 0.0, 0.0, 1.0]);
+        assert_eq!(refused, Err(NotPositiveDefinite { index: 3 }));
+        assert_eq!((ours.rows, ours.order), (before, 3));
+        assert!(Factor::default().append(&[f64::NAN]).is_err());
+        let mut indefinite = dense(&DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]));
+        assert_eq!(indefinite.factor(1.0), Err(NotPositiveDefinite { index: 1 }));
+    }
+}

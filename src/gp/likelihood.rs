@@ -1,0 +1,250 @@
+//! The log marginal likelihood of hyperparameters and its gradient.
+
+use super::correlations::{Correlations, batches};
+use super::covariance;
+use super::covariance::CovarianceError;
+use super::dense::Dense;
+use super::derivative_covariance::PairWeights;
+use super::kernel::{Hyperparameters, Kernel};
+use super::mean::Mean;
+use super::observations::{NoiseRatio, Observations};
+use super::range::Scale;
+use crate::math::simd::{dot, widest};
+
+/// Scores hyperparameters against fixed observations; keeps its buffers between calls.
+///
+/// With K = s²·A, A = C + g²·I (s the signal's standard deviation, C the correlations, g the
+/// noise as a fraction of s) the log marginal likelihood is
+/// −½·yᵀA⁻¹y / s² − n·ln s − ½·ln|A| − (n/2)·ln 2π, where y are the heights above the mean. A slope
+/// counts as a further height, slope · length, with its own noise, and adds ln length: the density
+/// is that of the slope.
+pub struct Likelihood<'a> {
+    kernel: &'static dyn Kernel,
+    mean: Mean,
+    observations: &'a Observations,
+    dense: Dense,
+    /// L⁻¹·y, then A⁻¹·y where a gradient is asked for.
+    weights: Vec<f64>,
+    scratch: Vec<f64>,
+    pair: PairWeights,
+    correlations: Correlations,
+    factorisations: u32,
+}
+
+/// A profiled score: the signal's standard deviation follows from the other parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct ProfiledLikelihood {
+    /// Log marginal likelihood.
+    pub log_likelihood: f64,
+    /// Signal standard deviation.
+    pub signal_sd: f64,
+    /// The mean that the model chooses.
+    pub mean: f64,
+}
+
+impl<'a> Likelihood<'a> {
+    /// Prepares to score hyperparameters against `observations`.
+    pub fn new(kernel: &'static dyn Kernel, mean: Mean, observations: &'a Observations) -> Self {
+        let count = observations.order();
+        Self {
+            kernel,
+            mean,
+            observations,
+            dense: Dense::new(count),
+            weights: Vec::with_capacity(count),
+            scratch: Vec::with_capacity(count),
+            pair: PairWeights::default(),
+            correlations: Correlations::default(),
+            factorisations: 0,
+        }
+    }
+
+    /// How many matrices were factored so far.
+    pub fn factorisations(&self) -> u32 {
+        self.factorisations
+    }
+
+    /// Log marginal likelihood; writes its gradient with respect to
+    /// (ln signal_sd, ln length_1, …, ln length_d, ln noise_sd), and ln slope_noise_sd if there is
+    /// room, unless `gradient` is empty.
+    ///
+    /// # Errors
+    /// [`CovarianceError`] if the covariance cannot be factored.
+    pub fn value_gradient(
+        &mut self,
+        at: &Hyperparameters,
+        gradient: &mut [f64],
+    ) -> Result<f64, CovarianceError> {
+        let lengths = &at.length_scales;
+        let noise = at.noise_ratio();
+        self.factor(lengths, noise)?;
+        let fit = self.whiten(at.mean, lengths);
+        let value = self.value(at.signal_sd, lengths, fit);
+        let [by_signal, rest @ ..] = gradient else { return Ok(value) };
+        let signal2 = at.signal_sd * at.signal_sd;
+        self.gradient(signal2, lengths, noise, rest);
+        let by_noise: f64 = rest.iter().skip(lengths.len()).sum();
+        *by_signal = fit / signal2 - self.observations.order() as f64 - by_noise;
+        Ok(value)
+    }
+
+    /// Log marginal likelihood with the signal_sd that `scale` says; with a `gradient`, writes it
+    /// with respect to (ln length_1, …, ln length_d, ln noise_ratio), and the logarithm of the slope
+    /// noise ratio if there is room, the prior of signal_sd included.
+    ///
+    /// # Errors
+    /// [`CovarianceError`] if the covariance cannot be factored.
+    pub fn profile(
+        &mut self,
+        length_scales: &[f64],
+        noise_ratio: impl Into<NoiseRatio>,
+        scale: &Scale,
+        gradient: Option<&mut [f64]>,
+    ) -> Result<ProfiledLikelihood, CovarianceError> {
+        let noise = noise_ratio.into();
+        self.factor(length_scales, noise)?;
+        let buffers = [&mut self.scratch, &mut self.weights];
+        let mean = self.mean.of(self.observations, length_scales, &self.dense, buffers);
+        let fit = self.whiten(mean, length_scales);
+        let count = self.observations.order();
+        let signal_sd = scale.signal_sd(fit, count, noise.height);
+        if let Some(gradient) = gradient {
+            let signal2 = signal_sd * signal_sd;
+            self.gradient(signal2, length_scales, noise, gradient);
+            // The best signal_sd does not change the value to first order; a known noise makes
+            // it fall as the ratio rises.
+            if let (Scale::KnownNoise(_), Some(by_noise)) =
+                (scale, gradient.get_mut(length_scales.len()))
+            {
+                *by_noise -= fit / signal2 - count as f64;
+            }
+        }
+        let log_likelihood = self.value(signal_sd, length_scales, fit);
+        Ok(ProfiledLikelihood { log_likelihood, signal_sd, mean })
+    }
+
+    fn value(&self, signal_sd: f64, length_scales: &[f64], fit: f64) -> f64 {
+        let n = self.observations.order() as f64;
+        let value = -0.5 * fit / (signal_sd * signal_sd)
+            - n * signal_sd.ln()
+            - 0.5 * self.dense.log_determinant()
+            - 0.5 * n * (2.0 * std::f64::consts::PI).ln();
+        let logs: f64 = length_scales.iter().map(|length| length.ln()).sum();
+        value + self.observations.sloped() as f64 * logs
+    }
+
+    fn factor(&mut self, length_scales: &[f64], noise: NoiseRatio) -> Result<(), CovarianceError> {
+        self.factorisations += 1;
+        let (kernel, observations) = (self.kernel, self.observations);
+        let buffer = &mut self.correlations;
+        let dense = &mut self.dense;
+        covariance::factor(dense, kernel, observations, length_scales, noise, buffer).map(|_| ())
+    }
+
+    /// Makes L⁻¹·y of the heights above `mean` the weights, and returns its square yᵀA⁻¹y.
+    fn whiten(&mut self, mean: f64, length_scales: &[f64]) -> f64 {
+        self.observations.residuals(mean, length_scales, &mut self.weights);
+        self.dense.solve_lower(&mut self.weights);
+        widest(|| dot(&self.weights, &self.weights))
+    }
+
+    /// With respect to the logarithms of the length scales and of the noise ratio, by
+    /// ½·tr((w·wᵀ/s² − A⁻¹)·∂A), after [`whiten`](Self::whiten) at the same parameters. The
+    /// mean is the best one or does not depend on them, so it has no part in this.
+    fn gradient(&mut self, signal2: f64, lengths: &[f64], noise: NoiseRatio, gradient: &mut [f64]) {
+        self.dense.solve_upper(&mut self.weights);
+        self.dense.invert();
+        gradient.fill(0.0);
+        let Some((by_length, by_noise)) = gradient.split_at_mut_checked(lengths.len()) else {
+            return;
+        };
+        if self.observations.has_slopes() {
+            return self.gradient_with_slopes(signal2, lengths, noise, (by_length, by_noise));
+        }
+        let observations = self.observations;
+        let count = observations.len();
+        let mut trace = 0.0;
+        for columns in batches(count) {
+            let mut rest =
+                self.correlations.slopes_of(self.kernel, observations, lengths, &columns);
+            for j in columns {
+                let weight = self.weights[j] / signal2;
+                let [on, inverse @ ..] = self.dense.inverse_column(j) else { return };
+                trace +=
+                    (weight * self.weights[j] - on) * observations.height_noise2(j, 1.0.into());
+                let (slopes, others) = rest.split_at_mut(inverse.len());
+                rest = others;
+                let weights = &self.weights[j + 1..];
+                widest(|| {
+                    for ((slope, other), inverse) in slopes.iter_mut().zip(weights).zip(inverse) {
+                        *slope *= -2.0 * (weight * other - inverse);
+                    }
+                });
+                for (axis, (by_length, length)) in by_length.iter_mut().zip(lengths).enumerate() {
+                    let column = observations.column(axis);
+                    let (at, per_length) = (column[j], 1.0 / length);
+                    self.scratch.resize(slopes.len(), 0.0);
+                    *by_length += widest(|| {
+                        for (square, x) in self.scratch.iter_mut().zip(&column[j + 1..]) {
+                            let step = (at - x) * per_length;
+                            *square = step * step;
+                        }
+                        dot(slopes, &self.scratch)
+                    });
+                }
+            }
+        }
+        let by_height = noise.height * noise.height * trace;
+        by_noise.iter_mut().take(1).for_each(|by_noise| *by_noise = by_height);
+    }
+
+    /// The same where slopes were observed, pair of places by pair; and the slopes, counted per
+    /// length scale, change with it.
+    fn gradient_with_slopes(
+        &mut self,
+        signal2: f64,
+        lengths: &[f64],
+        noise: NoiseRatio,
+        (by_length, by_noise): (&mut [f64], &mut [f64]),
+    ) {
+        let Self { observations, dense, weights, pair, correlations, kernel, .. } = self;
+        let d = lengths.len();
+        let change = |row: usize, column: usize| {
+            let inverse = dense.inverse_column(column)[row - column];
+            weights[row] * weights[column] / signal2 - inverse
+        };
+        observations.residuals(0.0, lengths, &mut self.scratch);
+        for j in 0..observations.len() {
+            let column = observations.start(j);
+            by_noise.iter_mut().take(1).for_each(|by_noise| {
+                *by_noise += change(column, column) * observations.height_noise2(j, noise);
+            });
+            for axis in 0..observations.slope(j).len() {
+                let k = column + 1 + axis;
+                let by_this = change(k, k) * observations.slope_noise2(j, noise, lengths[axis]);
+                by_length[axis] += by_this + 1.0 - weights[k] * self.scratch[k] / signal2;
+                by_noise.iter_mut().skip(1).for_each(|by_noise| *by_noise += by_this);
+            }
+            let jet = &mut correlations.jet;
+            jet.look(*kernel, observations, lengths, observations.place(j), j);
+            for i in j + 1..observations.len() {
+                let row = observations.start(i);
+                pair.both = change(row, column);
+                pair.slopes.clear();
+                pair.slopes.resize(d, 0.0);
+                pair.pairs.clear();
+                pair.pairs.resize(d * d, 0.0);
+                for axis in 0..observations.slope(j).len() {
+                    pair.slopes[axis] += change(row, column + 1 + axis);
+                }
+                for other in 0..observations.slope(i).len() {
+                    pair.slopes[other] -= change(row + 1 + other, column);
+                    for axis in 0..observations.slope(j).len() {
+                        pair.pairs[axis * d + other] = change(row + 1 + other, column + 1 + axis);
+                    }
+                }
+                jet.add_length_gradient(observations, lengths, i, pair, by_length);
+            }
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! Places with the heights, and perhaps the slopes, observed there.
+
+use crate::math::simd::widest;
+use std::ops::Range;
+
+/// What was observed at one place.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation<'a> {
+    /// Where.
+    pub place: &'a [f64],
+    /// The height there.
+    pub height: f64,
+    /// Standard deviation of the height's error, in units of the belief's noise.
+    pub noise: f64,
+    /// The slope there, if it was observed too.
+    pub slope: Option<Slope<'a>>,
+}
+
+/// The gradient of the height at a place.
+#[derive(Clone, Copy, Debug)]
+pub struct Slope<'a> {
+    /// Its components, one per coordinate of the place.
+    pub gradient: &'a [f64],
+    /// Standard deviation of each component's error, in units of the belief's slope noise.
+    pub noise: f64,
+}
+
+impl<'a> Observation<'a> {
+    /// A height alone, with the belief's noise.
+    pub fn height(place: &'a [f64], height: f64) -> Self {
+        Self { place, height, noise: 1.0, slope: None }
+    }
+
+    /// How many numbers it is.
+    pub(super) fn order(&self) -> usize {
+        1 + self.slope.map_or(0, |_| self.place.len())
+    }
+
+    /// Variance of its height's error, in units of the signal's.
+    pub(super) fn height_noise2(&self, ratio: NoiseRatio) -> f64 {
+        ratio.height * ratio.height * (self.noise * self.noise)
+    }
+
+    /// Variance of its slopes' errors per length scale, in units of the signal's.
+    pub(super) fn slope_noise2(&self, ratio: NoiseRatio, length_scale: f64) -> f64 {
+        let noise = self.slope.map_or(0.0, |slope| slope.noise);
+        (ratio.slope * length_scale).powi(2) * (noise * noise)
+    }
+}
+
+/// Standard deviations of the errors, in units of the signal's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseRatio {
+    /// Of a height.
+    pub height: f64,
+    /// Of a slope, per unit of the inputs.
+    pub slope: f64,
+}
+
+impl From<f64> for NoiseRatio {
+    fn from(height: f64) -> Self {
+        Self { height, slope: 0.0 }
+    }
+}
+
+/// Places and what was observed there, stored coordinate by coordinate.
+///
+/// The numbers observed stand in the order in which they were taken in, at each place the height
+/// and then the slope along each axis, if any. A slope is counted per length scale, so that it has
+/// the unit of a height and one scale with it.
+#[derive(Clone, Debug, Default)]
+pub struct Observations {
+    columns: Vec<Vec<f64>>,
+    heights: Vec<f64>,
+    height_noise2: Vec<f64>,
+    slopes: Vec<f64>,
+    slope_noise2: Vec<f64>,
+    /// Where the numbers of each place begin.
+    starts: Vec<usize>,
+}
+
+impl Observations {
+    /// None yet, with `dimension` coordinates each.
+    pub fn new(dimension: usize) -> Self {
+        Self { columns: vec![Vec::new(); dimension], ..Self::default() }
+    }
+
+    /// Adds a height; `place` has `dimension` coordinates.
+    pub fn push(&mut self, place: &[f64], height: f64) {
+        self.take_in(&Observation::height(place, height));
+    }
+
+    /// Adds one observation; its place, and its slope if it has one, have `dimension` coordinates.
+    pub fn take_in(&mut self, observation: &Observation) {
+        self.starts.push(self.order());
+        for (column, at) in self.columns.iter_mut().zip(observation.place) {
+            column.push(*at);
+        }
+        self.heights.push(observation.height);
+        self.height_noise2.push(observation.noise * observation.noise);
+        if let Some(slope) = observation.slope {
+            self.slopes.extend(slope.gradient.iter().take(self.dimension()));
+        }
+        self.slope_noise2.push(observation.slope.map_or(0.0, |slope| slope.noise * slope.noise));
+    }
+
+    /// Number of coordinates.
+    pub fn dimension(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// How many places there are.
+    pub fn len(&self) -> usize {
+        self.heights.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.heights.is_empty()
+    }
+
+    /// How many numbers were observed: heights and slopes.
+    pub fn order(&self) -> usize {
+        self.heights.len() + self.slopes.len()
+    }
+
+    /// Whether any slope was observed.
+    pub fn has_slopes(&self) -> bool {
+        !self.slopes.is_empty()
+    }
+
+    /// At how many places a slope was observed.
+    pub fn sloped(&self) -> usize {
+        self.slopes.len() / self.dimension().max(1)
+    }
+
+    /// Coordinate `axis` of every place.
+    pub fn column(&self, axis: usize) -> &[f64] {
+        &self.columns[axis]
+    }
+
+    /// Where observation `i` was made.
+    pub fn place(&self, i: usize) -> impl Iterator<Item = f64> {
+        self.columns.iter().map(move |column| column[i])
+    }
+
+    /// The first one with a coordinate, height or slope that is not finite.
+    pub fn first_not_finite(&self) -> Option<usize> {
+        let columns = self.columns.iter().chain([&self.heights]);
+        let place = columns.filter_map(|column| column.iter().position(|x| !x.is_finite())).min();
+        let slope = (0..self.len()).find(|&i| self.slope(i).iter().any(|g| !g.is_finite()));
+        place.into_iter().chain(slope).min()
+    }
+
+    /// All heights in order.
+    pub fn heights(&self) -> &[f64] {
+        &self.heights
+    }
+
+    /// The gradient observed at place `i`; empty if none was.
+    pub fn slope(&self, i: usize) -> &[f64] {
+        let before = |i: usize| self.start(i) - i;
+        &self.slopes[before(i)..before(i + 1)]
+    }
+
+    /// Where the numbers of place `i` begin; of one beyond the last, the [`order`](Self::order).
+    pub(super) fn start(&self, i: usize) -> usize {
+        self.starts.get(i).copied().unwrap_or(self.order())
+    }
+
+    /// Writes the observed numbers: heights above `mean`, and slopes per length scale.
+    pub(super) fn residuals(&self, mean: f64, length_scales: &[f64], out: &mut Vec<f64>) {
+        out.clear();
+        if !self.has_slopes() {
+            out.extend(self.heights.iter().map(|y| y - mean));
+            return;
+        }
+        for (i, height) in self.heights.iter().enumerate() {
+            out.push(height - mean);
+            out.extend(self.slope(i).iter().zip(length_scales).map(|(slope, l)| slope * l));
+        }
+    }
+
+    /// Writes 1 for each height and 0 for each slope: how the numbers depend on the mean.
+    pub(super) fn ones(&self, out: &mut Vec<f64>) {
+        out.clear();
+        out.resize(self.order(), 0.0);
+        (0..self.len()).for_each(|i| out[self.start(i)] = 1.0);
+    }
+
+    /// Variance of the error of height `i`, in units of the signal's.
+    #[inline(always)]
+    pub(super) fn height_noise2(&self, i: usize, ratio: NoiseRatio) -> f64 {
+        ratio.height * ratio.height * self.height_noise2[i]
+    }
+
+    /// Variance of the error of the slopes at place `i` per length scale, in units of the signal's.
+    #[inline(always)]
+    pub(super) fn slope_noise2(&self, i: usize, ratio: NoiseRatio, length_scale: f64) -> f64 {
+        (ratio.slope * length_scale).powi(2) * self.slope_noise2[i]
+    }
+
+    /// Writes the scaled squared distances of the pairs in `columns` of the lower triangle, column
+    /// after column, each from below its diagonal down.
+    pub(super) fn distances2_below(
+        &self,
+        columns: Range<usize>,
+        length_scales: &[f64],
+        r2: &mut Vec<f64>,
+    ) {
+        r2.clear();
+        for j in columns {
+            let begin = r2.len();
+            r2.resize(begin + self.len() - j - 1, 0.0);
+            self.distances2(self.place(j), length_scales, j + 1, &mut r2[begin..]);
+        }
+    }
+
+    /// Writes the scaled squared distances Σ_d ((place_d − x_d) / l_d)² of `place` from the
+    /// observations beginning with `first`, as many as `r2` holds.
+    pub fn distances2(
+        &self,
+        place: impl Iterator<Item = f64>,
+        length_scales: &[f64],
+        first: usize,
+        r2: &mut [f64],
+    ) {
+        r2.fill(0.0);
+        for ((column, at), length) in self.columns.iter().zip(place).zip(length_scales) {
+            let column = &column[first..first + r2.len()];
+            let per_length = 1.0 / length;
+            widest(|| {
+                for (r2, x) in r2.iter_mut().zip(column) {
+                    let step = (at - x) * per_length;
+                    *r2 += step * step;
+                }
+            });
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! The exact posterior of a Gaussian process, Eq. 3 of Yi et al. 2016.
+
+use super::cholesky::{Factor, NotPositiveDefinite};
+use super::correlations::Correlations;
+use super::covariance;
+use super::covariance::CovarianceError;
+use super::dense::Dense;
+use super::derivative_covariance::DerivativeCovariance;
+use super::kernel::{Hyperparameters, Kernel};
+use super::observations::{Observation, Observations};
+use crate::math::simd::{dot, widest};
+
+/// Buffers of a query, so that asking allocates nothing.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    pub(super) slopes: Vec<f64>,
+    pub(super) solved: Vec<f64>,
+    jet: DerivativeCovariance,
+    row: Vec<f64>,
+}
+
+/// The belief after the observations: mean and variance of the height at any place.
+#[derive(Clone)]
+pub struct Posterior {
+    kernel: &'static dyn Kernel,
+    hyperparameters: Hyperparameters,
+    observations: Observations,
+    factor: Factor,
+    weights: Vec<f64>,
+    jitter: f64,
+}
+
+impl Posterior {
+    /// Conditions the prior on `observations`: n³/3 operations.
+    ///
+    /// # Errors
+    /// [`CovarianceError`] if the covariance cannot be factored.
+    pub fn new(
+        kernel: &'static dyn Kernel,
+        hyperparameters: Hyperparameters,
+        observations: Observations,
+    ) -> Result<Self, CovarianceError> {
+        let mut dense = Dense::new(observations.order());
+        let noise_ratio = hyperparameters.noise_ratio();
+        let lengths = &hyperparameters.length_scales;
+        let buffer = &mut Correlations::default();
+        let jitter =
+            covariance::factor(&mut dense, kernel, &observations, lengths, noise_ratio, buffer)?;
+        let factor = Factor::from(&dense);
+        let weights = Vec::new();
+        let mut new = Self { kernel, hyperparameters, observations, factor, weights, jitter };
+        new.weigh();
+        Ok(new)
+    }
+
+    /// Takes in one more height without factoring again: n² operations. The
+    /// hyperparameters stay.
+    ///
+    /// # Errors
+    /// If the enlarged covariance is not positive definite; nothing is taken in then, and
+    /// [`new`](Self::new) would find the jitter it needs.
+    pub fn add(&mut self, place: &[f64], height: f64) -> Result<(), NotPositiveDefinite> {
+        self.take_in(&Observation::height(place, height))
+    }
+
+    /// As [`add`](Self::add), of any observation.
+    ///
+    /// # Errors
+    /// As [`add`](Self::add).
+    pub fn take_in(&mut self, observation: &Observation) -> Result<(), NotPositiveDefinite> {
+        self.append(observation)?;
+        self.weigh();
+        Ok(())
+    }
+
+    fn append(&mut self, observation: &Observation) -> Result<(), NotPositiveDefinite> {
+        let order = self.observations.order();
+        let noise = self.hyperparameters.noise_ratio();
+        let mut scratch = Scratch::default();
+        for number in 0..observation.order() {
+            let axis = number.checked_sub(1);
+            self.covariances(observation.place, axis, &mut scratch);
+            let row = &mut scratch.solved;
+            // Height and slopes of one place do not tell of each other.
+            row.resize(order + number, 0.0);
+            row.push(match axis {
+                None => 1.0 + observation.height_noise2(noise) + self.jitter,
+                Some(axis) => {
+                    let prior = self.kernel.slope_variance();
+                    let length = self.hyperparameters.length_scales[axis];
+                    prior + observation.slope_noise2(noise, length) + self.jitter * prior
+                }
+            });
+            if let Err(indefinite) = self.factor.append(row) {
+                self.factor.truncate(order);
+                return Err(indefinite);
+            }
+        }
+        self.observations.take_in(observation);
+        Ok(())
+    }
+
+    /// What would be known of the variance if `places` had been touched as well; its mean means
+    /// nothing. n² operations for each.
+    ///
+    /// # Errors
+    /// [`CovarianceError`] if the enlarged covariance cannot be factored.
+    pub fn fantasize<'a>(
+        &self,
+        places: impl Iterator<Item = &'a [f64]> + Clone,
+    ) -> Result<Self, CovarianceError> {
+        let mut fantasize = self.clone();
+        if places
+            .clone()
+            .try_for_each(|place| fantasize.append(&Observation::height(place, 0.0)))
+            .is_ok()
+        {
+            return Ok(fantasize);
+        }
+        let mut observations = self.observations.clone();
+        places.for_each(|place| observations.push(place, 0.0));
+        Self::new(self.kernel, self.hyperparameters.clone(), observations)
+    }
+
+    fn weigh(&mut self) {
+        let Hyperparameters { mean, length_scales, .. } = &self.hyperparameters;
+        self.observations.residuals(*mean, length_scales, &mut self.weights);
+        self.factor.solve_lower(&mut self.weights);
+        self.factor.solve_upper(&mut self.weights);
+    }
+
+    /// Writes into `scratch.solved` the covariances of the height at `place`, or of its slope along
+    /// `axis` per length scale, with all that was observed; a slope's only if slopes were.
+    fn covariances(&self, place: &[f64], axis: Option<usize>, scratch: &mut Scratch) {
+        let lengths = &self.hyperparameters.length_scales;
+        let Scratch { solved, jet, .. } = scratch;
+        let at = place.iter().copied();
+        solved.resize(self.observations.order(), 0.0);
+        if self.observations.has_slopes() || axis.is_some() {
+            jet.look(self.kernel, &self.observations, lengths, at, 0);
+            jet.covariances(&self.observations, lengths, axis, solved);
+        } else {
+            self.observations.distances2(at, lengths, 0, solved);
+            self.kernel.correlate(solved);
+        }
+    }
+
+    /// Writes the gradient of Σ_i w_i·k(place, i), in units of the signal's variance, with respect to
+    /// the place looked at last by [`covariances`](Self::covariances).
+    fn gradient_with_slopes(
+        &self,
+        weights: &[f64],
+        (jet, row): (&DerivativeCovariance, &mut Vec<f64>),
+        gradient: &mut [f64],
+    ) {
+        let lengths = &self.hyperparameters.length_scales;
+        row.resize(self.observations.order(), 0.0);
+        for (axis, (slope, length)) in gradient.iter_mut().zip(lengths).enumerate() {
+            jet.covariances(&self.observations, lengths, Some(axis), row);
+            *slope = widest(|| dot(row, weights)) / length;
+        }
+    }
+
+    /// The hyperparameters it was made with.
+    pub fn hyperparameters(&self) -> &Hyperparameters {
+        &self.hyperparameters
+    }
+
+    /// What it was conditioned on.
+    pub fn observations(&self) -> &Observations {
+        &self.observations
+    }
+
+    /// Jitter the factorisation needed, relative to the diagonal signal_sd²; 0 if none.
+    pub fn jitter(&self) -> f64 {
+        self.jitter
+    }
+
+    /// Mean height m + k*ᵀ·K⁻¹·(y − m) at `place`.
+    pub fn mean(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
+        self.mean_with_correlations(place, scratch).0
+    }
+
+    /// The mean, and the correlations of `place` with the observations.
+    pub(super) fn mean_with_correlations<'a>(
+        &self,
+        place: &[f64],
+        scratch: &'a mut Scratch,
+    ) -> (f64, &'a [f64]) {
+        self.covariances(place, None, scratch);
+        let correlations = &scratch.solved;
+        let mean = self.hyperparameters.mean + widest(|| dot(correlations, &self.weights));
+        (mean, correlations)
+    }
+
+    /// As [`mean`](Self::mean), and writes its gradient with respect to the place.
+    pub fn mean_gradient(&self, place: &[f64], gradient: &mut [f64], scratch: &mut Scratch) -> f64 {
+        let lengths = &self.hyperparameters.length_scales;
+        if self.observations.has_slopes() {
+            self.covariances(place, None, scratch);
+            let Scratch { solved, jet, row, .. } = scratch;
+            self.gradient_with_slopes(&self.weights, (jet, row), gradient);
+            return self.hyperparameters.mean + widest(|| dot(solved, &self.weights));
+        }
+        let Scratch { solved, slopes, .. } = scratch;
+        solved.resize(self.observations.len(), 0.0);
+        slopes.resize(self.observations.len(), 0.0);
+        self.observations.distances2(place.iter().copied(), lengths, 0, solved);
+        self.kernel.correlate_slope(solved, slopes);
+        for (axis, (slope, at)) in gradient.iter_mut().zip(place).enumerate() {
+            let column = self.observations.column(axis);
+            let terms = self.weights.iter().zip(slopes.iter()).zip(column);
+            let sum: f64 = terms.map(|((weight, slope), x)| weight * slope * (at - x)).sum();
+            *slope = 2.0 * sum / (lengths[axis] * lengths[axis]);
+        }
+        self.hyperparameters.mean + widest(|| dot(solved, &self.weights))
+    }
+
+    /// Variance of the surface (without touch noise) k** − k*ᵀ·K⁻¹·k* at `place`, in [0, k**].
+    pub fn variance(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
+        self.remaining(self.whiten(place, scratch))
+    }
+
+    /// As [`variance`](Self::variance), and writes its gradient with respect to the place.
+    pub fn variance_gradient(
+        &self,
+        place: &[f64],
+        gradient: &mut [f64],
+        scratch: &mut Scratch,
+    ) -> f64 {
+        let lengths = &self.hyperparameters.length_scales;
+        if self.observations.has_slopes() {
+            let explained = self.whiten(place, scratch);
+            let Scratch { solved, jet, row, .. } = scratch;
+            self.factor.solve_upper(solved);
+            self.gradient_with_slopes(solved, (jet, row), gradient);
+            let signal2 = self.hyperparameters.signal_sd.powi(2);
+            gradient.iter_mut().for_each(|slope| *slope *= -2.0 * signal2);
+            return self.remaining(explained);
+        }
+        let Scratch { solved, slopes, .. } = scratch;
+        solved.resize(self.observations.len(), 0.0);
+        slopes.resize(self.observations.len(), 0.0);
+        self.observations.distances2(place.iter().copied(), lengths, 0, solved);
+        self.kernel.correlate_slope(solved, slopes);
+        let explained = self.factor.solve_lower(solved);
+        self.factor.solve_upper(solved);
+        let signal2 = self.hyperparameters.signal_sd.powi(2);
+        for (axis, (slope, at)) in gradient.iter_mut().zip(place).enumerate() {
+            let column = self.observations.column(axis);
+            let terms = solved.iter().zip(slopes.iter()).zip(column);
+            let sum: f64 = terms.map(|((solved, slope), x)| solved * slope * (at - x)).sum();
+            *slope = -4.0 * signal2 * sum / (lengths[axis] * lengths[axis]);
+        }
+        self.remaining(explained)
+    }
+
+    /// Writes L⁻¹·k* into `scratch.solved`, and returns the share of the variance at `place` that is
+    /// explained, its square.
+    pub(super) fn whiten(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
+        self.covariances(place, None, scratch);
+        self.factor.solve_lower(&mut scratch.solved)
+    }
+
+    pub(super) fn kernel(&self) -> &'static dyn Kernel {
+        self.kernel
+    }
+
+    pub(super) fn factor(&self) -> &Factor {
+        &self.factor
+    }
+
+    /// The variance left when `explained` of the prior's, as a share, is.
+    pub(super) fn remaining(&self, explained: f64) -> f64 {
+        self.hyperparameters.signal_sd.powi(2) * (1.0 - explained).max(0.0)
+    }
+}

@@ -1,0 +1,57 @@
+//! How much one more observation would lower the variance elsewhere (Cohn, Ghahramani & Jordan
+//! 1996).
+
+use super::observations::Observations;
+use super::posterior::{Posterior, Scratch};
+use crate::math::simd::{dot, widest};
+
+/// A posterior and the places at which its variance counts.
+pub struct Reduction<'a> {
+    posterior: &'a Posterior,
+    references: Observations,
+    /// L⁻¹·k(X, r) of each reference place r, one after the other.
+    whitened: Vec<f64>,
+}
+
+impl<'a> Reduction<'a> {
+    /// Prepares for `references`: n² operations for each.
+    pub fn new<'b>(posterior: &'a Posterior, references: impl Iterator<Item = &'b [f64]>) -> Self {
+        let mut places = Observations::new(posterior.observations().dimension());
+        let mut whitened = Vec::new();
+        let mut scratch = Scratch::default();
+        for place in references {
+            places.push(place, 0.0);
+            posterior.whiten(place, &mut scratch);
+            whitened.extend_from_slice(&scratch.solved);
+        }
+        Self { posterior, references: places, whitened }
+    }
+
+    /// Mean fall of the variance at the references if `place` were observed,
+    /// (1/m)·Σ_r k(r, x)² / (σ²(x) + noise²) with the posterior covariance k and variance σ²:
+    /// n² + n·m operations.
+    pub fn at(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
+        let explained = self.posterior.whiten(place, scratch);
+        let Scratch { solved, slopes: correlations, .. } = scratch;
+        correlations.resize(self.references.len(), 0.0);
+        let hyperparameters = self.posterior.hyperparameters();
+        let lengths = &hyperparameters.length_scales;
+        self.references.distances2(place.iter().copied(), lengths, 0, correlations);
+        self.posterior.kernel().correlate(correlations);
+        let squares: f64 = widest(|| {
+            let pairs = correlations.iter().enumerate();
+            pairs.map(|(r, prior)| (prior - self.explained(r, solved)).powi(2)).sum()
+        });
+        let signal2 = hyperparameters.signal_sd.powi(2);
+        let noise2 = hyperparameters.noise_sd.powi(2) / signal2 + self.posterior.jitter();
+        let variance = (1.0 - explained).max(0.0) + noise2;
+        signal2 * squares / (variance * self.references.len().max(1) as f64)
+    }
+
+    /// What the observations say of the covariance of reference `r` with the place of `solved`.
+    #[inline(always)]
+    fn explained(&self, r: usize, solved: &[f64]) -> f64 {
+        let start = r * solved.len();
+        dot(&self.whitened[start..start + solved.len()], solved)
+    }
+}

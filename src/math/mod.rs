@@ -1,0 +1,6 @@
+//! Mathematics that knows nothing of touch.
+
+pub mod normal;
+pub mod optimize;
+pub mod seed;
+pub mod simd;

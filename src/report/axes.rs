@@ -1,0 +1,253 @@
+//! Axes: from data to pixels, with ticks at round numbers.
+
+use super::canvas::{Anchor, Area, Canvas, Point};
+use super::style;
+use super::style::{FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
+use crate::task::Zone;
+
+/// A unit of length for labels.
+#[derive(Clone, Copy, Debug)]
+pub struct Length {
+    /// How many make a metre.
+    pub per_m: f64,
+    /// Its symbol.
+    pub symbol: &'static str,
+}
+
+/// Millimetres.
+pub const MM: Length = Length { per_m: 1e3, symbol: "mm" };
+
+impl Length {
+    /// Metres for a zone of a metre or more, millimetres for a smaller one.
+    pub fn of(zone: &Zone) -> Self {
+        match zone.extents_m().iter().any(|&side| side >= 1.0) {
+            true => Self { per_m: 1.0, symbol: "m" },
+            false => MM,
+        }
+    }
+}
+
+/// A range of values along one side of a panel.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    low: f64,
+    high: f64,
+    is_log: bool,
+    aim: f64,
+}
+
+impl Axis {
+    /// From `low` to `high`, with about `aim` ticks.
+    pub fn linear(low: f64, high: f64, aim: f64) -> Self {
+        let (low, high) = if high > low { (low, high) } else { (low - 0.5, low + 0.5) };
+        Self { low, high, is_log: false, aim }
+    }
+
+    /// Around all `values` with a margin, as a fraction of their range.
+    pub fn around(values: impl IntoIterator<Item = f64>, margin: f64, aim: f64) -> Option<Self> {
+        let (low, high) = range(values)?;
+        let margin = margin * (high - low);
+        Some(Self::linear(low - margin, high + margin, aim))
+    }
+
+    /// A logarithmic axis around the positive ones of `values`.
+    pub fn log(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let (low, high) = range(values.into_iter().filter(|&value| value > 0.0))?;
+        Some(Self { low: low / 1.25, high: high * 1.25, is_log: true, aim: 5.0 })
+    }
+
+    /// Smallest and largest value.
+    pub fn range(&self) -> (f64, f64) {
+        (self.low, self.high)
+    }
+
+    /// How far along `value` lies, 0 to 1 between the ends.
+    pub fn fraction(&self, value: f64) -> f64 {
+        match self.is_log {
+            true => (value / self.low).ln() / (self.high / self.low).ln(),
+            false => (value - self.low) / (self.high - self.low),
+        }
+    }
+
+    /// Values to label, with their labels.
+    pub fn ticks(&self) -> Vec<(f64, String)> {
+        match self.is_log {
+            true => self.log_ticks(),
+            false => self.linear_ticks(),
+        }
+    }
+
+    fn linear_ticks(&self) -> Vec<(f64, String)> {
+        let rough = (self.high - self.low) / self.aim;
+        let power = 10f64.powf(rough.log10().floor());
+        let step =
+            [1.0, 2.0, 5.0, 10.0].map(|digit| digit * power).into_iter().find(|&s| s >= rough);
+        let step = step.unwrap_or(rough);
+        let decimals = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
+        let slack = 1e-9 * step;
+        let first = ((self.low - slack) / step).ceil() as i64;
+        let last = ((self.high + slack) / step).floor() as i64;
+        (first..=last)
+            .map(|i| i as f64 * step)
+            .map(|value| (value, format!("{value:.decimals$}").replace('-', "−")))
+            .collect()
+    }
+
+    fn log_ticks(&self) -> Vec<(f64, String)> {
+        let decades = (self.low.log10().floor() as i32)..=(self.high.log10().ceil() as i32);
+        let digits: &[f64] = match (self.high / self.low).log10() {
+            span if span < 1.0 => &[1.0, 2.0, 3.0, 5.0, 7.0],
+            span if span < 2.0 => &[1.0, 2.0, 5.0],
+            _ => &[1.0],
+        };
+        decades
+            .flat_map(|power| digits.iter().map(move |digit| (digit, power)))
+            .map(|(digit, power)| {
+                let decimals = (-power).max(0) as usize;
+                let value = digit * 10f64.powi(power);
+                (value, format!("{value:.decimals$}"))
+            })
+            .filter(|(value, _)| (self.low..=self.high).contains(value))
+            .collect()
+    }
+}
+
+/// Smallest and largest of the finite values.
+pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    values.into_iter().filter(|value| value.is_finite()).fold(None, |range, value| {
+        let (low, high) = range.unwrap_or((value, value));
+        Some((low.min(value), high.max(value)))
+    })
+}
+
+/// A number without needless decimals, for a label.
+pub fn rounded(value: f64) -> String {
+    // Adding zero turns a negative zero into a positive one.
+    let value = (value * 1e3).round() / 1e3 + 0.0;
+    value.to_string().replace('-', "−")
+}
+
+/// A rectangle with two axes.
+pub struct Panel {
+    /// The rectangle that holds the data.
+    pub area: Area,
+    /// To the right.
+    pub x: Axis,
+    /// Upwards.
+    pub y: Axis,
+}
+
+impl Panel {
+    /// Where a value lies on the sheet.
+    pub fn at(&self, x: f64, y: f64) -> Point {
+        [
+            self.area.left + self.x.fraction(x) * self.area.width,
+            self.area.bottom() - self.y.fraction(y) * self.area.height,
+        ]
+    }
+
+    /// Grid lines, ticks and frame.
+    pub fn frame(&self, canvas: &mut Canvas) {
+        let Area { left, top, .. } = self.area;
+        let (right, bottom) = (self.area.right(), self.area.bottom());
+        for (value, label) in self.x.ticks() {
+            let x = self.at(value, 0.0)[0];
+            canvas.line([[x, top], [x, bottom]], &style::stroke(GRID, 1.0));
+            canvas.text([x, bottom + 16.0], &label, SMALL_PX, Anchor::Middle);
+        }
+        for (value, label) in self.y.ticks() {
+            let y = self.at(0.0, value)[1];
+            canvas.line([[left, y], [right, y]], &style::stroke(GRID, 1.0));
+            canvas.text([left - 7.0, y + 4.0], &label, SMALL_PX, Anchor::End);
+        }
+        canvas.rect(self.area, &style::stroke(FAINT_INK, 1.0));
+    }
+
+    /// What stands above and beside the panel; empty words are left out.
+    pub fn label(&self, canvas: &mut Canvas, title: &str, x: &str, y: &str) {
+        let [centre_x, centre_y] = self.area.centre();
+        canvas.text([centre_x, self.area.top - 9.0], title, TEXT_PX, Anchor::Middle);
+        canvas.text([centre_x, self.area.bottom() + 35.0], x, TEXT_PX, Anchor::Middle);
+        canvas.upward_text([self.area.left - 46.0, centre_y], y, TEXT_PX);
+    }
+
+    /// A line through values, cut off at the frame.
+    pub fn curve(&self, canvas: &mut Canvas, values: &[(f64, f64)], attributes: &str) {
+        canvas.clipped(self.area, |canvas| {
+            canvas.line(values.iter().map(|&(x, y)| self.at(x, y)), attributes);
+        });
+    }
+
+    /// The area between two curves over the same places (x, low, high), cut off at the frame.
+    pub fn band(&self, canvas: &mut Canvas, values: &[(f64, f64, f64)], colour: &str) {
+        let upper = values.iter().map(|&(x, _, high)| self.at(x, high));
+        let lower = values.iter().rev().map(|&(x, low, _)| self.at(x, low));
+        canvas.clipped(self.area, |canvas| {
+            canvas.polygon(upper.chain(lower), &style::fill(colour, 0.22));
+        });
+    }
+}
+
+/// Draws samples with their words in a row, from `at` to the right.
+pub fn legend(canvas: &mut Canvas, at: Point, entries: &[(Sample, &str)]) {
+    let [mut x, y] = at;
+    for (sample, words) in entries {
+        sample.draw(canvas, [x + 11.0, y]);
+        canvas.text([x + 28.0, y + 4.5], words, TEXT_PX, Anchor::Start);
+        // No font metrics here: room for the widest common sans-serif.
+        x += 28.0 + 7.4 * words.chars().count() as f64 + 18.0;
+    }
+}
+
+/// What a legend shows beside its words.
+pub enum Sample {
+    /// A line with these attributes.
+    Line(String),
+    /// A band in this colour.
+    Band(&'static str),
+    /// A cross in this colour.
+    Cross(&'static str),
+    /// A circle with these attributes.
+    Circle(String),
+    /// A hollow diamond in this colour.
+    Diamond(&'static str),
+}
+
+impl Sample {
+    fn draw(&self, canvas: &mut Canvas, [x, y]: Point) {
+        match self {
+            Self::Line(attributes) => canvas.line([[x - 11.0, y], [x + 11.0, y]], attributes),
+            Self::Band(colour) => {
+                let area = Area { left: x - 11.0, top: y - 6.0, width: 22.0, height: 12.0 };
+                canvas.rect(area, &style::fill(colour, 0.22));
+            }
+            Self::Cross(colour) => canvas.cross([x, y], colour),
+            Self::Circle(attributes) => canvas.circle([x, y], 3.6, attributes),
+            Self::Diamond(colour) => canvas.diamond([x, y], &style::stroke(colour, 1.3)),
+        }
+    }
+}
+
+/// A horizontal bar of colours with its scale below.
+pub fn colour_bar(
+    canvas: &mut Canvas,
+    area: Area,
+    axis: &Axis,
+    words: &str,
+    colour: impl Fn(f64) -> String,
+) {
+    const STEPS: usize = 64;
+    for i in 0..STEPS {
+        let width = area.width / STEPS as f64;
+        let step = Area { left: area.left + i as f64 * width, width, ..area };
+        let attributes = style::fill(&colour((i as f64 + 0.5) / STEPS as f64), 1.0);
+        canvas.rect(step, &(attributes + r#" shape-rendering="crispEdges""#));
+    }
+    canvas.rect(area, &style::stroke(FAINT_INK, 0.8));
+    for (value, label) in axis.ticks() {
+        let x = area.left + axis.fraction(value) * area.width;
+        canvas.line([[x, area.bottom()], [x, area.bottom() + 4.0]], &style::stroke(INK, 0.8));
+        canvas.text([x, area.bottom() + 17.0], &label, SMALL_PX, Anchor::Middle);
+    }
+    canvas.text([area.left - 10.0, area.bottom() - 1.0], words, TEXT_PX, Anchor::End);
+}

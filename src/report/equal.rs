@@ -1,0 +1,128 @@
+//! Touches to equal error, as tables of the page and as a file.
+
+use super::paired::{Table, with_interval};
+use super::replay::digits;
+use super::table::write_lines;
+use crate::experiment::comparison::BASELINES;
+use crate::experiment::equal_error::{ERRORS, EqualError, Estimate};
+use crate::experiment::store::Run;
+use serde::Serialize;
+use std::path::Path;
+
+/// A table for each baseline that ran: a line for each other planner, a column for each error.
+pub fn tables(run: &Run, found: &[EqualError]) -> Vec<Table> {
+    let most = run.experiment.touches;
+    let table = |baseline: &str| {
+        let of_baseline: Vec<&EqualError> =
+            found.iter().filter(|equal| equal.baseline == baseline).collect();
+        let shown = |error: &str| of_baseline.iter().find(|equal| equal.measure.name == error);
+        let errors: Vec<_> = ERRORS.iter().filter_map(|error| shown(error.name)).collect();
+        let head = |equal: &&&EqualError| {
+            let (unit, per_si) = equal.measure.shown_in;
+            format!(
+                "{}: {} {unit}, {baseline} {}",
+                equal.measure.title,
+                digits(per_si * equal.goal),
+                touches(equal.baseline_touches, most)
+            )
+        };
+        let lines = run.experiment.planners.iter().filter_map(|planner| {
+            let of = |error: &str| {
+                let is_it =
+                    |equal: &&&EqualError| equal.planner == planner && equal.measure.name == error;
+                of_baseline.iter().find(is_it).map(|equal| cell(equal, most))
+            };
+            let cells: Vec<_> = errors.iter().map(|error| of(error.measure.name)).collect();
+            cells.iter().any(Option::is_some).then(|| {
+                let cells = cells.into_iter().map(|cell| cell.unwrap_or("-".into()));
+                std::iter::once(planner.clone()).chain(cells).collect()
+            })
+        });
+        let lines = lines.collect();
+        let first = format!("to the error of {baseline}");
+        Table { header: std::iter::once(first).chain(errors.iter().map(head)).collect(), lines }
+    };
+    BASELINES.into_iter().map(table).filter(|table| !table.lines.is_empty()).collect()
+}
+
+/// What the cells are.
+pub fn note(run: &Run) -> String {
+    format!(
+        "Touches, initial ones included, after which a planner\u{2019}s median error stays at or below \
+         the one in the column\u{2019}s head, which is the baseline\u{2019}s after {} touches; behind \
+         \u{d7} their ratio to the baseline\u{2019}s own count, and that of the lateral ways after the \
+         initial touches. All with the 95 % interval of a bootstrap over trials: a planner saves \
+         touches for certain where the ratio\u{2019}s interval stays below 1.",
+        run.experiment.goal_touches()
+    )
+}
+
+/// A line of `equal_error.csv`; a count or ratio is left out where the error is not reached.
+#[derive(Serialize)]
+struct Line<'a> {
+    planner: &'a str,
+    baseline: &'a str,
+    measure: &'a str,
+    trials: usize,
+    goal: f64,
+    baseline_touches: Option<f64>,
+    touches: Option<f64>,
+    touches_low: Option<f64>,
+    touches_high: Option<f64>,
+    ratio: Option<f64>,
+    ratio_low: Option<f64>,
+    ratio_high: Option<f64>,
+    path_ratio: Option<f64>,
+    path_ratio_low: Option<f64>,
+    path_ratio_high: Option<f64>,
+}
+
+/// Writes `equal_error.csv`: a line per planner, baseline and error.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_csv(found: &[EqualError], folder: &Path) -> anyhow::Result<()> {
+    let finite = |value: f64| value.is_finite().then_some(value);
+    let end = |estimate: &Estimate, end: usize| finite(estimate.interval?[end]);
+    let lines = found.iter().map(|equal| Line {
+        planner: equal.planner,
+        baseline: equal.baseline,
+        measure: equal.measure.name,
+        trials: equal.trials,
+        goal: equal.goal,
+        baseline_touches: finite(equal.baseline_touches),
+        touches: finite(equal.touches.value),
+        touches_low: end(&equal.touches, 0),
+        touches_high: end(&equal.touches, 1),
+        ratio: finite(equal.ratio.value),
+        ratio_low: end(&equal.ratio, 0),
+        ratio_high: end(&equal.ratio, 1),
+        path_ratio: finite(equal.path_ratio.value),
+        path_ratio_low: end(&equal.path_ratio, 0),
+        path_ratio_high: end(&equal.path_ratio, 1),
+    });
+    write_lines(&folder.join("equal_error.csv"), lines)
+}
+
+fn cell(equal: &EqualError, most: u32) -> String {
+    let shown = |estimate: &Estimate, shown: &dyn Fn(f64) -> String| {
+        with_interval(estimate.value, estimate.interval, shown)
+    };
+    // Without a count there is no ratio, and of its interval at most the lower end.
+    if !equal.touches.value.is_finite() {
+        let low = equal.touches.interval.map_or(f64::INFINITY, |[low, _]| low);
+        let some = if low.is_finite() { format!(", {low:.0} at least") } else { String::new() };
+        return format!("{}{some}", touches(f64::INFINITY, most));
+    }
+    let ratio = |ratio: f64| if ratio.is_finite() { format!("{ratio:.2}") } else { "–".into() };
+    format!(
+        "{} \u{d7} {}; way \u{d7} {}",
+        shown(&equal.touches, &|count| touches(count, most)),
+        shown(&equal.ratio, &ratio),
+        shown(&equal.path_ratio, &ratio),
+    )
+}
+
+fn touches(count: f64, most: u32) -> String {
+    if count.is_finite() { format!("{count:.0}") } else { format!("over {most}") }
+}

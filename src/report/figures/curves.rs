@@ -1,0 +1,147 @@
+//! Beliefs of a curve after some touches, Fig. 3 of Yi et al. 2016.
+
+use super::{Figure, miss_entry};
+use crate::experiment::store::Run;
+use crate::gp::Posterior;
+use crate::gp::posterior::Scratch;
+use crate::report::axes::{Axis, Length, Panel, Sample, legend};
+use crate::report::canvas::{Anchor, Area, Canvas};
+use crate::report::replay;
+use crate::report::replay::Replay;
+use crate::report::style;
+use crate::report::style::{FAINT_INK, INITIAL, INK, LATER, SMALL_PX, TEXT_PX, TRUTH};
+use crate::task::Zone;
+
+pub(super) const FIGURE: Figure = Figure { name: "curves", caption, draw };
+
+fn caption(run: &Run) -> String {
+    format!(
+        "Beliefs of trial {} after some touches: posterior mean, its 95 % band, and the true \
+         surface. Blue crosses are the {} initial touches, red ones those the planner chose. \
+         Corresponds to Fig. 3 of the paper.",
+        run.experiment.report.trial, run.experiment.initial_touches
+    )
+}
+
+/// Places at which curves are read.
+const STEPS: usize = 300;
+/// Half-width of a 95 % band in standard deviations.
+const BAND_SD: f64 = 1.96;
+const MARGIN: (f64, f64) = (72.0, 80.0);
+const PANEL: (f64, f64) = (236.0, 188.0);
+const GAP: (f64, f64) = (22.0, 68.0);
+
+fn draw(run: &Run) -> anyhow::Result<Option<String>> {
+    let zone = &run.experiment.scene.zone;
+    let (planners, counts) = (run.experiment.drawn_planners(), run.experiment.drawn_touch_counts());
+    if zone.dimension() != 1 || !planners.iter().any(|name| replay::row(run, name).is_some()) {
+        return Ok(None);
+    }
+    let Some(y) = height_axis(run) else { return Ok(None) };
+    let (columns, rows) = (counts.len() as f64, planners.len() as f64);
+    let mut canvas =
+        Canvas::new(MARGIN.0 + columns * (PANEL.0 + GAP.0), MARGIN.1 + rows * (PANEL.1 + GAP.1));
+    draw_legend(&mut canvas, run);
+    let unit = Length::of(zone);
+    for (row, planner) in planners.iter().enumerate() {
+        for (column, &count) in counts.iter().enumerate() {
+            let area = Area {
+                left: MARGIN.0 + column as f64 * (PANEL.0 + GAP.0),
+                top: MARGIN.1 + row as f64 * (PANEL.1 + GAP.1),
+                width: PANEL.0,
+                height: PANEL.1,
+            };
+            let [low, high] = zone.x_m.map(|x| x * unit.per_m);
+            let panel = Panel { area, x: Axis::linear(low, high, 5.0), y: y.clone() };
+            let replay = Replay::new(run, planner, count)?;
+            let score = match &replay {
+                Some(replay) => replay.score(),
+                None => "not reached in this trial".into(),
+            };
+            let is_last_row = row + 1 == planners.len();
+            panel.frame(&mut canvas);
+            let x_label = if is_last_row { format!("x ({})", unit.symbol) } else { String::new() };
+            let y_label = format!("{planner}: height ({})", unit.symbol);
+            let above = [area.centre()[0], area.top - 24.0];
+            canvas.text(above, &format!("{count} touches"), TEXT_PX, Anchor::Middle);
+            let above = [above[0], area.top - 8.0];
+            canvas.coloured_text(above, &score, SMALL_PX, Anchor::Middle, FAINT_INK);
+            panel.label(&mut canvas, "", &x_label, if column == 0 { &y_label } else { "" });
+            if let Some(replay) = replay {
+                let colour = style::planner(&run.experiment.planners, planner);
+                draw_belief(&mut canvas, &panel, run, &replay, colour);
+            }
+        }
+    }
+    Ok(Some(canvas.finish()))
+}
+
+/// Room for the truth and every drawn touch, and nearly as much again for the bands.
+pub(super) fn height_axis(run: &Run) -> Option<Axis> {
+    let per_m = Length::of(&run.experiment.scene.zone).per_m;
+    let heights_m = replay::heights_m(run, run.experiment.drawn_planners());
+    Axis::around(heights_m.map(|height_m| height_m * per_m), 0.4, 5.0)
+}
+
+fn draw_legend(canvas: &mut Canvas, run: &Run) {
+    let mut entries = vec![
+        (Sample::Line(style::stroke(TRUTH, 2.0)), "true surface"),
+        (Sample::Line(style::stroke(INK, 1.6)), "posterior mean"),
+        (Sample::Band(INK), "95 % band"),
+        (Sample::Cross(INITIAL), "initial touch"),
+        (Sample::Cross(LATER), "later touch"),
+    ];
+    entries.extend(miss_entry(run));
+    legend(canvas, [MARGIN.0, 20.0], &entries);
+}
+
+/// The belief in `panel`: band, truth, mean, touches.
+pub(super) fn draw_belief(
+    canvas: &mut Canvas,
+    panel: &Panel,
+    run: &Run,
+    replay: &Replay,
+    colour: &str,
+) {
+    let zone = &run.experiment.scene.zone;
+    let per_m = Length::of(zone).per_m;
+    let belief = read(zone, &replay.surface);
+    let band: Vec<(f64, f64, f64)> = belief
+        .iter()
+        .map(|&(x, mean, sd)| (x, mean - BAND_SD * sd, mean + BAND_SD * sd))
+        .map(|(x, low, high)| (x * per_m, low * per_m, high * per_m))
+        .collect();
+    panel.band(canvas, &band, colour);
+    let truth: Vec<(f64, f64)> = (run.truth.places.iter().zip(&run.truth.heights_m))
+        .filter_map(|(place, height)| Some((place.first()? * per_m, (*height)? * per_m)))
+        .collect();
+    panel.curve(canvas, &truth, &style::stroke(TRUTH, 2.0));
+    let mean: Vec<(f64, f64)> =
+        belief.iter().map(|&(x, mean, _)| (x * per_m, mean * per_m)).collect();
+    panel.curve(canvas, &mean, &style::stroke(INK, 1.5));
+    canvas.clipped(panel.area, |canvas| {
+        for (touch, is_initial) in replay.marks() {
+            let colour = if is_initial { INITIAL } else { LATER };
+            match replay::contact(zone, touch) {
+                Some((place, height)) => {
+                    canvas.cross(panel.at(place[0] * per_m, height * per_m), colour);
+                }
+                None => {
+                    let [x, _] = panel.at(touch.target[0] * per_m, 0.0);
+                    canvas.diamond([x, panel.area.bottom() - 6.0], &style::stroke(colour, 1.3));
+                }
+            }
+        }
+    });
+}
+
+/// (x, mean, standard deviation) along the zone.
+fn read(zone: &Zone, surface: &Posterior) -> Vec<(f64, f64, f64)> {
+    let mut scratch = Scratch::default();
+    (zone.grid(STEPS).into_iter())
+        .map(|place| {
+            let mean = surface.mean(&place, &mut scratch);
+            (place[0], mean, surface.variance(&place, &mut scratch).sqrt())
+        })
+        .collect()
+}

@@ -1,0 +1,181 @@
+//! Beliefs of a surface after some touches, Figs. 5 and 7 of Yi et al. 2016.
+
+use super::{Figure, miss_entry};
+use crate::experiment::row::TouchRow;
+use crate::experiment::store::Run;
+use crate::gp::posterior::Scratch;
+use crate::report::axes::{Axis, Length, Sample, colour_bar, legend};
+use crate::report::canvas::{Area, Canvas, Point};
+use crate::report::relief::{Relief, Space};
+use crate::report::replay;
+use crate::report::replay::Replay;
+use crate::report::sheet::Sheet;
+use crate::report::style;
+use crate::report::style::{INITIAL, LATER, PAPER};
+use anyhow::ensure;
+
+/// Beliefs beside the true surface.
+pub const FIGURE: Figure = Figure { name: "surfaces", caption, draw };
+
+fn caption(run: &Run) -> String {
+    let stretch = space(run).map_or(1.0, |space| space.stretch());
+    let stretched = match stretch > 1.0 {
+        true => format!(" Heights are stretched {stretch:.1} times."),
+        false => String::new(),
+    };
+    format!(
+        "Posterior mean over the zone in trial {} after some touches, and the true object on the \
+         right, all in the same view, scale and colours. Blue points are the {} initial touches, \
+         red ones those the planner chose.{stretched} Corresponds to Figs. 5 and 7 of the paper.",
+        run.experiment.report.trial, run.experiment.initial_touches
+    )
+}
+
+/// Faces along each side of a relief; more would not show at this size.
+const FACES: usize = 40;
+const MARGIN: (f64, f64) = (24.0, 44.0);
+const PANEL: (f64, f64) = (252.0, 316.0);
+const FOOT_PX: f64 = 62.0;
+
+fn draw(run: &Run) -> anyhow::Result<Option<String>> {
+    let (planners, counts) = (run.experiment.drawn_planners(), run.experiment.drawn_touch_counts());
+    let Some(space) = space(run) else { return Ok(None) };
+    if !planners.iter().any(|planner| replay::row(run, planner).is_some()) {
+        return Ok(None);
+    }
+    let grid = Grid::new(run)?;
+    let unit = Length::of(&run.experiment.scene.zone);
+    let (columns, rows) = (counts.len() as f64 + 1.0, planners.len() as f64);
+    let (width, height) = (columns * PANEL.0, MARGIN.1 + rows * PANEL.1 + FOOT_PX);
+    let mut canvas = Canvas::new(width + 2.0 * MARGIN.0, height);
+    draw_legend(&mut canvas, run);
+    let area = |row: f64, column: usize| Area {
+        left: MARGIN.0 + column as f64 * PANEL.0,
+        top: MARGIN.1 + row * PANEL.1,
+        width: PANEL.0,
+        height: PANEL.1,
+    };
+    let [low, high] = space.height_m;
+    let axis = Axis::linear(low, high, 5.0);
+    for (row, planner) in planners.iter().enumerate() {
+        for (column, &count) in counts.iter().enumerate() {
+            let sheet = Sheet::new(unit, area(row as f64, column), space);
+            let replay = Replay::new(run, planner, count)?;
+            let score = match &replay {
+                Some(replay) => replay.score(),
+                None => "not reached in this trial".into(),
+            };
+            sheet.frame(&mut canvas, &format!("{planner}, {count} touches"), &score);
+            if let Some(replay) = replay {
+                let mut scratch = Scratch::default();
+                let heights =
+                    grid.heights(|place, _| Some(replay.surface.mean(place, &mut scratch)));
+                let relief = Relief::new(&sheet.view, &grid.xs, &grid.zs, &heights, &axis);
+                relief.draw(&mut canvas);
+                for (touch, is_initial) in replay.marks() {
+                    mark(&sheet, &mut canvas, run, &relief, (touch, is_initial));
+                }
+            }
+        }
+    }
+    let sheet = Sheet::new(unit, area(0.5 * (rows - 1.0), counts.len()), space);
+    sheet.frame(&mut canvas, "true object", "");
+    let heights = grid.heights(|_, height| Some(height));
+    Relief::new(&sheet.view, &grid.xs, &grid.zs, &heights, &axis).draw(&mut canvas);
+    draw_colour_bar(&mut canvas, run, space, [0.5 * width, height - FOOT_PX + 14.0]);
+    Ok(Some(canvas.finish()))
+}
+
+/// What is drawn: the zone, and heights around the truth and the drawn touches; none in 1-D.
+fn space(run: &Run) -> Option<Space> {
+    let zone = &run.experiment.scene.zone;
+    let (low, high) =
+        Axis::around(replay::heights_m(run, run.experiment.drawn_planners()), 0.08, 5.0)?.range();
+    Some(Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: [low, high] })
+}
+
+/// Some of the test grid's places.
+struct Grid<'a> {
+    run: &'a Run,
+    side: usize,
+    picked: Vec<usize>,
+    xs: Vec<f64>,
+    zs: Vec<f64>,
+}
+
+impl<'a> Grid<'a> {
+    fn new(run: &'a Run) -> anyhow::Result<Self> {
+        let (side, places) = (run.experiment.grid as usize, &run.truth.places);
+        ensure!(
+            places.len() == side * side && side > 1,
+            "the true surface has {} places on a grid of {side} × {side}",
+            places.len()
+        );
+        let faces = (side - 1).min(FACES);
+        let picked: Vec<usize> = (0..=faces).map(|i| i * (side - 1) / faces).collect();
+        let xs = picked.iter().map(|&i| places[i][0]).collect();
+        let zs = picked.iter().map(|&j| places[j * side][1]).collect();
+        Ok(Self { run, side, picked, xs, zs })
+    }
+
+    /// A height for each place that has a true one, given that.
+    fn heights(&self, mut height: impl FnMut(&[f64], f64) -> Option<f64>) -> Vec<Option<f64>> {
+        let truth = &self.run.truth;
+        (self.picked.iter())
+            .flat_map(|&j| self.picked.iter().map(move |&i| j * self.side + i))
+            .map(|index| height(&truth.places[index], truth.heights_m[index]?))
+            .collect()
+    }
+}
+
+/// A touch: a point where it met the surface, hollow if that is hidden; a diamond at the
+/// back where it met nothing.
+fn mark(
+    sheet: &Sheet,
+    canvas: &mut Canvas,
+    run: &Run,
+    relief: &Relief,
+    (touch, is_initial): (&TouchRow, bool),
+) {
+    let colour = if is_initial { INITIAL } else { LATER };
+    match replay::contact(&run.experiment.scene.zone, touch) {
+        Some((place, height)) => {
+            let point = [place[0], height, place[1]];
+            let attributes = match relief.hides(&sheet.view, point) {
+                true => hidden(colour),
+                false => visible(colour),
+            };
+            canvas.circle(sheet.view.at(point), 3.1, &attributes);
+        }
+        None => {
+            let at = [touch.target[0], sheet.space.height_m[0], touch.target[1]];
+            canvas.diamond(sheet.view.at(at), &style::stroke(colour, 1.3));
+        }
+    }
+}
+
+fn visible(colour: &str) -> String {
+    format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".9""#)
+}
+
+fn hidden(colour: &str) -> String {
+    format!(r#"fill="{PAPER}" fill-opacity=".35" stroke="{colour}" stroke-width="1.1""#)
+}
+
+fn draw_legend(canvas: &mut Canvas, run: &Run) {
+    let mut entries = vec![
+        (Sample::Circle(visible(INITIAL)), "initial touch"),
+        (Sample::Circle(visible(LATER)), "later touch"),
+        (Sample::Circle(hidden(LATER)), "behind the surface"),
+    ];
+    entries.extend(miss_entry(run));
+    legend(canvas, [MARGIN.0, 20.0], &entries);
+}
+
+fn draw_colour_bar(canvas: &mut Canvas, run: &Run, space: Space, [middle, top]: Point) {
+    let unit = Length::of(&run.experiment.scene.zone);
+    let [low, high] = space.height_m.map(|height| height * unit.per_m);
+    let area = Area { left: middle - 60.0, top, width: 320.0, height: 13.0 };
+    let words = format!("height above the datum ({})", unit.symbol);
+    colour_bar(canvas, area, &Axis::linear(low, high, 6.0), &words, |t| style::height(t, 1.0));
+}

@@ -1,0 +1,104 @@
+//! Where the finger was sent and where it met the object, seen along the approach.
+
+use super::{Figure, miss_entry};
+use crate::experiment::store::Run;
+use crate::report::axes::{Axis, Length, Panel, Sample, legend};
+use crate::report::canvas::{Area, Canvas};
+use crate::report::replay;
+use crate::report::style;
+use crate::report::style::{FAINT_INK, INITIAL, LATER, PAPER};
+
+pub(super) const FIGURE: Figure = Figure { name: "targets", caption, draw };
+
+fn caption(run: &Run) -> String {
+    let shift = match shift_mm(run) {
+        Some(shift) => format!(
+            " Over all trials, half of the contacts lie more than {} mm beside their target.",
+            replay::digits(shift)
+        ),
+        None => String::new(),
+    };
+    format!(
+        "Targets (rings) and contacts (points) of trial {}, seen along the approach: the finger is \
+         as wide as it is, and touches a slope beside its tip.{shift}",
+        run.experiment.report.trial
+    )
+}
+
+/// Median distance between target and contact in the zone's plane.
+fn shift_mm(run: &Run) -> Option<f64> {
+    let zone = &run.experiment.scene.zone;
+    let shifts: Vec<f64> = (run.rows.iter().flat_map(|row| &row.touches))
+        .filter_map(|touch| {
+            let (place, _) = replay::contact(zone, touch)?;
+            let square = |(a, b): (&f64, &f64)| (a - b).powi(2);
+            Some(1e3 * place.iter().zip(&touch.target).map(square).sum::<f64>().sqrt())
+        })
+        .collect();
+    crate::experiment::statistics::median(&shifts)
+}
+
+const PANEL_PX: (f64, f64) = (300.0, 300.0);
+const LEFT_PX: f64 = 66.0;
+const TOP_PX: f64 = 66.0;
+/// Share of the zone's side drawn around it: contacts may lie outside.
+const MARGIN: f64 = 0.12;
+
+fn draw(run: &Run) -> anyhow::Result<Option<String>> {
+    let zone = &run.experiment.scene.zone;
+    let Some(z_m) = zone.z_m else { return Ok(None) };
+    let rows: Vec<_> = (run.experiment.drawn_planners().into_iter())
+        .filter_map(|planner| replay::row(run, planner))
+        .collect();
+    if rows.is_empty() {
+        return Ok(None);
+    }
+    let unit = Length::of(zone);
+    let axis = |[low, high]: [f64; 2]| {
+        let margin = MARGIN * (high - low);
+        Axis::linear((low - margin) * unit.per_m, (high + margin) * unit.per_m, 5.0)
+    };
+    let step_px = PANEL_PX.0 + 84.0;
+    let width = LEFT_PX + rows.len() as f64 * step_px;
+    let mut canvas = Canvas::new(width.max(760.0), TOP_PX + PANEL_PX.1 + 60.0);
+    let mut entries = vec![
+        (Sample::Circle(ring(LATER)), "target"),
+        (Sample::Circle(point(INITIAL)), "contact of an initial touch"),
+        (Sample::Circle(point(LATER)), "of a later one"),
+    ];
+    entries.extend(miss_entry(run));
+    legend(&mut canvas, [LEFT_PX, 20.0], &entries);
+    for (column, row) in rows.iter().enumerate() {
+        let left = LEFT_PX + column as f64 * step_px;
+        let area = Area { left, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };
+        let panel = Panel { area, x: axis(zone.x_m), y: axis(z_m) };
+        panel.frame(&mut canvas);
+        let [x, z] = ["x", "z"].map(|name| format!("{name} ({})", unit.symbol));
+        panel.label(&mut canvas, &row.planner, &x, if column == 0 { &z } else { "" });
+        let at = |place: &[f64]| panel.at(place[0] * unit.per_m, place[1] * unit.per_m);
+        canvas.clipped(area, |canvas| {
+            for (count, touch) in row.touches.iter().enumerate() {
+                let initial = count < run.experiment.initial_touches as usize;
+                let colour = if initial { INITIAL } else { LATER };
+                let target = at(&touch.target);
+                match replay::contact(zone, touch) {
+                    Some((place, _)) => {
+                        canvas.line([target, at(&place)], &style::stroke(FAINT_INK, 0.9));
+                        canvas.circle(target, 2.6, &ring(colour));
+                        canvas.circle(at(&place), 2.6, &point(colour));
+                    }
+                    None => canvas.diamond(target, &style::stroke(colour, 1.3)),
+                }
+            }
+        });
+    }
+    Ok(Some(canvas.finish()))
+}
+
+fn ring(colour: &str) -> String {
+    style::stroke(colour, 1.1)
+}
+
+fn point(colour: &str) -> String {
+    format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".7""#)
+}

@@ -1,0 +1,129 @@
+//! Beliefs as they were: a recorded trial's touches and hyperparameters, conditioned again.
+
+use crate::experiment::metrics::Metrics;
+use crate::experiment::row::{TouchRow, TrialRow};
+use crate::experiment::store::Run;
+use crate::explore::belief::Belief;
+use crate::explore::probe::{Contact, Swept, Touch};
+use crate::gp::Posterior;
+use crate::task::Zone;
+use anyhow::{Context, ensure};
+use nalgebra::{Point3, Vector3};
+
+/// One planner's belief after some touches of the trial that the report draws.
+pub struct Replay<'a> {
+    /// What was known.
+    pub belief: Belief,
+    /// The posterior of the surface.
+    pub surface: Posterior,
+    /// Its agreement with the truth.
+    pub metrics: Option<Metrics>,
+    /// The touches so far.
+    pub touches: &'a [TouchRow],
+    /// The touch that followed.
+    pub next: Option<&'a TouchRow>,
+    initial_touches: usize,
+}
+
+impl<'a> Replay<'a> {
+    /// The belief of `planner` after `count` touches; none if the trial is missing, ended
+    /// before, or had no fit then.
+    ///
+    /// # Errors
+    /// If the recorded touches do not belong to the zone or cannot be conditioned on.
+    pub fn new(run: &'a Run, planner: &str, count: u32) -> anyhow::Result<Option<Self>> {
+        let Some(row) = row(run, planner) else { return Ok(None) };
+        let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
+        let Some(last) = touches.last() else { return Ok(None) };
+        let Some(fit) = &last.fit else { return Ok(None) };
+        let experiment = &run.experiment;
+        let zone = &experiment.scene.zone;
+        let place = || format!("trial {} of {planner}, touch {count}", row.trial);
+        let mut belief = Belief::new(zone.clone(), experiment.gp.clone());
+        for touch in touches {
+            ensure!(
+                touch.target.len() == zone.dimension(),
+                "{}: a target of {} coordinates in a zone of {}",
+                place(),
+                touch.target.len(),
+                zone.dimension()
+            );
+            belief.observe(&touch.target, &met(touch));
+            if let Some(tip) = touch.tip {
+                let finger = experiment.scene.finger.clone();
+                belief.observe_swept(&Swept { finger, p_wt: Point3::from(tip) });
+            }
+        }
+        belief.condition(fit.hyperparameters.clone()).with_context(place)?;
+        let Some(surface) = belief.surface().cloned() else { return Ok(None) };
+        Ok(Some(Self {
+            belief,
+            surface,
+            metrics: last.metrics,
+            touches,
+            next: row.touches.get(count as usize),
+            initial_touches: experiment.initial_touches as usize,
+        }))
+    }
+
+    /// Every touch with whether it is one of the initial ones.
+    pub fn marks(&self) -> impl Iterator<Item = (&TouchRow, bool)> {
+        self.touches.iter().enumerate().map(|(i, touch)| (touch, i < self.initial_touches))
+    }
+
+    /// Its agreement with the truth, in words.
+    pub fn score(&self) -> String {
+        self.metrics.map_or(String::new(), |metrics| {
+            let centred = format!("{:.4}", metrics.centred_r).replace('-', "−");
+            let rmse_mm = digits(1e3 * metrics.rmse_m);
+            format!("R {:.4}, centred {centred}, RMSE {rmse_mm} mm", metrics.r)
+        })
+    }
+}
+
+/// The row that the report draws of a planner.
+pub fn row<'a>(run: &'a Run, planner: &str) -> Option<&'a TrialRow> {
+    let trial = run.experiment.report.trial;
+    run.rows.iter().find(|row| row.planner == planner && row.trial == trial)
+}
+
+/// The place (x) or (x, z) of a touch and its height above the datum; none for a miss.
+pub fn contact(zone: &Zone, touch: &TouchRow) -> Option<(Vec<f64>, f64)> {
+    let p_wc = Point3::from(touch.contact?);
+    Some((zone.place(&p_wc), p_wc.y - zone.datum_y_m))
+}
+
+/// Every height that a drawing of beliefs of `planners` should have room for: true ones and
+/// touched ones.
+pub fn heights_m<'a>(
+    run: &'a Run,
+    planners: impl IntoIterator<Item = &'a str>,
+) -> impl Iterator<Item = f64> {
+    let touched = planners
+        .into_iter()
+        .filter_map(move |planner| row(run, planner))
+        .flat_map(|row| &row.touches)
+        .filter_map(move |touch| Some(contact(&run.experiment.scene.zone, touch)?.1));
+    run.truth.heights_m.iter().flatten().copied().chain(touched)
+}
+
+/// A number with three digits that say something.
+pub fn digits(value: f64) -> String {
+    if !value.is_finite() {
+        return "–".into();
+    }
+    let power = value.abs().max(1e-9).log10().floor();
+    let decimals = (2.0 - power).clamp(0.0, 6.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+fn met(touch: &TouchRow) -> Touch {
+    match touch.contact {
+        // A normal that is not recorded was not observed.
+        Some(p_wc) => Touch::Contact(Contact {
+            p_wc: Point3::from(p_wc),
+            normal_w: touch.normal.map_or(Vector3::y(), Vector3::from),
+        }),
+        None => Touch::Miss,
+    }
+}

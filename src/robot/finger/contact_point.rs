@@ -1,0 +1,135 @@
+//! From a tactile frame to a contact: is there one, and where (Eq. 1 of Yi et al. 2016).
+
+use super::electrode_table;
+use super::frame::FULL_SCALE_COUNTS;
+use super::frame::{ELECTRODES, Frame};
+use crate::config::{Checked, Rules};
+use nalgebra::{Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Radius of the cylinder and sphere that stand for the skin (tams_biotac).
+pub const SURFACE_M: f64 = 7.0e-3;
+
+/// Electrodes that fell by less than this in all say nothing of a place (chosen: below the noise
+/// of 19 electrodes).
+const LEAST_COUNTS: f64 = 10.0;
+
+/// What the sensor reads untouched.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tare {
+    /// E1 to E19.
+    pub electrode_counts: Option<[f64; ELECTRODES]>,
+    /// PDC.
+    pub pdc_counts: Option<f64>,
+}
+
+impl Tare {
+    /// Means over frames without contact; a channel that one of them lacks is none.
+    pub fn of(frames: &[Frame]) -> Self {
+        let count = frames.len() as f64;
+        let mean = |value: &dyn Fn(&Frame) -> Option<f64>| {
+            let sum: Option<f64> = frames.iter().map(value).sum();
+            sum.filter(|_| count > 0.0).map(|sum| sum / count)
+        };
+        let mut electrode_counts = Some([0.0; ELECTRODES]);
+        for i in 0..ELECTRODES {
+            let electrode = mean(&|frame| frame.electrode_counts.map(|counts| counts[i]));
+            match (&mut electrode_counts, electrode) {
+                (Some(counts), Some(electrode)) => counts[i] = electrode,
+                _ => electrode_counts = None,
+            }
+        }
+        Self { electrode_counts, pdc_counts: mean(&|frame| frame.pdc_counts) }
+    }
+}
+
+/// Where the skin is touched, in `T`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointOfContact {
+    /// Weighted mean of the electrodes' positions: inside the core.
+    pub centroid_t: Point3<f64>,
+    /// That, projected onto the skin: a sphere for x > 0, else a cylinder.
+    pub surface_t: Point3<f64>,
+    /// Outward normal of the skin there; minus it estimates the direction of the force.
+    pub normal_t: Vector3<f64>,
+}
+
+/// The point of contact as the weighted centroid of the electrodes,
+/// p = Σ eᵢ² pᵢ / Σ eᵢ² with eᵢ the fall of electrode i, normalised by its tare.
+///
+/// Only electrodes that fell count, as in tams_biotac: fluid that a contact pushes aside makes
+/// others rise on the far side, and they would draw the centroid into the core. None
+/// without electrodes, or if none fell.
+pub fn locate(tare: &Tare, frame: &Frame) -> Option<PointOfContact> {
+    let (rest, now) = (tare.electrode_counts?, frame.electrode_counts?);
+    let (mut sum, mut weights, mut fall_counts) = (Vector3::zeros(), 0.0, 0.0);
+    for (i, position) in electrode_table::positions_t().iter().enumerate() {
+        let fall = (rest[i] - now[i]).clamp(0.0, FULL_SCALE_COUNTS);
+        let weight = (fall / rest[i].max(1.0)).powi(2);
+        sum += position.coords * weight;
+        weights += weight;
+        fall_counts += fall;
+    }
+    if fall_counts.is_nan() || fall_counts < LEAST_COUNTS {
+        return None;
+    }
+    let centroid_t = Point3::from(sum / weights);
+    let axis_t = Point3::new(centroid_t.x.min(0.0), 0.0, 0.0);
+    let normal_t = (centroid_t - axis_t).try_normalize(0.0)?;
+    Some(PointOfContact { centroid_t, surface_t: axis_t + normal_t * SURFACE_M, normal_t })
+}
+
+/// When a rise of fluid pressure counts as contact.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Detection {
+    /// Rise of PDC above its tare.
+    pub threshold_counts: f64,
+    /// Frames in a row that must agree.
+    pub frames: u32,
+}
+
+impl Default for Detection {
+    /// Threshold: tams_biotac and balakumar-s/biotac_force_net. Frames: chosen, 30 ms; the latter
+    /// waits for 10.
+    fn default() -> Self {
+        Self { threshold_counts: 10.0, frames: 3 }
+    }
+}
+
+impl Checked for Detection {
+    fn check(&self, rules: &mut Rules) {
+        rules.number("threshold_counts", self.threshold_counts, 0.0..=FULL_SCALE_COUNTS);
+        rules.require("frames", self.frames, (1..=1000).contains(&self.frames), || {
+            "1 to 1000".into()
+        });
+    }
+}
+
+/// Says whether there is contact, and changes its mind only when enough frames agree.
+#[derive(Clone, Debug)]
+pub struct Detector {
+    detection: Detection,
+    touching: bool,
+    against: u32,
+}
+
+impl Detector {
+    /// A detector that saw no contact yet.
+    pub fn new(detection: Detection) -> Self {
+        Self { detection, touching: false, against: 0 }
+    }
+
+    /// Whether the skin is touched, after another frame. Without PDC nothing changes.
+    pub fn update(&mut self, tare: &Tare, frame: &Frame) -> bool {
+        if let (Some(rest), Some(now)) = (tare.pdc_counts, frame.pdc_counts) {
+            let above = now - rest > self.detection.threshold_counts;
+            self.against = if above == self.touching { 0 } else { self.against + 1 };
+            if self.against >= self.detection.frames {
+                self.touching = above;
+                self.against = 0;
+            }
+        }
+        self.touching
+    }
+}

@@ -1,0 +1,52 @@
+//! What the finger's sensor sends.
+
+use serde::{Deserialize, Serialize};
+
+/// Electrodes of a BioTac.
+pub const ELECTRODES: usize = 19;
+
+/// Slots of a frame (SynTouch QuickStart guide): E1, PAC, E2, PAC, … E19, PAC, PDC, PAC, TAC, PAC,
+/// TDC, PAC.
+pub const SLOTS: usize = 44;
+
+/// Slots per second (same).
+pub const SLOTS_HZ: f64 = 4400.0;
+
+/// Vibration samples in a frame: every second slot.
+pub const VIBRATIONS: usize = SLOTS / 2;
+
+/// Time between frames.
+pub const FRAME_S: f64 = SLOTS as f64 / SLOTS_HZ;
+
+/// Largest value of the 12-bit converter.
+pub const FULL_SCALE_COUNTS: f64 = 4095.0;
+
+/// One tactile frame in raw counts, as a BioTac sends it; what the scene does not simulate, or
+/// the sensor does not have, is none.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Frame {
+    /// When its last channel was sampled, since reset.
+    pub time_s: f64,
+    /// E1 to E19: high where the fluid is thick, falling as the skin comes down.
+    pub electrode_counts: Option<[f64; ELECTRODES]>,
+    /// Static fluid pressure (PDC).
+    pub pdc_counts: Option<f64>,
+    /// Dynamic fluid pressure (PAC), oldest first.
+    pub pac_counts: Option<[f64; VIBRATIONS]>,
+    /// Temperature (TDC).
+    pub tdc_counts: Option<f64>,
+    /// Change of temperature (TAC).
+    pub tac_counts: Option<f64>,
+}
+
+impl Frame {
+    /// Whether every count is a number.
+    pub fn is_finite(&self) -> bool {
+        let Self { electrode_counts, pac_counts, .. } = self;
+        let singles = [self.pdc_counts, self.tdc_counts, self.tac_counts];
+        let all = (singles.iter().flatten())
+            .chain(electrode_counts.iter().flatten())
+            .chain(pac_counts.iter().flatten());
+        all.copied().all(f64::is_finite)
+    }
+}

@@ -1,0 +1,13 @@
+//! The finger as a lab knows it: its shape, where its electrodes are, what it sends, and what a
+//! frame says of a contact.
+
+pub mod contact_point;
+pub mod electrode_table;
+pub mod frame;
+pub mod motion;
+pub mod shape;
+
+pub use contact_point::{Detection, Detector, PointOfContact, Tare};
+pub use frame::Frame;
+pub use motion::TipMotion;
+pub use shape::Finger;

@@ -1,0 +1,114 @@
+//! The fingertip's outer skin as a rigid hull: a cylinder closed by a hemisphere.
+
+use crate::config::{Checked, Rules};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Shape and attitude of the finger.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Finger {
+    /// Radius of cylinder and hemisphere.
+    pub radius_m: f64,
+    /// Length of the cylinder behind the hemisphere's centre.
+    pub length_m: f64,
+    /// Angle of the finger's axis above the direction of approach: 0 touches with the tip's
+    /// apex, 90 with the finger's side.
+    pub pitch_deg: f64,
+}
+
+impl Default for Finger {
+    /// The BioTac: the outer skin lies 7.0 mm from the axis at the sides and the sensing part
+    /// is 28 mm long (NVIDIA's FEM mesh of the sensor). The pitch is chosen, half-way between
+    /// touching with the tip's apex and with the pad.
+    fn default() -> Self {
+        Self { radius_m: 0.007, length_m: 0.021, pitch_deg: 45.0 }
+    }
+}
+
+impl Finger {
+    /// From the hemisphere's centre (origin of `T`) to the cylinder's far end, in `W`.
+    ///
+    /// The finger points along the approach −y and up by its pitch, so its cylinder lies
+    /// behind (+y) and below.
+    pub fn axis_w(&self) -> Vector3<f64> {
+        let (up, forward) = self.pitch_deg.to_radians().sin_cos();
+        Vector3::new(0.0, forward, -up) * self.length_m
+    }
+
+    /// Farthest that any part of the soft skin around the hemisphere's centre lies from it: the
+    /// pad's corner is 8.7 mm out where the sides are 7.0 (NVIDIA's FEM mesh).
+    pub fn bulge_m(&self) -> f64 {
+        8.75 / 7.0 * self.radius_m
+    }
+
+    /// Attitude of `T` in `W`: +x distal, towards -y and up by the pitch; the pad, -z, towards
+    /// the object.
+    pub fn attitude_w(&self) -> UnitQuaternion<f64> {
+        let (up, forward) = self.pitch_deg.to_radians().sin_cos();
+        let axes = [Vector3::new(0.0, -forward, up), Vector3::x(), Vector3::new(0.0, up, forward)];
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
+        UnitQuaternion::from_rotation_matrix(&rotation)
+    }
+
+    /// The y of the hull's foremost point (towards −y) at (`dx_m`, `dz_m`) beside the hemisphere's
+    /// centre, relative to it; none where the hull does not reach.
+    ///
+    /// A sphere whose centre lies at s·(a_y, a_z) on the axis has its front at
+    /// s·a_y − sqrt(q² − (dz − s·a_z)²) with q² = r² − dx², which is least where
+    /// dz − s·a_z = sign(a_z)·q·a_y / |a|.
+    pub fn front_m(&self, dx_m: f64, dz_m: f64) -> Option<f64> {
+        let q2 = self.radius_m * self.radius_m - dx_m * dx_m;
+        if q2 < 0.0 {
+            return None;
+        }
+        let axis = self.axis_w();
+        let s = if axis.z == 0.0 {
+            0.0
+        } else {
+            let beside_m = axis.z.signum() * q2.sqrt() * axis.y / axis.norm();
+            ((dz_m - beside_m) / axis.z).clamp(0.0, 1.0)
+        };
+        let across_m = dz_m - s * axis.z;
+        let depth2 = q2 - across_m * across_m;
+        (depth2 >= 0.0).then(|| s * axis.y - depth2.sqrt())
+    }
+}
+
+impl Checked for Finger {
+    fn check(&self, rules: &mut Rules) {
+        rules.number("radius_m", self.radius_m, 1e-5..=0.1);
+        rules.number("length_m", self.length_m, 0.0..=1.0);
+        rules.number("pitch_deg", self.pitch_deg, -90.0..=90.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The slow twin walks along the axis.
+    #[test]
+    fn the_front_is_the_foremost_of_all_spheres_along_the_axis() {
+        for pitch_deg in [-60.0, 0.0, 20.0, 45.0, 90.0] {
+            let finger = Finger { pitch_deg, ..Finger::default() };
+            let axis = finger.axis_w();
+            for i in 0..400 {
+                let (dx, dz) =
+                    (0.01 * (f64::from(i) * 0.7).sin(), 0.03 * (f64::from(i) * 1.3).sin());
+                let spheres = (0..=20_000).filter_map(|k| {
+                    let s = f64::from(k) / 20_000.0;
+                    let depth2 = finger.radius_m.powi(2) - dx * dx - (dz - s * axis.z).powi(2);
+                    (depth2 >= 0.0).then(|| s * axis.y - depth2.sqrt())
+                });
+                let twin = spheres.reduce(f64::min);
+                match (finger.front_m(dx, dz), twin) {
+                    (Some(front), Some(twin)) => {
+                        assert!((front - twin).abs() < 1e-6, "{front} {twin}")
+                    }
+                    (front, twin) => assert_eq!(front, twin, "{pitch_deg} {dx} {dz}"),
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! From what the fingertip feels to the frames its sensor sends.
+
+use super::electrodes::Electrodes;
+use super::fluid::{Filter, FluidEffect};
+use super::thermal::ThermalEffect;
+use super::timing::{Channel, TimingEffect, channel};
+use crate::robot::finger::frame::{ELECTRODES, Frame, VIBRATIONS};
+use crate::robot::finger::frame::{SLOTS, SLOTS_HZ};
+use crate::sim::finger::counter;
+use crate::sim::finger::counter::Stage;
+use rand_chacha::ChaCha8Rng;
+use std::collections::VecDeque;
+
+/// Frames kept for a reader that does not come, one second of them; then the oldest is lost
+/// (chosen).
+const KEPT: usize = 100;
+
+/// A slot this close to the end of a step, in seconds, belongs to it: sums of time steps round.
+const SOON_S: f64 = 1e-9;
+
+/// What the channels would read without noise, at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Signals {
+    /// E1 to E19.
+    pub electrode_counts: [f64; ELECTRODES],
+    /// Fluid pressure above rest.
+    pub pressure_pa: f64,
+    /// Temperature of the fluid.
+    pub temperature_c: f64,
+    /// Its rate of change within the sensor's band.
+    pub warming_c_s: f64,
+}
+
+/// What converts signals: the parts of a fingertip.
+#[derive(Clone, Copy)]
+pub(super) struct Parts<'a> {
+    pub electrodes: Option<&'a Electrodes>,
+    pub fluid: Option<&'a FluidEffect>,
+    pub thermal: Option<&'a ThermalEffect>,
+    pub timing: Option<&'a TimingEffect>,
+}
+
+/// The converter of one trial: each effect draws noise from a stream of its own, so that
+/// switching one leaves the others' noise as it was.
+#[derive(Clone, Debug)]
+pub(super) struct Converter {
+    before: Signals,
+    time_s: f64,
+    frames: u64,
+    slot: usize,
+    frame: Frame,
+    drift_counts: f64,
+    electrodes_rng: Option<ChaCha8Rng>,
+    fluid_rng: Option<ChaCha8Rng>,
+    filter: Option<Filter>,
+    thermal_rng: Option<ChaCha8Rng>,
+    queue: VecDeque<Frame>,
+    ready: usize,
+}
+
+impl Converter {
+    pub fn new(parts: &Parts, before: Signals, rng: &ChaCha8Rng) -> Self {
+        let stream = |number| {
+            let mut rng = rng.clone();
+            rng.set_stream(number);
+            rng
+        };
+        let batch = parts.timing.map_or(1, |timing| timing.batch_frames);
+        Self {
+            before,
+            time_s: 0.0,
+            frames: 0,
+            slot: 0,
+            frame: Frame::default(),
+            drift_counts: 0.0,
+            electrodes_rng: parts.electrodes.map(|_| stream(1)),
+            fluid_rng: parts.fluid.map(|_| stream(2)),
+            filter: parts
+                .fluid
+                .and_then(|fluid| fluid.vibration.as_ref())
+                .map(|_| Filter::default()),
+            thermal_rng: parts.thermal.map(|_| stream(3)),
+            queue: VecDeque::with_capacity(KEPT + batch),
+            ready: 0,
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let rngs = [&self.electrodes_rng, &self.fluid_rng, &self.thermal_rng];
+        rngs.into_iter().flatten().map(size_of_val).sum::<usize>()
+            + self.filter.as_ref().map_or(0, size_of_val)
+            + self.queue.capacity() * size_of::<Frame>()
+    }
+
+    /// The oldest frame that has arrived.
+    pub fn frame(&mut self) -> Option<Frame> {
+        self.ready = self.ready.checked_sub(1)?;
+        self.queue.pop_front()
+    }
+
+    /// Samples every slot until `time_s`; signals between the last call and now are
+    /// interpolated. The [`Stage`] numbered `OFF` is left out by the compiler.
+    pub fn advance<const OFF: usize>(&mut self, parts: &Parts, time_s: f64, now: &Signals) {
+        let (start_s, before) = (self.time_s, self.before);
+        loop {
+            let slots = self.frames * SLOTS as u64 + self.slot as u64 + 1;
+            let slot_s = slots as f64 / SLOTS_HZ;
+            if slot_s > time_s + SOON_S {
+                break;
+            }
+            let part = ((slot_s - start_s) / (time_s - start_s)).clamp(0.0, 1.0);
+            self.sample::<OFF>(parts, &before, now, if part.is_nan() { 1.0 } else { part });
+            self.slot += 1;
+            if self.slot == SLOTS {
+                self.finish::<OFF>(parts, slot_s);
+            }
+        }
+        (self.time_s, self.before) = (time_s, *now);
+    }
+
+    fn sample<const OFF: usize>(
+        &mut self,
+        parts: &Parts,
+        before: &Signals,
+        now: &Signals,
+        part: f64,
+    ) {
+        let last = self.slot + 1 == SLOTS;
+        let skewed = OFF != Stage::Timing as usize && parts.timing.is_some();
+        match channel(self.slot) {
+            Channel::Pac(i) => {
+                self.pac::<OFF>(parts, i, mix(before.pressure_pa, now.pressure_pa, part));
+                if last && !skewed {
+                    for slot in (0..SLOTS).step_by(2) {
+                        self.convert::<OFF>(parts, channel(slot), before, now, part);
+                    }
+                }
+            }
+            slow if skewed => self.convert::<OFF>(parts, slow, before, now, part),
+            _ => {}
+        }
+    }
+
+    fn pac<const OFF: usize>(&mut self, parts: &Parts, i: usize, pressure_pa: f64) {
+        if OFF != Stage::Vibration as usize
+            && OFF != Stage::Fluid as usize
+            && let Some(fluid) = parts.fluid
+            && let (Some(vibration), Some(filter), Some(rng)) =
+                (&fluid.vibration, &mut self.filter, &mut self.fluid_rng)
+        {
+            counter::count(Stage::Vibration);
+            let counts = filter.pac_counts((fluid, vibration), pressure_pa, 2.0 / SLOTS_HZ, rng);
+            self.frame.pac_counts.get_or_insert([0.0; VIBRATIONS])[i] = counts;
+        }
+    }
+
+    fn convert<const OFF: usize>(
+        &mut self,
+        parts: &Parts,
+        channel: Channel,
+        before: &Signals,
+        now: &Signals,
+        part: f64,
+    ) {
+        let frame = &mut self.frame;
+        match channel {
+            Channel::Electrode(i) => {
+                if OFF != Stage::Electrodes as usize
+                    && let (Some(electrodes), Some(rng)) =
+                        (parts.electrodes, &mut self.electrodes_rng)
+                {
+                    let ideal = mix(before.electrode_counts[i], now.electrode_counts[i], part);
+                    frame.electrode_counts.get_or_insert([0.0; ELECTRODES])[i] =
+                        electrodes.convert(i, ideal, self.drift_counts, rng);
+                }
+            }
+            Channel::Pdc => {
+                if OFF != Stage::Fluid as usize
+                    && let (Some(fluid), Some(rng)) = (parts.fluid, &mut self.fluid_rng)
+                {
+                    counter::count(Stage::Fluid);
+                    let pressure_pa = mix(before.pressure_pa, now.pressure_pa, part);
+                    frame.pdc_counts = Some(fluid.pdc_counts(pressure_pa, rng));
+                }
+            }
+            Channel::Tac => {
+                if OFF != Stage::Thermal as usize
+                    && let (Some(thermal), Some(rng)) = (parts.thermal, &mut self.thermal_rng)
+                {
+                    let warming_c_s = mix(before.warming_c_s, now.warming_c_s, part);
+                    frame.tac_counts = Some(thermal.tac_counts(warming_c_s, rng));
+                }
+            }
+            Channel::Tdc => {
+                if OFF != Stage::Thermal as usize
+                    && let (Some(thermal), Some(rng)) = (parts.thermal, &mut self.thermal_rng)
+                {
+                    let temperature_c = mix(before.temperature_c, now.temperature_c, part);
+                    frame.tdc_counts = Some(thermal.tdc_counts(temperature_c, rng));
+                }
+            }
+            Channel::Pac(_) => {}
+        }
+    }
+
+    fn finish<const OFF: usize>(&mut self, parts: &Parts, time_s: f64) {
+        self.frame.time_s = time_s;
+        if OFF != Stage::Electrodes as usize
+            && let (Some(electrodes), Some(rng)) = (parts.electrodes, &mut self.electrodes_rng)
+        {
+            let frame_s = SLOTS as f64 / SLOTS_HZ;
+            self.drift_counts = electrodes.drifted(self.drift_counts, frame_s, rng);
+        }
+        let mut batch = 1;
+        if OFF != Stage::Timing as usize
+            && let Some(timing) = parts.timing
+        {
+            counter::count(Stage::Timing);
+            batch = timing.batch_frames;
+        }
+        if self.queue.len() >= KEPT + batch {
+            self.queue.pop_front();
+            self.ready = self.ready.saturating_sub(1);
+        }
+        self.queue.push_back(std::mem::take(&mut self.frame));
+        (self.slot, self.frames) = (0, self.frames + 1);
+        if self.queue.len() - self.ready >= batch {
+            self.ready = self.queue.len();
+        }
+    }
+}
+
+fn mix(before: f64, now: f64, part: f64) -> f64 {
+    before + part * (now - before)
+}

@@ -1,0 +1,172 @@
+//! The impedance electrodes: where the fluid over one grows thin, its counts fall.
+
+use super::noise::normal;
+use super::samples::SkinSample;
+use super::skin::Pressed;
+use crate::config::{Checked, Rules};
+use crate::robot::finger::electrode_table;
+use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+/// The resistor an electrode divides its voltage with (SynTouch BioTac SP manual, §5.1).
+const LOAD_OHM: f64 = 10e3;
+
+/// A closed gap keeps this part of its fluid: the largest Z/Z0 in MiaoLi/syntouchcontact's
+/// recordings is 40.
+const FILM: f64 = 1.0 / 40.0;
+
+/// Samples farther than this many spreads do not count.
+const REACH: f64 = 3.0;
+
+/// Table `[electrodes]`: 19 impedances through the fluid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ElectrodesEffect {
+    /// What E1 to E19 read untouched.
+    pub baseline_counts: [f64; ELECTRODES],
+    /// Standard deviation of the patch of fluid an electrode senses.
+    pub spread_m: f64,
+    /// Power p in Z = Z0 (g0/g)^p.
+    pub exponent: f64,
+    /// White noise, as a factor on the recorded standard deviations; 0 is none.
+    pub noise: f64,
+    /// Random walk shared by all electrodes, in counts per root second; 0 is none.
+    pub drift_counts: f64,
+    /// Whether counts are whole numbers.
+    pub quantise: bool,
+    /// Whether counts stay within the converter's 0 to 4095.
+    pub clip: bool,
+}
+
+impl Default for ElectrodesEffect {
+    /// Baselines and noise: MiaoLi/syntouchcontact recordings, sensor F2. The recorded standard
+    /// deviations contain drift; three quarters of them match the differences between frames
+    /// (2.1 to 5.8 counts). Drift: 6 to 16 counts over 11 s. Spread: fitted by `calibration` to the same
+    /// sensor on a flat plate. Exponent: the gap's resistance grows with its inverse.
+    fn default() -> Self {
+        Self {
+            baseline_counts: electrode_table::BASELINES_COUNTS,
+            spread_m: 2.1e-3,
+            exponent: 1.0,
+            noise: 0.75,
+            drift_counts: 3.0,
+            quantise: true,
+            clip: true,
+        }
+    }
+}
+
+impl Checked for ElectrodesEffect {
+    fn check(&self, rules: &mut Rules) {
+        rules.numbers("baseline_counts", &self.baseline_counts, 1.0..=FULL_SCALE_COUNTS - 1.0);
+        rules.number("spread_m", self.spread_m, 1e-5..=1e-1);
+        rules.number("exponent", self.exponent, 0.1..=10.0);
+        rules.number("noise", self.noise, 0.0..=1e3);
+        rules.number("drift_counts", self.drift_counts, 0.0..=1e3);
+    }
+}
+
+/// The electrodes over a skin; never change.
+#[derive(Clone, Debug)]
+pub struct Electrodes {
+    effect: ElectrodesEffect,
+    /// Untouched impedances.
+    z0_ohm: [f64; ELECTRODES],
+    /// For each electrode, samples and what moving each inwards by a metre takes off g/g0.
+    weights: [Vec<(usize, f64)>; ELECTRODES],
+}
+
+impl Electrodes {
+    /// Electrodes under `samples`, whose lengths are `scale` times a BioTac's.
+    pub fn new(effect: &ElectrodesEffect, samples: &[SkinSample], scale: f64) -> Self {
+        let weights = electrode_table::positions_t().map(|electrode| {
+            let from = |sample: &SkinSample| {
+                let layers = &sample.layers;
+                let core_m = layers.outer_m - layers.skin_m - layers.gap_m;
+                (sample.start + sample.direction.scale(core_m) - electrode * scale).norm()
+            };
+            let nearest_m = samples.iter().map(from).fold(f64::INFINITY, f64::min);
+            let spread_m = effect.spread_m * scale;
+            let reach_m = nearest_m.max(REACH * spread_m);
+            let near: Vec<(usize, f64)> = (samples.iter().enumerate())
+                .filter(|(_, sample)| from(sample) <= reach_m)
+                .map(|(i, sample)| {
+                    // Relative to the nearest, so that a spread far below the samples' spacing
+                    // leaves one weight instead of none.
+                    let squares = from(sample).powi(2) - nearest_m.powi(2);
+                    (i, sample.section_m2() * (-0.5 * squares / spread_m.powi(2)).exp())
+                })
+                .collect();
+            let gap: f64 = near.iter().map(|&(i, weight)| weight * samples[i].layers.gap_m).sum();
+            near.into_iter().map(|(i, weight)| (i, weight / gap)).collect()
+        });
+        Self { z0_ohm: effect.baseline_counts.map(impedance_ohm), weights, effect: effect.clone() }
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self)
+            + self.weights.iter().map(|near| size_of_val(near.as_slice())).sum::<usize>()
+    }
+
+    /// Ideal counts over a pressed skin when the fluid conducts `conductivity` times as well as at
+    /// rest.
+    pub fn counts(&self, pressed: &Pressed, conductivity: f64) -> [f64; ELECTRODES] {
+        self.counts_over(pressed.moved_m(), conductivity)
+    }
+
+    /// The same over samples whose skin moved inwards by `inward_m`, one each, or none at rest.
+    pub(super) fn counts_over(&self, inward_m: &[f64], conductivity: f64) -> [f64; ELECTRODES] {
+        // An untouched skin is the usual case and needs no sums.
+        let moved = |weights: &[(usize, f64)]| match inward_m.is_empty() {
+            true => 0.0,
+            false => {
+                let part = |&(i, weight): &(usize, f64)| Some(weight * inward_m.get(i)?);
+                weights.iter().filter_map(part).sum()
+            }
+        };
+        std::array::from_fn(|i| {
+            let closed = moved(&self.weights[i]);
+            let gap = (1.0 - closed).max(FILM);
+            counts(self.z0_ohm[i] / (gap.powf(self.effect.exponent) * conductivity))
+        })
+    }
+
+    /// What the converter makes of ideal counts, with `drift_counts` on top.
+    pub(super) fn convert(
+        &self,
+        i: usize,
+        ideal_counts: f64,
+        drift_counts: f64,
+        rng: &mut impl Rng,
+    ) -> f64 {
+        let effect = &self.effect;
+        let mut counts = ideal_counts + drift_counts;
+        if effect.noise > 0.0 {
+            counts += effect.noise * electrode_table::NOISE_COUNTS[i] * normal(rng);
+        }
+        if effect.quantise {
+            counts = counts.round();
+        }
+        if effect.clip { counts.clamp(0.0, FULL_SCALE_COUNTS) } else { counts }
+    }
+
+    /// The common drift after another `duration_s`.
+    pub(super) fn drifted(&self, drift_counts: f64, duration_s: f64, rng: &mut impl Rng) -> f64 {
+        if self.effect.drift_counts == 0.0 {
+            return drift_counts;
+        }
+        drift_counts + self.effect.drift_counts * duration_s.sqrt() * normal(rng)
+    }
+}
+
+/// Counts over impedance: E = 4095 / (1 + Z / 10 kΩ) (SynTouch BioTac SP manual, §5.1).
+pub fn counts(impedance_ohm: f64) -> f64 {
+    FULL_SCALE_COUNTS / (1.0 + impedance_ohm / LOAD_OHM)
+}
+
+/// Impedance over counts: the inverse of [`counts`].
+pub fn impedance_ohm(counts: f64) -> f64 {
+    (FULL_SCALE_COUNTS / counts - 1.0) * LOAD_OHM
+}

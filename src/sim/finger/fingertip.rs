@@ -1,0 +1,295 @@
+//! The fingertip, put together from the effects a scene names.
+
+use super::converter::{Converter, Parts, Signals};
+use super::effects::Effects;
+use super::electrodes::Electrodes;
+use super::fluid::FluidEffect;
+use super::friction::{Bristle, FrictionEffect};
+use super::lattice::Lattice;
+use super::load::{Load, PressError};
+use super::profile::Profile;
+use super::samples::spread;
+use super::skin::{Pressed, Skin, SkinEffect};
+use super::thermal::{Heat, ThermalEffect};
+use super::timing::TimingEffect;
+use crate::geometry::bvh::MeshBvh;
+use crate::robot::finger::TipMotion;
+use crate::robot::finger::frame::Frame;
+use crate::robot::finger::shape::Finger;
+use crate::sim::finger::counter;
+use crate::sim::finger::counter::Stage;
+use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
+
+/// Longest step: beyond it a frame's signals would be mostly interpolated (chosen).
+const LONGEST_STEP_S: f64 = 1.0;
+
+/// No stage: what [`FingertipState::step`] leaves out.
+const NOTHING: usize = usize::MAX;
+
+/// What never changes about a fingertip; shared by trials.
+#[derive(Clone, Debug)]
+pub struct Fingertip {
+    skin: Option<Skin>,
+    lattice: Option<Lattice>,
+    electrodes: Option<Electrodes>,
+    fluid: Option<FluidEffect>,
+    thermal: Option<ThermalEffect>,
+    friction: Option<FrictionEffect>,
+    timing: Option<TimingEffect>,
+    sends_frames: bool,
+}
+
+impl Fingertip {
+    /// A BioTac in the finger's size.
+    pub fn new(finger: &Finger, effects: &Effects) -> Self {
+        let profile = Profile::biotac(finger);
+        let cavity_pa_m3 = effects.fluid.as_ref().map_or(0.0, |fluid| fluid.stiffness_pa_m3);
+        let skin = effects.skin.as_ref().map(|skin| Skin::new(&profile, skin, cavity_pa_m3));
+        // Electrodes sense a shell through as many points as a default skin has.
+        let shell = effects.flex.as_ref().map(|flex| {
+            let samples = spread(&profile, SkinEffect::default().samples);
+            (Lattice::new(&profile, flex, &samples), samples)
+        });
+        let samples = skin.as_ref().map(Skin::samples).or(shell.as_ref().map(|(_, all)| &all[..]));
+        let electrodes = (effects.electrodes.as_ref().zip(samples))
+            .map(|(effect, samples)| Electrodes::new(effect, samples, profile.scale()));
+        Self {
+            skin,
+            lattice: shell.map(|(lattice, _)| lattice),
+            electrodes,
+            fluid: effects.fluid.clone(),
+            thermal: effects.thermal.clone(),
+            friction: effects.friction.clone(),
+            timing: effects.timing.clone(),
+            sends_frames: effects.sends_frames(),
+        }
+    }
+
+    /// Its skin.
+    pub fn skin(&self) -> Option<&Skin> {
+        self.skin.as_ref()
+    }
+
+    /// Its skin as a shell.
+    pub fn lattice(&self) -> Option<&Lattice> {
+        self.lattice.as_ref()
+    }
+
+    /// Its electrodes.
+    pub fn electrodes(&self) -> Option<&Electrodes> {
+        self.electrodes.as_ref()
+    }
+
+    /// Bytes held by skin and electrodes.
+    pub fn bytes(&self) -> usize {
+        let skin = self.skin.as_ref().map_or(0, |skin| skin.bytes());
+        skin + self.electrodes.as_ref().map_or(0, Electrodes::bytes)
+    }
+
+    fn parts(&self) -> Parts<'_> {
+        Parts {
+            electrodes: self.electrodes.as_ref(),
+            fluid: self.fluid.as_ref(),
+            thermal: self.thermal.as_ref(),
+            timing: self.timing.as_ref(),
+        }
+    }
+}
+
+/// Why a step was refused; the trial's state is as before.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum FingertipError {
+    /// A number is NaN or infinite, or the step is negative or longer than a second.
+    #[error("at {time_s} s: a step of {dt_s} s with {motion:?} is not finite")]
+    NotFinite {
+        /// Since the start of the trial.
+        time_s: f64,
+        /// The step.
+        dt_s: f64,
+        /// What it was asked with.
+        motion: Box<TipMotion>,
+    },
+    /// The object encloses the fingertip's centre.
+    #[error("at {time_s} s: the fingertip's centre is inside the object with {motion:?}")]
+    Inside {
+        /// Since the start of the trial.
+        time_s: f64,
+        /// What it was asked with.
+        motion: Box<TipMotion>,
+    },
+}
+
+/// What one fingertip feels during one trial.
+#[derive(Clone, Debug)]
+pub struct FingertipState {
+    time_s: f64,
+    pressed: Option<Pressed>,
+    /// How far a skin that is simulated elsewhere moved inwards at each sample; empty at rest.
+    shell_m: Vec<f64>,
+    bristle: Option<Bristle>,
+    heat: Option<Heat>,
+    converter: Option<Converter>,
+}
+
+impl FingertipState {
+    /// At the start of a trial, untouched; `rng` is the only randomness.
+    pub fn new(tip: &Fingertip, rng: &ChaCha8Rng) -> Self {
+        let mut feel = Self {
+            time_s: 0.0,
+            pressed: tip.skin.as_ref().map(Skin::relaxed),
+            shell_m: Vec::new(),
+            bristle: tip.friction.as_ref().map(|_| Bristle::default()),
+            heat: tip.thermal.as_ref().map(Heat::new),
+            converter: None,
+        };
+        if tip.sends_frames {
+            let untouched = feel.signals::<NOTHING>(tip, 0.0);
+            feel.converter = Some(Converter::new(&tip.parts(), untouched, rng));
+        }
+        feel
+    }
+
+    /// Since the start of the trial.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// The skin in its last pose.
+    pub fn pressed(&self) -> Option<&Pressed> {
+        self.pressed.as_ref()
+    }
+
+    /// Goes on by `dt_s`, to `motion` at its end, against an object that stands in `W`.
+    ///
+    /// # Errors
+    /// If a number is not finite or the finger's centre is inside the object.
+    pub fn step(
+        &mut self,
+        tip: &Fingertip,
+        object: &MeshBvh,
+        motion: &TipMotion,
+        dt_s: f64,
+    ) -> Result<Load, FingertipError> {
+        self.step_without::<NOTHING>(tip, object, motion, dt_s)
+    }
+
+    /// As [`step`](Self::step), in code from which the [`Stage`] numbered `OFF` is left out by the compiler:
+    /// what the switch of an effect that is off costs is measured against it.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step).
+    pub fn step_without<const OFF: usize>(
+        &mut self,
+        tip: &Fingertip,
+        object: &MeshBvh,
+        motion: &TipMotion,
+        dt_s: f64,
+    ) -> Result<Load, FingertipError> {
+        self.accept(motion, dt_s)?;
+        let time_s = self.time_s;
+        let load = match (&tip.skin, &mut self.pressed) {
+            (Some(skin), Some(pressed)) => {
+                counter::count(Stage::Skin);
+                skin.press(object, &motion.x_wt, pressed).map_err(|error| match error {
+                    PressError::NotFinite => {
+                        FingertipError::NotFinite { time_s, dt_s, motion: Box::new(*motion) }
+                    }
+                    PressError::Inside => {
+                        FingertipError::Inside { time_s, motion: Box::new(*motion) }
+                    }
+                })?
+            }
+            _ => Load::default(),
+        };
+        Ok(self.advance::<OFF>(tip, load, motion, dt_s))
+    }
+
+    /// The same for a skin that is simulated elsewhere: `load` is what the object does to it at the
+    /// end of the step, `inward_m` how far it then lies inwards at each sample of the
+    /// [`Lattice`]; empty at rest.
+    ///
+    /// # Errors
+    /// If a number is not finite.
+    pub fn step_loaded(
+        &mut self,
+        tip: &Fingertip,
+        (load, inward_m): (Load, &[f64]),
+        motion: &TipMotion,
+        dt_s: f64,
+    ) -> Result<Load, FingertipError> {
+        self.accept(motion, dt_s)?;
+        self.shell_m.clear();
+        self.shell_m.extend_from_slice(inward_m);
+        Ok(self.advance::<NOTHING>(tip, load, motion, dt_s))
+    }
+
+    fn accept(&self, motion: &TipMotion, dt_s: f64) -> Result<(), FingertipError> {
+        if motion.is_finite() && (0.0..=LONGEST_STEP_S).contains(&dt_s) {
+            return Ok(());
+        }
+        Err(FingertipError::NotFinite { time_s: self.time_s, dt_s, motion: Box::new(*motion) })
+    }
+
+    /// What follows from the load on the skin.
+    fn advance<const OFF: usize>(
+        &mut self,
+        tip: &Fingertip,
+        mut load: Load,
+        motion: &TipMotion,
+        dt_s: f64,
+    ) -> Load {
+        self.time_s += dt_s;
+        if OFF != Stage::Friction as usize
+            && let (Some(friction), Some(bristle)) = (&tip.friction, &mut self.bristle)
+        {
+            counter::count(Stage::Friction);
+            let velocity = [&motion.linear_w, &motion.angular_w];
+            bristle.step(friction, &motion.x_wt, velocity, dt_s, &mut load);
+        }
+        if OFF != Stage::Thermal as usize
+            && let (Some(thermal), Some(heat)) = (&tip.thermal, &mut self.heat)
+        {
+            counter::count(Stage::Thermal);
+            heat.step(thermal, load.area_m2, dt_s);
+        }
+        let signals = self.converter.is_some().then(|| self.signals::<OFF>(tip, load.pressure_pa));
+        if let (Some(converter), Some(signals)) = (&mut self.converter, signals) {
+            converter.advance::<OFF>(&tip.parts(), self.time_s, &signals);
+        }
+        load
+    }
+
+    /// Bytes of this trial's state: what an effect that is off does not hold.
+    pub fn bytes(&self) -> usize {
+        let pressed = self.pressed.as_ref().map_or(0, Pressed::bytes);
+        let bristle = self.bristle.as_ref().map_or(0, size_of_val);
+        let heat = self.heat.as_ref().map_or(0, size_of_val);
+        pressed + bristle + heat + self.converter.as_ref().map_or(0, Converter::bytes)
+    }
+
+    /// The oldest tactile frame that has arrived and was not asked for yet.
+    pub fn frame(&mut self) -> Option<Frame> {
+        self.converter.as_mut()?.frame()
+    }
+
+    fn signals<const OFF: usize>(&self, tip: &Fingertip, pressure_pa: f64) -> Signals {
+        let mut signals = Signals { pressure_pa, ..Signals::default() };
+        let mut conductivity = 1.0;
+        if OFF != Stage::Thermal as usize
+            && let (Some(thermal), Some(heat)) = (&tip.thermal, &self.heat)
+        {
+            signals.temperature_c = heat.temperature_c;
+            signals.warming_c_s = heat.warming_c_s();
+            conductivity = heat.conductivity(thermal);
+        }
+        let moved_m = self.pressed.as_ref().map_or(&self.shell_m[..], Pressed::moved_m);
+        if OFF != Stage::Electrodes as usize
+            && let Some(electrodes) = &tip.electrodes
+        {
+            counter::count(Stage::Electrodes);
+            signals.electrode_counts = electrodes.counts_over(moved_m, conductivity);
+        }
+        signals
+    }
+}

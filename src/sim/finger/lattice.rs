@@ -1,0 +1,150 @@
+//! The shell of `[flex]` as triangles: where its nodes are, and what their motion is at the points of
+//! the skin over which electrodes sense.
+
+use super::flex::FlexEffect;
+use super::profile::Profile;
+use super::samples::SkinSample;
+use nalgebra::{Point3, UnitVector3, Vector3};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// One node, in the middle of the skin's thickness, in `T`.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// Where it rests.
+    pub point: Point3<f64>,
+    /// Direction of the ray from the axis through it.
+    pub direction: UnitVector3<f64>,
+    /// Thickness of the fluid under it.
+    pub gap_m: f64,
+    /// The area it stands for, along its outward normal, in m².
+    pub area_m2: Vector3<f64>,
+    /// Whether nail or back end hold it.
+    pub clamped: bool,
+}
+
+/// A shell over the half of the fingertip that has fluid under it; never changes.
+#[derive(Clone, Debug)]
+pub struct Lattice {
+    nodes: Vec<Node>,
+    triangles: Vec<[usize; 3]>,
+    thickness_m: f64,
+    /// For each sample, nodes and their shares in its motion; none on the back.
+    shares: Vec<Option<[(usize, f64); 4]>>,
+}
+
+/// Stations along the finger times angles around it; all angles meet in the apex.
+struct Grid {
+    stations_m: Vec<f64>,
+    around: usize,
+}
+
+impl Grid {
+    /// Half of the cells are before the origin of `T`, where the profile bends most, in equal steps of
+    /// an arc, and an even number, so that the corner at 45° is a node.
+    fn new(profile: &Profile, effect: &FlexEffect) -> Self {
+        let (radius_m, length_m) = (profile.radius_m, profile.length_m);
+        let arc = 2 * effect.along.div_ceil(4);
+        let straight = if length_m > 0.0 { effect.along - arc } else { 0 };
+        let behind = (0..straight).map(|i| -length_m * (1.0 - i as f64 / straight as f64));
+        let before = (0..=arc).map(|i| radius_m * (FRAC_PI_2 * i as f64 / arc as f64).sin());
+        Self { stations_m: behind.chain(before).collect(), around: effect.around }
+    }
+
+    fn node(&self, i: usize, j: usize) -> usize {
+        let apex = i + 1 == self.stations_m.len();
+        i * (self.around + 1) + if apex { 0 } else { j }
+    }
+
+    fn turn(&self, j: usize) -> f64 {
+        PI * (j as f64 / self.around as f64 - 0.5)
+    }
+
+    /// The four nodes around a place of the skin with their bilinear weights.
+    fn shares(&self, x_m: f64, turn: f64) -> [(usize, f64); 4] {
+        let i = self.stations_m.partition_point(|&station_m| station_m <= x_m);
+        let i = i.clamp(1, self.stations_m.len() - 1) - 1;
+        let [low_m, high_m] = [self.stations_m[i], self.stations_m[i + 1]];
+        let along = ((x_m - low_m) / (high_m - low_m)).clamp(0.0, 1.0);
+        let turned = ((turn / PI + 0.5) * self.around as f64).clamp(0.0, self.around as f64);
+        let j = (turned as usize).min(self.around - 1);
+        let across = turned - j as f64;
+        [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(di, dj)| {
+            let weight_along = if di == 0 { 1.0 - along } else { along };
+            let weight_across = if dj == 0 { 1.0 - across } else { across };
+            (self.node(i + di, j + dj), weight_along * weight_across)
+        })
+    }
+}
+
+impl Lattice {
+    /// The shell of this shape and resolution, read at `samples`.
+    pub fn new(profile: &Profile, effect: &FlexEffect, samples: &[SkinSample]) -> Self {
+        let grid = Grid::new(profile, effect);
+        let last = grid.stations_m.len() - 1;
+        let mut thickness_m = 0.0;
+        let mut nodes = Vec::new();
+        for (i, &x_m) in grid.stations_m.iter().enumerate() {
+            let angles = if i == last { 0..=0 } else { 0..=grid.around };
+            for j in angles {
+                let (start, direction) = profile.ray(x_m, grid.turn(j));
+                let layers = profile.layers(start.x, &direction);
+                thickness_m = layers.skin_m;
+                nodes.push(Node {
+                    point: start + direction.scale(layers.outer_m - layers.skin_m / 2.0),
+                    direction,
+                    gap_m: layers.gap_m,
+                    area_m2: Vector3::zeros(),
+                    clamped: i == 0 || (i < last && (j == 0 || j == grid.around)),
+                });
+            }
+        }
+        let mut triangles = Vec::new();
+        for (i, j) in (0..last).flat_map(|i| (0..grid.around).map(move |j| (i, j))) {
+            let [a, b, c, d] =
+                [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| grid.node(i, j));
+            // Diagonals mirrored at the middle keep left and right alike.
+            let split = match j < grid.around / 2 {
+                true => [[a, b, c], [a, c, d]],
+                false => [[a, b, d], [b, c, d]],
+            };
+            for [p, q, r] in split.into_iter().filter(|[p, q, r]| p != q && q != r && r != p) {
+                let corner = |k: usize| nodes[k].point;
+                let area_m2 = (corner(q) - corner(p)).cross(&(corner(r) - corner(p))) / 2.0;
+                let outward = area_m2.dot(&nodes[p].direction) > 0.0;
+                triangles.push(if outward { [p, q, r] } else { [p, r, q] });
+                let area_m2 = if outward { area_m2 } else { -area_m2 };
+                [p, q, r].into_iter().for_each(|k| nodes[k].area_m2 += area_m2 / 3.0);
+            }
+        }
+        let shares = samples.iter().map(|sample| {
+            let d = &sample.direction;
+            let x_m = if sample.start.x < 0.0 { sample.start.x } else { profile.radius_m * d.x };
+            sample.layers.wet.then(|| grid.shares(x_m, d.y.atan2(-d.z)))
+        });
+        Self { shares: shares.collect(), nodes, triangles, thickness_m }
+    }
+
+    /// Its nodes.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// Corners of its triangles, counterclockwise seen from outside.
+    pub fn triangles(&self) -> &[[usize; 3]] {
+        &self.triangles
+    }
+
+    /// Thickness of the skin.
+    pub fn thickness_m(&self) -> f64 {
+        self.thickness_m
+    }
+
+    /// How far each sample's point of the skin moved inwards, given how far each node did.
+    pub fn inward_m(&self, nodes_m: &[f64], samples_m: &mut Vec<f64>) {
+        let node_m = |&(k, share): &(usize, f64)| share * nodes_m.get(k).copied().unwrap_or(0.0);
+        samples_m.clear();
+        samples_m.extend(
+            self.shares.iter().map(|shares| shares.iter().flatten().map(node_m).sum::<f64>()),
+        );
+    }
+}

@@ -1,0 +1,117 @@
+//! The shape of a BioTac: outer skin, skin thickness and fluid gap, along rays out of its axis.
+//!
+//! All figures are from the FEM mesh of NVlabs/biotac_sim unless said otherwise. Behind the
+//! origin of `T` (x ≤ 0) rays leave the axis at right angles; before it they leave the origin.
+
+use crate::robot::finger::shape::Finger;
+use nalgebra::{Point3, UnitVector3, Vector3};
+
+/// Outer radius at the sides that all other lengths here belong to.
+const SIDE_M: f64 = 7.0e-3;
+/// Radius of the rigid core: cylinder and hemisphere (electrode table of TAMS biotac_gazebo_plugin).
+pub const CORE_M: f64 = 5.08e-3;
+/// Distance of the core's flat facet, which carries E7 to E10, from the origin (same table).
+const FACET_M: f64 = 4.3994e-3;
+/// Normal of the facet: 30° from −z towards the tip (same table).
+const FACET_NORMAL: [f64; 3] = [0.5, 0.0, -0.866_025_403_784_438_6];
+/// Skin thickness: 1.56 to 1.62 mm over sides and pulp.
+const SKIN_M: f64 = 1.6e-3;
+/// The pad at the pulp is this much thicker than the sides, most at `BULGE_X_M`: 8.31 mm.
+const BULGE_M: f64 = 1.31e-3;
+const BULGE_X_M: f64 = -7.0e-3;
+/// How the bulge flattens, bulge = `BULGE_M` − c (x − `BULGE_X_M`)²: 8.02 mm at x = 0 and 8.03 mm at −13.6.
+const BULGE_FALL_PER_M: f64 = 6.0;
+/// The tip's corner, 45° from −z: 8.72 mm there, 8.30 mm at 30°, almost nothing at 0.
+const CORNER_M: f64 = 1.175e-3;
+const CORNER_WIDTH: f64 = 0.041;
+/// The apex lies this much deeper than the sides: 6.65 mm.
+const APEX_M: f64 = 0.35e-3;
+/// A gap is at least this: at the apex skin and core touch (0.00 mm), but a film stays (chosen).
+const FILM_M: f64 = 0.05e-3;
+
+/// Outer skin, skin and gap of a fingertip; lengths scale with the radius of its hull.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    /// Length of the part behind the origin of `T`.
+    pub length_m: f64,
+    /// Outer radius at the sides.
+    pub radius_m: f64,
+    /// Whether pad, corner, apex and facet differ from a plain capsule.
+    pub shaped: bool,
+}
+
+/// Where a ray out of the axis passes the layers of the fingertip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Layers {
+    /// From the axis to the outer skin.
+    pub outer_m: f64,
+    /// Thickness of the skin.
+    pub skin_m: f64,
+    /// Thickness of the fluid under the skin.
+    pub gap_m: f64,
+    /// Whether fluid flows there: not on the back, where the nail holds the skin (chosen: above
+    /// the axis).
+    pub wet: bool,
+}
+
+impl Profile {
+    /// The BioTac in the finger's size.
+    pub fn biotac(finger: &Finger) -> Self {
+        Self { length_m: finger.length_m, radius_m: finger.radius_m, shaped: true }
+    }
+
+    /// A capsule whose layers are everywhere those of the BioTac's sides: a shape with closed forms.
+    pub fn capsule(finger: &Finger) -> Self {
+        Self { shaped: false, ..Self::biotac(finger) }
+    }
+
+    /// Every length of the BioTac is multiplied by this.
+    pub fn scale(&self) -> f64 {
+        self.radius_m / SIDE_M
+    }
+
+    /// Layers along the ray that leaves the axis at `x_m` ≤ 0 in direction `d`.
+    ///
+    /// At x < 0 the direction has no x. The pad is the sides' circle shifted towards −z: its
+    /// radius grows with the cosine of the angle from −z.
+    pub fn layers(&self, x_m: f64, d: &Vector3<f64>) -> Layers {
+        let scale = self.scale();
+        let (skin_m, film_m) = (SKIN_M * scale, FILM_M * scale);
+        if !self.shaped {
+            let outer_m = self.radius_m;
+            let gap_m = (outer_m - skin_m - CORE_M * scale).max(film_m);
+            return Layers { outer_m, skin_m, gap_m, wet: true };
+        }
+        let off_m = x_m / scale - BULGE_X_M;
+        let bulge_m = (BULGE_M - BULGE_FALL_PER_M * off_m * off_m).max(0.0);
+        let corner = (d.x - d.z) * std::f64::consts::FRAC_1_SQRT_2;
+        let mut outer_m = SIDE_M + bulge_m * (-d.z).max(0.0);
+        let mut core_m = CORE_M;
+        if d.x > 0.0 {
+            outer_m += CORNER_M * ((corner - 1.0) / CORNER_WIDTH).exp() - APEX_M * d.x * d.x;
+            let towards_facet = d.dot(&Vector3::from(FACET_NORMAL));
+            if towards_facet * CORE_M > FACET_M {
+                core_m = FACET_M / towards_facet;
+            }
+        }
+        let gap_m = (outer_m - SKIN_M - core_m).max(FILM_M) * scale;
+        Layers { outer_m: outer_m * scale, skin_m, gap_m, wet: d.z <= 0.0 }
+    }
+
+    /// Where the outer skin is over the capsule's point at height `x_m` and angle `turn` from −z
+    /// towards +y: start of the ray on the axis, direction.
+    ///
+    /// `x_m` runs from −`length_m` to the apex at `radius_m`.
+    pub fn ray(&self, x_m: f64, turn: f64) -> (Point3<f64>, UnitVector3<f64>) {
+        let along = (x_m / self.radius_m).clamp(0.0, 1.0);
+        let across = (1.0 - along * along).sqrt();
+        let direction = Vector3::new(along, across * turn.sin(), -across * turn.cos());
+        (Point3::new(x_m.min(0.0), 0.0, 0.0), UnitVector3::new_normalize(direction))
+    }
+
+    /// The point of the outer skin along that ray, in `T`.
+    pub fn skin_t(&self, x_m: f64, turn: f64) -> Point3<f64> {
+        let (start, direction) = self.ray(x_m, turn);
+        start + direction.scale(self.layers(start.x, &direction).outer_m)
+    }
+}

@@ -1,0 +1,63 @@
+//! What is not where it is believed to be: the finger on its mount, the object in the world.
+
+use super::noise::normal;
+use crate::config::{Checked, Rules};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+/// Table `[registration]`: errors that stay through a trial, drawn anew for each. Forward kinematics
+/// and the truth know nothing of them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RegistrationEffect {
+    /// Standard deviation of the fingertip's place on its mount, along each axis.
+    pub finger_m: f64,
+    /// The same of its attitude, about each axis.
+    pub finger_deg: f64,
+    /// Standard deviation of the object's place, along each axis.
+    pub object_m: f64,
+    /// The same of its attitude, about each axis through the origin of its mesh.
+    pub object_deg: f64,
+}
+
+impl Default for RegistrationEffect {
+    /// Chosen: a finger that was measured with a calliper, an object put against a mark.
+    fn default() -> Self {
+        Self { finger_m: 0.2e-3, finger_deg: 0.5, object_m: 0.5e-3, object_deg: 0.5 }
+    }
+}
+
+impl Checked for RegistrationEffect {
+    fn check(&self, rules: &mut Rules) {
+        rules.number("finger_m", self.finger_m, 0.0..=0.1);
+        rules.number("finger_deg", self.finger_deg, 0.0..=45.0);
+        rules.number("object_m", self.object_m, 0.0..=0.1);
+        rules.number("object_deg", self.object_deg, 0.0..=45.0);
+    }
+}
+
+/// The errors of one trial.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Registration {
+    /// Pose of the finger's own `T` in the `T` of the kinematics.
+    pub finger: Isometry3<f64>,
+    /// From where the object is believed to be to where it is, in its own frame.
+    pub object: Isometry3<f64>,
+}
+
+impl Registration {
+    /// Drawn by `rng`.
+    pub fn new(effect: &RegistrationEffect, rng: &mut impl Rng) -> Self {
+        let mut pose = |place_m: f64, angle_deg: f64| {
+            let mut vector = |sd| Vector3::from_fn(|_, _| sd * normal(rng));
+            let place = Translation3::from(vector(place_m));
+            let turn = UnitQuaternion::from_scaled_axis(vector(angle_deg.to_radians()));
+            Isometry3::from_parts(place, turn)
+        };
+        Self {
+            finger: pose(effect.finger_m, effect.finger_deg),
+            object: pose(effect.object_m, effect.object_deg),
+        }
+    }
+}

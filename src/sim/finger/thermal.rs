@@ -1,0 +1,134 @@
+//! The thermistor in a heated finger: TDC (temperature) and TAC (its change).
+
+use super::noise::normal;
+use crate::config::{Checked, Rules};
+use crate::robot::finger::frame::FULL_SCALE_COUNTS;
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// TAC's units: K/s per count (SynTouch BioTac SP manual).
+const TAC_C_S: f64 = 1e-3;
+
+/// Lower end of TAC's band (same); a change slower than this is sent as it is.
+const TAC_HZ: f64 = 0.45;
+
+/// Table `[thermal]`: a warm finger that a cold object cools.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ThermalEffect {
+    /// The fluid's temperature when a trial starts.
+    pub start_c: f64,
+    /// Temperature the finger's own heat brings the fluid to.
+    pub finger_c: f64,
+    /// The object's temperature.
+    pub object_c: f64,
+    /// Time constant of the fluid.
+    pub time_constant_s: f64,
+    /// Contact area that brings the fluid half-way to the object's temperature.
+    pub half_area_m2: f64,
+    /// The fluid's conductivity grows by this part per kelvin; electrodes drift with it.
+    pub conductivity_per_k: f64,
+    /// TAC at a constant temperature.
+    pub tac_baseline_counts: f64,
+    /// White noise of TDC; 0 is none.
+    pub tdc_noise_counts: f64,
+    /// White noise of TAC; 0 is none.
+    pub tac_noise_counts: f64,
+    /// Whether counts are whole numbers from 0 to 4095.
+    pub quantise: bool,
+}
+
+impl Default for ThermalEffect {
+    /// Temperatures: within the 25.7 to 35.3 °C a warming BioTac showed (mattmongeon's BioTac page);
+    /// the object's: a room. Noise and TAC's baseline: I-Quotient-Robotics/syntouch_btd_decode and
+    /// RuihanGao/BioTacSP_setup recordings. Time constant and area: chosen so that a contact
+    /// of 100 mm² moves TAC by the recorded 57 counts. Conductivity: 2 % per kelvin, as salt
+    /// water (chosen).
+    fn default() -> Self {
+        Self {
+            start_c: 31.0,
+            finger_c: 31.0,
+            object_c: 22.0,
+            time_constant_s: 30.0,
+            half_area_m2: 1e-3,
+            conductivity_per_k: 0.02,
+            tac_baseline_counts: 2053.0,
+            tdc_noise_counts: 0.4,
+            tac_noise_counts: 1.0,
+            quantise: true,
+        }
+    }
+}
+
+impl Checked for ThermalEffect {
+    fn check(&self, rules: &mut Rules) {
+        rules.number("start_c", self.start_c, -50.0..=150.0);
+        rules.number("finger_c", self.finger_c, -50.0..=150.0);
+        rules.number("object_c", self.object_c, -50.0..=150.0);
+        rules.number("time_constant_s", self.time_constant_s, 1e-3..=1e6);
+        rules.number("half_area_m2", self.half_area_m2, 1e-9..=1.0);
+        rules.number("conductivity_per_k", self.conductivity_per_k, -0.01..=0.1);
+        rules.number("tac_baseline_counts", self.tac_baseline_counts, 0.0..=FULL_SCALE_COUNTS);
+        rules.number("tdc_noise_counts", self.tdc_noise_counts, 0.0..=1e3);
+        rules.number("tac_noise_counts", self.tac_noise_counts, 0.0..=1e3);
+    }
+}
+
+impl ThermalEffect {
+    /// TDC at a temperature: the inverse of the SynTouch BioTac SP manual's
+    /// T = 4025 / ln((155183 − 46555 r) / r) − 273.15, r = TDC / 4095.
+    pub(super) fn tdc_counts(&self, temperature_c: f64, rng: &mut impl Rng) -> f64 {
+        let ratio = 155_183.0 / ((4025.0 / (temperature_c + 273.15)).exp() + 46_555.0);
+        self.convert(FULL_SCALE_COUNTS * ratio, self.tdc_noise_counts, rng)
+    }
+
+    /// TAC at a rate of warming: cooling raises it.
+    pub(super) fn tac_counts(&self, warming_c_s: f64, rng: &mut impl Rng) -> f64 {
+        let counts = self.tac_baseline_counts - warming_c_s / TAC_C_S;
+        self.convert(counts, self.tac_noise_counts, rng)
+    }
+
+    fn convert(&self, mut counts: f64, noise_counts: f64, rng: &mut impl Rng) -> f64 {
+        if noise_counts > 0.0 {
+            counts += noise_counts * normal(rng);
+        }
+        if self.quantise { counts.round().clamp(0.0, FULL_SCALE_COUNTS) } else { counts }
+    }
+}
+
+/// The fluid's heat: one trial's state.
+#[derive(Clone, Debug)]
+pub struct Heat {
+    start_c: f64,
+    /// The fluid's temperature.
+    pub temperature_c: f64,
+    slow_c: f64,
+}
+
+impl Heat {
+    /// At the start of a trial.
+    pub fn new(effect: &ThermalEffect) -> Self {
+        let start_c = effect.start_c;
+        Self { start_c, temperature_c: start_c, slow_c: start_c }
+    }
+
+    /// Another `dt_s` with this contact area: exact for a constant area.
+    pub fn step(&mut self, effect: &ThermalEffect, area_m2: f64, dt_s: f64) {
+        let cooled = area_m2 / (area_m2 + effect.half_area_m2);
+        let end_c = effect.finger_c + cooled * (effect.object_c - effect.finger_c);
+        self.temperature_c -=
+            (-dt_s / effect.time_constant_s).exp_m1() * (end_c - self.temperature_c);
+        self.slow_c -= (-dt_s * TAU * TAC_HZ).exp_m1() * (self.temperature_c - self.slow_c);
+    }
+
+    /// The rate of warming within TAC's band.
+    pub fn warming_c_s(&self) -> f64 {
+        (self.temperature_c - self.slow_c) * TAU * TAC_HZ
+    }
+
+    /// How well the fluid conducts, relative to the start.
+    pub fn conductivity(&self, effect: &ThermalEffect) -> f64 {
+        (1.0 + effect.conductivity_per_k * (self.temperature_c - self.start_c)).max(0.01)
+    }
+}

@@ -1,0 +1,80 @@
+//! An arm or stage that moves exactly as commanded, carrying the soft finger.
+
+use super::simulated_finger::SimulatedFinger;
+use crate::backend::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
+use crate::robot::arm::{Chain, Joints};
+use crate::robot::finger::TipMotion;
+use crate::sim::Environment;
+use std::sync::Arc;
+
+/// No masses, no servo: joint positions are the sum of the velocities commanded.
+pub struct Kinematic {
+    chain: Chain,
+    capabilities: Capabilities,
+    sense: SimulatedFinger,
+    q: Joints,
+    tick: u64,
+    reading: Reading,
+}
+
+impl Kinematic {
+    /// At the chain's home; none in a world without a soft finger.
+    pub fn new(environment: &Arc<Environment>) -> Option<Self> {
+        let chain = environment.chain()?;
+        let sense = SimulatedFinger::new(Arc::clone(environment), 0)?;
+        let capabilities = Capabilities::of(&chain, environment.scene().period_s());
+        let q = chain.home;
+        let mut body = Self { chain, capabilities, sense, q, tick: 0, reading: Reading::default() };
+        body.report(&Wrench::default(), &Joints::zeros());
+        Some(body)
+    }
+
+    fn time_s(&self) -> f64 {
+        self.tick as f64 * self.capabilities.period_s
+    }
+
+    fn report(&mut self, load: &Wrench, qdot: &Joints) {
+        let joints = self.chain.joints.len();
+        let copy = |to: &mut Vec<f64>, from: &Joints| {
+            to.clear();
+            to.extend(from.iter().take(joints));
+        };
+        self.reading.time_s = self.time_s();
+        copy(&mut self.reading.q, &self.q);
+        copy(&mut self.reading.qdot, qdot);
+        copy(&mut self.reading.applied.qdot, qdot);
+        self.sense.report(load, self.capabilities.period_s, &mut self.reading);
+    }
+}
+
+impl Backend for Kinematic {
+    fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
+        self.sense.reset(seed);
+        self.q = self.chain.home;
+        self.tick = 0;
+        self.report(&Wrench::default(), &Joints::zeros());
+        Ok(&self.reading)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        let wanted = self.capabilities.accept(command)?;
+        let period_s = self.capabilities.period_s;
+        let mut qdot = wanted;
+        for (joint, qdot) in self.chain.joints.iter().zip(qdot.iter_mut()) {
+            *qdot = qdot.clamp(-joint.qdot_limit, joint.qdot_limit);
+        }
+        let q = self.chain.clamp(&(self.q + qdot * period_s));
+        let qdot = (q - self.q) / period_s;
+        let (x_wt, jacobian) = self.chain.jacobian(&q);
+        let motion = TipMotion::moving(x_wt, &(jacobian * qdot));
+        let load = self.sense.step(&motion, period_s)?;
+        self.q = q;
+        self.tick += 1;
+        self.report(&load, &qdot);
+        Ok(&self.reading)
+    }
+}

@@ -1,0 +1,103 @@
+//! Scene → MJCF, the text a MuJoCo model is compiled from. Numbers are SI, in `W`.
+
+mod height_field;
+mod hull;
+mod mesh;
+mod robot;
+mod scenery;
+mod sdf;
+mod shell;
+
+pub use shell::flex;
+
+use super::collision::Collision;
+use super::environment::Environment;
+use super::solver::Integrator;
+use std::fmt::{Display, Write};
+
+/// Time step of a model that is only looked at; chosen, the period of the PA-10's servo.
+const PICTURE_STEP_S: f64 = 0.002;
+
+/// What a model is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mode {
+    /// To look at: everything in the scene.
+    Picture,
+    /// To step: what moves and nothing else. Shapes would cost time at every step, and contact is
+    /// the skin's matter, not MuJoCo's; only a finger without a skin meets the object, as the
+    /// scene's [`Collision`].
+    Dynamic {
+        /// Time step; the servos' gains are chosen for 2 ms and less.
+        step_s: f64,
+    },
+}
+
+/// The scene as MJCF: the arm or stage at its home (keyframe `home`) with the finger on it, the
+/// force/torque sensor at the site `mount` and `T` at the site `tip`; in a picture also the
+/// object at its pose on a vertical board, the floor, a camera and lights. None for a scene
+/// without a mesh.
+pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
+    let mesh = environment.mesh()?;
+    let chain = environment.chain()?;
+    let shown = mode == Mode::Picture;
+    let collides = !shown && environment.scene().collides();
+    let scenery = match shown {
+        true => scenery::scenery(mesh, &chain),
+        false if collides => obstacle(environment)?,
+        false => String::new(),
+    };
+    let step_s = match mode {
+        Mode::Picture => PICTURE_STEP_S,
+        Mode::Dynamic { step_s } => step_s,
+    };
+    let mut text = String::new();
+    // Writing to a String cannot fail. A diverging state must be seen, not reset in silence.
+    let _ = write!(
+        text,
+        r#"<mujoco model="palpate">
+{robot}
+  <compiler discardvisual="{discard}"/>
+  <option timestep="{step_s}" integrator="{integrator}"><flag autoreset="disable"/></option>
+  <sensor>
+    <force name="force" site="mount"/>
+    <torque name="torque" site="mount"/>
+  </sensor>
+  <keyframe><key name="home" qpos="{home}"/></keyframe>
+{scenery}</mujoco>
+"#,
+        robot = robot::robot(environment.scene(), &chain, collides),
+        discard = !shown,
+        integrator = keyword(environment.scene().solver.integrator),
+        home = list(chain.home.iter().take(chain.joints.len())),
+    );
+    Some(text)
+}
+
+/// What collides with a finger without skin; one line and one file to add a geometry.
+fn obstacle(environment: &Environment) -> Option<String> {
+    match environment.scene().solver.collision.unwrap_or_default() {
+        Collision::HeightField => height_field::obstacle(environment),
+        Collision::Hull => hull::obstacle(environment),
+        Collision::Sdf => sdf::obstacle(environment),
+    }
+}
+
+/// Attributes of the two geoms that collide: without friction, yielding as mount and gears of an
+/// arm would: an arm that has to stop at once would be stopped by force (chosen).
+const CONTACT: &str =
+    r#"contype="1" conaffinity="1" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
+
+/// As MJCF spells it.
+fn keyword(integrator: Integrator) -> &'static str {
+    match integrator {
+        Integrator::ImplicitFast => "implicitfast",
+        Integrator::Implicit => "implicit",
+        Integrator::Euler => "Euler",
+        Integrator::Rk4 => "RK4",
+    }
+}
+
+fn list<T: Display>(numbers: impl IntoIterator<Item = T>) -> String {
+    let texts: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();
+    texts.join(" ")
+}

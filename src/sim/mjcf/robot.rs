@@ -1,0 +1,69 @@
+//! The arm or the stage with the finger on it.
+
+use super::{CONTACT, list};
+use crate::robot::arm::settings::TOOL_KG;
+use crate::robot::arm::{Chain, Links};
+use crate::robot::finger::Finger;
+use crate::sim::Scene;
+use nalgebra::Isometry3;
+
+const C: &str = include_str!("../../../models/pa10/c.xml");
+const A: &str = include_str!("../../../models/pa10/a.xml");
+const STAGE: &str = include_str!("../../../models/stage.xml");
+
+/// The robot's model without its outermost tags, with its base and its tool put in; the finger's
+/// hull is met by the object if it `collides`.
+pub(super) fn robot(scene: &Scene, chain: &Chain, collides: bool) -> String {
+    let model = match scene.arm.as_ref().map(|arm| arm.links) {
+        Some(Links::C) => C,
+        Some(Links::A) => A,
+        None => STAGE,
+    };
+    let after_open = model.split_once("<mujoco").and_then(|(_, rest)| rest.split_once('>'));
+    let inner = after_open.and_then(|(_, rest)| rest.split_once("</mujoco>"));
+    let tool_kg = scene.arm.as_ref().map_or(TOOL_KG, |arm| arm.tool_kg);
+    let contact = if collides { CONTACT } else { "" };
+    inner
+        .map_or("", |(inner, _)| inner)
+        .replace("<body name=\"base\"", &format!("<body name=\"base\" {}", pose(&chain.base)))
+        .replace("<!-- tool -->", &tool(&scene.finger, tool_kg, chain, contact))
+}
+
+/// Adapter and finger as one body at the flange, where the force/torque sensor is.
+fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, contact: &str) -> String {
+    let mount_m = chain.tool.translation.vector.norm();
+    let heel_m = (mount_m - finger.length_m).max(0.0);
+    // A rod of the tool's mass and length, radius 10 mm: m/12 (3 r² + l²) across, m r²/2 along.
+    let (radius_m, along) = (0.01_f64, 0.5 * tool_kg * 0.01 * 0.01);
+    let across = tool_kg / 12.0 * (3.0 * radius_m * radius_m + mount_m * mount_m);
+    // MuJoCo refuses a capsule without length.
+    let hull = match finger.length_m > 1e-9 {
+        true => format!(r#"type="capsule" fromto="0 0 {heel_m} 0 0 {mount_m}""#),
+        false => format!(r#"type="sphere" pos="0 0 {mount_m}""#),
+    };
+    let adapter = match heel_m > 1e-9 {
+        true => format!(
+            r#"<geom name="adapter" type="cylinder" fromto="0 0 0 0 0 {heel_m}" size="{}" rgba=".55 .57 .6 1"/>"#,
+            2.0 * finger.radius_m
+        ),
+        false => String::new(),
+    };
+    format!(
+        r#"<body name="finger" {flange}>
+          <inertial pos="0 0 {middle}" mass="{tool_kg}" diaginertia="{across} {across} {along}"/>
+          {adapter}
+          <geom name="finger" {hull} size="{radius}" rgba=".2 .35 .6 1" {contact}/>
+          <site name="mount" size=".005" group="4"/>
+          <site name="tip" size=".002" group="4" {tip}/>
+        </body>"#,
+        flange = pose(&chain.flange),
+        middle = mount_m / 2.0,
+        radius = finger.radius_m,
+        tip = pose(&chain.tool),
+    )
+}
+
+fn pose(x: &Isometry3<f64>) -> String {
+    let q = x.rotation.quaternion();
+    format!(r#"pos="{}" quat="{}""#, list(x.translation.vector.iter()), list([q.w, q.i, q.j, q.k]))
+}

@@ -1,0 +1,69 @@
+//! What stands around: the object on its board, the floor, the camera, the lights.
+
+use super::list;
+use super::mesh::asset;
+use crate::geometry::mesh::Mesh;
+use crate::robot::arm::Chain;
+use nalgebra::{Point3, Vector3};
+
+/// Thickness of the board that the object is fixed to, and how far it reaches beyond it.
+const BOARD_M: f64 = 0.02;
+const RIM_M: f64 = 0.1;
+
+/// From the middle of all there is towards a spectator beside the finger, who also sees the object's
+/// front.
+const BESIDE: Vector3<f64> = Vector3::new(1.08, 0.45, 0.36);
+
+/// Two cameras: `front` sees the object from in front and above, `whole` from beside the finger
+/// all there is.
+pub(super) fn scenery(mesh: &Mesh, chain: &Chain) -> String {
+    let (low, high) = mesh.bounds();
+    let middle = nalgebra::center(&low, &high);
+    let half = (high - low) / 2.0;
+    // The board stands on the floor and overlaps the object.
+    let (foot_z, top_z) = ((low.z - RIM_M).min(0.0), high.z + RIM_M);
+    let board = Point3::new(middle.x, low.y - BOARD_M / 2.0, (foot_z + top_z) / 2.0);
+    let front = middle + Vector3::new(0.9, 2.2, 0.7) * (4.0 * half.norm());
+    // From the robot's foot to the object, or the object alone if the stage carries the finger.
+    let foot = if chain.turns() { Point3::from(chain.base.translation.vector) } else { middle };
+    let between = nalgebra::center(&foot, &middle) + Vector3::z() * (0.3 * (foot - middle).norm());
+    let size = (foot - middle).norm() + 4.0 * half.norm();
+    let whole = between + BESIDE * size;
+    // A free camera, that of a viewer, starts there too: the direction it looks in.
+    let azimuth = (-BESIDE.y).atan2(-BESIDE.x).to_degrees();
+    let elevation = (-BESIDE.z).atan2(BESIDE.xy().norm()).to_degrees();
+    let asset = asset(mesh, "object");
+    format!(
+        r#"  <statistic center="{between}" extent="{size}"/>
+  <visual>
+    <global offwidth="1280" offheight="960" azimuth="{azimuth}" elevation="{elevation}"/>
+    <headlight ambient=".45 .45 .45" diffuse=".25 .25 .25" specular="0 0 0"/>
+    <quality shadowsize="8192" offsamples="8"/>
+  </visual>
+  <asset>
+    {asset}
+    <texture name="sky" type="skybox" builtin="gradient" rgb1="1 1 1" rgb2=".75 .8 .85" width="64" height="64"/>
+    <texture name="tiles" type="2d" builtin="checker" rgb1=".86 .87 .87" rgb2=".82 .83 .83" width="256" height="256"/>
+    <material name="tiles" texture="tiles" texrepeat="8 8" texuniform="true"/>
+    <material name="porcelain" rgba=".95 .95 .93 1" specular=".6" shininess=".7"/>
+    <material name="wood" rgba=".7 .55 .4 1"/>
+  </asset>
+  <worldbody>
+    <light pos="{front}" dir="-1 -1.2 -2.5" directional="true" diffuse=".45 .45 .45" specular=".2 .2 .2"/>
+    <body name="between" pos="{between}"/>
+    <camera name="front" mode="targetbodycom" target="object" pos="{front}"/>
+    <camera name="whole" mode="targetbody" target="between" pos="{whole}"/>
+    <geom name="floor" type="plane" size="3 3 .1" material="tiles"/>
+    <body name="object">
+      <geom name="object" type="mesh" mesh="object" material="porcelain"/>
+    </body>
+    <geom name="board" type="box" pos="{board}" size="{board_size}" material="wood"/>
+  </worldbody>
+"#,
+        front = list(front.iter()),
+        between = list(between.iter()),
+        whole = list(whole.iter()),
+        board = list(board.iter()),
+        board_size = list([half.x + RIM_M, BOARD_M / 2.0, (top_z - foot_z) / 2.0]),
+    )
+}

@@ -1,0 +1,19 @@
+//! What only a simulator knows: the object, the physics of the finger, the simulated bodies.
+
+pub mod collision;
+pub mod environment;
+pub mod finger;
+pub mod function;
+pub mod kinematic;
+pub mod mjcf;
+#[cfg(feature = "mujoco")]
+pub mod mujoco;
+pub mod probe;
+pub mod reach;
+pub mod scene;
+pub mod simulated_finger;
+pub mod simulator;
+pub mod solver;
+
+pub use environment::Environment;
+pub use scene::Scene;

@@ -1,0 +1,131 @@
+//! An arm or stage with masses, servos and friction, carrying the finger.
+
+use super::{Models, Plant};
+use crate::backend::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
+use crate::robot::arm::Chain;
+use crate::robot::finger::TipMotion;
+use crate::sim::Environment;
+use crate::sim::simulated_finger::SimulatedFinger;
+use std::sync::Arc;
+
+/// A state counts as diverged this far beyond a joint's limits, rad or m (the stops stand 0.05 rad
+/// beyond, and give), or this many times faster than its limit; chosen.
+const BEYOND: f64 = 0.2;
+const FASTER: f64 = 5.0;
+
+/// A [`Plant`] whose fingertip carries the skin, if the scene has one.
+pub struct Dynamic {
+    chain: Chain,
+    capabilities: Capabilities,
+    plant: Plant,
+    /// None for a finger without skin, which MuJoCo lets collide.
+    sense: Option<SimulatedFinger>,
+    wrench: Wrench,
+    steps: u32,
+    tick: u64,
+    reading: Reading,
+}
+
+impl Dynamic {
+    /// At the chain's home; none without memory or in a world of another body.
+    pub fn new(environment: &Arc<Environment>, models: &Models) -> Option<Self> {
+        let chain = environment.chain()?;
+        let period_s = environment.scene().period_s();
+        let mut sense = SimulatedFinger::new(Arc::clone(environment), 0);
+        if let (Some(sense), Some(shell)) = (&mut sense, models.shell(environment).ok()?) {
+            sense.wear(shell);
+        }
+        let mut body = Self {
+            capabilities: Capabilities::of(&chain, period_s),
+            plant: Plant::new(Arc::clone(&models.plant)).ok()?,
+            sense,
+            wrench: Wrench::default(),
+            steps: (period_s / models.plant.opt().timestep).round() as u32,
+            tick: 0,
+            reading: Reading::default(),
+            chain,
+        };
+        body.reset(0).ok()?;
+        Some(body)
+    }
+
+    /// What the servos are told: `command` within the joints' speeds.
+    fn apply(&mut self, command: &Command) {
+        let applied = &mut self.reading.applied.qdot;
+        applied.clear();
+        applied.extend(
+            command
+                .qdot
+                .iter()
+                .zip(&self.chain.joints)
+                .map(|(&qdot, joint)| qdot.clamp(-joint.qdot_limit, joint.qdot_limit)),
+        );
+    }
+
+    /// One step of plant and skin: the skin's force is that at the start of the step.
+    fn advance(&mut self) -> Result<(), Fault> {
+        let step_s = self.plant.step_s();
+        self.plant.step(&self.reading.applied.qdot, &self.wrench)?;
+        let Some(sense) = &mut self.sense else { return Ok(()) };
+        let motion = TipMotion::moving(self.plant.tip(), &self.plant.tip_twist());
+        self.wrench = sense.step(&motion, step_s)?;
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Fault> {
+        let (q, qdot) = (self.plant.q(), self.plant.qdot());
+        let plausible = self.chain.joints.iter().zip(q.iter().zip(qdot)).all(|(joint, (q, v))| {
+            let [low, high] = joint.q_limits;
+            (low - BEYOND..=high + BEYOND).contains(q) && v.abs() <= FASTER * joint.qdot_limit
+        });
+        if plausible {
+            return Ok(());
+        }
+        let state = q.iter().chain(qdot).copied().collect();
+        Err(Fault::Diverged { time_s: self.plant.time_s(), state })
+    }
+
+    fn report(&mut self) {
+        let Self { plant, reading, .. } = self;
+        reading.time_s = self.tick as f64 * self.capabilities.period_s;
+        reading.q.clear();
+        reading.q.extend_from_slice(plant.q());
+        reading.qdot.clear();
+        reading.qdot.extend_from_slice(plant.qdot());
+        match &mut self.sense {
+            Some(sense) => sense.report(&plant.mount(), self.capabilities.period_s, reading),
+            None => reading.ideal = plant.contact(),
+        }
+    }
+}
+
+impl Backend for Dynamic {
+    fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
+        let joints = self.chain.joints.len();
+        self.plant.reset(self.chain.start())?;
+        if let Some(sense) = &mut self.sense {
+            sense.reset(seed);
+        }
+        (self.wrench, self.tick) = (Wrench::default(), 0);
+        self.reading.applied.qdot.clear();
+        self.reading.applied.qdot.resize(joints, 0.0);
+        self.report();
+        Ok(&self.reading)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        self.capabilities.accept(command)?;
+        self.apply(command);
+        for _ in 0..self.steps {
+            self.advance()?;
+        }
+        self.check()?;
+        self.tick += 1;
+        self.report();
+        Ok(&self.reading)
+    }
+}

@@ -1,0 +1,75 @@
+//! What MuJoCo compiles of a world, once for all trials.
+
+use super::{FlexShell, ModelError, Substeps, compile};
+use crate::sim::Environment;
+use crate::sim::collision::Collision;
+use crate::sim::environment::Shape;
+use crate::sim::mjcf;
+use crate::sim::mjcf::Mode;
+use crate::sim::simulated_finger::Shell;
+use mujoco_rs::wrappers::MjModel;
+use std::sync::Arc;
+
+/// Shared by the trials of an experiment.
+#[derive(Clone, Debug)]
+pub struct Models {
+    /// The arm or stage.
+    pub plant: Arc<MjModel>,
+    /// The skin of `[effects.flex]`.
+    pub flex: Option<Arc<MjModel>>,
+    /// How the scene's time step was divided, and why; none if it was not.
+    pub substeps: Option<Substeps>,
+}
+
+impl Models {
+    /// With the scene's time step, or part of it where that is too long for the skin.
+    ///
+    /// # Errors
+    /// If MuJoCo refuses the world, no step is short enough for its skin, or the object has no inside
+    /// where the scene's collision needs one.
+    pub fn new(environment: &Environment) -> Result<Self, ModelError> {
+        let step_s = environment.scene().solver.step_s;
+        let whole = Self::at(environment, step_s)?;
+        match Substeps::needed(environment, &whole.plant)? {
+            None => Ok(whole),
+            Some(substeps) => {
+                let divided = Self::at(environment, step_s / f64::from(substeps.count))?;
+                Ok(Self { substeps: Some(substeps), ..divided })
+            }
+        }
+    }
+
+    /// With a time step of `step_s`, whatever the skin needs.
+    ///
+    /// # Errors
+    /// If MuJoCo refuses the world, or the object has no inside where the scene's collision needs
+    /// one.
+    pub fn at(environment: &Environment, step_s: f64) -> Result<Self, ModelError> {
+        check_inside(environment)?;
+        let text = mjcf::scene(environment, Mode::Dynamic { step_s });
+        let plant = Arc::new(compile(&text.ok_or(ModelError::Lacks { part: "an object" })?)?);
+        Ok(Self { plant, flex: FlexShell::model(environment)?, substeps: None })
+    }
+
+    /// The skin of `[effects.flex]`, at rest; none if the world has none.
+    ///
+    /// # Errors
+    /// If memory is short.
+    pub fn shell(
+        &self,
+        environment: &Arc<Environment>,
+    ) -> Result<Option<Box<dyn Shell>>, ModelError> {
+        let Some(model) = &self.flex else { return Ok(None) };
+        Ok(Some(Box::new(FlexShell::new(Arc::clone(environment), Arc::clone(model))?)))
+    }
+}
+
+/// Without an inside a distance has no sign.
+fn check_inside(environment: &Environment) -> Result<(), ModelError> {
+    let Shape::Mesh { report, .. } = environment.shape() else { return Ok(()) };
+    let edges = report.border_edges.count + report.non_manifold_edges.count;
+    match environment.scene().solver.collision {
+        Some(Collision::Sdf) if edges > 0 => Err(ModelError::Open { edges }),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,216 @@
+//! The arm or stage with its velocity servos, gravity and friction, one step at a time.
+
+use super::ModelError;
+use super::contact;
+use super::joint_servo::JointServo;
+use crate::backend::backend::{Fault, IdealContact, Wrench};
+use crate::robot::arm::Joints;
+use crate::robot::arm::chain::MAX_JOINTS;
+use mujoco_rs::wrappers::mj_data::MjData;
+use mujoco_rs::wrappers::mj_model::{MjModel, MjtIntegrator, MjtObjBase};
+use nalgebra::{
+    DMatrix, Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion,
+    Vector3, Vector6,
+};
+use std::sync::Arc;
+
+/// A compiled model of [`mjcf::scene`](crate::sim::mjcf::scene), shared, and one state of it.
+///
+/// It knows nothing of skin: the caller gives the wrench on the fingertip.
+pub struct Plant {
+    data: MjData<Arc<MjModel>>,
+    servo: JointServo,
+    /// The site of `T` and the body it is on.
+    tip: usize,
+    finger: usize,
+    /// Pose of the sensor in `T`.
+    x_tm: Isometry3<f64>,
+    /// Whether a step evaluates the model in between.
+    staged: bool,
+    contact: Option<IdealContact>,
+}
+
+impl Plant {
+    /// A state of `model` at q = 0; [`reset`](Self::reset) brings it to its start.
+    ///
+    /// # Errors
+    /// If `model` is not one of a robot with a finger, or memory is short.
+    pub fn new(model: Arc<MjModel>) -> Result<Self, ModelError> {
+        let part = |kind, name: &'static str| {
+            model.name_to_id(kind, name).ok_or(ModelError::Lacks { part: name })
+        };
+        let tip = part(MjtObjBase::mjOBJ_SITE, "tip")?;
+        let mount = part(MjtObjBase::mjOBJ_SITE, "mount")?;
+        let finger = part(MjtObjBase::mjOBJ_BODY, "finger")?;
+        let joints = model.nv() as usize;
+        let driven = model.nq() as usize == joints && model.nu() as usize == joints;
+        if !driven || joints > MAX_JOINTS {
+            return Err(ModelError::Lacks { part: "one servo for each of at most 7 joints" });
+        }
+        // Six numbers: the force, then the torque.
+        if model.nsensordata() != 6 {
+            return Err(ModelError::Lacks { part: "a force and a torque sensor" });
+        }
+        let mut kv = Joints::zeros();
+        let mut limit = Joints::zeros();
+        let motors = model.actuator_gainprm().iter().zip(model.actuator_forcerange());
+        for (i, (gain, range)) in motors.enumerate().take(joints) {
+            kv[i] = gain[0];
+            limit[i] = range[1];
+        }
+        let local = |site: usize| {
+            let [x, y, z] = model.site_pos()[site];
+            let [w, i, j, k] = model.site_quat()[site];
+            Isometry3::from_parts(
+                Translation3::new(x, y, z),
+                UnitQuaternion::new_normalize(Quaternion::new(w, i, j, k)),
+            )
+        };
+        let x_tm = local(tip).inv_mul(&local(mount));
+        let staged = model.opt().integrator == MjtIntegrator::mjINT_RK4 as i32;
+        let data = MjData::try_new(Arc::clone(&model)).map_err(|_| ModelError::Memory)?;
+        Ok(Self {
+            data,
+            servo: JointServo::new(kv, limit),
+            tip,
+            finger,
+            x_tm,
+            staged,
+            contact: None,
+        })
+    }
+
+    /// Puts the arm at rest at `q`, its servos holding its weight, at time 0.
+    ///
+    /// # Errors
+    /// [`Fault::Refused`] if `q` is not one finite number per joint.
+    pub fn reset(&mut self, q: &[f64]) -> Result<(), Fault> {
+        self.accept(q)?;
+        self.data.reset();
+        self.contact = None;
+        self.data.qpos_mut().copy_from_slice(q);
+        self.data.forward();
+        self.servo.hold(self.data.qfrc_bias());
+        self.check()
+    }
+
+    /// One time step with velocities commanded to the servos (rad/s or m/s) and `wrench` on the
+    /// fingertip, given in `T` about its origin and kept through the step.
+    ///
+    /// # Errors
+    /// [`Fault::Refused`] if a number is not finite or missing, [`Fault::Diverged`] with time,
+    /// q and qdot if MuJoCo warns; the state is then meaningless until the next reset.
+    pub fn step(&mut self, qdot: &[f64], wrench: &Wrench) -> Result<(), Fault> {
+        self.accept(qdot)?;
+        let Wrench { force_n, torque_nm } = wrench;
+        if !force_n.iter().chain(torque_nm.iter()).all(|value| value.is_finite()) {
+            let values = force_n.iter().chain(torque_nm.iter()).copied().collect();
+            return Err(Fault::Refused { values });
+        }
+        let step_s = self.step_s();
+        for (i, &command) in qdot.iter().enumerate() {
+            let (speed, force) = (self.data.qvel()[i], self.data.actuator_force()[i]);
+            let control = self.servo.control(i, command, speed, force, step_s);
+            self.data.ctrl_mut()[i] = control;
+        }
+        // MuJoCo takes a wrench about the body's centre of mass. Only what is applied this way
+        // reaches the force/torque sensor.
+        let x_wt = self.tip();
+        let force_w = x_wt.rotation * force_n;
+        let arm = x_wt.translation.vector - Vector3::from(self.data.xipos()[self.finger]);
+        let torque_w = x_wt.rotation * torque_nm + arm.cross(&force_w);
+        self.data.xfrc_applied_mut()[self.finger] =
+            [force_w.x, force_w.y, force_w.z, torque_w.x, torque_w.y, torque_w.z];
+        // In this order positions and velocities are those after the step; `mj_step` would leave
+        // those before it. `mj_step2` cannot do Runge and Kutta's stages: it takes Euler's instead.
+        match self.staged {
+            true => self.data.step(),
+            false => self.data.step2(),
+        }
+        self.contact = contact::contact(&self.data, self.finger, &x_wt);
+        self.data.step1();
+        self.check()
+    }
+
+    /// Time step.
+    pub fn step_s(&self) -> f64 {
+        self.data.model_opt().timestep
+    }
+
+    /// Time since reset.
+    pub fn time_s(&self) -> f64 {
+        self.data.time()
+    }
+
+    /// Joint positions, rad or m.
+    pub fn q(&self) -> &[f64] {
+        self.data.qpos()
+    }
+
+    /// Joint velocities, rad/s or m/s.
+    pub fn qdot(&self) -> &[f64] {
+        self.data.qvel()
+    }
+
+    /// What the motors gave during the last step, N·m or N.
+    pub fn motors(&self) -> &[f64] {
+        self.data.actuator_force()
+    }
+
+    /// What MuJoCo's contacts did to the finger during the last step, for a finger without skin.
+    pub fn contact(&self) -> Option<IdealContact> {
+        self.contact
+    }
+
+    /// Pose of `T` in `W`.
+    pub fn tip(&self) -> Isometry3<f64> {
+        let p = Point3::from(self.data.site_xpos()[self.tip]);
+        let r = Matrix3::from_row_slice(&self.data.site_xmat()[self.tip]);
+        let r = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(r));
+        Isometry3::from_parts(p.into(), r)
+    }
+
+    /// Velocity of `T`: linear (m/s) at its origin, then angular (rad/s), in `W`.
+    pub fn tip_twist(&self) -> Vector6<f64> {
+        let site = self.data.try_object_velocity(MjtObjBase::mjOBJ_SITE, self.tip, false);
+        let [rx, ry, rz, x, y, z] = site.unwrap_or_default();
+        Vector6::new(x, y, z, rx, ry, rz)
+    }
+
+    /// The smallest mass with which `T` yields to a push at the present posture, over all
+    /// directions: one over the largest eigenvalue of `J M⁻¹ Jᵀ`.
+    pub fn tip_mass_kg(&self) -> f64 {
+        let n = self.q().len();
+        let mut inertia = vec![0.0; n * n];
+        let whole = self.data.full_m(&mut inertia).is_ok();
+        let (linear, _) = self.data.jac_site(true, false, self.tip);
+        let jacobian = DMatrix::from_row_slice(3, n, &linear);
+        let solved = DMatrix::from_row_slice(n, n, &inertia).cholesky().filter(|_| whole);
+        let mobility = solved.map(|inertia| &jacobian * inertia.solve(&jacobian.transpose()));
+        mobility.map_or(0.0, |mobility| 1.0 / mobility.symmetric_eigenvalues().max())
+    }
+
+    /// What the force/torque sensor measured during the last step, carried over to `T` about its
+    /// origin: the load of everything beyond it, so the wrench on the fingertip plus the weight
+    /// and inertia of adapter and finger.
+    pub fn mount(&self) -> Wrench {
+        let [fx, fy, fz, tx, ty, tz] = *self.data.sensordata() else { return Wrench::default() };
+        // MuJoCo gives what the link does to the finger; the sensor feels the opposite.
+        let (force_n, torque_nm) = (-Vector3::new(fx, fy, fz), -Vector3::new(tx, ty, tz));
+        Wrench { force_n, torque_nm }.moved(&self.x_tm)
+    }
+
+    fn accept(&self, values: &[f64]) -> Result<(), Fault> {
+        let fits = values.len() == self.q().len() && values.iter().all(|value| value.is_finite());
+        if fits { Ok(()) } else { Err(Fault::Refused { values: values.into() }) }
+    }
+
+    /// MuJoCo warns of a state that is not finite or larger than 1e10.
+    fn check(&self) -> Result<(), Fault> {
+        if self.data.warning().iter().all(|warning| warning.number == 0) {
+            return Ok(());
+        }
+        let state = self.q().iter().chain(self.qdot()).copied().collect();
+        Err(Fault::Diverged { time_s: self.time_s(), state })
+    }
+}

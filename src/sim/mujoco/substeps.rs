@@ -1,0 +1,99 @@
+//! How finely the scene's time step must be divided for the skin's force.
+
+use super::{ModelError, Plant};
+use crate::sim::Environment;
+use crate::sim::environment::APPROACH_W;
+use crate::sim::finger::stiffness;
+use mujoco_rs::wrappers::MjModel;
+use std::fmt::{Display, Formatter, Result as Written};
+use std::sync::Arc;
+
+/// Shortest step, that of a scene.
+const SHORTEST_S: f64 = 1e-5;
+
+/// A division of the time step, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Substeps {
+    /// Steps in one of the scene's.
+    pub count: u32,
+    /// The scene's step.
+    pub step_s: f64,
+    /// The longest that is stable.
+    pub limit: StepLimit,
+}
+
+/// What limits a step at whose start the skin's force is taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepLimit {
+    /// Largest force of a touch.
+    pub force_n: f64,
+    /// Largest stiffness of the skin up to that force.
+    pub stiffness_n_m: f64,
+    /// Smallest mass that the fingertip moves with.
+    pub mass_kg: f64,
+    /// √(mass / stiffness).
+    pub limit_s: f64,
+}
+
+impl StepLimit {
+    /// Of a model of `world`; none without a skin.
+    ///
+    /// A force that is explicit in the position of a mass m is stable in steps below `2 √(m / k)`;
+    /// half of that is the limit, because a hollow object presses more skin at once than the
+    /// flat plate on which k is measured.
+    ///
+    /// # Errors
+    /// If the model is not one of a robot with a finger.
+    pub fn of(environment: &Environment, model: &Arc<MjModel>) -> Result<Option<Self>, ModelError> {
+        let scene = environment.scene();
+        let skin = environment.fingertip().and_then(|tip| tip.skin());
+        let (Some(skin), Some(chain)) = (skin, environment.chain()) else { return Ok(None) };
+        let mut plant = Plant::new(Arc::clone(model))?;
+        plant.reset(chain.start()).map_err(|_| ModelError::Lacks { part: "a home" })?;
+        let mass_kg = plant.tip_mass_kg();
+        let towards_t = scene.finger.attitude_w().inverse_transform_vector(&APPROACH_W);
+        let force_n = scene.touch.force_limit_n;
+        let stiffness_n_m = stiffness::largest_n_m(skin, &towards_t, force_n);
+        let limit_s = (mass_kg / stiffness_n_m).sqrt();
+        Ok(Some(Self { force_n, stiffness_n_m, mass_kg, limit_s }))
+    }
+}
+
+impl Substeps {
+    /// What `model`, which has the scene's own step, needs; none if that is short enough.
+    ///
+    /// # Errors
+    /// If the longest stable step is shorter than 10 µs.
+    pub fn needed(
+        environment: &Environment,
+        model: &Arc<MjModel>,
+    ) -> Result<Option<Self>, ModelError> {
+        let step_s = environment.scene().solver.step_s;
+        let Some(limit) = StepLimit::of(environment, model)? else { return Ok(None) };
+        match limit.limit_s {
+            limit_s if step_s <= limit_s => Ok(None),
+            limit_s if limit_s >= SHORTEST_S => {
+                Ok(Some(Self { count: (step_s / limit_s).ceil() as u32, step_s, limit }))
+            }
+            _ => Err(ModelError::Stiff { step_s, limit }),
+        }
+    }
+}
+
+impl Display for StepLimit {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Written {
+        let Self { force_n, stiffness_n_m, mass_kg, limit_s } = self;
+        write!(
+            f,
+            "up to {force_n} N (touch.force_limit_n) the skin is as stiff as {stiffness_n_m:.0} N/m and the \
+             fingertip as light as {mass_kg:.3} kg, which needs at most {limit_s:.2e} s"
+        )
+    }
+}
+
+impl Display for Substeps {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Written {
+        let Self { count, step_s, limit } = self;
+        write!(f, "solver.step_s = {step_s} is divided by {count}: {limit}")
+    }
+}

@@ -1,0 +1,97 @@
+//! A window that shows a model in the posture that something else gives it: MuJoCo's viewer.
+
+use super::{ModelError, compile};
+use crate::backend::watched::Seen;
+use crate::sim::Environment;
+use crate::sim::mjcf;
+use crate::sim::mjcf::Mode;
+use mujoco_rs::viewer::{MjViewer, MjViewerError};
+use mujoco_rs::wrappers::mj_data::MjData;
+use mujoco_rs::wrappers::mj_model::{MjModel, MjtGeom};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, PoisonError};
+use thiserror::Error;
+
+/// Most marks that are drawn, the latest ones; as many as an experiment has touches at most.
+const MARKS_MAX: usize = 2000;
+
+/// Radius and colour of a mark; chosen.
+const MARK_M: f64 = 0.002;
+const MARK_RGBA: [f32; 4] = [0.84, 0.37, 0.0, 1.0];
+
+/// Why there is no window.
+#[derive(Debug, Error)]
+pub enum WindowError {
+    /// There is no model to show.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// There is no memory for the model's state.
+    #[error("no memory for the state of the MuJoCo model")]
+    Memory,
+    /// There is no display, or OpenGL cannot be used on it.
+    #[error("cannot open a window: {cause}; this needs X11 or Wayland with OpenGL")]
+    Display {
+        /// What the viewer says.
+        cause: MjViewerError,
+    },
+    /// The display offers nothing to draw on.
+    #[error("cannot open a window: the display has no OpenGL configuration")]
+    Configuration,
+}
+
+/// An open window. Only the main thread may have one.
+pub struct Window {
+    viewer: MjViewer,
+    data: MjData<Arc<MjModel>>,
+}
+
+impl Window {
+    /// Opens it on the picture of `world`.
+    ///
+    /// # Errors
+    /// If the world has nothing to show, or there is no display with OpenGL.
+    pub fn open(environment: &Environment, title: &str) -> Result<Self, WindowError> {
+        let picture = mjcf::scene(environment, Mode::Picture);
+        let picture = picture.ok_or(ModelError::Lacks { part: "an object" })?;
+        let model = Arc::new(compile(&picture)?);
+        let data = MjData::try_new(Arc::clone(&model)).map_err(|_| WindowError::Memory)?;
+        let builder = MjViewer::builder().window_name(title.to_owned()).max_user_geoms(MARKS_MAX);
+        // The viewer panics on a display without configurations.
+        let viewer = catch_unwind(AssertUnwindSafe(|| builder.build_passive(&model)))
+            .map_err(|_| WindowError::Configuration)?
+            .map_err(|cause| WindowError::Display { cause })?;
+        Ok(Self { viewer, data })
+    }
+
+    /// Whether its user has not closed it.
+    pub fn is_open(&self) -> bool {
+        self.viewer.running()
+    }
+
+    /// Draws the model at the joints seen, with a small ball at every mark.
+    ///
+    /// # Errors
+    /// If the display fails.
+    pub fn draw(&mut self, seen: &Seen) -> Result<(), WindowError> {
+        if seen.q.len() == self.data.qpos().len() {
+            self.data.qpos_mut().copy_from_slice(&seen.q);
+        }
+        self.data.set_time(seen.time_s);
+        self.data.forward();
+        let mut state = self.viewer.state().lock().unwrap_or_else(PoisonError::into_inner);
+        state.sync_data(&mut self.data);
+        let scene = state.user_scene_mut();
+        scene.clear_geom();
+        for mark in seen.marks_w.iter().rev().take(MARKS_MAX) {
+            let (size, place) = (Some([MARK_M; 3]), Some(mark.coords.into()));
+            let ball = MjtGeom::mjGEOM_SPHERE;
+            // SAFETY: the ball keeps the ids of material, texture and object that say none.
+            let drawn = unsafe { scene.try_create_geom(ball, size, place, None, Some(MARK_RGBA)) };
+            if drawn.is_err() {
+                break;
+            }
+        }
+        drop(state);
+        self.viewer.render().map_err(|cause| WindowError::Display { cause })
+    }
+}

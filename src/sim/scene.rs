@@ -1,0 +1,310 @@
+//! What there is: the object, the finger, the zone, and which body carries out a touch.
+
+use super::function::Function;
+use super::solver::SolverSettings;
+use crate::config::{Checked, ConfigError, Loader, Rules};
+use crate::geometry::surfaces;
+use crate::robot::arm::ArmSettings;
+use crate::robot::finger::Finger;
+use crate::sim::finger::Effects;
+use crate::sim::finger::profile::Profile;
+use crate::task::touch::TouchSettings;
+use crate::task::zone::Zone;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A scene means one thing: everything that decides what a touch returns stands in it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// What carries out a touch.
+    pub body: Body,
+    /// The surface, if the body is `function`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub function: Option<Function>,
+    /// The rectangle explored.
+    pub zone: Zone,
+    /// The object, if the body is not `function`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object: Option<Object>,
+    /// The finger; a `function` is touched without one.
+    #[serde(default)]
+    pub finger: Finger,
+    /// The arm that carries the finger; without one, a stage of three slides does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arm: Option<ArmSettings>,
+    /// Optional physics of a body that feels, each a table of its own; the others leave it alone.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub effects: Effects,
+    /// How a `dynamic` body is integrated.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub solver: SolverSettings,
+    /// How a touch is carried out by a body that moves.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub touch: TouchSettings,
+}
+
+/// A force must stand this many standard deviations of its noise above it to say contact: an approach
+/// is a thousand readings (chosen).
+const SDS_OF_CONTACT: f64 = 5.0;
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// How faithfully a touch is carried out, cheapest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Body {
+    /// An analytic surface is read where it is asked.
+    Function,
+    /// The finger's hull is swept along −y to first contact on the exact mesh.
+    Cast,
+    /// The soft finger is moved exactly as commanded and feels the exact mesh.
+    Kinematic,
+    /// Masses, gravity, friction and velocity servos carry the finger, in MuJoCo.
+    Dynamic,
+}
+
+impl Body {
+    /// As a scene file names it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Function => "function",
+            Self::Cast => "cast",
+            Self::Kinematic => "kinematic",
+            Self::Dynamic => "dynamic",
+        }
+    }
+}
+
+/// A mesh and where it stands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Object {
+    /// Its file: .obj, .gltf or .glb, relative to the scene's file.
+    pub mesh: PathBuf,
+    /// Unit of the file's numbers.
+    #[serde(default)]
+    pub unit: Unit,
+    /// Factor on top of the unit.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Where the mesh's origin stands in `W`.
+    #[serde(default)]
+    pub position_m: [f64; 3],
+    /// Turns about the fixed axes x, then y, then z of `W`.
+    #[serde(default)]
+    pub rotation_deg: [f64; 3],
+    /// Name of the analytic surface the mesh was made from; metrics then compare with it
+    /// instead of with the mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<String>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// Unit of a mesh file's numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+pub enum Unit {
+    /// Metres, as glTF prescribes.
+    #[default]
+    #[serde(rename = "m")]
+    M,
+    /// Centimetres.
+    #[serde(rename = "cm")]
+    Cm,
+    /// Millimetres.
+    #[serde(rename = "mm")]
+    Mm,
+    /// Micrometres.
+    #[serde(rename = "um")]
+    Um,
+    /// Inches.
+    #[serde(rename = "in")]
+    In,
+}
+
+impl Unit {
+    /// Metres per unit.
+    pub fn metres(self) -> f64 {
+        match self {
+            Self::M => 1.0,
+            Self::Cm => 1e-2,
+            Self::Mm => 1e-3,
+            Self::Um => 1e-6,
+            Self::In => 0.0254,
+        }
+    }
+}
+
+impl Object {
+    /// Pose of the mesh's frame in `W`.
+    pub fn x_wo(&self) -> Isometry3<f64> {
+        let [roll, pitch, yaw] = self.rotation_deg.map(f64::to_radians);
+        Isometry3::from_parts(
+            Translation3::from(self.position_m),
+            UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+        )
+    }
+}
+
+impl Checked for Object {
+    fn check(&self, rules: &mut Rules) {
+        let named = !self.mesh.as_os_str().is_empty();
+        rules.require("mesh", "\"\"", named, || "the name of an .obj, .gltf or .glb file".into());
+        rules.number("scale", self.scale, 1e-9..=1e9);
+        rules.numbers("position_m", &self.position_m, -1e3..=1e3);
+        rules.numbers("rotation_deg", &self.rotation_deg, -360.0..=360.0);
+        if let Some(truth) = &self.truth {
+            let known: Vec<&str> = surfaces::names().collect();
+            rules.one_of("truth", truth, &known);
+        }
+    }
+}
+
+impl Checked for Scene {
+    fn check(&self, rules: &mut Rules) {
+        rules.table("zone", &self.zone);
+        rules.table("finger", &self.finger);
+        match self.body {
+            Body::Function => {
+                rules.require("function", "(none)", self.function.is_some(), || {
+                    "\"toy\", because body = \"function\"".into()
+                });
+                rules.require("object", "(given)", self.object.is_none(), || {
+                    "no object: body = \"function\" touches a curve".into()
+                });
+                let flat = self.zone.z_m.is_none();
+                rules.require("arm", "(given)", self.arm.is_none(), || {
+                    "no arm: body = \"function\" is touched by none".into()
+                });
+                rules.require("zone.z_m", "(given)", flat, || {
+                    "no z_m: the surface of body = \"function\" is a curve over x".into()
+                });
+            }
+            Body::Cast | Body::Kinematic | Body::Dynamic => {
+                let body = self.body.name();
+                rules.require("function", "(given)", self.function.is_none(), || {
+                    format!("no function: body = \"{body}\" touches an object")
+                });
+                rules.require("object", "(none)", self.object.is_some(), || {
+                    format!("a table with a mesh, because body = \"{body}\"")
+                });
+            }
+        }
+        rules.table("effects", &self.effects);
+        rules.table("touch", &self.touch);
+        rules.table("solver", &self.solver);
+        if self.body == Body::Dynamic {
+            let (period_s, step_s) = (self.period_s(), self.solver.step_s);
+            let whole = self.solver.steps(period_s).is_some();
+            rules.require("touch.period_s", period_s, whole, || {
+                format!("a whole number of steps of solver.step_s = {step_s} s")
+            });
+            let longest_s = self.solver.longest_step_s();
+            let stable = self.arm.is_none() || step_s <= longest_s;
+            rules.require("solver.step_s", step_s, stable, || {
+                let integrator = self.solver.integrator.name();
+                format!(
+                    "at most {longest_s}: an arm's servos are too stiff for longer steps of \
+                         solver.integrator = \"{integrator}\""
+                )
+            });
+        }
+        if let Some(collision) = self.solver.collision {
+            let value = format!("\"{}\"", collision.name());
+            rules.require("solver.collision", value, self.collides(), || {
+                "no collision: only a finger without skin of body = \"dynamic\" collides in \
+                 MuJoCo; any other meets the exact mesh"
+                    .into()
+            });
+        }
+        let feels = self.body != Body::Kinematic || self.effects.skin.is_some();
+        rules.require("effects.skin", "(none)", feels, || {
+            "a table, because body = \"kinematic\" feels with a soft skin (a rigid finger is \
+             body = \"cast\")"
+                .into()
+        });
+        let stepped = self.body == Body::Dynamic || self.effects.flex.is_none();
+        rules.require("effects.flex", "(given)", stepped, || {
+            "no flex: only body = \"dynamic\" is stepped by MuJoCo".into()
+        });
+        if let (Some(wrench), None) = (&self.effects.wrench, &self.effects.fluid) {
+            let least_n = SDS_OF_CONTACT * wrench.noise_max_n();
+            let told = self.touch.detection_n >= least_n;
+            rules.require("touch.detection_n", self.touch.detection_n, told, || {
+                format!(
+                    "at least {least_n} N, {SDS_OF_CONTACT} standard deviations of effects.wrench, \
+                     because no fluid says contact"
+                )
+            });
+        }
+        if let Some(limit_m_s) = self.approach_limit_m_s() {
+            let approach_m_s = self.touch.approach_m_s;
+            rules.require("touch.approach_m_s", approach_m_s, approach_m_s <= limit_m_s, || {
+                format!(
+                    "at most {:.4}: with this period_s, detection.frames and timing a faster finger \
+                     is pressed past its skin before contact is told",
+                    (1e4 * limit_m_s).floor() / 1e4
+                )
+            });
+        }
+        if let Some(object) = &self.object {
+            rules.table("object", object);
+        }
+        if let Some(arm) = &self.arm {
+            rules.table("arm", arm);
+            let clear = arm.mount_m >= self.finger.length_m;
+            rules.require("arm.mount_m", arm.mount_m, clear, || {
+                format!("at least finger.length_m, {} m", self.finger.length_m)
+            });
+        }
+    }
+}
+
+impl Scene {
+    /// Duration of one control tick: the scene's, or the body's own. That of a simulated arm is
+    /// the cycle of the PA-10's servo driver (`hydro`, Orca robotics); a body without inertia needs
+    /// no more than a tick for each tactile frame.
+    pub fn period_s(&self) -> f64 {
+        self.touch.period_s.unwrap_or(match self.body {
+            Body::Dynamic => 0.002,
+            Body::Function | Body::Cast | Body::Kinematic => 0.01,
+        })
+    }
+
+    /// Whether MuJoCo lets the finger collide with the object: it does where no skin says what the
+    /// object does to it.
+    pub fn collides(&self) -> bool {
+        self.body == Body::Dynamic && !self.effects.is_soft()
+    }
+
+    /// Fastest approach at which contact is told before skin and fluid are used up in front of the
+    /// tip; none for a body that is not moved through contact.
+    pub fn approach_limit_m_s(&self) -> Option<f64> {
+        if self.body != Body::Kinematic || self.effects.skin.is_none() {
+            return None;
+        }
+        let ahead_t = self.finger.attitude_w().inverse() * -Vector3::y();
+        let layers = Profile::biotac(&self.finger).layers(0.0, &ahead_t);
+        let batch = self.effects.timing.as_ref().map_or(1, |timing| timing.batch_frames);
+        let told_by_frames = self.effects.fluid.is_some().then_some(batch);
+        let depth_m = layers.skin_m + layers.gap_m;
+        Some(self.touch.approach_limit_m_s(self.period_s(), told_by_frames, depth_m))
+    }
+
+    /// Reads a scene file and applies `--set` assignments.
+    ///
+    /// # Errors
+    /// The first thing that is wrong, with its place.
+    pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
+        let mut loader = Loader::read(path)?;
+        sets.iter().try_for_each(|set| loader.set(set))?;
+        loader.resolve_path("object.mesh");
+        loader.finish()
+    }
+}

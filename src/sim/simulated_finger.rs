@@ -1,0 +1,192 @@
+//! What the simulated finger feels of the scene's object, for every simulated body.
+
+use crate::backend::backend::{Fault, IdealContact, Reading, Wrench};
+use crate::math::seed;
+use crate::robot::finger::Frame;
+use crate::robot::finger::TipMotion;
+use crate::sim::Environment;
+use crate::sim::environment::Shape;
+use crate::sim::finger::registration::Registration;
+use crate::sim::finger::wrench::Gauge;
+use crate::sim::finger::{Fingertip, FingertipError, FingertipState, Load};
+use nalgebra::{Isometry3, Vector6};
+use std::sync::Arc;
+
+/// Forces below this have no place; far below any that is detected (chosen).
+const LEAST_FORCE_N: f64 = 1e-6;
+
+/// A skin that is stepped in its own simulation: that of `[effects.flex]`.
+pub trait Shell: Send {
+    /// Brings it to rest, away from any object.
+    fn reset(&mut self);
+
+    /// Goes on by `dt_s`, to the pose `x_wt` at its end, against the object that stands in `W`: the
+    /// load on it, and how far it lies inwards at each point where it is read; none at rest.
+    ///
+    /// # Errors
+    /// [`Fault::Diverged`] with the largest displacement (m) and speed (m/s) of a node,
+    /// [`Fault::Inside`] if the object is where the skin does not yield.
+    fn step(&mut self, x_wt: &Isometry3<f64>, dt_s: f64) -> Result<(Load, &[f64]), Fault>;
+}
+
+/// The finger's state during one trial.
+pub struct SimulatedFinger {
+    environment: Arc<Environment>,
+    shell: Option<Box<dyn Shell>>,
+    /// Pose of `T` in the frame of the force/torque sensor.
+    x_mt: Isometry3<f64>,
+    trial: Trial,
+    load: Load,
+    /// Whether the fluid tells of contact and the electrodes of its place.
+    has_sensor: bool,
+}
+
+/// What a trial's seed decides.
+struct Trial {
+    feel: FingertipState,
+    gauge: Option<Gauge>,
+    misplaced: Option<Misplaced>,
+}
+
+/// Errors of registration.
+struct Misplaced {
+    /// Pose of the finger's own `T` in that of the kinematics.
+    finger: Isometry3<f64>,
+    /// From where the object is to where it is believed to be, in `W`.
+    object: Isometry3<f64>,
+}
+
+impl SimulatedFinger {
+    /// Untouched; none in a world without a soft finger.
+    pub fn new(environment: Arc<Environment>, seed: u64) -> Option<Self> {
+        let effects = &environment.scene().effects;
+        Some(Self {
+            x_mt: environment.chain()?.tool,
+            trial: Trial::new(&environment, environment.fingertip()?, seed),
+            shell: None,
+            load: Load::default(),
+            has_sensor: effects.fluid.is_some() && effects.electrodes.is_some(),
+            environment,
+        })
+    }
+
+    /// Puts a simulated skin on; without it the finger feels with its `[effects.skin]`.
+    pub fn wear(&mut self, shell: Box<dyn Shell>) {
+        self.shell = Some(shell);
+    }
+
+    /// Forgets everything.
+    pub fn reset(&mut self, seed: u64) {
+        if let Some(shell) = &mut self.shell {
+            shell.reset();
+        }
+        if let Some(tip) = self.environment.fingertip() {
+            self.trial = Trial::new(&self.environment, tip, seed);
+            self.load = Load::default();
+        }
+    }
+
+    /// Goes on by `dt_s`, to `motion` at its end; what the object does to the finger then, in `T`.
+    ///
+    /// # Errors
+    /// [`Fault::Diverged`] if the motion is not finite, [`Fault::Inside`] if the object encloses
+    /// the tip; and those of the [`Shell`].
+    pub fn step(&mut self, motion: &TipMotion, dt_s: f64) -> Result<Wrench, Fault> {
+        let (Some(tip), Shape::Mesh { bvh, .. }) =
+            (self.environment.fingertip(), self.environment.shape())
+        else {
+            return Ok(Wrench::default());
+        };
+        let Trial { feel, misplaced, .. } = &mut self.trial;
+        let motion = misplaced.as_ref().map_or(*motion, |misplaced| misplaced.motion(motion));
+        self.load = match &mut self.shell {
+            Some(shell) => feel.step_loaded(tip, shell.step(&motion.x_wt, dt_s)?, &motion, dt_s),
+            None => feel.step(tip, bvh, &motion, dt_s),
+        }
+        .map_err(fault)?;
+        let wrench = Wrench { force_n: self.load.force_n, torque_nm: self.load.torque_nm };
+        Ok(misplaced.as_ref().map_or(wrench, |misplaced| wrench.moved(&misplaced.finger)))
+    }
+
+    /// Writes into `reading` what a control tick of `period_s` brought: the frames that arrived, what
+    /// a force/torque sensor under the load `mount` (in `T`) says, and the load where no sensor
+    /// tells it.
+    pub fn report(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
+        reading.frames.clear();
+        reading.frames.extend(std::iter::from_fn(|| self.frame()));
+        let effect = self.environment.scene().effects.wrench.as_ref();
+        reading.wrench = self.trial.gauge.as_mut().zip(effect).map(|(gauge, effect)| {
+            let Wrench { force_n: f, torque_nm: t } = mount.moved(&self.x_mt);
+            let said = gauge.read(effect, &Vector6::new(f.x, f.y, f.z, t.x, t.y, t.z), period_s);
+            let said = Wrench {
+                force_n: said.fixed_rows::<3>(0).into(),
+                torque_nm: said.fixed_rows::<3>(3).into(),
+            };
+            said.moved(&self.x_mt.inverse())
+        });
+        reading.ideal = self.ideal();
+    }
+
+    /// The oldest tactile frame that has arrived and was not asked for yet.
+    pub fn frame(&mut self) -> Option<Frame> {
+        self.trial.feel.frame()
+    }
+
+    /// The load where no sensor tells it.
+    pub fn ideal(&self) -> Option<IdealContact> {
+        let force_n = self.load.force_n.norm();
+        (!self.has_sensor && force_n > LEAST_FORCE_N).then_some(IdealContact {
+            p_tc: self.load.centre_t,
+            normal_t: self.load.normal_t,
+            force_n,
+        })
+    }
+}
+
+impl Misplaced {
+    /// How the finger moves before the object where that is believed to be.
+    fn motion(&self, motion: &TipMotion) -> TipMotion {
+        let Self { finger, object } = self;
+        let aside_w = motion.x_wt.rotation * finger.translation.vector;
+        TipMotion {
+            x_wt: object * motion.x_wt * finger,
+            linear_w: object.rotation * (motion.linear_w + motion.angular_w.cross(&aside_w)),
+            angular_w: object.rotation * motion.angular_w,
+        }
+    }
+}
+
+impl Trial {
+    fn new(environment: &Environment, tip: &Fingertip, seed: u64) -> Self {
+        let stream = |purpose| seed::stream(seed, 0, purpose);
+        let scene = environment.scene();
+        let effects = &scene.effects;
+        let mut trial = Self {
+            feel: FingertipState::new(tip, &stream("finger")),
+            gauge: effects.wrench.as_ref().map(|effect| Gauge::new(effect, stream("wrench"))),
+            misplaced: None,
+        };
+        if let (Some(effect), Some(object)) = (&effects.registration, &scene.object) {
+            let error = Registration::new(effect, &mut stream("registration"));
+            let x_wo = object.x_wo();
+            trial.misplaced = Some(Misplaced {
+                finger: error.finger,
+                object: x_wo * error.object.inverse() * x_wo.inverse(),
+            });
+        }
+        trial
+    }
+}
+
+fn fault(error: FingertipError) -> Fault {
+    match error {
+        FingertipError::NotFinite { time_s, motion, .. } => {
+            let parts = [motion.x_wt.translation.vector, motion.linear_w, motion.angular_w];
+            let state = parts.iter().flat_map(|part| part.iter().copied()).collect();
+            Fault::Diverged { time_s, state }
+        }
+        FingertipError::Inside { time_s, motion } => {
+            Fault::Inside { time_s, p_wt: motion.x_wt.translation.vector.into() }
+        }
+    }
+}

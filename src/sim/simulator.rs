@@ -1,0 +1,126 @@
+//! What the trials of an experiment share: the world, and what is compiled from it once.
+
+use super::kinematic::Kinematic;
+#[cfg(feature = "mujoco")]
+use super::mujoco;
+use super::probe::{Cast, FunctionProbe};
+use super::simulated_finger::Shell;
+use crate::backend::backend::{Backend, Fault};
+use crate::backend::delay::Delayed;
+use crate::explore::probe::Probe;
+use crate::explore::probe::servo::Servo;
+use crate::sim::Environment;
+use crate::sim::scene::Body;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// A world with everything ready to put bodies into it.
+#[derive(Clone)]
+pub struct Simulator {
+    environment: Arc<Environment>,
+    #[cfg(feature = "mujoco")]
+    models: Option<mujoco::Models>,
+}
+
+/// A world that no body can be put into.
+#[derive(Debug, Error)]
+pub enum SimulatorError {
+    /// Its physics cannot be simulated.
+    #[cfg(feature = "mujoco")]
+    #[error(transparent)]
+    Model(#[from] mujoco::ModelError),
+    /// This build lacks what the scene's body needs.
+    #[error("body = \"{body}\" needs a build with the feature `mujoco`")]
+    NotBuilt {
+        /// The body.
+        body: &'static str,
+    },
+}
+
+impl Simulator {
+    /// Compiles what the scene's body needs.
+    ///
+    /// # Errors
+    /// If it cannot be simulated as the scene asks.
+    pub fn new(environment: Arc<Environment>) -> Result<Self, SimulatorError> {
+        #[cfg(feature = "mujoco")]
+        {
+            let moved = environment.scene().body == Body::Dynamic;
+            let models = if moved { Some(mujoco::Models::new(&environment)?) } else { None };
+            Ok(Self { environment, models })
+        }
+        #[cfg(not(feature = "mujoco"))]
+        match environment.scene().body {
+            Body::Dynamic => Err(SimulatorError::NotBuilt { body: Body::Dynamic.name() }),
+            _ => Ok(Self { environment }),
+        }
+    }
+
+    /// The world.
+    pub fn environment(&self) -> &Arc<Environment> {
+        &self.environment
+    }
+
+    /// What is simulated otherwise than the scene asks, and why.
+    pub fn notice(&self) -> Option<String> {
+        #[cfg(feature = "mujoco")]
+        if let Some(models) = &self.models {
+            return models.substeps.map(|substeps| substeps.to_string());
+        }
+        None
+    }
+
+    /// A skin of finite elements, at rest; none if the scene's finger has none.
+    ///
+    /// # Errors
+    /// If there is no memory for its state.
+    pub fn shell(&self) -> Result<Option<Box<dyn Shell>>, Fault> {
+        #[cfg(feature = "mujoco")]
+        if let Some(models) = &self.models {
+            return models.shell(&self.environment).map_err(|_| unusable());
+        }
+        Ok(None)
+    }
+
+    /// The probe that the scene's body asks for; `seed` is all the randomness of its sensors.
+    ///
+    /// # Errors
+    /// If the body cannot be brought to its start.
+    pub fn probe(&self, seed: u64) -> Result<Box<dyn Probe>, Fault> {
+        let environment = Arc::clone(&self.environment);
+        if let Some(body) = self.body()? {
+            return Ok(Box::new(Servo::new(environment, body, seed)?));
+        }
+        Ok(match environment.scene().body {
+            Body::Function => Box::new(FunctionProbe::new(environment)),
+            _ => Box::new(Cast::new(environment)),
+        })
+    }
+
+    /// The simulated body that the scene asks for, at its start; none where a touch is no motion.
+    ///
+    /// # Errors
+    /// If there is no memory for its state.
+    pub fn body(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
+        let body: Box<dyn Backend> = match self.environment.scene().body {
+            Body::Function | Body::Cast => return Ok(None),
+            Body::Kinematic => Box::new(Kinematic::new(&self.environment).ok_or_else(unusable)?),
+            #[cfg(feature = "mujoco")]
+            Body::Dynamic => {
+                let models = self.models.as_ref().ok_or_else(unusable)?;
+                Box::new(mujoco::Dynamic::new(&self.environment, models).ok_or_else(unusable)?)
+            }
+            #[cfg(not(feature = "mujoco"))]
+            Body::Dynamic => return Err(unusable()),
+        };
+        let timing = self.environment.scene().effects.timing.as_ref();
+        Ok(Some(match timing.map_or(0.0, |timing| timing.control_delay_s) {
+            delay_s if delay_s > 0.0 => Box::new(Delayed::new(body, delay_s)),
+            _ => body,
+        }))
+    }
+}
+
+fn unusable() -> Fault {
+    Fault::Lost { time_s: 0.0 }
+}

@@ -1,0 +1,90 @@
+//! How the finger was loaded when it was read: the touch's movement, gone through again without
+//! noise.
+
+use crate::backend::trace::Tick;
+use crate::math::seed;
+use crate::robot::finger::Frame;
+use crate::robot::finger::TipMotion;
+use crate::robot::finger::frame::ELECTRODES;
+use crate::sim::Scene;
+use crate::sim::environment::Shape;
+use crate::sim::finger::FingertipState;
+use crate::sim::simulator::Simulator;
+
+/// The finger still stands where it was deepest as long as it is within this; chosen: far above
+/// rounding, far below a tick of any approach.
+const STILL_M: f64 = 1e-7;
+
+/// How the finger was loaded.
+#[derive(Clone, Debug)]
+pub struct ReferenceLoad {
+    /// Where it stood.
+    pub motion: TipMotion,
+    /// Magnitude of the force.
+    pub force_n: f64,
+    /// Rise of the static pressure.
+    pub pdc_counts: Option<f64>,
+    /// Change of each electrode.
+    pub electrode_counts: Option<[f64; ELECTRODES]>,
+}
+
+/// `scene` with sensors that neither rush, drift nor round.
+pub fn quiet(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    let effects = &mut scene.effects;
+    if let Some(electrodes) = &mut effects.electrodes {
+        (electrodes.noise, electrodes.drift_counts, electrodes.quantise) = (0.0, 0.0, false);
+    }
+    if let Some(fluid) = &mut effects.fluid {
+        (fluid.noise_counts, fluid.quantise) = (0.0, false);
+        if let Some(vibration) = &mut fluid.vibration {
+            vibration.noise_counts = 0.0;
+        }
+    }
+    if let Some(thermal) = &mut effects.thermal {
+        (thermal.tdc_noise_counts, thermal.tac_noise_counts) = (0.0, 0.0);
+        thermal.quantise = false;
+    }
+    scene
+}
+
+/// What the finger of a [`quiet`] world felt at the end of its rest on the object; none without
+/// a skin, or if it touched nothing.
+pub fn felt(simulator: &Simulator, ticks: &[Tick]) -> Option<ReferenceLoad> {
+    let environment = simulator.environment();
+    let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape()) else {
+        return None;
+    };
+    let y_m = |tick: &Tick| tick.motion.x_wt.translation.y;
+    let mut shell = simulator.shell().ok()?;
+    let deepest_m = ticks.iter().map(y_m).fold(f64::INFINITY, f64::min);
+    let last = ticks.iter().rposition(|tick| y_m(tick) <= deepest_m + STILL_M)?;
+    let mut feel = FingertipState::new(tip, &seed::stream(0, 0, "finger"));
+    let mut before_s = ticks.first()?.time_s;
+    let (mut rest, mut now) = (None, Frame::default());
+    let mut load = Default::default();
+    for tick in &ticks[..=last] {
+        let dt_s = (tick.time_s - before_s).max(0.0);
+        before_s = tick.time_s;
+        load = match &mut shell {
+            Some(shell) => {
+                let pressed = shell.step(&tick.motion.x_wt, dt_s).ok()?;
+                feel.step_loaded(tip, pressed, &tick.motion, dt_s).ok()?
+            }
+            None => feel.step(tip, bvh, &tick.motion, dt_s).ok()?,
+        };
+        while let Some(frame) = feel.frame() {
+            rest.get_or_insert_with(|| frame.clone());
+            now = frame;
+        }
+    }
+    let rest = rest.unwrap_or_default();
+    let electrode_counts = (now.electrode_counts.zip(rest.electrode_counts))
+        .map(|(now, rest)| std::array::from_fn(|i| now[i] - rest[i]));
+    Some(ReferenceLoad {
+        motion: ticks[last].motion,
+        force_n: load.force_n.norm(),
+        pdc_counts: now.pdc_counts.zip(rest.pdc_counts).map(|(now, rest)| now - rest),
+        electrode_counts,
+    })
+}

@@ -1,0 +1,175 @@
+//! Touches with one scene: what they found, how the finger was loaded, and what they cost.
+
+use super::reference_load::{ReferenceLoad, felt, quiet};
+use crate::backend::backend::Fault;
+use crate::backend::trace::Trace;
+use crate::experiment::statistics::median;
+use crate::experiment::truth::Truth;
+use crate::explore::belief::{Belief, GpSettings};
+use crate::explore::planner;
+use crate::explore::planner::PlanningSettings;
+use crate::explore::probe::servo::Servo;
+use crate::explore::probe::{Contact, Probe, Touch};
+use crate::math::seed;
+use crate::sim::environment::EnvironmentError;
+use crate::sim::simulator::{Simulator, SimulatorError};
+use crate::sim::{Environment, Scene};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Touches are repeated until they have taken this long; chosen: far above the clock's grain.
+const LEAST_S: f64 = 0.02;
+
+/// Most repetitions of a touch; chosen.
+const REPEATS: u32 = 1000;
+
+/// What the touches of one scene brought.
+pub struct Touches {
+    /// What each touch found; none where it missed or faulted.
+    pub contacts: Vec<Option<Contact>>,
+    /// How the finger was loaded when it was read.
+    pub felt: Vec<Option<ReferenceLoad>>,
+    /// Median wall time of a touch.
+    pub wall_s: f64,
+    /// Simulated time of a touch, in a body that has any.
+    pub simulated_s: Option<f64>,
+    /// Touches that ended in a fault, and the first of these.
+    pub faults: usize,
+    /// The first fault.
+    pub fault: Option<Fault>,
+}
+
+/// Evenly spread places of the scene's zone.
+pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Vec<f64>> {
+    let belief = Belief::new(scene.zone.clone(), GpSettings::default());
+    let sobol = planner::by_name("sobol").map(|entry| {
+        (entry.make)(&scene.zone, &PlanningSettings::default(), seed::stream(seed, 0, "targets"))
+    });
+    sobol
+        .map_or_else(Vec::new, |mut sobol| (0..count).map(|_| sobol.plan(&belief).target).collect())
+}
+
+/// Why nothing can be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum MeasureError {
+    /// A scene cannot be built.
+    #[error(transparent)]
+    Environment(#[from] EnvironmentError),
+    /// Its body cannot be simulated as the scene asks.
+    #[error(transparent)]
+    Simulator(#[from] SimulatorError),
+    /// A body cannot be brought to its start.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+}
+
+/// Touches every target; `tick` is called after each and says whether to go on.
+///
+/// # Errors
+/// If the body cannot be brought to its start.
+pub fn touch_all(
+    environment: &Arc<Environment>,
+    targets: &[Vec<f64>],
+    seed: u64,
+    tick: &mut dyn FnMut() -> bool,
+) -> Result<Option<Touches>, MeasureError> {
+    let simulator = Simulator::new(Arc::clone(environment))?;
+    let hushed = hushed(&simulator)?;
+    let mut ticks = None;
+    let mut traced: Box<dyn Probe> = match (simulator.body()?, environment.chain()) {
+        (Some(body), Some(chain)) => {
+            let (trace, log) = Trace::new(body, chain);
+            ticks = Some(log);
+            Box::new(Servo::new(Arc::clone(environment), Box::new(trace), seed)?)
+        }
+        _ => simulator.probe(seed)?,
+    };
+    let mut timed = simulator.probe(seed)?;
+    let mut touches = Touches {
+        contacts: Vec::new(),
+        felt: Vec::new(),
+        wall_s: f64::NAN,
+        simulated_s: None,
+        faults: 0,
+        fault: None,
+    };
+    let (mut walls_s, mut simulated_s) = (Vec::new(), Vec::new());
+    for target in targets {
+        let contact = match traced.touch(target) {
+            Ok(Touch::Contact(contact)) => Some(contact),
+            Ok(Touch::Miss | Touch::Overload) => None,
+            Err(fault) => {
+                touches.faults += 1;
+                touches.fault.get_or_insert(fault);
+                None
+            }
+        };
+        if let Some(log) = ticks.as_ref().map(crate::backend::trace::Ticks::take) {
+            if let (Some(first), Some(last)) = (log.first(), log.last()) {
+                simulated_s.push(last.time_s - first.time_s);
+            }
+            touches.felt.push(contact.as_ref().and_then(|_| felt(&hushed, &log)));
+        } else {
+            touches.felt.push(None);
+        }
+        touches.contacts.push(contact);
+        walls_s.push(time(timed.as_mut(), target));
+        if !tick() {
+            return Ok(None);
+        }
+    }
+    touches.wall_s = median(&walls_s).unwrap_or(f64::NAN);
+    touches.simulated_s = median(&simulated_s);
+    Ok(Some(touches))
+}
+
+/// The same scene without noise.
+fn hushed(simulator: &Simulator) -> Result<Simulator, MeasureError> {
+    let scene = quiet(simulator.environment().scene());
+    match scene == *simulator.environment().scene() {
+        true => Ok(simulator.clone()),
+        false => Ok(Simulator::new(Arc::new(Environment::build(scene)?))?),
+    }
+}
+
+/// Wall time of a touch: the mean over as many as take long enough to be measured.
+fn time(probe: &mut dyn Probe, target: &[f64]) -> f64 {
+    let begun = Instant::now();
+    let mut count = 0;
+    loop {
+        let _ = std::hint::black_box(probe.touch(target));
+        count += 1;
+        let taken_s = begun.elapsed().as_secs_f64();
+        if taken_s > LEAST_S || count >= REPEATS {
+            return taken_s / f64::from(count);
+        }
+    }
+}
+
+/// Bytes of a finger's skin, electrodes and one trial's memory of them. The mesh and its tree,
+/// which every rung shares, are left out.
+pub fn finger_bytes(environment: &Environment) -> usize {
+    let Some(tip) = environment.fingertip() else { return 0 };
+    let feel = crate::sim::finger::FingertipState::new(tip, &seed::stream(0, 0, "finger"));
+    tip.bytes() + feel.bytes()
+}
+
+/// Root mean square error of the surface that a belief makes of these contacts; none where
+/// nothing can be fitted.
+pub fn surface_rmse_m(
+    scene: &Scene,
+    targets: &[Vec<f64>],
+    contacts: &[Option<Contact>],
+    truth: &Truth,
+) -> Option<f64> {
+    if !crate::math::optimize::BUILT {
+        return None;
+    }
+    let mut belief = Belief::new(scene.zone.clone(), GpSettings::default());
+    for (target, contact) in targets.iter().zip(contacts) {
+        let touch = contact.clone().map_or(Touch::Miss, Touch::Contact);
+        belief.observe(target, &touch);
+    }
+    let (_, surface) = belief.refit().ok()?;
+    Some(truth.compare(surface).rmse_m)
+}

@@ -1,0 +1,91 @@
+//! The PA-10 carrying the finger where arms are weak.
+
+use super::case::{Case, Outcome, case};
+use super::checked_touch::deed;
+use super::solids::{mesh, wall};
+use super::wall::scene;
+use crate::robot::arm::ArmSettings;
+use crate::sim::Scene;
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "straight elbow",
+        "at full reach no joint moves the tip outwards",
+        "distance m",
+        (&[0.65, 0.75, 0.85, 0.95, 1.05, 1.2], 5),
+        |distance_m, period_s| {
+            reach(scene(period_s), [0.0, -distance_m, 0.5], ArmSettings::default())
+        },
+    )
+    .timed(),
+    case(
+        "wrist singularity",
+        "two axes of the wrist fall into one on the way",
+        "W1 away from it deg",
+        (&[60.0, 20.0, 5.0, 1.0, 0.0], 5),
+        |away_deg, period_s| {
+            let mut arm = ArmSettings::default();
+            arm.home_deg[5] = -away_deg;
+            reach(scene(period_s), [0.0, -0.65, 0.5], arm)
+        },
+    )
+    .timed(),
+    case(
+        "joint limit",
+        "the object stands where a joint ends",
+        "to the side m",
+        (&[0.0, 0.2, 0.4, 0.6, 0.8], 5),
+        |x_m, period_s| reach(scene(period_s), [x_m, -0.6, 0.5], ArmSettings::default()),
+    )
+    .timed(),
+    case(
+        "close to the base",
+        "the elbow folds until it ends, and at last home is inside the object",
+        "distance m",
+        (&[0.65, 0.6, 0.5, 0.4, 0.3, 0.2], 2),
+        |distance_m, period_s| {
+            reach(scene(period_s), [0.0, -distance_m, 0.5], ArmSettings::default())
+        },
+    )
+    .timed(),
+    case(
+        "high and low",
+        "shoulder and wrist share what is left",
+        "height m",
+        (&[0.5, 0.3, 0.8, 0.1, 1.1], 5),
+        |z_m, period_s| reach(scene(period_s), [0.0, -0.6, z_m], ArmSettings::default()),
+    )
+    .timed(),
+    case(
+        "base turned away",
+        "the first joint starts at its limit",
+        "deg",
+        (&[0.0, 30.0, 60.0, 87.0, 120.0], 5),
+        |deg, period_s| {
+            let arm = ArmSettings { base_rotation_deg: [0.0, 0.0, deg], ..ArmSettings::default() };
+            reach(scene(period_s), [0.0, -0.65, 0.5], arm)
+        },
+    )
+    .timed(),
+    case(
+        "base far away",
+        "kinematics a kilometre from the origin",
+        "m",
+        (&[0.0, 10.0, 100.0, 900.0], 4),
+        |far_m, period_s| {
+            let arm = ArmSettings { base_position_m: [far_m, 0.0, 0.0], ..ArmSettings::default() };
+            reach(scene(period_s), [far_m, -0.65, 0.5], arm)
+        },
+    )
+    .timed(),
+];
+
+/// The arm touches the middle of a small wall at `place_m`; out of reach, it says so.
+pub(super) fn reach(scene: Scene, [x, y, z]: [f64; 3], arm: ArmSettings) -> Outcome {
+    let mut zone = scene.zone.clone();
+    zone.x_m = [x - 0.03, x + 0.03];
+    zone.z_m = Some([z - 0.03, z + 0.03]);
+    zone.datum_y_m = y;
+    let Some(mesh) = mesh(wall(0.03), [x, y, z]) else { return Outcome::Wrong("no mesh".into()) };
+    deed(Scene { zone, arm: Some(arm), ..scene }, mesh, &[x, z]).on_surface(1e-3)
+}

@@ -1,0 +1,215 @@
+//! The Gaussian process on data that break others.
+
+use super::case::{Case, Outcome, all, case, hold};
+use crate::gp::fit::SearchBox;
+use crate::gp::kernel::{Hyperparameters, SquaredExponential};
+use crate::gp::posterior::Scratch;
+use crate::gp::{Mean, Observations, Posterior};
+use crate::math::optimize;
+use crate::math::optimize::Stop;
+
+static KERNEL: SquaredExponential = SquaredExponential;
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "duplicate touches",
+        "equal rows make the covariance singular",
+        "times each",
+        (&[1.0, 2.0, 8.0, 32.0], 4),
+        |times, _| {
+            let one = smooth(20);
+            fitted(&(0..times as usize).flat_map(|_| one.clone()).collect::<Vec<_>>(), 0.01)
+        },
+    ),
+    case(
+        "touches close together",
+        "rows that differ by rounding only",
+        "apart m",
+        (&[1e-3, 1e-6, 1e-9, 1e-12, 1e-15], 5),
+        |apart_m, _| {
+            let pairs: Vec<_> =
+                smooth(20).into_iter().flat_map(|(x, y)| [(x, y), (x + apart_m, y)]).collect();
+            fitted(&pairs, 0.01)
+        },
+    ),
+    case(
+        "long and short lengths",
+        "a length scale far beyond the data's",
+        "ratio",
+        (&[1.0, 25.0, 250.0, 2500.0, 1e5], 5),
+        |ratio, _| given(&smooth(60), 4.0 * ratio, 1e-4),
+    ),
+    case(
+        "little noise",
+        "nothing lifts the smallest eigenvalue",
+        "noise ratio",
+        (&[1e-2, 1e-4, 1e-7, 1e-10, 0.0], 5),
+        |noise, _| given(&smooth(200), 1.0, noise),
+    ),
+    case(
+        "many touches in a belief",
+        "condition and cost grow with their number",
+        "touches",
+        (&[100.0, 500.0, 1000.0, 4000.0], 4),
+        |count, _| given(&smooth(count as u32), 0.3, 1e-3),
+    ),
+    case(
+        "constant heights",
+        "a plate has no scale of its own",
+        "height m",
+        (&[1.0, 0.0, 1e-9, 1e6], 4),
+        |y, _| fitted(&smooth(12).into_iter().map(|(x, _)| (x, y)).collect::<Vec<_>>(), 0.01),
+    ),
+    case(
+        "one outlier",
+        "a single touch that is far out",
+        "times the range",
+        (&[1.0, 10.0, 1e3, 1e6], 4),
+        |times, _| {
+            let mut touches = smooth(30);
+            touches[11].1 += times;
+            // Followed, or smoothed over as noise: more than half of the range would be neither.
+            fitted(&touches, 0.5)
+        },
+    ),
+    case(
+        "heights with an offset",
+        "what varies is a millionth of what is there",
+        "offset m",
+        (&[0.0, 1.0, 1e3, 1e6, 1e9], 5),
+        |offset, _| {
+            let touches: Vec<_> = smooth(40).into_iter().map(|(x, y)| (x, y + offset)).collect();
+            // Heights keep sixteen digits: of a range of one at 1e9, seven.
+            fitted(&touches, 0.01)
+        },
+    ),
+    case(
+        "places with an offset",
+        "differences of places lose digits",
+        "offset m",
+        (&[0.0, 1e2, 1e4, 1e6], 4),
+        |offset, _| {
+            let touches: Vec<_> = smooth(40).into_iter().map(|(x, y)| (x + offset, y)).collect();
+            fitted(&touches, 0.01)
+        },
+    ),
+    case(
+        "heights in other units",
+        "thresholds in metres",
+        "times",
+        (&[1.0, 1e-3, 1e-9, 1e3, 1e9], 5),
+        |unit, _| {
+            fitted(&smooth(40).into_iter().map(|(x, y)| (x, y * unit)).collect::<Vec<_>>(), 0.01)
+        },
+    ),
+    case(
+        "few touches",
+        "fewer than there are parameters",
+        "touches",
+        (&[5.0, 3.0, 2.0, 1.0], 4),
+        |count, _| fitted(&smooth(count as u32), 0.05),
+    ),
+    case(
+        "touch that is no number",
+        "one NaN is in every weight",
+        "which",
+        (&[0.0, 5.0, 11.0], 0),
+        |which, _| {
+            let mut touches = smooth(12);
+            touches[which as usize].1 = f64::NAN;
+            match fitted(&touches, 0.01) {
+                Outcome::Faulted(words) => Outcome::Faulted(words),
+                _ if !optimize::BUILT => Outcome::Faulted("no optimisers in this build".into()),
+                _ => Outcome::Wrong("a belief was made of it".into()),
+            }
+        },
+    ),
+];
+
+/// A smooth curve at irregular places of [-2, 2].
+fn smooth(count: u32) -> Vec<(f64, f64)> {
+    (0..count)
+        .map(|i| -2.0 + 4.0 * (f64::from(i) * 0.618_033_988_75).fract())
+        .map(|x| (x, (1.5 * x).sin() + 0.3 * x))
+        .collect()
+}
+
+fn observations(touches: &[(f64, f64)]) -> Observations {
+    let mut all = Observations::new(1);
+    touches.iter().for_each(|(x, y)| all.push(&[*x], *y));
+    all
+}
+
+/// Fits and holds the laws of any belief, and that it follows the touches within a share
+/// `misfit` of their range.
+fn fitted(touches: &[(f64, f64)], misfit: f64) -> Outcome {
+    if !optimize::BUILT {
+        return Outcome::Stable;
+    }
+    let all_of = observations(touches);
+    let heights: Vec<f64> = touches.iter().map(|(_, y)| *y).collect();
+    let rms = (heights.iter().map(|y| y * y).sum::<f64>() / heights.len() as f64).sqrt();
+    let scale = if rms > 0.0 { rms } else { 4.0 };
+    let search = SearchBox {
+        mean: Mean::Data,
+        length_scales: vec![(0.02, 4.0).into()],
+        noise_ratio: (1e-4, 1e-2).into(),
+        signal_sd: (1e-12 * scale, 1e3 * scale).into(),
+        noise_sd: None,
+        slope_noise_ratio: None,
+    };
+    let fit = search.fit(&KERNEL, &all_of, None);
+    if fit.stop == Stop::Failed {
+        return Outcome::Faulted("the fit says that it failed".into());
+    }
+    laws(fit.hyperparameters, touches, misfit)
+}
+
+/// The same with given hyperparameters.
+fn given(touches: &[(f64, f64)], length: f64, noise_ratio: f64) -> Outcome {
+    let at = Hyperparameters {
+        signal_sd: 1.0,
+        length_scales: vec![length],
+        noise_sd: noise_ratio,
+        slope_noise_sd: 0.0,
+        mean: 0.0,
+    };
+    laws(at, touches, f64::INFINITY)
+}
+
+/// Finite; variance within 0 and the prior's; less of it with every touch; heights followed.
+fn laws(at: Hyperparameters, touches: &[(f64, f64)], misfit: f64) -> Outcome {
+    let half = &touches[..touches.len().div_ceil(2)];
+    let [fewer, more] =
+        [half, touches].map(|some| Posterior::new(&KERNEL, at.clone(), observations(some)));
+    let (fewer, more) = match (fewer, more) {
+        (Ok(fewer), Ok(more)) => (fewer, more),
+        (Err(error), _) | (_, Err(error)) => return Outcome::Faulted(error.to_string()),
+    };
+    let mut scratch = Scratch::default();
+    let prior = at.signal_sd.powi(2);
+    // What rounding and jitter leave undecided.
+    let slack = prior * (1e-9 + more.jitter().max(fewer.jitter()) * touches.len() as f64);
+    let first = touches[0].0;
+    for i in 0..=100 {
+        let place = [first + 4.0 * (f64::from(i) / 100.0 - 0.5)];
+        let mean = more.mean(&place, &mut scratch);
+        let [before, after] = [&fewer, &more].map(|p| p.variance(&place, &mut scratch));
+        let outcome = all([
+            hold(mean.is_finite() && after.is_finite(), || format!("not finite at {place:?}")),
+            hold((0.0..=prior * (1.0 + 1e-9)).contains(&after), || format!("variance {after}")),
+            hold(after <= before + slack, || format!("variance grew: {before} to {after}")),
+        ]);
+        if outcome != Outcome::Stable {
+            return outcome;
+        }
+    }
+    let heights = || touches.iter().map(|(_, y)| *y);
+    let (low, high) = (heights().fold(f64::MAX, f64::min), heights().fold(f64::MIN, f64::max));
+    let range = if high > low { high - low } else { high.abs().max(1.0) };
+    let worst = touches
+        .iter()
+        .map(|(x, y)| (more.mean(&[*x], &mut scratch) - y).abs() / range)
+        .fold(0.0, f64::max);
+    hold(worst <= misfit, || format!("misses its touches by {worst:.3} of their range"))
+}

@@ -1,0 +1,110 @@
+//! A finger pressed on a wall, pose by pose.
+
+use super::case::Outcome;
+use super::solids::{mesh, wall};
+use crate::geometry::bvh::MeshBvh;
+use crate::math::seed;
+use crate::robot::finger::Finger;
+use crate::robot::finger::TipMotion;
+use crate::sim::finger::profile::Profile;
+use crate::sim::finger::samples::spread;
+use crate::sim::finger::{Effects, Fingertip, FingertipError, FingertipState, Load};
+use nalgebra::{Isometry3, Vector3};
+
+/// A finger over a wall, its tip pointing at it as in a touch.
+pub(super) struct Bench {
+    tip: Fingertip,
+    wall: MeshBvh,
+    /// Its hull.
+    pub finger: Finger,
+    /// Distance of the tip's centre from the wall at which the skin just touches.
+    touching_m: f64,
+}
+
+impl Bench {
+    /// With these effects; `size` times a BioTac.
+    pub(super) fn new(effects: &Effects, size: f64) -> Option<Self> {
+        let standard = Finger::default();
+        let finger = Finger {
+            radius_m: size * standard.radius_m,
+            length_m: size * standard.length_m,
+            ..standard
+        };
+        let wall = MeshBvh::new(mesh(wall(0.05 * size), [0.0; 3])?);
+        let mut bench =
+            Self { tip: Fingertip::new(&finger, effects), wall, finger, touching_m: 0.0 };
+        let rotation = bench.finger.attitude_w();
+        // From more points than any case has, so that depth means the same for all.
+        let fine = spread(&Profile::biotac(&bench.finger), 16_000);
+        let lowest = fine.iter().map(|sample| (rotation * sample.point()).y);
+        bench.touching_m = -lowest.fold(0.0, f64::min);
+        Some(bench)
+    }
+
+    /// Standing `depth_m` inside the wall, `x_m` beside its middle.
+    pub(super) fn at(&self, depth_m: f64, x_m: f64) -> TipMotion {
+        let p_wt = Vector3::new(x_m, self.touching_m - depth_m, 0.0);
+        TipMotion::at(Isometry3::from_parts(p_wt.into(), self.finger.attitude_w()))
+    }
+
+    /// A finger's memory, untouched.
+    pub(super) fn feel(&self) -> FingertipState {
+        FingertipState::new(&self.tip, &seed::stream(0, 0, "finger"))
+    }
+
+    /// What the wall does to it.
+    pub(super) fn press(
+        &self,
+        feel: &mut FingertipState,
+        motion: &TipMotion,
+        dt_s: f64,
+    ) -> Result<Load, FingertipError> {
+        feel.step(&self.tip, &self.wall, motion, dt_s)
+    }
+
+    /// The force at a depth.
+    pub(super) fn force_n(&self, depth_m: f64) -> Result<f64, FingertipError> {
+        Ok(self.press(&mut self.feel(), &self.at(depth_m, 0.0), 0.01)?.force_n.norm())
+    }
+}
+
+/// Runs `law`; its fault is the outcome.
+pub(super) fn on_bench(
+    effects: &Effects,
+    law: impl FnOnce(&Bench) -> Result<Outcome, FingertipError>,
+) -> Outcome {
+    on_bench_of(effects, 1.0, law)
+}
+
+/// The same with a finger of another size.
+pub(super) fn on_bench_of(
+    effects: &Effects,
+    size: f64,
+    law: impl FnOnce(&Bench) -> Result<Outcome, FingertipError>,
+) -> Outcome {
+    match Bench::new(effects, size) {
+        Some(bench) => law(&bench).unwrap_or_else(|fault| Outcome::Faulted(fault.to_string())),
+        None => Outcome::Wrong("no bench".into()),
+    }
+}
+
+/// Whether every number of a load is one.
+pub(super) fn finite(load: &Load) -> bool {
+    let vectors = [&load.force_n, &load.torque_nm, &load.normal_t, &load.centre_t.coords];
+    vectors.iter().all(|vector| vector.iter().all(|number| number.is_finite()))
+        && load.energy_j.is_finite()
+        && load.pressure_pa.is_finite()
+}
+
+/// Multiplies everything that makes the skin resist.
+pub(super) fn stiffen(effects: &mut Effects, times: f64) {
+    if let Some(skin) = &mut effects.skin {
+        let resists = [
+            &mut skin.modulus_pa,
+            &mut skin.flatten_pa_m,
+            &mut skin.inflate_pa_m,
+            &mut skin.core_pa_m,
+        ];
+        resists.into_iter().for_each(|constant| *constant *= times);
+    }
+}

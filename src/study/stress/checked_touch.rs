@@ -1,0 +1,162 @@
+//! One touch of a solid, and what every touch is held to.
+
+use super::case::{Outcome, all, hold};
+use crate::backend::backend::{Backend, Fault};
+use crate::backend::trace::{Tick, Trace};
+use crate::explore::probe::servo::Servo;
+use crate::explore::probe::{Contact, Probe, Touch};
+use crate::geometry::bvh::MeshBvh;
+use crate::geometry::mesh::Mesh;
+use crate::sim::environment::{EnvironmentError, Shape};
+use crate::sim::simulator::Simulator;
+use crate::sim::{Environment, Scene};
+use crate::study::fidelity::reference_load::{ReferenceLoad, felt};
+use std::sync::Arc;
+
+/// One touch and what came of it.
+pub(super) struct CheckedTouch {
+    /// What it returned.
+    pub touch: Result<Touch, Fault>,
+    environment: Option<Arc<Environment>>,
+    /// How the finger was loaded when it was read.
+    pub felt: Option<ReferenceLoad>,
+    ticks: Vec<Tick>,
+    refused: Option<String>,
+}
+
+/// Touches `target` of `mesh`, with sensors without noise but for what the scene raises.
+pub(super) fn deed(scene: Scene, mesh: Mesh, target: &[f64]) -> CheckedTouch {
+    deed_with(scene, mesh, target, |body| body)
+}
+
+/// As [`deed`], with the body put into another.
+pub(super) fn deed_with(
+    scene: Scene,
+    mesh: Mesh,
+    target: &[f64],
+    wrap: impl FnOnce(Box<dyn Backend>) -> Box<dyn Backend>,
+) -> CheckedTouch {
+    if let Some(limit_m_s) = scene.approach_limit_m_s()
+        && scene.touch.approach_m_s > limit_m_s
+    {
+        return CheckedTouch::not_done(&format!(
+            "refused: approach faster than {limit_m_s:.4} m/s"
+        ));
+    }
+    let environment = match around(scene, mesh) {
+        Ok(environment) => environment,
+        Err(error) => return CheckedTouch::not_done(&error.to_string()),
+    };
+    let simulator = match Simulator::new(Arc::clone(&environment)) {
+        Ok(simulator) => simulator,
+        Err(error) => return CheckedTouch::not_done(&error.to_string()),
+    };
+    let (Ok(Some(body)), Some(chain)) = (simulator.body(), environment.chain()) else {
+        return CheckedTouch::not_done("no body");
+    };
+    let (trace, ticks) = Trace::new(body, chain);
+    let touch = Servo::new(Arc::clone(&environment), wrap(Box::new(trace)), 1)
+        .and_then(|mut servo| servo.touch(target));
+    let ticks = ticks.take();
+    // The object is not in a file, so its world cannot be built again without noise; force and
+    // pose need no sensor.
+    let felt = felt(&simulator, &ticks);
+    CheckedTouch { touch, environment: Some(environment), felt, ticks, refused: None }
+}
+
+/// `scene` with `mesh` as its object.
+pub(super) fn around(scene: Scene, mesh: Mesh) -> Result<Arc<Environment>, EnvironmentError> {
+    let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
+    Environment::around(scene, shape).map(Arc::new)
+}
+
+impl CheckedTouch {
+    /// Not even begun, and why.
+    pub(super) fn not_done(why: &str) -> Self {
+        Self {
+            touch: Err(Fault::Refused { values: Vec::new() }),
+            environment: None,
+            felt: None,
+            ticks: Vec::new(),
+            refused: Some(why.into()),
+        }
+    }
+
+    /// The contact, if there was one.
+    pub(super) fn contact(&self) -> Option<&Contact> {
+        match &self.touch {
+            Ok(Touch::Contact(contact)) => Some(contact),
+            _ => None,
+        }
+    }
+
+    /// A contact within `tolerance_m` of the mesh.
+    pub(super) fn on_surface(&self, tolerance_m: f64) -> Outcome {
+        match &self.touch {
+            Ok(Touch::Miss) => Outcome::Wrong("met nothing".into()),
+            Ok(Touch::Overload) => Outcome::Faulted("broken off: too much pressure".into()),
+            _ => self.on_surface_or_missed(tolerance_m),
+        }
+    }
+
+    /// The same, or no contact; in either case a movement within the laws.
+    pub(super) fn on_surface_or_missed(&self, tolerance_m: f64) -> Outcome {
+        if let Some(why) = &self.refused {
+            return Outcome::Faulted(why.clone());
+        }
+        let near = match (&self.touch, self.off_surface_m()) {
+            (Err(fault), _) => return Outcome::Faulted(fault.to_string()),
+            (Ok(Touch::Contact(contact)), Some(off_m)) => all([
+                hold((contact.normal_w.norm() - 1.0).abs() < 1e-6, || "normal not unit".into()),
+                hold(off_m <= tolerance_m, || format!("{:.3} mm off the surface", 1e3 * off_m)),
+            ]),
+            _ => Outcome::Stable,
+        };
+        all([near, self.keeps_speed(), self.keeps_apart()])
+    }
+
+    fn off_surface_m(&self) -> Option<f64> {
+        let Shape::Mesh { bvh, .. } = self.environment.as_ref()?.shape() else { return None };
+        Some(bvh.closest_point(&self.contact()?.p_wc).distance_m)
+    }
+
+    /// The tip is never faster than any speed that was asked for, nor anything else than finite.
+    fn keeps_speed(&self) -> Outcome {
+        let Some(environment) = &self.environment else { return Outcome::Stable };
+        let touch = &environment.scene().touch;
+        // Corrections of the path come on top of travel.
+        let limit_m_s = touch.travel_m_s.max(touch.approach_m_s) + CORRECTION_M_S;
+        let fastest = self.ticks.iter().map(|tick| tick.motion.linear_w.norm()).fold(0.0, f64::max);
+        hold(fastest <= limit_m_s, || format!("{fastest:.3} m/s, allowed {limit_m_s:.3}"))
+    }
+
+    /// The tip's centre keeps away from the object by what the core measures.
+    fn keeps_apart(&self) -> Outcome {
+        let Some((environment, felt)) = self.environment.as_ref().zip(self.felt.as_ref()) else {
+            return Outcome::Stable;
+        };
+        let Shape::Mesh { bvh, .. } = environment.shape() else { return Outcome::Stable };
+        let centre = felt.motion.x_wt.translation.vector.into();
+        let apart_m = bvh.closest_point(&centre).distance_m;
+        let least_m = CORE_SHARE * environment.scene().finger.radius_m;
+        hold(apart_m >= least_m, || format!("the tip is {:.2} mm from the object", 1e3 * apart_m))
+    }
+
+    /// Whether `other`, moved by `by_m` along x and y, met the same within `tolerance_m` and a
+    /// thousandth of the force.
+    pub(super) fn agrees(&self, other: &Self, by_m: f64, tolerance_m: f64) -> Outcome {
+        let (Some(a), Some(b)) = (self.contact(), other.contact()) else { return Outcome::Stable };
+        let shift_m = (b.p_wc - a.p_wc - nalgebra::Vector3::new(by_m, by_m, 0.0)).norm();
+        let [force, other_n] = [self, other].map(|d| d.felt.as_ref().map_or(0.0, |f| f.force_n));
+        all([
+            hold(shift_m <= tolerance_m, || format!("contact moved by {:.4} mm", 1e3 * shift_m)),
+            hold((force - other_n).abs() <= 1e-3 * force, || format!("{other_n} N, not {force} N")),
+        ])
+    }
+}
+
+/// Largest correction of the controller, and a margin for rounding.
+const CORRECTION_M_S: f64 = 0.25 + 1e-6;
+
+/// Of the hull's radius: half of it, inside the core (chosen).
+const CORE_SHARE: f64 = 0.5;

@@ -1,0 +1,204 @@
+//! Whole touches of a wall.
+
+use super::bench::stiffen;
+use super::case::{Case, Outcome, case, hold};
+use super::checked_touch::{CheckedTouch, around, deed};
+use super::solids::{mesh, wall};
+use crate::explore::probe::{Contact, Touch};
+use crate::robot::finger::Finger;
+use crate::sim::Scene;
+use crate::sim::finger::Effects;
+use crate::sim::finger::timing::TimingEffect;
+use crate::sim::scene::Body;
+use crate::sim::simulator::Simulator;
+use crate::study::fidelity::reference_load::quiet;
+use crate::task::Zone;
+use crate::task::touch::TouchSettings;
+
+pub(super) const CASES: &[Case] = &[
+    case(
+        "fast approach to a wall",
+        "the finger goes on while frames agree that there is contact",
+        "m/s",
+        (&[0.005, 0.02, 0.04, 0.06, 0.1, 0.2, 0.5, 1.0], 3),
+        |approach_m_s, period_s| {
+            let mut scene = scene(period_s);
+            scene.touch.approach_m_s = approach_m_s;
+            on_wall(scene)
+        },
+    )
+    .timed(),
+    case(
+        "stiff skin",
+        "force per tick of approach grows with the stiffness",
+        "times stiffer",
+        (&[1.0, 3.0, 10.0, 100.0, 1000.0], 4),
+        |times, period_s| on_wall(skin(period_s, times)),
+    )
+    .timed(),
+    case(
+        "soft skin",
+        "pressure rises too late to tell of contact",
+        "times softer",
+        (&[1.0, 3.0, 10.0, 100.0, 1000.0], 3),
+        |times, period_s| on_wall(skin(period_s, 1.0 / times)),
+    )
+    .known("its pressure stays below the threshold: lower touch.detection.threshold_counts")
+    .timed(),
+    case(
+        "late frames",
+        "frames come in batches long after the contact",
+        "frames a batch",
+        (&[1.0, 5.0, 10.0, 30.0, 100.0], 2),
+        |batch, period_s| {
+            let mut scene = scene(period_s);
+            let batch_frames = batch as usize;
+            scene.effects.timing = Some(TimingEffect { batch_frames, ..TimingEffect::default() });
+            on_wall(scene)
+        },
+    )
+    .timed(),
+    case(
+        "patient detection",
+        "every frame that must agree is a frame of approach",
+        "frames",
+        (&[1.0, 3.0, 6.0, 20.0, 100.0], 3),
+        |frames, period_s| {
+            let mut scene = scene(period_s);
+            scene.touch.detection.frames = frames as u32;
+            on_wall(scene)
+        },
+    )
+    .timed(),
+    case(
+        "noisy pressure",
+        "noise passes for contact in the air",
+        "times the noise",
+        (&[1.0, 3.0, 10.0, 30.0, 100.0], 2),
+        |times, period_s| {
+            let mut scene = scene(period_s);
+            scene.effects.fluid.get_or_insert_default().noise_counts *= times;
+            on_wall(scene)
+        },
+    )
+    .known("noise above a third of the threshold passes for contact: raise touch.detection"),
+    case(
+        "many touches",
+        "errors of the servo that add up from touch to touch",
+        "touches",
+        (&[10.0, 100.0, 1000.0], 3),
+        many,
+    ),
+    case(
+        "refined time step",
+        "a touch that changes with the period is not resolved",
+        "times coarser",
+        (&[1.0, 2.0, 4.0, 8.0], 4),
+        refined,
+    ),
+    case(
+        "too much force",
+        "the limit is passed within one tick",
+        "limit counts",
+        (&[1500.0, 100.0, 10.0, 1.0], 4),
+        |limit, period_s| {
+            let mut scene = scene(period_s);
+            scene.touch.pressure_limit_counts = limit;
+            wall_deed(scene).on_surface_or_missed(1e-3)
+        },
+    )
+    .timed(),
+    case(
+        "target off the object",
+        "there is nothing to meet",
+        "beside it mm",
+        (&[7.5, 20.0, 100.0], 3),
+        |mm, period_s| {
+            let mut scene = scene(period_s);
+            scene.zone.x_m = [-0.2, 0.2];
+            let Some(mesh) = mesh(wall(0.03), [0.0; 3]) else {
+                return Outcome::Wrong("no mesh".into());
+            };
+            let deed = deed(scene, mesh, &[0.03 + 1e-3 * mm, 0.0]);
+            hold(deed.touch == Ok(Touch::Miss), || format!("{:?}", deed.touch))
+        },
+    ),
+];
+
+/// A kinematic stage with a soft finger whose point of contact is exact, before an object near
+/// the origin.
+pub(super) fn scene(period_s: f64) -> Scene {
+    let mut effects = Effects { skin: Some(Default::default()), ..Effects::default() };
+    effects.fluid = Some(Default::default());
+    Scene {
+        body: Body::Kinematic,
+        function: None,
+        zone: Zone { x_m: [-0.05, 0.05], z_m: Some([-0.05, 0.05]), datum_y_m: 0.0 },
+        object: None,
+        finger: Finger::default(),
+        arm: None,
+        effects,
+        touch: TouchSettings { period_s: Some(period_s), ..TouchSettings::default() },
+        solver: Default::default(),
+    }
+}
+
+fn skin(period_s: f64, times: f64) -> Scene {
+    let mut scene = scene(period_s);
+    stiffen(&mut scene.effects, times);
+    scene
+}
+
+pub(super) fn wall_deed(scene: Scene) -> CheckedTouch {
+    match mesh(wall(0.05), [0.0; 3]) {
+        Some(mesh) => deed(scene, mesh, &[0.0, 0.0]),
+        None => CheckedTouch::not_done("no mesh"),
+    }
+}
+
+pub(super) fn on_wall(scene: Scene) -> Outcome {
+    wall_deed(scene).on_surface(1e-3)
+}
+
+/// The same target again and again gives the same contact, but for a tactile frame of approach:
+/// sums of ticks round, and a frame falls to the tick before or after.
+fn many(count: f64, period_s: f64) -> Outcome {
+    let mut scene = quiet(&scene(period_s));
+    scene.effects.skin.get_or_insert_default().samples = 125;
+    let Some(mesh) = mesh(wall(0.05), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
+    let Ok(environment) = around(scene, mesh) else { return Outcome::Wrong("no world".into()) };
+    let simulator = match Simulator::new(environment) {
+        Ok(simulator) => simulator,
+        Err(error) => return Outcome::Faulted(error.to_string()),
+    };
+    let mut probe = match simulator.probe(1) {
+        Ok(probe) => probe,
+        Err(fault) => return Outcome::Faulted(fault.to_string()),
+    };
+    let mut first: Option<Contact> = None;
+    for i in 0..count as u32 {
+        match probe.touch(&[0.0, 0.0]) {
+            Ok(Touch::Contact(contact)) => {
+                let moved_m = (contact.p_wc - first.get_or_insert(contact.clone()).p_wc).norm();
+                if moved_m > 3e-4 {
+                    return Outcome::Wrong(format!("moved by {moved_m} m at touch {i}"));
+                }
+            }
+            Ok(other) => return Outcome::Wrong(format!("{other:?} at touch {i}")),
+            Err(fault) => return Outcome::Faulted(fault.to_string()),
+        }
+    }
+    Outcome::Stable
+}
+
+/// Within what the finger travels in a tick and a tactile frame of the touch at 0.25 ms.
+fn refined(times: f64, _: f64) -> Outcome {
+    let [fine, coarse] =
+        [0.00025, 0.0025 * times].map(|period_s| wall_deed(quiet(&scene(period_s))));
+    let depth = |deed: &CheckedTouch| deed.felt.as_ref().map(|felt| felt.motion.x_wt.translation.y);
+    let (Some(a), Some(b)) = (depth(&fine), depth(&coarse)) else {
+        return Outcome::Wrong("no contact".into());
+    };
+    let travel_m = 0.02 * (0.0025 * times + 0.01);
+    hold((a - b).abs() <= 1.5 * travel_m, || format!("{:.3} mm apart", 1e3 * (a - b).abs()))
+}

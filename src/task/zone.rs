@@ -1,0 +1,109 @@
+//! The rectangle that is explored.
+
+use crate::config::{Checked, Rules};
+use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
+
+/// An interval of x, or a rectangle of (x, z), in `W`; heights are y above a datum.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Zone {
+    /// Smallest and largest x.
+    pub x_m: [f64; 2],
+    /// Smallest and largest z; left out, the zone is an interval of x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub z_m: Option<[f64; 2]>,
+    /// The y from which heights are measured. A zero-mean belief returns to it away from all
+    /// touches, and Eq. 5 depends on it.
+    #[serde(default)]
+    pub datum_y_m: f64,
+}
+
+/// Largest coordinate of a zone; far beyond any arm's reach.
+const REACH_M: f64 = 1e3;
+
+/// Smallest side of a zone; below it, places differ by rounding only.
+const SIDE_MIN_M: f64 = 1e-6;
+
+impl Checked for Zone {
+    fn check(&self, rules: &mut Rules) {
+        rules.interval("x_m", self.x_m, -REACH_M..=REACH_M);
+        if let Some(z_m) = self.z_m {
+            rules.interval("z_m", z_m, -REACH_M..=REACH_M);
+        }
+        for (key, side) in ["x_m", "z_m"].iter().zip(self.sides()) {
+            let wide = side[1] - side[0] >= SIDE_MIN_M;
+            rules.require(key, format!("{side:?}"), wide, || {
+                format!("at least {SIDE_MIN_M} m wide")
+            });
+        }
+        rules.number("datum_y_m", self.datum_y_m, -REACH_M..=REACH_M);
+    }
+}
+
+impl Zone {
+    /// Number of coordinates of a place: 1 or 2.
+    pub fn dimension(&self) -> usize {
+        self.sides().count()
+    }
+
+    /// [smallest, largest] of each coordinate.
+    pub fn sides(&self) -> impl Iterator<Item = [f64; 2]> + Clone {
+        std::iter::once(self.x_m).chain(self.z_m)
+    }
+
+    /// Size along each coordinate.
+    pub fn extents_m(&self) -> Vec<f64> {
+        self.sides().map(|[low, high]| high - low).collect()
+    }
+
+    /// Whether `place` has as many coordinates as the zone and lies in it, edges included.
+    pub fn contains(&self, place: &[f64]) -> bool {
+        place.len() == self.dimension()
+            && self.sides().zip(place).all(|([low, high], at)| (low..=high).contains(at))
+    }
+
+    /// The place at fractions 0..1 of the sides.
+    pub fn at(&self, fractions: &[f64]) -> Vec<f64> {
+        self.sides().zip(fractions).map(|([low, high], t)| low + (high - low) * t).collect()
+    }
+
+    /// The place (x) or (x, z) of a point in `W`.
+    pub fn place(&self, p_w: &Point3<f64>) -> Vec<f64> {
+        [p_w.x, p_w.z].into_iter().take(self.dimension()).collect()
+    }
+
+    /// The point of `W` at `place` and `height_m` above the datum; z = 0 in an interval.
+    pub fn point(&self, place: &[f64], height_m: f64) -> Point3<f64> {
+        let z = place.get(1).copied().unwrap_or(0.0);
+        Point3::new(place.first().copied().unwrap_or(0.0), self.datum_y_m + height_m, z)
+    }
+
+    /// An even grid with `per_side` places along each side, edges included, x varying fastest.
+    pub fn grid(&self, per_side: usize) -> Vec<Vec<f64>> {
+        let step = |i: usize| i as f64 / (per_side.max(2) - 1) as f64;
+        match self.z_m {
+            None => (0..per_side).map(|i| self.at(&[step(i)])).collect(),
+            Some(_) => (0..per_side * per_side)
+                .map(|k| self.at(&[step(k % per_side), step(k / per_side)]))
+                .collect(),
+        }
+    }
+
+    /// Whether `place` lies in the outer tenth: within a tenth of a side of that side's ends.
+    pub fn is_edge(&self, place: &[f64]) -> bool {
+        self.sides().zip(place).any(|([low, high], &at)| {
+            let margin = 0.1 * (high - low);
+            at <= low + margin || at >= high - margin
+        })
+    }
+
+    /// Distance of two places in units of the sides.
+    pub fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
+        let squares = self.sides().zip(a.iter().zip(b)).map(|([low, high], (a, b))| {
+            let step = (a - b) / (high - low);
+            step * step
+        });
+        squares.sum::<f64>().sqrt()
+    }
+}

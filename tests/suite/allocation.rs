@@ -1,0 +1,69 @@
+//! A control tick asks the allocator for nothing.
+
+use crate::common::counting::allocations;
+use palpate::explore::control::{Controller, Goal};
+use palpate::robot::arm::ArmSettings;
+
+#[test]
+fn the_controller_allocates_nothing() {
+    assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(1)))), 1);
+    let chain = ArmSettings::default().chain();
+    let mut q = chain.home;
+    let mut goal = Goal::still(chain.forward(&q));
+    let mut controller = Controller::new(chain, 0.004).unwrap();
+    // Out of reach, past singularities and limits.
+    goal.x_wt.translation.vector.y = -3.0;
+    let count = allocations(|| {
+        for _ in 0..2000 {
+            q += controller.step(q.as_slice(), &goal).unwrap().qdot * 0.004;
+        }
+    });
+    assert_eq!(count, 0);
+}
+
+#[test]
+#[cfg(feature = "mujoco")]
+fn the_plant_allocates_nothing() {
+    use palpate::backend::backend::Wrench;
+    use palpate::sim::mjcf;
+    use palpate::sim::mjcf::Mode;
+    use palpate::sim::mujoco::{Plant, compile};
+    use palpate::sim::{Environment, Scene};
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
+    let mut scene = Scene::load(&path, &[]).unwrap();
+    scene.arm = Some(ArmSettings::default());
+    let environment = Environment::build(scene).unwrap();
+    let text = mjcf::scene(&environment, Mode::Dynamic { step_s: 0.002 }).unwrap();
+    let mut plant = Plant::new(compile(&text).unwrap().into()).unwrap();
+    let home = environment.chain().unwrap().home;
+    let count = allocations(|| {
+        plant.reset(home.as_slice()).unwrap();
+        for _ in 0..100 {
+            plant.step(&[0.1; 7], &Wrench::default()).unwrap();
+            let _ = (plant.tip(), plant.tip_twist(), plant.mount(), plant.q());
+        }
+    });
+    assert_eq!(count, 0);
+}
+
+#[test]
+#[cfg(feature = "mujoco")]
+fn a_tick_of_the_dynamic_body_allocates_nothing() {
+    use palpate::backend::backend::Command;
+    use palpate::sim::simulator::Simulator;
+    use palpate::sim::{Environment, Scene};
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_pa10.toml");
+    let sets = ["effects.wrench={}".into(), "effects.timing={}".into()];
+    let environment = Environment::build(Scene::load(&path, &sets).unwrap()).unwrap();
+    let mut body = Simulator::new(environment.into()).unwrap().body().unwrap().unwrap();
+    let command = Command { qdot: vec![0.02; 7] };
+    body.reset(1).unwrap();
+    // The first frames size the reading.
+    (0..100).for_each(|_| assert!(body.step(&command).is_ok()));
+    let count = allocations(|| {
+        for _ in 0..400 {
+            body.step(&command).unwrap();
+        }
+    });
+    assert_eq!(count, 0);
+}

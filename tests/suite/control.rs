@@ -1,0 +1,332 @@
+//! The controller: it follows where it can, and its limits hold where it cannot.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
+use palpate::explore::control::{ControlError, Controller, Goal, posture};
+use palpate::math::seed;
+use palpate::robot::arm::stage::stage;
+use palpate::robot::arm::{ArmSettings, Chain, Joints, Links};
+use palpate::robot::finger::Finger;
+use palpate::sim::{Environment, Scene};
+use proptest::prelude::*;
+use rand::RngExt;
+use std::path::Path;
+
+const PERIOD_S: f64 = 0.004;
+
+fn arm() -> Chain {
+    ArmSettings::default().chain()
+}
+
+fn slides() -> Chain {
+    stage([0.0, -0.6, 0.5].into(), Finger::default().attitude_w())
+}
+
+/// Steps the arm exactly as commanded towards `goal(t)` and holds every limit at every tick.
+/// Returns the last posture, the worst damping and how far the tip was off last.
+fn drive(
+    chain: &Chain,
+    start: Joints,
+    ticks: usize,
+    goal: impl Fn(f64) -> Goal,
+) -> (Joints, f64, f64) {
+    let mut controller = Controller::new(chain.clone(), PERIOD_S).unwrap();
+    let n = chain.joints.len();
+    let (mut q, mut before) = (start, Joints::zeros());
+    let (mut damping, mut off): (f64, f64) = (0.0, 0.0);
+    for tick in 0..ticks {
+        let goal = goal(tick as f64 * PERIOD_S);
+        let motion = controller.step(&q.as_slice()[..n], &goal).unwrap();
+        for (i, joint) in chain.joints.iter().enumerate() {
+            let (qdot, qddot) = (motion.qdot[i], (motion.qdot[i] - before[i]) / PERIOD_S);
+            assert!(qdot.abs() <= joint.qdot_limit * (1.0 + 1e-9), "{} {qdot}", joint.name);
+            assert!(qddot.abs() <= joint.qddot_limit * (1.0 + 1e-9), "{} {qddot}", joint.name);
+        }
+        before = motion.qdot;
+        damping = damping.max(motion.damping);
+        q += motion.qdot * PERIOD_S;
+        for (i, joint) in chain.joints.iter().enumerate() {
+            let [low, high] = joint.q_limits;
+            assert!((low - 1e-9..=high + 1e-9).contains(&q[i]), "{} {} {start}", joint.name, q[i]);
+        }
+        off = (chain.forward(&q).translation.vector - goal.x_wt.translation.vector).norm();
+    }
+    (q, damping, off)
+}
+
+fn anywhere(chain: &Chain, random: &mut impl rand::Rng) -> Joints {
+    let mut q = Joints::zeros();
+    for (q, joint) in q.iter_mut().zip(&chain.joints) {
+        *q = random.random_range(joint.q_limits[0]..joint.q_limits[1]);
+    }
+    q
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..Default::default() })]
+
+    /// Postures anywhere, limits and singularities included, and goals anywhere, most of them
+    /// out of reach, with a velocity that no arm could follow.
+    #[test]
+    fn limits_hold_for_any_goal(
+        fractions in prop::array::uniform7(prop_oneof![Just(0.0), Just(1.0), Just(0.5), 0.0..1.0]),
+        place in prop::array::uniform3(-3.0..3.0),
+        turn in prop::array::uniform3(-3.0..3.0),
+        twist in prop::array::uniform6(-10.0..10.0),
+        slide in any::<bool>(),
+    ) {
+        let chain = if slide { slides() } else { arm() };
+        let mut q = Joints::zeros();
+        for (i, joint) in chain.joints.iter().enumerate() {
+            q[i] = joint.q_limits[0] + fractions[i] * (joint.q_limits[1] - joint.q_limits[0]);
+        }
+        let x_wt = Isometry3::new(Vector3::from(place), Vector3::from(turn));
+        drive(&chain, q, 300, |t| Goal {
+            x_wt,
+            // Changes its sign every 0.2 s.
+            twist: Vector6::from(twist) * (-1.0_f64).powi((t / 0.2) as i32),
+        });
+    }
+}
+
+/// Out along -y at 0.1 m/s until the elbow is straight and beyond, and back again.
+#[test]
+fn a_goal_that_leaves_the_reach_and_returns_is_met_again() {
+    let chain = arm();
+    let home = chain.forward(&chain.home);
+    let (_, damping, off) = drive(&chain, chain.home, 6000, |t| {
+        let out = (0.1 * t).min(1.2 - 0.1 * t).max(0.0);
+        let speed = if t > 12.0 { 0.0 } else { -0.1 * (6.0 - t).signum() };
+        let mut twist = Vector6::zeros();
+        twist.y = speed;
+        Goal { x_wt: Translation3::new(0.0, -out, 0.0) * home, twist }
+    });
+    assert!(damping > 0.9, "{damping}");
+    assert!(off < 1e-4, "{off}");
+}
+
+/// Turns the finger in place until W1 is straight, where S3, E2 and W2 align, and beyond.
+#[test]
+fn the_wrist_passes_its_singularity() {
+    let chain = arm();
+    let mut q = chain.home;
+    q[5] = 0.3;
+    let start = chain.forward(&q);
+    let rate = 0.15;
+    let (_, damping, off) = drive(&chain, q, 1000, |t| {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), (rate * t).min(0.6));
+        let x_wt = Isometry3::from_parts(start.translation, turn * start.rotation);
+        let mut twist = Vector6::zeros();
+        twist[3] = if rate * t < 0.6 { rate } else { 0.0 };
+        Goal { x_wt, twist }
+    });
+    assert!(damping > 0.3, "{damping}");
+    assert!(off < 1e-3, "{off}");
+}
+
+/// In towards the base until E1, which alone shortens the arm, is at its limit, and out again.
+#[test]
+fn a_goal_beyond_a_joints_limit_is_met_again_on_its_way_back() {
+    let chain = arm();
+    let home = chain.forward(&chain.home);
+    let path = |t: f64| (0.08 * t).min(0.8 - 0.08 * t).max(0.0);
+    let goal = |t: f64| {
+        let mut twist = Vector6::zeros();
+        twist.y = if t > 10.0 { 0.0 } else { 0.08 * (5.0 - t).signum() };
+        Goal { x_wt: Translation3::new(0.0, path(t), 0.0) * home, twist }
+    };
+    let (inside, _, away) = drive(&chain, chain.home, 1250, goal);
+    assert!(away > 0.05, "{away}");
+    assert!(chain.joints[3].q_limits[1] - inside[3] < 0.05, "{}", inside[3].to_degrees());
+    let (_, _, off) = drive(&chain, chain.home, 5000, goal);
+    assert!(off < 1e-4, "{off}");
+}
+
+/// Upright, all axes lie in one plane and no direction along the arm is left.
+#[test]
+fn the_arm_leaves_its_upright_posture() {
+    let chain = arm();
+    let home = chain.forward(&chain.home);
+    let (_, damping, off) = drive(&chain, Joints::zeros(), 5000, |_| Goal::still(home));
+    assert!(damping > 0.99, "{damping}");
+    assert!(off < 1e-4, "{off}");
+}
+
+#[test]
+fn away_from_trouble_the_goal_is_followed_exactly() {
+    for chain in [arm(), slides()] {
+        let start = chain.forward(&chain.home);
+        let mut controller = Controller::new(chain.clone(), PERIOD_S).unwrap();
+        let n = chain.joints.len();
+        let mut q = chain.home;
+        for tick in 0..1000 {
+            let t = tick as f64 * PERIOD_S;
+            // 20 mm/s, after a start within the acceleration limits.
+            let speed = 0.02 * (t / 0.2).min(1.0);
+            let along = if t < 0.2 { 0.05 * t * t } else { 0.02 * (t - 0.1) };
+            let mut twist = Vector6::zeros();
+            twist.x = speed;
+            let x_wt = Translation3::new(along, 0.0, 0.0) * start;
+            let motion = controller.step(&q.as_slice()[..n], &Goal { x_wt, twist }).unwrap();
+            assert_eq!(motion.damping, 0.0);
+            if t > 0.01 {
+                assert!((motion.followed - 1.0).abs() < 1e-6, "{t} {}", motion.followed);
+            }
+            q += motion.qdot * PERIOD_S;
+        }
+        let x = chain.forward(&q);
+        assert!(x.rotation.angle_to(&start.rotation) < 1e-4);
+        assert!((x.translation.y - start.translation.y).abs() < 2e-5);
+    }
+}
+
+#[test]
+fn the_null_space_brings_the_elbow_home_while_the_tip_stands() {
+    let chain = arm();
+    let start = chain.forward(&chain.home);
+    let mut q = chain.home;
+    // Away from home with the tip where it was: a turn of the elbow about the line from shoulder
+    // to wrist, found by driving there.
+    let mut odd = chain.clone();
+    odd.home[2] += 0.8;
+    q = drive(&odd, q, 2000, |_| Goal::still(start)).0;
+    let away = (q - chain.home).norm();
+    let (back, _, off) = drive(&chain, q, 4000, |_| Goal::still(start));
+    assert!(away > 0.2 && (back - chain.home).norm() < 0.02);
+    assert!(off < 1e-4, "{off}");
+}
+
+#[test]
+fn nonsense_is_an_error() {
+    let chain = arm();
+    assert!(Controller::new(chain.clone(), f64::NAN).is_err());
+    assert!(Controller::new(chain.clone(), 0.0).is_err());
+    let mut controller = Controller::new(chain.clone(), PERIOD_S).unwrap();
+    let still = Goal::still(chain.forward(&chain.home));
+    let wrong = controller.step(&[0.0; 3], &still).unwrap_err();
+    assert_eq!(wrong, ControlError::Joints { expected: 7, found: 3 });
+    assert!(controller.step(&[f64::NAN; 7], &still).is_err());
+    let mut nan = still;
+    nan.x_wt.translation.vector.x = f64::NAN;
+    assert_eq!(controller.step(chain.home.as_slice(), &nan), Err(ControlError::NotFinite));
+    nan = still;
+    nan.twist[4] = f64::INFINITY;
+    assert!(controller.step(chain.home.as_slice(), &nan).is_err());
+    assert!(posture(&chain, &nan.x_wt).is_ok());
+    nan.x_wt.translation.vector.x = f64::NAN;
+    assert_eq!(posture(&chain, &nan.x_wt), Err(ControlError::NotFinite));
+}
+
+#[test]
+fn every_place_of_the_scenes_has_a_posture() {
+    for name in ["bird", "container"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
+        for arm in [
+            Some(ArmSettings::default()),
+            Some(ArmSettings { links: Links::A, ..Default::default() }),
+            None,
+        ] {
+            let mut scene = Scene::load(&path, &[]).unwrap();
+            scene.arm = arm;
+            let environment = Environment::build(scene).unwrap();
+            let chain = environment.chain().unwrap();
+            let attitude = environment.scene().finger.attitude_w();
+            for place in environment.scene().zone.grid(5) {
+                // From the datum, deep in the object, to well in front of it.
+                for height_m in [0.0, 0.1] {
+                    let p = environment.scene().zone.point(&place, height_m);
+                    let x_wt = Isometry3::from_parts(p.into(), attitude);
+                    let q = posture(&chain, &x_wt).unwrap();
+                    let x = chain.forward(&q);
+                    assert!((x.translation.vector - p.coords).norm() < 1e-8);
+                    assert!(x.rotation.angle_to(&attitude) < 1e-7);
+                    assert_eq!(q, chain.clamp(&q));
+                    // At home and near it: nowhere close to a limit or a singularity.
+                    for (i, joint) in chain.joints.iter().enumerate() {
+                        let room = (q[i] - joint.q_limits[0]).min(joint.q_limits[1] - q[i]);
+                        assert!(room > 0.1, "{name} {place:?} {} {room}", joint.name);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn postures_are_found_wherever_the_arm_can_be() {
+    let chain = arm();
+    let mut random = seed::stream(1, 0, "posture");
+    let mut found = 0;
+    for _ in 0..200 {
+        let x_wt = chain.forward(&anywhere(&chain, &mut random));
+        if let Ok(q) = posture(&chain, &x_wt) {
+            let x = chain.forward(&q);
+            assert!((x.translation.vector - x_wt.translation.vector).norm() < 1e-8);
+            assert_eq!(q, chain.clamp(&q));
+            found += 1;
+        }
+    }
+    assert!(found > 190, "{found}");
+}
+
+#[test]
+fn a_place_out_of_reach_says_by_how_much() {
+    let chain = arm();
+    let ahead = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -std::f64::consts::FRAC_PI_2);
+    let x_wt = Isometry3::from_parts(Translation3::new(0.0, -2.0, 0.317), ahead);
+    let Err(ControlError::OutOfReach { distance_m, .. }) = posture(&chain, &x_wt) else { panic!() };
+    // Shoulder to fingertip, outstretched: 0.45 + 0.48 + 0.07 + 0.12 m.
+    assert!((distance_m - (2.0 - 1.12)).abs() < 0.01, "{distance_m}");
+    let turned = Translation3::new(0.0, -0.6, 0.5).into();
+    let Err(ControlError::OutOfReach { angle_rad, .. }) = posture(&slides(), &turned) else {
+        panic!()
+    };
+    assert!(angle_rad > 0.1);
+}
+
+#[cfg(feature = "mujoco")]
+mod mujoco {
+    use super::*;
+    use palpate::backend::backend::Wrench;
+    use palpate::sim::mjcf;
+    use palpate::sim::mjcf::Mode;
+    use palpate::sim::mujoco::{Plant, compile};
+    use std::sync::Arc;
+
+    /// From rest, 60 mm along -y at 0.02 m/s with masses, friction and servos.
+    #[test]
+    fn an_approach_stays_on_its_line() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
+        let [c, a] =
+            [Links::C, Links::A].map(|links| Some(ArmSettings { links, ..Default::default() }));
+        for settings in [c, a, None] {
+            let mut scene = Scene::load(&path, &[]).unwrap();
+            scene.arm = settings;
+            let environment = Environment::build(scene).unwrap();
+            let chain = environment.chain().unwrap();
+            let n = chain.joints.len();
+            let text = mjcf::scene(&environment, Mode::Dynamic { step_s: 0.002 }).unwrap();
+            let mut plant = Plant::new(Arc::new(compile(&text).unwrap())).unwrap();
+            let start = Translation3::new(0.02, -0.54, 0.47);
+            let start = Isometry3::from_parts(start, environment.scene().finger.attitude_w());
+            plant.reset(&posture(&chain, &start).unwrap().as_slice()[..n]).unwrap();
+            let mut controller = Controller::new(chain, PERIOD_S).unwrap();
+            let (mut aside, mut turned, mut behind): (f64, f64, f64) = (0.0, 0.0, 0.0);
+            for tick in 0..750 {
+                let t = tick as f64 * PERIOD_S;
+                let mut twist = Vector6::zeros();
+                twist.y = -0.02 * (t / 0.1).min(1.0);
+                let along = if t < 0.1 { 0.1 * t * t } else { 0.02 * (t - 0.05) };
+                let x_wt = Translation3::new(0.0, -along, 0.0) * start;
+                let motion = controller.step(plant.q(), &Goal { x_wt, twist }).unwrap();
+                for _ in 0..2 {
+                    plant.step(&motion.qdot.as_slice()[..n], &Wrench::default()).unwrap();
+                }
+                let off = plant.tip().translation.vector - x_wt.translation.vector;
+                aside = aside.max(off.x.hypot(off.z));
+                behind = behind.max(off.y.abs());
+                turned = turned.max(plant.tip().rotation.angle_to(&start.rotation));
+            }
+            assert!(aside < 2e-4, "{aside}");
+        }
+    }
+}

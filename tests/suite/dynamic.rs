@@ -1,0 +1,343 @@
+//! The dynamic body: against the kinematic one, in its speed, its limits and its force of contact.
+
+use nalgebra::{Isometry3, Translation3};
+use palpate::backend::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
+use palpate::explore::control::{Controller, Goal};
+use palpate::explore::probe::servo::Servo;
+use palpate::explore::probe::{Contact, Probe, Touch};
+use palpate::sim::environment::Shape;
+use palpate::sim::mujoco::{Models, StepLimit};
+use palpate::sim::probe::rest_y_m;
+use palpate::sim::scene::Body;
+use palpate::sim::simulator::Simulator;
+use palpate::sim::{Environment, Scene};
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+const ARM: &str = "arm={links=\"C\"}";
+const DYNAMIC: &str = "body=\"dynamic\"";
+const DRY: &str = "effects={skin={}}";
+const WET: &str = "effects={skin={}, fluid={}}";
+
+fn environment(name: &str, sets: &[&str]) -> Arc<Environment> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
+    Arc::new(Environment::build(Scene::load(&path, &sets).unwrap()).unwrap())
+}
+
+fn contact(touch: Touch) -> Contact {
+    match touch {
+        Touch::Contact(contact) => contact,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Keeps every reading of a body.
+struct Tap {
+    inner: Box<dyn Backend>,
+    readings: Arc<Mutex<Vec<Reading>>>,
+}
+
+impl Backend for Tap {
+    fn capabilities(&self) -> &Capabilities {
+        self.inner.capabilities()
+    }
+
+    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
+        self.inner.reset(seed)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        let reading = self.inner.step(command)?;
+        self.readings.lock().unwrap().push(reading.clone());
+        Ok(reading)
+    }
+}
+
+/// A touch with everything that was read during it.
+fn tapped(environment: &Arc<Environment>, target: &[f64]) -> (Touch, Vec<Reading>) {
+    let simulator = Simulator::new(Arc::clone(environment)).unwrap();
+    let readings = Arc::new(Mutex::new(Vec::new()));
+    let body = Tap { inner: simulator.body().unwrap().unwrap(), readings: Arc::clone(&readings) };
+    let mut servo = Servo::new(Arc::clone(environment), Box::new(body), 1).unwrap();
+    let touch = servo.touch(target).unwrap();
+    let readings = readings.lock().unwrap().clone();
+    (touch, readings)
+}
+
+/// Presses the finger to `deep` from `above` and waits; what it feels there.
+fn press(simulator: &Simulator, above: &Isometry3<f64>, deep: &Isometry3<f64>) -> IdealContact {
+    let mut body = simulator.body().unwrap().unwrap();
+    let mut reading = body.reset(1).unwrap().clone();
+    let chain = simulator.environment().chain().unwrap();
+    let mut controller = Controller::new(chain, body.capabilities().period_s).unwrap();
+    for goal in [above, deep] {
+        let until_s = reading.time_s + 5.0;
+        while reading.time_s < until_s {
+            let motion = controller.step(&reading.q, &Goal::still(*goal)).unwrap();
+            let qdot = motion.qdot.as_slice()[..reading.q.len()].to_vec();
+            reading.clone_from(body.step(&Command { qdot }).unwrap());
+        }
+    }
+    reading.ideal.unwrap()
+}
+
+#[test]
+fn pressed_to_the_same_depth_forces_and_places_are_the_kinematic_ones() {
+    let (mut force, mut place): (f64, f64) = (0.0, 0.0);
+    for (name, arm, effects) in [
+        ("container_finger.toml", ARM, DRY),
+        ("container_finger.toml", ARM, WET),
+        ("bird_finger.toml", ARM, WET),
+        ("container_finger.toml", DYNAMIC, WET),
+    ] {
+        let [still, moved] = ["body=\"kinematic\"", DYNAMIC]
+            .map(|body| Simulator::new(environment(name, &[arm, body, effects])).unwrap());
+        let scene = still.environment().scene();
+        for fractions in [[0.4, 0.4], [0.7, 0.6], [0.2, 0.7]] {
+            let target = scene.zone.at(&fractions);
+            let rest_y = rest_y_m(still.environment(), &target).unwrap();
+            let p = scene.zone.point(&target, 0.0);
+            let at = |depth_m: f64| {
+                let place = Translation3::new(p.x, rest_y - depth_m, p.z);
+                Isometry3::from_parts(place, scene.finger.attitude_w())
+            };
+            let (above, deep) = (at(-0.005), at(0.001));
+            let [kinematic, dynamic] =
+                [&still, &moved].map(|simulator| press(simulator, &above, &deep));
+            force = force.max((dynamic.force_n / kinematic.force_n - 1.0).abs());
+            place = place.max((dynamic.p_tc - kinematic.p_tc).norm());
+            assert!(kinematic.force_n > 0.1, "{name} {target:?}: {}", kinematic.force_n);
+        }
+    }
+    assert!(force < 1e-3 && place < 1e-5, "{force} {place}");
+}
+
+/// The same approach, detection and rest. Servos take 40 ms (arm) to stop the finger, by which it ends
+/// deeper; what remains after ten time constants of the controller (0.2 s) is what a tick of a slow
+/// approach makes of depth.
+#[test]
+fn a_slow_touch_is_the_kinematic_one() {
+    let slow = [
+        "touch.approach_m_s=0.0005",
+        "touch.period_s=0.002",
+        "touch.standoff_m=0.001",
+        "touch.detection_n=0.3",
+        "touch.settle_s=2.0",
+    ];
+    for carrier in [ARM, DYNAMIC] {
+        let (mut apart, mut stronger): (f64, f64) = (0.0, 0.0);
+        for target in [[0.0, 0.5], [0.03, 0.47], [-0.02, 0.53]] {
+            let [kinematic, dynamic] = ["body=\"kinematic\"", DYNAMIC].map(|body| {
+                let sets: Vec<&str> = [carrier, DRY, body].into_iter().chain(slow).collect();
+                let (touch, readings) =
+                    tapped(&environment("container_finger.toml", &sets), &target);
+                // The last tick before the finger is pulled back.
+                let rests = |reading: &&Reading| {
+                    reading.applied.qdot.iter().all(|qdot| qdot.abs() < 1e-3)
+                        && reading.ideal.is_some_and(|ideal| ideal.force_n > 0.0)
+                };
+                let rest = readings.iter().rev().find(rests).unwrap();
+                (contact(touch).p_wc, rest.ideal.unwrap().force_n)
+            });
+            apart = apart.max((kinematic.0 - dynamic.0).norm());
+            stronger = stronger.max((dynamic.1 / kinematic.1 - 1.0).abs());
+        }
+        assert!(apart < 1e-4 && stronger < 0.02, "{carrier} {apart} {stronger}");
+    }
+}
+
+/// The force when the pressure has been above its threshold for the frames it takes.
+fn detected_n(environment: &Environment, readings: &[Reading]) -> f64 {
+    let detection = &environment.scene().touch.detection;
+    let pdc = |reading: &Reading| reading.frames.last().and_then(|frame| frame.pdc_counts);
+    let rest = readings.iter().find_map(pdc).unwrap();
+    let mut above = 0;
+    for reading in readings {
+        let Some(counts) = pdc(reading) else { continue };
+        // The tare averages the noise of a count or two; so high only a contact is.
+        above = if counts - rest > detection.threshold_counts { above + 1 } else { 0 };
+        if above == detection.frames {
+            return reading.ideal.map_or(0.0, |ideal| ideal.force_n);
+        }
+    }
+    panic!("no contact");
+}
+
+#[test]
+fn a_touch_stops_gently_and_keeps_its_limits_and_its_line() {
+    let fast = ["touch.approach_m_s=0.02", "touch.press_m=0"];
+    for (name, sets) in [
+        ("container_finger.toml", &[ARM, fast[0], fast[1]][..]),
+        ("bird_finger.toml", &[ARM, fast[0], fast[1]]),
+        ("container_finger.toml", &[fast[0], fast[1]]),
+        ("container_pa10.toml", &[]),
+        ("bird_pa10.toml", &[]),
+    ] {
+        let carrier = format!("{sets:?}");
+        let environment = environment(name, &[&[DYNAMIC, WET], sets].concat());
+        let scene = environment.scene();
+        let chain = environment.chain().unwrap();
+        let top = environment.mesh().unwrap().bounds().1.y;
+        let start_y = top + scene.finger.bulge_m() + scene.touch.standoff_m;
+        for target in scene.zone.grid(2).into_iter().chain([scene.zone.at(&[0.5, 0.5])]) {
+            let (touch, readings) = tapped(&environment, &target);
+            contact(touch);
+            let force = |reading: &Reading| reading.ideal.map_or(0.0, |ideal| ideal.force_n);
+            let most_n = readings.iter().map(force).fold(0.0, f64::max);
+            let over_n = most_n - detected_n(&environment, &readings);
+            assert!(over_n < 1.0, "{name} {carrier} {target:?}: {over_n} N");
+
+            let touched = readings.iter().position(|reading| force(reading) > 0.0).unwrap();
+            let aside = readings[..touched]
+                .iter()
+                .rev()
+                .map(|reading| chain.forward(&chain.joints_from(&reading.q).unwrap()).translation)
+                .take_while(|tip| tip.y < start_y - 1e-4)
+                .map(|tip| (tip.x - target[0]).hypot(tip.z - target[1]))
+                .fold(0.0, f64::max);
+            assert!(aside < 2e-4, "{name} {carrier} {target:?}: {aside}");
+
+            let mut before = vec![0.0; chain.joints.len()];
+            for reading in &readings {
+                let applied = reading.applied.qdot.iter().zip(&mut before);
+                for (joint, (now, before)) in chain.joints.iter().zip(applied) {
+                    assert!(now.abs() <= joint.qdot_limit * (1.0 + 1e-9), "{}", joint.name);
+                    let change = (now - *before).abs();
+                    let allowed = joint.qddot_limit * scene.period_s();
+                    assert!(change <= allowed * (1.0 + 1e-6), "{}", joint.name);
+                    *before = *now;
+                }
+            }
+        }
+    }
+}
+
+/// As stiff as contact and arm are, an approach at the usual 20 mm/s would end in an overload.
+#[test]
+fn a_finger_without_skin_finds_the_surface() {
+    for name in ["container_finger.toml", "bird_finger.toml"] {
+        let slow = "touch.approach_m_s=0.005";
+        let environment = environment(name, &[ARM, DYNAMIC, "effects={}", slow]);
+        let mut scene = environment.scene().clone();
+        scene.body = Body::Cast;
+        let cast = Simulator::new(Arc::new(Environment::build(scene).unwrap())).unwrap();
+        let mut cast = cast.probe(1).unwrap();
+        let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
+        let Shape::Mesh { bvh, .. } = environment.shape() else { panic!() };
+        let (mut off, mut apart): (f64, f64) = (0.0, 0.0);
+        for target in environment.scene().zone.grid(3) {
+            let felt = contact(probe.touch(&target).unwrap());
+            let exact = contact(cast.touch(&target).unwrap());
+            off = off.max(bvh.closest_point(&felt.p_wc).distance_m);
+            apart = apart.max((felt.p_wc.y - exact.p_wc.y).abs());
+        }
+        assert!(off < 5e-5 && apart < 5e-4, "{name}: {off} {apart}");
+    }
+}
+
+/// The limit is √(m / k). A skin whose every constant is 100 times larger bears 100 times the force at
+/// the same depth, so with the limit of force 100 times larger that of the step is a tenth.
+#[test]
+fn a_step_too_long_for_the_skin_is_divided_or_refused_with_the_longest_that_is_not() {
+    let soft = environment("container_finger.toml", &[ARM, DYNAMIC, DRY]);
+    let stiffer = |times: f64| {
+        let mut scene = soft.scene().clone();
+        let skin = scene.effects.skin.as_mut().unwrap();
+        for constant in [
+            &mut skin.modulus_pa,
+            &mut skin.flatten_pa_m,
+            &mut skin.inflate_pa_m,
+            &mut skin.core_pa_m,
+        ] {
+            *constant *= times;
+        }
+        scene.touch.force_limit_n *= times;
+        let environment = Environment::build(scene).unwrap();
+        (Models::new(&environment), environment)
+    };
+    let limit = |times: f64| {
+        let (models, environment) = stiffer(times);
+        StepLimit::of(&environment, &models.unwrap().plant).unwrap().unwrap()
+    };
+    let (one, hundred) = (limit(1.0), limit(100.0));
+    assert!((one.limit_s - (one.mass_kg / one.stiffness_n_m).sqrt()).abs() < 1e-12);
+    let times = one.limit_s / hundred.limit_s;
+    assert!((times - 10.0).abs() < 1e-3, "{times}");
+
+    let (models, environment) = stiffer(1000.0);
+    let models = models.unwrap();
+    let substeps = models.substeps.unwrap();
+    let divided_s = models.plant.opt().timestep;
+    assert!(divided_s <= substeps.limit.limit_s && 2.0 * divided_s > substeps.limit.limit_s);
+    assert_eq!(divided_s, 0.002 / f64::from(substeps.count));
+    let simulator = Simulator::new(Arc::new(environment)).unwrap();
+    let text = simulator.notice().unwrap();
+    let limit = format!("at most {:.2e} s", substeps.limit.limit_s);
+    assert!(text.contains("solver.step_s = 0.002 is divided") && text.contains(&limit), "{text}");
+
+    let text = stiffer(1e9).0.unwrap_err().to_string();
+    assert!(
+        text.contains("solver.step_s = 0.002 is too long") && text.contains("at most"),
+        "{text}"
+    );
+    assert_eq!(Simulator::new(soft).unwrap().notice(), None);
+}
+
+#[test]
+fn steps_that_do_not_fit_are_refused_when_the_scene_is_read() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_pa10.toml");
+    for (set, word) in [
+        ("solver.step_s=0.003", "0.002"),
+        ("touch.period_s=0.005", "whole number"),
+        ("touch.period_s=0.001", "whole number"),
+        ("effects.wrench.noise_n=[1, 1]", "noise_n"),
+    ] {
+        let error = Scene::load(&path, &[set.into()]).unwrap_err().to_string();
+        assert!(error.contains(word), "{set}: {error}");
+    }
+    let scene = Scene::load(&path, &["touch.period_s=0.01".into()]).unwrap();
+    assert_eq!(scene.solver.steps(scene.period_s()), Some(5));
+}
+
+/// A millimetre of error in the object's place shows in the contact, a new one for each seed.
+#[test]
+fn registration_errors_move_what_is_found_and_nothing_else() {
+    let touch = |effects: &str, seed: u64| {
+        let environment = environment("container_finger.toml", &[effects]);
+        let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
+        let found = contact(simulator.probe(seed).unwrap().touch(&[0.01, 0.5]).unwrap());
+        let Shape::Mesh { bvh, .. } = environment.shape() else { panic!() };
+        (bvh.closest_point(&found.p_wc).distance_m, found)
+    };
+    let none = "{finger_m=0, finger_deg=0, object_m=0, object_deg=0}";
+    let exact = touch(WET, 1);
+    assert_eq!(exact, touch(&format!("effects={{skin={{}}, fluid={{}}, registration={none}}}"), 1));
+    for part in ["object_m=0.001", "finger_m=0.001"] {
+        let zero = none.replace(&part.replace("0.001", "0"), part);
+        let effects = format!("effects={{skin={{}}, fluid={{}}, registration={zero}}}");
+        let found: Vec<f64> = (1..9).map(|seed| touch(&effects, seed).0).collect();
+        let rms = (found.iter().map(|off| off * off).sum::<f64>() / 8.0).sqrt();
+        assert!((3e-4..3e-3).contains(&rms), "{part} {rms}");
+        assert_eq!(touch(&effects, 3), touch(&effects, 3));
+    }
+}
+
+/// With bias, drift, noise, weight and resolution the sensor still finds contact without a fluid.
+#[test]
+fn a_force_sensor_tells_contact_where_no_fluid_does() {
+    for body in ["body=\"kinematic\"", DYNAMIC] {
+        let sets = [ARM, body, "effects={skin={}, wrench={}}", "touch.detection_n=0.4"];
+        let environment = environment("container_finger.toml", &sets);
+        let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
+        let Shape::Mesh { bvh, .. } = environment.shape() else { panic!() };
+        for seed in 0..3 {
+            let mut probe = simulator.probe(seed).unwrap();
+            for target in [[0.0, 0.5], [0.03, 0.47]] {
+                let found = contact(probe.touch(&target).unwrap());
+                let off = bvh.closest_point(&found.p_wc).distance_m;
+                assert!(off < 5e-4, "{body} {target:?} {off}");
+            }
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Fits reach the global maximum of the likelihood.
+
+use palpate::experiment::experiment::Experiment;
+use palpate::experiment::trial;
+use palpate::experiment::truth::Truth;
+use palpate::explore::planner;
+use palpate::gp::fit::SearchBox;
+use palpate::gp::kernel::SquaredExponential;
+use palpate::gp::likelihood::Likelihood;
+use palpate::gp::{LogNormal, Mean, Observations, Range, Scale};
+use palpate::sim::Environment;
+use palpate::sim::simulator::Simulator;
+use std::path::Path;
+use std::sync::Arc;
+
+static KERNEL: SquaredExponential = SquaredExponential;
+
+fn toy(x: f64) -> f64 {
+    if x.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x).sin() + 1.0 } else { 1.0 }
+}
+
+/// The ranges of noise and signal that a belief searches by default.
+fn search_box(mean: Mean, length_scales: Vec<Range>) -> SearchBox {
+    let (noise_ratio, signal_sd) = ((1e-4, 1e-2).into(), (1e-3, 1e3).into());
+    SearchBox {
+        mean,
+        length_scales,
+        noise_ratio,
+        signal_sd,
+        noise_sd: None,
+        slope_noise_ratio: None,
+    }
+}
+
+/// The slow twin of a fit: the profiled likelihood on a dense grid over the same box.
+fn best_on_grid(bounds: &SearchBox, touches: &Observations) -> f64 {
+    let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, touches);
+    let level = |Range { low, high, .. }: Range, i: usize, of: usize| {
+        low * (high / low).powf(i as f64 / (of - 1) as f64)
+    };
+    let mut best = f64::MIN;
+    for i in 0..240 {
+        let length = level(bounds.length_scales[0], i, 240);
+        for j in 0..30 {
+            let ratio = level(bounds.noise_ratio, j, 30);
+            if let Ok(profile) =
+                likelihood.profile(&[length], ratio, &Scale::Best(bounds.signal_sd), None)
+            {
+                best = best.max(profile.log_likelihood);
+            }
+        }
+    }
+    best
+}
+
+/// The fits of whole trials as they run, each begun from the one before, and cold.
+#[test]
+fn fits_of_the_toys_trials_reach_the_global_maximum() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let experiment = Experiment::load(&root.join("experiments/toy.toml"), &[]).unwrap();
+    let environment = Arc::new(Environment::build(experiment.scene.clone()).unwrap());
+    let truth = Truth::sample(&environment, experiment.grid as usize);
+    let simulator = Simulator::new(environment).unwrap();
+    let bounds = search_box(Mean::Zero, vec![(0.02, 4.0).into()]);
+    let (mut fits, mut warm, mut cold) = (0, 0, 0);
+    for (number, name) in [(0, "active"), (1, "active"), (2, "active"), (3, "random")] {
+        let planner = planner::by_name(name).unwrap();
+        let row = trial::run(&experiment, &simulator, &truth, planner, number);
+        let mut touches = Observations::new(1);
+        for touch in &row.touches {
+            let [x, y, _] = touch.contact.unwrap();
+            touches.push(&[x], y);
+            let Some(fit) = &touch.fit else { continue };
+            let best = best_on_grid(&bounds, &touches);
+            fits += 1;
+            warm += usize::from(fit.log_likelihood < best - 1e-3);
+            let fit = bounds.fit(&KERNEL, &touches, None);
+            cold += usize::from(fit.log_likelihood < best - 1e-3);
+        }
+    }
+    let short = format!("of {fits} fits {warm} warm and {cold} cold ones fall short");
+    assert!(fits == 192 && 100 * warm.max(cold) <= fits, "{short}");
+}
+
+/// A trial's fits begin from the last one and do not scan each time; what they reach is what a
+/// scan would have, but for a twentieth of a nat until the next scan.
+#[test]
+fn fits_touch_by_touch_reach_what_cold_fits_reach() {
+    let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
+    let (mut fits, mut gaps) = (0, Vec::new());
+    for trial in 0..4 {
+        let mut touches = Observations::new(2);
+        let mut last = None;
+        for i in 0..90 {
+            let step = f64::from(trial) * 0.377 + f64::from(i);
+            let place = [(step * 0.754_877_666) % 1.0, (step * 0.569_840_291) % 1.0];
+            let bump = (-40.0 * ((place[0] - 0.6).powi(2) + (place[1] - 0.4).powi(2))).exp();
+            touches.push(&place, 1.0 - place[0] * place[0] + 0.3 * bump);
+            let fit = bounds.fit(&KERNEL, &touches, last.as_ref());
+            if i >= 20 && i % 5 == 0 {
+                let cold = bounds.fit(&KERNEL, &touches, None);
+                fits += 1;
+                gaps.push(cold.log_likelihood - fit.log_likelihood);
+            }
+            last = Some(fit);
+        }
+    }
+    let short = gaps.iter().filter(|gap| **gap > 1e-3).count();
+    let worst = gaps.iter().fold(0.0, |worst: f64, gap| worst.max(*gap));
+    assert!(fits == 56 && short <= 1 && worst < 0.05, "{short} of {fits}, worst {worst}");
+}
+
+#[test]
+fn a_fit_recovers_the_lengths_of_an_anisotropic_surface() {
+    let mut touches = Observations::new(2);
+    for i in 0..64u64 {
+        let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
+        touches.push(&place, (9.0 * place[0]).sin() + 0.3 * place[1]);
+    }
+    let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
+    let fit = bounds.fit(&KERNEL, &touches, None).hyperparameters;
+    assert!(fit.length_scales[1] > 2.0 * fit.length_scales[0], "{fit:?}");
+}
+
+#[test]
+fn a_prior_pulls_a_known_noise_stays_and_a_constant_is_found() {
+    let mut touches = Observations::new(1);
+    for i in 0..12 {
+        let x = -2.0 + 4.0 * (f64::from(i) * 0.618_033_988_75 % 1.0);
+        touches.push(&[x], 1000.0 + toy(x));
+    }
+    let free = search_box(Mean::Constant, vec![(0.02, 4.0).into()]);
+    let found = free.fit(&KERNEL, &touches, None).hyperparameters;
+    assert!((found.mean - 1001.0).abs() < 1.0 && found.signal_sd < 2.0, "{found:?}");
+    let prior = Some(LogNormal { median: 1.0, spread: 1.05 });
+    let ranges = vec![Range { prior, ..free.length_scales[0] }];
+    let pulled = SearchBox { length_scales: ranges, ..free.clone() };
+    let pulled = pulled.fit(&KERNEL, &touches, None).hyperparameters;
+    let off = |length: f64| length.ln().abs();
+    assert!(off(pulled.length_scales[0]) < off(found.length_scales[0]), "{pulled:?}");
+    let known = SearchBox { noise_sd: Some(0.05), ..free };
+    let known = known.fit(&KERNEL, &touches, None).hyperparameters;
+    assert!((known.noise_sd - 0.05).abs() < 1e-12, "{known:?}");
+}

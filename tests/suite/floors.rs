@@ -1,0 +1,327 @@
+//! The floor plan: a room imports only from rooms below its own, and no files import each other in a
+//! circle.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Rooms of `src`, lowest floor first; the rooms of a floor know nothing of each other.
+const FLOORS: [&[&str]; 9] = [
+    &["geometry", "config", "math"],
+    &["robot", "gp"],
+    &["task", "backend"],
+    &["explore"],
+    &["sim"],
+    &["experiment"],
+    &["study"],
+    &["report"],
+    &["cli"],
+];
+
+/// Imports between rooms of one floor that point down a flight of stairs inside it.
+const STAIRS: [(&str, &str); 4] =
+    [("geometry", "config"), ("geometry", "math"), ("gp", "config"), ("config", "math")];
+
+/// A module by its path below the crate's root.
+type Module = Vec<String>;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            files.extend(sources(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+    files.sort();
+    files
+}
+
+/// The sources without comments and without their unit tests.
+struct Tree {
+    texts: BTreeMap<Module, String>,
+    /// Where a name that a module passes on comes from.
+    passed_on: BTreeMap<Module, Module>,
+}
+
+impl Tree {
+    fn read() -> Self {
+        let root = root();
+        let mut texts = BTreeMap::new();
+        for path in sources(&root) {
+            let below = path.strip_prefix(&root).unwrap().with_extension("");
+            let mut module: Module =
+                below.iter().map(|part| part.to_str().unwrap().to_owned()).collect();
+            match module.last().map(String::as_str) {
+                Some("main") => continue,
+                Some("mod" | "lib") => drop(module.pop()),
+                _ => {}
+            }
+            let text = fs::read_to_string(&path).unwrap();
+            let text = text.split("#[cfg(test)]\nmod tests").next().unwrap();
+            let code = |line: &str| line.split("//").next().unwrap().to_owned() + "\n";
+            texts.insert(module, text.lines().map(code).collect());
+        }
+        let mut tree = Self { texts, passed_on: BTreeMap::new() };
+        for module in tree.texts.keys().cloned().collect::<Vec<_>>() {
+            for (is_passed_on, path) in tree.imports(&module) {
+                if is_passed_on {
+                    let mut name = module.clone();
+                    name.extend(path.last().cloned());
+                    tree.passed_on.insert(name, path);
+                }
+            }
+        }
+        tree
+    }
+
+    /// What a module names of this crate, by path from the root, and whether it passes it on.
+    fn imports(&self, module: &Module) -> Vec<(bool, Module)> {
+        let mut found = Vec::new();
+        let mut rest = String::new();
+        for statement in self.texts[module].split_inclusive(';') {
+            let line = statement.rsplit('\n').find(|line| line.contains("use "));
+            let start = statement.find("use ").filter(|_| line.is_some_and(is_import));
+            let Some(start) = start.filter(|_| statement.ends_with(';')) else {
+                rest += statement;
+                continue;
+            };
+            let (before, tree) = statement.split_at(start);
+            let is_passed_on = before.trim_end().lines().last().is_some_and(|l| l.contains("pub"));
+            let flat = tree[4..tree.len() - 1].split_whitespace().collect::<Vec<_>>().join(" ");
+            for path in expanded(&flat) {
+                found.extend(self.absolute(module, &path).map(|path| (is_passed_on, path)));
+            }
+        }
+        for start in ["crate::", "super::"] {
+            for (at, _) in rest.match_indices(start) {
+                let is_path = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
+                let path: String = rest[at..].chars().take_while(|&c| is_path(c)).collect();
+                found.extend(self.absolute(module, &path).map(|path| (false, path)));
+            }
+        }
+        found
+    }
+
+    fn absolute(&self, module: &Module, path: &str) -> Option<Module> {
+        let path = path.split(" as ").next().unwrap();
+        let mut parts: Vec<&str> = path.split("::").filter(|part| !part.is_empty()).collect();
+        parts.retain(|part| *part != "self" || parts_are_one(path));
+        let mut from = match parts.first() {
+            Some(&"crate") => Module::new(),
+            Some(&"super") => module.clone(),
+            Some(&"self") => module.clone(),
+            Some(first) => {
+                let mut child = module.clone();
+                child.push((*first).to_owned());
+                return self.texts.contains_key(&child).then(|| {
+                    child.extend(parts[1..].iter().map(|&part| part.to_owned()));
+                    child
+                });
+            }
+            None => return None,
+        };
+        for part in parts {
+            match part {
+                "crate" | "self" => {}
+                "super" => drop(from.pop()),
+                name => from.push(name.to_owned()),
+            }
+        }
+        Some(from)
+    }
+
+    /// The file that what stands at `path` is written in.
+    fn file(&self, path: &Module) -> Module {
+        let mut path = path.clone();
+        for _ in 0..8 {
+            let passed = (1..=path.len()).rev().find_map(|end| {
+                let head = path[..end].to_vec();
+                let is_file = self.texts.contains_key(&head);
+                let to = self.passed_on.get(&head).filter(|_| !is_file)?;
+                Some(to.iter().chain(&path[end..]).cloned().collect())
+            });
+            match passed {
+                Some(next) => path = next,
+                None => break,
+            }
+        }
+        let known = (0..=path.len()).rev().map(|end| path[..end].to_vec());
+        known.into_iter().find(|head| self.texts.contains_key(head)).unwrap()
+    }
+
+    /// Which files each file imports; what a module only passes on is not its own.
+    fn edges(&self) -> BTreeMap<Module, BTreeSet<Module>> {
+        let to = |module: &Module| {
+            let used = self.imports(module).into_iter().filter(|(is_passed_on, _)| !is_passed_on);
+            let files = used.map(|(_, path)| self.file(&path));
+            files.filter(|file| file != module && !file.is_empty()).collect()
+        };
+        self.texts.keys().map(|module| (module.clone(), to(module))).collect()
+    }
+}
+
+fn parts_are_one(path: &str) -> bool {
+    path.starts_with("self")
+}
+
+fn is_import(line: &str) -> bool {
+    let line = line.trim_start();
+    line.starts_with("use ") || (line.starts_with("pub") && line.contains("use "))
+}
+
+/// Every path of an import with braces.
+fn expanded(tree: &str) -> Vec<String> {
+    let Some(open) = tree.find('{') else { return vec![tree.trim().to_owned()] };
+    let (head, body) = (tree[..open].trim(), &tree[open + 1..tree.rfind('}').unwrap()]);
+    let (mut parts, mut depth) = (vec![String::new()], 0);
+    for c in body.chars() {
+        match c {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            ',' if depth == 0 => {
+                parts.push(String::new());
+                continue;
+            }
+            _ => {}
+        }
+        parts.last_mut().unwrap().push(c);
+    }
+    let parts = parts.iter().filter(|part| !part.trim().is_empty());
+    parts.flat_map(|part| expanded(part)).map(|part| format!("{head}{part}")).collect()
+}
+
+fn floor(room: &str) -> usize {
+    FLOORS.iter().position(|rooms| rooms.contains(&room)).unwrap_or_else(|| panic!("{room}"))
+}
+
+#[test]
+fn imports_point_down() {
+    let tree = Tree::read();
+    let mut seen = 0;
+    for (module, imports) in tree.edges() {
+        let Some(room) = module.first() else { continue };
+        for import in imports {
+            let other = &import[0];
+            let is_allowed = room == other
+                || floor(other) < floor(room)
+                || STAIRS.contains(&(room.as_str(), other.as_str()));
+            assert!(is_allowed, "{} imports {}", module.join("/"), import.join("/"));
+            seen += 1;
+        }
+    }
+    assert!(seen > 400, "the test found only {seen} imports");
+}
+
+/// What compiles without `sim` runs on the real arm, and cannot see the truth.
+#[test]
+fn the_explorer_knows_nothing_of_the_simulator() {
+    let edges = Tree::read().edges();
+    let mut reached: BTreeSet<Module> = (edges.keys())
+        .filter(|module| module.first().is_some_and(|room| floor(room) <= floor("explore")))
+        .cloned()
+        .collect();
+    assert!(reached.len() > 60);
+    loop {
+        let more: BTreeSet<Module> = reached.iter().flat_map(|from| edges[from].clone()).collect();
+        let before = reached.len();
+        reached.extend(more);
+        if reached.len() == before {
+            break;
+        }
+    }
+    for module in reached {
+        assert!(floor(&module[0]) <= floor("explore"), "{}", module.join("/"));
+    }
+}
+
+#[test]
+fn no_files_import_each_other_in_a_circle() {
+    let mut edges = Tree::read().edges();
+    assert!(edges.len() > 150);
+    // A file that imports no other is in no circle; take such files away until none is left.
+    loop {
+        let ends: Vec<Module> =
+            edges.iter().filter(|(_, to)| to.is_empty()).map(|(from, _)| from.clone()).collect();
+        if ends.is_empty() {
+            break;
+        }
+        for end in &ends {
+            edges.remove(end);
+        }
+        edges.values_mut().for_each(|to| to.retain(|file| !ends.contains(file)));
+    }
+    let Some(start) = edges.keys().next() else { return };
+    let mut walk = vec![start.clone()];
+    loop {
+        let next = edges[walk.last().unwrap()].iter().next().unwrap().clone();
+        if let Some(from) = walk.iter().position(|module| *module == next) {
+            let circle: Vec<String> = walk[from..].iter().map(|module| module.join("/")).collect();
+            panic!("a circle: {}", circle.join(" -> "));
+        }
+        walk.push(next);
+    }
+}
+
+/// A planner that could see the object could peek at the truth.
+#[test]
+fn planners_see_the_belief_and_the_zone_and_nothing_else() {
+    let tree = Tree::read();
+    let mut seen = 0;
+    for (module, imports) in tree.edges() {
+        if !module.join("/").starts_with("explore/planner") {
+            continue;
+        }
+        for import in imports {
+            let path = import.join("/");
+            let allowed =
+                ["gp", "math", "config", "explore/planner", "explore/belief", "task/zone"];
+            let is_allowed = allowed.iter().any(|room| path.starts_with(room));
+            assert!(is_allowed, "{} imports {path}", module.join("/"));
+            seen += 1;
+        }
+    }
+    assert!(seen > 20, "the test found only {seen} imports");
+}
+
+#[test]
+fn a_file_is_one_idea() {
+    for path in sources(&root()) {
+        let text = fs::read_to_string(&path).unwrap();
+        let lines = text.lines().count();
+        assert!(lines <= 400, "{} has {lines} lines", path.display());
+        for (i, line) in text.lines().enumerate() {
+            let is_comment = line.trim_start().starts_with("//");
+            let length = line.chars().count();
+            let is_short = !is_comment || length <= 100;
+            assert!(is_short, "{}:{}: {length} columns", path.display(), i + 1);
+        }
+    }
+}
+
+#[test]
+fn every_folder_of_the_sources_is_a_room() {
+    for entry in fs::read_dir(root()).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            floor(path.file_name().unwrap().to_str().unwrap());
+        }
+    }
+}
+
+/// The test's own reading of imports, on what it must understand.
+#[test]
+fn imports_are_read_whole() {
+    assert_eq!(expanded("a::{b, c::{d, e as f}}"), ["a::b", "a::c::d", "a::c::e as f"]);
+    let edges = Tree::read().edges();
+    let path = |text: &str| -> Module { text.split('/').map(str::to_owned).collect() };
+    // Through a name that a front page passes on, and through one in the midst of an expression.
+    assert!(edges[&path("explore/belief")].contains(&path("task/zone")));
+    assert!(edges[&path("experiment/trial")].contains(&path("explore/belief")));
+}

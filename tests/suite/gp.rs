@@ -1,0 +1,269 @@
+//! The Gaussian process against values to 80 digits, against laws, and against slow twins.
+
+use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
+use palpate::gp::likelihood::Likelihood;
+use palpate::gp::posterior::Scratch;
+use palpate::gp::{LogNormal, Mean, Observations, Posterior, Range, Scale};
+use proptest::prelude::*;
+use serde::Deserialize;
+
+static KERNEL: SquaredExponential = SquaredExponential;
+
+/// `data/gp_reference.json`: made with mpmath at 80 digits and rounded to the nearest float64;
+/// its `model` field says of what.
+#[derive(Deserialize)]
+struct Reference {
+    cases: Vec<Case>,
+}
+
+#[derive(Deserialize)]
+struct Case {
+    name: String,
+    x: Vec<Vec<f64>>,
+    y: Vec<f64>,
+    query: Vec<Vec<f64>>,
+    signal_sd: f64,
+    length_scales: Vec<f64>,
+    noise_sd: f64,
+    condition_number: f64,
+    mean: Vec<f64>,
+    variance: Vec<f64>,
+    log_marginal_likelihood: f64,
+    gradient_log_sf_l_sw: Vec<f64>,
+}
+
+impl Case {
+    fn hyperparameters(&self) -> Hyperparameters {
+        Hyperparameters {
+            signal_sd: self.signal_sd,
+            length_scales: self.length_scales.clone(),
+            noise_sd: self.noise_sd,
+            slope_noise_sd: 0.0,
+            mean: 0.0,
+        }
+    }
+
+    fn observations(&self) -> Observations {
+        observations(self.x.iter().map(Vec::as_slice).zip(self.y.iter().copied()))
+    }
+}
+
+fn reference() -> Vec<Case> {
+    let reference: Reference =
+        serde_json::from_str(include_str!("../data/gp_reference.json")).unwrap();
+    assert_eq!(reference.cases.len(), 9);
+    reference.cases
+}
+
+fn observations<'a>(pairs: impl IntoIterator<Item = (&'a [f64], f64)>) -> Observations {
+    let mut pairs = pairs.into_iter().peekable();
+    let mut all = Observations::new(pairs.peek().map_or(1, |(place, _)| place.len()));
+    pairs.for_each(|(place, height)| all.push(place, height));
+    all
+}
+
+fn posterior(at: Hyperparameters, observations: Observations) -> Posterior {
+    Posterior::new(&KERNEL, at, observations).unwrap()
+}
+
+/// What float64 can keep at a condition number: `share` of its rounding, or 1e-11.
+fn tolerance(share: f64, case: &Case) -> f64 {
+    (share * f64::EPSILON * case.condition_number).max(1e-11)
+}
+
+#[test]
+fn posterior_keeps_the_digits_the_condition_number_allows() {
+    for case in reference() {
+        let tolerance = tolerance(0.02, &case);
+        let ours = posterior(case.hyperparameters(), case.observations());
+        assert_eq!(ours.jitter(), 0.0, "{}", case.name);
+        let largest = case.y.iter().fold(0.0, |largest: f64, y| largest.max(y.abs()));
+        let mut scratch = Scratch::default();
+        for (i, place) in case.query.iter().enumerate() {
+            let mean_error = (ours.mean(place, &mut scratch) - case.mean[i]).abs() / largest;
+            let variance_error = (ours.variance(place, &mut scratch) - case.variance[i]).abs();
+            assert!(mean_error <= tolerance, "{} mean {i}: {mean_error:e}", case.name);
+            let variance_error = variance_error / case.signal_sd.powi(2);
+            assert!(variance_error <= tolerance, "{} variance {i}: {variance_error:e}", case.name);
+        }
+    }
+}
+
+#[test]
+fn likelihood_and_gradient_keep_the_digits_the_condition_number_allows() {
+    for case in reference() {
+        let tolerance = tolerance(0.2, &case);
+        let observations = case.observations();
+        let mut gradient = vec![0.0; case.gradient_log_sf_l_sw.len()];
+        let value = Likelihood::new(&KERNEL, Mean::Zero, &observations)
+            .value_gradient(&case.hyperparameters(), &mut gradient)
+            .unwrap();
+        let error = (value / case.log_marginal_likelihood - 1.0).abs();
+        assert!(error <= tolerance, "{} likelihood: {error:e}", case.name);
+        let scale = case.gradient_log_sf_l_sw.iter().fold(0.0, |s: f64, g| s.max(g.abs()));
+        for (i, (ours, exact)) in gradient.iter().zip(&case.gradient_log_sf_l_sw).enumerate() {
+            let error = (ours - exact).abs() / scale;
+            assert!(error <= tolerance, "{} gradient {i}: {error:e}", case.name);
+        }
+    }
+}
+
+#[test]
+fn one_touch_gives_the_closed_form() {
+    let at = Hyperparameters {
+        signal_sd: 2.0,
+        length_scales: vec![0.5],
+        noise_sd: 0.1,
+        slope_noise_sd: 0.0,
+        mean: 0.0,
+    };
+    let ours = posterior(at, observations([(&[0.3][..], 1.5)]));
+    let mut scratch = Scratch::default();
+    for x in [-1.0, 0.3, 0.31, 4.0] {
+        let k = 4.0 * (-0.5 * ((x - 0.3) / 0.5f64).powi(2)).exp();
+        let k_yy = 4.0 + 0.01;
+        assert!((ours.mean(&[x], &mut scratch) - k * 1.5 / k_yy).abs() < 1e-14);
+        assert!((ours.variance(&[x], &mut scratch) - (4.0 - k * k / k_yy)).abs() < 1e-14);
+    }
+}
+
+#[test]
+fn coinciding_places_without_noise_need_jitter_and_say_so() {
+    let at = Hyperparameters {
+        signal_sd: 1.0,
+        length_scales: vec![1.0],
+        noise_sd: 0.0,
+        slope_noise_sd: 0.0,
+        mean: 0.0,
+    };
+    let twice = observations([(&[0.0][..], 1.0), (&[0.0][..], 1.0), (&[0.5][..], 0.0)]);
+    let ours = posterior(at, twice);
+    assert!(ours.jitter() > 0.0 && ours.jitter() < 1e-12, "{:e}", ours.jitter());
+    assert!((ours.mean(&[0.0], &mut Scratch::default()) - 1.0).abs() < 1e-6);
+}
+
+/// Between 1 and 25 distinct touches on [-1, 1]², with sane hyperparameters.
+fn any_belief() -> impl Strategy<Value = (Hyperparameters, Vec<([f64; 2], f64)>)> {
+    let touch = ([-1.0..1.0f64, -1.0..1.0f64], -1.0..1.0f64);
+    let at = (0.1..3.0f64, 0.1..2.0f64, 0.1..2.0f64, 1e-3..0.3f64).prop_map(|(s, a, b, ratio)| {
+        Hyperparameters {
+            signal_sd: s,
+            length_scales: vec![a, b],
+            noise_sd: s * ratio,
+            slope_noise_sd: 0.0,
+            mean: 0.0,
+        }
+    });
+    (at, proptest::collection::vec(touch, 1..25))
+}
+
+fn all(touches: &[([f64; 2], f64)]) -> Observations {
+    observations(touches.iter().map(|(place, height)| (&place[..], *height)))
+}
+
+proptest! {
+    #[test]
+    fn gradients_are_central_differences((at, touches) in any_belief(), place in [-1.0..1.0f64, -1.0..1.0f64]) {
+        let touches = all(&touches);
+        let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, &touches);
+        let mut gradient = vec![0.0; 4];
+        likelihood.value_gradient(&at, &mut gradient).unwrap();
+        for (i, ours) in gradient.iter().enumerate() {
+            let mut moved = |by: f64| {
+                let mut at = at.clone();
+                match i {
+                    0 => at.signal_sd *= by.exp(),
+                    3 => at.noise_sd *= by.exp(),
+                    _ => at.length_scales[i - 1] *= by.exp(),
+                }
+                likelihood.value_gradient(&at, &mut []).unwrap()
+            };
+            let step = 1e-5;
+            let twin = (moved(step) - moved(-step)) / (2.0 * step);
+            prop_assert!((ours - twin).abs() < 1e-4 * (1.0 + twin.abs()), "{i}: {ours} {twin}");
+        }
+        let ours = posterior(at, touches);
+        let mut scratch = Scratch::default();
+        let mut slope = [0.0; 2];
+        let value = ours.variance_gradient(&place, &mut slope, &mut scratch);
+        prop_assert!((value - ours.variance(&place, &mut scratch)).abs() < 1e-12);
+        for axis in 0..2 {
+            let mut moved = |by: f64| {
+                let mut place = place;
+                place[axis] += by;
+                ours.variance(&place, &mut scratch)
+            };
+            let twin = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+            prop_assert!((slope[axis] - twin).abs() < 1e-4 * (1.0 + twin.abs()));
+        }
+    }
+
+    /// However signal and mean are chosen, the profiled gradient is a central difference.
+    #[test]
+    fn profiled_gradients_are_central_differences((at, touches) in any_belief(), choice in 0..3usize) {
+        let touches = all(&touches);
+        let prior = Some(LogNormal { median: 1.0, spread: 1.5 });
+        let scale = [
+            Scale::Best((1e-3, 1e3).into()),
+            Scale::Best(Range { low: 1e-3, high: 1e3, prior }),
+            Scale::KnownNoise(0.05),
+        ][choice];
+        let mean = [Mean::Zero, Mean::Constant, Mean::Data][choice];
+        let mut likelihood = Likelihood::new(&KERNEL, mean, &touches);
+        let logs: Vec<f64> =
+            [at.length_scales[0], at.length_scales[1], at.noise_sd / at.signal_sd].map(f64::ln).into();
+        let mut score = |logs: &[f64], gradient: Option<&mut [f64]>| {
+            let (lengths, ratio) = ([logs[0].exp(), logs[1].exp()], logs[2].exp());
+            let profile = likelihood.profile(&lengths, ratio, &scale, gradient).unwrap();
+            profile.log_likelihood + scale.log_prior(profile.signal_sd)
+        };
+        let mut gradient = [0.0; 3];
+        score(&logs, Some(&mut gradient));
+        for (i, ours) in gradient.iter().enumerate() {
+            let mut moved = |by: f64| {
+                let mut logs = logs.clone();
+                logs[i] += by;
+                score(&logs, None)
+            };
+            let twin = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+            prop_assert!((ours - twin).abs() < 1e-3 * (1.0 + twin.abs()), "{i}: {ours} {twin}");
+        }
+    }
+
+    #[test]
+    fn a_touch_never_raises_the_variance((at, touches) in any_belief(), place in [-1.5..1.5f64, -1.5..1.5f64]) {
+        let prior = at.signal_sd.powi(2);
+        let mut scratch = Scratch::default();
+        let mut last = prior;
+        for count in 1..=touches.len() {
+            let now = posterior(at.clone(), all(&touches[..count])).variance(&place, &mut scratch);
+            prop_assert!(now >= 0.0 && now <= last + 1e-10 * prior, "{count}: {now} after {last}");
+            last = now;
+        }
+    }
+
+    #[test]
+    fn many_places_at_once_are_the_places_one_by_one((at, touches) in any_belief(), count in 0..40usize) {
+        let belief = posterior(at.clone(), all(&touches));
+        let place = |i: usize| [(i as f64).sin(), (1.7 * i as f64).cos()];
+        let places: Vec<[f64; 2]> = (0..count).map(place).collect();
+        let together = belief.predict(places.iter().map(|place| place.as_slice()));
+        prop_assert_eq!(together.len(), count);
+        let mut scratch = Scratch::default();
+        for (place, prediction) in places.iter().zip(together) {
+            prop_assert_eq!(prediction.mean, belief.mean(place, &mut scratch));
+            let variance = belief.variance(place, &mut scratch);
+            prop_assert!((prediction.variance - variance).abs() <= 1e-8 * at.signal_sd.powi(2));
+        }
+    }
+
+    #[test]
+    fn the_order_of_touches_is_only_rounding((at, touches) in any_belief(), place in [-1.0..1.0f64, -1.0..1.0f64]) {
+        let mut backwards = touches.clone();
+        backwards.reverse();
+        let (a, b) = (posterior(at.clone(), all(&touches)), posterior(at, all(&backwards)));
+        let mut scratch = Scratch::default();
+        prop_assert!((a.mean(&place, &mut scratch) - b.mean(&place, &mut scratch)).abs() < 1e-8);
+        prop_assert!((a.variance(&place, &mut scratch) - b.variance(&place, &mut scratch)).abs() < 1e-8);
+    }
+}

@@ -1,0 +1,223 @@
+//! Data that other Gaussian-process libraries answer with a panic, σ = 0, silence, or "all noise".
+//!
+//! Measured on such cases elsewhere: one library panics on a single touch and returns σ = 0 on a
+//! flat plate, another explains smooth data away as noise, a third predicts NaN after a NaN touch.
+
+use palpate::gp::covariance::CovarianceError;
+use palpate::gp::fit::{Fit, SearchBox};
+use palpate::gp::kernel::SquaredExponential;
+use palpate::gp::posterior::Scratch;
+use palpate::gp::{Mean, Observations, Posterior};
+use palpate::math::optimize::Stop;
+
+static KERNEL: SquaredExponential = SquaredExponential;
+
+fn toy(x: f64) -> f64 {
+    if x.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x).sin() + 1.0 } else { 1.0 }
+}
+
+/// `count` irregular places on [-2, 2].
+fn spread(count: u32) -> Vec<f64> {
+    (0..count).map(|i| -2.0 + 4.0 * (f64::from(i) * 0.618_033_988_75 % 1.0)).collect()
+}
+
+fn data(pairs: impl IntoIterator<Item = (f64, f64)>) -> Observations {
+    let mut touches = Observations::new(1);
+    pairs.into_iter().for_each(|(x, y)| touches.push(&[x], y));
+    touches
+}
+
+/// The box that a belief searches, for touches within `side`.
+fn search_box(touches: &Observations, side: f64, noisiest: f64) -> SearchBox {
+    let squares: f64 = touches.heights().iter().map(|y| y * y).sum();
+    let rms = (squares / touches.len().max(1) as f64).sqrt();
+    let scale = if rms > 0.0 { rms } else { side };
+    SearchBox {
+        mean: Mean::Zero,
+        length_scales: vec![(0.005 * side, side).into()],
+        noise_ratio: (1e-4, noisiest).into(),
+        signal_sd: (1e-3 * scale, 1e3 * scale).into(),
+        noise_sd: None,
+        slope_noise_ratio: None,
+    }
+}
+
+/// Fits, and holds the laws that no data set may break: every number finite, σ within (0, prior].
+fn believe(name: &str, touches: &Observations, middle: f64, side: f64) -> (Fit, Posterior) {
+    believe_with(name, touches, middle, side, 1e-2)
+}
+
+fn believe_with(
+    name: &str,
+    touches: &Observations,
+    middle: f64,
+    side: f64,
+    noisiest: f64,
+) -> (Fit, Posterior) {
+    let fit = search_box(touches, side, noisiest).fit(&KERNEL, touches, None);
+    assert_ne!(fit.stop, Stop::Failed, "{name}");
+    let posterior = Posterior::new(&KERNEL, fit.hyperparameters.clone(), touches.clone()).unwrap();
+    let mut scratch = Scratch::default();
+    let prior = fit.hyperparameters.signal_sd.powi(2);
+    let mut largest: f64 = 0.0;
+    for i in 0..=400 {
+        let place = [middle + side * (f64::from(i) / 400.0 - 0.5)];
+        let (mean, variance) =
+            (posterior.mean(&place, &mut scratch), posterior.variance(&place, &mut scratch));
+        assert!(mean.is_finite() && variance.is_finite(), "{name} at {place:?}");
+        assert!((0.0..=prior * (1.0 + 1e-12)).contains(&variance), "{name} at {place:?}");
+        largest = largest.max(variance);
+    }
+    assert!(largest > 0.0, "{name}: sure everywhere");
+    (fit, posterior)
+}
+
+/// Largest misfit at the touches, as a share of the heights' range.
+fn misfit(posterior: &Posterior, touches: &Observations) -> f64 {
+    let mut scratch = Scratch::default();
+    let heights = touches.heights();
+    let (low, high) =
+        heights.iter().fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(*y), high.max(*y)));
+    let errors = heights.iter().enumerate().map(|(i, y)| {
+        let place: Vec<f64> = touches.place(i).collect();
+        (posterior.mean(&place, &mut scratch) - y).abs()
+    });
+    errors.fold(0.0, f64::max) / (high - low)
+}
+
+#[test]
+fn one_touch_and_identical_touches_give_a_belief_informed_by_the_prior() {
+    for count in [1, 2, 7] {
+        let touches = data(vec![(0.3, 0.8); count]);
+        let (fit, posterior) = believe("identical", &touches, 0.0, 4.0);
+        let mut scratch = Scratch::default();
+        assert!((posterior.mean(&[0.3], &mut scratch) - 0.8).abs() < 0.01, "{count}");
+        let signal = fit.hyperparameters.signal_sd;
+        assert!(signal > 0.08 && signal < 8.0, "{count}: {signal}");
+        let far = posterior.variance(&[-2.0], &mut scratch).sqrt();
+        assert!(far > 0.01 * signal, "{count}: {far} far from the only place touched");
+    }
+}
+
+#[test]
+fn duplicates_and_near_duplicates_are_followed() {
+    let places = spread(20);
+    let at = |x: f64| (x, toy(x));
+    let cases = [
+        ("exact duplicates", data(places.iter().chain(&places).map(|&x| at(x)))),
+        ("a nanometre apart", data(places.iter().flat_map(|&x| [at(x), at(x + 1e-9)]))),
+    ];
+    for (name, touches) in cases {
+        let (_, posterior) = believe(name, &touches, 0.0, 4.0);
+        assert!(misfit(&posterior, &touches) < 0.01, "{name}");
+        assert_eq!(posterior.jitter(), 0.0, "{name}");
+    }
+}
+
+/// Two readings that disagree by 0.2 of a range of 2 cannot both be met: half of that is the
+/// least misfit there is.
+#[test]
+fn duplicates_that_disagree_are_split_between() {
+    let touches = data(spread(20).into_iter().flat_map(|x| [(x, toy(x)), (x, toy(x) + 0.2)]));
+    let (_, posterior) = believe_with("disagreeing", &touches, 0.0, 4.0, 0.3);
+    assert!(misfit(&posterior, &touches) < 0.1, "{}", misfit(&posterior, &touches));
+}
+
+#[test]
+fn a_flat_plate_and_the_toys_lattice_stay_open() {
+    let plate = data(spread(12).into_iter().map(|x| (x, 1.0)));
+    let zero = data(spread(12).into_iter().map(|x| (x, 0.0)));
+    let lattice = data((0..17).map(|i| -2.0 + 0.25 * f64::from(i)).map(|x| (x, toy(x))));
+    for (name, touches) in [("plate", plate), ("zero plate", zero), ("lattice", lattice)] {
+        let (_, posterior) = believe(name, &touches, 0.0, 4.0);
+        let mut scratch = Scratch::default();
+        let height = touches.heights()[0];
+        assert!((posterior.mean(&[0.1], &mut scratch) - height).abs() < 1e-2, "{name}");
+    }
+}
+
+#[test]
+fn smooth_data_are_followed_whatever_their_unit_offset_or_number() {
+    let smooth = |x: f64| (1.5 * x).sin() + 0.3 * x;
+    let touches = |count: u32, unit: f64, offset: f64| {
+        data(spread(count).into_iter().map(|x| (x, unit * smooth(x) + offset)))
+    };
+    for (name, touches) in [
+        ("25", touches(25, 1.0, 0.0)),
+        ("200", touches(200, 1.0, 0.0)),
+        ("1e-6 units", touches(40, 1e-6, 0.0)),
+        ("1e6 units", touches(40, 1e6, 0.0)),
+    ] {
+        let (fit, posterior) = believe(name, &touches, 0.0, 4.0);
+        assert!(misfit(&posterior, &touches) < 1e-3, "{name}: {}", misfit(&posterior, &touches));
+        assert!(fit.hyperparameters.length_scales[0] > 0.3, "{name}: {fit:?}");
+    }
+    let far = data(spread(40).into_iter().map(|x| (1e4 + 2.5e-4 * x, smooth(x))));
+    let (_, posterior) = believe("places at 1e4", &far, 1e4, 1e-3);
+    assert!(misfit(&posterior, &far) < 1e-3);
+}
+
+/// With a mean of zero an offset of 1e6 is the signal, and what varies is a millionth of it.
+#[test]
+fn an_offset_of_a_million_wants_a_mean_and_gets_it() {
+    let touches = data(spread(40).into_iter().map(|x| (x, 1e6 + toy(x))));
+    for mean in [Mean::Data, Mean::Constant] {
+        let range =
+            SearchBox { mean, signal_sd: (1e-3, 1e3).into(), ..search_box(&touches, 4.0, 1e-2) };
+        let fit = range.fit(&KERNEL, &touches, None);
+        let posterior = Posterior::new(&KERNEL, fit.hyperparameters, touches.clone()).unwrap();
+        assert!(misfit(&posterior, &touches) < 0.01, "{mean:?}");
+    }
+}
+
+#[test]
+fn a_step_and_an_outlier_are_met() {
+    let step = data(spread(30).into_iter().map(|x| (x, if x < 0.1 { 0.0 } else { 1.0 })));
+    let outlier = data(
+        spread(30).into_iter().enumerate().map(|(i, x)| (x, if i == 11 { 100.0 } else { toy(x) })),
+    );
+    for (name, touches) in [("step", step), ("outlier", outlier)] {
+        let (fit, posterior) = believe(name, &touches, 0.0, 4.0);
+        assert!(misfit(&posterior, &touches) < 0.05, "{name}: {fit:?}");
+    }
+}
+
+#[test]
+fn a_touch_that_is_not_finite_is_an_error_not_a_belief() {
+    for bad in [f64::NAN, f64::INFINITY] {
+        let height = data([(0.0, 1.0), (0.5, bad), (1.0, 1.0)]);
+        let place = data([(0.0, 1.0), (bad, 1.0)]);
+        for touches in [height, place] {
+            let fit = search_box(&touches, 4.0, 1e-2).fit(&KERNEL, &touches, None);
+            assert_eq!(fit.stop, Stop::Failed);
+            let refused = Posterior::new(&KERNEL, fit.hyperparameters, touches).err();
+            assert_eq!(refused, Some(CovarianceError::NotFinite { index: 1 }));
+        }
+    }
+}
+
+#[test]
+fn a_thousand_additions_equal_one_factorisation() {
+    let places = spread(1000);
+    let all = data(places.iter().map(|&x| (x, toy(x))));
+    let at = palpate::gp::Hyperparameters {
+        signal_sd: 0.8,
+        length_scales: vec![0.02],
+        noise_sd: 0.05,
+        slope_noise_sd: 0.0,
+        mean: 0.0,
+    };
+    let mut grown = Posterior::new(&KERNEL, at.clone(), Observations::new(1)).unwrap();
+    for &x in &places {
+        grown.add(&[x], toy(x)).unwrap();
+    }
+    let whole = Posterior::new(&KERNEL, at, all).unwrap();
+    let mut scratch = Scratch::default();
+    for i in 0..=100 {
+        let place = [-2.0 + 0.04 * f64::from(i)];
+        let (a, b) = (grown.mean(&place, &mut scratch), whole.mean(&place, &mut scratch));
+        assert!((a - b).abs() < 1e-9, "{place:?}: {a} {b}");
+        let (a, b) = (grown.variance(&place, &mut scratch), whole.variance(&place, &mut scratch));
+        assert!((a - b).abs() < 1e-9, "{place:?}: {a} {b}");
+    }
+}

@@ -1,0 +1,207 @@
+//! Contact normals and swept free space, from the touch to the recorded belief.
+
+use nalgebra::{Point3, Vector3};
+use palpate::experiment::experiment::Experiment;
+use palpate::experiment::row::TrialRow;
+use palpate::experiment::trial;
+use palpate::experiment::truth::Truth;
+use palpate::explore::belief::{Belief, GpSettings};
+use palpate::explore::planner;
+use palpate::explore::probe::{Contact, Swept, Touch};
+use palpate::gp::posterior::Scratch;
+use palpate::math::seed;
+use palpate::robot::finger::shape::Finger;
+use palpate::sim::Environment;
+use palpate::sim::simulator::Simulator;
+use palpate::task::Zone;
+use std::path::Path;
+use std::sync::Arc;
+
+const SQUARE: Zone = Zone { x_m: [-0.05, 0.05], z_m: Some([-0.05, 0.05]), datum_y_m: -0.6 };
+
+fn load(name: &str, sets: &[&str]) -> Result<Experiment, String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments").join(name);
+    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
+    Experiment::load(&path, &sets).map_err(|error| error.to_string())
+}
+
+fn run(name: &str, sets: &[&str], number: u32) -> (Experiment, Truth, TrialRow) {
+    let experiment = load(name, sets).unwrap();
+    let environment = Arc::new(Environment::build(experiment.scene.clone()).unwrap());
+    let truth = Truth::sample(&environment, experiment.grid as usize);
+    let active = planner::by_name("active").unwrap();
+    let row = trial::run(
+        &experiment,
+        &Simulator::new(Arc::clone(&environment)).unwrap(),
+        &truth,
+        active,
+        number,
+    );
+    assert_eq!(row.failure, None);
+    (experiment, truth, row)
+}
+
+/// No surface is where the finger has passed, and a miss reaches behind all of it.
+#[test]
+fn the_surface_is_below_what_the_finger_has_swept() {
+    for name in ["container.toml", "bird.toml"] {
+        let experiment = load(name, &[]).unwrap();
+        let environment = Arc::new(Environment::build(experiment.scene.clone()).unwrap());
+        let truth = Truth::sample(&environment, 21);
+        let zone = &environment.scene().zone;
+        let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
+        assert_eq!(probe.swept(), None);
+        let mut rng = seed::stream(1, 0, "targets");
+        let (mut bounded, mut tight) = (0, 0);
+        for _ in 0..200 {
+            let touch = probe.touch(&planner::uniform(zone, &mut rng)).unwrap();
+            let swept = probe.swept().unwrap();
+            let Touch::Contact(Contact { p_wc, .. }) = touch else { panic!("missed") };
+            let at_contact = swept.ceiling_y_m(p_wc.x, p_wc.z).unwrap();
+            assert!((at_contact - p_wc.y).abs() < 1e-6, "{at_contact} {p_wc}");
+            for (place, height_m) in truth.places.iter().zip(&truth.heights_m) {
+                let p_w = zone.point(place, height_m.unwrap());
+                let Some(ceiling_y_m) = swept.ceiling_y_m(p_w.x, p_w.z) else { continue };
+                bounded += 1;
+                tight += usize::from(ceiling_y_m < p_w.y + 1e-3);
+                // The mesh is not quite the formula that is the truth.
+                assert!(p_w.y < ceiling_y_m + 2e-4, "{name}: {} {ceiling_y_m}", p_w.y);
+            }
+        }
+        assert!(bounded > 1000 && tight > 100, "{name}: {bounded} {tight}");
+        assert_eq!(probe.touch(&[0.3, 0.5]), Ok(Touch::Miss));
+        assert!(probe.swept().unwrap().p_wt.y < environment.mesh().unwrap().bounds().0.y);
+    }
+}
+
+/// Contacts on two ridges; between them a miss has shown that nothing is above a depth.
+#[test]
+fn a_bound_lowers_the_mean_under_it_and_leaves_the_variance_honest() {
+    let believe = |free_space| {
+        let settings = GpSettings { free_space, ..GpSettings::default() };
+        let mut belief = Belief::new(SQUARE, settings);
+        for i in 0..5 {
+            for x in [-0.04, 0.04] {
+                let z = -0.04 + 0.02 * f64::from(i);
+                let p_wc = SQUARE.point(&[x, z], 0.03 + 0.2 * x * x);
+                let contact = Contact { p_wc, normal_w: Vector3::y() };
+                belief.observe(&[x, z], &Touch::Contact(contact));
+            }
+        }
+        let finger = Finger { length_m: 0.0, ..Finger::default() };
+        let p_wt = Point3::new(0.0, SQUARE.datum_y_m + 0.02 + finger.radius_m, 0.0);
+        belief.observe_swept(&Swept { finger, p_wt });
+        belief.refit().unwrap();
+        belief.surface().unwrap().clone()
+    };
+    let (without, with) = (believe(false), believe(true));
+    assert_eq!(without.hyperparameters(), with.hyperparameters());
+    let mut scratch = Scratch::default();
+    let mut at = |place: [f64; 2]| {
+        [&without, &with].map(|belief| {
+            (belief.mean(&place, &mut scratch), belief.variance(&place, &mut scratch).sqrt())
+        })
+    };
+    let [(before, before_sd), (after, after_sd)] = at([0.0, 0.0]);
+    assert!(before > 0.025 && after < 0.02 + 5e-4, "{before} {after}");
+    assert!(after_sd > 0.0 && after_sd <= before_sd, "{before_sd} {after_sd}");
+    // The contacts are still met.
+    let [(before, _), (after, _)] = at([0.04, 0.0]);
+    assert!((before - after).abs() < 5e-4, "{before} {after}");
+}
+
+/// The mean turns as the normals say, which tell the two sides of one contact apart.
+#[test]
+fn normals_tilt_the_belief_and_grazing_ones_are_dropped() {
+    for (normal_w, slopes) in [
+        (Vector3::new(-0.3, 1.0, 0.0), [0.3, 0.0]),
+        (Vector3::new(0.0, 1.0, 0.4), [0.0, -0.4]),
+        (Vector3::new(1.0, 0.01, 0.0), [0.0, 0.0]),
+        (Vector3::new(0.0, -1.0, 0.0), [0.0, 0.0]),
+    ] {
+        let settings = GpSettings { normals: true, ..GpSettings::default() };
+        let mut belief = Belief::new(SQUARE, settings);
+        let p_wc = SQUARE.point(&[0.0, 0.0], 0.02);
+        let contact = Contact { p_wc, normal_w: normal_w.normalize() };
+        belief.observe(&[0.0, 0.0], &Touch::Contact(contact));
+        let (_, surface) = belief.refit().unwrap();
+        let mut gradient = [0.0; 2];
+        surface.mean_gradient(&[0.0, 0.0], &mut gradient, &mut Scratch::default());
+        for (ours, observed) in gradient.iter().zip(slopes) {
+            assert!((ours - observed).abs() < 0.02, "{normal_w}: {gradient:?}");
+        }
+    }
+}
+
+#[test]
+fn the_toys_normals_are_its_slopes() {
+    let experiment = load("toy.toml", &[]).unwrap();
+    let environment = Arc::new(Environment::build(experiment.scene).unwrap());
+    for i in 0..50 {
+        let x = -1.973 + 0.08 * f64::from(i);
+        let touch = Simulator::new(Arc::clone(&environment))
+            .unwrap()
+            .probe(1)
+            .unwrap()
+            .touch(&[x])
+            .unwrap();
+        let Touch::Contact(Contact { normal_w, .. }) = touch else { panic!("missed") };
+        let [above, below] = [1e-6, -1e-6].map(|by| environment.true_height_m(&[x + by]).unwrap());
+        assert!((-normal_w.x / normal_w.y - (above - below) / 2e-6).abs() < 1e-6, "{x}");
+        assert!((normal_w.norm() - 1.0).abs() < 1e-12 && normal_w.z == 0.0);
+    }
+}
+
+/// Touches and hyperparameters read back from their line make the belief that was measured.
+#[test]
+fn a_recorded_row_holds_all_that_the_belief_was_made_of() {
+    for (normals, free_space) in [(false, false), (true, false), (false, true), (true, true)] {
+        let sets = [
+            "grid=15".into(),
+            format!("gp.normals={normals}"),
+            format!("gp.free_space={free_space}"),
+        ];
+        let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
+        let (experiment, truth, row) = run("container.toml", &sets, 3);
+        let line = serde_json::to_string(&row).unwrap();
+        assert_eq!((line.contains("normal"), line.contains("tip")), (normals, free_space));
+        assert_eq!(line.contains("slope_noise"), normals);
+        let read: TrialRow = serde_json::from_str(&line).unwrap();
+        assert_eq!(read, row);
+        let mut belief = Belief::new(experiment.scene.zone.clone(), experiment.gp.clone());
+        for touch in &read.touches {
+            let p_wc = Point3::from(touch.contact.unwrap());
+            let normal_w = touch.normal.map_or(Vector3::y(), Vector3::from);
+            belief.observe(&touch.target, &Touch::Contact(Contact { p_wc, normal_w }));
+            if let Some(tip) = touch.tip {
+                let finger = experiment.scene.finger.clone();
+                belief.observe_swept(&Swept { finger, p_wt: Point3::from(tip) });
+            }
+        }
+        let last = read.touches.last().unwrap();
+        belief.condition(last.fit.clone().unwrap().hyperparameters).unwrap();
+        assert_eq!(Some(truth.compare(belief.surface().unwrap())), last.metrics);
+    }
+}
+
+/// Exact normals are worth touches: the container's front is found with a third of the error.
+#[test]
+fn exact_normals_find_the_container_sooner() {
+    for number in 0..2 {
+        let [without, with] = ["false", "true"].map(|normals| {
+            let (_, _, row) =
+                run("container.toml", &["grid=15", &format!("gp.normals={normals}")], number);
+            row.touches.last().unwrap().metrics.unwrap().rmse_m
+        });
+        assert!(with < 0.6 * without, "{number}: {with} {without}");
+    }
+}
+
+#[test]
+fn a_kernel_without_slopes_is_refused_with_those_that_have_them() {
+    let error =
+        load("container.toml", &["gp.normals=true", "gp.kernel=\"matern_32\""]).unwrap_err();
+    assert!(error.contains("gp.normals") && error.contains("matern_52"), "{error}");
+    assert!(load("container.toml", &["gp.normals=true", "gp.kernel=\"matern_52\""]).is_ok());
+    assert!(load("container.toml", &["gp.free_space=true", "gp.kernel=\"matern_32\""]).is_ok());
+}

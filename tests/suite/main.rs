@@ -1,0 +1,46 @@
+//! Every integration test in one program, so that the library is linked once.
+
+mod common;
+
+mod allocation;
+mod arm;
+mod backend;
+mod broken;
+mod control;
+#[cfg(feature = "mujoco")]
+mod dynamic;
+#[cfg(feature = "nlopt")]
+mod experiments;
+mod fidelity;
+mod finger;
+mod finger_parts;
+mod finger_signals;
+#[cfg(feature = "nlopt")]
+mod fit;
+#[cfg(feature = "mujoco")]
+mod flex;
+mod floors;
+mod geometry;
+mod gp;
+#[cfg(feature = "nlopt")]
+mod hard;
+mod import;
+#[cfg(feature = "nlopt")]
+mod information;
+mod memory;
+mod meshes;
+mod models;
+mod page;
+#[cfg(feature = "nlopt")]
+mod planners;
+mod probes;
+mod reach;
+mod report;
+#[cfg(feature = "nlopt")]
+mod reproducible;
+#[cfg(feature = "mujoco")]
+mod rigid;
+mod scenes;
+mod servo;
+mod slopes;
+mod stress;

@@ -1,0 +1,307 @@
+//! Planners against what they promise.
+
+use nalgebra::{Point3, Vector3};
+use palpate::explore::belief::{Belief, GpSettings};
+use palpate::explore::planner;
+use palpate::explore::planner::{PLANNERS, PlanningSettings, Stall};
+use palpate::explore::probe::{Contact, Touch};
+use palpate::gp::Posterior;
+use palpate::gp::kernel::SquaredExponential;
+use palpate::gp::posterior::Scratch;
+use palpate::gp::reduction::Reduction;
+use palpate::math::{normal, seed};
+use palpate::task::Zone;
+use rand::RngExt;
+
+const SQUARE: Zone = Zone { x_m: [-0.05, 0.05], z_m: Some([0.4, 0.52]), datum_y_m: -0.6 };
+const LINE: Zone = Zone { x_m: [-2.0, 2.0], z_m: None, datum_y_m: 0.0 };
+
+/// A belief after `count` touches of a bumpy surface; every `elsewhere`-th contact lies beside
+/// its target, as a finger's does on a slope.
+fn belief(zone: &Zone, trial: u64, count: usize, elsewhere: usize) -> Belief {
+    let mut rng = seed::stream(7, trial, "test");
+    let mut belief = Belief::new(zone.clone(), GpSettings::default());
+    let extent = zone.extents_m()[0];
+    for i in 1..=count {
+        let target = planner::uniform(zone, &mut rng);
+        let wave: f64 =
+            target.iter().enumerate().map(|(d, at)| (at / extent * (5.0 + d as f64)).sin()).sum();
+        let mut p_wc = zone.point(&target, 0.3 * extent * (1.5 + wave));
+        if i % elsewhere == 0 {
+            p_wc.x += extent * 0.05 * rng.random_range(-1.0..1.0);
+        }
+        belief.observe(&target, &Touch::Contact(Contact { p_wc, normal_w: Vector3::y() }));
+    }
+    belief.refit().unwrap();
+    belief
+}
+
+fn make(name: &str, zone: &Zone) -> Box<dyn planner::Planner> {
+    let entry = planner::by_name(name).unwrap();
+    (entry.make)(zone, &PlanningSettings::default(), seed::stream(1, 0, name))
+}
+
+/// The slow twin of DIRECT and L-BFGS is a dense grid.
+#[test]
+fn active_finds_the_largest_explorable_variance() {
+    for (zone, per_side) in [(&LINE, 2001), (&SQUARE, 81)] {
+        let (mut plans, mut near, mut worst) = (0, 0, 1.0f64);
+        for trial in 0..40 {
+            let belief = belief(zone, trial, 5 + 2 * trial as usize, 3);
+            let plan = make("active", zone).plan(&belief);
+            if plan.stall.is_some() {
+                continue;
+            }
+            let mut scratch = Scratch::default();
+            let grid = zone.grid(per_side).into_iter();
+            let best = grid
+                .map(|place| belief.explorable_variance(&place, &mut [], &mut scratch).sqrt())
+                .fold(0.0, f64::max);
+            let share = plan.sd_m.unwrap() / best;
+            plans += 1;
+            near += usize::from(share > 0.98);
+            worst = worst.min(share);
+        }
+        assert_eq!((plans, near), (40, 40), "{} dimensions, worst {worst}", zone.dimension());
+    }
+}
+
+#[test]
+fn every_planner_stays_in_the_zone_and_repeats_itself() {
+    for zone in [&LINE, &SQUARE] {
+        for entry in PLANNERS {
+            let belief = belief(zone, 3, 12, 2);
+            let mut planners = [make(entry.name, zone), make(entry.name, zone)];
+            for _ in 0..20 {
+                let plans = planners.each_mut().map(|planner| planner.plan(&belief));
+                assert_eq!(plans[0], plans[1], "{}", entry.name);
+                for (at, [low, high]) in plans[0].target.iter().zip(zone.sides()) {
+                    assert!((low..=high).contains(at), "{}: {at}", entry.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_belief_that_is_sure_everywhere_is_a_stall() {
+    let mut belief = Belief::new(LINE, GpSettings::default());
+    for i in 0..60 {
+        let x = -2.0 + 4.0 * f64::from(i) / 59.0;
+        let p_wc = Point3::new(x, 1.0, 0.0);
+        belief.observe(&[x], &Touch::Contact(Contact { p_wc, normal_w: Vector3::y() }));
+    }
+    belief.refit().unwrap();
+    let plan = make("active", &LINE).plan(&belief);
+    assert!(matches!(plan.stall, Some(Stall::Collapsed | Stall::Repeated)), "{plan:?}");
+}
+
+#[test]
+fn a_belief_without_any_contact_still_plans() {
+    for entry in PLANNERS {
+        let mut belief = Belief::new(SQUARE, GpSettings::default());
+        let mut planner = make(entry.name, &SQUARE);
+        let mut targets: Vec<Vec<f64>> = vec![SQUARE.at(&[0.4, 0.7])];
+        belief.observe(&targets[0], &Touch::Miss);
+        for _ in 0..30 {
+            belief.refit().unwrap();
+            let target = planner.plan(&belief).target;
+            let repeated = targets.iter().any(|other| SQUARE.distance(other, &target) < 1e-6);
+            assert!(!repeated, "{}: {target:?} again", entry.name);
+            belief.observe(&target, &Touch::Miss);
+            targets.push(target);
+        }
+    }
+}
+
+/// The slow twin takes the candidate in and looks at every reference again.
+#[test]
+fn reduction_is_what_a_refit_with_the_candidate_finds() {
+    for (zone, noisy) in [(&LINE, false), (&SQUARE, true)] {
+        for trial in 0..5 {
+            let belief = belief(zone, trial, 6 + 9 * trial as usize, if noisy { 2 } else { 99 });
+            let posterior = belief.explorable().unwrap();
+            let references = zone.grid(9);
+            let reduction = Reduction::new(posterior, references.iter().map(Vec::as_slice));
+            let mut scratch = Scratch::default();
+            let mut rng = seed::stream(5, trial, "candidates");
+            for _ in 0..20 {
+                let place = planner::uniform(zone, &mut rng);
+                let mut observations = posterior.observations().clone();
+                observations.push(&place, 0.0);
+                let hyperparameters = posterior.hyperparameters().clone();
+                let signal2 = hyperparameters.signal_sd.powi(2);
+                let kernel = &SquaredExponential;
+                let after = Posterior::new(kernel, hyperparameters, observations).unwrap();
+                let falls = references.iter().map(|at| {
+                    posterior.variance(at, &mut scratch) - after.variance(at, &mut scratch)
+                });
+                let twin = falls.sum::<f64>() / references.len() as f64;
+                let found = reduction.at(&place, &mut scratch);
+                assert!((found - twin).abs() < 1e-7 * signal2, "{found} {twin}");
+            }
+        }
+    }
+}
+
+#[test]
+fn mean_gradient_is_its_central_difference() {
+    for zone in [&LINE, &SQUARE] {
+        let belief = belief(zone, 2, 25, 3);
+        let surface = belief.surface().unwrap();
+        let mut scratch = Scratch::default();
+        let mut rng = seed::stream(5, 0, "places");
+        for _ in 0..50 {
+            let place = planner::uniform(zone, &mut rng);
+            let mut gradient = vec![0.0; zone.dimension()];
+            let mean = surface.mean_gradient(&place, &mut gradient, &mut scratch);
+            assert_eq!(mean, surface.mean(&place, &mut scratch));
+            for (axis, extent) in zone.extents_m().iter().enumerate() {
+                let mut at = |step: f64| {
+                    let mut beside = place.clone();
+                    beside[axis] += step;
+                    surface.mean(&beside, &mut scratch)
+                };
+                let step = 1e-6 * extent;
+                let twin = (at(step) - at(-step)) / (2.0 * step);
+                let scale = surface.hyperparameters().signal_sd / extent;
+                assert!((gradient[axis] - twin).abs() < 1e-5 * scale, "{gradient:?} {twin}");
+            }
+        }
+    }
+}
+
+/// What a place is worth.
+type Formula<'a> = Box<dyn Fn(&[f64], &mut Scratch) -> f64 + 'a>;
+
+/// A planner's plan against a dense grid of its formula, written out again.
+fn finds(name: &str, formula: impl for<'a> Fn(&'a Belief, &[Vec<f64>]) -> Formula<'a>) {
+    for (zone, per_side) in [(&LINE, 1001), (&SQUARE, 61)] {
+        for trial in 0..8 {
+            let belief = belief(zone, trial, 6 + 3 * trial as usize, 3);
+            let plan = make(name, zone).plan(&belief);
+            if plan.stall.is_some() {
+                continue;
+            }
+            let mut scratch = Scratch::default();
+            let grid = zone.grid(per_side);
+            let worth = formula(&belief, &grid);
+            let values: Vec<f64> = grid.iter().map(|place| worth(place, &mut scratch)).collect();
+            let best = values.iter().copied().fold(f64::MIN, f64::max);
+            let worst = values.iter().copied().fold(f64::MAX, f64::min);
+            let share = (worth(&plan.target, &mut scratch) - worst) / (best - worst);
+            assert!(share > 0.97, "{name}, {} d, {trial}: {share}", zone.dimension());
+        }
+    }
+}
+
+fn mean_sd(belief: &Belief, place: &[f64], scratch: &mut Scratch) -> (f64, f64) {
+    let mean = belief.surface().unwrap().mean(place, scratch);
+    (mean, belief.explorable_variance(place, &mut [], scratch).sqrt())
+}
+
+fn goal(belief: &Belief) -> f64 {
+    let surface = belief.surface().unwrap();
+    let heights = surface.observations().heights().iter().copied();
+    heights.fold(f64::MIN, f64::max) + 0.01 * surface.hyperparameters().signal_sd
+}
+
+#[test]
+fn ucb_finds_the_highest_upper_bound() {
+    finds("ucb", |belief, _| {
+        Box::new(|place, scratch| {
+            let (mean, sd) = mean_sd(belief, place, scratch);
+            mean + 2.0 * sd
+        })
+    });
+}
+
+#[test]
+fn pi_finds_the_most_probable_improvement() {
+    finds("pi", |belief, _| {
+        let goal = goal(belief);
+        Box::new(move |place, scratch| {
+            let (mean, sd) = mean_sd(belief, place, scratch);
+            normal::cumulative((mean - goal) / sd)
+        })
+    });
+}
+
+#[test]
+fn ei_finds_the_largest_expected_improvement() {
+    finds("ei", |belief, _| {
+        let goal = goal(belief);
+        Box::new(move |place, scratch| {
+            let (mean, sd) = mean_sd(belief, place, scratch);
+            let z = (mean - goal) / sd;
+            sd * (normal::density(z) + z * normal::cumulative(z))
+        })
+    });
+}
+
+#[test]
+fn slope_finds_the_unsure_and_steep() {
+    finds("slope", |belief, grid| {
+        let slope = |place: &[f64], scratch: &mut Scratch| {
+            let mut gradient = [0.0; 2];
+            belief.surface().unwrap().mean_gradient(place, &mut gradient, scratch);
+            gradient[0].hypot(gradient[1])
+        };
+        let mut scratch = Scratch::default();
+        let sum: f64 = grid.iter().map(|place| slope(place, &mut scratch)).sum();
+        let mean = sum / grid.len() as f64;
+        Box::new(move |place, scratch| {
+            mean_sd(belief, place, scratch).1 * (1.0 + slope(place, scratch) / mean)
+        })
+    });
+}
+
+#[test]
+fn integrated_variance_finds_the_largest_fall() {
+    finds("integrated_variance", |belief, grid| {
+        let places = grid.iter().step_by(7).map(Vec::as_slice);
+        let reduction = Reduction::new(belief.explorable().unwrap(), places);
+        Box::new(move |place, scratch| reduction.at(place, scratch))
+    });
+}
+
+/// A tour is what `active` would ask for with the same fit, in another order: as many different places,
+/// the one of the largest deviation among them, on a shorter way.
+#[test]
+fn travel_tours_the_places_of_active_on_a_shorter_way() {
+    let tour = PlanningSettings::default().travel.tour as usize;
+    for trial in 0..5 {
+        let belief = belief(&SQUARE, trial, 8 + 3 * trial as usize, 99);
+        let largest = make("active", &SQUARE).plan(&belief);
+        let mut travel = make("travel", &SQUARE);
+        let places: Vec<Vec<f64>> = (0..tour).map(|_| travel.plan(&belief).target).collect();
+        let near = |a: &[f64], b: &[f64]| SQUARE.distance(a, b) < 0.02;
+        assert!(places.iter().any(|place| near(place, &largest.target)), "{trial}: {places:?}");
+        let way = |places: &[Vec<f64>]| -> f64 {
+            let start = belief.targets().last().unwrap();
+            let from = std::iter::once(start).chain(places);
+            from.zip(places).map(|(from, to)| SQUARE.distance(from, to)).sum()
+        };
+        // Uniform places of a unit square are 0.52 apart on average, those at its border more.
+        assert!(way(&places) < 0.52 * tour as f64, "{trial}: {}", way(&places));
+        for (i, place) in places.iter().enumerate() {
+            assert!(places[..i].iter().all(|other| SQUARE.distance(place, other) > 1e-6));
+        }
+    }
+}
+
+/// Counted in one dimension, and without repeats in two.
+#[test]
+fn grid_goes_from_coarse_to_fine() {
+    let belief = Belief::new(LINE, GpSettings::default());
+    let mut grid = make("grid", &LINE);
+    let places: Vec<f64> = (0..9).map(|_| grid.plan(&belief).target[0]).collect();
+    assert_eq!(places, [-2.0, 2.0, 0.0, -1.0, 1.0, -1.5, 0.5, -0.5, 1.5]);
+    let belief = Belief::new(SQUARE, GpSettings::default());
+    let mut grid = make("grid", &SQUARE);
+    let places: Vec<Vec<f64>> = (0..289).map(|_| grid.plan(&belief).target).collect();
+    for place in SQUARE.grid(17) {
+        let same = |other: &&Vec<f64>| SQUARE.distance(&place, other) < 1e-9;
+        assert_eq!(places.iter().filter(same).count(), 1, "{place:?}");
+    }
+}

@@ -1,0 +1,198 @@
+//! Figures and page of made-up runs.
+
+use crate::common::runs::{CURVE, SURFACE, run};
+use palpate::experiment::experiment::Claim;
+use palpate::experiment::store::Run;
+use palpate::report;
+use palpate::report::axes::Axis;
+use palpate::report::{Beside, png};
+use resvg::tiny_skia::Pixmap;
+use resvg::usvg::{Options, Tree};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+/// Every file of a folder's report by name.
+fn written(run: &Run, folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    report::write(run, &Beside::of(run), folder).unwrap();
+    [folder.to_owned(), folder.join("figures")]
+        .iter()
+        .flat_map(|folder| fs::read_dir(folder).unwrap())
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.is_file())
+        .map(|path| (path.file_name().unwrap().to_string_lossy().into(), fs::read(path).unwrap()))
+        .collect()
+}
+
+fn drawn(run: &Run) -> BTreeMap<String, Vec<u8>> {
+    written(run, tempfile::tempdir().unwrap().path())
+}
+
+fn text<'a>(files: &'a BTreeMap<String, Vec<u8>>, name: &str) -> &'a str {
+    std::str::from_utf8(&files[name]).unwrap()
+}
+
+#[test]
+fn figures_are_whole() {
+    for (settings, names) in [
+        (CURVE, ["acquisition", "convergence", "curves"].as_slice()),
+        (SURFACE, &["acquisition", "convergence", "surfaces", "targets"]),
+    ] {
+        let files = drawn(&run(settings));
+        let svgs: Vec<&str> = files.keys().filter_map(|name| name.strip_suffix(".svg")).collect();
+        assert_eq!(svgs, names);
+        for name in names {
+            let svg = text(&files, &format!("{name}.svg"));
+            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
+            assert!(svg.len() < 2_000_000, "{name}: {} bytes", svg.len());
+            let size = Tree::from_str(svg, &Options::default()).unwrap().size();
+            let pixels = Pixmap::decode_png(&files[&format!("{name}.png")]).unwrap();
+            let expected = [size.width(), size.height()].map(|side| (png::SCALE * side) as u32);
+            assert_eq!([pixels.width(), pixels.height()], expected, "{name}");
+        }
+    }
+}
+
+#[test]
+fn page_needs_nothing_and_trusts_nothing() {
+    let files = drawn(&run(CURVE));
+    let page = text(&files, "report.html").replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
+    for resource in ["http:", "https:", "src=", "<link", "@import", "url(", "<script>alert"] {
+        assert!(!page.contains(resource), "{resource}");
+    }
+    // The explorer's data and its script.
+    assert_eq!(page.matches("<script").count(), 2);
+    assert_eq!(page.matches("</script").count(), 2);
+    assert!(page.contains("&lt;script&gt;alert(&#39;1&#39;)&lt;/script&gt; &amp; &quot;this"));
+    assert!(page.contains("After 12 touches"));
+    assert_eq!(page.matches("<figure").count(), 3);
+}
+
+#[test]
+fn drawing_again_gives_the_same_bytes() {
+    for settings in [CURVE, SURFACE] {
+        assert!(drawn(&run(settings)) == drawn(&run(settings)));
+    }
+}
+
+#[test]
+fn partial_runs_are_drawn() {
+    for settings in [CURVE, SURFACE] {
+        let with = |change: &dyn Fn(&mut Run)| {
+            let mut run = run(settings);
+            change(&mut run);
+            drawn(&run)
+        };
+        let none = with(&|run| run.rows.clear());
+        assert_eq!(none.keys().collect::<Vec<_>>(), ["report.html"]);
+        assert!(text(&none, "report.html").contains("nothing to say yet"));
+        let one = with(&|run| run.rows.truncate(1));
+        assert!(text(&one, "report.html").contains("Only 1 of"));
+        let later = with(&|run| run.rows.retain(|row| row.trial == 1));
+        assert!(later.contains_key("convergence.svg"));
+        for touches in [0, 2, 8] {
+            let failed = with(&|run| {
+                for row in &mut run.rows {
+                    row.touches.truncate(touches);
+                    row.failure = Some("arm <lost>".into());
+                }
+            });
+            assert!(text(&failed, "report.html").contains("arm &lt;lost&gt;"));
+        }
+    }
+}
+
+#[test]
+fn a_surface_that_is_nowhere_is_drawn() {
+    for settings in [CURVE, SURFACE] {
+        let mut run = run(settings);
+        run.truth.heights_m.fill(None);
+        run.rows.iter_mut().flat_map(|row| &mut row.touches).for_each(|touch| touch.contact = None);
+        for (name, bytes) in drawn(&run) {
+            let text = String::from_utf8_lossy(&bytes);
+            assert!(name.ends_with("png") || !text.contains("NaN"), "{name}");
+        }
+    }
+}
+
+#[test]
+fn figures_of_an_earlier_run_do_not_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(written(&run(CURVE), folder.path()).contains_key("curves.png"));
+    let files = written(&run(SURFACE), folder.path());
+    assert!(!files.contains_key("curves.png") && !files.contains_key("curves.svg"));
+}
+
+#[test]
+fn rows_of_another_zone_are_refused() {
+    let mut run = run(SURFACE);
+    run.rows[0].touches[0].target.pop();
+    let folder = tempfile::tempdir().unwrap();
+    let error = format!("{:#}", report::write(&run, &Beside::of(&run), folder.path()).unwrap_err());
+    assert!(error.contains("surfaces: trial 0 of random, touch 5: a target of 1"), "{error}");
+}
+
+#[test]
+fn ticks_are_round() {
+    let labels = |axis: Axis| axis.ticks().into_iter().map(|(_, label)| label).collect::<Vec<_>>();
+    assert_eq!(labels(Axis::linear(-0.1, 0.32, 4.0)), ["0.0", "0.2"]);
+    assert_eq!(labels(Axis::linear(-50.0, 50.0, 5.0)), ["−40", "−20", "0", "20", "40"]);
+    assert_eq!(labels(Axis::log([0.03, 40.0]).unwrap()), ["0.1", "1", "10"]);
+    assert_eq!(labels(Axis::log([2.0, 12.0]).unwrap()), ["2", "3", "5", "7", "10"]);
+    assert!(Axis::log([0.0, f64::NAN]).is_none());
+    // No range, or hardly one, must not make endless labels.
+    assert!(labels(Axis::linear(1.0, 1.0, 5.0)).len() < 10);
+    assert!(labels(Axis::linear(0.0, 1e-320, 5.0)).len() < 10);
+}
+
+/// Twice the error of `active` at every count, so twice its touches; each table in words and as a file.
+#[test]
+fn planners_are_compared_in_every_measure_and_in_touches_to_equal_error() {
+    let mut run = run(SURFACE);
+    for row in run.rows.iter_mut().filter(|row| row.planner == "random") {
+        let metrics = row.touches.iter_mut().filter_map(|touch| touch.metrics.as_mut());
+        metrics.for_each(|metrics| metrics.rmse_m *= 2.0);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    report::write_tables(&run, &Beside::of(&run), folder.path()).unwrap();
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    let equal = read("equal_error.csv");
+    // 0.02 / count is twice 0.02 / 20 at 10, and random is never better than twice that.
+    assert!(
+        equal.contains("active,random,rmse_m,2,0.002,20.0,10.0,10.0,10.0,0.5,0.5,0.5"),
+        "{equal}"
+    );
+    assert!(equal.contains("random,active,rmse_m,2,0.001,20.0,,"), "{equal}");
+    let paired = read("comparison.csv");
+    assert!(paired.contains("active,random,rmse_m,2,-0.001,-0.001,-0.001,1.0"), "{paired}");
+    assert!(paired.contains("active,random,r,2,0.0,0.0,0.0,0.5"), "{paired}");
+    assert!(!paired.contains("time_s"), "{paired}");
+    let files = drawn(&run);
+    let page = text(&files, "report.html");
+    for words in ["minus random", "largest error, mm", "lateral travel, m", ">over 20<"] {
+        assert!(page.contains(words), "{words}");
+    }
+}
+
+/// What a publication says stands beside the same number here; after touches that do not occur it
+/// says nothing.
+#[test]
+fn claims_stand_beside_what_came_out() {
+    let mut run = run(SURFACE);
+    let claim = |touches, says: &str| Claim {
+        place: "Fig. 5".into(),
+        says: says.into(),
+        touches,
+        measures: vec!["rmse_m".into(), "length_scale_z_m".into()],
+    };
+    run.experiment.report.claims = vec![claim(10, "it is <accurate>"), claim(99, "it is nowhere")];
+    let files = drawn(&run);
+    let page = text(&files, "report.html");
+    assert!(
+        page.contains(
+            "it is &lt;accurate&gt;</td><td>10 touches</td><td>RMSE, mm</td><td>2.00</td>"
+        )
+    );
+    assert!(page.contains("<td>length scale along z, mm</td><td>42.0</td>"));
+    assert!(!page.contains("it is nowhere"));
+}

@@ -1,0 +1,179 @@
+//! Scene and experiment files: all that ship load, all that are saved mean the same.
+
+use palpate::experiment::experiment::Experiment;
+use palpate::experiment::store;
+use palpate::sim::{Environment, Scene, mjcf};
+use proptest::prelude::*;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn shipped(folder: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    paths.filter(|path| path.extension().is_some_and(|extension| extension == "toml")).collect()
+}
+
+#[test]
+fn every_shipped_scene_can_be_built() {
+    let scenes = shipped("scenes");
+    assert!(scenes.len() >= 3);
+    for path in scenes {
+        let environment = Environment::build(Scene::load(&path, &[]).unwrap()).unwrap();
+        let middle = environment.scene().zone.at(&[0.5, 0.5]);
+        assert!(environment.true_height_m(&middle).is_some(), "{}", path.display());
+    }
+}
+
+#[test]
+fn every_shipped_experiment_loads_and_its_saved_form_means_the_same() {
+    let experiments = [shipped("experiments"), shipped("experiments/paper")].concat();
+    assert!(experiments.len() >= 12);
+    let folder = TempDir::new().unwrap();
+    for path in experiments {
+        let experiment = Experiment::load(&path, &[]).unwrap();
+        let saved = folder.path().join("resolved.toml");
+        fs::write(&saved, store::resolved(&experiment)).unwrap();
+        assert_eq!(Experiment::load(&saved, &[]).unwrap(), experiment, "{}", path.display());
+    }
+}
+
+#[test]
+fn settings_are_overridden_in_order_and_reach_into_the_scene() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/bird.toml");
+    let sets =
+        ["trials=3", "trials=4", "scene.finger.radius_m = 0.001", "name=thin", "gp.noise=[1e-3,1]"];
+    let experiment = Experiment::load(&path, &sets.map(String::from)).unwrap();
+    assert_eq!((experiment.trials, experiment.name.as_str()), (4, "thin"));
+    assert_eq!(experiment.scene.finger.radius_m, 0.001);
+    assert_eq!(experiment.gp.noise, [1e-3, 1.0]);
+    let other = Experiment::load(&path, &["scene=scenes/container.toml".into()]).unwrap();
+    let object = other.scene.object.unwrap();
+    assert_eq!(object.truth.as_deref(), Some("container"));
+    assert!(object.mesh.is_file(), "{}", object.mesh.display());
+}
+
+/// The mesh is the truth to within its tested distance from the formula, wherever it is placed.
+#[test]
+fn the_mesh_and_its_formula_give_the_same_heights() {
+    for name in ["container", "bird"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
+        let analytic = Environment::build(Scene::load(&path, &[]).unwrap()).unwrap();
+        let mut scene = Scene::load(&path, &[]).unwrap();
+        scene.object.as_mut().unwrap().truth = None;
+        let mesh = Environment::build(scene).unwrap();
+        let mut errors: Vec<f64> = (analytic.scene().zone.grid(60).iter())
+            .map(|place| {
+                let heights =
+                    [&analytic, &mesh].map(|environment| environment.true_height_m(place).unwrap());
+                (heights[0] - heights[1]).abs()
+            })
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        // Along a slope of 60 degrees a distance of 0.05 mm is 0.1 mm of height; at the nose's
+        // side the height jumps.
+        assert!(errors[errors.len() * 99 / 100] < 1e-4, "{name}: {errors:?}");
+    }
+}
+
+#[test]
+fn the_generated_model_names_the_object_the_board_and_the_finger() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
+    let environment = Environment::build(Scene::load(&path, &[]).unwrap()).unwrap();
+    let text = mjcf::scene(&environment, mjcf::Mode::Picture).unwrap();
+    for name in ["object", "board", "finger", "floor", "mount", "tip"] {
+        assert!(text.contains(&format!("name=\"{name}\"")), "{name}");
+    }
+    let toy = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/toy.toml");
+    let toy = Environment::build(Scene::load(&toy, &[]).unwrap()).unwrap();
+    assert!(mjcf::scene(&toy, mjcf::Mode::Picture).is_none());
+}
+
+#[test]
+#[cfg(feature = "mujoco")]
+fn mujoco_compiles_the_generated_model() {
+    use palpate::sim::mujoco;
+    assert_eq!(mujoco::version(), "3.17.0");
+    for (name, vertices) in [("container", 21_559), ("bird", 24_102)] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
+        let environment = Environment::build(Scene::load(&path, &[]).unwrap()).unwrap();
+        let model =
+            mujoco::compile(&mjcf::scene(&environment, mjcf::Mode::Picture).unwrap()).unwrap();
+        assert_eq!((model.ngeom(), model.nmeshvert()), (5, vertices), "{name}");
+    }
+    assert!(mujoco::compile("<mujoco><worldbody><geom/></worldbody></mujoco>").is_err());
+}
+
+/// A setting that would change nothing, or be unstable, is refused with its key and what is allowed.
+#[test]
+fn solver_settings_that_mean_nothing_are_refused() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird_pa10.toml");
+    let load = |sets: &[&str]| {
+        Scene::load(&path, &sets.iter().map(|set| set.to_string()).collect::<Vec<_>>())
+    };
+    let (rigid, sdf) = ("effects={}", "solver.collision=\"sdf\"");
+    for (sets, words) in [
+        (&[sdf][..], ["solver.collision", "without skin"]),
+        (&["body=\"kinematic\"", sdf], ["solver.collision", "dynamic"]),
+        (&["body=\"cast\"", rigid, sdf], ["solver.collision", "dynamic"]),
+        (&[rigid, "solver.collision=\"box\""], ["solver.collision", "height_field"]),
+        (&[rigid, "solver.sdf={}"], ["solver.sdf", "collision = \"sdf\""]),
+        (&[rigid, sdf, "solver.sdf.iterations=0"], ["solver.sdf.iterations", "1 to 1000"]),
+        (&[rigid, sdf, "solver.sdf.initpoints=1001"], ["solver.sdf.initpoints", "1 to 1000"]),
+        (&["solver.integrator=\"heun\""], ["solver.integrator", "implicitfast"]),
+        (&["solver.integrator=\"euler\""], ["solver.step_s", "at most 0.001"]),
+        (&["solver.integrator=\"rk4\""], ["solver.step_s", "at most 0.001"]),
+    ] {
+        let error = load(sets).unwrap_err().to_string();
+        assert!(words.iter().all(|word| error.contains(word)), "{sets:?}: {error}");
+    }
+    for sets in [
+        &[rigid, sdf, "solver.sdf={iterations=5, initpoints=5}"][..],
+        &[rigid, "solver.collision=\"hull\""],
+        &[rigid, "solver.collision=\"height_field\""],
+        &["solver={step_s=0.001, integrator=\"rk4\"}"],
+    ] {
+        let scene = load(sets).unwrap();
+        let text = toml::to_string(&scene).unwrap();
+        let saved = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+        fs::write(saved.path(), text).unwrap();
+        assert_eq!(Scene::load(saved.path(), &[]).unwrap(), scene, "{sets:?}");
+    }
+}
+
+const EXPERIMENT: &str = include_str!("../../experiments/toy.toml");
+const SCENE: &str = include_str!("../../scenes/bird.toml");
+
+fn damaged(text: &str, at: usize, bytes: &[u8], removed: usize) -> Vec<u8> {
+    let mut text = text.as_bytes().to_vec();
+    let at = at % text.len();
+    let end = (at + removed).min(text.len());
+    text.splice(at..end, bytes.iter().copied());
+    text
+}
+
+proptest! {
+    /// Whatever stands in a file, reading it ends in a value or an error.
+    #[test]
+    fn damaged_files_never_panic(
+        at in 0..10_000usize,
+        bytes in proptest::collection::vec(any::<u8>(), 0..8),
+        removed in 0..40usize,
+    ) {
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("damaged.toml");
+        fs::write(&path, damaged(EXPERIMENT, at, &bytes, removed)).unwrap();
+        let _ = Experiment::load(&path, &[]).map_err(|error| error.to_string());
+        fs::write(&path, damaged(SCENE, at, &bytes, removed)).unwrap();
+        let _ = Scene::load(&path, &[]).map_err(|error| error.to_string());
+    }
+
+    #[test]
+    fn any_assignment_ends_in_a_value_or_an_error(key in "[a-z_.]{0,20}", value in "\\PC{0,20}") {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/toy.toml");
+        for key in [key.as_str(), "scene", "scene.zone.x_m", "gp.noise", "touches", "report"] {
+            let set = format!("{key}={value}");
+            let _ = Experiment::load(&path, &[set]).map_err(|error| error.to_string());
+        }
+    }
+}
