@@ -7,7 +7,7 @@
 use anyhow::{Context, ensure};
 use mujoco_rs::wrappers::mj_data::MjData;
 use nalgebra::{Isometry3, Point3};
-use palpate::backend::backend::Command;
+use palpate::backend::Command;
 use palpate::experiment::statistics::median;
 use palpate::explore::control::{Controller, Goal};
 use palpate::explore::probe::Touch;
@@ -194,7 +194,7 @@ fn step(
         for (gap_m, duration_s) in [(2e-3, 3.0), (-depth_m, 1.0)] {
             let mut p_wt = scene.zone.point(&rest.target, 0.0);
             p_wt.y = rest.y_m + gap_m;
-            let goal = Goal::still(Isometry3::from_parts(p_wt.into(), scene.finger.attitude_w()));
+            let goal = Goal::still(Isometry3::from_parts(p_wt.into(), scene.finger.r_at()));
             let until_s = reading.time_s + duration_s;
             while reading.time_s < until_s {
                 let motion = controller.step(&reading.q, &goal)?;

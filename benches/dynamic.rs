@@ -1,7 +1,7 @@
 //! What a touch of a dynamic body costs, and what of it each part does; one thread, best of several.
 
 use nalgebra::Isometry3;
-use palpate::backend::backend::Command;
+use palpate::backend::Command;
 use palpate::explore::probe::Probe;
 use palpate::explore::probe::servo::Servo;
 use palpate::robot::finger::TipMotion;
@@ -73,7 +73,7 @@ fn main() -> anyhow::Result<()> {
         for gap_mm in [-0.5, 0.5, 1.0, 2.0, 5.0, 20.0] {
             let mut x_wt = Isometry3::from_parts(
                 environment.scene().zone.point(&[0.0, 0.5], 0.0).into(),
-                environment.scene().finger.attitude_w(),
+                environment.scene().finger.r_at(),
             );
             x_wt.translation.y = rest_y_m + 1e-3 * gap_mm;
             let feel_us = best(|| {

@@ -6,7 +6,7 @@
 //! after a name is its trials, and `own` or `estimated`, `active` or `slope` leaves the others out.
 
 use nalgebra::{Rotation3, Unit, Vector3};
-use palpate::backend::backend::Fault;
+use palpate::backend::Fault;
 use palpate::experiment::equal_error::{Estimate, equal_error};
 use palpate::experiment::experiment::Experiment;
 use palpate::experiment::measure::RMSE;

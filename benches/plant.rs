@@ -4,7 +4,7 @@
 //! weighs on neither.
 
 use mujoco_rs::wrappers::mj_data::MjData;
-use palpate::backend::backend::Wrench;
+use palpate::backend::Wrench;
 use palpate::explore::control::{Controller, Goal};
 use palpate::robot::arm::ArmSettings;
 use palpate::sim::mjcf;

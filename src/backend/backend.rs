@@ -1,69 +1,12 @@
-//! One control tick of a body.
+//! One control tick of a body: what it is told, what it can do, and the trait.
 
 use crate::robot::arm::chain::MAX_JOINTS;
 use crate::robot::arm::{Chain, Joints};
-use crate::robot::finger::Frame;
-use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-/// Joint velocities for the next tick.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Command {
-    /// One entry per joint, in the order of [`Capabilities::joints`]: rad/s, or m/s where the
-    /// joint slides.
-    pub qdot: Vec<f64>,
-}
-
-/// What a body returns after a tick. Time stands in it and is never read from a clock.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Reading {
-    /// Since reset.
-    pub time_s: f64,
-    /// Joint positions, rad, or m where the joint slides.
-    pub q: Vec<f64>,
-    /// Joint velocities, rad/s or m/s.
-    pub qdot: Vec<f64>,
-    /// What the force/torque sensor at the finger's mount says, if there is one.
-    pub wrench: Option<Wrench>,
-    /// Tactile frames that arrived during the tick, oldest first.
-    pub frames: Vec<Frame>,
-    /// Where and how much the skin is loaded, in a scene that leaves out the sensor which would
-    /// tell; a real body never knows it.
-    pub ideal: Option<IdealContact>,
-    /// The command as it was really applied after limiting.
-    pub applied: Command,
-}
-
-/// Force and torque of the object on the finger, in the fingertip's frame `T` about its origin.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Wrench {
-    /// Force.
-    pub force_n: Vector3<f64>,
-    /// Torque about the origin of `T`.
-    pub torque_nm: Vector3<f64>,
-}
-
-impl Wrench {
-    /// The same load, given in a frame A about its origin, in a frame B about B's origin; `x_ba` is
-    /// the pose of A in B.
-    pub fn moved(&self, x_ba: &Isometry3<f64>) -> Self {
-        let force_n = x_ba.rotation * self.force_n;
-        let lever = x_ba.translation.vector.cross(&force_n);
-        Self { force_n, torque_nm: x_ba.rotation * self.torque_nm + lever }
-    }
-}
-
-/// A contact as a simulator knows it: exact.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct IdealContact {
-    /// Centre of pressure on the skin, in `T`.
-    pub p_tc: Point3<f64>,
-    /// Unit outward normal of the object there, in `T`.
-    pub normal_t: Vector3<f64>,
-    /// Magnitude of the force.
-    pub force_n: f64,
-}
+use super::command::Command;
+use super::fault::Fault;
+use super::reading::Reading;
 
 /// What a body can do, known before it is connected.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -110,63 +53,6 @@ impl Capabilities {
             false => Err(Fault::Refused { values: qdot.clone() }),
         }
     }
-}
-
-/// Why a body or a touch could not go on. A fault is data: it reaches the trial's row.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum Fault {
-    /// A command or target with a number that is not finite, or of the wrong length.
-    #[error("command refused: {values:?}")]
-    Refused {
-        /// The command or target.
-        values: Vec<f64>,
-    },
-    /// The state is no longer finite or left its limits.
-    #[error("diverged at {time_s} s: {state:?}")]
-    Diverged {
-        /// When.
-        time_s: f64,
-        /// The state.
-        state: Vec<f64>,
-    },
-    /// The fingertip's centre is inside the object: the skin no longer keeps them apart.
-    #[error("at {time_s} s the finger is inside the object, its tip at {p_wt:?}")]
-    Inside {
-        /// When.
-        time_s: f64,
-        /// The tip in `W`.
-        p_wt: [f64; 3],
-    },
-    /// A movement did not end in its time: its goal is out of reach, or something is in the way.
-    #[error("at {time_s} s the movement to {phase} has not ended; joints at {q:?}")]
-    Late {
-        /// Where it led.
-        phase: &'static str,
-        /// When.
-        time_s: f64,
-        /// Joint positions.
-        q: Vec<f64>,
-    },
-    /// A recording cannot be written: what cannot be kept is not done.
-    #[error("the recording fails at {time_s} s: {message}")]
-    Unrecorded {
-        /// When.
-        time_s: f64,
-        /// What the system says.
-        message: String,
-    },
-    /// Whoever watched it had it stopped.
-    #[error("stopped at {time_s} s")]
-    Stopped {
-        /// When.
-        time_s: f64,
-    },
-    /// The body stopped answering.
-    #[error("no answer since {time_s} s")]
-    Lost {
-        /// When it last answered.
-        time_s: f64,
-    },
 }
 
 /// A body that is commanded and read: simulated, recorded or real.

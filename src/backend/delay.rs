@@ -1,6 +1,6 @@
 //! Commands that take effect late, around any body.
 
-use super::backend::{Backend, Capabilities, Command, Fault, Reading};
+use super::{Backend, Capabilities, Command, Fault, Reading};
 use std::collections::VecDeque;
 
 /// Longest delay of a command; chosen, far beyond what the controller stands.

@@ -1,6 +1,6 @@
 //! A body whose sensors and joints fail, to test what drives it.
 
-use super::backend::{Backend, Capabilities, Command, Fault, Reading};
+use super::{Backend, Capabilities, Command, Fault, Reading};
 use crate::math::seed;
 use crate::robot::finger::Frame;
 use rand::RngExt;

@@ -1,6 +1,6 @@
 //! The last line before a body moves: limits, and a watchdog.
 
-use super::backend::{Backend, Capabilities, Command, Fault, Reading};
+use super::{Backend, Capabilities, Command, Fault, Reading};
 use crate::robot::arm::Chain;
 
 /// Ticks without progress of the body's time after which it counts as lost: three cycles, as the
@@ -31,11 +31,11 @@ impl Limited {
     /// `inner` moves the joints of `chain`.
     ///
     /// # Errors
-    /// [`Fault::Refused`] if their numbers of joints differ.
+    /// [`Fault::Joints`] if their numbers of joints differ.
     pub fn new(inner: Box<dyn Backend>, chain: Chain) -> Result<Self, Fault> {
         let count = inner.capabilities().joints.len();
         if count != chain.joints.len() {
-            return Err(Fault::Refused { values: vec![count as f64, chain.joints.len() as f64] });
+            return Err(Fault::Joints { expected: chain.joints.len(), found: count });
         }
         let command = Command { qdot: vec![0.0; count] };
         let q = chain.start().to_vec();
@@ -85,10 +85,10 @@ impl Backend for Limited {
             }
         };
         self.silent_ticks = if reading.time_s > self.time_s { 0 } else { self.silent_ticks + 1 };
-        let finite = reading.q.iter().chain(&reading.qdot).all(|value| value.is_finite());
-        if !finite || reading.q.len() != self.q.len() {
-            let state = reading.q.iter().chain(&reading.qdot).copied().collect();
-            self.fault = Some(Fault::Diverged { time_s: reading.time_s, state });
+        if let Err(fault) = reading.check() {
+            self.fault = Some(fault);
+        } else if reading.q.len() != self.q.len() {
+            self.fault = Some(Fault::Joints { expected: self.q.len(), found: reading.q.len() });
         } else if self.silent_ticks >= SILENT_TICKS {
             self.fault = Some(Fault::Lost { time_s: self.time_s });
         }

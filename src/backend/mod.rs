@@ -1,10 +1,21 @@
-//! Bodies that are commanded and read, simulated, recorded or real, and wrappers around them.
+//! Bodies that are commanded and read: simulated, recorded or real.
+//!
+//! [`Backend`] is the trait of a body, one control tick at a time. `delay`, `limits`, `recorder`,
+//! `trace`, `watched` and `fault_injector` are bodies around other bodies.
 
 #[allow(clippy::module_inception)]
-pub mod backend;
+mod backend;
+mod command;
 pub mod delay;
+mod fault;
 pub mod fault_injector;
 pub mod limits;
+mod reading;
 pub mod recorder;
 pub mod trace;
 pub mod watched;
+
+pub use backend::{Backend, Capabilities};
+pub use command::Command;
+pub use fault::{Fault, Quantity};
+pub use reading::{IdealContact, Reading, Wrench};

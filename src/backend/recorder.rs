@@ -1,6 +1,6 @@
 //! Writes down every command and reading, around any body.
 
-use super::backend::{Backend, Capabilities, Command, Fault, Reading};
+use super::{Backend, Capabilities, Command, Fault, Reading};
 use serde::Serialize;
 use std::io::Write;
 

@@ -1,6 +1,6 @@
 //! Where a body was during a touch.
 
-use crate::backend::backend::{Backend, Capabilities, Command, Fault, Reading};
+use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use crate::robot::arm::Chain;
 use crate::robot::finger::TipMotion;
 use std::sync::{Arc, Mutex, PoisonError};

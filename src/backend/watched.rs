@@ -1,6 +1,6 @@
 //! Lets any body be watched: it says where it stands and keeps pace with the clock.
 
-use super::backend::{Backend, Capabilities, Command, Fault, Reading};
+use super::{Backend, Capabilities, Command, Fault, Reading};
 use nalgebra::Point3;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;

@@ -13,6 +13,7 @@ mod show;
 mod stress;
 mod watch;
 
+use crate::experiment::{Experiment, Simulation};
 use crate::explore::planner::PLANNERS;
 use crate::sim::Environment;
 use crate::sim::simulator::Simulator;
@@ -109,11 +110,23 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Makes a world ready for bodies, and says on standard error what is not simulated as its scene asks.
+/// Makes an experiment ready to run, and says on standard error what is not simulated as it asks.
+fn simulation(experiment: Experiment) -> anyhow::Result<Simulation> {
+    let simulation = Simulation::new(experiment)?;
+    tell(simulation.simulator());
+    Ok(simulation)
+}
+
+/// Makes an environment ready for bodies, and says on standard error what is not simulated as its
+/// scene asks.
 fn simulator(environment: &Arc<Environment>) -> anyhow::Result<Simulator> {
     let simulator = Simulator::new(Arc::clone(environment))?;
-    simulator.notice().iter().for_each(|notice| eprintln!("note: {notice}"));
+    tell(&simulator);
     Ok(simulator)
+}
+
+fn tell(simulator: &Simulator) {
+    simulator.notice().iter().for_each(|notice| eprintln!("note: {notice}"));
 }
 
 /// Prints to standard output; a reader who has gone away is no error.

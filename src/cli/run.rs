@@ -1,17 +1,14 @@
 //! `palpate run`.
 
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::{Ending, print, simulator};
+use super::{Ending, print, simulation};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner;
 use crate::experiment::store::{Manifest, Run, RunFolder};
-use crate::experiment::truth::Truth;
 use crate::report;
 use crate::report::Beside;
-use crate::sim::Environment;
 use anyhow::Context;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Instant;
 
 pub(super) const EXAMPLES: &str = "\
@@ -45,30 +42,24 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let experiment = Experiment::load(&args.experiment, &args.set)?;
-    let environment = Arc::new(Environment::build(experiment.scene.clone())?);
-    let truth = Truth::sample(&environment, experiment.grid as usize);
-    let simulator = simulator(&environment)?;
+    let simulation = simulation(experiment)?;
+    let experiment = simulation.experiment();
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&experiment.name));
-    runner::check(&truth)?;
-    let manifest = manifest(&experiment);
-    let (mut folder, done) = RunFolder::open(&path, &experiment, &truth, &manifest, args.fresh)?;
+    let manifest = manifest(experiment);
+    let (mut folder, done) =
+        RunFolder::open(&path, experiment, simulation.truth(), &manifest, args.fresh)?;
     let stop = stop_on_interrupt("trials")?;
 
     let total = u64::from(experiment.trials) * experiment.planners.len() as u64;
     let bar = progress_bar(&experiment.name, "trials", total, done.len() as u64);
     let begun = Instant::now();
-    let count = runner::run(
-        &experiment,
-        &simulator,
-        &truth,
-        (&mut folder, &done),
-        args.threads.into(),
-        &stop,
-        &|_| step(&bar),
-    )?;
+    let count =
+        runner::run(&simulation, (&mut folder, &done), args.threads.into(), &stop, &|_| {
+            step(&bar)
+        })?;
     bar.finish_and_clear();
     if count > 0 {
-        folder.sort(&experiment)?;
+        folder.sort(experiment)?;
     }
 
     let run = Run::read(&path)?;

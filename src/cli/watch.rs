@@ -1,21 +1,19 @@
 //! `palpate watch`.
 
 use super::show::is_experiment;
-use super::{Ending, print, simulator};
-use crate::backend::backend::Fault;
+use super::{Ending, print, simulation};
+use crate::backend::Fault;
 use crate::backend::watched::{Sight, Watched};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::row::TrialRow;
-use crate::experiment::truth::Truth;
-use crate::experiment::{runner, trial};
 use crate::explore::planner;
 use crate::explore::planner::PLANNERS;
 use crate::explore::probe::servo::Servo;
 use crate::explore::probe::{Probe, Swept, Touch};
-use crate::sim::{Environment, Scene};
+use crate::sim::Scene;
+use crate::task::Approach;
 use anyhow::{Context, bail};
 use std::path::PathBuf;
-use std::sync::Arc;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -58,25 +56,23 @@ fn speed(text: &str) -> Result<f64, String> {
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let experiment = experiment(args)?;
     let planner = planner(args, &experiment)?;
-    let environment = Arc::new(Environment::build(experiment.scene.clone())?);
-    let truth = Truth::sample(&environment, experiment.grid as usize);
-    runner::check(&truth)?;
-    let Some(body) = simulator(&environment)?.body()? else {
-        let (path, body) = (args.path.display(), experiment.scene.body.name());
+    let simulation = simulation(experiment)?;
+    let Some(body) = simulation.simulator().body()? else {
+        let (path, body) = (args.path.display(), simulation.experiment().scene.body.name());
         bail!(
             "{path}: body = \"{body}\" touches without moving; to be watched are \"kinematic\" and \
              \"dynamic\""
         );
     };
-    let window = Window::open(&environment, &format!("Palpate: {}", args.path.display()))?;
+    let window =
+        Window::open(simulation.environment(), &format!("Palpate: {}", args.path.display()))?;
     let (body, sight) = Watched::new(body, args.speed);
-    let seed = trial::body_seed(&experiment, args.trial);
-    let servo = Servo::new(Arc::clone(&environment), Box::new(body), seed)?;
+    let servo = simulation.simulator().servo(Box::new(body), simulation.body_seed(args.trial))?;
     let mut probe = Told { servo, sight: sight.clone(), count: 0 };
     let number = args.trial;
     // The window has to be drawn by the main thread.
     let worker = std::thread::spawn(move || {
-        let row = trial::run_with(&experiment, &mut probe, &truth, planner, number);
+        let row = simulation.trial_with(&mut probe, planner, number);
         let _ = print(&ending(&row));
     });
     let drawn = show(window, &sight);
@@ -115,8 +111,8 @@ struct Told {
 }
 
 impl Probe for Told {
-    fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault> {
-        let touch = self.servo.touch(target)?;
+    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+        let touch = self.servo.touch(approach)?;
         self.count += 1;
         let found = match &touch {
             Touch::Contact(contact) => {
@@ -174,7 +170,7 @@ enum Window {}
 
 #[cfg(not(feature = "viewer"))]
 impl Window {
-    fn open(_: &Environment, _: &str) -> anyhow::Result<Self> {
+    fn open(_: &crate::sim::Environment, _: &str) -> anyhow::Result<Self> {
         bail!("this build has no window: build it with --features viewer")
     }
 }

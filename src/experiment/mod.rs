@@ -9,8 +9,12 @@ pub mod metrics;
 pub mod row;
 pub mod runner;
 pub mod scan;
+pub mod simulation;
 pub mod statistics;
 pub mod store;
 pub mod summary;
 pub mod trial;
 pub mod truth;
+
+pub use experiment::Experiment;
+pub use simulation::Simulation;

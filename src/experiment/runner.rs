@@ -2,12 +2,9 @@
 
 use super::experiment::Experiment;
 use super::row::TrialRow;
+use super::simulation::Simulation;
 use super::store::{RunFolder, StoreError};
-use super::trial;
-use super::truth::Truth;
 use crate::explore::planner;
-use crate::math::optimize;
-use crate::sim::simulator::Simulator;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -21,15 +18,6 @@ pub enum RunError {
     /// Its folder is unusable.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// This build lacks what it needs.
-    #[error("this build has no optimisers; build with the feature `{feature}` to run experiments")]
-    NotBuilt {
-        /// The missing feature.
-        feature: &'static str,
-    },
-    /// No surface at any test place.
-    #[error("no place of the zone has a surface along -y: nothing to explore")]
-    NoSurface,
     /// Threads could not be started.
     #[error("cannot start {threads} threads: {message}")]
     Threads {
@@ -43,20 +31,6 @@ pub enum RunError {
 /// One piece of work.
 type Job = (u32, &'static planner::Entry);
 
-/// Whether an experiment can be run at all.
-///
-/// # Errors
-/// If this build lacks what it needs, or the zone has no surface.
-pub fn check(truth: &Truth) -> Result<(), RunError> {
-    if !optimize::BUILT {
-        return Err(RunError::NotBuilt { feature: "nlopt" });
-    }
-    if truth.count() == 0 {
-        return Err(RunError::NoSurface);
-    }
-    Ok(())
-}
-
 /// Runs what `done` lacks and adds each row to `folder` as it finishes; returns how many trials
 /// it ran.
 ///
@@ -66,15 +40,13 @@ pub fn check(truth: &Truth) -> Result<(), RunError> {
 /// # Errors
 /// If a row cannot be stored, or threads cannot be started.
 pub fn run(
-    experiment: &Experiment,
-    simulator: &Simulator,
-    truth: &Truth,
+    simulation: &Simulation,
     (folder, done): (&mut RunFolder, &[TrialRow]),
     threads: usize,
     stop: &AtomicBool,
     progress: &(dyn Fn(&TrialRow) + Sync),
 ) -> Result<usize, RunError> {
-    let jobs = jobs(experiment, done);
+    let jobs = jobs(simulation.experiment(), done);
     let pool = pool(threads)?;
     let finished = Mutex::new((folder, 0));
     // Handed out one by one, so that rows finish about in order and an interrupted run has
@@ -84,7 +56,7 @@ pub fn run(
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let row = run_caught(experiment, simulator, truth, planner, trial);
+            let row = run_caught(simulation, planner, trial);
             let mut finished = finished.lock().unwrap_or_else(PoisonError::into_inner);
             finished.0.append(&row)?;
             finished.1 += 1;
@@ -110,14 +82,8 @@ pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, RunError> {
 
 /// Runs one trial; a planner's or probe's panic becomes the trial's failure, so that one fault
 /// in somebody's code does not lose the others' work.
-fn run_caught(
-    experiment: &Experiment,
-    simulator: &Simulator,
-    truth: &Truth,
-    planner: &'static planner::Entry,
-    trial: u32,
-) -> TrialRow {
-    let run = || trial::run(experiment, simulator, truth, planner, trial);
+fn run_caught(simulation: &Simulation, planner: &'static planner::Entry, trial: u32) -> TrialRow {
+    let run = || simulation.trial(planner, trial);
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");

@@ -1,7 +1,7 @@
 //! Touches on a grid of targets: the object's surface as the finger feels it, without a belief.
 
 use super::runner::{RunError, pool};
-use crate::backend::backend::Fault;
+use crate::backend::Fault;
 use crate::explore::probe::Touch;
 use crate::sim::simulator::Simulator;
 use crate::task::Zone;
@@ -43,7 +43,8 @@ pub fn scan(
     stop: &AtomicBool,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Option<Vec<ScanTouch>>, RunError> {
-    let zone = &simulator.environment().scene().zone;
+    let task = simulator.environment().task();
+    let zone = task.zone();
     let share = |i: usize, count: usize| i as f64 / (count.max(2) - 1) as f64;
     let row = |j: usize| {
         if stop.load(Ordering::Relaxed) {
@@ -53,7 +54,7 @@ pub fn scan(
         let felt = (0..columns).map(|i| {
             let target = zone.at(&[share(i, columns), share(j, rows)]);
             let touch = match &mut probe {
-                Ok(probe) => probe.touch(&target),
+                Ok(probe) => probe.touch(&task.approach(&target)),
                 Err(fault) => Err(fault.clone()),
             };
             ScanTouch { touch, target }

@@ -8,47 +8,29 @@ use crate::explore::planner;
 use crate::explore::planner::{Plan, uniform};
 use crate::explore::probe::{Probe, Touch};
 use crate::math::seed;
-use crate::sim::simulator::Simulator;
+use crate::task::Task;
 use rand::RngExt;
-
-/// Runs one trial of `planner` from start to end.
-///
-/// Its row depends on the experiment, the trial's number and the planner only.
-pub fn run(
-    experiment: &Experiment,
-    simulator: &Simulator,
-    truth: &Truth,
-    planner: &planner::Entry,
-    trial: u32,
-) -> TrialRow {
-    match simulator.probe(body_seed(experiment, trial)) {
-        Ok(mut probe) => run_with(experiment, &mut *probe, truth, planner, trial),
-        Err(fault) => TrialRow {
-            trial,
-            planner: planner.name.into(),
-            failure: Some(format!("before the first touch: {fault}")),
-            touches: Vec::new(),
-        },
-    }
-}
 
 /// Seed of all the randomness of a trial's body.
 pub fn body_seed(experiment: &Experiment, trial: u32) -> u64 {
     seed::stream(experiment.seed, trial.into(), "body").random()
 }
 
-/// As [`run`], with the touches of any `probe`.
-pub fn run_with(
+/// Runs one trial of `planner` from start to end with the touches of `probe`.
+///
+/// Its row depends on the experiment, the trial's number, the planner and the probe only.
+pub fn run(
     experiment: &Experiment,
-    probe: &mut dyn Probe,
+    task: &Task,
     truth: &Truth,
+    probe: &mut dyn Probe,
     planner: &planner::Entry,
     trial: u32,
 ) -> TrialRow {
     let mut row =
         TrialRow { trial, planner: planner.name.into(), failure: None, touches: Vec::new() };
     let stream = |purpose| seed::stream(experiment.seed, trial.into(), purpose);
-    let zone = &experiment.scene.zone;
+    let zone = task.zone();
     let mut start = stream("initial touches");
     let mut planner = (planner.make)(zone, &experiment.planning, stream(planner.name));
     let mut belief = Belief::new(zone.clone(), experiment.gp.clone());
@@ -62,7 +44,7 @@ pub fn run_with(
             row.failure = Some(format!("touch {count}: planned at {target:?}, not in the zone"));
             break;
         }
-        let touch = match probe.touch(&plan.target) {
+        let touch = match probe.touch(&task.approach(&plan.target)) {
             Ok(touch) => touch,
             Err(fault) => {
                 row.failure = Some(format!("touch {count}: {fault}"));

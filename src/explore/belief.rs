@@ -116,7 +116,7 @@ impl Checked for GpSettings {
 /// unreached; chosen well above rounding, below any grid a figure shows.
 const REACHED_WITHIN: f64 = 1e-3;
 
-/// A normal whose y is smaller is dropped: the slope that follows from it is nearly infinite, and a
+/// A normal whose y in the zone is smaller is dropped: the slope that follows from it is nearly infinite, and a
 /// small error of the normal changes its sign. Chosen, 87° from the approach.
 const NORMAL_Y_MIN: f64 = 0.05;
 
@@ -160,7 +160,7 @@ impl Belief {
         let reached = match touch {
             Touch::Contact(contact) => {
                 let place = self.zone.place(&contact.p_wc);
-                let height = contact.p_wc.y - self.zone.datum_y_m;
+                let height = self.zone.height_m(&contact.p_wc);
                 let slope = self.slope(&contact.normal_w);
                 let slope =
                     slope.as_ref().map(|(gradient, noise)| Slope { gradient, noise: *noise });
@@ -188,10 +188,11 @@ impl Belief {
     /// (1 + g²)·dθ that along it. The smaller is taken for both, chosen: with the larger, a curve as
     /// steep as the toy is passed off as noise.
     fn slope(&self, normal_w: &Vector3<f64>) -> Option<(Vec<f64>, f64)> {
+        let normal_z = self.zone.x_wz().inverse_transform_vector(normal_w);
         let is_usable = self.settings.normals
             && self.kernel.has_slopes()
-            && normal_w.y >= NORMAL_Y_MIN * normal_w.norm();
-        let slopes = [-normal_w.x / normal_w.y, -normal_w.z / normal_w.y];
+            && normal_z.y >= NORMAL_Y_MIN * normal_z.norm();
+        let slopes = [-normal_z.x / normal_z.y, -normal_z.z / normal_z.y];
         let noise = (1.0 + slopes.iter().map(|slope| slope * slope).sum::<f64>()).sqrt();
         is_usable.then(|| (slopes[..self.zone.dimension()].into(), noise))
     }

@@ -47,17 +47,14 @@ impl Ceiling {
 
     /// Takes in what one touch swept.
     pub(super) fn lower(&mut self, zone: &Zone, swept: &Swept) {
-        for (place, height_m) in self.places.iter().zip(&mut self.heights_m) {
-            let p_w = zone.point(place, 0.0);
-            if let Some(ceiling_y_m) = swept.ceiling_y_m(p_w.x, p_w.z) {
-                *height_m = height_m.min(ceiling_y_m - zone.datum_y_m);
-            }
+        let ceilings_m = swept.ceilings_m(zone, self.places.iter().map(Vec::as_slice));
+        for (height_m, ceiling_m) in self.heights_m.iter_mut().zip(ceilings_m) {
+            *height_m = height_m.min(ceiling_m.unwrap_or(f64::INFINITY));
         }
     }
 
     /// Cuts the belief where its mean is above the bound by more than its softness, where most first,
-    /// at
-    /// each place once.
+    /// at each place once.
     pub(super) fn cut(&self, belief: &mut Posterior) {
         let &Hyperparameters { noise_sd, signal_sd, .. } = belief.hyperparameters();
         let soft_sd = noise_sd.max(SOFTNESS_MIN * signal_sd);

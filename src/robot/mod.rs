@@ -2,3 +2,8 @@
 
 pub mod arm;
 pub mod finger;
+#[allow(clippy::module_inception)]
+mod robot;
+
+pub use finger::Finger;
+pub use robot::Robot;

@@ -9,16 +9,19 @@ use crate::geometry::import::import;
 use crate::geometry::mesh::Mesh;
 use crate::geometry::report::MeshReport;
 use crate::geometry::surfaces;
+use crate::robot::Robot;
 use crate::robot::arm::Chain;
 use crate::robot::arm::stage::stage;
 use crate::sim::finger::Fingertip;
-use nalgebra::{Point3, UnitVector3, Vector3};
+use crate::task::{Task, TaskError, Zone};
+use nalgebra::Point3;
 use thiserror::Error;
 
 /// A scene with its mesh loaded and its search tree built.
 pub struct Environment {
     scene: Scene,
     shape: Shape,
+    task: Task,
     fingertip: Option<Fingertip>,
 }
 
@@ -47,17 +50,22 @@ pub enum EnvironmentError {
         /// The part.
         part: &'static str,
     },
-    /// The surface exists nowhere in the zone.
+    /// The object lies wholly beside the zone, or before or behind its depth range.
     #[error(
-        "the object has no surface in the zone: seen along -y, it spans x {} to {} m and z {} to {} m",
-        x_m[0], x_m[1], z_m[0], z_m[1]
+        "the object has no surface in the zone: in the zone's frame it spans x {} to {} m, z {} to {} m and \
+         depth {} to {} m", x_m[0], x_m[1], z_m[0], z_m[1], depth_m[0], depth_m[1]
     )]
     OutsideZone {
         /// The object's extent.
         x_m: [f64; 2],
         /// The object's extent.
         z_m: [f64; 2],
+        /// The object's extent.
+        depth_m: [f64; 2],
     },
+    /// The zone is not complete.
+    #[error(transparent)]
+    Task(#[from] TaskError),
 }
 
 impl Environment {
@@ -80,15 +88,19 @@ impl Environment {
     ///
     /// # Errors
     /// If the shape lies wholly outside the zone.
-    pub fn around(scene: Scene, shape: Shape) -> Result<Self, EnvironmentError> {
+    pub fn around(mut scene: Scene, shape: Shape) -> Result<Self, EnvironmentError> {
+        let extent = extent(&scene.zone, &shape);
+        scene.zone.depth_m.get_or_insert([-extent.high.y, -extent.low.y]);
+        let task = Task::new(scene.zone.clone(), scene.touch.clone(), &scene.finger)?;
+        if matches!(shape, Shape::Mesh { .. }) {
+            check_overlap(&task, &extent)?;
+        }
         let fingertip =
             (scene.effects.is_soft()).then(|| Fingertip::new(&scene.finger, &scene.effects));
-        let environment = Self { scene, shape, fingertip };
-        environment.check_overlap()?;
-        Ok(environment)
+        Ok(Self { scene, shape, task, fingertip })
     }
 
-    /// The scene it was built from.
+    /// The scene it was built from, with what it left to the object written out.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -111,42 +123,58 @@ impl Environment {
         self.fingertip.as_ref()
     }
 
+    /// What the robot is told.
+    pub fn task(&self) -> &Task {
+        &self.task
+    }
+
+    /// The arm or stage with its finger; none for a function.
+    pub fn robot(&self) -> Option<Robot> {
+        let (finger, is_soft) = (self.scene.finger.clone(), self.fingertip.is_some());
+        Some(Robot { chain: self.chain()?, finger, is_soft })
+    }
+
     /// What carries the finger: the scene's arm, or a stage whose home is in front of the zone's
     /// middle, clear of the object. None for a function.
     pub fn chain(&self) -> Option<Chain> {
-        let (_, high) = self.mesh()?.bounds();
+        self.mesh()?;
         let Scene { arm, finger, zone, .. } = &self.scene;
         Some(arm.as_ref().map_or_else(
             || {
-                let mut home = zone.point(&zone.at(&[0.5, 0.5]), 0.0);
-                home.y = high.y + CLEARANCE_M + finger.radius_m;
-                stage(home, finger.attitude_w())
+                let [near_m, _] = self.task.depth_m();
+                let home_y_m = -near_m + CLEARANCE_M + finger.radius_m;
+                let x_wz = zone.x_wz();
+                let home_w = x_wz * zone.local(&zone.at(&[0.5, 0.5]), home_y_m);
+                stage(home_w, x_wz.rotation * finger.r_at())
             },
             |arm| arm.chain(),
         ))
     }
 
-    /// True height above the datum at `place`: the first surface met along −y, or none.
+    /// True height above the datum at `place`: the first surface met along the approach, or none.
     pub fn true_height_m(&self, place: &[f64]) -> Option<f64> {
         match &self.shape {
             Shape::Function(function) => place.first().map(|&x| function.height_m(x)),
             Shape::Mesh { bvh, .. } => {
-                let (low, high) = bvh.mesh().bounds();
-                let mut origin = self.scene.zone.point(place, 0.0);
-                origin.y = high.y + CLEARANCE_M;
-                let reach_m = origin.y - low.y + CLEARANCE_M;
+                let zone = &self.scene.zone;
+                let approach = self.task.approach(place);
+                let ahead_w = approach.direction_w();
+                let [near_m, far_m] = self.task.depth_m();
+                let start_y_m = -near_m + CLEARANCE_M;
+                let start_w = zone.x_wz() * zone.local(place, start_y_m);
+                let reach_m = start_y_m - -far_m + CLEARANCE_M;
                 let distance_m = match self.analytic() {
                     Some((surface, object)) => {
                         let x_wo = object.x_wo();
-                        let local = x_wo.inverse_transform_point(&origin) / object.scale;
-                        let along = x_wo.inverse_transform_vector(&APPROACH_W);
+                        let local = x_wo.inverse_transform_point(&start_w) / object.scale;
+                        let along = x_wo.inverse_transform_vector(&ahead_w);
                         surface
                             .ray(local, along, reach_m / object.scale)
                             .map(|distance| distance * object.scale)
                     }
-                    None => bvh.ray(&origin, &APPROACH_W, reach_m).map(|hit| hit.distance_m),
+                    None => bvh.ray(&start_w, &ahead_w, reach_m).map(|hit| hit.distance_m),
                 };
-                distance_m.map(|distance| origin.y - distance - self.scene.zone.datum_y_m)
+                distance_m.map(|distance| start_y_m - distance - zone.datum_y_m)
             }
         }
     }
@@ -164,24 +192,51 @@ impl Environment {
         let surface = surfaces::by_name(object.truth.as_deref()?)?;
         Some((surface, object))
     }
+}
 
-    fn check_overlap(&self) -> Result<(), EnvironmentError> {
-        let Shape::Mesh { bvh, .. } = &self.shape else { return Ok(()) };
-        let (Point3 { coords: low }, Point3 { coords: high }) = bvh.mesh().bounds();
-        let [x, z] = [self.scene.zone.x_m, self.scene.zone.z_m.unwrap_or([0.0; 2])];
-        let apart = x[1] < low.x || x[0] > high.x || z[1] < low.z || z[0] > high.z;
-        if apart {
-            return Err(EnvironmentError::OutsideZone {
-                x_m: [low.x, high.x],
-                z_m: [low.z, high.z],
-            });
+/// Smallest and largest coordinates in the frame of a zone.
+struct Extent {
+    low: Point3<f64>,
+    high: Point3<f64>,
+}
+
+/// What a shape spans in the frame of `zone`.
+fn extent(zone: &Zone, shape: &Shape) -> Extent {
+    match shape {
+        Shape::Function(function) => {
+            let [low, high] = function.heights_m().map(|height_m| zone.datum_y_m + height_m);
+            let [at_low, at_high] = [0.0, 1.0].map(|end| zone.at(&[end, end]));
+            Extent { low: zone.local(&at_low, low), high: zone.local(&at_high, high) }
         }
-        Ok(())
+        Shape::Mesh { bvh, .. } => {
+            let x_zw = zone.x_wz().inverse();
+            let nothing = Extent {
+                low: Point3::from([f64::INFINITY; 3]),
+                high: Point3::from([f64::NEG_INFINITY; 3]),
+            };
+            bvh.mesh().vertices().iter().fold(nothing, |Extent { low, high }, p_w| {
+                let p_z = x_zw * p_w;
+                Extent { low: low.inf(&p_z), high: high.sup(&p_z) }
+            })
+        }
     }
 }
 
-/// Direction in which the finger moves to touch.
-pub const APPROACH_W: UnitVector3<f64> = UnitVector3::new_unchecked(Vector3::new(0.0, -1.0, 0.0));
+fn check_overlap(task: &Task, extent: &Extent) -> Result<(), EnvironmentError> {
+    let Extent { low, high } = extent;
+    let [x, z] = [task.zone().x_m, task.zone().z_m.unwrap_or([0.0; 2])];
+    let [near_m, far_m] = task.depth_m();
+    let is_beside = x[1] < low.x || x[0] > high.x || z[1] < low.z || z[0] > high.z;
+    let is_before_or_behind = -high.y > far_m || -low.y < near_m;
+    match is_beside || is_before_or_behind {
+        true => Err(EnvironmentError::OutsideZone {
+            x_m: [low.x, high.x],
+            z_m: [low.z, high.z],
+            depth_m: [-high.y, -low.y],
+        }),
+        false => Ok(()),
+    }
+}
 
-/// Distance in front of and behind the object at which rays begin and end.
+/// Distance in front of and behind what may be touched at which rays begin and end.
 pub const CLEARANCE_M: f64 = 0.01;

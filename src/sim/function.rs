@@ -20,6 +20,13 @@ impl Function {
         }
     }
 
+    /// Smallest and largest height.
+    pub fn heights_m(self) -> [f64; 2] {
+        match self {
+            Self::Toy => [0.0, 2.0],
+        }
+    }
+
     /// Slope at `x`; at a kink that of the side nearer to 0.
     pub fn slope(self, x: f64) -> f64 {
         match self {

@@ -1,7 +1,7 @@
 //! An arm or stage that moves exactly as commanded, carrying the soft finger.
 
 use super::simulated_finger::SimulatedFinger;
-use crate::backend::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
+use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
 use crate::robot::arm::{Chain, Joints};
 use crate::robot::finger::TipMotion;
 use crate::sim::Environment;
@@ -18,15 +18,19 @@ pub struct Kinematic {
 }
 
 impl Kinematic {
-    /// At the chain's home; none in a world without a soft finger.
-    pub fn new(environment: &Arc<Environment>) -> Option<Self> {
-        let chain = environment.chain()?;
-        let sense = SimulatedFinger::new(Arc::clone(environment), 0)?;
+    /// At the chain's home.
+    ///
+    /// # Errors
+    /// [`Fault::Lacks`] in an environment without an object or without a soft finger.
+    pub fn new(environment: &Arc<Environment>) -> Result<Self, Fault> {
+        let chain = environment.chain().ok_or(Fault::Lacks { part: "an object" })?;
+        let sense = SimulatedFinger::new(Arc::clone(environment), 0);
+        let sense = sense.ok_or(Fault::Lacks { part: "a soft finger" })?;
         let capabilities = Capabilities::of(&chain, environment.scene().period_s());
         let q = chain.home;
         let mut body = Self { chain, capabilities, sense, q, tick: 0, reading: Reading::default() };
         body.report(&Wrench::default(), &Joints::zeros());
-        Some(body)
+        Ok(body)
     }
 
     fn time_s(&self) -> f64 {

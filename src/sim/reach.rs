@@ -4,7 +4,7 @@
 //! Fingers resting on the surface all over the zone leave below them the morphological closing of
 //! the surface by the finger's hull; the surface is reachable where it touches that envelope.
 
-use super::probe::rest_y_m;
+use super::probe::rest;
 use crate::sim::Environment;
 use crate::sim::scene::Body;
 use rayon::prelude::*;
@@ -43,9 +43,13 @@ pub fn is_reachable(
             zone.at(&fractions.collect::<Vec<_>>())
         })
         .collect();
+    let x_zw = zone.x_wz().inverse();
     let fingers: Vec<(Vec<f64>, f64)> = targets
         .into_par_iter()
-        .filter_map(|target| rest_y_m(environment, &target).map(|tip_y_m| (target, tip_y_m)))
+        .filter_map(|target| {
+            let rest = rest(environment, &environment.task().approach(&target))?;
+            Some((target, x_zw.transform_point(&rest.p_wt).y))
+        })
         .collect();
     // The nearest finger may stand half a step from the one that touches; on a plane that lifts
     // the sphere off by the square of the distance over twice its radius.

@@ -10,7 +10,7 @@ use crate::sim::finger::Effects;
 use crate::sim::finger::profile::Profile;
 use crate::task::touch::TouchSettings;
 use crate::task::zone::Zone;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -59,7 +59,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 pub enum Body {
     /// An analytic surface is read where it is asked.
     Function,
-    /// The finger's hull is swept along −y to first contact on the exact mesh.
+    /// The finger's hull is swept along the approach to first contact on the exact mesh.
     Cast,
     /// The soft finger is moved exactly as commanded and feels the exact mesh.
     Kinematic,
@@ -289,7 +289,7 @@ impl Scene {
         if self.body != Body::Kinematic || self.effects.skin.is_none() {
             return None;
         }
-        let ahead_t = self.finger.attitude_w().inverse() * -Vector3::y();
+        let ahead_t = self.finger.ahead_t();
         let layers = Profile::biotac(&self.finger).layers(0.0, &ahead_t);
         let batch = self.effects.timing.as_ref().map_or(1, |timing| timing.batch_frames);
         let told_by_frames = self.effects.fluid.is_some().then_some(batch);

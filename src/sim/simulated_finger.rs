@@ -1,6 +1,6 @@
 //! What the simulated finger feels of the scene's object, for every simulated body.
 
-use crate::backend::backend::{Fault, IdealContact, Reading, Wrench};
+use crate::backend::{Fault, IdealContact, Reading, Wrench};
 use crate::math::seed;
 use crate::robot::finger::Frame;
 use crate::robot::finger::TipMotion;

@@ -5,8 +5,8 @@ use super::kinematic::Kinematic;
 use super::mujoco;
 use super::probe::{Cast, FunctionProbe};
 use super::simulated_finger::Shell;
-use crate::backend::backend::{Backend, Fault};
 use crate::backend::delay::Delayed;
+use crate::backend::{Backend, Fault};
 use crate::explore::probe::Probe;
 use crate::explore::probe::servo::Servo;
 use crate::sim::Environment;
@@ -77,7 +77,7 @@ impl Simulator {
     pub fn shell(&self) -> Result<Option<Box<dyn Shell>>, Fault> {
         #[cfg(feature = "mujoco")]
         if let Some(models) = &self.models {
-            return models.shell(&self.environment).map_err(|_| unusable());
+            return models.shell(&self.environment).map_err(Fault::from);
         }
         Ok(None)
     }
@@ -89,12 +89,21 @@ impl Simulator {
     pub fn probe(&self, seed: u64) -> Result<Box<dyn Probe>, Fault> {
         let environment = Arc::clone(&self.environment);
         if let Some(body) = self.body()? {
-            return Ok(Box::new(Servo::new(environment, body, seed)?));
+            return Ok(Box::new(self.servo(body, seed)?));
         }
         Ok(match environment.scene().body {
             Body::Function => Box::new(FunctionProbe::new(environment)),
             _ => Box::new(Cast::new(environment)),
         })
+    }
+
+    /// What drives `body`, one of the scene's own or around one, through touches.
+    ///
+    /// # Errors
+    /// If it cannot be brought to its start.
+    pub fn servo(&self, body: Box<dyn Backend>, seed: u64) -> Result<Servo, Fault> {
+        let robot = self.environment.robot().ok_or(Fault::Lacks { part: "an object" })?;
+        Servo::new(robot, self.environment.task().touch().clone(), body, seed)
     }
 
     /// The simulated body that the scene asks for, at its start; none where a touch is no motion.
@@ -104,14 +113,17 @@ impl Simulator {
     pub fn body(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
         let body: Box<dyn Backend> = match self.environment.scene().body {
             Body::Function | Body::Cast => return Ok(None),
-            Body::Kinematic => Box::new(Kinematic::new(&self.environment).ok_or_else(unusable)?),
+            Body::Kinematic => Box::new(Kinematic::new(&self.environment)?),
             #[cfg(feature = "mujoco")]
             Body::Dynamic => {
-                let models = self.models.as_ref().ok_or_else(unusable)?;
-                Box::new(mujoco::Dynamic::new(&self.environment, models).ok_or_else(unusable)?)
+                let lacking = || Fault::Lacks { part: "a compiled model" };
+                let models = self.models.as_ref().ok_or_else(lacking)?;
+                Box::new(mujoco::Dynamic::new(&self.environment, models)?)
             }
             #[cfg(not(feature = "mujoco"))]
-            Body::Dynamic => return Err(unusable()),
+            Body::Dynamic => {
+                return Err(Fault::NotBuilt { body: Body::Dynamic.name(), feature: "mujoco" });
+            }
         };
         let timing = self.environment.scene().effects.timing.as_ref();
         Ok(Some(match timing.map_or(0.0, |timing| timing.control_delay_s) {
@@ -119,8 +131,4 @@ impl Simulator {
             _ => body,
         }))
     }
-}
-
-fn unusable() -> Fault {
-    Fault::Lost { time_s: 0.0 }
 }

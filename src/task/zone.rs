@@ -1,10 +1,15 @@
 //! The rectangle that is explored.
 
 use crate::config::{Checked, Rules};
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// An interval of x, or a rectangle of (x, z), in `W`; heights are y above a datum.
+/// An interval of x, or a rectangle of (x, z), in the frame `Z` of the zone; heights are y above a
+/// datum, and the finger comes along −y.
+///
+/// `Z` stands at [`position_m`](Self::position_m) in `W`, turned by
+/// [`rotation_deg`](Self::rotation_deg). Left out, it is `W`: the object is then explored along −y of
+/// the robot's base. A zone turned by −90° about z explores its side towards +x.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Zone {
@@ -17,6 +22,18 @@ pub struct Zone {
     /// touches, and Eq. 5 depends on it.
     #[serde(default)]
     pub datum_y_m: f64,
+    /// Nearest and farthest depth at which there may be something to touch, along the approach from
+    /// the origin of `Z`: depth = −y. The finger keeps its stand-off from the nearest and turns back
+    /// behind the farthest. Left out, a simulation takes what its object spans; a real robot must be
+    /// told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_m: Option<[f64; 2]>,
+    /// Where the origin of `Z` stands in `W`.
+    #[serde(default)]
+    pub position_m: [f64; 3],
+    /// Turns of `Z` about the fixed axes x, then y, then z of `W`.
+    #[serde(default)]
+    pub rotation_deg: [f64; 3],
 }
 
 /// Largest coordinate of a zone; far beyond any arm's reach.
@@ -38,10 +55,21 @@ impl Checked for Zone {
             });
         }
         rules.number("datum_y_m", self.datum_y_m, -REACH_M..=REACH_M);
+        if let Some(depth_m) = self.depth_m {
+            rules.interval("depth_m", depth_m, -REACH_M..=REACH_M);
+        }
+        rules.numbers("position_m", &self.position_m, -REACH_M..=REACH_M);
+        rules.numbers("rotation_deg", &self.rotation_deg, -360.0..=360.0);
     }
 }
 
 impl Zone {
+    /// An interval of x or a rectangle of (x, z) in `W`, heights measured from y = 0.
+    pub const fn new(x_m: [f64; 2], z_m: Option<[f64; 2]>) -> Self {
+        let (position_m, rotation_deg) = ([0.0; 3], [0.0; 3]);
+        Self { x_m, z_m, datum_y_m: 0.0, depth_m: None, position_m, rotation_deg }
+    }
+
     /// Number of coordinates of a place: 1 or 2.
     pub fn dimension(&self) -> usize {
         self.sides().count()
@@ -68,15 +96,40 @@ impl Zone {
         self.sides().zip(fractions).map(|([low, high], t)| low + (high - low) * t).collect()
     }
 
-    /// The place (x) or (x, z) of a point in `W`.
-    pub fn place(&self, p_w: &Point3<f64>) -> Vec<f64> {
-        [p_w.x, p_w.z].into_iter().take(self.dimension()).collect()
+    /// Pose of `Z` in `W`.
+    pub fn x_wz(&self) -> Isometry3<f64> {
+        let [roll, pitch, yaw] = self.rotation_deg.map(f64::to_radians);
+        Isometry3::from_parts(
+            Translation3::from(self.position_m),
+            UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+        )
     }
 
-    /// The point of `W` at `place` and `height_m` above the datum; z = 0 in an interval.
+    /// The place (x) or (x, z) of a point in `W`.
+    pub fn place(&self, p_w: &Point3<f64>) -> Vec<f64> {
+        let p_z = self.x_wz().inverse_transform_point(p_w);
+        [p_z.x, p_z.z].into_iter().take(self.dimension()).collect()
+    }
+
+    /// How high a point of `W` is above the datum.
+    pub fn height_m(&self, p_w: &Point3<f64>) -> f64 {
+        self.x_wz().inverse_transform_point(p_w).y - self.datum_y_m
+    }
+
+    /// The point of `W` at `place` and `height_m` above the datum.
     pub fn point(&self, place: &[f64], height_m: f64) -> Point3<f64> {
+        self.x_wz() * self.local(place, self.datum_y_m + height_m)
+    }
+
+    /// The point of `Z` at `place` and `y_m`; z = 0 in an interval.
+    pub fn local(&self, place: &[f64], y_m: f64) -> Point3<f64> {
         let z = place.get(1).copied().unwrap_or(0.0);
-        Point3::new(place.first().copied().unwrap_or(0.0), self.datum_y_m + height_m, z)
+        Point3::new(place.first().copied().unwrap_or(0.0), y_m, z)
+    }
+
+    /// The unit vector of `W` along which heights grow: against the approach.
+    pub fn up_w(&self) -> Vector3<f64> {
+        self.x_wz().rotation * Vector3::y()
     }
 
     /// An even grid with `per_side` places along each side, edges included, x varying fastest.

@@ -24,7 +24,7 @@ fn the_controller_allocates_nothing() {
 #[test]
 #[cfg(feature = "mujoco")]
 fn the_plant_allocates_nothing() {
-    use palpate::backend::backend::Wrench;
+    use palpate::backend::Wrench;
     use palpate::sim::mjcf;
     use palpate::sim::mjcf::Mode;
     use palpate::sim::mujoco::{Plant, compile};
@@ -49,7 +49,7 @@ fn the_plant_allocates_nothing() {
 #[test]
 #[cfg(feature = "mujoco")]
 fn a_tick_of_the_dynamic_body_allocates_nothing() {
-    use palpate::backend::backend::Command;
+    use palpate::backend::Command;
     use palpate::sim::simulator::Simulator;
     use palpate::sim::{Environment, Scene};
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_pa10.toml");

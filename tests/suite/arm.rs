@@ -84,7 +84,7 @@ fn at_home_the_finger_is_in_front_of_the_zone_and_has_its_pitch() {
         })
     {
         let x = chain.forward(&chain.home);
-        let attitude = palpate::robot::finger::Finger::default().attitude_w();
+        let attitude = palpate::robot::finger::Finger::default().r_at();
         assert!(x.rotation.angle_to(&attitude) < 1e-9);
         assert!(x.translation.x.abs() < 1e-9);
         assert!((-0.65..-0.5).contains(&x.translation.y), "{}", x.translation.y);
@@ -99,7 +99,7 @@ mod mujoco {
     use mujoco_rs::wrappers::mj_data::MjData;
     use mujoco_rs::wrappers::mj_model::MjtObjBase;
     use nalgebra::{Vector3, Vector6};
-    use palpate::backend::backend::{Fault, Wrench};
+    use palpate::backend::{Fault, Wrench};
     use palpate::math::seed;
     use palpate::robot::arm::{ArmSettings, Links};
     use palpate::sim::Environment;

@@ -1,10 +1,10 @@
 //! What every body promises, asked of each of them and of each with a wrapper around it.
 
-use palpate::backend::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::backend::delay::Delayed;
 use palpate::backend::limits::Limited;
 use palpate::backend::recorder::Recorder;
 use palpate::backend::watched::Watched;
+use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::robot::arm::Chain;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};

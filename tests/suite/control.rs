@@ -1,8 +1,9 @@
 //! The controller: it follows where it can, and its limits hold where it cannot.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
-use palpate::explore::control::{ControlError, Controller, Goal, posture};
+use palpate::explore::control::{Controller, Goal, posture};
 use palpate::math::seed;
+use palpate::robot::arm::ArmError;
 use palpate::robot::arm::stage::stage;
 use palpate::robot::arm::{ArmSettings, Chain, Joints, Links};
 use palpate::robot::finger::Finger;
@@ -18,7 +19,7 @@ fn arm() -> Chain {
 }
 
 fn slides() -> Chain {
-    stage([0.0, -0.6, 0.5].into(), Finger::default().attitude_w())
+    stage([0.0, -0.6, 0.5].into(), Finger::default().r_at())
 }
 
 /// Steps the arm exactly as commanded towards `goal(t)` and holds every limit at every tick.
@@ -203,17 +204,17 @@ fn nonsense_is_an_error() {
     let mut controller = Controller::new(chain.clone(), PERIOD_S).unwrap();
     let still = Goal::still(chain.forward(&chain.home));
     let wrong = controller.step(&[0.0; 3], &still).unwrap_err();
-    assert_eq!(wrong, ControlError::Joints { expected: 7, found: 3 });
+    assert_eq!(wrong, ArmError::Joints { expected: 7, found: 3 });
     assert!(controller.step(&[f64::NAN; 7], &still).is_err());
     let mut nan = still;
     nan.x_wt.translation.vector.x = f64::NAN;
-    assert_eq!(controller.step(chain.home.as_slice(), &nan), Err(ControlError::NotFinite));
+    assert_eq!(controller.step(chain.home.as_slice(), &nan), Err(ArmError::NotFinite));
     nan = still;
     nan.twist[4] = f64::INFINITY;
     assert!(controller.step(chain.home.as_slice(), &nan).is_err());
     assert!(posture(&chain, &nan.x_wt).is_ok());
     nan.x_wt.translation.vector.x = f64::NAN;
-    assert_eq!(posture(&chain, &nan.x_wt), Err(ControlError::NotFinite));
+    assert_eq!(posture(&chain, &nan.x_wt), Err(ArmError::NotFinite));
 }
 
 #[test]
@@ -229,7 +230,7 @@ fn every_place_of_the_scenes_has_a_posture() {
             scene.arm = arm;
             let environment = Environment::build(scene).unwrap();
             let chain = environment.chain().unwrap();
-            let attitude = environment.scene().finger.attitude_w();
+            let attitude = environment.scene().finger.r_at();
             for place in environment.scene().zone.grid(5) {
                 // From the datum, deep in the object, to well in front of it.
                 for height_m in [0.0, 0.1] {
@@ -273,20 +274,18 @@ fn a_place_out_of_reach_says_by_how_much() {
     let chain = arm();
     let ahead = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -std::f64::consts::FRAC_PI_2);
     let x_wt = Isometry3::from_parts(Translation3::new(0.0, -2.0, 0.317), ahead);
-    let Err(ControlError::OutOfReach { distance_m, .. }) = posture(&chain, &x_wt) else { panic!() };
+    let Err(ArmError::OutOfReach { distance_m, .. }) = posture(&chain, &x_wt) else { panic!() };
     // Shoulder to fingertip, outstretched: 0.45 + 0.48 + 0.07 + 0.12 m.
     assert!((distance_m - (2.0 - 1.12)).abs() < 0.01, "{distance_m}");
     let turned = Translation3::new(0.0, -0.6, 0.5).into();
-    let Err(ControlError::OutOfReach { angle_rad, .. }) = posture(&slides(), &turned) else {
-        panic!()
-    };
+    let Err(ArmError::OutOfReach { angle_rad, .. }) = posture(&slides(), &turned) else { panic!() };
     assert!(angle_rad > 0.1);
 }
 
 #[cfg(feature = "mujoco")]
 mod mujoco {
     use super::*;
-    use palpate::backend::backend::Wrench;
+    use palpate::backend::Wrench;
     use palpate::sim::mjcf;
     use palpate::sim::mjcf::Mode;
     use palpate::sim::mujoco::{Plant, compile};
@@ -307,7 +306,7 @@ mod mujoco {
             let text = mjcf::scene(&environment, Mode::Dynamic { step_s: 0.002 }).unwrap();
             let mut plant = Plant::new(Arc::new(compile(&text).unwrap())).unwrap();
             let start = Translation3::new(0.02, -0.54, 0.47);
-            let start = Isometry3::from_parts(start, environment.scene().finger.attitude_w());
+            let start = Isometry3::from_parts(start, environment.scene().finger.r_at());
             plant.reset(&posture(&chain, &start).unwrap().as_slice()[..n]).unwrap();
             let mut controller = Controller::new(chain, PERIOD_S).unwrap();
             let (mut aside, mut turned, mut behind): (f64, f64, f64) = (0.0, 0.0, 0.0);

@@ -1,7 +1,7 @@
 //! The dynamic body: against the kinematic one, in its speed, its limits and its force of contact.
 
 use nalgebra::{Isometry3, Translation3};
-use palpate::backend::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
+use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
 use palpate::explore::control::{Controller, Goal};
 use palpate::explore::probe::servo::Servo;
 use palpate::explore::probe::{Contact, Probe, Touch};
@@ -100,7 +100,7 @@ fn pressed_to_the_same_depth_forces_and_places_are_the_kinematic_ones() {
             let p = scene.zone.point(&target, 0.0);
             let at = |depth_m: f64| {
                 let place = Translation3::new(p.x, rest_y - depth_m, p.z);
-                Isometry3::from_parts(place, scene.finger.attitude_w())
+                Isometry3::from_parts(place, scene.finger.r_at())
             };
             let (above, deep) = (at(-0.005), at(0.001));
             let [kinematic, dynamic] =

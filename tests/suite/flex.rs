@@ -2,7 +2,7 @@
 
 use crate::common::presses::{environment, press, press_from, shell, wall};
 use nalgebra::{Isometry3, Vector3};
-use palpate::backend::backend::Fault;
+use palpate::backend::Fault;
 use palpate::explore::probe::Touch;
 use palpate::robot::finger::electrode_table::BASELINES_COUNTS;
 use palpate::sim::finger::Effects;
@@ -35,7 +35,7 @@ fn force_and_pressure_grow_with_depth() {
     assert!(loads.is_sorted_by(|a, b| a.pressure_pa < b.pressure_pa), "{loads:?}");
     // Nothing but a plane without friction presses: the force is across it.
     for load in loads {
-        let force_w = environment.scene().finger.attitude_w() * load.force_n;
+        let force_w = environment.scene().finger.r_at() * load.force_n;
         assert!(force_w.xz().norm() < 1e-6 * force_w.norm(), "{force_w}");
     }
 }
@@ -123,10 +123,7 @@ fn an_untouched_shell_rests() {
     let environment = environment(shell(12, 8), wall(), PULP_DEG);
     let mut flex = flex(&environment);
     let above = |y_m: f64| {
-        Isometry3::from_parts(
-            Vector3::y().scale(y_m).into(),
-            environment.scene().finger.attitude_w(),
-        )
+        Isometry3::from_parts(Vector3::y().scale(y_m).into(), environment.scene().finger.r_at())
     };
     // The pulp is 8.31 mm from the axis.
     for _ in 0..100 {
@@ -143,7 +140,7 @@ fn the_finest_shell_has_memory() {
     let mut flex = flex(&environment);
     for i in 0..10 {
         let p_wt = Vector3::y().scale(8.4e-3 - 2e-5 * f64::from(i));
-        let x_wt = Isometry3::from_parts(p_wt.into(), environment.scene().finger.attitude_w());
+        let x_wt = Isometry3::from_parts(p_wt.into(), environment.scene().finger.r_at());
         flex.step(&x_wt, 1e-3).unwrap();
     }
 }
@@ -164,7 +161,7 @@ fn what_cannot_be_carried_is_a_fault() {
     let mut end = Ok(());
     for i in 0..8 {
         let p_wt = Vector3::y().scale(11e-3 - 2e-3 * f64::from(i));
-        let x_wt = Isometry3::from_parts(p_wt.into(), struck.scene().finger.attitude_w());
+        let x_wt = Isometry3::from_parts(p_wt.into(), struck.scene().finger.r_at());
         end = end.and_then(|()| flex.step(&x_wt, 2e-3).map(drop));
     }
     assert!(matches!(end, Err(Fault::Diverged { .. } | Fault::Inside { .. })), "{end:?}");

@@ -84,7 +84,7 @@ proptest! {
         let start = nalgebra::Point3::new(x, -0.5, z);
         let hull = Capsule {
             p0_w: start,
-            p1_w: start + finger.axis_w(),
+            p1_w: start + finger.axis_a(),
             radius_m: finger.radius_m,
         };
         let hit = bvh.sweep(&hull, &APPROACH_W, 1.0).unwrap();
@@ -97,7 +97,7 @@ proptest! {
         prop_assert!(bvh.closest_point(&hit.point).distance_m < 1e-9);
         let steps = 15;
         for i in 0..=steps {
-            let on_axis = stopped.p0_w + finger.axis_w() * (f64::from(i) / f64::from(steps));
+            let on_axis = stopped.p0_w + finger.axis_a() * (f64::from(i) / f64::from(steps));
             let distance_m = bvh.closest_point(&on_axis).distance_m;
             prop_assert!(distance_m > finger.radius_m - 1e-9, "{distance_m} at {i}");
         }

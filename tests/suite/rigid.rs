@@ -3,7 +3,7 @@
 
 use mujoco_rs::wrappers::mj_data::MjData;
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
-use palpate::backend::backend::{Command, Fault, Wrench};
+use palpate::backend::{Command, Fault, Wrench};
 use palpate::explore::probe::{Contact, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;

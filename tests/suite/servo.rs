@@ -1,6 +1,6 @@
 //! One touch by a body that moves and feels, held to what it promises.
 
-use palpate::backend::backend::{Backend, Capabilities, Command, Fault, Reading};
+use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::explore::probe::servo::Servo;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::sim::environment::Shape;

@@ -3,10 +3,9 @@
 mod inverse;
 mod limits;
 
-use crate::robot::arm::{Chain, Joints};
+use crate::robot::arm::{ArmError, Chain, Joints};
 use inverse::ResolvedRate;
 use nalgebra::{Isometry3, Vector6};
-use thiserror::Error;
 
 /// Share of the pose's error taken back per second; chosen, a tenth of the servos' integral
 /// rate, so that the two loops do not fight.
@@ -44,30 +43,6 @@ pub struct JointMotion {
     pub followed: f64,
 }
 
-/// Why there is no command.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
-pub enum ControlError {
-    /// A position, goal or period that is not finite, or a period that is not positive.
-    #[error("the arm's position, goal or period is not a number")]
-    NotFinite,
-    /// The wrong number of joints.
-    #[error("{found} joint positions for an arm of {expected} joints")]
-    Joints {
-        /// Joints of the chain.
-        expected: usize,
-        /// Positions given.
-        found: usize,
-    },
-    /// No posture within the joint limits brings the tip there.
-    #[error("out of reach: the tip stays {distance_m} m and {angle_rad} rad away")]
-    OutOfReach {
-        /// Smallest distance found.
-        distance_m: f64,
-        /// Angle at that distance.
-        angle_rad: f64,
-    },
-}
-
 /// Resolved-rate control (Whitney 1969) with feed-forward:
 /// `qdot = J⁺ · (twist + GAIN_PER_S · error) + N · posture`, J⁺ damped near singularities and
 /// the null space N pulling towards the chain's home and away from joint limits; then limited.
@@ -86,10 +61,10 @@ impl Controller {
     ///
     /// # Errors
     /// If the period is not a positive number.
-    pub fn new(chain: Chain, period_s: f64) -> Result<Self, ControlError> {
+    pub fn new(chain: Chain, period_s: f64) -> Result<Self, ArmError> {
         let usable = period_s.is_finite() && period_s > 0.0;
         let controller = Self { chain, period_s, qdot: Joints::zeros() };
-        if usable { Ok(controller) } else { Err(ControlError::NotFinite) }
+        if usable { Ok(controller) } else { Err(ArmError::NotFinite) }
     }
 
     /// What it drives.
@@ -106,22 +81,22 @@ impl Controller {
     ///
     /// # Errors
     /// If a number is not finite or missing; what was commanded last still holds.
-    pub fn step(&mut self, q: &[f64], goal: &Goal) -> Result<JointMotion, ControlError> {
+    pub fn step(&mut self, q: &[f64], goal: &Goal) -> Result<JointMotion, ArmError> {
         let q = positions(&self.chain, q)?;
         let (x_wt, jacobian) = self.chain.jacobian(&q);
         let twist = goal.twist + correction(&x_wt, &goal.x_wt);
         let task = ResolvedRate::new(&self.chain, &q, jacobian, twist);
-        let (wanted, damping) = task.solve().ok_or(ControlError::NotFinite)?;
+        let (wanted, damping) = task.solve().ok_or(ArmError::NotFinite)?;
         self.qdot = limits::limited(&self.chain, &q, &self.qdot, &wanted, self.period_s);
         Ok(JointMotion { qdot: self.qdot, damping, followed: task.followed(&self.qdot) })
     }
 }
 
-fn positions(chain: &Chain, q: &[f64]) -> Result<Joints, ControlError> {
+fn positions(chain: &Chain, q: &[f64]) -> Result<Joints, ArmError> {
     let expected = chain.joints.len();
-    let joints = chain.joints_from(q).ok_or(ControlError::Joints { expected, found: q.len() })?;
+    let joints = chain.joints_from(q).ok_or(ArmError::Joints { expected, found: q.len() })?;
     let finite = joints.iter().all(|q| q.is_finite());
-    if finite { Ok(joints) } else { Err(ControlError::NotFinite) }
+    if finite { Ok(joints) } else { Err(ArmError::NotFinite) }
 }
 
 /// From `at` to `to` as a displacement in `W`: m, then rad.
@@ -165,8 +140,8 @@ const TURNS_DEG: [f64; 8] = [0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0
 /// in large steps, and near home where the arm is redundant.
 ///
 /// # Errors
-/// [`ControlError::OutOfReach`] if no start leads there within the joint limits.
-pub fn posture(chain: &Chain, x_wt: &Isometry3<f64>) -> Result<Joints, ControlError> {
+/// [`ArmError::OutOfReach`] if no start leads there within the joint limits.
+pub fn posture(chain: &Chain, x_wt: &Isometry3<f64>) -> Result<Joints, ArmError> {
     let mut nearest = (f64::INFINITY, f64::INFINITY);
     let starts = if chain.turns() { &TURNS_DEG[..] } else { &TURNS_DEG[..1] };
     for turn in starts {
@@ -179,7 +154,7 @@ pub fn posture(chain: &Chain, x_wt: &Isometry3<f64>) -> Result<Joints, ControlEr
             let (distance, angle) =
                 (away.fixed_rows::<3>(0).norm(), away.fixed_rows::<3>(3).norm());
             if !(distance.is_finite() && angle.is_finite()) {
-                return Err(ControlError::NotFinite);
+                return Err(ArmError::NotFinite);
             }
             if distance + angle < NEAR {
                 return Ok(q);
@@ -188,9 +163,9 @@ pub fn posture(chain: &Chain, x_wt: &Isometry3<f64>) -> Result<Joints, ControlEr
                 nearest = (distance, angle);
             }
             let task = ResolvedRate::new(chain, &q, jacobian, shortened(away, STRIDE));
-            let (step, _) = task.solve().ok_or(ControlError::NotFinite)?;
+            let (step, _) = task.solve().ok_or(ArmError::NotFinite)?;
             q = chain.clamp(&(q + step));
         }
     }
-    Err(ControlError::OutOfReach { distance_m: nearest.0, angle_rad: nearest.1 })
+    Err(ArmError::OutOfReach { distance_m: nearest.0, angle_rad: nearest.1 })
 }

@@ -1,11 +1,12 @@
-//! One touch: ask for a target, get a contact or a miss.
+//! One touch: go the way of an approach, get a contact or a miss.
 
 pub mod servo;
 mod swept;
 
 pub use swept::Swept;
 
-use crate::backend::backend::Fault;
+use crate::backend::Fault;
+use crate::task::Approach;
 use nalgebra::{Point3, Vector3};
 
 /// What a touch ended with.
@@ -22,19 +23,19 @@ pub enum Touch {
 /// Where a touch met the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contact {
-    /// The point of contact in `W`; its (x, z) may differ from the target.
+    /// The point of contact in `W`; its place may differ from the target.
     pub p_wc: Point3<f64>,
     /// Unit normal in `W`, from the surface towards the finger.
     pub normal_w: Vector3<f64>,
 }
 
-/// A body that can be sent to a target.
+/// A body that can be sent to touch.
 pub trait Probe: Send {
-    /// Approaches along −y over `target` (a place of the zone) until contact, and returns.
+    /// Goes the way of `approach` until contact, and returns.
     ///
     /// # Errors
-    /// A fault of the body, or a target that is not finite.
-    fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault>;
+    /// A fault of the body, or an approach that is not finite.
+    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault>;
 
     /// The space that the last touch found free; none if it is not known.
     fn swept(&self) -> Option<Swept> {
@@ -47,13 +48,16 @@ pub trait Probe: Send {
     }
 }
 
-/// A target must be of numbers.
+/// An approach must be of numbers.
 ///
 /// # Errors
 /// [`Fault::Refused`] if one is not finite.
-pub fn refuse_unless_finite(target: &[f64]) -> Result<(), Fault> {
-    match target.iter().all(|coordinate| coordinate.is_finite()) {
+pub fn refuse_unless_finite(approach: &Approach) -> Result<(), Fault> {
+    let points = [approach.p_near_w, approach.p_far_w];
+    match approach.is_finite() {
         true => Ok(()),
-        false => Err(Fault::Refused { values: target.into() }),
+        false => {
+            Err(Fault::Refused { values: points.iter().flat_map(|p| p.iter().copied()).collect() })
+        }
     }
 }

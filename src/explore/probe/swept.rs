@@ -1,9 +1,11 @@
 //! The space that a touch has found free: what the finger's hull swept on its way.
 
-use crate::robot::finger::shape::Finger;
+use crate::robot::Finger;
+use crate::task::Zone;
 use nalgebra::Point3;
 
-/// Where an approach ended; the hull came there along −y, so no surface is above its front.
+/// Where an approach along the zone's axis ended; the hull came there straight, so no surface is
+/// above its front.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Swept {
     /// The hull.
@@ -14,10 +16,18 @@ pub struct Swept {
 }
 
 impl Swept {
-    /// The largest y that the surface can have at (`x_m`, `z_m`) in `W`; none where the hull did not
-    /// pass.
-    pub fn ceiling_y_m(&self, x_m: f64, z_m: f64) -> Option<f64> {
-        let front_m = self.finger.front_m(x_m - self.p_wt.x, z_m - self.p_wt.z)?;
-        Some(self.p_wt.y + front_m)
+    /// The greatest height above the datum that the surface can have at each of `places` of `zone`;
+    /// none where the hull did not pass.
+    pub fn ceilings_m<'a>(
+        &'a self,
+        zone: &'a Zone,
+        places: impl Iterator<Item = &'a [f64]> + 'a,
+    ) -> impl Iterator<Item = Option<f64>> + 'a {
+        let p_zt = zone.x_wz().inverse_transform_point(&self.p_wt);
+        places.map(move |place| {
+            let p_z = zone.local(place, 0.0);
+            let front_m = self.finger.front_m(p_z.x - p_zt.x, p_z.z - p_zt.z)?;
+            Some(p_zt.y + front_m - zone.datum_y_m)
+        })
     }
 }

@@ -27,11 +27,12 @@ impl Default for Finger {
 }
 
 impl Finger {
-    /// From the hemisphere's centre (origin of `T`) to the cylinder's far end, in `W`.
+    /// From the hemisphere's centre (origin of `T`) to the cylinder's far end, in a frame `A` along
+    /// whose −y the finger approaches.
     ///
-    /// The finger points along the approach −y and up by its pitch, so its cylinder lies
-    /// behind (+y) and below.
-    pub fn axis_w(&self) -> Vector3<f64> {
+    /// The finger points along the approach and up by its pitch, so its cylinder lies behind (+y)
+    /// and below.
+    pub fn axis_a(&self) -> Vector3<f64> {
         let (up, forward) = self.pitch_deg.to_radians().sin_cos();
         Vector3::new(0.0, forward, -up) * self.length_m
     }
@@ -42,17 +43,22 @@ impl Finger {
         8.75 / 7.0 * self.radius_m
     }
 
-    /// Attitude of `T` in `W`: +x distal, towards -y and up by the pitch; the pad, -z, towards
-    /// the object.
-    pub fn attitude_w(&self) -> UnitQuaternion<f64> {
+    /// Attitude of `T` in a frame `A` along whose −y the finger approaches: +x distal, towards −y
+    /// and up by the pitch; the pad, −z, towards the object.
+    pub fn r_at(&self) -> UnitQuaternion<f64> {
         let (up, forward) = self.pitch_deg.to_radians().sin_cos();
         let axes = [Vector3::new(0.0, -forward, up), Vector3::x(), Vector3::new(0.0, up, forward)];
         let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
         UnitQuaternion::from_rotation_matrix(&rotation)
     }
 
+    /// The approach's direction in `T`.
+    pub fn ahead_t(&self) -> Vector3<f64> {
+        self.r_at().inverse() * -Vector3::y()
+    }
+
     /// The y of the hull's foremost point (towards −y) at (`dx_m`, `dz_m`) beside the hemisphere's
-    /// centre, relative to it; none where the hull does not reach.
+    /// centre, relative to it, in the frame `A`; none where the hull does not reach.
     ///
     /// A sphere whose centre lies at s·(a_y, a_z) on the axis has its front at
     /// s·a_y − sqrt(q² − (dz − s·a_z)²) with q² = r² − dx², which is least where
@@ -62,7 +68,7 @@ impl Finger {
         if q2 < 0.0 {
             return None;
         }
-        let axis = self.axis_w();
+        let axis = self.axis_a();
         let s = if axis.z == 0.0 {
             0.0
         } else {
@@ -92,7 +98,7 @@ mod tests {
     fn the_front_is_the_foremost_of_all_spheres_along_the_axis() {
         for pitch_deg in [-60.0, 0.0, 20.0, 45.0, 90.0] {
             let finger = Finger { pitch_deg, ..Finger::default() };
-            let axis = finger.axis_w();
+            let axis = finger.axis_a();
             for i in 0..400 {
                 let (dx, dz) =
                     (0.01 * (f64::from(i) * 0.7).sin(), 0.03 * (f64::from(i) * 1.3).sin());

@@ -13,6 +13,7 @@ pub use shell::flex;
 use super::collision::Collision;
 use super::environment::Environment;
 use super::solver::Integrator;
+use nalgebra::Isometry3;
 use std::fmt::{Display, Write};
 
 /// Time step of a model that is only looked at; chosen, the period of the PA-10's servo.
@@ -100,4 +101,10 @@ fn keyword(integrator: Integrator) -> &'static str {
 fn list<T: Display>(numbers: impl IntoIterator<Item = T>) -> String {
     let texts: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();
     texts.join(" ")
+}
+
+/// A pose as attributes.
+fn pose(x: &Isometry3<f64>) -> String {
+    let q = x.rotation.quaternion();
+    format!(r#"pos="{}" quat="{}""#, list(x.translation.vector.iter()), list([q.w, q.i, q.j, q.k]))
 }

@@ -1,11 +1,10 @@
 //! The arm or the stage with the finger on it.
 
-use super::{CONTACT, list};
+use super::{CONTACT, pose};
 use crate::robot::arm::settings::TOOL_KG;
 use crate::robot::arm::{Chain, Links};
 use crate::robot::finger::Finger;
 use crate::sim::Scene;
-use nalgebra::Isometry3;
 
 const C: &str = include_str!("../../../models/pa10/c.xml");
 const A: &str = include_str!("../../../models/pa10/a.xml");
@@ -61,9 +60,4 @@ fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, contact: &str) -> String {
         radius = finger.radius_m,
         tip = pose(&chain.tool),
     )
-}
-
-fn pose(x: &Isometry3<f64>) -> String {
-    let q = x.rotation.quaternion();
-    format!(r#"pos="{}" quat="{}""#, list(x.translation.vector.iter()), list([q.w, q.i, q.j, q.k]))
 }

@@ -1,6 +1,6 @@
 //! What MuJoCo's own contacts say, where the finger has no skin.
 
-use crate::backend::backend::IdealContact;
+use crate::backend::IdealContact;
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::MjModel;
 use nalgebra::{Isometry3, Point3, Vector3};

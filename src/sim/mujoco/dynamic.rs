@@ -1,7 +1,7 @@
 //! An arm or stage with masses, servos and friction, carrying the finger.
 
 use super::{Models, Plant};
-use crate::backend::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
+use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
 use crate::robot::arm::Chain;
 use crate::robot::finger::TipMotion;
 use crate::sim::Environment;
@@ -27,17 +27,20 @@ pub struct Dynamic {
 }
 
 impl Dynamic {
-    /// At the chain's home; none without memory or in a world of another body.
-    pub fn new(environment: &Arc<Environment>, models: &Models) -> Option<Self> {
-        let chain = environment.chain()?;
+    /// At the chain's home.
+    ///
+    /// # Errors
+    /// [`Fault::NoMemory`], or [`Fault::Lacks`] in an environment without an object.
+    pub fn new(environment: &Arc<Environment>, models: &Models) -> Result<Self, Fault> {
+        let chain = environment.chain().ok_or(Fault::Lacks { part: "an object" })?;
         let period_s = environment.scene().period_s();
         let mut sense = SimulatedFinger::new(Arc::clone(environment), 0);
-        if let (Some(sense), Some(shell)) = (&mut sense, models.shell(environment).ok()?) {
+        if let (Some(sense), Some(shell)) = (&mut sense, models.shell(environment)?) {
             sense.wear(shell);
         }
         let mut body = Self {
             capabilities: Capabilities::of(&chain, period_s),
-            plant: Plant::new(Arc::clone(&models.plant)).ok()?,
+            plant: Plant::new(Arc::clone(&models.plant))?,
             sense,
             wrench: Wrench::default(),
             steps: (period_s / models.plant.opt().timestep).round() as u32,
@@ -45,8 +48,8 @@ impl Dynamic {
             reading: Reading::default(),
             chain,
         };
-        body.reset(0).ok()?;
-        Some(body)
+        body.reset(0)?;
+        Ok(body)
     }
 
     /// What the servos are told: `command` within the joints' speeds.

@@ -18,6 +18,7 @@ pub use plant::Plant;
 pub use shell::FlexShell;
 pub use substeps::{StepLimit, Substeps};
 
+use crate::backend::Fault;
 use mujoco_rs::error::MjModelError;
 use mujoco_rs::wrappers::MjModel;
 use mujoco_rs::wrappers::mj_logging::{log_config, set_log_config};
@@ -59,6 +60,17 @@ pub enum ModelError {
     /// There is no memory for its state.
     #[error("no memory for the state of the MuJoCo model")]
     Memory,
+}
+
+impl From<ModelError> for Fault {
+    /// What is left to go wrong once a scene was compiled.
+    fn from(error: ModelError) -> Self {
+        match error {
+            ModelError::Lacks { part } => Self::Lacks { part },
+            ModelError::Memory => Self::NoMemory,
+            _ => Self::Lacks { part: "a model that MuJoCo steps" },
+        }
+    }
 }
 
 /// Version of the linked library.

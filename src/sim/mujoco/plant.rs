@@ -3,7 +3,7 @@
 use super::ModelError;
 use super::contact;
 use super::joint_servo::JointServo;
-use crate::backend::backend::{Fault, IdealContact, Wrench};
+use crate::backend::{Fault, IdealContact, Wrench};
 use crate::robot::arm::Joints;
 use crate::robot::arm::chain::MAX_JOINTS;
 use mujoco_rs::wrappers::mj_data::MjData;

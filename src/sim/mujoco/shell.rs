@@ -1,7 +1,7 @@
 //! The skin of `[effects.flex]` during one trial: a shell that MuJoCo bends over the object.
 
 use super::{ModelError, compile};
-use crate::backend::backend::Fault;
+use crate::backend::Fault;
 use crate::geometry::primitives::normal;
 use crate::sim::Environment;
 use crate::sim::environment::Shape;

@@ -2,7 +2,6 @@
 
 use super::{ModelError, Plant};
 use crate::sim::Environment;
-use crate::sim::environment::APPROACH_W;
 use crate::sim::finger::stiffness;
 use mujoco_rs::wrappers::MjModel;
 use std::fmt::{Display, Formatter, Result as Written};
@@ -51,7 +50,7 @@ impl StepLimit {
         let mut plant = Plant::new(Arc::clone(model))?;
         plant.reset(chain.start()).map_err(|_| ModelError::Lacks { part: "a home" })?;
         let mass_kg = plant.tip_mass_kg();
-        let towards_t = scene.finger.attitude_w().inverse_transform_vector(&APPROACH_W);
+        let towards_t = scene.finger.ahead_t();
         let force_n = scene.touch.force_limit_n;
         let stiffness_n_m = stiffness::largest_n_m(skin, &towards_t, force_n);
         let limit_s = (mass_kg / stiffness_n_m).sqrt();

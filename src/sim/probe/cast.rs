@@ -1,11 +1,13 @@
-//! Sweeps the finger's hull along −y to first contact on the exact mesh.
+//! Sweeps the finger's hull along the approach to first contact on the exact mesh.
 
-use crate::backend::backend::Fault;
+use crate::backend::Fault;
 use crate::explore::probe::{Contact, Probe, Swept, Touch, refuse_unless_finite};
 use crate::geometry::bvh::SweepHit;
 use crate::geometry::sweep::Capsule;
 use crate::sim::Environment;
-use crate::sim::environment::{APPROACH_W, CLEARANCE_M, Shape};
+use crate::sim::environment::{CLEARANCE_M, Shape};
+use crate::task::Approach;
+use nalgebra::Point3;
 use std::sync::Arc;
 
 /// Touches the exact mesh with the rigid hull.
@@ -15,28 +17,24 @@ pub struct Cast {
 }
 
 impl Cast {
-    /// In `world`.
+    /// In `environment`.
     pub fn new(environment: Arc<Environment>) -> Self {
         Self { environment, swept: None }
     }
 }
 
 impl Probe for Cast {
-    fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault> {
-        refuse_unless_finite(target)?;
-        let found = rest(&self.environment, target);
-        let tip_y_m = match (&found, self.environment.mesh()) {
-            (Some((tip_y_m, _)), _) => Some(*tip_y_m),
-            (None, Some(mesh)) => Some(mesh.bounds().0.y - reach_m(&self.environment)),
-            (None, None) => None,
-        };
-        self.swept = tip_y_m.map(|tip_y_m| {
-            let mut p_wt = self.environment.scene().zone.point(target, 0.0);
-            p_wt.y = tip_y_m;
-            Swept { finger: self.environment.scene().finger.clone(), p_wt }
-        });
+    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+        refuse_unless_finite(approach)?;
+        let found = rest(&self.environment, approach);
+        let turned_w =
+            || approach.p_far_w + approach.direction_w().scale(reach_m(&self.environment));
+        let p_wt = found.as_ref().map_or_else(turned_w, |rest| rest.p_wt);
+        self.swept = Some(Swept { finger: self.environment.scene().finger.clone(), p_wt });
         Ok(match found {
-            Some((_, hit)) => Touch::Contact(Contact { p_wc: hit.point, normal_w: hit.normal }),
+            Some(Rest { hit, .. }) => {
+                Touch::Contact(Contact { p_wc: hit.point, normal_w: hit.normal })
+            }
             None => Touch::Miss,
         })
     }
@@ -46,30 +44,30 @@ impl Probe for Cast {
     }
 }
 
-/// The y at which the centre of the fingertip's hemisphere comes to rest over `target`, in `W`;
-/// none for a miss, or without a mesh.
-pub fn rest_y_m(environment: &Environment, target: &[f64]) -> Option<f64> {
-    rest(environment, target).map(|(tip_y_m, _)| tip_y_m)
+/// The hull at rest on the object.
+pub struct Rest {
+    /// The centre of the fingertip's hemisphere in `W`.
+    pub p_wt: Point3<f64>,
+    /// Where it touches.
+    pub hit: SweepHit,
 }
 
-/// How far in front of the object and behind it the centre of the fingertip's hemisphere sets out and
-/// turns back.
+/// Where the hull comes to rest on its approach; none for a miss, or without a mesh.
+pub fn rest(environment: &Environment, approach: &Approach) -> Option<Rest> {
+    let Shape::Mesh { bvh, .. } = environment.shape() else { return None };
+    let finger = &environment.scene().finger;
+    let (ahead_w, reach_m) = (approach.direction_w(), reach_m(environment));
+    let start_w = approach.p_near_w - ahead_w.scale(reach_m);
+    let axis_w = approach.r_wa * finger.axis_a();
+    let hull = Capsule { p0_w: start_w, p1_w: start_w + axis_w, radius_m: finger.radius_m };
+    let way_m = (approach.p_far_w - start_w).dot(&ahead_w) + reach_m;
+    let hit = bvh.sweep(&hull, &ahead_w, way_m)?;
+    Some(Rest { p_wt: start_w + ahead_w.scale(hit.travel_m), hit })
+}
+
+/// How far in front of all that may be touched and behind it the centre of the fingertip's hemisphere
+/// sets out and turns back.
 fn reach_m(environment: &Environment) -> f64 {
     let finger = &environment.scene().finger;
     finger.radius_m + finger.length_m + CLEARANCE_M
-}
-
-/// Sweeps the hull: the centre of the fingertip's hemisphere moves over the target; the contact is
-/// where the hull touches.
-fn rest(environment: &Environment, target: &[f64]) -> Option<(f64, SweepHit)> {
-    let Shape::Mesh { bvh, .. } = environment.shape() else { return None };
-    let scene = environment.scene();
-    let (low, high) = bvh.mesh().bounds();
-    let reach_m = reach_m(environment);
-    let mut tip = scene.zone.point(target, 0.0);
-    tip.y = high.y + reach_m;
-    let hull =
-        Capsule { p0_w: tip, p1_w: tip + scene.finger.axis_w(), radius_m: scene.finger.radius_m };
-    let hit = bvh.sweep(&hull, &APPROACH_W, tip.y - low.y + reach_m)?;
-    Some((tip.y - hit.travel_m, hit))
 }

@@ -1,9 +1,10 @@
 //! Reads an analytic curve exactly where it is asked.
 
-use crate::backend::backend::Fault;
+use crate::backend::Fault;
 use crate::explore::probe::{Contact, Probe, Touch, refuse_unless_finite};
 use crate::sim::Environment;
 use crate::sim::environment::Shape;
+use crate::task::Approach;
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -13,22 +14,25 @@ pub struct FunctionProbe {
 }
 
 impl FunctionProbe {
-    /// In `world`.
+    /// In `environment`.
     pub fn new(environment: Arc<Environment>) -> Self {
         Self { environment }
     }
 }
 
 impl Probe for FunctionProbe {
-    fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault> {
-        refuse_unless_finite(target)?;
-        let (Shape::Function(function), Some(&x_m)) = (self.environment.shape(), target.first())
+    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+        refuse_unless_finite(approach)?;
+        let zone = &self.environment.scene().zone;
+        let place = zone.place(&approach.p_near_w);
+        let (Shape::Function(function), Some(&x_m)) = (self.environment.shape(), place.first())
         else {
             return Ok(Touch::Miss);
         };
+        let normal_z = Vector3::new(-function.slope(x_m), 1.0, 0.0).normalize();
         Ok(Touch::Contact(Contact {
-            p_wc: self.environment.scene().zone.point(target, function.height_m(x_m)),
-            normal_w: Vector3::new(-function.slope(x_m), 1.0, 0.0).normalize(),
+            p_wc: zone.point(&place, function.height_m(x_m)),
+            normal_w: zone.x_wz().rotation * normal_z,
         }))
     }
 }

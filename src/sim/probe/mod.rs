@@ -3,5 +3,5 @@
 mod cast;
 mod function;
 
-pub use cast::{Cast, rest_y_m};
+pub use cast::{Cast, Rest, rest};
 pub use function::FunctionProbe;

@@ -5,10 +5,9 @@ pub mod overhead;
 use super::fidelity::reference_load::ReferenceLoad;
 use super::fidelity::row::{Spread, electrodes_apart};
 use super::fidelity::touches::{MeasureError, Touches, touch_all};
-use crate::experiment::experiment::Experiment;
 use crate::experiment::statistics::{Paired, median};
-use crate::experiment::trial;
 use crate::experiment::truth::Truth;
+use crate::experiment::{Experiment, Simulation};
 use crate::explore::planner;
 use crate::robot::finger::TipMotion;
 use crate::sim::finger::counter;
@@ -249,7 +248,7 @@ fn runs(
     let (Some(stage), Some(target)) = (stage, targets.first()) else { return Ok(None) };
     let mut probe = Simulator::new(Arc::clone(environment))?.probe(0)?;
     let before = counter::counts();
-    let _ = probe.touch(target);
+    let _ = probe.touch(&environment.task().approach(target));
     Ok(counter::counts().zip(before).map(|(after, before)| after[stage] - before[stage]))
 }
 
@@ -270,7 +269,7 @@ fn time_ratio(
         // Which goes first alternates: the second finds the caches warm.
         for k in [i % 2, (i + 1) % 2] {
             let begun = Instant::now();
-            let _ = std::hint::black_box(probes[k].touch(target));
+            let _ = std::hint::black_box(probes[k].touch(&with.task().approach(target)));
             taken_s[k] = begun.elapsed().as_secs_f64();
         }
         ratios.push(taken_s[1] / taken_s[0]);
@@ -280,18 +279,19 @@ fn time_ratio(
 
 /// `active` against `random` in the same trials.
 fn verdict(environment: &Arc<Environment>, truth: &Truth, budget: Budget) -> Option<Paired> {
-    let simulator = Simulator::new(Arc::clone(environment)).ok()?;
     let planners = [planner::by_name("active")?, planner::by_name("random")?];
-    if budget.trials == 0 || !crate::math::optimize::BUILT {
+    if budget.trials == 0 {
         return None;
     }
     let names = planners.map(|planner| planner.name);
     let experiment = Experiment::on(environment.scene(), &names, budget.trials, budget.touches);
+    let environment = Arc::clone(environment);
+    let simulation = Simulation::against(experiment, environment, truth.clone()).ok()?;
     let pairs: Vec<(f64, f64)> = (0..budget.trials)
         .into_par_iter()
         .filter_map(|number| {
             let [active, random] = planners.map(|planner| {
-                let row = trial::run(&experiment, &simulator, truth, planner, number);
+                let row = simulation.trial(planner, number);
                 row.touches.last().and_then(|touch| Some(touch.metrics?.rmse_m))
             });
             active.zip(random)

@@ -1,6 +1,6 @@
 //! What an effect that is off still costs: the scene without it, beside code that does not have it.
 
-use crate::backend::backend::{Reading, Wrench};
+use crate::backend::{Reading, Wrench};
 use crate::experiment::statistics::{median, median_interval};
 use crate::geometry::bvh::MeshBvh;
 use crate::math::seed;

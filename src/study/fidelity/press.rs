@@ -5,9 +5,9 @@ use super::order::{Order, STEPPED_SAMPLES};
 use super::reference_load::quiet;
 use super::rung::{Rung, Senses};
 use super::touches::MeasureError;
-use crate::backend::backend::Command;
+use crate::backend::Command;
 use crate::experiment::statistics::mean;
-use crate::sim::probe::rest_y_m;
+use crate::sim::probe::rest;
 use crate::sim::scene::Body;
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
@@ -64,16 +64,19 @@ pub fn in_step(scene: &Scene) -> Result<Option<Order>, MeasureError> {
 fn pressed(environment: &Arc<Environment>) -> Result<Option<Vec<f64>>, MeasureError> {
     let middle = environment.scene().zone.at(&[0.5, 0.5]);
     let simulator = Simulator::new(Arc::clone(environment))?;
-    let (Some(chain), Some(rest_y_m), Some(mut body)) =
-        (environment.chain(), rest_y_m(environment, &middle), simulator.body()?)
+    let approach = environment.task().approach(&middle);
+    let (Some(chain), Some(rest), Some(mut body)) =
+        (environment.chain(), rest(environment, &approach), simulator.body()?)
     else {
         return Ok(None);
     };
-    let gap_m = chain.forward(&chain.home).translation.y - rest_y_m;
+    let home_w = chain.forward(&chain.home).translation.vector;
+    let ahead_w = approach.direction_w();
+    let gap_m = (rest.p_wt.coords - home_w).dot(&ahead_w);
     let far_m = (gap_m - NEAR_M).max(0.0);
     let ticks = |way_m: f64, speed_m_s: f64| (way_m / (speed_m_s * PERIOD_S)).round() as usize;
     let mut go = |speed_m_s: f64, count: usize| {
-        let command = Command { qdot: vec![0.0, -speed_m_s, 0.0] };
+        let command = Command { qdot: ahead_w.scale(speed_m_s).as_slice().into() };
         let force = |_| Ok(body.step(&command)?.ideal.map_or(0.0, |ideal| ideal.force_n));
         (0..count).map(force).collect::<Result<Vec<f64>, MeasureError>>()
     };

@@ -55,10 +55,11 @@ pub fn felt(simulator: &Simulator, ticks: &[Tick]) -> Option<ReferenceLoad> {
     let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape()) else {
         return None;
     };
-    let y_m = |tick: &Tick| tick.motion.x_wt.translation.y;
+    let zone = environment.task().zone();
+    let height_m = |tick: &Tick| zone.height_m(&tick.motion.x_wt.translation.vector.into());
     let mut shell = simulator.shell().ok()?;
-    let deepest_m = ticks.iter().map(y_m).fold(f64::INFINITY, f64::min);
-    let last = ticks.iter().rposition(|tick| y_m(tick) <= deepest_m + STILL_M)?;
+    let deepest_m = ticks.iter().map(height_m).fold(f64::INFINITY, f64::min);
+    let last = ticks.iter().rposition(|tick| height_m(tick) <= deepest_m + STILL_M)?;
     let mut feel = FingertipState::new(tip, &seed::stream(0, 0, "finger"));
     let mut before_s = ticks.first()?.time_s;
     let (mut rest, mut now) = (None, Frame::default());

@@ -1,19 +1,19 @@
 //! Touches with one scene: what they found, how the finger was loaded, and what they cost.
 
 use super::reference_load::{ReferenceLoad, felt, quiet};
-use crate::backend::backend::Fault;
+use crate::backend::Fault;
 use crate::backend::trace::Trace;
 use crate::experiment::statistics::median;
 use crate::experiment::truth::Truth;
 use crate::explore::belief::{Belief, GpSettings};
 use crate::explore::planner;
 use crate::explore::planner::PlanningSettings;
-use crate::explore::probe::servo::Servo;
 use crate::explore::probe::{Contact, Probe, Touch};
 use crate::math::seed;
 use crate::sim::environment::EnvironmentError;
 use crate::sim::simulator::{Simulator, SimulatorError};
 use crate::sim::{Environment, Scene};
+use crate::task::Approach;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -80,7 +80,7 @@ pub fn touch_all(
         (Some(body), Some(chain)) => {
             let (trace, log) = Trace::new(body, chain);
             ticks = Some(log);
-            Box::new(Servo::new(Arc::clone(environment), Box::new(trace), seed)?)
+            Box::new(simulator.servo(Box::new(trace), seed)?)
         }
         _ => simulator.probe(seed)?,
     };
@@ -95,7 +95,7 @@ pub fn touch_all(
     };
     let (mut walls_s, mut simulated_s) = (Vec::new(), Vec::new());
     for target in targets {
-        let contact = match traced.touch(target) {
+        let contact = match traced.touch(&environment.task().approach(target)) {
             Ok(Touch::Contact(contact)) => Some(contact),
             Ok(Touch::Miss | Touch::Overload) => None,
             Err(fault) => {
@@ -113,7 +113,7 @@ pub fn touch_all(
             touches.felt.push(None);
         }
         touches.contacts.push(contact);
-        walls_s.push(time(timed.as_mut(), target));
+        walls_s.push(time(timed.as_mut(), &environment.task().approach(target)));
         if !tick() {
             return Ok(None);
         }
@@ -133,11 +133,11 @@ fn hushed(simulator: &Simulator) -> Result<Simulator, MeasureError> {
 }
 
 /// Wall time of a touch: the mean over as many as take long enough to be measured.
-fn time(probe: &mut dyn Probe, target: &[f64]) -> f64 {
+fn time(probe: &mut dyn Probe, approach: &Approach) -> f64 {
     let begun = Instant::now();
     let mut count = 0;
     loop {
-        let _ = std::hint::black_box(probe.touch(target));
+        let _ = std::hint::black_box(probe.touch(approach));
         count += 1;
         let taken_s = begun.elapsed().as_secs_f64();
         if taken_s > LEAST_S || count >= REPEATS {

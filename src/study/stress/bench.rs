@@ -33,7 +33,7 @@ impl Bench {
         let wall = MeshBvh::new(mesh(wall(0.05 * size), [0.0; 3])?);
         let mut bench =
             Self { tip: Fingertip::new(&finger, effects), wall, finger, touching_m: 0.0 };
-        let rotation = bench.finger.attitude_w();
+        let rotation = bench.finger.r_at();
         // From more points than any case has, so that depth means the same for all.
         let fine = spread(&Profile::biotac(&bench.finger), 16_000);
         let lowest = fine.iter().map(|sample| (rotation * sample.point()).y);
@@ -44,7 +44,7 @@ impl Bench {
     /// Standing `depth_m` inside the wall, `x_m` beside its middle.
     pub(super) fn at(&self, depth_m: f64, x_m: f64) -> TipMotion {
         let p_wt = Vector3::new(x_m, self.touching_m - depth_m, 0.0);
-        TipMotion::at(Isometry3::from_parts(p_wt.into(), self.finger.attitude_w()))
+        TipMotion::at(Isometry3::from_parts(p_wt.into(), self.finger.r_at()))
     }
 
     /// A finger's memory, untouched.

@@ -1,9 +1,8 @@
 //! One touch of a solid, and what every touch is held to.
 
 use super::case::{Outcome, all, hold};
-use crate::backend::backend::{Backend, Fault};
 use crate::backend::trace::{Tick, Trace};
-use crate::explore::probe::servo::Servo;
+use crate::backend::{Backend, Fault};
 use crate::explore::probe::{Contact, Probe, Touch};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::mesh::Mesh;
@@ -55,8 +54,9 @@ pub(super) fn deed_with(
         return CheckedTouch::not_done("no body");
     };
     let (trace, ticks) = Trace::new(body, chain);
-    let touch = Servo::new(Arc::clone(&environment), wrap(Box::new(trace)), 1)
-        .and_then(|mut servo| servo.touch(target));
+    let approach = environment.task().approach(target);
+    let touch =
+        (simulator.servo(wrap(Box::new(trace)), 1)).and_then(|mut servo| servo.touch(&approach));
     let ticks = ticks.take();
     // The object is not in a file, so its world cannot be built again without noise; force and
     // pose need no sensor.

@@ -6,7 +6,7 @@ use super::case::{Case, Outcome, all, case, hold};
 use super::checked_touch::around;
 use super::dynamic::{APPROACH_M_S, with_masses};
 use super::solids::{mesh, wall};
-use crate::backend::backend::{Backend, Command, Fault, Reading};
+use crate::backend::{Backend, Command, Fault, Reading};
 use crate::explore::control::{Controller, Goal};
 use crate::robot::arm::ArmSettings;
 use crate::sim::Environment;
@@ -160,7 +160,7 @@ impl Rig {
     /// The force in steps of `step_s`, pressed for `pressed_s`.
     fn force(&self, step_s: f64, pressed_s: f64) -> Result<Force, String> {
         let models = Models::at(&self.environment, step_s).map_err(|error| error.to_string())?;
-        let mut body = Dynamic::new(&self.environment, &models).ok_or("no body")?;
+        let mut body = Dynamic::new(&self.environment, &models).map_err(|_| "no body")?;
         let resting_s = self.way_m / APPROACH_M_S + pressed_s - LOOK_S;
         let (mut peak_n, mut resting) = (0.0_f64, Vec::new());
         self.press(&mut body, pressed_s, &mut |reading| {
@@ -301,7 +301,7 @@ fn long(ticks: f64) -> Outcome {
     let run = || -> Result<Outcome, Fault> {
         let lost = Fault::Lost { time_s: 0.0 };
         let models = Models::at(&rig.environment, 0.002).map_err(|_| lost.clone())?;
-        let mut body = Dynamic::new(&rig.environment, &models).ok_or(lost.clone())?;
+        let mut body = Dynamic::new(&rig.environment, &models)?;
         let chain = rig.environment.chain().ok_or(lost)?;
         let mut last = Reading::default();
         rig.press(&mut body, REST_S, &mut |reading| last.clone_from(reading))?;

@@ -140,7 +140,7 @@ fn release(steps: f64, _: f64) -> Outcome {
         }
         let same = forces.iter().zip(forces.iter().rev()).all(|(a, b)| a == b);
         let stored_j = forces[steps as usize].energy_j;
-        let rotation = bench.finger.attitude_w();
+        let rotation = bench.finger.r_at();
         let work_j: f64 = (forces[..=steps as usize].windows(2))
             .map(|pair| (rotation * (pair[0].force_n + pair[1].force_n)).y / 2.0 * depth_m(1))
             .sum();

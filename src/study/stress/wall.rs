@@ -14,6 +14,7 @@ use crate::sim::simulator::Simulator;
 use crate::study::fidelity::reference_load::quiet;
 use crate::task::Zone;
 use crate::task::touch::TouchSettings;
+use std::sync::Arc;
 
 pub(super) const CASES: &[Case] = &[
     case(
@@ -133,7 +134,7 @@ pub(super) fn scene(period_s: f64) -> Scene {
     Scene {
         body: Body::Kinematic,
         function: None,
-        zone: Zone { x_m: [-0.05, 0.05], z_m: Some([-0.05, 0.05]), datum_y_m: 0.0 },
+        zone: Zone::new([-0.05, 0.05], Some([-0.05, 0.05])),
         object: None,
         finger: Finger::default(),
         arm: None,
@@ -167,7 +168,7 @@ fn many(count: f64, period_s: f64) -> Outcome {
     scene.effects.skin.get_or_insert_default().samples = 125;
     let Some(mesh) = mesh(wall(0.05), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
     let Ok(environment) = around(scene, mesh) else { return Outcome::Wrong("no world".into()) };
-    let simulator = match Simulator::new(environment) {
+    let simulator = match Simulator::new(Arc::clone(&environment)) {
         Ok(simulator) => simulator,
         Err(error) => return Outcome::Faulted(error.to_string()),
     };
@@ -177,7 +178,7 @@ fn many(count: f64, period_s: f64) -> Outcome {
     };
     let mut first: Option<Contact> = None;
     for i in 0..count as u32 {
-        match probe.touch(&[0.0, 0.0]) {
+        match probe.touch(&environment.task().approach(&[0.0, 0.0])) {
             Ok(Touch::Contact(contact)) => {
                 let moved_m = (contact.p_wc - first.get_or_insert(contact.clone()).p_wc).norm();
                 if moved_m > 3e-4 {

@@ -1,7 +1,7 @@
 //! Presses of a soft finger on a shape, by its foundation or its shell of finite elements.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use palpate::backend::backend::Fault;
+use palpate::backend::Fault;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::seed::stream;
@@ -95,7 +95,7 @@ pub fn press_from(
 ) -> Result<Press, Fault> {
     let Shape::Mesh { bvh, .. } = environment.shape() else { panic!("no mesh") };
     let (tip, finger) = (environment.fingertip().unwrap(), &environment.scene().finger);
-    let rotation: UnitQuaternion<f64> = finger.attitude_w();
+    let rotation: UnitQuaternion<f64> = finger.r_at();
     let skin = spread(&Profile::biotac(finger), 16_000);
     let points = skin.iter().map(|sample| rotation * sample.point().coords);
     let front = points.min_by(|a, b| a.y.total_cmp(&b.y)).unwrap();

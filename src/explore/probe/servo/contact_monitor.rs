@@ -1,6 +1,6 @@
 //! What the finger says while it moves: contact, too much force, and where.
 
-use crate::backend::backend::{IdealContact, Reading};
+use crate::backend::{IdealContact, Reading};
 use crate::robot::finger::contact_point;
 use crate::robot::finger::contact_point::Detector;
 use crate::robot::finger::{Frame, Tare};

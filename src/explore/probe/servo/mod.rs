@@ -4,25 +4,28 @@ mod contact_monitor;
 mod trajectory;
 
 use super::{Contact, Probe, Swept, Touch, refuse_unless_finite};
-use crate::backend::backend::{Backend, Command, Fault, Reading};
-use crate::explore::control::{ControlError, Controller, Goal};
+use crate::backend::{Backend, Command, Fault, Reading};
+use crate::explore::control::{Controller, Goal, posture};
+use crate::robot::Robot;
+use crate::robot::arm::ArmError;
 use crate::robot::finger::frame::FRAME_S;
-use crate::sim::Environment;
-use crate::sim::environment::CLEARANCE_M;
+use crate::task::Approach;
 use crate::task::touch::TouchSettings;
 use contact_monitor::{ApproachEnd, ContactMonitor};
-use nalgebra::{Isometry3, Vector3};
-use std::sync::Arc;
+use nalgebra::Isometry3;
 use trajectory::StraightPath;
 
 /// A movement has arrived when the tip is this near to its end; chosen: below what a touch
 /// resolves.
 const ARRIVED_M: f64 = 5e-5;
 
+/// Distance that the finger's hull goes beyond the farthest depth before it turns back; chosen.
+const BEYOND_M: f64 = 0.01;
+
 /// Drives any [`Backend`] through touches. The same code drives simulators, recordings and the
-/// real arm.
+/// real arm: it knows the robot, how to touch, and what it is told of each touch.
 pub struct Servo {
-    environment: Arc<Environment>,
+    robot: Robot,
     body: Box<dyn Backend>,
     control: Controller,
     settings: TouchSettings,
@@ -40,25 +43,28 @@ struct State {
 }
 
 impl Servo {
-    /// Brings `body`, which moves the world's chain, to its start.
+    /// Brings `body`, which moves the robot's chain, to its start.
     ///
     /// # Errors
-    /// If the body cannot be brought there.
+    /// If the body cannot be brought there, or is another arm.
     pub fn new(
-        environment: Arc<Environment>,
+        robot: Robot,
+        settings: TouchSettings,
         mut body: Box<dyn Backend>,
         seed: u64,
     ) -> Result<Self, Fault> {
-        let chain = environment.chain().ok_or(Fault::Refused { values: Vec::new() })?;
-        let settings = environment.scene().touch.clone();
-        let joints = chain.joints.len();
-        let control = Controller::new(chain, body.capabilities().period_s).map_err(refused)?;
+        let (expected, found) = (robot.chain.joints.len(), body.capabilities().joints.len());
+        if expected != found {
+            return Err(Fault::Joints { expected, found });
+        }
+        let control = Controller::new(robot.chain.clone(), body.capabilities().period_s)
+            .map_err(|cause| Fault::NoCommand { time_s: 0.0, cause })?;
         let mut state = State::default();
-        state.take(body.reset(seed)?);
+        state.take(body.reset(seed)?)?;
         Ok(Self {
             monitor: ContactMonitor::new(&settings),
-            command: Command { qdot: vec![0.0; joints] },
-            environment,
+            command: Command { qdot: vec![0.0; expected] },
+            robot,
             body,
             control,
             settings,
@@ -79,11 +85,13 @@ impl Servo {
 
     /// One tick towards `goal`.
     fn tick(&mut self, goal: &Goal) -> Result<(), Fault> {
-        let motion = self.control.step(&self.state.q, goal).map_err(refused)?;
+        let State { time_s, q } = &self.state;
+        let no_command = |cause| Fault::NoCommand { time_s: *time_s, cause };
+        let motion = self.control.step(q, goal).map_err(no_command)?;
         self.command.qdot.iter_mut().zip(motion.qdot.iter()).for_each(|(to, from)| *to = *from);
         let reading = self.body.step(&self.command)?;
+        self.state.take(reading)?;
         self.monitor.take(reading);
-        self.state.take(reading);
         match self.monitor.heard_s() {
             Some(heard_s) if self.state.time_s - heard_s > SILENCE_S => {
                 Err(Fault::Lost { time_s: heard_s })
@@ -114,9 +122,20 @@ impl Servo {
                 return Ok(None);
             }
             if self.state.time_s > deadline_s {
-                let State { time_s, q } = &self.state;
-                return Err(Fault::Late { phase, time_s: *time_s, q: q.clone() });
+                return Err(self.overdue(phase, &to));
             }
+        }
+    }
+
+    /// Why a movement to `to` has not ended in its time.
+    fn overdue(&self, phase: &'static str, to: &Isometry3<f64>) -> Fault {
+        let State { time_s, q } = &self.state;
+        let time_s = *time_s;
+        match posture(&self.robot.chain, to) {
+            Err(ArmError::OutOfReach { distance_m, angle_rad }) => {
+                Fault::OutOfReach { phase, time_s, distance_m, angle_rad }
+            }
+            _ => Fault::Late { phase, time_s, q: q.clone() },
         }
     }
 
@@ -138,28 +157,29 @@ impl Servo {
         Ok(None)
     }
 
-    /// The tip in front of the object, over `target`.
-    fn standoff(&self, target: &[f64]) -> Isometry3<f64> {
-        let scene = self.environment.scene();
-        let mut p_wt = scene.zone.point(target, 0.0);
-        p_wt.y = self.extent_y().1 + scene.finger.bulge_m() + self.settings.standoff_m;
-        Isometry3::from_parts(p_wt.into(), scene.finger.attitude_w())
+    /// The tip in front of all that may be touched.
+    fn standoff(&self, approach: &Approach) -> Isometry3<f64> {
+        let back_w = -approach.direction_w().into_inner();
+        let bulge_w = back_w * self.robot.finger.bulge_m();
+        let p_wt = approach.p_near_w + bulge_w + back_w * self.settings.standoff_m;
+        Isometry3::from_parts(p_wt.into(), approach.r_wt())
     }
 
-    /// Smallest and largest y of the object.
-    fn extent_y(&self) -> (f64, f64) {
-        self.environment.mesh().map_or((0.0, 0.0), |mesh| {
-            let (low, high) = mesh.bounds();
-            (low.y, high.y)
-        })
+    /// The tip behind all that may be touched.
+    fn turning_point(&self, approach: &Approach) -> Isometry3<f64> {
+        let ahead_w = approach.direction_w().into_inner();
+        let hull_w = ahead_w * self.robot.finger.radius_m;
+        let p_wt = approach.p_far_w + hull_w + ahead_w * BEYOND_M;
+        Isometry3::from_parts(p_wt.into(), approach.r_wt())
     }
 
     /// Stops, settles where contact was told, and reads it: what the finger overran while its
     /// servos stopped it is taken back, so that the depth does not depend on them.
-    fn read(&mut self) -> Result<Option<Contact>, Fault> {
+    fn read(&mut self, approach: &Approach) -> Result<Option<Contact>, Fault> {
         let until_s = self.state.time_s + self.settings.settle_s;
         let mut held = self.x_wt();
-        held.translation.y -= self.environment.fingertip().map_or(0.0, |_| self.settings.press_m);
+        let press_m = if self.robot.is_soft { self.settings.press_m } else { 0.0 };
+        held.translation.vector += approach.direction_w().scale(press_m);
         while self.state.time_s < until_s {
             self.tick(&Goal::still(held))?;
             if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
@@ -185,31 +205,30 @@ const GIVES_WAY_M: f64 = 1.5e-3;
 const SILENCE_S: f64 = 0.15;
 
 impl Probe for Servo {
-    /// The centre of the fingertip's hemisphere travels over the target and approaches along −y.
-    fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault> {
-        refuse_unless_finite(target)?;
+    /// The centre of the fingertip's hemisphere travels to the stand-off and goes the approach's way.
+    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+        refuse_unless_finite(approach)?;
         let TouchSettings { travel_m_s, approach_m_s, frames, .. } = self.settings;
-        let above = self.standoff(target);
+        let above = self.standoff(approach);
         self.go("the stand-off", above, travel_m_s, false)?;
         self.rest(above, frames)?;
         self.monitor.tare();
-        let mut below = above;
-        below.translation.y =
-            self.extent_y().0 - self.environment.scene().finger.radius_m - CLEARANCE_M;
+        let below = self.turning_point(approach);
         let end = self.go("the object", below, approach_m_s, true)?;
-        let reached = self.x_wt().translation.vector + Vector3::y() * GIVES_WAY_M;
-        let finger = self.environment.scene().finger.clone();
-        self.swept = Some(Swept { finger, p_wt: reached.into() });
+        let ahead_w = approach.direction_w();
+        let reached_w = self.x_wt().translation.vector - ahead_w.scale(GIVES_WAY_M);
+        let finger = self.robot.finger.clone();
+        self.swept = Some(Swept { finger, p_wt: reached_w.into() });
         let touch = match end {
             None => Touch::Miss,
             Some(ApproachEnd::Overload) => Touch::Overload,
-            Some(ApproachEnd::Contact) => self.read()?.map_or(Touch::Overload, Touch::Contact),
+            Some(ApproachEnd::Contact) => {
+                self.read(approach)?.map_or(Touch::Overload, Touch::Contact)
+            }
         };
-        let here = self.x_wt().translation.vector;
-        let back = Isometry3::from_parts(
-            Vector3::new(here.x, above.translation.y, here.z).into(),
-            above.rotation,
-        );
+        let here_w = self.x_wt().translation.vector;
+        let back_w = approach.level_with(&here_w, &above.translation.vector);
+        let back = Isometry3::from_parts(back_w.into(), above.rotation);
         self.go("the way back", back, travel_m_s, false)?;
         Ok(touch)
     }
@@ -224,17 +243,12 @@ impl Probe for Servo {
 }
 
 impl State {
-    fn take(&mut self, reading: &Reading) {
+    /// # Errors
+    /// [`Fault::BadReading`] if a number that is acted on is none.
+    fn take(&mut self, reading: &Reading) -> Result<(), Fault> {
+        reading.check()?;
         self.time_s = reading.time_s;
         self.q.clone_from(&reading.q);
+        Ok(())
     }
-}
-
-fn refused(error: ControlError) -> Fault {
-    let values = match error {
-        ControlError::NotFinite => vec![f64::NAN],
-        ControlError::Joints { expected, found } => vec![expected as f64, found as f64],
-        ControlError::OutOfReach { distance_m, angle_rad } => vec![distance_m, angle_rad],
-    };
-    Fault::Refused { values }
 }

@@ -1,0 +1,141 @@
+//! Why a body or a touch could not go on.
+
+use crate::robot::arm::ArmError;
+use thiserror::Error;
+
+/// Why a body or a touch could not go on. A fault is data: it reaches the trial's row.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum Fault {
+    /// A command or an approach with a number that is not finite, or of the wrong length.
+    #[error("command refused: {values:?}")]
+    Refused {
+        /// The command or approach.
+        values: Vec<f64>,
+    },
+    /// The body has another number of joints than the arm it is said to be.
+    #[error("a body of {found} joints for an arm of {expected}")]
+    Joints {
+        /// Joints of the arm.
+        expected: usize,
+        /// Joints of the body.
+        found: usize,
+    },
+    /// What was read is not a number.
+    #[error("bad reading at {time_s} s: {quantity} is {values:?}")]
+    BadReading {
+        /// When.
+        time_s: f64,
+        /// What was read.
+        quantity: Quantity,
+        /// As it was read.
+        values: Vec<f64>,
+    },
+    /// The controller has no command for where the arm stands and shall go.
+    #[error("no command at {time_s} s: {cause}")]
+    NoCommand {
+        /// When.
+        time_s: f64,
+        /// Why.
+        cause: ArmError,
+    },
+    /// No posture within the joint limits brings the tip to where it was sent.
+    #[error(
+        "out of reach at {time_s} s: on the way to {phase} the tip stays {:.1} mm and {:.1} deg away",
+        1e3 * distance_m, angle_rad.to_degrees()
+    )]
+    OutOfReach {
+        /// Where it was sent.
+        phase: &'static str,
+        /// When.
+        time_s: f64,
+        /// Smallest distance found.
+        distance_m: f64,
+        /// Angle at that distance.
+        angle_rad: f64,
+    },
+    /// The state is no longer finite or left its limits.
+    #[error("diverged at {time_s} s: {state:?}")]
+    Diverged {
+        /// When.
+        time_s: f64,
+        /// The state.
+        state: Vec<f64>,
+    },
+    /// The fingertip's centre is inside the object: the skin no longer keeps them apart.
+    #[error("at {time_s} s the finger is inside the object, its tip at {p_wt:?}")]
+    Inside {
+        /// When.
+        time_s: f64,
+        /// The tip in `W`.
+        p_wt: [f64; 3],
+    },
+    /// A movement within reach did not end in its time: something is in the way, or the joints do not
+    /// follow.
+    #[error("at {time_s} s the movement to {phase} has not ended; joints at {q:?}")]
+    Late {
+        /// Where it led.
+        phase: &'static str,
+        /// When.
+        time_s: f64,
+        /// Joint positions.
+        q: Vec<f64>,
+    },
+    /// A recording cannot be written: what cannot be kept is not done.
+    #[error("the recording fails at {time_s} s: {message}")]
+    Unrecorded {
+        /// When.
+        time_s: f64,
+        /// What the system says.
+        message: String,
+    },
+    /// Whoever watched it had it stopped.
+    #[error("stopped at {time_s} s")]
+    Stopped {
+        /// When.
+        time_s: f64,
+    },
+    /// The body stopped answering.
+    #[error("no answer since {time_s} s")]
+    Lost {
+        /// When it last answered.
+        time_s: f64,
+    },
+    /// There is no memory for the body's state.
+    #[error("no memory for the state of the body")]
+    NoMemory,
+    /// The body cannot be made of the scene: what it needs is missing.
+    #[error("the body needs {part}, which its scene lacks")]
+    Lacks {
+        /// What is missing.
+        part: &'static str,
+    },
+    /// This build lacks what the body needs.
+    #[error("{body} needs a build with the feature `{feature}`")]
+    NotBuilt {
+        /// The body, as a scene names it.
+        body: &'static str,
+        /// The missing feature.
+        feature: &'static str,
+    },
+}
+
+/// What is read from a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Joint positions.
+    Positions,
+    /// Joint velocities.
+    Velocities,
+    /// Force at the finger's mount.
+    Force,
+}
+
+impl std::fmt::Display for Quantity {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Positions => "joint positions",
+            Self::Velocities => "joint velocities",
+            Self::Force => "force at the mount",
+        })
+    }
+}

@@ -1,0 +1,160 @@
+//! From an experiment to its trials: the one way that everything goes which runs a simulation.
+
+use super::experiment::Experiment;
+use super::row::TrialRow;
+use super::trial;
+use super::truth::Truth;
+use crate::backend::Fault;
+use crate::explore::planner;
+use crate::explore::probe::Probe;
+use crate::math::optimize;
+use crate::sim::Environment;
+use crate::sim::environment::EnvironmentError;
+use crate::sim::simulator::{Simulator, SimulatorError};
+use crate::task::Task;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// An experiment with everything that its trials share: the scene built, its models compiled, the
+/// truth sampled. It never changes, and threads share it.
+///
+/// ```no_run
+/// use palpate::experiment::{Experiment, Simulation};
+/// use palpate::explore::planner;
+///
+/// let experiment = Experiment::load("experiments/toy.toml".as_ref(), &[])?;
+/// let simulation = Simulation::new(experiment)?;
+/// let active = planner::by_name("active").expect("it is there");
+/// let row = simulation.trial(active, 0);
+/// println!("{} touches", row.touches.len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Simulation {
+    experiment: Experiment,
+    simulator: Simulator,
+    truth: Truth,
+}
+
+/// An experiment that cannot be simulated.
+#[derive(Debug, Error)]
+pub enum SimulationError {
+    /// Its scene cannot be built.
+    #[error(transparent)]
+    Environment(#[from] EnvironmentError),
+    /// Its body cannot be made.
+    #[error(transparent)]
+    Simulator(#[from] SimulatorError),
+    /// This build lacks what every experiment needs.
+    #[error("this build has no optimisers; build with the feature `{feature}` to run experiments")]
+    NotBuilt {
+        /// The missing feature.
+        feature: &'static str,
+    },
+    /// No surface at any test place.
+    #[error("no place of the zone has a surface along the approach: nothing to explore")]
+    NoSurface,
+}
+
+impl Simulation {
+    /// Builds the experiment's scene, compiles its models and samples the truth.
+    ///
+    /// # Errors
+    /// If the scene cannot be built or simulated, or the zone has no surface.
+    pub fn new(experiment: Experiment) -> Result<Self, SimulationError> {
+        let environment = Environment::build(experiment.scene.clone())?;
+        Self::within(experiment, Arc::new(environment))
+    }
+
+    /// As [`new`](Self::new), in an environment that is there already; its scene takes the place of
+    /// the experiment's.
+    ///
+    /// # Errors
+    /// If it cannot be simulated, or the zone has no surface.
+    pub fn within(
+        experiment: Experiment,
+        environment: Arc<Environment>,
+    ) -> Result<Self, SimulationError> {
+        let truth = Truth::sample(&environment, experiment.grid as usize);
+        Self::against(experiment, environment, truth)
+    }
+
+    /// As [`within`](Self::within), held against a `truth` that was sampled before.
+    ///
+    /// # Errors
+    /// If it cannot be simulated, or the truth has no surface.
+    pub fn against(
+        mut experiment: Experiment,
+        environment: Arc<Environment>,
+        truth: Truth,
+    ) -> Result<Self, SimulationError> {
+        if !optimize::BUILT {
+            return Err(SimulationError::NotBuilt { feature: "nlopt" });
+        }
+        if truth.count() == 0 {
+            return Err(SimulationError::NoSurface);
+        }
+        experiment.scene = environment.scene().clone();
+        Ok(Self { experiment, simulator: Simulator::new(environment)?, truth })
+    }
+
+    /// What is run, with everything that it left to its object written out.
+    pub fn experiment(&self) -> &Experiment {
+        &self.experiment
+    }
+
+    /// The scene, built.
+    pub fn environment(&self) -> &Arc<Environment> {
+        self.simulator.environment()
+    }
+
+    /// What makes the trials' bodies.
+    pub fn simulator(&self) -> &Simulator {
+        &self.simulator
+    }
+
+    /// The truth on the test grid.
+    pub fn truth(&self) -> &Truth {
+        &self.truth
+    }
+
+    /// What the robot is told.
+    pub fn task(&self) -> &Task {
+        self.environment().task()
+    }
+
+    /// Seed of all the randomness of a trial's body.
+    pub fn body_seed(&self, trial: u32) -> u64 {
+        trial::body_seed(&self.experiment, trial)
+    }
+
+    /// What touches in a trial.
+    ///
+    /// # Errors
+    /// If the body cannot be brought to its start.
+    pub fn probe(&self, trial: u32) -> Result<Box<dyn Probe>, Fault> {
+        self.simulator.probe(self.body_seed(trial))
+    }
+
+    /// Runs one trial of `planner` from start to end; what goes wrong stands in its row.
+    pub fn trial(&self, planner: &planner::Entry, trial: u32) -> TrialRow {
+        match self.probe(trial) {
+            Ok(mut probe) => self.trial_with(&mut *probe, planner, trial),
+            Err(fault) => TrialRow {
+                trial,
+                planner: planner.name.into(),
+                failure: Some(format!("before the first touch: {fault}")),
+                touches: Vec::new(),
+            },
+        }
+    }
+
+    /// As [`trial`](Self::trial), with the touches of any `probe`.
+    pub fn trial_with(
+        &self,
+        probe: &mut dyn Probe,
+        planner: &planner::Entry,
+        trial: u32,
+    ) -> TrialRow {
+        trial::run(&self.experiment, self.task(), &self.truth, probe, planner, trial)
+    }
+}
