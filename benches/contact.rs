@@ -12,7 +12,7 @@ use palpate::experiment::statistics::median;
 use palpate::explore::control::{Controller, Goal};
 use palpate::explore::probe::Touch;
 use palpate::sim::mujoco::Models;
-use palpate::sim::probe::rest_y_m;
+use palpate::sim::probe::rest;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::study::fidelity::row::Spread;
@@ -134,8 +134,9 @@ fn true_rest(environment: &Environment, target: Vec<f64>) -> Option<Rest> {
 fn exact(cast: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
     let mut probe = Simulator::new(Arc::clone(cast))?.probe(0)?;
     let mut rest = |target: &Vec<f64>| {
-        let y_m = rest_y_m(cast, target).context("a place without contact")?;
-        let Touch::Contact(contact) = probe.touch(target)? else { anyhow::bail!("a miss") };
+        let approach = cast.task().approach(target);
+        let y_m = rest(cast, &approach).context("a place without contact")?.p_wt.y;
+        let Touch::Contact(contact) = probe.touch(&approach)? else { anyhow::bail!("a miss") };
         Ok(Rest { target: target.clone(), y_m, p_wc: contact.p_wc })
     };
     truth.iter().map(|truth| rest(&truth.target)).collect()

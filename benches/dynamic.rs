@@ -3,11 +3,10 @@
 use nalgebra::Isometry3;
 use palpate::backend::Command;
 use palpate::explore::probe::Probe;
-use palpate::explore::probe::servo::Servo;
 use palpate::robot::finger::TipMotion;
 use palpate::sim::environment::Shape;
 use palpate::sim::finger::FingertipState;
-use palpate::sim::probe::rest_y_m;
+use palpate::sim::probe::rest;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
@@ -39,12 +38,12 @@ fn main() -> anyhow::Result<()> {
         let mut simulated_s = 0.0;
         let touches_s = best(|| {
             let Ok(Some(body)) = simulator.body() else { return f64::NAN };
-            let Ok(mut servo) = Servo::new(Arc::clone(&environment), body, 1) else {
+            let Ok(mut servo) = simulator.servo(body, 1) else {
                 return f64::NAN;
             };
             let begun = Instant::now();
             for target in &targets {
-                let _ = servo.touch(target);
+                let _ = servo.touch(&environment.task().approach(target));
             }
             simulated_s = servo.time_s().unwrap_or(f64::NAN);
             begun.elapsed().as_secs_f64()
@@ -68,14 +67,12 @@ fn main() -> anyhow::Result<()> {
         else {
             continue;
         };
-        let Some(rest_y_m) = rest_y_m(&environment, &[0.0, 0.5]) else { continue };
+        let approach = environment.task().approach(&[0.0, 0.5]);
+        let Some(rest) = rest(&environment, &approach) else { continue };
         let mut feel = FingertipState::new(tip, &palpate::math::seed::stream(1, 0, "finger"));
         for gap_mm in [-0.5, 0.5, 1.0, 2.0, 5.0, 20.0] {
-            let mut x_wt = Isometry3::from_parts(
-                environment.scene().zone.point(&[0.0, 0.5], 0.0).into(),
-                environment.scene().finger.r_at(),
-            );
-            x_wt.translation.y = rest_y_m + 1e-3 * gap_mm;
+            let p_wt = rest.p_wt - approach.direction_w().scale(1e-3 * gap_mm);
+            let x_wt = Isometry3::from_parts(p_wt.into(), approach.r_wt());
             let feel_us = best(|| {
                 let begun = Instant::now();
                 for _ in 0..1000 {

@@ -8,22 +8,18 @@
 use nalgebra::{Rotation3, Unit, Vector3};
 use palpate::backend::Fault;
 use palpate::experiment::equal_error::{Estimate, equal_error};
-use palpate::experiment::experiment::Experiment;
 use palpate::experiment::measure::RMSE;
 use palpate::experiment::metrics::Metrics;
 use palpate::experiment::row::TrialRow;
 use palpate::experiment::statistics::{Paired, median};
-use palpate::experiment::trial;
-use palpate::experiment::truth::Truth;
+use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::explore::probe::{Contact, Probe, Swept, Touch};
 use palpate::math::seed;
-use palpate::sim::Environment;
-use palpate::sim::simulator::Simulator;
+use palpate::task::Approach;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 /// Tilt about either tangent, normal about 0: with two of them the median angle is 1.177 times this,
@@ -51,8 +47,8 @@ impl Estimating {
 }
 
 impl Probe for Estimating {
-    fn touch(&mut self, target: &[f64]) -> Result<Touch, Fault> {
-        let touch = self.exact.touch(target)?;
+    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+        let touch = self.exact.touch(approach)?;
         let (moved, turned) = (PLACE_SD_M * self.normals(), TILT_RAD * self.normals());
         Ok(match touch {
             none @ (Touch::Miss | Touch::Overload) => none,
@@ -122,22 +118,19 @@ fn compare(name: &str, trials: u32, is_own: bool, planner: &str) {
         if experiment.scene.object.is_none() && settings.contains(&"gp.free_space=true") {
             continue;
         }
-        let Ok(environment) = Environment::build(experiment.scene.clone()).map(Arc::new) else {
-            return;
-        };
-        let Ok(simulator) = Simulator::new(environment) else { return };
-        let truth = Truth::sample(simulator.environment(), experiment.grid as usize);
+        let Ok(simulation) = Simulation::new(experiment) else { return };
+        let experiment = simulation.experiment();
         let Some(entry) = planner::by_name(planner) else { return };
         let begun = Instant::now();
         let rows: Vec<TrialRow> = (0..trials)
             .map(|number| {
                 let mut row = if is_own {
-                    trial::run(&experiment, &simulator, &truth, entry, number)
+                    simulation.trial(entry, number)
                 } else {
                     let rng = seed::stream(experiment.seed, number.into(), "estimates");
-                    let exact = simulator.probe(number.into()).unwrap();
+                    let exact = simulation.simulator().probe(number.into()).unwrap();
                     let mut probe = Estimating { exact, rng };
-                    trial::run_with(&experiment, &mut probe, &truth, entry, number)
+                    simulation.trial_with(&mut probe, entry, number)
                 };
                 row.planner = belief.into();
                 row

@@ -3,11 +3,10 @@
 use nalgebra::{Isometry3, Translation3};
 use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
 use palpate::explore::control::{Controller, Goal};
-use palpate::explore::probe::servo::Servo;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::sim::environment::Shape;
 use palpate::sim::mujoco::{Models, StepLimit};
-use palpate::sim::probe::rest_y_m;
+use palpate::sim::probe::rest;
 use palpate::sim::scene::Body;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
@@ -59,8 +58,8 @@ fn tapped(environment: &Arc<Environment>, target: &[f64]) -> (Touch, Vec<Reading
     let simulator = Simulator::new(Arc::clone(environment)).unwrap();
     let readings = Arc::new(Mutex::new(Vec::new()));
     let body = Tap { inner: simulator.body().unwrap().unwrap(), readings: Arc::clone(&readings) };
-    let mut servo = Servo::new(Arc::clone(environment), Box::new(body), 1).unwrap();
-    let touch = servo.touch(target).unwrap();
+    let mut servo = simulator.servo(Box::new(body), 1).unwrap();
+    let touch = servo.touch(&environment.task().approach(target)).unwrap();
     let readings = readings.lock().unwrap().clone();
     (touch, readings)
 }
@@ -96,10 +95,10 @@ fn pressed_to_the_same_depth_forces_and_places_are_the_kinematic_ones() {
         let scene = still.environment().scene();
         for fractions in [[0.4, 0.4], [0.7, 0.6], [0.2, 0.7]] {
             let target = scene.zone.at(&fractions);
-            let rest_y = rest_y_m(still.environment(), &target).unwrap();
-            let p = scene.zone.point(&target, 0.0);
+            let approach = still.environment().task().approach(&target);
+            let p = rest(still.environment(), &approach).unwrap().p_wt;
             let at = |depth_m: f64| {
-                let place = Translation3::new(p.x, rest_y - depth_m, p.z);
+                let place = Translation3::new(p.x, p.y - depth_m, p.z);
                 Isometry3::from_parts(place, scene.finger.r_at())
             };
             let (above, deep) = (at(-0.005), at(0.001));
@@ -227,8 +226,9 @@ fn a_finger_without_skin_finds_the_surface() {
         let Shape::Mesh { bvh, .. } = environment.shape() else { panic!() };
         let (mut off, mut apart): (f64, f64) = (0.0, 0.0);
         for target in environment.scene().zone.grid(3) {
-            let felt = contact(probe.touch(&target).unwrap());
-            let exact = contact(cast.touch(&target).unwrap());
+            let approach = environment.task().approach(&target);
+            let felt = contact(probe.touch(&approach).unwrap());
+            let exact = contact(cast.touch(&approach).unwrap());
             off = off.max(bvh.closest_point(&felt.p_wc).distance_m);
             apart = apart.max((felt.p_wc.y - exact.p_wc.y).abs());
         }
@@ -306,7 +306,8 @@ fn registration_errors_move_what_is_found_and_nothing_else() {
     let touch = |effects: &str, seed: u64| {
         let environment = environment("container_finger.toml", &[effects]);
         let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
-        let found = contact(simulator.probe(seed).unwrap().touch(&[0.01, 0.5]).unwrap());
+        let approach = environment.task().approach(&[0.01, 0.5]);
+        let found = contact(simulator.probe(seed).unwrap().touch(&approach).unwrap());
         let Shape::Mesh { bvh, .. } = environment.shape() else { panic!() };
         (bvh.closest_point(&found.p_wc).distance_m, found)
     };
@@ -334,7 +335,7 @@ fn a_force_sensor_tells_contact_where_no_fluid_does() {
         for seed in 0..3 {
             let mut probe = simulator.probe(seed).unwrap();
             for target in [[0.0, 0.5], [0.03, 0.47]] {
-                let found = contact(probe.touch(&target).unwrap());
+                let found = contact(probe.touch(&environment.task().approach(&target)).unwrap());
                 let off = bvh.closest_point(&found.p_wc).distance_m;
                 assert!(off < 5e-4, "{body} {target:?} {off}");
             }

@@ -1,38 +1,31 @@
 //! What the shipped experiments must show, run whole or cut down in trials.
 
 use palpate::experiment::equal_error::equal_error;
-use palpate::experiment::experiment::Experiment;
 use palpate::experiment::measure::RMSE;
 use palpate::experiment::row::TrialRow;
 use palpate::experiment::summary;
 use palpate::experiment::summary::CurvePoint;
-use palpate::experiment::trial;
-use palpate::experiment::truth::Truth;
+use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
-use palpate::sim::Environment;
-use palpate::sim::simulator::Simulator;
 use rayon::prelude::*;
 use std::path::Path;
-use std::sync::Arc;
 
 fn run(name: &str, sets: &[&str]) -> (Experiment, Vec<TrialRow>) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments").join(name);
     let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
     let experiment = Experiment::load(&path, &sets).unwrap();
-    let environment = Arc::new(Environment::build(experiment.scene.clone()).unwrap());
-    let truth = Truth::sample(&environment, experiment.grid as usize);
-    let simulator = Simulator::new(environment).unwrap();
+    let simulation = Simulation::new(experiment).unwrap();
+    let experiment = simulation.experiment();
     let rows: Vec<TrialRow> = (0..experiment.trials)
         .into_par_iter()
         .flat_map_iter(|trial| {
-            let (experiment, simulator, truth) = (&experiment, &simulator, &truth);
-            experiment.planners.iter().map(move |name| {
-                trial::run(experiment, simulator, truth, planner::by_name(name).unwrap(), trial)
-            })
+            let simulation = &simulation;
+            let planners = experiment.planners.iter().map(|name| planner::by_name(name).unwrap());
+            planners.map(move |planner| simulation.trial(planner, trial))
         })
         .collect();
     assert!(rows.iter().all(|row| row.failure.is_none()));
-    (experiment, rows)
+    (experiment.clone(), rows)
 }
 
 fn after(experiment: &Experiment, rows: &[TrialRow], planner: &str, touches: u32) -> CurvePoint {

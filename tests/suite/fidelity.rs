@@ -100,7 +100,7 @@ fn an_effect_that_is_off_has_no_state_and_never_runs() {
             .unwrap()
             .probe(0)
             .unwrap()
-            .touch(&[0.0, 0.5])
+            .touch(&environment.task().approach(&[0.0, 0.5]))
             .unwrap();
         let after = counter::counts().unwrap();
         std::array::from_fn::<u64, { counter::STAGES.len() }, _>(|i| after[i] - before[i])

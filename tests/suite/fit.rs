@@ -1,17 +1,12 @@
 //! Fits reach the global maximum of the likelihood.
 
-use palpate::experiment::experiment::Experiment;
-use palpate::experiment::trial;
-use palpate::experiment::truth::Truth;
+use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::gp::fit::SearchBox;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::{LogNormal, Mean, Observations, Range, Scale};
-use palpate::sim::Environment;
-use palpate::sim::simulator::Simulator;
 use std::path::Path;
-use std::sync::Arc;
 
 static KERNEL: SquaredExponential = SquaredExponential;
 
@@ -58,14 +53,12 @@ fn best_on_grid(bounds: &SearchBox, touches: &Observations) -> f64 {
 fn fits_of_the_toys_trials_reach_the_global_maximum() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let experiment = Experiment::load(&root.join("experiments/toy.toml"), &[]).unwrap();
-    let environment = Arc::new(Environment::build(experiment.scene.clone()).unwrap());
-    let truth = Truth::sample(&environment, experiment.grid as usize);
-    let simulator = Simulator::new(environment).unwrap();
+    let simulation = Simulation::new(experiment).unwrap();
     let bounds = search_box(Mean::Zero, vec![(0.02, 4.0).into()]);
     let (mut fits, mut warm, mut cold) = (0, 0, 0);
     for (number, name) in [(0, "active"), (1, "active"), (2, "active"), (3, "random")] {
         let planner = planner::by_name(name).unwrap();
-        let row = trial::run(&experiment, &simulator, &truth, planner, number);
+        let row = simulation.trial(planner, number);
         let mut touches = Observations::new(1);
         for touch in &row.touches {
             let [x, y, _] = touch.contact.unwrap();

@@ -1,10 +1,9 @@
 //! Contact normals and swept free space, from the touch to the recorded belief.
 
 use nalgebra::{Point3, Vector3};
-use palpate::experiment::experiment::Experiment;
 use palpate::experiment::row::TrialRow;
-use palpate::experiment::trial;
 use palpate::experiment::truth::Truth;
+use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::{Belief, GpSettings};
 use palpate::explore::planner;
 use palpate::explore::probe::{Contact, Swept, Touch};
@@ -17,7 +16,7 @@ use palpate::task::Zone;
 use std::path::Path;
 use std::sync::Arc;
 
-const SQUARE: Zone = Zone { x_m: [-0.05, 0.05], z_m: Some([-0.05, 0.05]), datum_y_m: -0.6 };
+const SQUARE: Zone = Zone { datum_y_m: -0.6, ..Zone::new([-0.05, 0.05], Some([-0.05, 0.05])) };
 
 fn load(name: &str, sets: &[&str]) -> Result<Experiment, String> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments").join(name);
@@ -26,19 +25,10 @@ fn load(name: &str, sets: &[&str]) -> Result<Experiment, String> {
 }
 
 fn run(name: &str, sets: &[&str], number: u32) -> (Experiment, Truth, TrialRow) {
-    let experiment = load(name, sets).unwrap();
-    let environment = Arc::new(Environment::build(experiment.scene.clone()).unwrap());
-    let truth = Truth::sample(&environment, experiment.grid as usize);
-    let active = planner::by_name("active").unwrap();
-    let row = trial::run(
-        &experiment,
-        &Simulator::new(Arc::clone(&environment)).unwrap(),
-        &truth,
-        active,
-        number,
-    );
+    let simulation = Simulation::new(load(name, sets).unwrap()).unwrap();
+    let row = simulation.trial(planner::by_name("active").unwrap(), number);
     assert_eq!(row.failure, None);
-    (experiment, truth, row)
+    (simulation.experiment().clone(), simulation.truth().clone(), row)
 }
 
 /// No surface is where the finger has passed, and a miss reaches behind all of it.
@@ -54,22 +44,26 @@ fn the_surface_is_below_what_the_finger_has_swept() {
         let mut rng = seed::stream(1, 0, "targets");
         let (mut bounded, mut tight) = (0, 0);
         for _ in 0..200 {
-            let touch = probe.touch(&planner::uniform(zone, &mut rng)).unwrap();
+            let touch = probe
+                .touch(&environment.task().approach(&planner::uniform(zone, &mut rng)))
+                .unwrap();
             let swept = probe.swept().unwrap();
             let Touch::Contact(Contact { p_wc, .. }) = touch else { panic!("missed") };
-            let at_contact = swept.ceiling_y_m(p_wc.x, p_wc.z).unwrap();
-            assert!((at_contact - p_wc.y).abs() < 1e-6, "{at_contact} {p_wc}");
+            let ceiling_m =
+                |place: &[f64]| swept.ceilings_m(zone, std::iter::once(place)).next().unwrap();
+            let at_contact = ceiling_m(&zone.place(&p_wc)).unwrap();
+            assert!((at_contact - zone.height_m(&p_wc)).abs() < 1e-6, "{at_contact} {p_wc}");
             for (place, height_m) in truth.places.iter().zip(&truth.heights_m) {
-                let p_w = zone.point(place, height_m.unwrap());
-                let Some(ceiling_y_m) = swept.ceiling_y_m(p_w.x, p_w.z) else { continue };
+                let Some(ceiling_m) = ceiling_m(place) else { continue };
+                let height_m = height_m.unwrap();
                 bounded += 1;
-                tight += usize::from(ceiling_y_m < p_w.y + 1e-3);
+                tight += usize::from(ceiling_m < height_m + 1e-3);
                 // The mesh is not quite the formula that is the truth.
-                assert!(p_w.y < ceiling_y_m + 2e-4, "{name}: {} {ceiling_y_m}", p_w.y);
+                assert!(height_m < ceiling_m + 2e-4, "{name}: {height_m} {ceiling_m}");
             }
         }
         assert!(bounded > 1000 && tight > 100, "{name}: {bounded} {tight}");
-        assert_eq!(probe.touch(&[0.3, 0.5]), Ok(Touch::Miss));
+        assert_eq!(probe.touch(&environment.task().approach(&[0.3, 0.5])), Ok(Touch::Miss));
         assert!(probe.swept().unwrap().p_wt.y < environment.mesh().unwrap().bounds().0.y);
     }
 }
@@ -143,7 +137,7 @@ fn the_toys_normals_are_its_slopes() {
             .unwrap()
             .probe(1)
             .unwrap()
-            .touch(&[x])
+            .touch(&environment.task().approach(&[x]))
             .unwrap();
         let Touch::Contact(Contact { normal_w, .. }) = touch else { panic!("missed") };
         let [above, below] = [1e-6, -1e-6].map(|by| environment.true_height_m(&[x + by]).unwrap());

@@ -3,6 +3,7 @@
 mod common;
 
 mod allocation;
+mod approach;
 mod arm;
 mod backend;
 mod broken;

@@ -13,8 +13,8 @@ use palpate::math::{normal, seed};
 use palpate::task::Zone;
 use rand::RngExt;
 
-const SQUARE: Zone = Zone { x_m: [-0.05, 0.05], z_m: Some([0.4, 0.52]), datum_y_m: -0.6 };
-const LINE: Zone = Zone { x_m: [-2.0, 2.0], z_m: None, datum_y_m: 0.0 };
+const SQUARE: Zone = Zone { datum_y_m: -0.6, ..Zone::new([-0.05, 0.05], Some([0.4, 0.52])) };
+const LINE: Zone = Zone::new([-2.0, 2.0], None);
 
 /// A belief after `count` touches of a bumpy surface; every `elsewhere`-th contact lies beside
 /// its target, as a finger's does on a slope.

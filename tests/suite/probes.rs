@@ -2,7 +2,7 @@
 
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::geometry::sweep::Capsule;
-use palpate::sim::environment::{APPROACH_W, Shape};
+use palpate::sim::environment::Shape;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use proptest::prelude::*;
@@ -20,7 +20,7 @@ fn open(environment: &Arc<Environment>) -> Box<dyn Probe> {
 }
 
 fn contact(environment: &Arc<Environment>, target: &[f64]) -> Contact {
-    match open(environment).touch(target).unwrap() {
+    match open(environment).touch(&environment.task().approach(target)).unwrap() {
         Touch::Contact(contact) => contact,
         other => panic!("{target:?}: {other:?}"),
     }
@@ -68,9 +68,10 @@ fn a_thin_probe_finds_the_nose_that_the_finger_cannot_enter_beside() {
 
 #[test]
 fn past_the_object_the_finger_meets_nothing() {
-    assert_eq!(open(&BIRD).touch(&[0.3, 0.5]), Ok(Touch::Miss));
-    assert!(open(&BIRD).touch(&[f64::NAN, 0.5]).is_err());
-    assert!(open(&BIRD).touch(&[0.0, f64::INFINITY]).is_err());
+    let touch = |target: &[f64]| open(&BIRD).touch(&BIRD.task().approach(target));
+    assert_eq!(touch(&[0.3, 0.5]), Ok(Touch::Miss));
+    assert!(touch(&[f64::NAN, 0.5]).is_err());
+    assert!(touch(&[0.0, f64::INFINITY]).is_err());
 }
 
 proptest! {
@@ -81,17 +82,18 @@ proptest! {
         let environment = if is_bird { &*BIRD } else { &*CONTAINER };
         let Shape::Mesh { bvh, .. } = environment.shape() else { unreachable!() };
         let finger = &environment.scene().finger;
+        let ahead_w = environment.task().approach(&[x, z]).direction_w();
         let start = nalgebra::Point3::new(x, -0.5, z);
         let hull = Capsule {
             p0_w: start,
             p1_w: start + finger.axis_a(),
             radius_m: finger.radius_m,
         };
-        let hit = bvh.sweep(&hull, &APPROACH_W, 1.0).unwrap();
+        let hit = bvh.sweep(&hull, &ahead_w, 1.0).unwrap();
         let touched = contact(environment, &[x, z]);
         prop_assert!((touched.p_wc - hit.point).norm() < 1e-9);
         prop_assert!((touched.normal_w - hit.normal).norm() < 1e-6);
-        let stopped = hull.translated(&APPROACH_W.scale(hit.travel_m));
+        let stopped = hull.translated(&ahead_w.scale(hit.travel_m));
         let (on_axis, on_mesh) = stopped.nearest(&[hit.point; 3]);
         prop_assert!(((on_axis - on_mesh).norm() - finger.radius_m).abs() < 1e-9);
         prop_assert!(bvh.closest_point(&hit.point).distance_m < 1e-9);

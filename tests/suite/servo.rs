@@ -1,7 +1,6 @@
 //! One touch by a body that moves and feels, held to what it promises.
 
-use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
-use palpate::explore::probe::servo::Servo;
+use palpate::backend::{Backend, Capabilities, Command, Fault, Quantity, Reading};
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::sim::environment::Shape;
 use palpate::sim::kinematic::Kinematic;
@@ -21,7 +20,7 @@ fn simulator(environment: &Arc<Environment>, seed: u64) -> Box<dyn Probe> {
 }
 
 fn touch(environment: &Arc<Environment>, seed: u64, target: &[f64]) -> Result<Touch, Fault> {
-    simulator(environment, seed).touch(target)
+    simulator(environment, seed).touch(&environment.task().approach(target))
 }
 
 fn contact(touch: Touch) -> Contact {
@@ -78,7 +77,9 @@ fn a_trial_repeats_to_the_bit_and_its_noise_is_the_seeds() {
     let run = |seed| {
         let mut probe = simulator(&environment, seed);
         let targets = environment.scene().zone.grid(3).into_iter().take(4);
-        targets.map(|target| probe.touch(&target).unwrap()).collect::<Vec<_>>()
+        targets
+            .map(|target| probe.touch(&environment.task().approach(&target)).unwrap())
+            .collect::<Vec<_>>()
     };
     assert_eq!(run(7), run(7));
     assert_ne!(run(7), run(8));
@@ -102,7 +103,9 @@ fn a_target_that_is_not_a_number_or_out_of_reach_ends_as_a_fault() {
     let near = environment("container_finger.toml", &[]);
     assert!(matches!(touch(&near, 1, &[f64::NAN, 0.5]), Err(Fault::Refused { .. })));
     let arm = environment("container_finger.toml", &["arm.links=\"C\"", "zone.x_m=[-0.05, 3]"]);
-    assert!(matches!(touch(&arm, 1, &[2.9, 0.5]), Err(Fault::Late { .. })));
+    let Err(Fault::OutOfReach { distance_m, .. }) = touch(&arm, 1, &[2.9, 0.5]) else { panic!() };
+    // Nearly as far as the target is from the base, less the arm's length.
+    assert!((1.5..2.5).contains(&distance_m), "{distance_m}");
 }
 
 /// What a broken body does to each of its readings.
@@ -145,8 +148,9 @@ fn broken(environment: &Arc<Environment>, breaks: Breaks) -> (Result<Touch, Faul
         reading: Reading::default(),
         commands: Arc::clone(&commands),
     };
-    let mut servo = Servo::new(Arc::clone(environment), Box::new(body), 1).unwrap();
-    let touch = servo.touch(&[0.02, 0.5]);
+    let simulator = Simulator::new(Arc::clone(environment)).unwrap();
+    let mut servo = simulator.servo(Box::new(body), 1).unwrap();
+    let touch = servo.touch(&environment.task().approach(&[0.02, 0.5]));
     let commands = commands.lock().unwrap().clone();
     (touch, commands)
 }
@@ -167,7 +171,8 @@ fn a_sensor_that_falls_silent_and_joints_that_do_not_move_are_faults_with_their_
             reading.q[1] = f64::NAN;
         }
     });
-    assert!(matches!(nan, Err(Fault::Refused { .. })), "{nan:?}");
+    let Err(Fault::BadReading { time_s, quantity, values }) = nan else { panic!("{nan:?}") };
+    assert!(time_s > 0.0 && quantity == Quantity::Positions && values[1].is_nan());
 }
 
 #[test]
