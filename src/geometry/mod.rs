@@ -7,6 +7,7 @@
 
 mod bounds;
 pub mod bvh;
+pub mod element;
 pub mod error;
 pub mod implicit;
 pub mod import;
