@@ -1,6 +1,6 @@
 //! What benches of the Gaussian process are made of.
 
-use palpate::gp::fit::SearchBox;
+use palpate::gp::SearchBox;
 use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
 use palpate::gp::{Mean, Observations};
 

@@ -3,8 +3,9 @@
 use super::free_space::Ceiling;
 use super::probe::{Swept, Touch};
 use crate::config::{Checked, Rules};
+use crate::gp::SearchBox;
 use crate::gp::covariance::CovarianceError;
-use crate::gp::fit::{Fit, SearchBox};
+use crate::gp::fit::Fit;
 use crate::gp::kernel;
 use crate::gp::kernel::{Hyperparameters, Kernel};
 use crate::gp::posterior::{Posterior, Scratch};

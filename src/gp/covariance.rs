@@ -1,8 +1,8 @@
 //! The covariance of what was observed, factored with as little jitter as it needs.
 
-use super::cholesky::NotPositiveDefinite;
 use super::correlations::{Correlations, batches};
 use super::dense::Dense;
+use super::indefinite::NotPositiveDefinite;
 use super::kernel::Kernel;
 use super::observations::{NoiseRatio, Observations};
 use thiserror::Error;

@@ -4,7 +4,7 @@ use palpate::experiment::experiment::Experiment;
 use palpate::experiment::trial;
 use palpate::experiment::truth::Truth;
 use palpate::explore::planner;
-use palpate::gp::fit::SearchBox;
+use palpate::gp::SearchBox;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::{LogNormal, Mean, Observations, Range, Scale};
