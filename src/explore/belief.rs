@@ -3,13 +3,12 @@
 use super::free_space::Ceiling;
 use super::probe::{Swept, Touch};
 use crate::config::{Checked, Rules};
-use crate::gp::SearchBox;
 use crate::gp::covariance::CovarianceError;
 use crate::gp::fit::Fit;
 use crate::gp::kernel;
 use crate::gp::kernel::{Hyperparameters, Kernel};
 use crate::gp::posterior::{Posterior, Scratch};
-use crate::gp::{LogNormal, Mean, Observation, Observations, Range, Slope};
+use crate::gp::{LogNormal, Mean, Observation, Observations, Range, SearchBox, Slope};
 use crate::task::Zone;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

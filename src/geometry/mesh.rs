@@ -4,9 +4,10 @@ use nalgebra::{Isometry3, Point3};
 
 /// A triangle mesh, in metres.
 ///
-/// Only [`repair`](super::repair::repair) makes one, so it always has at least one triangle, finite vertices that are
-/// all used, indices in range, and no degenerate or duplicate triangles. Winding is consistent
-/// over each edge-connected component: seen from outside, corners run counter-clockwise.
+/// Only [`repair`](super::repair::repair) makes one, so it always has at least one triangle,
+/// finite vertices that are all used, indices in range, and no degenerate or duplicate triangles.
+/// Winding is consistent over each edge-connected component: seen from outside, corners run
+/// counter-clockwise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     vertices: Vec<Point3<f64>>,

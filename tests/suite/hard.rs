@@ -3,12 +3,11 @@
 //! Measured on such cases elsewhere: one library panics on a single touch and returns σ = 0 on a
 //! flat plate, another explains smooth data away as noise, a third predicts NaN after a NaN touch.
 
-use palpate::gp::SearchBox;
 use palpate::gp::covariance::CovarianceError;
 use palpate::gp::fit::Fit;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::posterior::Scratch;
-use palpate::gp::{Mean, Observations, Posterior};
+use palpate::gp::{Mean, Observations, Posterior, SearchBox};
 use palpate::math::optimize::Stop;
 
 static KERNEL: SquaredExponential = SquaredExponential;
