@@ -1,8 +1,8 @@
 //! Lower bounds on distance and travel to a box: what lets a query skip most of a mesh.
 //!
 //! A node of the hierarchy need not be opened if what is asked about cannot reach its box before
-//! the best hit so far. A point or segment has its distance to the box; a ray enters a
-//! [`Slab`] each along x, y and z; a moving capsule must enter the [`SweptBox`], the [`Tube`]
+//! the best hit so far. A point or segment has its distance to the box; a ray must pass the
+//! [`Slab`]s of the box; of a moving capsule, p0 must enter the [`SweptBox`], the [`Tube`]
 //! about its axis must meet the box's ball, and the [`Wall`] ahead of it must meet the box. Each
 //! is a lower bound, so the largest of them is one too.
 
