@@ -1,8 +1,7 @@
 //! What benches of the Gaussian process are made of.
 
-use palpate::gp::fit::SearchBox;
 use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
-use palpate::gp::{Mean, Observations};
+use palpate::gp::{Mean, Observations, SearchBox};
 
 pub static KERNEL: SquaredExponential = SquaredExponential;
 

@@ -69,8 +69,8 @@ pub enum Fault {
         /// The tip in `W`.
         p_wt: [f64; 3],
     },
-    /// A movement within reach did not end in its time: something is in the way, or the joints do not
-    /// follow.
+    /// A movement within reach did not end in its time: something is in the way, or the joints do
+    /// not follow.
     #[error("at {time_s} s the movement to {phase} has not ended; joints at {q:?}")]
     Late {
         /// Where it led.

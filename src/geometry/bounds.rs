@@ -1,4 +1,10 @@
 //! Lower bounds on distance and travel to a box: what lets a query skip most of a mesh.
+//!
+//! A node of the hierarchy need not be opened if what is asked about cannot reach its box before
+//! the best hit so far. A point or segment has its distance to the box; a ray must pass the
+//! [`Slab`]s of the box; of a moving capsule, p0 must enter the [`SweptBox`], the [`Tube`]
+//! about its axis must meet the box's ball, and the [`Wall`] ahead of it must meet the box. Each
+//! is a lower bound, so the largest of them is one too.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use obvhs::aabb::Aabb;
@@ -37,7 +43,8 @@ impl Box3 {
     }
 }
 
-/// What a box grows by, so that a capsule against the box is its end p0 against the grown box.
+/// What a box grows by, so that a moving capsule meets the box no earlier than a ray from its end
+/// p0 meets the grown box: the Minkowski sum with the bounding box of the capsule.
 pub(super) struct SweptBox {
     low: Vector3<f64>,
     high: Vector3<f64>,
@@ -145,7 +152,8 @@ impl Wall {
     }
 }
 
-/// A ray prepared for boxes.
+/// A ray prepared for boxes: a box is where three slabs, each between two parallel planes, overlap
+/// (Kay & Kajiya 1986).
 pub(super) struct Slab {
     origin: Vector3<f64>,
     inverse: Vector3<f64>,

@@ -5,8 +5,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::raw::Element;
-use super::repair::MAX_COORDINATE_M;
+use super::element::Element;
 
 /// A file that gave no mesh: which file, and what is wrong with it.
 #[derive(Debug, Error)]
@@ -99,7 +98,7 @@ pub enum MeshFault {
     },
     /// A coordinate is too large for anything a finger could touch.
     #[error(
-        "vertex {vertex} lies {coordinate_m:e} m from the origin, more than {MAX_COORDINATE_M} m{}",
+        "vertex {vertex} lies {coordinate_m:e} m from the origin, more than {limit_m} m{}",
         likely_unit.map(|unit| format!("; for a file in {unit} say unit = \"{unit}\"")).unwrap_or_default()
     )]
     TooFar {
@@ -107,6 +106,8 @@ pub enum MeshFault {
         vertex: Element,
         /// Its coordinate of largest magnitude, in metres.
         coordinate_m: f64,
+        /// The largest magnitude that is accepted.
+        limit_m: f64,
         /// The unit that would bring it in range, if there is one.
         likely_unit: Option<&'static str>,
     },

@@ -105,8 +105,8 @@ impl Field {
         Self { value: normal.dot(&(p - on)), gradient: normal }
     }
 
-    /// An ellipsoid, (|v / r| - 1) min r for the offset v from its centre. An infinite radius makes
-    /// it an elliptic cylinder.
+    /// An ellipsoid, (|v / r| - 1) min r for the offset v from its centre. An infinite radius
+    /// makes it an elliptic cylinder.
     pub fn ellipsoid(offset: Vector3<f64>, radii_m: Vector3<f64>) -> Self {
         let scale_m = radii_m.min();
         let scaled = offset.component_div(&radii_m);

@@ -2,16 +2,12 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::error::MeshFault;
-use super::raw::RawMesh;
-use super::repair::repair;
-use super::report::MeshReport;
-
 /// A triangle mesh, in metres.
 ///
-/// Only [`repair`] makes one, so it always has at least one triangle, finite vertices that are
-/// all used, indices in range, and no degenerate or duplicate triangles. Winding is consistent
-/// over each edge-connected component: seen from outside, corners run counter-clockwise.
+/// Only [`repair`](super::repair::repair) makes one, so it always has at least one triangle,
+/// finite vertices that are all used, indices in range, and no degenerate or duplicate triangles.
+/// Winding is consistent over each edge-connected component: seen from outside, corners run
+/// counter-clockwise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     vertices: Vec<Point3<f64>>,
@@ -19,19 +15,6 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Repairs vertices (metres) and triangles (indices into them) into a mesh.
-    ///
-    /// # Errors
-    /// Whatever [`repair`] refuses; elements are named as parts of "the mesh".
-    pub fn new(
-        vertices: &[Point3<f64>],
-        triangles: &[[u32; 3]],
-    ) -> Result<(Self, MeshReport), MeshFault> {
-        let mut raw = RawMesh::default();
-        raw.add_part("the mesh", vertices.iter().copied(), triangles.iter().copied())?;
-        repair(raw)
-    }
-
     /// The caller promises what the type promises.
     pub(super) fn from_sound_parts(vertices: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Self {
         Self { vertices, triangles }

@@ -1,9 +1,8 @@
 //! What importers hand over: vertices and triangles nobody has checked yet.
 
-use std::fmt;
-
 use nalgebra::Point3;
 
+use super::element::Element;
 use super::error::MeshFault;
 
 /// More triangles than this are refused, so that a corrupt count cannot exhaust memory.
@@ -11,21 +10,6 @@ pub const MAX_TRIANGLES: usize = 5_000_000;
 
 /// More vertices than this are refused: three for each triangle.
 pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
-
-/// A vertex or triangle as its source knows it: number `index` (from 0) of `part`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Element {
-    /// The part of the source, such as an object's name.
-    pub part: String,
-    /// The number within that part, from 0.
-    pub index: usize,
-}
-
-impl fmt::Display for Element {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} of {}", self.index, self.part)
-    }
-}
 
 /// Vertices (metres) and triangles in parts, each part named after where it came from.
 #[derive(Clone, Debug, Default)]

@@ -5,9 +5,10 @@ use std::collections::HashSet;
 
 use nalgebra::Point3;
 
+use super::element::Element;
 use super::error::MeshFault;
 use super::mesh::Mesh;
-use super::raw::{Element, RawMesh};
+use super::raw::RawMesh;
 use super::report::{Finding, MeshReport};
 use super::topology::orient;
 
@@ -66,6 +67,21 @@ pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), MeshFault> {
     Ok((mesh, report))
 }
 
+impl Mesh {
+    /// Repairs vertices (metres) and triangles (indices into them) into a mesh.
+    ///
+    /// # Errors
+    /// Whatever [`repair`] refuses; elements are named as parts of "the mesh".
+    pub fn new(
+        vertices: &[Point3<f64>],
+        triangles: &[[u32; 3]],
+    ) -> Result<(Self, MeshReport), MeshFault> {
+        let mut raw = RawMesh::default();
+        raw.add_part("the mesh", vertices.iter().copied(), triangles.iter().copied())?;
+        repair(raw)
+    }
+}
+
 fn check_positions(raw: &RawMesh) -> Result<(), MeshFault> {
     for (number, vertex) in raw.vertices.iter().enumerate() {
         let coordinate_m = vertex.coords.amax();
@@ -80,8 +96,8 @@ fn check_positions(raw: &RawMesh) -> Result<(), MeshFault> {
                 .into_iter()
                 .find(|(_, metres)| coordinate_m * metres <= MAX_COORDINATE_M)
                 .map(|(unit, _)| unit);
-            let vertex = raw.vertex_element(number);
-            return Err(MeshFault::TooFar { vertex, coordinate_m, likely_unit });
+            let (vertex, limit_m) = (raw.vertex_element(number), MAX_COORDINATE_M);
+            return Err(MeshFault::TooFar { vertex, coordinate_m, limit_m, likely_unit });
         }
     }
     Ok(())

@@ -4,17 +4,9 @@
 //! addition of contiguous numbers, and a row can be appended without moving the others.
 
 use super::dense::Dense;
+use super::indefinite::NotPositiveDefinite;
 use crate::math::simd::{dot, widest};
 use pulp::NullaryFnOnce;
-use thiserror::Error;
-
-/// The matrix is not positive definite in floating point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("pivot {index} is not positive")]
-pub struct NotPositiveDefinite {
-    /// Row at which it was seen.
-    pub index: usize,
-}
 
 /// A lower triangular factor of growing order.
 #[derive(Clone, Debug, Default)]

@@ -30,7 +30,7 @@ pub(super) struct Correlations {
     entries: Vec<f64>,
     slopes: Vec<f64>,
     /// Buffers for observations with slopes.
-    pub(super) jet: DerivativeCovariance,
+    pub(super) derivatives: DerivativeCovariance,
     pub(super) row: Vec<f64>,
 }
 

@@ -1,8 +1,8 @@
 //! The covariance of what was observed, factored with as little jitter as it needs.
 
-use super::cholesky::NotPositiveDefinite;
 use super::correlations::{Correlations, batches};
 use super::dense::Dense;
+use super::indefinite::NotPositiveDefinite;
 use super::kernel::Kernel;
 use super::observations::{NoiseRatio, Observations};
 use thiserror::Error;
@@ -89,17 +89,17 @@ fn with_slopes(
     observations: &Observations,
     length_scales: &[f64],
     (noise, jitter): (NoiseRatio, f64),
-    Correlations { jet, row, .. }: &mut Correlations,
+    Correlations { derivatives, row, .. }: &mut Correlations,
 ) -> f64 {
     row.resize(observations.order(), 0.0);
     let mut largest: f64 = 0.0;
     for j in 0..observations.len() {
-        jet.look(kernel, observations, length_scales, observations.place(j), j);
+        derivatives.correlate(kernel, observations, length_scales, observations.place(j), j);
         let start = observations.start(j);
         let row = &mut row[start..];
         for number in 0..observations.start(j + 1) - start {
             let axis = number.checked_sub(1);
-            jet.covariances(observations, length_scales, axis, row);
+            derivatives.covariances(observations, length_scales, axis, row);
             largest = largest.max(row[number]);
             let noise2 = match axis {
                 None => observations.height_noise2(j, noise),

@@ -1,8 +1,8 @@
-//! Factorisation and inversion of a whole covariance matrix: plain loops for the small ones, which
-//! a search factors by the thousand, and faer's blocks for the others.
+//! Cholesky factorisation and inversion of a whole covariance matrix: unblocked for the small ones,
+//! which a search factors by the thousand, and by faer's blocked algorithms for the others.
 
-use super::cholesky::NotPositiveDefinite;
-use super::plain;
+use super::indefinite::NotPositiveDefinite;
+use super::unblocked;
 use crate::math::simd::{dot, widest};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
@@ -10,8 +10,8 @@ use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::{Accum, Mat, Par};
 
-/// Largest order of plain loops. Measured: at 32 they take half of faer's time, at 64 as much.
-const PLAIN: usize = 64;
+/// Largest order factored unblocked. Measured: at 32 that takes half of faer's time, at 64 as much.
+const UNBLOCKED_MAX: usize = 64;
 
 /// A symmetric matrix that is factored in place; only its lower triangle is read and written.
 pub struct Dense {
@@ -55,8 +55,8 @@ impl Dense {
     /// If A is not positive definite to within rounding: a pivot lost to cancellation is as good
     /// as none, its sign is noise. `largest` is A's largest diagonal entry.
     pub fn factor(&mut self, largest: f64) -> Result<(), NotPositiveDefinite> {
-        match self.order() <= PLAIN {
-            true => widest(plain::Factor(self.matrix.as_mut()))?,
+        match self.order() <= UNBLOCKED_MAX {
+            true => widest(unblocked::Factor(self.matrix.as_mut()))?,
             false => self.factor_blocked()?,
         }
         let is_lost = |i: &usize| {
@@ -112,16 +112,16 @@ impl Dense {
         });
     }
 
-    /// Computes A⁻¹ = XᵀX with X = L⁻¹ of the factored matrix: 2n³/3 operations. The factor is used
-    /// up: what needs it comes before.
+    /// Computes A⁻¹ = XᵀX with X = L⁻¹ of the factored matrix: 2n³/3 operations. The factor is
+    /// used up: what needs it comes before.
     pub fn invert(&mut self) {
         let n = self.order();
         if self.inverse.nrows() != n {
             self.inverse = Mat::zeros(n, n);
         }
-        if n <= PLAIN {
+        if n <= UNBLOCKED_MAX {
             let (factor, inverse) = (self.matrix.as_ref(), self.inverse.as_mut());
-            return widest(plain::Invert { factor, inverse });
+            return widest(unblocked::Invert { factor, inverse });
         }
         invert_lower_triangular(self.inverse.as_mut(), self.matrix.as_ref(), Par::Seq);
         triangular::matmul(

@@ -1,5 +1,5 @@
-//! Covariances of heights and slopes: a Gaussian process and its derivatives are one Gaussian process
-//! (Rasmussen & Williams 2006, section 9.4; Solak et al. 2003).
+//! Covariances of heights and slopes: a Gaussian process and its derivatives are one Gaussian
+//! process (Rasmussen & Williams 2006, section 9.4; Solak et al. 2003).
 //!
 //! With the correlation c(r²), u_d = (a_d − b_d) / l_d and slopes per length scale,
 //! f_d = l_d·∂f/∂x_d, in units of the signal's variance:
@@ -11,30 +11,33 @@
 use super::kernel::Kernel;
 use super::observations::Observations;
 
-/// The correlations of one place with those of some observations, and their first three derivatives
-/// with respect to the squared distance.
+/// The correlations c of one place with the places of some observations, and their first three
+/// derivatives c′, c″, c‴ with respect to the squared distance: all that the covariances of heights
+/// and slopes are made of.
 #[derive(Clone, Debug, Default)]
 pub(super) struct DerivativeCovariance {
-    at: Vec<f64>,
-    /// Observations from this one on.
+    /// The one place.
+    place: Vec<f64>,
+    /// The observations are those from this one on.
     first: usize,
-    value: Vec<f64>,
+    correlations: Vec<f64>,
     derivatives: [Vec<f64>; 3],
 }
 
-/// The weights of one pair of places in a sum over covariances: `both` of the two heights,
-/// `slopes` the first place's minus the second's of slope and height, and `pairs`, row by row, of the
-/// slopes of both.
+/// The weights of one pair of places (a, b) in a sum over covariances.
 #[derive(Debug, Default)]
 pub(super) struct PairWeights {
-    pub(super) both: f64,
+    /// Of cov(f(a), f(b)).
+    pub(super) heights: f64,
+    /// Of cov(f_d(a), f(b)) minus that of cov(f(a), f_d(b)), per axis d.
+    pub(super) slope_height: Vec<f64>,
+    /// Of cov(f_d(a), f_e(b)), row by row.
     pub(super) slopes: Vec<f64>,
-    pub(super) pairs: Vec<f64>,
 }
 
 impl DerivativeCovariance {
-    /// Looks from `place` at the observations from `first` on.
-    pub(super) fn look(
+    /// Correlates `place` with the observations from `first` on.
+    pub(super) fn correlate(
         &mut self,
         kernel: &dyn Kernel,
         observations: &Observations,
@@ -42,26 +45,26 @@ impl DerivativeCovariance {
         place: impl Iterator<Item = f64>,
         first: usize,
     ) {
-        self.at.clear();
-        self.at.extend(place);
+        self.place.clear();
+        self.place.extend(place);
         self.first = first;
         let count = observations.len() - first;
-        self.value.resize(count, 0.0);
+        self.correlations.resize(count, 0.0);
         self.derivatives.iter_mut().for_each(|derivative| derivative.resize(count, 0.0));
-        let at = self.at.iter().copied();
-        observations.distances2(at, length_scales, first, &mut self.value);
+        let place = self.place.iter().copied();
+        observations.distances2(place, length_scales, first, &mut self.correlations);
         let derivatives = self.derivatives.each_mut().map(Vec::as_mut_slice);
-        kernel.correlate_derivatives(&mut self.value, derivatives);
+        kernel.correlate_derivatives(&mut self.correlations, derivatives);
     }
 
     /// u_d of the place and observation `i`.
     #[inline(always)]
     fn step(&self, observations: &Observations, lengths: &[f64], i: usize, axis: usize) -> f64 {
-        (self.at[axis] - observations.column(axis)[i]) / lengths[axis]
+        (self.place[axis] - observations.column(axis)[i]) / lengths[axis]
     }
 
     /// Writes the covariances of the height at the place, or of its slope along `axis`, with every
-    /// number observed at the places looked at.
+    /// number of the observations.
     pub(super) fn covariances(
         &self,
         observations: &Observations,
@@ -71,7 +74,7 @@ impl DerivativeCovariance {
     ) {
         let offset = observations.start(self.first);
         let [c1, c2, _] = &self.derivatives;
-        for (k, ((c, c1), c2)) in self.value.iter().zip(c1).zip(c2).enumerate() {
+        for (k, ((c, c1), c2)) in self.correlations.iter().zip(c1).zip(c2).enumerate() {
             let i = self.first + k;
             let step = |axis: usize| self.step(observations, length_scales, i, axis);
             let (start, end) = (observations.start(i) - offset, observations.start(i + 1) - offset);
@@ -95,11 +98,11 @@ impl DerivativeCovariance {
         }
     }
 
-    /// Adds to `gradient` what the covariances of the place with observation `i`, times their weights,
-    /// change with the logarithm of each length scale.
+    /// Adds to `gradient` the derivative, with respect to the logarithm of each length scale, of
+    /// the weighted sum of the covariances of the place with observation `i`.
     ///
-    /// With the weights w of both heights, v of slope and height and R of both slopes the sum is
-    /// w·c + 2c′·vᵀu − 4c″·uᵀRu − 2c′·tr R, and u_k falls by itself with ln l_k.
+    /// With the weights w of the heights, v of slope and height and R of the slopes the sum is
+    /// w·c + 2c′·vᵀu − 4c″·uᵀRu − 2c′·tr R, and ∂u_k/∂ln l_k = −u_k.
     pub(super) fn add_length_gradient(
         &self,
         observations: &Observations,
@@ -111,19 +114,19 @@ impl DerivativeCovariance {
         let dimension = lengths.len();
         let [c1, c2, c3] = self.derivatives.each_ref().map(|all| all[i - self.first]);
         let step = |axis: usize| self.step(observations, lengths, i, axis);
-        let PairWeights { both, slopes, pairs } = weights;
-        let pair = |d: usize, e: usize| pairs[d * dimension + e];
+        let PairWeights { heights, slope_height, slopes } = weights;
+        let pair = |d: usize, e: usize| slopes[d * dimension + e];
         let (mut bend, mut along, mut trace) = (0.0, 0.0, 0.0);
-        for (d, slope) in slopes.iter().enumerate() {
-            along += slope * step(d);
+        for (d, weight) in slope_height.iter().enumerate() {
+            along += weight * step(d);
             trace += pair(d, d);
             bend += (0..dimension).map(|e| pair(d, e) * step(d) * step(e)).sum::<f64>();
         }
-        let by_distance = both * c1 + 2.0 * c2 * (along - trace) - 4.0 * c3 * bend;
+        let by_distance = heights * c1 + 2.0 * c2 * (along - trace) - 4.0 * c3 * bend;
         for (k, slope) in gradient.iter_mut().enumerate() {
             let u = step(k);
             let across: f64 = (0..dimension).map(|e| (pair(k, e) + pair(e, k)) * step(e)).sum();
-            *slope += -2.0 * u * (u * by_distance + c1 * slopes[k] - 2.0 * c2 * across);
+            *slope += -2.0 * u * (u * by_distance + c1 * slope_height[k] - 2.0 * c2 * across);
         }
     }
 }

@@ -15,9 +15,9 @@ use crate::math::simd::{dot, widest};
 ///
 /// With K = s²·A, A = C + g²·I (s the signal's standard deviation, C the correlations, g the
 /// noise as a fraction of s) the log marginal likelihood is
-/// −½·yᵀA⁻¹y / s² − n·ln s − ½·ln|A| − (n/2)·ln 2π, where y are the heights above the mean. A slope
-/// counts as a further height, slope · length, with its own noise, and adds ln length: the density
-/// is that of the slope.
+/// −½·yᵀA⁻¹y / s² − n·ln s − ½·ln|A| − (n/2)·ln 2π, where y are the heights above the mean
+/// (Rasmussen & Williams 2006, Eq. 2.30). A slope counts as a further height, slope · length, with
+/// its own noise, and adds ln length: the density is that of the slope.
 pub struct Likelihood<'a> {
     kernel: &'static dyn Kernel,
     mean: Mean,
@@ -88,9 +88,9 @@ impl<'a> Likelihood<'a> {
         Ok(value)
     }
 
-    /// Log marginal likelihood with the signal_sd that `scale` says; with a `gradient`, writes it
-    /// with respect to (ln length_1, …, ln length_d, ln noise_ratio), and the logarithm of the slope
-    /// noise ratio if there is room, the prior of signal_sd included.
+    /// Log marginal likelihood with the signal_sd that `scale` says. A `gradient` is written with
+    /// respect to (ln length_1, …, ln length_d, ln noise_ratio), and the logarithm of the slope
+    /// noise ratio if there is room; it includes the prior of signal_sd.
     ///
     /// # Errors
     /// [`CovarianceError`] if the covariance cannot be factored.
@@ -149,8 +149,9 @@ impl<'a> Likelihood<'a> {
     }
 
     /// With respect to the logarithms of the length scales and of the noise ratio, by
-    /// ½·tr((w·wᵀ/s² − A⁻¹)·∂A), after [`whiten`](Self::whiten) at the same parameters. The
-    /// mean is the best one or does not depend on them, so it has no part in this.
+    /// ½·tr((w·wᵀ/s² − A⁻¹)·∂A) (Rasmussen & Williams 2006, Eq. 5.9), after
+    /// [`whiten`](Self::whiten) at the same parameters. The mean is the best one or does not
+    /// depend on them, so it has no part in this.
     fn gradient(&mut self, signal2: f64, lengths: &[f64], noise: NoiseRatio, gradient: &mut [f64]) {
         self.dense.solve_upper(&mut self.weights);
         self.dense.invert();
@@ -225,25 +226,25 @@ impl<'a> Likelihood<'a> {
                 by_length[axis] += by_this + 1.0 - weights[k] * self.scratch[k] / signal2;
                 by_noise.iter_mut().skip(1).for_each(|by_noise| *by_noise += by_this);
             }
-            let jet = &mut correlations.jet;
-            jet.look(*kernel, observations, lengths, observations.place(j), j);
+            let derivatives = &mut correlations.derivatives;
+            derivatives.correlate(*kernel, observations, lengths, observations.place(j), j);
             for i in j + 1..observations.len() {
                 let row = observations.start(i);
-                pair.both = change(row, column);
+                pair.heights = change(row, column);
+                pair.slope_height.clear();
+                pair.slope_height.resize(d, 0.0);
                 pair.slopes.clear();
-                pair.slopes.resize(d, 0.0);
-                pair.pairs.clear();
-                pair.pairs.resize(d * d, 0.0);
+                pair.slopes.resize(d * d, 0.0);
                 for axis in 0..observations.slope(j).len() {
-                    pair.slopes[axis] += change(row, column + 1 + axis);
+                    pair.slope_height[axis] += change(row, column + 1 + axis);
                 }
                 for other in 0..observations.slope(i).len() {
-                    pair.slopes[other] -= change(row + 1 + other, column);
+                    pair.slope_height[other] -= change(row + 1 + other, column);
                     for axis in 0..observations.slope(j).len() {
-                        pair.pairs[axis * d + other] = change(row + 1 + other, column + 1 + axis);
+                        pair.slopes[axis * d + other] = change(row + 1 + other, column + 1 + axis);
                     }
                 }
-                jet.add_length_gradient(observations, lengths, i, pair, by_length);
+                derivatives.add_length_gradient(observations, lengths, i, pair, by_length);
             }
         }
     }

@@ -1,11 +1,12 @@
 //! The exact posterior of a Gaussian process, Eq. 3 of Yi et al. 2016.
 
-use super::cholesky::{Factor, NotPositiveDefinite};
+use super::cholesky::Factor;
 use super::correlations::Correlations;
 use super::covariance;
 use super::covariance::CovarianceError;
 use super::dense::Dense;
 use super::derivative_covariance::DerivativeCovariance;
+use super::indefinite::NotPositiveDefinite;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::{Observation, Observations};
 use crate::math::simd::{dot, widest};
@@ -15,7 +16,7 @@ use crate::math::simd::{dot, widest};
 pub struct Scratch {
     pub(super) slopes: Vec<f64>,
     pub(super) solved: Vec<f64>,
-    jet: DerivativeCovariance,
+    derivatives: DerivativeCovariance,
     row: Vec<f64>,
 }
 
@@ -53,8 +54,7 @@ impl Posterior {
         Ok(new)
     }
 
-    /// Takes in one more height without factoring again: n² operations. The
-    /// hyperparameters stay.
+    /// Takes in one more height without factoring again: n² operations. The hyperparameters stay.
     ///
     /// # Errors
     /// If the enlarged covariance is not positive definite; nothing is taken in then, and
@@ -100,8 +100,9 @@ impl Posterior {
         Ok(())
     }
 
-    /// What would be known of the variance if `places` had been touched as well; its mean means
-    /// nothing. n² operations for each.
+    /// Conditions on imagined touches at `places` as well, whose heights are not known: the
+    /// variance, which does not depend on them, is what it would be after these touches, and the
+    /// mean means nothing. n² operations for each.
     ///
     /// # Errors
     /// [`CovarianceError`] if the enlarged covariance cannot be factored.
@@ -109,13 +110,10 @@ impl Posterior {
         &self,
         places: impl Iterator<Item = &'a [f64]> + Clone,
     ) -> Result<Self, CovarianceError> {
-        let mut fantasize = self.clone();
-        if places
-            .clone()
-            .try_for_each(|place| fantasize.append(&Observation::height(place, 0.0)))
-            .is_ok()
-        {
-            return Ok(fantasize);
+        let mut fantasy = self.clone();
+        let imagine = |place| fantasy.append(&Observation::height(place, 0.0));
+        if places.clone().try_for_each(imagine).is_ok() {
+            return Ok(fantasy);
         }
         let mut observations = self.observations.clone();
         places.for_each(|place| observations.push(place, 0.0));
@@ -133,30 +131,30 @@ impl Posterior {
     /// `axis` per length scale, with all that was observed; a slope's only if slopes were.
     fn covariances(&self, place: &[f64], axis: Option<usize>, scratch: &mut Scratch) {
         let lengths = &self.hyperparameters.length_scales;
-        let Scratch { solved, jet, .. } = scratch;
+        let Scratch { solved, derivatives, .. } = scratch;
         let at = place.iter().copied();
         solved.resize(self.observations.order(), 0.0);
         if self.observations.has_slopes() || axis.is_some() {
-            jet.look(self.kernel, &self.observations, lengths, at, 0);
-            jet.covariances(&self.observations, lengths, axis, solved);
+            derivatives.correlate(self.kernel, &self.observations, lengths, at, 0);
+            derivatives.covariances(&self.observations, lengths, axis, solved);
         } else {
             self.observations.distances2(at, lengths, 0, solved);
             self.kernel.correlate(solved);
         }
     }
 
-    /// Writes the gradient of Σ_i w_i·k(place, i), in units of the signal's variance, with respect to
-    /// the place looked at last by [`covariances`](Self::covariances).
+    /// Writes the gradient of Σ_i w_i·k(place, i), in units of the signal's variance, with respect
+    /// to the place that [`covariances`](Self::covariances) was called with last.
     fn gradient_with_slopes(
         &self,
         weights: &[f64],
-        (jet, row): (&DerivativeCovariance, &mut Vec<f64>),
+        (derivatives, row): (&DerivativeCovariance, &mut Vec<f64>),
         gradient: &mut [f64],
     ) {
         let lengths = &self.hyperparameters.length_scales;
         row.resize(self.observations.order(), 0.0);
         for (axis, (slope, length)) in gradient.iter_mut().zip(lengths).enumerate() {
-            jet.covariances(&self.observations, lengths, Some(axis), row);
+            derivatives.covariances(&self.observations, lengths, Some(axis), row);
             *slope = widest(|| dot(row, weights)) / length;
         }
     }
@@ -198,8 +196,8 @@ impl Posterior {
         let lengths = &self.hyperparameters.length_scales;
         if self.observations.has_slopes() {
             self.covariances(place, None, scratch);
-            let Scratch { solved, jet, row, .. } = scratch;
-            self.gradient_with_slopes(&self.weights, (jet, row), gradient);
+            let Scratch { solved, derivatives, row, .. } = scratch;
+            self.gradient_with_slopes(&self.weights, (derivatives, row), gradient);
             return self.hyperparameters.mean + widest(|| dot(solved, &self.weights));
         }
         let Scratch { solved, slopes, .. } = scratch;
@@ -231,9 +229,9 @@ impl Posterior {
         let lengths = &self.hyperparameters.length_scales;
         if self.observations.has_slopes() {
             let explained = self.whiten(place, scratch);
-            let Scratch { solved, jet, row, .. } = scratch;
+            let Scratch { solved, derivatives, row, .. } = scratch;
             self.factor.solve_upper(solved);
-            self.gradient_with_slopes(solved, (jet, row), gradient);
+            self.gradient_with_slopes(solved, (derivatives, row), gradient);
             let signal2 = self.hyperparameters.signal_sd.powi(2);
             gradient.iter_mut().for_each(|slope| *slope *= -2.0 * signal2);
             return self.remaining(explained);
@@ -255,8 +253,8 @@ impl Posterior {
         self.remaining(explained)
     }
 
-    /// Writes L⁻¹·k* into `scratch.solved`, and returns the share of the variance at `place` that is
-    /// explained, its square.
+    /// Writes L⁻¹·k* into `scratch.solved`, and returns its square: the share of the variance at
+    /// `place` that the observations explain.
     pub(super) fn whiten(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
         self.covariances(place, None, scratch);
         self.factor.solve_lower(&mut scratch.solved)
@@ -270,7 +268,7 @@ impl Posterior {
         &self.factor
     }
 
-    /// The variance left when `explained` of the prior's, as a share, is.
+    /// The variance left when the share `explained` of the prior's is known.
     pub(super) fn remaining(&self, explained: f64) -> f64 {
         self.hyperparameters.signal_sd.powi(2) * (1.0 - explained).max(0.0)
     }

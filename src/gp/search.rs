@@ -1,13 +1,13 @@
 //! How the most likely hyperparameters are sought: a coarse scan finds the hills of the profiled
 //! likelihood, L-BFGS climbs those that may be the highest.
 
-use super::fit::{Fit, SearchBox, hyperparameters};
-use super::kernel::Kernel;
+use super::kernel::{Hyperparameters, Kernel};
 use super::likelihood::Likelihood;
 use super::observations::Observations;
 use super::range::Scale;
+use super::search_box::SearchBox;
 use crate::math::optimize;
-use crate::math::optimize::Optimum;
+use crate::math::optimize::{Optimum, Stop};
 
 /// Evaluations allowed to one climb; most need a fifth of it.
 const CLIMB_BUDGET: u32 = 100;
@@ -21,6 +21,15 @@ const GAIN_MIN: f64 = 1e-6;
 /// Where another noise makes the data less likely by up to this many nats, its own top may be the
 /// higher one; chosen.
 const NEARLY_AS_LIKELY: f64 = 0.3;
+
+/// The highest top that a search found.
+pub(super) struct Peak {
+    pub hyperparameters: Hyperparameters,
+    /// Their log marginal likelihood, without priors.
+    pub log_likelihood: f64,
+    /// Why the climb to it stopped.
+    pub stop: Stop,
+}
 
 /// One search of a box, over (ln lengths, ln noise ratio, ln slope noise ratio if there is one).
 pub(super) struct Search<'a> {
@@ -108,16 +117,15 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The fit at the highest top; none if no covariance could be factored.
-    pub(super) fn conclude(&mut self) -> Option<Fit> {
+    /// The highest top; none if no covariance could be factored.
+    pub(super) fn conclude(&mut self) -> Option<Peak> {
         let best = self.best.as_ref().filter(|best| best.value > f64::MIN)?;
         let (length_scales, noise) = self.sought.parameters(&best.x);
         let profile = self.likelihood.profile(&length_scales, noise, &self.scale, None).ok()?;
-        Some(Fit {
-            hyperparameters: hyperparameters(profile.signal_sd, length_scales, noise, profile.mean),
+        let (signal_sd, mean) = (profile.signal_sd, profile.mean);
+        Some(Peak {
+            hyperparameters: Hyperparameters::new(signal_sd, length_scales, noise, mean),
             log_likelihood: profile.log_likelihood,
-            factorisations: 0,
-            scanned_at: 0,
             stop: best.stop,
         })
     }

@@ -15,8 +15,8 @@ pub fn cumulative(z: f64) -> f64 {
     0.5 * libm::erfc(-z / SQRT_2)
 }
 
-/// φ(z) / Φ(z), for z below −30, where Φ nears the smallest numbers, by the first terms of its series
-/// −z − 1/z + 2/z³; both agree to 1e-6 there.
+/// φ(z) / Φ(z). For z below −30, where Φ nears the smallest numbers, by the first terms of its
+/// series −z − 1/z + 2/z³; both agree to 1e-6 there.
 pub fn inverse_mills(z: f64) -> f64 {
     if z > -30.0 {
         return density(z) / cumulative(z);

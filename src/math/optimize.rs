@@ -78,9 +78,9 @@ enum Method {
 
 type Objective<'a> = dyn FnMut(&[f64], Option<&mut [f64]>) -> f64 + 'a;
 
-/// The objective with the best it returned: an optimiser may end on a point that is not.
+/// The objective and the best it returned so far: an optimiser may end on a worse point.
 #[cfg_attr(not(feature = "nlopt"), allow(dead_code))]
-struct Watch<'a, 'b> {
+struct TrackedObjective<'a, 'b> {
     objective: &'a mut Objective<'b>,
     best: Optimum,
 }
@@ -98,37 +98,47 @@ fn run(
     }
     let best =
         Optimum { x: x.clone(), value: f64::NEG_INFINITY, evaluations: 0, stop: Stop::Failed };
-    engine::run(method, bounds, x, max_evaluations, Watch { objective, best })
+    engine::run(method, bounds, x, max_evaluations, TrackedObjective { objective, best })
 }
 
 #[cfg(not(feature = "nlopt"))]
 mod engine {
-    use super::{Bounds, Method, Optimum, Watch};
+    use super::{Bounds, Method, Optimum, TrackedObjective};
 
-    pub(super) fn run(_: Method, _: Bounds, _: Vec<f64>, _: u32, watch: Watch) -> Optimum {
-        watch.best
+    pub(super) fn run(
+        _: Method,
+        _: Bounds,
+        _: Vec<f64>,
+        _: u32,
+        tracked: TrackedObjective,
+    ) -> Optimum {
+        tracked.best
     }
 }
 
 #[cfg(feature = "nlopt")]
 mod engine {
-    use super::{Bounds, Method, Optimum, Stop, Watch};
+    use super::{Bounds, Method, Optimum, Stop, TrackedObjective};
     use nlopt::{Algorithm, FailState, Nlopt, SuccessState, Target};
 
     /// Relative change of the value below which L-BFGS counts as converged; chosen well above
     /// rounding, far below what changes a plan.
     const VALUE_TOLERANCE: f64 = 1e-8;
 
-    fn watched(x: &[f64], mut gradient: Option<&mut [f64]>, watch: &mut Watch) -> f64 {
-        let mut value = (watch.objective)(x, gradient.as_deref_mut());
+    fn evaluate(
+        x: &[f64],
+        mut gradient: Option<&mut [f64]>,
+        tracked: &mut TrackedObjective,
+    ) -> f64 {
+        let mut value = (tracked.objective)(x, gradient.as_deref_mut());
         if !value.is_finite() {
             value = f64::MIN;
             gradient.into_iter().flatten().for_each(|slope| *slope = 0.0);
         }
-        watch.best.evaluations += 1;
-        if value > watch.best.value {
-            watch.best.value = value;
-            watch.best.x.copy_from_slice(x);
+        tracked.best.evaluations += 1;
+        if value > tracked.best.value {
+            tracked.best.value = value;
+            tracked.best.x.copy_from_slice(x);
         }
         value
     }
@@ -138,13 +148,13 @@ mod engine {
         bounds: Bounds,
         mut x: Vec<f64>,
         max_evaluations: u32,
-        watch: Watch,
+        tracked: TrackedObjective,
     ) -> Optimum {
         let (algorithm, tolerance) = match method {
             Method::Direct => (Algorithm::Direct, 0.0),
             Method::Lbfgs => (Algorithm::Lbfgs, VALUE_TOLERANCE),
         };
-        let mut nlopt = Nlopt::new(algorithm, x.len(), watched, Target::Maximize, watch);
+        let mut nlopt = Nlopt::new(algorithm, x.len(), evaluate, Target::Maximize, tracked);
         let outcome = nlopt
             .set_lower_bounds(bounds.lower)
             .and_then(|_| nlopt.set_upper_bounds(bounds.upper))

@@ -3,8 +3,8 @@
 /// Runs `work` with its loops compiled once for each vector width and the widest one chosen.
 ///
 /// What it calls must be `#[inline(always)]` to be compiled along, and so must a long `work`,
-/// which is then a struct with [`pulp::NullaryFnOnce`] instead of a closure. Sums keep the order in which
-/// they are written, so that the width changes speed and not results.
+/// which is then a struct with [`pulp::NullaryFnOnce`] instead of a closure. Sums keep the order in
+/// which they are written, so that the width changes speed and not results.
 #[inline(always)]
 pub fn widest<Work: pulp::NullaryFnOnce>(work: Work) -> Work::Output {
     pulp::Arch::new().dispatch(work)

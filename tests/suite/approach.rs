@@ -65,9 +65,12 @@ fn a_side_is_the_same_from_wherever_it_is_explored() {
         ("container_finger.toml", &["effects.electrodes.noise=0", "effects.fluid.noise_counts=0"]),
     ] {
         let scene = scene(name, sets);
-        let targets = scene.zone.grid(4);
+        // No target so round that a movement's last tick hangs on rounding.
+        let mut dice = Dice(5);
+        let mut share = || 0.5 + 0.45 * dice.roll();
+        let targets: Vec<_> = (0..12).map(|_| scene.zone.at(&[share(), share()])).collect();
         let along_y = found(scene.clone(), &targets);
-        assert!(along_y.iter().flatten().count() > 8, "{name}");
+        assert!(along_y.iter().flatten().count() > 8, "{name}: mostly misses");
         for x_ww in [from_x, askew] {
             let other = found(turned(&scene, &x_ww), &targets);
             for ((a, b), target) in along_y.iter().zip(&other).zip(&targets) {

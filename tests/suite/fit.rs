@@ -2,10 +2,9 @@
 
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
-use palpate::gp::fit::SearchBox;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::likelihood::Likelihood;
-use palpate::gp::{LogNormal, Mean, Observations, Range, Scale};
+use palpate::gp::{LogNormal, Mean, Observations, Range, Scale, SearchBox};
 use std::path::Path;
 
 static KERNEL: SquaredExponential = SquaredExponential;

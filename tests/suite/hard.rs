@@ -4,10 +4,10 @@
 //! flat plate, another explains smooth data away as noise, a third predicts NaN after a NaN touch.
 
 use palpate::gp::covariance::CovarianceError;
-use palpate::gp::fit::{Fit, SearchBox};
+use palpate::gp::fit::Fit;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::posterior::Scratch;
-use palpate::gp::{Mean, Observations, Posterior};
+use palpate::gp::{Mean, Observations, Posterior, SearchBox};
 use palpate::math::optimize::Stop;
 
 static KERNEL: SquaredExponential = SquaredExponential;

@@ -11,7 +11,7 @@ use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
-use super::read_file;
+use super::file;
 use crate::geometry::error::{BufferFault, GltfFault};
 
 /// A glTF document and the bytes of its buffers.
@@ -218,7 +218,7 @@ fn fetch(document: &Path, uri: &str) -> Result<Vec<u8>, BufferFault> {
         return Err(BufferFault::Uri);
     }
     let path = document.with_file_name("").join(relative);
-    read_file(&path).map_err(|error| BufferFault::File { path, error })
+    file::read(&path).map_err(|error| BufferFault::File { path, error })
 }
 
 /// `%20` and its like replaced by the bytes they stand for; `None` if that is not UTF-8.

@@ -14,8 +14,8 @@ use gltf::json::{Index, Mesh, Root};
 use nalgebra::{Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
 
 use super::accessor::{Document, find};
-use super::{MeshFault, RawMesh};
-use crate::geometry::error::GltfFault;
+use crate::geometry::error::{GltfFault, MeshFault};
+use crate::geometry::raw::RawMesh;
 
 /// Extensions with these prefixes leave the geometry alone.
 const HARMLESS_EXTENSIONS: [&str; 4] =

@@ -1,6 +1,5 @@
 //! Mesh files. To add a format: write its file here and give it a line in `FORMATS`.
 
-use std::fs;
 use std::io;
 use std::path::Path;
 
@@ -11,6 +10,7 @@ use super::repair::repair;
 use super::report::MeshReport;
 
 mod accessor;
+mod file;
 mod gltf;
 mod obj;
 
@@ -44,19 +44,7 @@ fn read_and_repair(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshRepor
         let supported = FORMATS.iter().map(|(known, _)| *known).collect();
         return Err(MeshFault::UnsupportedExtension { extension, supported });
     };
-    let mut raw = read(path, &read_file(path)?)?;
+    let mut raw = read(path, &file::read(path)?)?;
     raw.scale(metres_per_unit);
     repair(raw)
-}
-
-/// Reads a regular file. A folder, pipe or device is refused, because it may never end.
-fn read_file(path: &Path) -> io::Result<Vec<u8>> {
-    let kind = fs::metadata(path)?;
-    if kind.is_dir() {
-        return Err(io::ErrorKind::IsADirectory.into());
-    }
-    if !kind.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
-    }
-    fs::read(path)
 }

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use nalgebra::Point3;
 
-use super::{MeshFault, RawMesh};
+use crate::geometry::error::MeshFault;
+use crate::geometry::raw::RawMesh;
 
 /// Reads an OBJ file.
 pub(super) fn read(_path: &Path, bytes: &[u8]) -> Result<RawMesh, MeshFault> {

@@ -1,6 +1,6 @@
 //! Matérn kernels (Rasmussen & Williams 2006, Eq. 4.17): surfaces with one or two derivatives.
 
-use super::Radial;
+use super::radial::Radial;
 use crate::math::simd::exp_of_negative;
 
 /// (1 + √3·r)·exp(−√3·r): one derivative.

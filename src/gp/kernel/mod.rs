@@ -1,88 +1,17 @@
 //! Stationary kernels with one length scale per input (automatic relevance determination).
 
 mod matern;
+mod radial;
 mod squared_exponential;
 
 pub use matern::{Matern32, Matern52};
+pub use radial::{Kernel, Radial};
 pub use squared_exponential::SquaredExponential;
 
 use super::observations::NoiseRatio;
-use crate::math::simd::widest;
 use serde::{Deserialize, Serialize};
 
-/// A correlation that depends on the scaled squared distance r² = Σ_d ((a_d − b_d) / l_d)².
-///
-/// A new kernel is one file with this trait and one line in [`KERNELS`].
-pub trait Radial: Send + Sync {
-    /// Correlation c(r²), with c(0) = 1, and its derivative dc/d(r²). Branch-free and
-    /// `#[inline(always)]`, so that loops over it are vectorised.
-    fn correlation_slope(r2: f64) -> (f64, f64);
-
-    /// Whether its surfaces have slopes that vary continuously, so that one slope tells of others
-    /// near by. Then it has [`curvatures`](Self::curvatures).
-    const HAS_SLOPES: bool = false;
-
-    /// The second and third derivative of c with respect to r². The third may stand at 0 for any
-    /// number: it is multiplied by r⁴.
-    #[inline(always)]
-    fn curvatures(_r2: f64) -> (f64, f64) {
-        (0.0, 0.0)
-    }
-}
-
-/// A kernel, many distances at a time.
-pub trait Kernel: Send + Sync {
-    /// Replaces each r² by c(r²).
-    fn correlate(&self, r2: &mut [f64]);
-
-    /// Replaces each r² by c(r²) and writes dc/d(r²) into `slopes`.
-    fn correlate_slope(&self, r2: &mut [f64], slopes: &mut [f64]);
-
-    /// Whether slopes can be observed with it, see [`Radial::HAS_SLOPES`].
-    fn has_slopes(&self) -> bool;
-
-    /// Replaces each r² by c(r²) and writes its first three derivatives with respect to r².
-    fn correlate_derivatives(&self, r2: &mut [f64], derivatives: [&mut [f64]; 3]);
-}
-
-impl<R: Radial> Kernel for R {
-    fn correlate(&self, r2: &mut [f64]) {
-        widest(|| r2.iter_mut().for_each(|r2| *r2 = R::correlation_slope(*r2).0));
-    }
-
-    fn correlate_slope(&self, r2: &mut [f64], slopes: &mut [f64]) {
-        widest(|| {
-            for (r2, slope) in r2.iter_mut().zip(slopes) {
-                (*r2, *slope) = R::correlation_slope(*r2);
-            }
-        });
-    }
-
-    fn has_slopes(&self) -> bool {
-        R::HAS_SLOPES
-    }
-
-    fn correlate_derivatives(&self, r2: &mut [f64], [first, second, third]: [&mut [f64]; 3]) {
-        widest(|| {
-            let derivatives = first.iter_mut().zip(second).zip(third);
-            for (r2, ((first, second), third)) in r2.iter_mut().zip(derivatives) {
-                (*second, *third) = R::curvatures(*r2);
-                (*r2, *first) = R::correlation_slope(*r2);
-            }
-        });
-    }
-}
-
-impl dyn Kernel {
-    /// Prior variance of a slope per length scale, −2·c′(0), in units of the signal's variance.
-    pub fn slope_variance(&self) -> f64 {
-        let mut slope = [0.0];
-        self.correlate_slope(&mut [0.0], &mut slope);
-        -2.0 * slope[0]
-    }
-}
-
-/// Every kernel by the name it has in an experiment file; one line to add one.
+/// Every kernel by name; one line adds one.
 pub const KERNELS: &[(&str, &dyn Kernel)] = &[
     ("squared_exponential", &SquaredExponential),
     ("matern_52", &Matern52),
@@ -112,6 +41,17 @@ pub struct Hyperparameters {
 }
 
 impl Hyperparameters {
+    /// From the noise in units of the signal.
+    pub fn new(signal_sd: f64, length_scales: Vec<f64>, noise: NoiseRatio, mean: f64) -> Self {
+        Self {
+            signal_sd,
+            length_scales,
+            noise_sd: noise.height * signal_sd,
+            slope_noise_sd: noise.slope * signal_sd,
+            mean,
+        }
+    }
+
     /// The noise in units of the signal.
     pub fn noise_ratio(&self) -> NoiseRatio {
         let [height, slope] =

@@ -1,6 +1,6 @@
 //! The squared exponential exp(−r²/2), Eq. 2 of Yi et al. 2016: infinitely smooth surfaces.
 
-use super::Radial;
+use super::radial::Radial;
 use crate::math::simd::exp_of_negative;
 
 /// exp(−r²/2).

@@ -1,10 +1,9 @@
 //! The Gaussian process on data that break others.
 
 use super::case::{Case, Outcome, all, case, hold};
-use crate::gp::fit::SearchBox;
 use crate::gp::kernel::{Hyperparameters, SquaredExponential};
 use crate::gp::posterior::Scratch;
-use crate::gp::{Mean, Observations, Posterior};
+use crate::gp::{Mean, Observations, Posterior, SearchBox};
 use crate::math::optimize;
 use crate::math::optimize::Stop;
 

@@ -1,7 +1,9 @@
-//! Cholesky factor and inverse of small matrices by plain loops over columns: a search factors
-//! them by the thousand, and a blocked algorithm's book-keeping would cost more than its arithmetic.
+//! Unblocked Cholesky factorisation and inversion, loops over whole columns, for small matrices.
+//!
+//! A search factors them by the thousand, and a blocked algorithm's book-keeping would cost more
+//! than its arithmetic.
 
-use super::cholesky::NotPositiveDefinite;
+use super::indefinite::NotPositiveDefinite;
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{MatMut, MatRef};
 use pulp::NullaryFnOnce;
