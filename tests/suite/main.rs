@@ -11,6 +11,8 @@ mod control;
 #[cfg(feature = "mujoco")]
 mod dynamic;
 #[cfg(feature = "nlopt")]
+mod examples;
+#[cfg(feature = "nlopt")]
 mod experiments;
 mod fidelity;
 mod finger;

@@ -1,0 +1,135 @@
+//! A body of one's own under the same explorer: a stage of three slides before a wall.
+//!
+//! Nothing here knows a simulator: this is what an arm's driver looks like. `cargo run --example
+//! own_backend` explores the wall and says how well the belief knows it.
+
+use nalgebra::{Point3, Vector3};
+use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
+use palpate::explore::belief::{Belief, GpSettings};
+use palpate::explore::planner;
+use palpate::explore::planner::PlanningSettings;
+use palpate::explore::probe::servo::Servo;
+use palpate::explore::probe::{Probe, Touch};
+use palpate::math::seed;
+use palpate::robot::arm::Chain;
+use palpate::robot::arm::stage::stage;
+use palpate::robot::{Finger, Robot};
+use palpate::task::touch::TouchSettings;
+use palpate::task::{Task, Zone};
+
+/// A wall that leans: y = 0.1·x + 0.2·z.
+fn wall_y_m(x_m: f64, z_m: f64) -> f64 {
+    0.1 * x_m + 0.2 * z_m
+}
+
+/// Spring of the wall against the fingertip.
+const STIFFNESS_N_M: f64 = 2000.0;
+
+/// Slides that move as they are told, carrying a ball that feels the wall.
+pub struct Slides {
+    chain: Chain,
+    radius_m: f64,
+    capabilities: Capabilities,
+    reading: Reading,
+}
+
+impl Slides {
+    /// At the start of `robot`, whose chain is a stage.
+    pub fn new(robot: &Robot) -> Self {
+        let chain = robot.chain.clone();
+        let capabilities = Capabilities::of(&chain, 0.01);
+        let (radius_m, reading) = (robot.finger.radius_m, Reading::default());
+        Self { chain, radius_m, capabilities, reading }
+    }
+
+    /// What the ball feels with its centre at the stage's position.
+    fn feel(&self) -> Option<IdealContact> {
+        let &[x, y, z] = self.reading.q.as_slice() else { return None };
+        // The wall's unit normal, towards the finger.
+        let normal_w = Vector3::new(-0.1, 1.0, -0.2).normalize();
+        let gap_m = (y - wall_y_m(x, z)) * normal_w.y - self.radius_m;
+        let x_wt = self.chain.forward(&self.chain.joints_from(&self.reading.q)?);
+        let p_wc = Point3::new(x, y, z) - normal_w * (self.radius_m + gap_m);
+        (gap_m < 0.0).then(|| IdealContact {
+            p_tc: x_wt.inverse_transform_point(&p_wc),
+            normal_t: x_wt.inverse_transform_vector(&normal_w),
+            force_n: -gap_m * STIFFNESS_N_M,
+        })
+    }
+}
+
+impl Backend for Slides {
+    fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    fn reset(&mut self, _seed: u64) -> Result<&Reading, Fault> {
+        self.reading = Reading { q: self.chain.start().into(), ..Reading::default() };
+        self.reading.qdot = vec![0.0; self.reading.q.len()];
+        Ok(&self.reading)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        let qdot = self.capabilities.accept(command)?;
+        for (q, qdot) in self.reading.q.iter_mut().zip(qdot.iter()) {
+            *q += qdot * self.capabilities.period_s;
+        }
+        self.reading.qdot.clone_from(&command.qdot);
+        self.reading.applied.clone_from(command);
+        self.reading.time_s += self.capabilities.period_s;
+        self.reading.ideal = self.feel();
+        Ok(&self.reading)
+    }
+}
+
+/// What is explored, and with what.
+pub fn task_and_robot() -> Result<(Task, Robot), palpate::task::TaskError> {
+    let finger = Finger { length_m: 0.0, ..Finger::default() };
+    let mut zone = Zone::new([-0.05, 0.05], Some([-0.05, 0.05]));
+    // Depths run along the approach: the wall is somewhere between y = 0.03 and y = −0.03.
+    zone.depth_m = Some([-0.03, 0.03]);
+    let task = Task::new(zone, TouchSettings::default(), &finger)?;
+    let chain = stage(Point3::new(0.0, 0.08, 0.0), finger.r_at());
+    Ok((task, Robot { chain, finger, is_soft: false }))
+}
+
+/// Explores with as many touches; the belief, and the largest error of a contact.
+pub fn explore(touches: usize) -> Result<(Belief, f64), Box<dyn std::error::Error>> {
+    let (task, robot) = task_and_robot()?;
+    let body = Slides::new(&robot);
+    let mut servo = Servo::new(robot, task.touch().clone(), Box::new(body), 0)?;
+    let mut belief = Belief::new(task.zone().clone(), GpSettings::default());
+    let active = planner::by_name("active").ok_or("no such planner")?;
+    let random = seed::stream(1, 0, active.name);
+    let mut planner = (active.make)(task.zone(), &PlanningSettings::default(), random);
+    let mut worst_m: f64 = 0.0;
+    for count in 0..touches {
+        let target = match count {
+            0 => task.zone().at(&[0.3, 0.6]),
+            _ => planner.plan(&belief).target,
+        };
+        let touch = servo.touch(&task.approach(&target))?;
+        if let Touch::Contact(contact) = &touch {
+            let p_w = contact.p_wc;
+            worst_m = worst_m.max((p_w.y - wall_y_m(p_w.x, p_w.z)).abs());
+        }
+        belief.observe(&target, &touch);
+        belief.refit()?;
+    }
+    Ok((belief, worst_m))
+}
+
+#[allow(dead_code)]
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let (belief, worst_m) = explore(15)?;
+    let surface = belief.surface().ok_or("no belief")?;
+    let mut scratch = Default::default();
+    println!("15 touches, contacts off the wall by {:.4} mm at most", 1e3 * worst_m);
+    for place in [[-0.04, -0.04], [0.0, 0.0], [0.04, 0.02]] {
+        let (mean_m, variance) =
+            (surface.mean(&place, &mut scratch), surface.variance(&place, &mut scratch));
+        let error_m = mean_m - wall_y_m(place[0], place[1]);
+        println!("{place:?}: error {:.3} mm, sd {:.3} mm", 1e3 * error_m, 1e3 * variance.sqrt());
+    }
+    Ok(())
+}
