@@ -9,6 +9,7 @@ mod broken;
 mod control;
 #[cfg(feature = "mujoco")]
 mod dynamic;
+mod effects;
 #[cfg(feature = "nlopt")]
 mod experiments;
 mod fidelity;

@@ -1,7 +1,7 @@
 //! The shell of `[flex]` as triangles: where its nodes are, and what their motion is at the points of
 //! the skin over which electrodes sense.
 
-use super::flex::FlexEffect;
+use super::effects::flex::FlexEffect;
 use super::profile::Profile;
 use super::samples::SkinSample;
 use nalgebra::{Point3, UnitVector3, Vector3};

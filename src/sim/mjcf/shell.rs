@@ -7,7 +7,7 @@
 //! convex hull.
 
 use crate::sim::Environment;
-use crate::sim::finger::flex::FlexEffect;
+use crate::sim::finger::effects::flex::FlexEffect;
 use crate::sim::finger::lattice::{Lattice, Node};
 use std::fmt::Write;
 

@@ -157,8 +157,10 @@ fn release(steps: f64, _: f64) -> Outcome {
 /// Pressed in, dragged aside and back, and released: friction and skin take work, never give it.
 fn friction_loop(coefficient: f64, period_s: f64) -> Outcome {
     let mut effects = effects();
-    effects.friction =
-        Some(crate::sim::finger::friction::FrictionEffect { coefficient, ..Default::default() });
+    effects.friction = Some(crate::sim::finger::effects::friction::FrictionEffect {
+        coefficient,
+        ..Default::default()
+    });
     on_bench(&effects, |bench| {
         let speed_m_s = 0.02;
         let corners: [(f64, f64); 6] =

@@ -8,7 +8,7 @@ use crate::explore::probe::{Contact, Touch};
 use crate::robot::finger::Finger;
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
-use crate::sim::finger::timing::TimingEffect;
+use crate::sim::finger::effects::timing::TimingEffect;
 use crate::sim::scene::Body;
 use crate::sim::simulator::Simulator;
 use crate::study::fidelity::reference_load::quiet;

@@ -1,5 +1,7 @@
 //! A skin of finite elements: the settings of a shell that MuJoCo bends and stretches.
 
+use super::effect::{Effect, Needs};
+use super::switch::Switch;
 use crate::config::{Checked, Rules};
 use serde::{Deserialize, Serialize};
 
@@ -57,5 +59,23 @@ impl Checked for FlexEffect {
         rules.number("damping_s", self.damping_s, 0.0..=0.1);
         rules.number("mass_kg", self.mass_kg, 1e-3..=10.0);
         rules.number("step_s", self.step_s, 1e-5..=2e-3);
+    }
+}
+
+impl Effect for FlexEffect {
+    type State = ();
+
+    const NEEDS: Needs = Needs::Nothing;
+
+    fn start(&self) {}
+
+    /// `[skin]` is the skin of a finger with everything.
+    fn complete() -> Option<Self> {
+        None
+    }
+
+    /// None: one skin instead of the other is another fidelity, not an effect switched on.
+    fn switches() -> Vec<Switch<Option<Self>>> {
+        Vec::new()
     }
 }

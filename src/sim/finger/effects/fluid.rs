@@ -1,8 +1,10 @@
 //! What the pressure sensor makes of the fluid: PDC (static) and PAC (vibration).
 
-use super::noise::normal;
+use super::effect::Effect;
+use super::switch::Switch;
 use crate::config::{Checked, Rules};
 use crate::robot::finger::frame::FULL_SCALE_COUNTS;
+use crate::sim::finger::noise::normal;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -56,6 +58,29 @@ impl Checked for FluidEffect {
     }
 }
 
+impl Effect for FluidEffect {
+    type State = ();
+
+    const FILLS_FRAMES: bool = true;
+
+    fn start(&self) {}
+
+    fn complete() -> Option<Self> {
+        Some(Self { vibration: Some(VibrationEffect::default()), ..Self::default() })
+    }
+
+    /// All of it, and its vibration, which brings the fluid with it.
+    fn switches() -> Vec<Switch<Option<Self>>> {
+        let is_on = |fluid: &Option<Self>| fluid.as_ref().is_some_and(|f| f.vibration.is_some());
+        let set = |fluid: &mut Option<Self>, on| match (fluid, on) {
+            (fluid, true) => fluid.get_or_insert_default().vibration = Some(Default::default()),
+            (Some(fluid), false) => fluid.vibration = None,
+            (None, false) => {}
+        };
+        vec![Switch::table(), Switch::new("vibration", is_on, set)]
+    }
+}
+
 /// Table `[fluid.vibration]`: the amplified, band-passed pressure at 2.2 kHz.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -89,7 +114,7 @@ impl Checked for VibrationEffect {
 
 impl FluidEffect {
     /// PDC at a pressure above rest.
-    pub(super) fn pdc_counts(&self, pressure_pa: f64, rng: &mut impl Rng) -> f64 {
+    pub fn pdc_counts(&self, pressure_pa: f64, rng: &mut impl Rng) -> f64 {
         self.convert(self.baseline_counts + pressure_pa / PDC_PA, self.noise_counts, rng)
     }
 
@@ -110,7 +135,7 @@ pub struct Filter {
 
 impl Filter {
     /// PAC `dt_s` after the last one.
-    pub(super) fn pac_counts(
+    pub fn pac_counts(
         &mut self,
         (fluid, vibration): (&FluidEffect, &VibrationEffect),
         pressure_pa: f64,
