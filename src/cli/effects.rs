@@ -9,7 +9,7 @@ use crate::sim::Scene;
 use crate::sim::scene::Body;
 use crate::study::effects::overhead::overheads;
 use crate::study::effects::{Baseline, Budget, Change, switches};
-use crate::study::fidelity::row::Spread;
+use crate::study::fidelity::spread::Spread;
 use crate::study::fidelity::touches::targets;
 use anyhow::bail;
 use std::path::PathBuf;

@@ -109,7 +109,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Makes a world ready for bodies, and says on standard error what is not simulated as its scene asks.
+/// Makes a world ready for bodies, and says on standard error what is not simulated as its scene
+/// asks.
 fn simulator(environment: &Arc<Environment>) -> anyhow::Result<Simulator> {
     let simulator = Simulator::new(Arc::clone(environment))?;
     simulator.notice().iter().for_each(|notice| eprintln!("note: {notice}"));

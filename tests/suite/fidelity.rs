@@ -5,11 +5,11 @@ use palpate::sim::finger::Effects;
 use palpate::sim::{Environment, Scene};
 use palpate::study::fidelity::ladder::{DIAGONAL, RUNGS, is_diagonal};
 use palpate::study::fidelity::order;
-#[cfg(feature = "mujoco")]
-use palpate::study::fidelity::press;
-use palpate::study::fidelity::reference_load::quiet;
-use palpate::study::fidelity::row::Spread;
+use palpate::study::fidelity::reference_load::noise_free;
 use palpate::study::fidelity::rung::Senses;
+use palpate::study::fidelity::spread::Spread;
+#[cfg(feature = "mujoco")]
+use palpate::study::fidelity::step_in_contact;
 use palpate::study::fidelity::tolerance::Tolerance;
 use palpate::study::fidelity::touches::{targets, touch_all};
 use std::collections::BTreeSet;
@@ -44,22 +44,22 @@ fn the_error_falls_with_the_resolution_as_it_should() {
     let targets = targets(&scene, 6, 0);
     let order = order::in_time_step(&scene, &targets, &mut || true).unwrap().unwrap();
     assert!((order.observed - order.expected).abs() < 0.4, "{order:?}");
-    let environment = Arc::new(Environment::build(quiet(&scene)).unwrap());
+    let environment = Arc::new(Environment::build(noise_free(&scene)).unwrap());
     let touches = touch_all(&environment, &targets, 0, &mut || true).unwrap().unwrap();
-    let poses: Vec<_> = touches.felt.iter().flatten().map(|felt| felt.motion).collect();
+    let poses: Vec<_> = touches.loads.iter().flatten().map(|load| load.motion).collect();
     assert_eq!(poses.len(), targets.len());
     let order = order::in_samples(&scene, &poses).unwrap();
     assert!((order.observed - order.expected).abs() < 0.5, "{order:?}");
 }
 
-/// Explicit in the skin's force, semi-implicit in the joints: of first order. The bar tells it from an
-/// order of a half and of two.
+/// Explicit in the skin's force, semi-implicit in the joints: of first order. The bar tells it from
+/// an order of a half and of two.
 #[test]
 #[cfg(feature = "mujoco")]
 fn with_masses_the_error_in_contact_falls_with_the_step() {
     for name in ["container", "bird"] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}_finger.toml"));
-        let order = press::in_step(&Scene::load(&path, &[]).unwrap()).unwrap().unwrap();
+        let order = step_in_contact::in_step(&Scene::load(&path, &[]).unwrap()).unwrap().unwrap();
         println!("{order:?}");
         assert!((order.observed - order.expected).abs() < 0.3, "{name}: {order:?}");
         assert!(order.errors.is_sorted_by(|a, b| a.1 > b.1), "{name}: {order:?}");

@@ -13,7 +13,8 @@ use crate::sim::finger::effects::switch::Switch;
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use crate::study::fidelity::reference_load::ReferenceLoad;
-use crate::study::fidelity::row::{Spread, electrodes_apart};
+use crate::study::fidelity::rung_result::electrode_rms_counts;
+use crate::study::fidelity::spread::Spread;
 use crate::study::fidelity::touches::{MeasureError, Touches, touch_all};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -96,9 +97,9 @@ impl Baseline {
         let shifts: Vec<f64> = (self.touches.contacts.iter().zip(contacts))
             .filter_map(|(a, b)| Some((a.as_ref()?.p_wc - b.as_ref()?.p_wc).norm()))
             .collect();
-        let felt = |apart: &dyn Fn(&ReferenceLoad, &ReferenceLoad) -> Option<f64>| {
-            let felt = touches.iter().flat_map(|touches| &touches.felt);
-            let values: Vec<f64> = (self.touches.felt.iter().zip(felt))
+        let spread = |apart: &dyn Fn(&ReferenceLoad, &ReferenceLoad) -> Option<f64>| {
+            let loads = touches.iter().flat_map(|touches| &touches.loads);
+            let values: Vec<f64> = (self.touches.loads.iter().zip(loads))
                 .filter_map(|(a, b)| apart(a.as_ref()?, b.as_ref()?))
                 .collect();
             Spread::of(&values)
@@ -112,8 +113,8 @@ impl Baseline {
             name: switch.name.clone(),
             is_on,
             shift_m: Spread::of(&shifts),
-            force_n: felt(&|a, b| Some((a.force_n - b.force_n).abs())),
-            electrode_counts: felt(&electrodes_apart),
+            force_n: spread(&|a, b| Some((a.force_n - b.force_n).abs())),
+            electrode_counts: spread(&electrode_rms_counts),
             time_ratio: time_ratio(without, with, &self.targets, budget.pairs)?,
             state_bytes: state_bytes(with) - state_bytes(without),
             runs: runs(&switch.name, without, &self.targets)?
@@ -126,7 +127,7 @@ impl Baseline {
 
     /// How the finger stood at the contacts.
     pub fn poses(&self) -> Vec<TipMotion> {
-        self.touches.felt.iter().flatten().map(|felt| felt.motion).collect()
+        self.touches.loads.iter().flatten().map(|load| load.motion).collect()
     }
 }
 

@@ -5,8 +5,8 @@ use super::switch::Switch;
 use crate::config::{Checked, Rules};
 use serde::{Deserialize, Serialize};
 
-/// Table `[flex]`: the skin as a shell of triangles over the pad, clamped along the nail and behind,
-/// instead of the columns of `[skin]`; the expensive reference.
+/// Table `[flex]`: the skin as a shell of triangles over the pad, clamped along the nail and
+/// behind, instead of the columns of `[skin]`; the expensive reference.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FlexEffect {
@@ -29,10 +29,10 @@ pub struct FlexEffect {
 }
 
 impl Default for FlexEffect {
-    /// Modulus and Poisson's ratio: NVlabs/biotac_sim. Core: that of `[skin]`, 1.4e9, in series with
-    /// the modulus over 1.6 mm of skin. The rest is chosen. Mass: some fifty times the silicone's,
-    /// which a skin at rest does not feel, while MuJoCo's contacts are the stiffer the heavier it is.
-    /// Damping: as much as lets a press come to rest within a tenth of a second.
+    /// Modulus and Poisson's ratio: NVlabs/biotac_sim. Core: that of `[skin]`, 1.4e9, in series
+    /// with the modulus over 1.6 mm of skin. The rest is chosen. Mass: some fifty times the
+    /// silicone's, which a skin at rest does not feel, while MuJoCo's contacts are the stiffer the
+    /// heavier it is. Damping: as much as lets a press come to rest within a tenth of a second.
     fn default() -> Self {
         Self {
             along: 12,

@@ -33,9 +33,10 @@ pub struct FluidEffect {
 }
 
 impl Default for FluidEffect {
-    /// Stiffness: chosen, 10 kPa compress hoses and bubbles by 1 mm³, little beside the 100 mm³ that
-    /// 2 N displace. Baseline: chosen amid 1326 to 2695 (recordings of RuihanGao/BioTacSP_setup and
-    /// I-Quotient-Robotics/syntouch_btd_decode), noise from the same: up to half a count.
+    /// Stiffness: chosen, 10 kPa compress hoses and bubbles by 1 mm³, little beside the 100 mm³
+    /// that 2 N displace. Baseline: chosen amid 1326 to 2695 (recordings of
+    /// RuihanGao/BioTacSP_setup and I-Quotient-Robotics/syntouch_btd_decode), noise from the same:
+    /// up to half a count.
     fn default() -> Self {
         Self {
             stiffness_pa_m3: 1e13,

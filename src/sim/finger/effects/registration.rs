@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-/// Table `[registration]`: errors that stay through a trial, drawn anew for each. Forward kinematics
-/// and the truth know nothing of them.
+/// Table `[registration]`: errors that stay through a trial, drawn anew for each. Forward
+/// kinematics and the truth know nothing of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegistrationEffect {

@@ -47,8 +47,8 @@ pub struct SkinEffect {
 }
 
 impl Default for SkinEffect {
-    /// Modulus E: NVlabs/biotac_sim. Inflation: that of a thin-walled tube, E t / R², with the skin's
-    /// thickness t = 1.6 mm and the sides' radius R = 7 mm. Flattening and core: fitted by
+    /// Modulus E: NVlabs/biotac_sim. Inflation: that of a thin-walled tube, E t / R², with the
+    /// skin's thickness t = 1.6 mm and the sides' radius R = 7 mm. Flattening and core: fitted by
     /// `calibration` to the MiaoLi/syntouchcontact recordings of sensor F2 on a flat plate. The fit
     /// is flat: half or twice a value costs a few counts.
     fn default() -> Self {

@@ -41,11 +41,11 @@ pub struct ThermalEffect {
 }
 
 impl Default for ThermalEffect {
-    /// Temperatures: within the 25.7 to 35.3 °C a warming BioTac showed (mattmongeon's BioTac page);
-    /// the object's: a room. Noise and TAC's baseline: I-Quotient-Robotics/syntouch_btd_decode and
-    /// RuihanGao/BioTacSP_setup recordings. Time constant and area: chosen so that a contact
-    /// of 100 mm² moves TAC by the recorded 57 counts. Conductivity: 2 % per kelvin, as salt
-    /// water (chosen).
+    /// Temperatures: within the 25.7 to 35.3 °C a warming BioTac showed (mattmongeon's BioTac
+    /// page); the object's: a room. Noise and TAC's baseline:
+    /// I-Quotient-Robotics/syntouch_btd_decode and RuihanGao/BioTacSP_setup recordings. Time
+    /// constant and area: chosen so that a contact of 100 mm² moves TAC by the recorded 57 counts.
+    /// Conductivity: 2 % per kelvin, as salt water (chosen).
     fn default() -> Self {
         Self {
             start_c: 31.0,
