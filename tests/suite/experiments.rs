@@ -113,8 +113,8 @@ fn targets_past_the_object_are_missed_once_and_not_asked_for_again() {
     }
 }
 
-/// At most two fifths of the way of `active` for at most a fifth more touches to equal error, with the
-/// same settings on toy and container. No target is asked for twice.
+/// At most two fifths of the way of `active` for at most a fifth more touches to equal error, with
+/// the same settings on toy and container. No target is asked for twice.
 #[test]
 fn travel_saves_three_fifths_of_the_way_for_a_fifth_more_touches() {
     let both = "planners=[\"active\", \"travel\"]";
@@ -132,8 +132,8 @@ fn travel_saves_three_fifths_of_the_way_for_a_fifth_more_touches() {
     }
 }
 
-/// The body's time is told where a touch is motion: more after every touch, the same for every planner
-/// up to the last touch that they share.
+/// The body's time is told where a touch is motion: more after every touch, the same for every
+/// planner up to the last touch that they share.
 #[test]
 fn a_body_that_moves_tells_its_time() {
     let sets = ["trials=1", "touches=7", "planners=[\"active\", \"random\"]"];
