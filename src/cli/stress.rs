@@ -41,7 +41,7 @@ pub(super) struct Args {
 
 /// A line of `stress.csv`.
 #[derive(Serialize)]
-struct Line<'a> {
+struct VerdictRecord<'a> {
     case: &'a str,
     severity: f64,
     unit: &'a str,
@@ -145,7 +145,7 @@ fn report(ran: &[Ran], args: &Args) -> anyhow::Result<()> {
     table.extend(ran.iter().map(cells));
     let mut text = aligned(&table);
     for line in lines.iter().filter(|line| !line.explained) {
-        let Line { case, severity, unit, axis_s, outcome, words, .. } = line;
+        let VerdictRecord { case, severity, unit, axis_s, outcome, words, .. } = line;
         let severity = short(*severity);
         text += &format!(
             "\nUNEXPLAINED {case} at {severity} {unit}, {} ms: {outcome}: {words}",
@@ -156,9 +156,9 @@ fn report(ran: &[Ran], args: &Args) -> anyhow::Result<()> {
     print(&format!("table and map in {}", args.out.display()))
 }
 
-fn line<'a>(case: &'a Case, verdict: &'a Verdict) -> Line<'a> {
+fn line<'a>(case: &'a Case, verdict: &'a Verdict) -> VerdictRecord<'a> {
     let (outcome, words) = described(&verdict.outcome);
-    Line {
+    VerdictRecord {
         case: case.name,
         severity: case.severities[verdict.rank],
         unit: case.severity,
