@@ -4,7 +4,7 @@ use super::columns::{aligned, cell};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::{Ending, print};
 use crate::experiment::statistics::Paired;
-use crate::report::paired::with_interval;
+use crate::report::number::with_interval;
 use crate::sim::Scene;
 use crate::sim::scene::Body;
 use crate::study::effects::overhead::overheads;

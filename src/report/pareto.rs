@@ -1,6 +1,6 @@
 //! What accuracy costs: errors over wall time, and how they fall with the resolution.
 
-use super::axes::{Axis, Panel, Sample, legend};
+use super::axes::{Axis, Panel, Swatch, legend};
 use super::canvas::{Anchor, Area, Canvas};
 use super::style;
 use super::style::{FAINT_INK, INK, PAPER, SMALL_PX};
@@ -36,8 +36,8 @@ const TOPS_PX: [f64; 2] = [66.0, 420.0];
 pub fn draw(ladder: &LadderComparison) -> Option<String> {
     let mut canvas = Canvas::new(LEFT_PX + 3.0 * STEP_PX - 60.0, TOPS_PX[1] + PANEL_PX.1 + 54.0);
     let entries: Vec<_> = (FAMILIES.iter())
-        .map(|(_, colour, words)| (Sample::Circle(point(colour)), *words))
-        .chain([(Sample::Line(style::dashed(INK, 1.3, "5 3")), "front")])
+        .map(|(_, colour, words)| (Swatch::Circle(point(colour)), *words))
+        .chain([(Swatch::Line(style::dashed(INK, 1.3, "5 3")), "front")])
         .collect();
     legend(&mut canvas, [LEFT_PX, 20.0], &entries);
     let measures: [(RungError, f64, &str); 3] = [
