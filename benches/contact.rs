@@ -15,7 +15,7 @@ use palpate::sim::mujoco::Models;
 use palpate::sim::probe::rest;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
-use palpate::study::fidelity::row::Spread;
+use palpate::study::fidelity::spread::Spread;
 use palpate::study::fidelity::touches;
 use std::path::Path;
 use std::sync::Arc;

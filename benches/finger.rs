@@ -6,7 +6,7 @@ use palpate::geometry::sweep::Capsule;
 use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
 use palpate::sim::environment::Shape;
-use palpate::sim::finger::skin::SkinEffect;
+use palpate::sim::finger::effects::skin::SkinEffect;
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 use palpate::sim::{Environment, Scene};
 use std::hint::black_box;

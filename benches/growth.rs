@@ -9,7 +9,7 @@ use common::{KERNEL, hyperparameters, search_box, touches};
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::posterior::Scratch;
 use palpate::gp::{Mean, Posterior};
-use palpate::report::axes::{Axis, Panel, Sample, legend};
+use palpate::report::axes::{Axis, Panel, Swatch, legend};
 use palpate::report::canvas::{Area, Canvas};
 use palpate::report::{png, style};
 use std::hint::black_box;
@@ -136,7 +136,7 @@ fn draw(curves: &[Curve]) -> Option<String> {
     for curve in curves {
         let stroke = style::stroke(curve.colour, 2.0);
         panel.curve(&mut canvas, &curve.seconds, &stroke);
-        entries.push((Sample::Line(stroke), curve.name));
+        entries.push((Swatch::Line(stroke), curve.name));
         if let Some((last, seconds)) = curve.seconds.last() {
             let law = |(n, _): &(f64, f64)| (*n, seconds * (n / last).powf(curve.expected));
             let upper = curve.seconds.iter().filter(|(n, _)| *n >= last / 10.0);

@@ -3,7 +3,7 @@
 use super::{Ending, print};
 use crate::sim::finger::calibration::{Free, Model, Residual, fit, residual};
 use crate::sim::finger::effects::Effects;
-use crate::sim::finger::fluid::FluidEffect;
+use crate::sim::finger::effects::fluid::FluidEffect;
 use crate::sim::finger::plate::{Attitude, Recordings};
 use anyhow::Context;
 use std::path::PathBuf;

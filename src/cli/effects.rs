@@ -4,12 +4,12 @@ use super::columns::{aligned, cell};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::{Ending, print};
 use crate::experiment::statistics::Paired;
-use crate::report::paired::with_interval;
+use crate::report::number::with_interval;
 use crate::sim::Scene;
 use crate::sim::scene::Body;
-use crate::study::effects::overhead::bare_ratio;
-use crate::study::effects::{Base, Budget, Change, SWITCHES};
-use crate::study::fidelity::row::Spread;
+use crate::study::effects::overhead::overheads;
+use crate::study::effects::{Baseline, Budget, Change, switches};
+use crate::study::fidelity::spread::Spread;
 use crate::study::fidelity::touches::targets;
 use anyhow::bail;
 use std::path::PathBuf;
@@ -56,19 +56,20 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         touches: args.trial_touches.into(),
     };
     let stop = stop_on_interrupt("effect")?;
-    let bar = progress_bar("effects", "effects", SWITCHES.len() as u64 + 1, 0);
+    let switches = switches();
+    let bar = progress_bar("effects", "effects", switches.len() as u64 + 1, 0);
     let mut go_on = || {
         step(&bar);
         !stop.load(Ordering::Relaxed)
     };
     let targets = targets(&scene, args.touches.into(), 0);
-    let Some(base) = Base::new(&scene, targets, budget, &mut go_on)? else {
+    let Some(baseline) = Baseline::new(&scene, targets, budget, &mut go_on)? else {
         return Ok(Ending::Interrupted);
     };
     let mut lines = vec![HEADER.map(String::from)];
     let mut finished = true;
-    for switch in SWITCHES {
-        lines.push(cells(&base.change(switch, budget)?));
+    for switch in &switches {
+        lines.push(cells(&baseline.change(switch, budget)?));
         if !go_on() {
             finished = false;
             break;
@@ -76,18 +77,18 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     }
     bar.finish_and_clear();
     let mut text = aligned(&lines);
-    if let Some((ratio, [low, high])) = bare_ratio(&scene, &base.poses(), args.pairs.into())? {
-        let [ratio, low, high] = [ratio, low, high].map(|ratio| 100.0 * (ratio - 1.0));
-        text += &format!(
-            "\ntime of a finger with every effect off but its skin, against the skin alone: \
-             {ratio:+.2} % [{low:+.2}, {high:+.2}]\n"
-        );
+    if let Some(ratios) = overheads(&scene, &baseline.poses(), args.pairs.into())? {
+        text += "\ntime of a finger with every effect off, against a twin without code for them:\n";
+        for (kept, (ratio, interval)) in ["but its skin", "but skin and fluid"].iter().zip(ratios) {
+            let [ratio, low, high] = [ratio, interval[0], interval[1]].map(|r| 100.0 * (r - 1.0));
+            text += &format!("  {kept:<18} {ratio:+.2} % [{low:+.2}, {high:+.2}]\n");
+        }
     }
     print(&text)?;
     Ok(if finished { Ending::Done } else { Ending::Interrupted })
 }
 
-const HEADER: [&str; 11] = [
+const HEADER: [&str; 10] = [
     "effect",
     "here",
     "contact moves mm: mean",
@@ -95,27 +96,22 @@ const HEADER: [&str; 11] = [
     "force N",
     "electrodes counts",
     "time of a touch",
-    "off costs",
     "state bytes",
     "runs a touch off, on",
     "active - random RMSE mm off; on",
 ];
 
-fn cells(change: &Change) -> [String; 11] {
+fn cells(change: &Change) -> [String; 10] {
     let mean = |spread: Option<Spread>| spread.map(|spread| spread.mean);
     let verdicts = change.verdict.map(verdict);
     [
-        change.name.into(),
+        change.name.clone(),
         if change.is_on { "on" } else { "off" }.into(),
         cell(mean(change.shift_m).map(|m| 1e3 * m), 3),
         cell(change.shift_m.map(|spread| 1e3 * spread.p95), 3),
         cell(mean(change.force_n), 4),
         cell(mean(change.electrode_counts), 1),
         change.time_ratio.map_or("-".into(), |ratio| format!("{:+.1} %", 100.0 * (ratio - 1.0))),
-        change.off_ratio.map_or("-".into(), |(ratio, [low, high])| {
-            let [ratio, low, high] = [ratio, low, high].map(|ratio| 100.0 * (ratio - 1.0));
-            format!("{ratio:+.2} % [{low:+.2}, {high:+.2}]")
-        }),
         format!("{:+}", change.state_bytes),
         change.runs.map_or("-".into(), |[off, on]| format!("{off}, {on}")),
         verdicts.join("; "),

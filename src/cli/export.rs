@@ -1,7 +1,7 @@
 //! `palpate export`.
 
 use super::{Ending, print};
-use crate::experiment::experiment::ReportSettings;
+use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
 use crate::gp::posterior::Scratch;
 use crate::report::points::Points;

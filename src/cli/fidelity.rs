@@ -7,10 +7,11 @@ use crate::experiment::store::write_whole;
 use crate::report::pareto;
 use crate::sim::Scene;
 use crate::study::fidelity::comparison;
-use crate::study::fidelity::comparison::{Climb, climb};
+use crate::study::fidelity::comparison::{LadderComparison, compare_rungs};
 use crate::study::fidelity::ladder::is_reference;
-use crate::study::fidelity::order::{Order, Step};
-use crate::study::fidelity::row::{Line, Row, Spread};
+use crate::study::fidelity::order::{Order, OrderRecord};
+use crate::study::fidelity::rung_result::{RungRecord, RungResult};
+use crate::study::fidelity::spread::Spread;
 use crate::study::fidelity::tolerance::Tolerance;
 use anyhow::{Context, bail};
 use std::path::{Path, PathBuf};
@@ -57,37 +58,37 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let count = usize::from(args.touches);
     let stop = stop_on_interrupt("touches")?;
     let bar = progress_bar("fidelity", "touches", comparison::pieces(count) as u64, 0);
-    let climb = climb(&scene, count, args.seed, &mut || {
+    let ladder = compare_rungs(&scene, count, args.seed, &mut || {
         step(&bar);
         !stop.load(Ordering::Relaxed)
     })?;
     bar.finish_and_clear();
-    let lines: Vec<Line> = climb.rows.iter().map(Line::from).collect();
+    let lines: Vec<RungRecord> = ladder.rows.iter().map(RungRecord::from).collect();
     write_csv(&out.join("fidelity.csv"), &lines)?;
-    let steps: Vec<Step> = climb.orders.iter().flat_map(Order::steps).collect();
-    write_csv(&out.join("orders.csv"), &steps)?;
-    if let Some(svg) = pareto::draw(&climb) {
+    let records: Vec<OrderRecord> = ladder.orders.iter().flat_map(Order::records).collect();
+    write_csv(&out.join("orders.csv"), &records)?;
+    if let Some(svg) = pareto::draw(&ladder) {
         write_figure(&out.join("fidelity"), &svg)?;
     }
-    print(&described(&climb))?;
+    print(&described(&ladder))?;
     print(&format!("tables and figure in {}", out.display()))?;
-    if !climb.finished {
+    if !ladder.finished {
         return Ok(Ending::Interrupted);
     }
     match args.tolerance {
-        Some(tolerance) => choose(&scene, &climb, tolerance, &out),
+        Some(tolerance) => choose(&scene, &ladder, tolerance, &out),
         None => Ok(Ending::Done),
     }
 }
 
 fn choose(
     scene: &Scene,
-    climb: &Climb,
+    ladder: &LadderComparison,
     tolerance: Tolerance,
     out: &Path,
 ) -> anyhow::Result<Ending> {
-    let Some(row) = tolerance.cheapest(&climb.rows) else {
-        let least = tolerance.least(&climb.rows);
+    let Some(row) = tolerance.cheapest(&ladder.rows) else {
+        let least = tolerance.least(&ladder.rows);
         bail!(
             "no rung keeps within {tolerance}: 95 % of the touches of the best lie within {}",
             cell(least, 4)
@@ -119,12 +120,12 @@ const HEADER: [&str; 11] = [
     "x real time",
 ];
 
-fn described(climb: &Climb) -> String {
+fn described(ladder: &LadderComparison) -> String {
     let mut lines = vec![HEADER.map(String::from)];
-    lines.extend(climb.rows.iter().map(cells));
+    lines.extend(ladder.rows.iter().map(cells));
     let mut text = aligned(&lines);
     text += "\nTowards the reference, mean change of the force (N) and of the contact (mm):\n";
-    for row in climb.diagonal() {
+    for row in ladder.diagonal() {
         let [force, contact] = [row.force_n, row.off_reference_m].map(|s| s.map(|s| s.mean));
         let words = match is_reference(&row.rung) {
             true => "the reference".into(),
@@ -132,11 +133,11 @@ fn described(climb: &Climb) -> String {
         };
         text += &format!("  {:<32} {words}\n", row.rung.name());
     }
-    if climb.finished {
-        let words = if climb.is_monotone() { "shrinks" } else { "does NOT shrink" };
+    if ladder.finished {
+        let words = if ladder.is_monotone() { "shrinks" } else { "does NOT shrink" };
         text += &format!("  it {words} at every step\n");
     }
-    for order in &climb.orders {
+    for order in &ladder.orders {
         text += &format!(
             "order of convergence in the {}: {:.2} observed, {} expected\n",
             order.name, order.observed, order.expected
@@ -145,7 +146,7 @@ fn described(climb: &Climb) -> String {
     text
 }
 
-fn cells(row: &Row) -> [String; 11] {
+fn cells(row: &RungResult) -> [String; 11] {
     let mean = |spread: Option<Spread>, unit: f64| spread.map(|spread| spread.mean / unit);
     let p95 = |spread: Option<Spread>, unit: f64| spread.map(|spread| spread.p95 / unit);
     [

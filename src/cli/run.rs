@@ -2,11 +2,11 @@
 
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::{Ending, print, simulation};
+use crate::experiment::analysis::Analysis;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner;
 use crate::experiment::store::{Manifest, Run, RunFolder};
 use crate::report;
-use crate::report::Beside;
 use anyhow::Context;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -17,7 +17,10 @@ Examples:
   palpate run experiments/toy.toml --out runs/noisy --set gp.noise='[0.01, 1]' --set trials=200
   palpate run runs/toy/resolved.toml --out runs/again    the same run again, to the byte
 
-Press Ctrl-C to stop after the trials in hand; the same command continues where it stopped.";
+Press Ctrl-C to stop after the trials in hand; the same command continues where it stopped.
+On a finished run, more trials or other planners are run beside those that are there, and trials or
+planners that are no longer listed are kept, but not shown; `question` and `report.…` only draw it
+again. Whatever else is changed wants another folder (--out) or a new start (--fresh).";
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -58,19 +61,17 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
             step(&bar)
         })?;
     bar.finish_and_clear();
-    if count > 0 {
-        folder.sort(experiment)?;
-    }
+    folder.sort(experiment)?;
 
     let run = Run::read(&path)?;
     let finished = run.rows.len() as u64 == total;
-    let mut text = report::table::summary(&run);
+    let mut text = report::tables::summary::text(&run);
     text += &format!("\n{count} trials in {:.1} s", begun.elapsed().as_secs_f64());
     if !done.is_empty() {
         text += &format!(", {} were there already", done.len());
     }
-    let beside = Beside::of(&run);
-    report::write_tables(&run, &beside, &path)?;
+    let analysis = Analysis::of(&run);
+    report::write_tables(&run, &analysis, &path)?;
     if !finished {
         text += &format!(
             "\nstopped with {} of {total} trials in {}; the same command continues",
@@ -80,7 +81,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     } else if args.no_report {
         text += &format!("\nrows and summary in {}", path.display());
     } else {
-        report::write(&run, &beside, &path).context("the rows are safe, but the report failed")?;
+        report::write(&run, &analysis, &path)
+            .context("the rows are safe, but the report failed")?;
         text += &format!("\nreport: {}", path.join("report.html").display());
     }
     print(&text)?;

@@ -61,7 +61,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         );
     }
     let text = match extension {
-        _ if args.path.is_dir() => report::table::summary(&Run::read(&args.path)?),
+        _ if args.path.is_dir() => report::tables::summary::text(&Run::read(&args.path)?),
         Some("toml") if is_scene => scene(args)?,
         Some("toml") => store::resolved(&Experiment::load(&args.path, &args.set)?),
         _ => {

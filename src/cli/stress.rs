@@ -4,7 +4,7 @@ use super::columns::{aligned, write_csv, write_figure};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::{Ending, print};
 use crate::report::severity;
-use crate::report::severity::{Ran, short};
+use crate::report::severity::{CaseVerdicts, short};
 use crate::study::stress::{Case, Outcome, Verdict, cases};
 use anyhow::{Context, bail};
 use rayon::prelude::*;
@@ -41,7 +41,7 @@ pub(super) struct Args {
 
 /// A line of `stress.csv`.
 #[derive(Serialize)]
-struct Line<'a> {
+struct CaseRecord<'a> {
     case: &'a str,
     severity: f64,
     unit: &'a str,
@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
             .collect()
     });
     bar.finish_and_clear();
-    let mut ran: Vec<Ran> = chosen.iter().map(|case| (*case, Vec::new())).collect();
+    let mut ran: Vec<CaseVerdicts> = chosen.iter().map(|case| (*case, Vec::new())).collect();
     for ((i, ..), verdict) in jobs.iter().zip(verdicts) {
         ran[*i].1.extend(verdict);
     }
@@ -108,10 +108,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
 /// How much stiffer the skin of the nominal scene could be at its time step.
 #[cfg(feature = "mujoco")]
 fn margins() -> String {
-    use crate::study::stress::hold::{TOLERANCE, margin};
+    use crate::study::stress::stiff_press::{TOLERANCE, stiffness_margin};
     let step_s = crate::sim::solver::SolverSettings::default().step_s;
     let line = |how: &str, divided| {
-        let margin = margin(step_s, divided);
+        let margin = stiffness_margin(step_s, divided);
         let beyond = margin.beyond.map_or("; no stiffer one was tried".into(), |(times, why)| {
             format!("; at {times} x {why}")
         });
@@ -133,7 +133,7 @@ fn margins() -> String {
     "no stiffness margin: this build is without MuJoCo (feature `mujoco`)".into()
 }
 
-fn report(ran: &[Ran], args: &Args) -> anyhow::Result<()> {
+fn report(ran: &[CaseVerdicts], args: &Args) -> anyhow::Result<()> {
     std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     let mut lines = Vec::new();
     for (case, verdicts) in ran {
@@ -145,7 +145,7 @@ fn report(ran: &[Ran], args: &Args) -> anyhow::Result<()> {
     table.extend(ran.iter().map(cells));
     let mut text = aligned(&table);
     for line in lines.iter().filter(|line| !line.explained) {
-        let Line { case, severity, unit, axis_s, outcome, words, .. } = line;
+        let CaseRecord { case, severity, unit, axis_s, outcome, words, .. } = line;
         let severity = short(*severity);
         text += &format!(
             "\nUNEXPLAINED {case} at {severity} {unit}, {} ms: {outcome}: {words}",
@@ -156,9 +156,9 @@ fn report(ran: &[Ran], args: &Args) -> anyhow::Result<()> {
     print(&format!("table and map in {}", args.out.display()))
 }
 
-fn line<'a>(case: &'a Case, verdict: &'a Verdict) -> Line<'a> {
+fn line<'a>(case: &'a Case, verdict: &'a Verdict) -> CaseRecord<'a> {
     let (outcome, words) = described(&verdict.outcome);
-    Line {
+    CaseRecord {
         case: case.name,
         severity: case.severities[verdict.rank],
         unit: case.severity,
@@ -181,7 +181,7 @@ fn described(outcome: &Outcome) -> (&'static str, &str) {
 const HEADER: [&str; 6] = ["case", "severity", "must hold", "held", "runs s/f/w", "beyond"];
 
 /// The case in a line: up to where it held at every period, and what came then.
-fn cells((case, verdicts): &Ran) -> [String; 6] {
+fn cells((case, verdicts): &CaseVerdicts) -> [String; 6] {
     let is_stable = |rank: &usize| {
         let mut here = verdicts.iter().filter(|verdict| verdict.rank == *rank);
         here.all(|verdict| verdict.outcome == Outcome::Stable)

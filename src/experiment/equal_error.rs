@@ -1,25 +1,25 @@
 //! How many touches a planner needs for the error that another one has.
 //!
-//! The goal is the baseline's median error after some touches, the last ones unless the experiment
-//! says otherwise. A planner has met it from the first count on from which its own median stays at or
-//! below up to the goal's touches, or else from the first one after them at which it is. All of it,
-//! goal, counts, ways and their ratios, is found again in every sample of the trials, the same sample
-//! for both planners: that is what the intervals are of.
+//! The goal is the baseline's median error after some touches, the last ones unless the report's
+//! settings say otherwise. A planner has met it from the first count on from which its own median
+//! stays at or below up to the goal's touches, or else from the first one after them at which it is.
+//! All of it, goal, counts, ways and their ratios, is found again in every sample of the trials, the
+//! same sample for both planners: that is what the intervals are of.
 
 use super::comparison::pairs;
 use super::experiment::Experiment;
-use super::measure::{EDGE_RMSE, Measure, REACHABLE_RMSE, RMSE};
-use super::row::TrialRow;
+use super::measure::{MEASURES, Measure};
+use super::row::{TrialRow, of_planner};
 use super::statistics::{middle, percentiles_95, resampled};
-use super::summary;
-use super::summary::path_m;
 use std::collections::BTreeMap;
 
 /// Errors that are compared.
-pub static ERRORS: [Measure; 3] = [RMSE, EDGE_RMSE, REACHABLE_RMSE];
+pub fn errors() -> impl Iterator<Item = &'static Measure> {
+    MEASURES.iter().filter(|measure| measure.is_error)
+}
 
-/// A number with its 95 % bootstrap interval, which a single trial does not have; infinite where the
-/// goal is not met.
+/// A number with its 95 % bootstrap interval, which a single trial does not have; infinite where
+/// the goal is not met.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimate {
     /// Of all trials.
@@ -55,7 +55,7 @@ pub struct EqualError<'a> {
 pub fn equal_errors<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<EqualError<'a>> {
     let mut found = Vec::new();
     for (planner, baseline) in pairs(experiment) {
-        for measure in &ERRORS {
+        for measure in errors() {
             found.extend(equal_error(experiment, rows, [planner, baseline], measure));
         }
     }
@@ -125,14 +125,16 @@ fn curves(
     let curve = |row: &TrialRow| -> Option<Curve> {
         let errors: Option<Vec<f64>> =
             counts.clone().map(|count| (measure.of)(row, count)).collect();
-        let start_m = path_m(row, experiment.initial_touches);
-        let paths_m = counts.clone().map(|count| path_m(row, count) - start_m).collect();
-        Some(Curve { errors: errors?, paths_m })
+        let start_m = row.path_m(experiment.initial_touches)?;
+        let paths_m: Option<Vec<f64>> =
+            counts.clone().map(|count| Some(row.path_m(count)? - start_m)).collect();
+        Some(Curve { errors: errors?, paths_m: paths_m? })
     };
-    summary::of(rows, planner).filter_map(|row| Some((row.trial, curve(row)?))).collect()
+    of_planner(rows, planner).filter_map(|row| Some((row.trial, curve(row)?))).collect()
 }
 
-/// When the two of each pair meet the second's median error at `goal_index` in a sample of the pairs.
+/// When the two of each pair meet the second's median error at `goal_index` in a sample of the
+/// pairs.
 fn meet(
     pairs: &[[&Curve; 2]],
     sample: &[usize],

@@ -1,6 +1,11 @@
 //! What is run: planners × trials on one scene.
+//!
+//! Only a part of it decides what a row holds: the experiment's [`Experiment::identity`]. The rest
+//! may change on a finished run. More trials and other planners are run beside the rows that are
+//! there; rows of trials or planners that are no longer listed are kept, but not shown.
 
-use super::measure;
+use super::report_settings::{ReportSettings, TOUCHES_MAX};
+use super::row::TrialRow;
 use crate::config::{Checked, ConfigError, Loader, Rules};
 use crate::explore::belief::GpSettings;
 use crate::explore::planner;
@@ -9,7 +14,7 @@ use crate::sim::Scene;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// An experiment with everything that decides its results.
+/// An experiment with everything that decides its results, and how they are shown.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
@@ -37,60 +42,22 @@ pub struct Experiment {
     /// How planners search.
     #[serde(default)]
     pub planning: PlanningSettings,
-    /// What the report draws.
+    /// What the report shows.
     #[serde(default)]
     pub report: ReportSettings,
     /// The scene, or in a file the path of one, relative to that file.
     pub scene: Scene,
 }
 
-/// What the report draws.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ReportSettings {
-    /// Touch counts after which beliefs are drawn, those that occur; none: a third, two thirds
-    /// and all of the planned touches.
-    pub touch_counts: Vec<u32>,
-    /// The trial whose beliefs are drawn.
-    pub trial: u32,
-    /// The planners whose beliefs are drawn, those that ran; none: all.
-    pub planners: Vec<String>,
-    /// Touches of a baseline whose error the others are asked to reach, if it makes as many; none:
-    /// all.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub goal_touches: Option<u32>,
-    /// What a publication says, to stand on the page beside what comes out here; those after touch
-    /// counts that occur.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub claims: Vec<Claim>,
-}
-
-/// What a publication says of an experiment.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Claim {
-    /// Where: its figure or section.
-    pub place: String,
-    /// What, in words.
-    pub says: String,
-    /// The count of touches after which it can be seen.
-    pub touches: u32,
-    /// Names of the measures that show it.
-    pub measures: Vec<String>,
-}
-
-/// Most touches of a trial; a fit costs the cube of their number.
-const TOUCHES_MAX: f64 = 2000.0;
-
-/// Most beliefs drawn side by side.
-const DRAWN_MAX: usize = 8;
+/// Planners that the others are held against, if nobody says which: the paper's two.
+const BASELINES: [&str; 2] = ["random", "active"];
 
 /// Test places along each side of the zone, if nobody says how many; chosen.
 const GRID: u32 = 31;
 
 impl Experiment {
-    /// `trials` trials of `touches` touches with each planner on `scene`, every other setting at its
-    /// default.
+    /// `trials` trials of `touches` touches with each planner on `scene`, every other setting at
+    /// its default.
     pub fn on(scene: &Scene, planners: &[&str], trials: u32, touches: u32) -> Self {
         Self {
             name: "scene".into(),
@@ -124,15 +91,44 @@ impl Experiment {
         loader.finish()
     }
 
+    /// What decides the rows of a run, all else left blank: a row depends on the name of its
+    /// planner and the number of its trial, not on the others, and on nothing that is only shown.
+    pub fn identity(&self) -> Self {
+        Self {
+            question: String::new(),
+            planners: Vec::new(),
+            trials: 0,
+            report: ReportSettings::default(),
+            ..self.clone()
+        }
+    }
+
+    /// Whether a row is of one of the trials and planners that are listed.
+    pub fn lists(&self, row: &TrialRow) -> bool {
+        row.trial < self.trials && self.planners.contains(&row.planner)
+    }
+
     /// Planners whose beliefs are drawn.
     pub fn drawn_planners(&self) -> Vec<&str> {
-        let run = |name: &&str| self.planners.iter().any(|planner| planner == name);
-        let chosen: Vec<&str> =
-            self.report.planners.iter().map(String::as_str).filter(run).collect();
+        let chosen = self.listed(self.report.planners.iter().map(String::as_str));
         match chosen.is_empty() {
             true => self.planners.iter().map(String::as_str).collect(),
             false => chosen,
         }
+    }
+
+    /// Planners that the others are held against.
+    pub fn baselines(&self) -> Vec<&str> {
+        let chosen = self.listed(self.report.baselines.iter().map(String::as_str));
+        let usual = || self.listed(BASELINES);
+        let all = || self.planners.iter().map(String::as_str).collect();
+        [chosen, usual()].into_iter().find(|found| !found.is_empty()).unwrap_or_else(all)
+    }
+
+    /// Those of `names` that are among the planners compared.
+    fn listed<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
+        let is_listed = |name: &&str| self.planners.iter().any(|planner| planner == name);
+        names.into_iter().filter(is_listed).collect()
     }
 
     /// Touches of a baseline whose error the others are asked to reach.
@@ -186,26 +182,7 @@ impl Checked for Experiment {
         });
         rules.table("gp", &self.gp);
         rules.table("planning", &self.planning);
-        let drawn = self.report.touch_counts.len();
-        rules.require("report.touch_counts", drawn, drawn <= DRAWN_MAX, || {
-            format!("at most {DRAWN_MAX} touch counts")
-        });
-        for (i, &count) in self.report.touch_counts.iter().enumerate() {
-            rules.number(&format!("report.touch_counts[{i}]"), count.into(), 1.0..=TOUCHES_MAX);
-        }
-        for (i, name) in self.report.planners.iter().enumerate() {
-            rules.one_of(&format!("report.planners[{i}]"), name, &known);
-        }
-        let goal = self.report.goal_touches.unwrap_or(self.touches);
-        rules.number("report.goal_touches", goal.into(), 1.0..=TOUCHES_MAX);
-        let measures: Vec<&str> = measure::all().map(|measure| measure.name).collect();
-        for (i, claim) in self.report.claims.iter().enumerate() {
-            let key = |field: &str| format!("report.claims[{i}].{field}");
-            rules.number(&key("touches"), claim.touches.into(), 1.0..=TOUCHES_MAX);
-            for (j, name) in claim.measures.iter().enumerate() {
-                rules.one_of(&key(&format!("measures[{j}]")), name, &measures);
-            }
-        }
+        rules.table("report", &self.report);
         let last = f64::from(self.trials.max(1) - 1);
         rules.number("report.trial", self.report.trial.into(), 0.0..=last);
         rules.table("scene", &self.scene);

@@ -1,97 +1,241 @@
-//! What planners are compared by: numbers that a trial has after some touches.
+//! The table of measures: what trials are judged by, and how each of them is told.
+//!
+//! A measure is a line of [`MEASURES`]. The columns of `summary.csv` with their intervals, the lines
+//! of `comparison.csv`, the panels of the convergence figure, the tables of the page and the names
+//! that a claim may use all follow from that line.
 
 use super::metrics::Metrics;
 use super::row::{TouchRow, TrialRow};
-use super::summary::path_m;
 use std::fmt;
 
-/// A number of a trial, in SI units.
+/// A number of a trial after some touches, in SI units.
+#[derive(Clone, Copy)]
 pub struct Measure {
     /// Its name in files, unit last.
-    pub name: &'static str,
+    pub id: &'static str,
     /// Its name in words.
     pub title: &'static str,
-    /// The unit it is shown in, and how many of it make the SI unit.
-    pub shown_in: (&'static str, f64),
-    /// Whether more of it is better.
-    pub more_is_better: bool,
+    /// What it is measured and shown in.
+    pub unit: Unit,
+    /// Which way is better.
+    pub direction: Direction,
+    /// What is told of it over many trials.
+    pub aggregate: Aggregate,
+    /// How it is drawn over touches.
+    pub panel: Panel,
+    /// Whether it stands in the summary on the terminal and on the page.
+    pub is_tabled: bool,
+    /// Whether it is an error, so that planners are compared in it after every touch, and in the
+    /// touches that they need to bring it down.
+    pub is_error: bool,
     /// Its value after some touches; none where the trial has none.
     pub of: fn(&TrialRow, u32) -> Option<f64>,
 }
 
-impl fmt::Debug for Measure {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(self.name)
+/// A unit in files and for readers.
+#[derive(Clone, Copy, Debug)]
+pub struct Unit {
+    /// How names in files end that are in it.
+    pub suffix: &'static str,
+    /// The symbol of the unit that readers are shown.
+    pub symbol: &'static str,
+    /// How many of that make one of the SI unit.
+    pub per_si: f64,
+    /// Decimals shown.
+    pub decimals: usize,
+}
+
+/// Which way is better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// Less of it.
+    Less,
+    /// More of it.
+    More,
+    /// Neither: a fact, in which planners are not compared.
+    Neither,
+}
+
+/// What is told of many trials.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aggregate {
+    /// The mean with its standard error.
+    Mean,
+    /// The median with its bootstrap interval.
+    Median,
+    /// Both; where there is room for one, the median.
+    Both,
+}
+
+impl Aggregate {
+    /// Whether the mean is told.
+    pub fn has_mean(self) -> bool {
+        self != Self::Median
+    }
+
+    /// Whether the median is told.
+    pub fn has_median(self) -> bool {
+        self != Self::Mean
     }
 }
 
-const PLAIN: (&str, f64) = ("", 1.0);
-const MM: (&str, f64) = ("mm", 1e3);
+/// A panel of the convergence figure.
+#[derive(Clone, Copy, Debug)]
+pub enum Panel {
+    /// None.
+    None,
+    /// With a linear axis.
+    Linear,
+    /// With a linear axis that shows 1, the best there is.
+    UpToOne,
+    /// With a logarithmic axis.
+    Log,
+    /// The same with another measure dotted beside it; none where that has no value.
+    LogBeside(&'static Measure),
+}
+
+const CORRELATION: Unit = Unit { suffix: "", symbol: "", per_si: 1.0, decimals: 4 };
+const PLAIN: Unit = Unit { decimals: 3, ..CORRELATION };
+const MM: Unit = Unit { suffix: "_m", symbol: "mm", per_si: 1e3, decimals: 3 };
+const METRES: Unit = Unit { suffix: "_m", symbol: "m", per_si: 1.0, decimals: 3 };
+const SECONDS: Unit = Unit { suffix: "_s", symbol: "s", per_si: 1.0, decimals: 1 };
 
 /// The share of the truth that an honest 95 % band holds.
 const HONEST: f64 = 0.95;
 
+/// Eq. 5 of Yi et al. 2016.
+pub const R: Measure =
+    more("r", "R (Eq. 5)", CORRELATION, |row, n| Some(metrics(row, n)?.r)).drawn(Panel::UpToOne);
+/// The same after subtracting each one's mean.
+pub const CENTRED_R: Measure =
+    more("centred_r", "centred R", CORRELATION, |row, n| Some(metrics(row, n)?.centred_r))
+        .drawn(Panel::UpToOne);
 /// Root mean square error.
-pub const RMSE: Measure = less("rmse_m", "RMSE", MM, |row, n| Some(metrics(row, n)?.rmse_m));
+pub const RMSE: Measure = less("rmse_m", "RMSE", MM, |row, n| Some(metrics(row, n)?.rmse_m))
+    .told(Aggregate::Both)
+    .drawn(Panel::Log)
+    .error();
 /// Root mean square error in the outer tenth of the zone.
 pub const EDGE_RMSE: Measure =
-    less("edge_rmse_m", "RMSE in the outer tenth", MM, |row, n| metrics(row, n)?.edge_rmse_m);
-/// Root mean square error where the finger can touch the surface.
-pub const REACHABLE_RMSE: Measure =
-    less("reachable_rmse_m", "RMSE where the finger reaches", MM, |row, n| {
-        metrics(row, n)?.reachable_rmse_m
-    });
-
-/// Every measure; one line to add one.
-pub static MEASURES: [Measure; 11] = [
-    RMSE,
-    EDGE_RMSE,
-    REACHABLE_RMSE,
+    less("edge_rmse_m", "RMSE in the outer tenth", MM, |row, n| metrics(row, n)?.edge_rmse_m)
+        .told(Aggregate::Median)
+        .drawn(Panel::Log)
+        .error();
+/// Root mean square error where the finger cannot touch the surface.
+const UNREACHABLE_RMSE: Measure =
     less("unreachable_rmse_m", "RMSE where it does not reach", MM, |row, n| {
         metrics(row, n)?.unreachable_rmse_m
-    }),
-    less("max_error_m", "largest error", MM, |row, n| Some(metrics(row, n)?.max_error_m)),
-    more("r", "R (Eq. 5)", |row, n| Some(metrics(row, n)?.r)),
-    more("centred_r", "centred R", |row, n| Some(metrics(row, n)?.centred_r)),
+    })
+    .told(Aggregate::Median)
+    .drawn(Panel::None)
+    .untabled();
+/// Share of the truth inside the 95 % band.
+pub const COVERAGE: Measure =
+    fact("coverage", "share in the 95 % band", PLAIN, |row, n| metrics(row, n)?.coverage)
+        .drawn(Panel::UpToOne);
+
+/// Every measure, in the order of columns and panels; one line to add one.
+pub static MEASURES: &[Measure] = &[
+    R,
+    CENTRED_R,
+    RMSE,
+    EDGE_RMSE,
+    less("reachable_rmse_m", "RMSE where the finger reaches", MM, |row, n| {
+        metrics(row, n)?.reachable_rmse_m
+    })
+    .told(Aggregate::Median)
+    .drawn(Panel::LogBeside(&UNREACHABLE_RMSE))
+    .untabled()
+    .error(),
+    UNREACHABLE_RMSE,
+    less("max_error_m", "largest error", MM, |row, n| Some(metrics(row, n)?.max_error_m))
+        .told(Aggregate::Median)
+        .drawn(Panel::None),
+    COVERAGE,
     less("coverage_off", "share in the 95 % band, away from 0.95", PLAIN, |row, n| {
         Some((metrics(row, n)?.coverage? - HONEST).abs())
-    }),
-    less("nlpd", "NLPD", PLAIN, |row, n| metrics(row, n)?.nlpd),
-    less("path_m", "lateral travel", ("m", 1.0), |row, n| {
-        (row.touches.len() >= n as usize).then(|| path_m(row, n))
-    }),
-    less("time_s", "time of the body", ("s", 1.0), |row, n| touch(row, n)?.time_s),
+    })
+    .drawn(Panel::None)
+    .untabled(),
+    less("nlpd", "NLPD", PLAIN, |row, n| metrics(row, n)?.nlpd).drawn(Panel::None),
+    less("path_m", "lateral travel", METRES, TrialRow::path_m),
+    less("time_s", "time of the body", SECONDS, |row, n| touch(row, n)?.time_s).drawn(Panel::None),
+    length_scale("length_scale_x_m", "length scale along x", |row, n| scale(row, n, 0)),
+    length_scale("length_scale_z_m", "length scale along z", |row, n| scale(row, n, 1)),
 ];
 
-/// What is told of a trial without being better or worse.
-static FACTS: [Measure; 3] = [
-    less("coverage", "share in the 95 % band", PLAIN, |row, n| metrics(row, n)?.coverage),
-    less("length_scale_x_m", "length scale along x", MM, |row, n| length_scale(row, n, 0)),
-    less("length_scale_z_m", "length scale along z", MM, |row, n| length_scale(row, n, 1)),
-];
-
-/// Every measure, those that planners are compared by first.
-pub fn all() -> impl Iterator<Item = &'static Measure> {
-    MEASURES.iter().chain(&FACTS)
+/// The measure of a name in files.
+pub fn by_id(id: &str) -> Option<&'static Measure> {
+    MEASURES.iter().find(|measure| measure.id == id)
 }
 
-/// A measure of which less is better.
-const fn less(
-    name: &'static str,
-    title: &'static str,
-    shown_in: (&'static str, f64),
-    of: fn(&TrialRow, u32) -> Option<f64>,
-) -> Measure {
-    Measure { name, title, shown_in, more_is_better: false, of }
+impl Measure {
+    /// A column of a file that holds `statistic` of it: the statistic stands before the unit.
+    pub fn column(&self, statistic: &str) -> String {
+        format!("{}_{statistic}{}", self.stem(), self.unit.suffix)
+    }
+
+    /// Its name in files without the unit.
+    pub fn stem(&self) -> &'static str {
+        self.id.strip_suffix(self.unit.suffix).unwrap_or(self.id)
+    }
+
+    /// With these statistics told of many trials.
+    const fn told(self, aggregate: Aggregate) -> Self {
+        Self { aggregate, ..self }
+    }
+
+    /// With this panel.
+    const fn drawn(self, panel: Panel) -> Self {
+        Self { panel, ..self }
+    }
+
+    /// In files only.
+    const fn untabled(self) -> Self {
+        Self { is_tabled: false, ..self }
+    }
+
+    /// As an error.
+    const fn error(self) -> Self {
+        Self { is_error: true, ..self }
+    }
 }
 
-/// A correlation.
-const fn more(
-    name: &'static str,
-    title: &'static str,
-    of: fn(&TrialRow, u32) -> Option<f64>,
-) -> Measure {
-    Measure { name, title, shown_in: PLAIN, more_is_better: true, of }
+impl fmt::Debug for Measure {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.id)
+    }
+}
+
+type Value = fn(&TrialRow, u32) -> Option<f64>;
+
+/// A measure of which less is better: its mean, drawn and tabled.
+const fn less(id: &'static str, title: &'static str, unit: Unit, of: Value) -> Measure {
+    Measure {
+        id,
+        title,
+        unit,
+        direction: Direction::Less,
+        aggregate: Aggregate::Mean,
+        panel: Panel::Linear,
+        is_tabled: true,
+        is_error: false,
+        of,
+    }
+}
+
+/// The same of which more is better.
+const fn more(id: &'static str, title: &'static str, unit: Unit, of: Value) -> Measure {
+    Measure { direction: Direction::More, ..less(id, title, unit, of) }
+}
+
+/// The same of which neither is better.
+const fn fact(id: &'static str, title: &'static str, unit: Unit, of: Value) -> Measure {
+    Measure { direction: Direction::Neither, ..less(id, title, unit, of) }
+}
+
+const fn length_scale(id: &'static str, title: &'static str, of: Value) -> Measure {
+    fact(id, title, MM, of).told(Aggregate::Median).drawn(Panel::None).untabled()
 }
 
 fn touch(row: &TrialRow, count: u32) -> Option<&TouchRow> {
@@ -102,7 +246,24 @@ fn metrics(row: &TrialRow, count: u32) -> Option<&Metrics> {
     touch(row, count)?.metrics.as_ref()
 }
 
-fn length_scale(row: &TrialRow, count: u32, axis: usize) -> Option<f64> {
+fn scale(row: &TrialRow, count: u32, axis: usize) -> Option<f64> {
     let fit = touch(row, count)?.fit.as_ref()?;
     fit.hyperparameters.length_scales.get(axis).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Names end with their unit and stand once, so that every column does.
+    #[test]
+    fn names_are_regular() {
+        for (i, measure) in MEASURES.iter().enumerate() {
+            assert!(measure.id.ends_with(measure.unit.suffix), "{measure:?}");
+            assert_eq!(by_id(measure.id).unwrap().title, measure.title);
+            assert!(MEASURES[..i].iter().all(|other| other.id != measure.id), "{measure:?}");
+        }
+        assert_eq!(RMSE.column("median"), "rmse_median_m");
+        assert_eq!(R.column("mean"), "r_mean");
+    }
 }

@@ -134,6 +134,18 @@ impl Sums {
     }
 }
 
+/// Eq. 5 of a constant with the sign of the heights f: |Σf| / sqrt(n · Σf²); none of no heights.
+pub fn constant_r<'a>(heights_m: impl IntoIterator<Item = &'a f64>) -> Option<f64> {
+    let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for f in heights_m {
+        count += 1.0;
+        sum += f;
+        squares += f * f;
+    }
+    let r = f64::abs(sum) / f64::sqrt(count * squares);
+    r.is_finite().then_some(r)
+}
+
 /// A constant has no direction: its correlation counts as 0.
 fn ratio(numerator: f64, denominator: f64) -> f64 {
     if denominator > 0.0 { numerator / denominator } else { 0.0 }
@@ -159,6 +171,9 @@ mod tests {
         let places = (0..4000).map(|i| -2.0 + (f64::from(i) + 0.5) / 1000.0);
         let constant: Vec<(f64, f64)> = places.map(|x| (toy(x), 0.7)).collect();
         let metrics = compare(&constant);
+        let heights: Vec<f64> = constant.iter().map(|(height, _)| *height).collect();
+        assert!((constant_r(&heights).unwrap() - metrics.r).abs() < 1e-12);
+        assert_eq!(constant_r(&[]), None);
         assert!((metrics.r - 1.25f64.powf(-0.5)).abs() < 1e-6, "{}", metrics.r);
         assert!(metrics.centred_r.abs() < 1e-6);
     }

@@ -1,11 +1,14 @@
 //! Experiments, their trials, and the folder their results lie in.
 
+pub mod analysis;
 pub mod comparison;
+pub mod curve_table;
 pub mod equal_error;
 #[allow(clippy::module_inception)]
 pub mod experiment;
 pub mod measure;
 pub mod metrics;
+pub mod report_settings;
 pub mod row;
 pub mod runner;
 pub mod scan;

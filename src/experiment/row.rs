@@ -57,6 +57,28 @@ pub struct TouchRow {
     pub metrics: Option<Metrics>,
 }
 
+impl TrialRow {
+    /// Lateral travel of the finger over its first `touches` targets, in straight lines; none of a
+    /// trial with fewer.
+    pub fn path_m(&self, touches: u32) -> Option<f64> {
+        let targets = self.touches.get(..touches as usize)?.iter().map(|touch| &touch.target);
+        let steps = targets.clone().zip(targets.skip(1));
+        let lengths = steps.map(|(from, to)| {
+            let squares = from.iter().zip(to).map(|(from, to)| (to - from).powi(2));
+            squares.sum::<f64>().sqrt()
+        });
+        Some(lengths.sum())
+    }
+}
+
+/// The rows of one planner.
+pub fn of_planner<'a>(
+    rows: &'a [TrialRow],
+    planner: &'a str,
+) -> impl Iterator<Item = &'a TrialRow> {
+    rows.iter().filter(move |row| row.planner == planner)
+}
+
 fn is_zero(jitter: &f64) -> bool {
     *jitter == 0.0
 }

@@ -1,14 +1,16 @@
 //! Curves over touches: what many trials of one planner have in common.
 
 use super::experiment::Experiment;
-use super::metrics::Metrics;
-use super::row::{TouchRow, TrialRow};
+use super::measure::{MEASURES, Measure};
+use super::row::{TouchRow, TrialRow, of_planner};
 use super::statistics::{mean, mean_and_error, median};
 use crate::explore::planner::Stall;
+use crate::task::Zone;
+use nalgebra::Point3;
 use serde::Serialize;
 
 /// One planner after one number of touches, over its trials.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CurvePoint {
     /// Which planner.
     pub planner: String,
@@ -16,36 +18,35 @@ pub struct CurvePoint {
     pub touches: u32,
     /// Trials that got this far.
     pub trials: usize,
-    /// Mean of Eq. 5.
-    pub r_mean: f64,
+    /// One for each of [`MEASURES`]; none of a measure that no trial has.
+    values: Vec<Option<Summary>>,
+}
+
+/// A measure over many trials.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Summary {
+    /// Its mean.
+    pub mean: f64,
     /// Standard error of that mean; none of a single trial.
-    pub r_se: Option<f64>,
-    /// Mean of the centred correlation.
-    pub centred_r_mean: f64,
-    /// Standard error of that mean.
-    pub centred_r_se: Option<f64>,
-    /// Mean root mean square error.
-    pub rmse_mean_m: f64,
-    /// Standard error of that mean.
-    pub rmse_se_m: Option<f64>,
-    /// Median root mean square error.
-    pub rmse_median_m: f64,
-    /// Median root mean square error in the outer tenth of the zone.
-    pub edge_rmse_median_m: Option<f64>,
-    /// Median root mean square error where the finger can touch the surface.
-    pub reachable_rmse_median_m: Option<f64>,
-    /// Median root mean square error where it cannot.
-    pub unreachable_rmse_median_m: Option<f64>,
-    /// Median largest error.
-    pub max_error_median_m: Option<f64>,
-    /// Mean share of the truth inside the 95 % band.
-    pub coverage_mean: Option<f64>,
-    /// Mean negative log predictive density.
-    pub nlpd_mean: Option<f64>,
-    /// Mean lateral travel from target to target since the first.
-    pub path_mean_m: f64,
-    /// Mean time of the body; none where a touch is no motion.
-    pub time_mean_s: Option<f64>,
+    pub error: Option<f64>,
+    /// Its median.
+    pub median: f64,
+}
+
+impl Summary {
+    fn new(values: &[f64]) -> Option<Self> {
+        let median = median(values)?;
+        let (mean, error) = mean_and_error(values);
+        Some(Self { mean, error, median })
+    }
+}
+
+impl CurvePoint {
+    /// A measure over the trials; none if no trial has it.
+    pub fn of(&self, measure: &Measure) -> Option<&Summary> {
+        let index = MEASURES.iter().position(|other| other.id == measure.id)?;
+        self.values.get(index)?.as_ref()
+    }
 }
 
 /// What happened to one planner's trials besides their errors.
@@ -69,64 +70,65 @@ pub struct Events {
 pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<CurvePoint> {
     (experiment.initial_touches..=experiment.touches)
         .filter_map(|touches| {
-            let trials: Vec<(&TrialRow, &Metrics)> = of(rows, planner)
-                .filter_map(|row| {
-                    Some((row, row.touches.get(touches as usize - 1)?.metrics.as_ref()?))
-                })
-                .collect();
-            let pick = |get: fn(&Metrics) -> f64| -> Vec<f64> {
-                trials.iter().map(|(_, metrics)| get(metrics)).collect()
+            let fitted = fitted(rows, planner, touches);
+            let of = |measure: &Measure| -> Vec<f64> {
+                fitted.iter().filter_map(|row| (measure.of)(row, touches)).collect()
             };
-            let pick_some = |get: fn(&Metrics) -> Option<f64>| -> Vec<f64> {
-                trials.iter().filter_map(|(_, metrics)| get(metrics)).collect()
-            };
-            let mean_of = |values: Vec<f64>| (!values.is_empty()).then(|| mean(&values));
-            let paths: Vec<f64> = trials.iter().map(|(row, _)| path_m(row, touches)).collect();
-            let times =
-                trials.iter().filter_map(|(row, _)| row.touches[touches as usize - 1].time_s);
-            let rmse = pick(|metrics| metrics.rmse_m);
-            let (r_mean, r_se) = mean_and_error(&pick(|metrics| metrics.r));
-            let (centred_r_mean, centred_r_se) = mean_and_error(&pick(|metrics| metrics.centred_r));
-            let (rmse_mean_m, rmse_se_m) = mean_and_error(&rmse);
-            Some(CurvePoint {
+            (!fitted.is_empty()).then(|| CurvePoint {
                 planner: planner.into(),
                 touches,
-                trials: trials.len(),
-                r_mean,
-                r_se,
-                centred_r_mean,
-                centred_r_se,
-                rmse_mean_m,
-                rmse_se_m,
-                rmse_median_m: median(&rmse)?,
-                edge_rmse_median_m: median(&pick_some(|metrics| metrics.edge_rmse_m)),
-                reachable_rmse_median_m: median(&pick_some(|metrics| metrics.reachable_rmse_m)),
-                unreachable_rmse_median_m: median(&pick_some(|metrics| metrics.unreachable_rmse_m)),
-                max_error_median_m: median(&pick(|metrics| metrics.max_error_m)),
-                coverage_mean: mean_of(pick_some(|metrics| metrics.coverage)),
-                nlpd_mean: mean_of(pick_some(|metrics| metrics.nlpd)),
-                path_mean_m: mean(&paths),
-                time_mean_s: mean_of(times.collect()),
+                trials: fitted.len(),
+                values: MEASURES.iter().map(|measure| Summary::new(&of(measure))).collect(),
             })
         })
         .collect()
 }
 
-/// Lateral travel of the finger over its first `touches` targets, in straight lines.
-pub fn path_m(row: &TrialRow, touches: u32) -> f64 {
-    let targets = row.touches.iter().take(touches as usize).map(|touch| &touch.target);
-    let steps = targets.clone().zip(targets.skip(1));
-    let lengths = steps.map(|(from, to)| {
-        let squares = from.iter().zip(to).map(|(from, to)| (to - from).powi(2));
-        squares.sum::<f64>().sqrt()
-    });
-    lengths.sum()
+/// The trials of a planner that have a belief after some touches.
+pub(super) fn fitted<'a>(
+    rows: &'a [TrialRow],
+    planner: &'a str,
+    touches: u32,
+) -> Vec<&'a TrialRow> {
+    let is_fitted = |row: &&TrialRow| {
+        row.touches.get(touches as usize - 1).is_some_and(|touch| touch.metrics.is_some())
+    };
+    of_planner(rows, planner).filter(is_fitted).collect()
+}
+
+/// What speaks for a measure of a planner's trials after some touches: the median where one is
+/// told, else the mean; none if no trial has it.
+pub fn typical(rows: &[TrialRow], planner: &str, touches: u32, measure: &Measure) -> Option<f64> {
+    let values: Vec<f64> =
+        of_planner(rows, planner).filter_map(|row| (measure.of)(row, touches)).collect();
+    match measure.aggregate.has_median() {
+        true => median(&values),
+        false => (!values.is_empty()).then(|| mean(&values)),
+    }
+}
+
+/// The count of touches from which on a curve meets a goal up to its end; none if it does not.
+pub fn met_from(points: &[CurvePoint], is_met: impl Fn(&CurvePoint) -> bool) -> Option<u32> {
+    points.iter().rev().take_while(|point| is_met(point)).last().map(|point| point.touches)
+}
+
+/// Median distance between target and contact in the zone's plane, over all touches that met
+/// something; none if none did.
+pub fn median_shift_m(zone: &Zone, rows: &[TrialRow]) -> Option<f64> {
+    let shifts_m: Vec<f64> = (rows.iter().flat_map(|row| &row.touches))
+        .filter_map(|touch| {
+            let place = zone.place(&Point3::from(touch.contact?));
+            let square = |(a, b): (&f64, &f64)| (a - b).powi(2);
+            Some(place.iter().zip(&touch.target).map(square).sum::<f64>().sqrt())
+        })
+        .collect();
+    median(&shifts_m)
 }
 
 /// What happened to one planner's trials.
 pub fn events(rows: &[TrialRow], planner: &str) -> Events {
     let mut events = Events::default();
-    for row in of(rows, planner) {
+    for row in of_planner(rows, planner) {
         let count = |condition: fn(&TouchRow) -> bool| {
             row.touches.iter().filter(|touch| condition(touch)).count()
         };
@@ -138,9 +140,4 @@ pub fn events(rows: &[TrialRow], planner: &str) -> Events {
         events.repeated += count(|touch| touch.stall == Some(Stall::Repeated));
     }
     events
-}
-
-/// The rows of one planner.
-pub fn of<'a>(rows: &'a [TrialRow], planner: &'a str) -> impl Iterator<Item = &'a TrialRow> {
-    rows.iter().filter(move |row| row.planner == planner)
 }

@@ -1,6 +1,6 @@
 //! Axes: from data to pixels, with ticks at round numbers.
 
-use super::canvas::{Anchor, Area, Canvas, Point};
+use super::canvas::{Anchor, Area, Canvas, PointPx};
 use super::style;
 use super::style::{FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
 use crate::task::Zone;
@@ -139,7 +139,7 @@ pub struct Panel {
 
 impl Panel {
     /// Where a value lies on the sheet.
-    pub fn at(&self, x: f64, y: f64) -> Point {
+    pub fn at(&self, x: f64, y: f64) -> PointPx {
         [
             self.area.left + self.x.fraction(x) * self.area.width,
             self.area.bottom() - self.y.fraction(y) * self.area.height,
@@ -188,11 +188,11 @@ impl Panel {
     }
 }
 
-/// Draws samples with their words in a row, from `at` to the right.
-pub fn legend(canvas: &mut Canvas, at: Point, entries: &[(Sample, &str)]) {
+/// Draws swatches with their words in a row, from `at` to the right.
+pub fn legend(canvas: &mut Canvas, at: PointPx, entries: &[(Swatch, &str)]) {
     let [mut x, y] = at;
-    for (sample, words) in entries {
-        sample.draw(canvas, [x + 11.0, y]);
+    for (swatch, words) in entries {
+        swatch.draw(canvas, [x + 11.0, y]);
         canvas.text([x + 28.0, y + 4.5], words, TEXT_PX, Anchor::Start);
         // No font metrics here: room for the widest common sans-serif.
         x += 28.0 + 7.4 * words.chars().count() as f64 + 18.0;
@@ -200,7 +200,7 @@ pub fn legend(canvas: &mut Canvas, at: Point, entries: &[(Sample, &str)]) {
 }
 
 /// What a legend shows beside its words.
-pub enum Sample {
+pub enum Swatch {
     /// A line with these attributes.
     Line(String),
     /// A band in this colour.
@@ -213,8 +213,8 @@ pub enum Sample {
     Diamond(&'static str),
 }
 
-impl Sample {
-    fn draw(&self, canvas: &mut Canvas, [x, y]: Point) {
+impl Swatch {
+    fn draw(&self, canvas: &mut Canvas, [x, y]: PointPx) {
         match self {
             Self::Line(attributes) => canvas.line([[x - 11.0, y], [x + 11.0, y]], attributes),
             Self::Band(colour) => {

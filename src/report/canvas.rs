@@ -8,7 +8,7 @@ use super::style::{FONT, INK, PAPER};
 use std::fmt::Write;
 
 /// A point in pixels, x to the right, y down.
-pub type Point = [f64; 2];
+pub type PointPx = [f64; 2];
 
 /// A rectangle in pixels.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +35,7 @@ impl Area {
     }
 
     /// Its middle.
-    pub fn centre(&self) -> Point {
+    pub fn centre(&self) -> PointPx {
         [self.left + 0.5 * self.width, self.top + 0.5 * self.height]
     }
 }
@@ -65,16 +65,16 @@ impl Canvas {
     }
 
     /// An open line.
-    pub fn line(&mut self, points: impl IntoIterator<Item = Point>, attributes: &str) {
+    pub fn line(&mut self, points: impl IntoIterator<Item = PointPx>, attributes: &str) {
         self.path(points, "", attributes);
     }
 
     /// A closed shape.
-    pub fn polygon(&mut self, points: impl IntoIterator<Item = Point>, attributes: &str) {
+    pub fn polygon(&mut self, points: impl IntoIterator<Item = PointPx>, attributes: &str) {
         self.path(points, "z", attributes);
     }
 
-    fn path(&mut self, points: impl IntoIterator<Item = Point>, end: &str, attributes: &str) {
+    fn path(&mut self, points: impl IntoIterator<Item = PointPx>, end: &str, attributes: &str) {
         let mut data = String::new();
         for point in points.into_iter().filter(|point| point.iter().all(|v| v.is_finite())) {
             data.push(if data.is_empty() { 'M' } else { 'L' });
@@ -102,7 +102,7 @@ impl Canvas {
     }
 
     /// A circle.
-    pub fn circle(&mut self, [x, y]: Point, radius: f64, attributes: &str) {
+    pub fn circle(&mut self, [x, y]: PointPx, radius: f64, attributes: &str) {
         if x.is_finite() && y.is_finite() {
             let (x, y) = (number(x), number(y));
             self.push(&format!(r#"<circle cx="{x}" cy="{y}" r="{radius}" {attributes}/>"#));
@@ -110,7 +110,7 @@ impl Canvas {
     }
 
     /// A diagonal cross with a rim of paper, so that it shows on any ground.
-    pub fn cross(&mut self, [x, y]: Point, colour: &str) {
+    pub fn cross(&mut self, [x, y]: PointPx, colour: &str) {
         if !(x.is_finite() && y.is_finite()) {
             return;
         }
@@ -129,20 +129,20 @@ impl Canvas {
     }
 
     /// A small square on its corner.
-    pub fn diamond(&mut self, [x, y]: Point, attributes: &str) {
+    pub fn diamond(&mut self, [x, y]: PointPx, attributes: &str) {
         const ARM: f64 = 4.0;
         self.polygon([[x - ARM, y], [x, y - ARM], [x + ARM, y], [x, y + ARM]], attributes);
     }
 
     /// Words in ink.
-    pub fn text(&mut self, at: Point, words: &str, size_px: f64, anchor: Anchor) {
+    pub fn text(&mut self, at: PointPx, words: &str, size_px: f64, anchor: Anchor) {
         self.coloured_text(at, words, size_px, anchor, INK);
     }
 
     /// Words in a colour.
     pub fn coloured_text(
         &mut self,
-        at: Point,
+        at: PointPx,
         words: &str,
         size_px: f64,
         anchor: Anchor,
@@ -153,7 +153,7 @@ impl Canvas {
     }
 
     /// Words that read upwards, centred at a point.
-    pub fn upward_text(&mut self, at: Point, words: &str, size_px: f64) {
+    pub fn upward_text(&mut self, at: PointPx, words: &str, size_px: f64) {
         let attributes = format!(r#"transform="translate({}) rotate(-90)""#, pair(at));
         self.words(words, size_px, Anchor::Middle, INK, &attributes);
     }
@@ -215,7 +215,7 @@ pub fn number(value: f64) -> String {
 }
 
 /// Two coordinates.
-pub fn pair([x, y]: Point) -> String {
+pub fn pair([x, y]: PointPx) -> String {
     format!("{} {}", number(x), number(y))
 }
 

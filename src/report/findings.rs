@@ -1,16 +1,14 @@
 //! What a run found, in words and numbers taken from its rows.
 
-use super::axes::MM;
-use super::replay::digits;
+use super::number::{digits, with_error};
+use crate::experiment::measure::{CENTRED_R, COVERAGE, EDGE_RMSE, Measure, R, RMSE};
+use crate::experiment::metrics::constant_r;
 use crate::experiment::store::Run;
 use crate::experiment::summary;
 use crate::experiment::summary::CurvePoint;
-use crate::report::table::with_error;
 
 /// The mean of Eq. 5 that counts as found, as where the paper says "almost 1".
 const R_FOUND: f64 = 0.99;
-/// The planner that the others are measured against, if it ran.
-const BASELINE: &str = "random";
 
 /// Sentences, the most important first.
 pub fn sentences(run: &Run) -> Vec<String> {
@@ -31,21 +29,14 @@ pub fn sentences(run: &Run) -> Vec<String> {
         return sentences;
     }
     sentences.extend(scores(run, &curves));
-    let constant = constant_score(run)
+    let constant = constant_r(run.truth.heights_m.iter().flatten())
         .map_or(String::new(), |score| format!(" (a constant height scores {score:.3})"));
     let goal = format!("a mean R of {R_FOUND}{constant}");
-    sentences.push(needed(run, &curves, &goal, |point| point.r_mean >= R_FOUND));
+    let is_found = |point: &CurvePoint| point.of(&R).is_some_and(|r| r.mean >= R_FOUND);
+    sentences.push(needed(run, &curves, &goal, is_found));
     sentences.extend(against_baseline(run, &curves));
     sentences.push(honesty(&curves));
     sentences
-}
-
-/// Eq. 5 of a constant with the heights' sign: |Σf| / sqrt(n · Σf²); none of no heights.
-pub fn constant_score(run: &Run) -> Option<f64> {
-    let heights = || run.truth.heights_m.iter().flatten();
-    let (sum, squares) = heights().fold((0.0, 0.0), |(sum, squares), f| (sum + f, squares + f * f));
-    let score = f64::abs(sum) / (heights().count() as f64 * squares).sqrt();
-    score.is_finite().then_some(score)
 }
 
 /// Scores at the last drawn touch count that any planner reached.
@@ -61,16 +52,24 @@ fn scores(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<String> {
         .iter()
         .filter_map(|(name, points)| {
             let point = at(points, count)?;
-            let r = with_error(point.r_mean, point.r_se, 4);
-            let rmse = digits(MM.per_m * point.rmse_median_m);
-            let edge = point.edge_rmse_median_m.map_or(String::new(), |edge_m| {
-                format!(", {} mm in the outer tenth of the zone", digits(MM.per_m * edge_m))
+            let mean = |measure: &Measure| {
+                let summary = point.of(measure)?;
+                Some(with_error(measure, summary.mean, summary.error))
+            };
+            let (r, centred) = (mean(&R)?, mean(&CENTRED_R)?);
+            let rmse = median(&point, &RMSE)?;
+            let edge = median(&point, &EDGE_RMSE).map_or(String::new(), |edge| {
+                format!(", {edge} mm in the outer tenth of the zone")
             });
-            let centred = with_error(point.centred_r_mean, point.centred_r_se, 4);
             Some(format!("{name} {r} (centred {centred}, median RMSE {rmse} mm{edge})"))
         })
         .collect();
     Some(format!("After {count} touches the mean R (Eq. 5) is: {}.", told.join("; ")))
+}
+
+/// The median of an error, in the unit it is shown in.
+fn median(point: &CurvePoint, measure: &Measure) -> Option<String> {
+    Some(digits(measure.unit.per_si * point.of(measure)?.median))
 }
 
 /// After how many touches each planner meets a goal, and keeps meeting it.
@@ -82,25 +81,27 @@ fn needed(
 ) -> String {
     let told: Vec<String> = curves
         .iter()
-        .map(|(name, points)| match points.iter().rev().take_while(|point| is_met(point)).last() {
-            Some(point) => format!("{name} {}", point.touches),
+        .map(|(name, points)| match summary::met_from(points, &is_met) {
+            Some(touches) => format!("{name} {touches}"),
             None => format!("{name} not within {}", run.experiment.touches),
         })
         .collect();
     format!("Touches needed for {goal}: {}.", told.join(", "))
 }
 
-/// How soon the others are as near the truth as the baseline is at its end.
+/// How soon the others are as near the truth as the first baseline is at its end.
 fn against_baseline(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<String> {
+    let name = *run.experiment.baselines().first()?;
     let (baseline, others): (Vec<_>, Vec<_>) =
-        curves.iter().cloned().partition(|(name, _)| *name == BASELINE);
+        curves.iter().cloned().partition(|(planner, _)| *planner == name);
     let last = baseline.first()?.1.last()?;
+    let error_m = last.of(&RMSE)?.median;
     let goal = format!(
-        "the median RMSE that {BASELINE} has after {} touches ({} mm)",
+        "the median RMSE that {name} has after {} touches ({} mm)",
         last.touches,
-        digits(MM.per_m * last.rmse_median_m)
+        median(last, &RMSE)?
     );
-    let is_met = |point: &CurvePoint| point.rmse_median_m <= last.rmse_median_m;
+    let is_met = |point: &CurvePoint| point.of(&RMSE).is_some_and(|rmse| rmse.median <= error_m);
     (!others.is_empty()).then(|| needed(run, &others, &goal, is_met))
 }
 
@@ -110,7 +111,7 @@ const HONEST: std::ops::RangeInclusive<f64> = 0.9..=0.98;
 /// Whether the beliefs know how far they are off after the last touch.
 fn honesty(curves: &[(&str, Vec<CurvePoint>)]) -> String {
     let shares = curves.iter().filter_map(|(name, points)| {
-        let share = points.last()?.coverage_mean?;
+        let share = points.last()?.of(&COVERAGE)?.mean;
         let verdict = match share {
             share if HONEST.contains(&share) => "",
             share if share < *HONEST.start() => " (too sure)",

@@ -2,29 +2,27 @@
 
 pub mod axes;
 pub mod canvas;
-pub mod claims;
-pub mod equal;
 pub mod explorer;
 pub mod figures;
 pub mod findings;
-pub mod heat;
+pub mod heat_map;
+pub mod number;
 pub mod page;
-pub mod paired;
 pub mod pareto;
 pub mod png;
 pub mod points;
 pub mod relief;
+pub mod relief_panel;
 pub mod replay;
 pub mod scan;
 pub mod severity;
-pub mod sheet;
 pub mod style;
-pub mod table;
+pub mod tables;
 
 pub use figures::{FIGURES, Figure};
 
-use crate::experiment::comparison::{Comparison, comparisons};
-use crate::experiment::equal_error::{EqualError, equal_errors};
+use crate::experiment::analysis::Analysis;
+use crate::experiment::curve_table::curve_table;
 use crate::experiment::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
 use anyhow::Context;
 use std::fs;
@@ -39,40 +37,21 @@ pub struct Drawing {
     pub svg: String,
 }
 
-/// The planners beside each other, found once for files and page: every bootstrap takes its time.
-pub struct Beside<'a> {
-    /// In every measure.
-    pub comparisons: Vec<Comparison<'a>>,
-    /// In touches to equal error.
-    pub equal_errors: Vec<EqualError<'a>>,
-}
-
-impl<'a> Beside<'a> {
-    /// Those of a run.
-    pub fn of(run: &'a Run) -> Self {
-        let Run { experiment, rows, .. } = run;
-        Self {
-            comparisons: comparisons(experiment, rows),
-            equal_errors: equal_errors(experiment, rows),
-        }
-    }
-}
-
 /// Writes the run's tables into its folder: `summary.csv`, `comparison.csv`, `equal_error.csv`.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub fn write_tables(run: &Run, beside: &Beside, folder: &Path) -> anyhow::Result<()> {
-    table::write_csv(run, folder)?;
-    paired::write_csv(&beside.comparisons, folder)?;
-    equal::write_csv(&beside.equal_errors, folder)
+pub fn write_tables(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()> {
+    tables::summary::write(&curve_table(&run.experiment, &run.rows), folder)?;
+    tables::comparison::write(&analysis.comparisons, folder)?;
+    tables::equal_error::write(&analysis.equal_errors, folder)
 }
 
 /// Draws everything into the run's folder: `figures/*.svg`, the same as `.png`, `report.html`.
 ///
 /// # Errors
 /// If the rows do not belong to the experiment, or a file cannot be written.
-pub fn write(run: &Run, beside: &Beside, folder: &Path) -> anyhow::Result<()> {
+pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()> {
     let figures = folder.join(FIGURES_FOLDER);
     fs::create_dir_all(&figures).with_context(|| figures.display().to_string())?;
     let mut drawings = Vec::new();
@@ -86,7 +65,7 @@ pub fn write(run: &Run, beside: &Beside, folder: &Path) -> anyhow::Result<()> {
     let (settings, manifest) = (text(RESOLVED), text(MANIFEST));
     let explorer = explorer::section(run)?;
     let files = [settings.as_deref(), manifest.as_deref()];
-    let html = page::html(run, beside, &drawings, &explorer, files);
+    let html = page::html(run, analysis, &drawings, &explorer, files);
     Ok(write_whole(&folder.join("report.html"), &html)?)
 }
 

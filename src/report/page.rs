@@ -1,10 +1,10 @@
 //! The page of a run: one file that needs nothing beside it.
 
 use super::canvas::escape;
-use super::paired::Table;
-use super::{Beside, Drawing, claims, equal, findings, paired, table};
+use super::tables::{Table, claims, comparison, equal_error, summary};
+use super::{Drawing, findings};
+use crate::experiment::analysis::Analysis;
 use crate::experiment::store::Run;
-use crate::experiment::summary;
 
 /// Files of a run folder that the page points to.
 const RAW: &[(&str, &str)] = &[
@@ -24,7 +24,7 @@ const FAILURES_TOLD: usize = 10;
 /// files of that name, if they are there.
 pub fn html(
     run: &Run,
-    beside: &Beside,
+    analysis: &Analysis,
     drawings: &[Drawing],
     explorer: &str,
     [settings, manifest]: [Option<&str>; 2],
@@ -44,7 +44,7 @@ pub fn html(
         paragraph(&findings::sentences(run)),
         claims_table(run),
         summary_table(run),
-        comparison_tables(run, beside),
+        comparison_tables(run, analysis),
         events(run),
         details("Every setting, defaults written out", settings)
             + &details("What ran it", manifest),
@@ -64,23 +64,19 @@ fn claims_table(run: &Run) -> String {
 }
 
 fn summary_table(run: &Run) -> String {
-    let mut lines = String::new();
-    let curves: Vec<_> = (run.experiment.planners.iter())
-        .map(|planner| summary::curve(&run.experiment, &run.rows, planner))
-        .collect();
-    for count in run.experiment.drawn_touch_counts() {
-        let points = curves.iter().flatten().filter(|point| point.touches == count);
-        lines.extend(points.map(|point| line(&table::cells(point))));
+    let table = summary::table(run);
+    match table.lines.is_empty() {
+        true => String::new(),
+        false => section("", &table_body(&table, "counted"), &summary::note(run)),
     }
-    let note =
-        format!("± is one standard error of the mean over {} trials.", run.experiment.trials);
-    table_section("", &table::HEADER, &lines, &note)
 }
 
-fn comparison_tables(run: &Run, beside: &Beside) -> String {
-    let Beside { comparisons, equal_errors } = beside;
-    let against = (paired::tables(run, comparisons), paired::note(run), "Planner against planner");
-    let equal = (equal::tables(run, equal_errors), equal::note(run), "Touches to equal error");
+fn comparison_tables(run: &Run, analysis: &Analysis) -> String {
+    let Analysis { comparisons, equal_errors } = analysis;
+    let against = comparison::tables(run, comparisons);
+    let against = (against, comparison::note(run), "Planner against planner");
+    let equal = equal_error::tables(run, equal_errors);
+    let equal = (equal, equal_error::note(run), "Touches to equal error");
     let section = |(tables, note, title): (Vec<Table>, String, &str)| {
         let bodies: String = tables.iter().map(|table| table_body(table, "named")).collect();
         match bodies.is_empty() {
@@ -91,47 +87,27 @@ fn comparison_tables(run: &Run, beside: &Beside) -> String {
     section(equal) + &section(against)
 }
 
+/// A table whose words stand in its first column (`named`), its second (`counted`) or its first
+/// four (`told`).
 fn table_body(table: &Table, class: &str) -> String {
-    let lines: String = table.lines.iter().map(|cells| line(cells)).collect();
-    let header: Vec<&str> = table.header.iter().map(String::as_str).collect();
-    marked_up(class, &header, &lines)
-}
-
-fn line(cells: &[String]) -> String {
-    let cells: String = cells.iter().map(|cell| format!("<td>{}</td>", escape(cell))).collect();
-    format!("<tr>{cells}</tr>\n")
-}
-
-/// A table; nothing if it has no lines.
-fn table_section(title: &str, header: &[&str], lines: &str, note: &str) -> String {
-    match lines.is_empty() {
-        true => String::new(),
-        false => section(title, &marked_up("counted", header, lines), note),
-    }
+    let cells = |kind: &str, cells: &[String]| -> String {
+        cells.iter().map(|cell| format!("<{kind}>{}</{kind}>", escape(cell))).collect()
+    };
+    let lines: String =
+        table.lines.iter().map(|line| format!("<tr>{}</tr>\n", cells("td", line))).collect();
+    format!(
+        "<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>{}</tr></thead>\n\
+         <tbody>\n{lines}</tbody>\n</table></div>\n",
+        cells("th", &table.header)
+    )
 }
 
 fn section(title: &str, body: &str, note: &str) -> String {
     format!("<section>\n{title}{body}<p class=\"note\">{}</p>\n</section>\n", escape(note))
 }
 
-/// A table whose words stand in its first column (`named`), its second (`counted`) or its first four
-/// (`told`).
-fn marked_up(class: &str, header: &[&str], lines: &str) -> String {
-    let head: String = header.iter().map(|head| format!("<th>{}</th>", escape(head))).collect();
-    format!(
-        "<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>{head}</tr></thead>\n\
-         <tbody>\n{lines}</tbody>\n</table></div>\n"
-    )
-}
-
 fn events(run: &Run) -> String {
-    let mut items: Vec<String> = run
-        .experiment
-        .planners
-        .iter()
-        .map(|planner| table::described(planner, &summary::events(&run.rows, planner)))
-        .filter(|line| !line.is_empty())
-        .collect();
+    let mut items = summary::happened(run);
     let failures = run.rows.iter().filter_map(|row| {
         Some(format!("{}, trial {}: {}", row.planner, row.trial, row.failure.as_ref()?))
     });
@@ -139,8 +115,7 @@ fn events(run: &Run) -> String {
     if items.is_empty() {
         return String::new();
     }
-    let items: String =
-        items.iter().map(|item| format!("<li>{}</li>\n", escape(item.trim_end()))).collect();
+    let items: String = items.iter().map(|item| format!("<li>{}</li>\n", escape(item))).collect();
     format!("<section>\n<h2>What else happened</h2>\n<ul>\n{items}</ul>\n</section>\n")
 }
 

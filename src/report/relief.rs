@@ -1,7 +1,7 @@
 //! A height field or a mesh as a shaded relief: orthographic view, painter's algorithm.
 
 use super::axes::Axis;
-use super::canvas::{Area, Canvas, Point, pair};
+use super::canvas::{Area, Canvas, PointPx, pair};
 use super::style;
 use crate::geometry::mesh::Mesh;
 use nalgebra::Vector3;
@@ -48,7 +48,7 @@ pub struct View {
     up: Vector3<f64>,
     toward: Vector3<f64>,
     scale: f64,
-    shift: Point,
+    shift: PointPx,
 }
 
 impl View {
@@ -74,7 +74,7 @@ impl View {
     }
 
     /// Where the point (x, height, z) in metres lies on the sheet.
-    pub fn at(&self, point: [f64; 3]) -> Point {
+    pub fn at(&self, point: [f64; 3]) -> PointPx {
         let p = self.stretched(point);
         [
             self.shift[0] + self.scale * p.dot(&self.right),
@@ -94,7 +94,7 @@ impl View {
 
 /// A part of the relief.
 struct Face {
-    outline: Vec<Point>,
+    outline: Vec<PointPx>,
     nearness: f64,
     colour: String,
 }
@@ -204,7 +204,7 @@ pub fn brightness(normal: Vector3<f64>) -> f64 {
 }
 
 /// Whether a polygon contains a point, by the parity of its crossings.
-fn contains(outline: &[Point], [x, y]: Point) -> bool {
+fn contains(outline: &[PointPx], [x, y]: PointPx) -> bool {
     let mut is_inside = false;
     for (i, &[ax, ay]) in outline.iter().enumerate() {
         let [bx, by] = outline[(i + 1) % outline.len()];

@@ -6,6 +6,7 @@ use crate::experiment::store::Run;
 use crate::explore::belief::Belief;
 use crate::explore::probe::{Contact, Swept, Touch};
 use crate::gp::Posterior;
+use crate::report::number::digits;
 use crate::task::Zone;
 use anyhow::{Context, ensure};
 use nalgebra::{Point3, Vector3};
@@ -105,16 +106,6 @@ pub fn heights_m<'a>(
         .flat_map(|row| &row.touches)
         .filter_map(move |touch| Some(contact(&run.experiment.scene.zone, touch)?.1));
     run.truth.heights_m.iter().flatten().copied().chain(touched)
-}
-
-/// A number with three digits that say something.
-pub fn digits(value: f64) -> String {
-    if !value.is_finite() {
-        return "–".into();
-    }
-    let power = value.abs().max(1e-9).log10().floor();
-    let decimals = (2.0 - power).clamp(0.0, 6.0) as usize;
-    format!("{value:.decimals$}")
 }
 
 fn met(touch: &TouchRow) -> Touch {

@@ -3,7 +3,7 @@
 use super::axes::{Axis, Length, colour_bar};
 use super::canvas::{Area, Canvas};
 use super::relief::{Relief, Space, brightness};
-use super::sheet::Sheet;
+use super::relief_panel::ReliefPanel;
 use super::style;
 use super::style::LATER;
 use crate::geometry::mesh::Mesh;
@@ -42,14 +42,14 @@ pub fn picture(
         z_m: around(low.z, high.z),
         height_m: [height_m(low.y), height_m(high.y)],
     };
-    let sheet = Sheet::new(unit, area(0.0), space);
-    sheet.frame(&mut canvas, "the object, and the zone on it", "");
-    Relief::of_mesh(&sheet.view, mesh, zone.datum_y_m, &inside).draw(&mut canvas);
+    let panel = ReliefPanel::new(unit, area(0.0), space);
+    panel.frame(&mut canvas, "the object, and the zone on it", "");
+    Relief::of_mesh(&panel.view, mesh, zone.datum_y_m, &inside).draw(&mut canvas);
     for side in rim(zone) {
         let on_surface = side.iter().map(|place| {
             environment
                 .true_height_m(place)
-                .map(|height| sheet.view.at([place[0], height, place[1]]))
+                .map(|height| panel.view.at([place[0], height, place[1]]))
         });
         let on_surface: Vec<_> = on_surface.collect();
         for part in on_surface.split(Option::is_none) {
@@ -59,16 +59,16 @@ pub fn picture(
 
     let (low, high) = inside.range();
     let space = Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: [low, high] };
-    let sheet = Sheet::new(unit, area(1.0), space);
-    sheet.frame(&mut canvas, &format!("{} points of contact", points.len()), "");
+    let panel = ReliefPanel::new(unit, area(1.0), space);
+    panel.frame(&mut canvas, &format!("{} points of contact", points.len()), "");
     let mut seen: Vec<_> = points
         .iter()
         .map(|(point, normal)| ([point.x, height_m(point.y), point.z], *normal))
         .collect();
-    seen.sort_by(|(a, _), (b, _)| sheet.view.nearness(*a).total_cmp(&sheet.view.nearness(*b)));
+    seen.sort_by(|(a, _), (b, _)| panel.view.nearness(*a).total_cmp(&panel.view.nearness(*b)));
     for (point, normal) in seen {
         let colour = style::height(inside.fraction(point[1]), brightness(normal));
-        canvas.circle(sheet.view.at(point), 2.0, &style::fill(&colour, 1.0));
+        canvas.circle(panel.view.at(point), 2.0, &style::fill(&colour, 1.0));
     }
     let bar = Area { left: PANEL.0 - 60.0, top: PANEL.1 + 20.0, width: 300.0, height: 13.0 };
     let scale = Axis::linear(low * unit.per_m, high * unit.per_m, 6.0);

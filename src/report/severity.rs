@@ -6,7 +6,7 @@ use super::style::{FAINT_INK, INK, PAPER, SMALL_PX, TEXT_PX};
 use crate::study::stress::{Case, Outcome, Verdict};
 
 /// A case with its verdicts.
-pub type Ran = (&'static Case, Vec<Verdict>);
+pub type CaseVerdicts = (&'static Case, Vec<Verdict>);
 
 const LEFT_PX: f64 = 232.0;
 const TOP_PX: f64 = 62.0;
@@ -23,7 +23,7 @@ const COLOURS: [(&str, &str); 4] = [
 
 /// One line per case, one cell per severity, one stripe per control period or time step where that
 /// matters.
-pub fn draw(ran: &[Ran]) -> String {
+pub fn draw(ran: &[CaseVerdicts]) -> String {
     let columns = ran.iter().map(|(case, _)| case.severities.len()).max().unwrap_or(1);
     let width = LEFT_PX + columns as f64 * CELL_PX.0 + 20.0;
     let mut canvas = Canvas::new(width, TOP_PX + ran.len() as f64 * (CELL_PX.1 + GAP_PX) + 14.0);

@@ -1,4 +1,11 @@
-//! Questions asked of many touches: what accuracy costs, what effects change, where it breaks.
+//! Questions asked of many touches.
+//!
+//! * [`fidelity`]: what does accuracy cost? The same touches over a ladder of scenes, from a rigid
+//!   hull that is swept to a fine skin at a fine time step.
+//! * [`effects`]: what does each piece of physics change, and what does it cost? One is switched,
+//!   the rest of the scene stays.
+//! * [`stress`]: where does it break, and does it say so? Hard cases at rising severity, each with
+//!   the law it must keep.
 
 pub mod effects;
 pub mod fidelity;

@@ -1,8 +1,8 @@
 //! What the shipped experiments must show, run whole or cut down in trials.
 
 use palpate::experiment::equal_error::equal_error;
-use palpate::experiment::measure::RMSE;
-use palpate::experiment::row::TrialRow;
+use palpate::experiment::measure::{EDGE_RMSE, R, RMSE};
+use palpate::experiment::row::{TrialRow, of_planner};
 use palpate::experiment::summary;
 use palpate::experiment::summary::CurvePoint;
 use palpate::experiment::{Experiment, Simulation};
@@ -39,13 +39,13 @@ fn after(experiment: &Experiment, rows: &[TrialRow], planner: &str, touches: u32
 fn toy_active_finds_the_curve_by_the_touches_of_the_paper() {
     let (experiment, rows) = run("toy.toml", &["planners=[\"active\", \"random\"]"]);
     assert_eq!((experiment.trials, experiment.initial_touches, experiment.touches), (50, 3, 50));
-    let active = |touches| after(&experiment, &rows, "active", touches).r_mean;
+    let active = |touches| after(&experiment, &rows, "active", touches).of(&R).unwrap().mean;
     assert!(active(23) >= 0.98, "{}", active(23));
     assert!(active(25) >= 0.99, "{}", active(25));
     assert!(active(35) >= 0.999, "{}", active(35));
-    let random = after(&experiment, &rows, "random", 23).r_mean;
+    let random = after(&experiment, &rows, "random", 23).of(&R).unwrap().mean;
     assert!(random < 0.965, "{random}");
-    for row in summary::of(&rows, "active") {
+    for row in of_planner(&rows, "active") {
         let r = row.touches.last().unwrap().metrics.unwrap().r;
         assert!(r >= 0.95, "trial {} ends at {r}", row.trial);
     }
@@ -68,7 +68,7 @@ fn toy_constant_starts_stall_visibly_and_recover() {
 #[test]
 fn container_active_needs_two_thirds_of_the_error_and_learns_the_straight_axis() {
     let (experiment, rows) = run("container.toml", &["planners=[\"active\", \"random\"]"]);
-    let median = |planner| after(&experiment, &rows, planner, 15).rmse_median_m;
+    let median = |planner| after(&experiment, &rows, planner, 15).of(&RMSE).unwrap().median;
     let (active, random) = (median("active"), median("random"));
     assert!(active <= random * 2.0 / 3.0, "{active} {random}");
     let longer_along_z = rows.iter().filter(|row| {
@@ -83,7 +83,7 @@ fn container_active_needs_two_thirds_of_the_error_and_learns_the_straight_axis()
 #[test]
 fn bird_active_is_better_in_the_outer_tenth() {
     let (experiment, rows) = run("bird.toml", &["planners=[\"active\", \"random\"]", "trials=10"]);
-    let edge = |planner| after(&experiment, &rows, planner, 120).edge_rmse_median_m.unwrap();
+    let edge = |planner| after(&experiment, &rows, planner, 120).of(&EDGE_RMSE).unwrap().median;
     assert!(edge("active") < edge("random"), "{} {}", edge("active"), edge("random"));
 }
 
@@ -113,8 +113,8 @@ fn targets_past_the_object_are_missed_once_and_not_asked_for_again() {
     }
 }
 
-/// At most two fifths of the way of `active` for at most a fifth more touches to equal error, with the
-/// same settings on toy and container. No target is asked for twice.
+/// At most two fifths of the way of `active` for at most a fifth more touches to equal error, with
+/// the same settings on toy and container. No target is asked for twice.
 #[test]
 fn travel_saves_three_fifths_of_the_way_for_a_fifth_more_touches() {
     let both = "planners=[\"active\", \"travel\"]";
@@ -123,7 +123,7 @@ fn travel_saves_three_fifths_of_the_way_for_a_fifth_more_touches() {
         let equal = equal_error(&experiment, &rows, ["travel", "active"], &RMSE).unwrap();
         assert!(equal.ratio.value <= 1.2, "{name}: {equal:?}");
         assert!(equal.path_ratio.value <= 0.4, "{name}: {equal:?}");
-        for row in summary::of(&rows, "travel") {
+        for row in of_planner(&rows, "travel") {
             for (i, touch) in row.touches.iter().enumerate() {
                 let mut earlier = row.touches[..i].iter();
                 assert!(earlier.all(|earlier| earlier.target != touch.target), "{name}, {i}");
@@ -132,8 +132,8 @@ fn travel_saves_three_fifths_of_the_way_for_a_fifth_more_touches() {
     }
 }
 
-/// The body's time is told where a touch is motion: more after every touch, the same for every planner
-/// up to the last touch that they share.
+/// The body's time is told where a touch is motion: more after every touch, the same for every
+/// planner up to the last touch that they share.
 #[test]
 fn a_body_that_moves_tells_its_time() {
     let sets = ["trials=1", "touches=7", "planners=[\"active\", \"random\"]"];
@@ -163,11 +163,13 @@ fn toy_slope_with_generic_priors_is_never_behind_random_and_found_by_touch_21() 
     let slope = summary::curve(&experiment, &rows, "slope");
     let random = summary::curve(&experiment, &rows, "random");
     for (slope, random) in slope.iter().zip(&random) {
-        let error = slope.r_se.unwrap().hypot(random.r_se.unwrap());
-        let behind = random.r_mean - slope.r_mean;
-        assert!(behind <= error, "{}: {behind} ± {error}", slope.touches);
-        if slope.touches >= 21 {
-            assert!(slope.r_mean >= 0.99, "{}: {}", slope.touches, slope.r_mean);
+        let touches = slope.touches;
+        let [slope, random] = [slope, random].map(|point| point.of(&R).unwrap());
+        let error = slope.error.unwrap().hypot(random.error.unwrap());
+        let behind = random.mean - slope.mean;
+        assert!(behind <= error, "{touches}: {behind} ± {error}");
+        if touches >= 21 {
+            assert!(slope.mean >= 0.99, "{touches}: {}", slope.mean);
         }
     }
 }

@@ -1,18 +1,15 @@
-//! What the ladder and the switches of effects promise.
+//! What the ladder of fidelities promises.
 
 use palpate::sim::collision::Collision;
-use palpate::sim::finger::counter;
-use palpate::sim::finger::{Effects, FingertipState};
-use palpate::sim::simulator::Simulator;
+use palpate::sim::finger::Effects;
 use palpate::sim::{Environment, Scene};
-use palpate::study::effects::{SWITCHES, switched};
 use palpate::study::fidelity::ladder::{DIAGONAL, RUNGS, is_diagonal};
 use palpate::study::fidelity::order;
-#[cfg(feature = "mujoco")]
-use palpate::study::fidelity::press;
-use palpate::study::fidelity::reference_load::quiet;
-use palpate::study::fidelity::row::Spread;
+use palpate::study::fidelity::reference_load::noise_free;
 use palpate::study::fidelity::rung::Senses;
+use palpate::study::fidelity::spread::Spread;
+#[cfg(feature = "mujoco")]
+use palpate::study::fidelity::step_in_contact;
 use palpate::study::fidelity::tolerance::Tolerance;
 use palpate::study::fidelity::touches::{targets, touch_all};
 use std::collections::BTreeSet;
@@ -47,22 +44,22 @@ fn the_error_falls_with_the_resolution_as_it_should() {
     let targets = targets(&scene, 6, 0);
     let order = order::in_time_step(&scene, &targets, &mut || true).unwrap().unwrap();
     assert!((order.observed - order.expected).abs() < 0.4, "{order:?}");
-    let environment = Arc::new(Environment::build(quiet(&scene)).unwrap());
+    let environment = Arc::new(Environment::build(noise_free(&scene)).unwrap());
     let touches = touch_all(&environment, &targets, 0, &mut || true).unwrap().unwrap();
-    let poses: Vec<_> = touches.felt.iter().flatten().map(|felt| felt.motion).collect();
+    let poses: Vec<_> = touches.loads.iter().flatten().map(|load| load.motion).collect();
     assert_eq!(poses.len(), targets.len());
     let order = order::in_samples(&scene, &poses).unwrap();
     assert!((order.observed - order.expected).abs() < 0.5, "{order:?}");
 }
 
-/// Explicit in the skin's force, semi-implicit in the joints: of first order. The bar tells it from an
-/// order of a half and of two.
+/// Explicit in the skin's force, semi-implicit in the joints: of first order. The bar tells it from
+/// an order of a half and of two.
 #[test]
 #[cfg(feature = "mujoco")]
 fn with_masses_the_error_in_contact_falls_with_the_step() {
     for name in ["container", "bird"] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}_finger.toml"));
-        let order = press::in_step(&Scene::load(&path, &[]).unwrap()).unwrap().unwrap();
+        let order = step_in_contact::in_step(&Scene::load(&path, &[]).unwrap()).unwrap().unwrap();
         println!("{order:?}");
         assert!((order.observed - order.expected).abs() < 0.3, "{name}: {order:?}");
         assert!(order.errors.is_sorted_by(|a, b| a.1 > b.1), "{name}: {order:?}");
@@ -79,43 +76,6 @@ fn a_rigid_scene_leaves_its_geometry_to_rigid_rungs() {
         assert_eq!(changed.solver.collision, rung.collision, "{}", rung.name());
         let searched = rung.collision == Some(Collision::Sdf);
         assert_eq!(changed.solver.sdf.is_some(), searched, "{}", rung.name());
-    }
-}
-
-/// Effects that a stage of the finger's stands for and that a skin alone can be given.
-const WITH_STAGE: [&str; 5] = ["fluid", "fluid.vibration", "electrodes", "thermal", "friction"];
-
-#[test]
-fn an_effect_that_is_off_has_no_state_and_never_runs() {
-    let bare = scene(&["effects={skin={}}"]);
-    let bytes = |scene: &Scene| {
-        let environment = Environment::build(scene.clone()).unwrap();
-        let rng = palpate::math::seed::stream(0, 0, "test");
-        FingertipState::new(environment.fingertip().unwrap(), &rng).bytes()
-    };
-    let runs = |scene: &Scene| {
-        let environment = Arc::new(Environment::build(scene.clone()).unwrap());
-        let before = counter::counts().unwrap();
-        Simulator::new(std::sync::Arc::clone(&environment))
-            .unwrap()
-            .probe(0)
-            .unwrap()
-            .touch(&environment.task().approach(&[0.0, 0.5]))
-            .unwrap();
-        let after = counter::counts().unwrap();
-        std::array::from_fn::<u64, { counter::STAGES.len() }, _>(|i| after[i] - before[i])
-    };
-    let [skin, others @ ..] = runs(&bare);
-    assert!(skin > 0);
-    assert!(others.iter().all(|runs| *runs == 0), "{others:?}");
-    for switch in SWITCHES.iter().filter(|switch| WITH_STAGE.contains(&switch.name)) {
-        let with = switched(&bare, switch);
-        assert!((switch.is_on)(&with), "{}", switch.name);
-        assert!(bytes(&with) > bytes(&bare), "{}", switch.name);
-        let stage =
-            counter::STAGES.iter().position(|(_, name)| switch.name.ends_with(name)).unwrap();
-        assert!(runs(&with)[stage] > 0, "{}", switch.name);
-        assert_eq!(switched(&with, switch).effects.skin, bare.effects.skin);
     }
 }
 
@@ -153,60 +113,4 @@ fn an_approach_that_would_press_past_the_skin_is_refused_with_its_limit() {
     let coarser = scene(&["touch.period_s=0.02"]).approach_limit_m_s().unwrap();
     assert!(coarser < limit_m_s);
     assert!(load(&["touch.approach_m_s=0.5", "body=\"cast\""]).is_ok());
-}
-
-/// The code that an effect is left out of does what the switch does when it is off, to the bit, so
-/// that comparing their times compares nothing else.
-#[test]
-fn without_a_stage_the_finger_feels_what_it_feels_with_the_stage_switched_off() {
-    use palpate::robot::finger::TipMotion;
-    use palpate::sim::environment::Shape;
-    use palpate::sim::finger::counter::Stage;
-    let off = scene(&["effects.thermal={}", "effects.timing={}"]);
-    let environment = Environment::build(off).unwrap();
-    let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip().unwrap(), environment.shape())
-    else {
-        panic!()
-    };
-    let rng = palpate::math::seed::stream(0, 0, "test");
-    let (mut one, mut other) = (FingertipState::new(tip, &rng), FingertipState::new(tip, &rng));
-    let mut x_wt = environment.chain().unwrap().forward(&environment.chain().unwrap().home);
-    let mut pressed = 0;
-    for _ in 0..300 {
-        x_wt.translation.y -= 1e-4;
-        let motion = TipMotion::at(x_wt);
-        let a = one.step(tip, bvh, &motion, 0.01).unwrap();
-        let b =
-            other.step_without::<{ Stage::Friction as usize }>(tip, bvh, &motion, 0.01).unwrap();
-        assert_eq!(a, b);
-        assert_eq!(one.frame(), other.frame());
-        pressed += i32::from(a.force_n.norm() > 0.0);
-        if a.force_n.norm() > 5.0 {
-            break;
-        }
-    }
-    assert!(pressed > 3);
-    // And what is left out does not run.
-    let before = counter::counts().unwrap();
-    other
-        .step_without::<{ Stage::Electrodes as usize }>(tip, bvh, &TipMotion::at(x_wt), 0.01)
-        .unwrap();
-    let after = counter::counts().unwrap();
-    assert_eq!(before[Stage::Electrodes as usize], after[Stage::Electrodes as usize]);
-    assert!(before[Stage::Thermal as usize] < after[Stage::Thermal as usize]);
-}
-
-/// Every switch turns the other way and back.
-#[test]
-fn a_switch_is_what_it_says() {
-    let scene = scene(&[]);
-    for switch in SWITCHES {
-        let other = switched(&scene, switch);
-        assert_ne!((switch.is_on)(&scene), (switch.is_on)(&other), "{}", switch.name);
-        assert!(Environment::build(other).is_ok(), "{}", switch.name);
-    }
-    let names: Vec<_> = SWITCHES.iter().map(|switch| switch.name).collect();
-    for effect in ["skin", "wrench", "registration", "timing.control_delay_s"] {
-        assert!(names.contains(&effect), "{effect}");
-    }
 }

@@ -8,13 +8,13 @@ use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::contact_point::locate;
 use palpate::robot::finger::{Detection, Detector, Finger, Frame, Tare};
 use palpate::sim::finger::calibration::{Free, Model, fit, residual};
-use palpate::sim::finger::electrodes::{ElectrodesEffect, counts, impedance_ohm};
-use palpate::sim::finger::fluid::FluidEffect;
-use palpate::sim::finger::friction::FrictionEffect;
+use palpate::sim::finger::effects::electrodes::{ElectrodesEffect, counts, impedance_ohm};
+use palpate::sim::finger::effects::fluid::FluidEffect;
+use palpate::sim::finger::effects::friction::FrictionEffect;
+use palpate::sim::finger::effects::skin::SkinEffect;
+use palpate::sim::finger::effects::thermal::ThermalEffect;
+use palpate::sim::finger::effects::timing::{Channel, channel};
 use palpate::sim::finger::plate::{Attitude, Plate, Recordings, direction_t};
-use palpate::sim::finger::skin::SkinEffect;
-use palpate::sim::finger::thermal::ThermalEffect;
-use palpate::sim::finger::timing::{Channel, channel};
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 
 const TICK_S: f64 = 1e-3;
@@ -207,8 +207,10 @@ fn channels_are_sampled_in_the_order_of_the_slots() {
     // While the pressure rises, PDC of a skewed frame is read before its end, E1 long before.
     let sinking = |t: f64| height(8.1e-3 - 0.01 * t);
     let ideal = frames(&quiet(), 1, 50, sinking);
-    let timing =
-        Some(palpate::sim::finger::timing::TimingEffect { batch_frames: 1, ..Default::default() });
+    let timing = Some(palpate::sim::finger::effects::timing::TimingEffect {
+        batch_frames: 1,
+        ..Default::default()
+    });
     let skewed = frames(&Effects { timing, ..quiet() }, 1, 50, sinking);
     for pair in ideal.windows(2).zip(&skewed[1..]).skip(1) {
         let ([before, now], skewed) = (pair.0, pair.1) else { unreachable!() };
@@ -225,8 +227,10 @@ fn channels_are_sampled_in_the_order_of_the_slots() {
 #[test]
 fn vibration_sees_changes_of_pressure_and_forgets_its_level() {
     let mut effects = quiet();
-    let vibration =
-        palpate::sim::finger::fluid::VibrationEffect { noise_counts: 0.0, ..Default::default() };
+    let vibration = palpate::sim::finger::effects::fluid::VibrationEffect {
+        noise_counts: 0.0,
+        ..Default::default()
+    };
     effects.fluid.as_mut().unwrap().vibration = Some(vibration);
     let pressed = frames(&effects, 1, 1000, |t| height(if t < 0.2 { 8.2e-3 } else { 7.9e-3 }));
     let swing = |frame: &Frame| {

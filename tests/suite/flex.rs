@@ -6,7 +6,7 @@ use palpate::backend::Fault;
 use palpate::explore::probe::Touch;
 use palpate::robot::finger::electrode_table::BASELINES_COUNTS;
 use palpate::sim::finger::Effects;
-use palpate::sim::finger::electrodes::impedance_ohm;
+use palpate::sim::finger::effects::electrodes::impedance_ohm;
 use palpate::sim::mujoco::FlexShell;
 use palpate::sim::simulated_finger::Shell;
 use palpate::sim::simulator::Simulator;

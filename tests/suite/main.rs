@@ -10,6 +10,7 @@ mod broken;
 mod control;
 #[cfg(feature = "mujoco")]
 mod dynamic;
+mod effects;
 #[cfg(feature = "nlopt")]
 mod examples;
 #[cfg(feature = "nlopt")]

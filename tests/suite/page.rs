@@ -3,8 +3,8 @@
 //! Without a Chromium this is skipped, and says so; `make page-test` insists on one.
 
 use crate::common::runs::{CURVE, SURFACE, run};
+use palpate::experiment::analysis::Analysis;
 use palpate::report;
-use palpate::report::Beside;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -67,7 +67,7 @@ fn acts(browser: &Path, settings: &str) -> Vec<[String; 3]> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("report.html");
     let run = run(settings);
-    report::write(&run, &Beside::of(&run), folder.path()).unwrap();
+    report::write(&run, &Analysis::of(&run), folder.path()).unwrap();
     let page = fs::read_to_string(&path).unwrap();
     let page = page.replace("<head>", &format!("<head>{CLOCK}"));
     fs::write(&path, page.replace("</body>", &format!("<script>{{{DRIVER}}}</script></body>")))

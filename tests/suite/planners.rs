@@ -265,8 +265,8 @@ fn integrated_variance_finds_the_largest_fall() {
     });
 }
 
-/// A tour is what `active` would ask for with the same fit, in another order: as many different places,
-/// the one of the largest deviation among them, on a shorter way.
+/// A tour is what `active` would ask for with the same fit, in another order: as many different
+/// places, the one of the largest deviation among them, on a shorter way.
 #[test]
 fn travel_tours_the_places_of_active_on_a_shorter_way() {
     let tour = PlanningSettings::default().travel.tour as usize;

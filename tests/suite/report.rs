@@ -1,11 +1,12 @@
 //! Figures and page of made-up runs.
 
 use crate::common::runs::{CURVE, SURFACE, run};
-use palpate::experiment::experiment::Claim;
+use palpate::experiment::analysis::Analysis;
+use palpate::experiment::report_settings::Claim;
 use palpate::experiment::store::Run;
 use palpate::report;
 use palpate::report::axes::Axis;
-use palpate::report::{Beside, png};
+use palpate::report::png;
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::{Options, Tree};
 use std::collections::BTreeMap;
@@ -14,7 +15,7 @@ use std::path::Path;
 
 /// Every file of a folder's report by name.
 fn written(run: &Run, folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    report::write(run, &Beside::of(run), folder).unwrap();
+    report::write(run, &Analysis::of(run), folder).unwrap();
     [folder.to_owned(), folder.join("figures")]
         .iter()
         .flat_map(|folder| fs::read_dir(folder).unwrap())
@@ -128,7 +129,8 @@ fn rows_of_another_zone_are_refused() {
     let mut run = run(SURFACE);
     run.rows[0].touches[0].target.pop();
     let folder = tempfile::tempdir().unwrap();
-    let error = format!("{:#}", report::write(&run, &Beside::of(&run), folder.path()).unwrap_err());
+    let error =
+        format!("{:#}", report::write(&run, &Analysis::of(&run), folder.path()).unwrap_err());
     assert!(error.contains("surfaces: trial 0 of random, touch 5: a target of 1"), "{error}");
 }
 
@@ -154,7 +156,7 @@ fn planners_are_compared_in_every_measure_and_in_touches_to_equal_error() {
         metrics.for_each(|metrics| metrics.rmse_m *= 2.0);
     }
     let folder = tempfile::tempdir().unwrap();
-    report::write_tables(&run, &Beside::of(&run), folder.path()).unwrap();
+    report::write_tables(&run, &Analysis::of(&run), folder.path()).unwrap();
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     let equal = read("equal_error.csv");
     // 0.02 / count is twice 0.02 / 20 at 10, and random is never better than twice that.

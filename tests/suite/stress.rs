@@ -1,6 +1,6 @@
 //! Every hard case at the hardest severity that must hold.
 
-use palpate::study::stress::{Case, Difficulty, Outcome, cases};
+use palpate::study::stress::{Case, Outcome, TimeAxis, cases};
 use rayon::prelude::*;
 use std::collections::HashSet;
 
@@ -39,7 +39,7 @@ fn a_panic_is_a_broken_law() {
         severities: &[1.0],
         holds: 1,
         known: "",
-        axis: Difficulty::Nothing,
+        axis: TimeAxis::Untimed,
         law: |_, _| panic!("as it should"),
     };
     let verdict = case.run(0, 0.01);
@@ -50,6 +50,6 @@ fn a_panic_is_a_broken_law() {
 #[cfg(feature = "mujoco")]
 #[test]
 fn a_skin_ten_times_stiffer_keeps_the_force_at_rest_in_steps_as_given() {
-    let margin = palpate::study::stress::hold::margin(0.002, false);
+    let margin = palpate::study::stress::stiff_press::stiffness_margin(0.002, false);
     assert!(margin.times >= 10.0, "{margin:?}");
 }

@@ -31,6 +31,15 @@ pub enum StoreError {
         /// What that line is in this experiment.
         wanted: String,
     },
+    /// An assignment to something that decides the rows of a run that is only shown.
+    #[error(
+        "--set {text}: a run that is there can be shown another way by `report.…` and `question` \
+         only; what else it is must be run (palpate run)"
+    )]
+    DecidesRows {
+        /// As typed.
+        text: String,
+    },
     /// Another process writes there.
     #[error("{}: another run is writing this folder", path.display())]
     Busy {

@@ -11,7 +11,7 @@ use std::path::Path;
 /// short and is left out.
 ///
 /// # Errors
-/// If a line is not a row, or not one of `experiment`, or the same trial again.
+/// If a line is not a row, or none that `experiment` can have, or the same trial again.
 pub(super) fn read(
     path: &Path,
     experiment: &Experiment,
@@ -33,11 +33,9 @@ pub(super) fn read(
     Ok((rows, good as u64))
 }
 
-/// Whether a row can be one of the experiment's; if not, why.
+/// Whether a row can be one of the experiment's, whichever trials and planners it lists; if not,
+/// why.
 fn belongs(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
-    if row.trial >= experiment.trials || !experiment.planners.contains(&row.planner) {
-        return Err(format!("the experiment has no trial {} of {}", row.trial, row.planner));
-    }
     if row.failure.is_none() && row.touches.len() != experiment.touches as usize {
         let (found, wanted) = (row.touches.len(), experiment.touches);
         return Err(format!("{found} touches of {wanted}, and no reason why"));
@@ -45,8 +43,14 @@ fn belongs(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
     Ok(())
 }
 
-/// Puts rows in order of trial, and of the experiment's planners.
+/// Puts rows in order of trial, and of the experiment's planners, those not listed last.
 pub(super) fn sort(rows: &mut [TrialRow], experiment: &Experiment) {
-    let rank = |row: &TrialRow| experiment.planners.iter().position(|name| *name == row.planner);
-    rows.sort_by_key(|row| (row.trial, rank(row)));
+    let rank = |name: &str| {
+        let listed = experiment.planners.iter().position(|planner| planner == name);
+        listed.unwrap_or(experiment.planners.len())
+    };
+    rows.sort_by(|a, b| {
+        let key = |row: &'_ TrialRow| (row.trial, rank(&row.planner));
+        key(a).cmp(&key(b)).then_with(|| a.planner.cmp(&b.planner))
+    });
 }

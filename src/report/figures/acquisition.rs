@@ -4,9 +4,9 @@ use super::{Figure, curves, miss_entry};
 use crate::experiment::store::Run;
 use crate::explore::belief::Belief;
 use crate::gp::posterior::Scratch;
-use crate::report::axes::{Axis, Length, Panel, Sample, colour_bar, legend};
+use crate::report::axes::{Axis, Length, Panel, Swatch, colour_bar, legend};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::heat::{CELL_PX, HeatMap};
+use crate::report::heat_map::{CELL_PX, HeatMap};
 use crate::report::replay;
 use crate::report::replay::Replay;
 use crate::report::style;
@@ -85,11 +85,11 @@ fn draw_curves(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
     let (_, largest) = Axis::around(all.chain([0.0]), 0.12, 4.0)?.range();
     let mut canvas = Canvas::new(1000.0, TOP_PX + CURVE_PX.0 + 40.0 + CURVE_PX.1 + 56.0);
     let mut entries = vec![
-        (Sample::Line(style::stroke(style::TRUTH, 2.0)), "true surface"),
-        (Sample::Line(style::stroke(style::INK, 1.6)), "posterior mean"),
-        (Sample::Cross(INITIAL), "initial touch"),
-        (Sample::Cross(LATER), "later touch"),
-        (Sample::Circle(ring(style::MAXIMUM)), "largest deviation found"),
+        (Swatch::Line(style::stroke(style::TRUTH, 2.0)), "true surface"),
+        (Swatch::Line(style::stroke(style::INK, 1.6)), "posterior mean"),
+        (Swatch::Cross(INITIAL), "initial touch"),
+        (Swatch::Cross(LATER), "later touch"),
+        (Swatch::Circle(ring(style::MAXIMUM)), "largest deviation found"),
     ];
     entries.extend(miss_entry(run));
     legend(&mut canvas, [LEFT_PX, 20.0], &entries);
@@ -172,9 +172,9 @@ fn draw_maps(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
     let scale = Axis::linear(0.0, largest, 5.0);
     let mut canvas = Canvas::new(1000.0, area.bottom() + 108.0);
     let mut entries = vec![
-        (Sample::Cross(INITIAL), "initial touch"),
-        (Sample::Cross(LATER), "later touch"),
-        (Sample::Circle(ring(style::MAXIMUM)), "largest deviation found"),
+        (Swatch::Cross(INITIAL), "initial touch"),
+        (Swatch::Cross(LATER), "later touch"),
+        (Swatch::Circle(ring(style::MAXIMUM)), "largest deviation found"),
     ];
     entries.extend(miss_entry(run));
     legend(&mut canvas, [LEFT_PX, 20.0], &entries);

@@ -4,7 +4,7 @@ use super::{Figure, miss_entry};
 use crate::experiment::store::Run;
 use crate::gp::Posterior;
 use crate::gp::posterior::Scratch;
-use crate::report::axes::{Axis, Length, Panel, Sample, legend};
+use crate::report::axes::{Axis, Length, Panel, Swatch, legend};
 use crate::report::canvas::{Anchor, Area, Canvas};
 use crate::report::replay;
 use crate::report::replay::Replay;
@@ -85,11 +85,11 @@ pub(super) fn height_axis(run: &Run) -> Option<Axis> {
 
 fn draw_legend(canvas: &mut Canvas, run: &Run) {
     let mut entries = vec![
-        (Sample::Line(style::stroke(TRUTH, 2.0)), "true surface"),
-        (Sample::Line(style::stroke(INK, 1.6)), "posterior mean"),
-        (Sample::Band(INK), "95 % band"),
-        (Sample::Cross(INITIAL), "initial touch"),
-        (Sample::Cross(LATER), "later touch"),
+        (Swatch::Line(style::stroke(TRUTH, 2.0)), "true surface"),
+        (Swatch::Line(style::stroke(INK, 1.6)), "posterior mean"),
+        (Swatch::Band(INK), "95 % band"),
+        (Swatch::Cross(INITIAL), "initial touch"),
+        (Swatch::Cross(LATER), "later touch"),
     ];
     entries.extend(miss_entry(run));
     legend(canvas, [MARGIN.0, 20.0], &entries);

@@ -8,7 +8,7 @@ mod targets;
 
 pub use surfaces::FIGURE as SURFACES;
 
-use super::axes::Sample;
+use super::axes::Swatch;
 use super::style::LATER;
 use crate::experiment::store::Run;
 
@@ -27,8 +27,8 @@ pub const FIGURES: &[Figure] =
     &[convergence::FIGURE, curves::FIGURE, surfaces::FIGURE, targets::FIGURE, acquisition::FIGURE];
 
 /// What a legend says of touches that met nothing, if there are any.
-fn miss_entry(run: &Run) -> Option<(Sample, &'static str)> {
+fn miss_entry(run: &Run) -> Option<(Swatch, &'static str)> {
     let mut touches = run.rows.iter().flat_map(|row| &row.touches);
     let is_missed = touches.any(|touch| touch.contact.is_none());
-    is_missed.then_some((Sample::Diamond(LATER), "touch that met nothing"))
+    is_missed.then_some((Swatch::Diamond(LATER), "touch that met nothing"))
 }

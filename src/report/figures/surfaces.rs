@@ -4,12 +4,12 @@ use super::{Figure, miss_entry};
 use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
 use crate::gp::posterior::Scratch;
-use crate::report::axes::{Axis, Length, Sample, colour_bar, legend};
-use crate::report::canvas::{Area, Canvas, Point};
+use crate::report::axes::{Axis, Length, Swatch, colour_bar, legend};
+use crate::report::canvas::{Area, Canvas, PointPx};
 use crate::report::relief::{Relief, Space};
+use crate::report::relief_panel::ReliefPanel;
 use crate::report::replay;
 use crate::report::replay::Replay;
-use crate::report::sheet::Sheet;
 use crate::report::style;
 use crate::report::style::{INITIAL, LATER, PAPER};
 use anyhow::ensure;
@@ -59,29 +59,29 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let axis = Axis::linear(low, high, 5.0);
     for (row, planner) in planners.iter().enumerate() {
         for (column, &count) in counts.iter().enumerate() {
-            let sheet = Sheet::new(unit, area(row as f64, column), space);
+            let panel = ReliefPanel::new(unit, area(row as f64, column), space);
             let replay = Replay::new(run, planner, count)?;
             let score = match &replay {
                 Some(replay) => replay.score(),
                 None => "not reached in this trial".into(),
             };
-            sheet.frame(&mut canvas, &format!("{planner}, {count} touches"), &score);
+            panel.frame(&mut canvas, &format!("{planner}, {count} touches"), &score);
             if let Some(replay) = replay {
                 let mut scratch = Scratch::default();
                 let heights =
                     grid.heights(|place, _| Some(replay.surface.mean(place, &mut scratch)));
-                let relief = Relief::new(&sheet.view, &grid.xs, &grid.zs, &heights, &axis);
+                let relief = Relief::new(&panel.view, &grid.xs, &grid.zs, &heights, &axis);
                 relief.draw(&mut canvas);
                 for (touch, is_initial) in replay.marks() {
-                    mark(&sheet, &mut canvas, run, &relief, (touch, is_initial));
+                    mark(&panel, &mut canvas, run, &relief, (touch, is_initial));
                 }
             }
         }
     }
-    let sheet = Sheet::new(unit, area(0.5 * (rows - 1.0), counts.len()), space);
-    sheet.frame(&mut canvas, "true object", "");
+    let panel = ReliefPanel::new(unit, area(0.5 * (rows - 1.0), counts.len()), space);
+    panel.frame(&mut canvas, "true object", "");
     let heights = grid.heights(|_, height| Some(height));
-    Relief::new(&sheet.view, &grid.xs, &grid.zs, &heights, &axis).draw(&mut canvas);
+    Relief::new(&panel.view, &grid.xs, &grid.zs, &heights, &axis).draw(&mut canvas);
     draw_colour_bar(&mut canvas, run, space, [0.5 * width, height - FOOT_PX + 14.0]);
     Ok(Some(canvas.finish()))
 }
@@ -131,7 +131,7 @@ impl<'a> Grid<'a> {
 /// A touch: a point where it met the surface, hollow if that is hidden; a diamond at the
 /// back where it met nothing.
 fn mark(
-    sheet: &Sheet,
+    panel: &ReliefPanel,
     canvas: &mut Canvas,
     run: &Run,
     relief: &Relief,
@@ -141,15 +141,15 @@ fn mark(
     match replay::contact(&run.experiment.scene.zone, touch) {
         Some((place, height)) => {
             let point = [place[0], height, place[1]];
-            let attributes = match relief.hides(&sheet.view, point) {
+            let attributes = match relief.hides(&panel.view, point) {
                 true => hidden(colour),
                 false => visible(colour),
             };
-            canvas.circle(sheet.view.at(point), 3.1, &attributes);
+            canvas.circle(panel.view.at(point), 3.1, &attributes);
         }
         None => {
-            let at = [touch.target[0], sheet.space.height_m[0], touch.target[1]];
-            canvas.diamond(sheet.view.at(at), &style::stroke(colour, 1.3));
+            let at = [touch.target[0], panel.space.height_m[0], touch.target[1]];
+            canvas.diamond(panel.view.at(at), &style::stroke(colour, 1.3));
         }
     }
 }
@@ -164,15 +164,15 @@ fn hidden(colour: &str) -> String {
 
 fn draw_legend(canvas: &mut Canvas, run: &Run) {
     let mut entries = vec![
-        (Sample::Circle(visible(INITIAL)), "initial touch"),
-        (Sample::Circle(visible(LATER)), "later touch"),
-        (Sample::Circle(hidden(LATER)), "behind the surface"),
+        (Swatch::Circle(visible(INITIAL)), "initial touch"),
+        (Swatch::Circle(visible(LATER)), "later touch"),
+        (Swatch::Circle(hidden(LATER)), "behind the surface"),
     ];
     entries.extend(miss_entry(run));
     legend(canvas, [MARGIN.0, 20.0], &entries);
 }
 
-fn draw_colour_bar(canvas: &mut Canvas, run: &Run, space: Space, [middle, top]: Point) {
+fn draw_colour_bar(canvas: &mut Canvas, run: &Run, space: Space, [middle, top]: PointPx) {
     let unit = Length::of(&run.experiment.scene.zone);
     let [low, high] = space.height_m.map(|height| height * unit.per_m);
     let area = Area { left: middle - 60.0, top, width: 320.0, height: 13.0 };

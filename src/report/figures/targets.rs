@@ -2,8 +2,10 @@
 
 use super::{Figure, miss_entry};
 use crate::experiment::store::Run;
-use crate::report::axes::{Axis, Length, Panel, Sample, legend};
+use crate::experiment::summary::median_shift_m;
+use crate::report::axes::{Axis, Length, Panel, Swatch, legend};
 use crate::report::canvas::{Area, Canvas};
+use crate::report::number::digits;
 use crate::report::replay;
 use crate::report::style;
 use crate::report::style::{FAINT_INK, INITIAL, LATER, PAPER};
@@ -11,10 +13,10 @@ use crate::report::style::{FAINT_INK, INITIAL, LATER, PAPER};
 pub(super) const FIGURE: Figure = Figure { name: "targets", caption, draw };
 
 fn caption(run: &Run) -> String {
-    let shift = match shift_mm(run) {
-        Some(shift) => format!(
+    let shift = match median_shift_m(&run.experiment.scene.zone, &run.rows) {
+        Some(shift_m) => format!(
             " Over all trials, half of the contacts lie more than {} mm beside their target.",
-            replay::digits(shift)
+            digits(1e3 * shift_m)
         ),
         None => String::new(),
     };
@@ -23,19 +25,6 @@ fn caption(run: &Run) -> String {
          as wide as it is, and touches a slope beside its tip.{shift}",
         run.experiment.report.trial
     )
-}
-
-/// Median distance between target and contact in the zone's plane.
-fn shift_mm(run: &Run) -> Option<f64> {
-    let zone = &run.experiment.scene.zone;
-    let shifts: Vec<f64> = (run.rows.iter().flat_map(|row| &row.touches))
-        .filter_map(|touch| {
-            let (place, _) = replay::contact(zone, touch)?;
-            let square = |(a, b): (&f64, &f64)| (a - b).powi(2);
-            Some(1e3 * place.iter().zip(&touch.target).map(square).sum::<f64>().sqrt())
-        })
-        .collect();
-    crate::experiment::statistics::median(&shifts)
 }
 
 const PANEL_PX: (f64, f64) = (300.0, 300.0);
@@ -62,9 +51,9 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let width = LEFT_PX + rows.len() as f64 * step_px;
     let mut canvas = Canvas::new(width.max(760.0), TOP_PX + PANEL_PX.1 + 60.0);
     let mut entries = vec![
-        (Sample::Circle(ring(LATER)), "target"),
-        (Sample::Circle(point(INITIAL)), "contact of an initial touch"),
-        (Sample::Circle(point(LATER)), "of a later one"),
+        (Swatch::Circle(ring(LATER)), "target"),
+        (Swatch::Circle(point(INITIAL)), "contact of an initial touch"),
+        (Swatch::Circle(point(LATER)), "of a later one"),
     ];
     entries.extend(miss_entry(run));
     legend(&mut canvas, [LEFT_PX, 20.0], &entries);

@@ -4,9 +4,9 @@
 //! nothing about the sensor. Loads below 2 N are left out: few frames, and the counts at rest are
 //! recorded on another day.
 
-use super::electrodes::ElectrodesEffect;
+use super::effects::electrodes::ElectrodesEffect;
+use super::effects::skin::SkinEffect;
 use super::plate::{Attitude, Plate, Recording, direction_t};
-use super::skin::SkinEffect;
 use crate::robot::finger::frame::ELECTRODES;
 use serde::Serialize;
 

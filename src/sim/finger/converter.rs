@@ -1,13 +1,12 @@
 //! From what the fingertip feels to the frames its sensor sends.
 
-use super::electrodes::Electrodes;
-use super::fluid::{Filter, FluidEffect};
-use super::thermal::ThermalEffect;
-use super::timing::{Channel, TimingEffect, channel};
+use super::counter::count;
+use super::effects::Effects;
+use super::effects::electrodes::Electrodes;
+use super::effects::fluid::Filter;
+use super::effects::timing::{Channel, channel};
 use crate::robot::finger::frame::{ELECTRODES, Frame, VIBRATIONS};
 use crate::robot::finger::frame::{SLOTS, SLOTS_HZ};
-use crate::sim::finger::counter;
-use crate::sim::finger::counter::Stage;
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 
@@ -31,13 +30,11 @@ pub struct Signals {
     pub warming_c_s: f64,
 }
 
-/// What converts signals: the parts of a fingertip.
+/// What converts signals: the electrodes of a fingertip and the settings of the rest.
 #[derive(Clone, Copy)]
 pub(super) struct Parts<'a> {
     pub electrodes: Option<&'a Electrodes>,
-    pub fluid: Option<&'a FluidEffect>,
-    pub thermal: Option<&'a ThermalEffect>,
-    pub timing: Option<&'a TimingEffect>,
+    pub effects: &'a Effects,
 }
 
 /// The converter of one trial: each effect draws noise from a stream of its own, so that
@@ -65,7 +62,7 @@ impl Converter {
             rng.set_stream(number);
             rng
         };
-        let batch = parts.timing.map_or(1, |timing| timing.batch_frames);
+        let batch = parts.effects.timing.as_ref().map_or(1, |timing| timing.batch_frames);
         Self {
             before,
             time_s: 0.0,
@@ -74,12 +71,14 @@ impl Converter {
             frame: Frame::default(),
             drift_counts: 0.0,
             electrodes_rng: parts.electrodes.map(|_| stream(1)),
-            fluid_rng: parts.fluid.map(|_| stream(2)),
+            fluid_rng: parts.effects.fluid.as_ref().map(|_| stream(2)),
             filter: parts
+                .effects
                 .fluid
+                .as_ref()
                 .and_then(|fluid| fluid.vibration.as_ref())
                 .map(|_| Filter::default()),
-            thermal_rng: parts.thermal.map(|_| stream(3)),
+            thermal_rng: parts.effects.thermal.as_ref().map(|_| stream(3)),
             queue: VecDeque::with_capacity(KEPT + batch),
             ready: 0,
         }
@@ -100,8 +99,8 @@ impl Converter {
     }
 
     /// Samples every slot until `time_s`; signals between the last call and now are
-    /// interpolated. The [`Stage`] numbered `OFF` is left out by the compiler.
-    pub fn advance<const OFF: usize>(&mut self, parts: &Parts, time_s: f64, now: &Signals) {
+    /// interpolated.
+    pub fn advance(&mut self, parts: &Parts, time_s: f64, now: &Signals) {
         let (start_s, before) = (self.time_s, self.before);
         loop {
             let slots = self.frames * SLOTS as u64 + self.slot as u64 + 1;
@@ -110,52 +109,44 @@ impl Converter {
                 break;
             }
             let part = ((slot_s - start_s) / (time_s - start_s)).clamp(0.0, 1.0);
-            self.sample::<OFF>(parts, &before, now, if part.is_nan() { 1.0 } else { part });
+            self.sample(parts, &before, now, if part.is_nan() { 1.0 } else { part });
             self.slot += 1;
             if self.slot == SLOTS {
-                self.finish::<OFF>(parts, slot_s);
+                self.finish(parts, slot_s);
             }
         }
         (self.time_s, self.before) = (time_s, *now);
     }
 
-    fn sample<const OFF: usize>(
-        &mut self,
-        parts: &Parts,
-        before: &Signals,
-        now: &Signals,
-        part: f64,
-    ) {
+    fn sample(&mut self, parts: &Parts, before: &Signals, now: &Signals, part: f64) {
         let last = self.slot + 1 == SLOTS;
-        let skewed = OFF != Stage::Timing as usize && parts.timing.is_some();
+        let skewed = parts.effects.timing.is_some();
         match channel(self.slot) {
             Channel::Pac(i) => {
-                self.pac::<OFF>(parts, i, mix(before.pressure_pa, now.pressure_pa, part));
+                self.pac(parts, i, mix(before.pressure_pa, now.pressure_pa, part));
                 if last && !skewed {
                     for slot in (0..SLOTS).step_by(2) {
-                        self.convert::<OFF>(parts, channel(slot), before, now, part);
+                        self.convert(parts, channel(slot), before, now, part);
                     }
                 }
             }
-            slow if skewed => self.convert::<OFF>(parts, slow, before, now, part),
+            slow if skewed => self.convert(parts, slow, before, now, part),
             _ => {}
         }
     }
 
-    fn pac<const OFF: usize>(&mut self, parts: &Parts, i: usize, pressure_pa: f64) {
-        if OFF != Stage::Vibration as usize
-            && OFF != Stage::Fluid as usize
-            && let Some(fluid) = parts.fluid
+    fn pac(&mut self, parts: &Parts, i: usize, pressure_pa: f64) {
+        if let Some(fluid) = &parts.effects.fluid
             && let (Some(vibration), Some(filter), Some(rng)) =
                 (&fluid.vibration, &mut self.filter, &mut self.fluid_rng)
         {
-            counter::count(Stage::Vibration);
+            count("fluid.vibration");
             let counts = filter.pac_counts((fluid, vibration), pressure_pa, 2.0 / SLOTS_HZ, rng);
             self.frame.pac_counts.get_or_insert([0.0; VIBRATIONS])[i] = counts;
         }
     }
 
-    fn convert<const OFF: usize>(
+    fn convert(
         &mut self,
         parts: &Parts,
         channel: Channel,
@@ -166,9 +157,7 @@ impl Converter {
         let frame = &mut self.frame;
         match channel {
             Channel::Electrode(i) => {
-                if OFF != Stage::Electrodes as usize
-                    && let (Some(electrodes), Some(rng)) =
-                        (parts.electrodes, &mut self.electrodes_rng)
+                if let (Some(electrodes), Some(rng)) = (parts.electrodes, &mut self.electrodes_rng)
                 {
                     let ideal = mix(before.electrode_counts[i], now.electrode_counts[i], part);
                     frame.electrode_counts.get_or_insert([0.0; ELECTRODES])[i] =
@@ -176,25 +165,21 @@ impl Converter {
                 }
             }
             Channel::Pdc => {
-                if OFF != Stage::Fluid as usize
-                    && let (Some(fluid), Some(rng)) = (parts.fluid, &mut self.fluid_rng)
-                {
-                    counter::count(Stage::Fluid);
+                if let (Some(fluid), Some(rng)) = (&parts.effects.fluid, &mut self.fluid_rng) {
+                    count("fluid");
                     let pressure_pa = mix(before.pressure_pa, now.pressure_pa, part);
                     frame.pdc_counts = Some(fluid.pdc_counts(pressure_pa, rng));
                 }
             }
             Channel::Tac => {
-                if OFF != Stage::Thermal as usize
-                    && let (Some(thermal), Some(rng)) = (parts.thermal, &mut self.thermal_rng)
+                if let (Some(thermal), Some(rng)) = (&parts.effects.thermal, &mut self.thermal_rng)
                 {
                     let warming_c_s = mix(before.warming_c_s, now.warming_c_s, part);
                     frame.tac_counts = Some(thermal.tac_counts(warming_c_s, rng));
                 }
             }
             Channel::Tdc => {
-                if OFF != Stage::Thermal as usize
-                    && let (Some(thermal), Some(rng)) = (parts.thermal, &mut self.thermal_rng)
+                if let (Some(thermal), Some(rng)) = (&parts.effects.thermal, &mut self.thermal_rng)
                 {
                     let temperature_c = mix(before.temperature_c, now.temperature_c, part);
                     frame.tdc_counts = Some(thermal.tdc_counts(temperature_c, rng));
@@ -204,19 +189,15 @@ impl Converter {
         }
     }
 
-    fn finish<const OFF: usize>(&mut self, parts: &Parts, time_s: f64) {
+    fn finish(&mut self, parts: &Parts, time_s: f64) {
         self.frame.time_s = time_s;
-        if OFF != Stage::Electrodes as usize
-            && let (Some(electrodes), Some(rng)) = (parts.electrodes, &mut self.electrodes_rng)
-        {
+        if let (Some(electrodes), Some(rng)) = (parts.electrodes, &mut self.electrodes_rng) {
             let frame_s = SLOTS as f64 / SLOTS_HZ;
             self.drift_counts = electrodes.drifted(self.drift_counts, frame_s, rng);
         }
         let mut batch = 1;
-        if OFF != Stage::Timing as usize
-            && let Some(timing) = parts.timing
-        {
-            counter::count(Stage::Timing);
+        if let Some(timing) = &parts.effects.timing {
+            count("timing");
             batch = timing.batch_frames;
         }
         if self.queue.len() >= KEPT + batch {

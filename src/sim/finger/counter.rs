@@ -1,60 +1,45 @@
-//! How often each piece of physics ran.
+//! How often each effect did its work.
 //!
 //! Only builds with debug assertions count, per thread; in a release build the calls are empty,
 //! so that counting costs nothing where time is measured.
 
 #[cfg(debug_assertions)]
-use std::cell::Cell;
-
-/// A piece of physics.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    /// The skin pressed against the object.
-    Skin,
-    /// Static pressure of the fluid read.
-    Fluid,
-    /// Vibration of the fluid read.
-    Vibration,
-    /// Impedances of all electrodes.
-    Electrodes,
-    /// Heat moved on.
-    Thermal,
-    /// The bristle moved on.
-    Friction,
-    /// A batch of frames held back.
-    Timing,
-}
-
-/// Every stage with its name.
-pub const STAGES: [(Stage, &str); 7] = [
-    (Stage::Skin, "skin"),
-    (Stage::Fluid, "fluid"),
-    (Stage::Vibration, "vibration"),
-    (Stage::Electrodes, "electrodes"),
-    (Stage::Thermal, "thermal"),
-    (Stage::Friction, "friction"),
-    (Stage::Timing, "timing"),
-];
+use std::cell::RefCell;
 
 #[cfg(debug_assertions)]
 thread_local! {
-    static COUNTS: [Cell<u64>; STAGES.len()] = const { [const { Cell::new(0) }; STAGES.len()] };
+    static COUNTS: RefCell<Vec<(&'static str, u64)>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Notes that `stage` ran once on this thread.
+/// Notes that `effect`, named as in the scene, did its work once on this thread.
 #[inline]
-pub fn count(stage: Stage) {
+pub fn count(effect: &'static str) {
     #[cfg(debug_assertions)]
-    COUNTS.with(|counts| counts[stage as usize].set(counts[stage as usize].get() + 1));
+    COUNTS.with_borrow_mut(|counts| match counts.iter_mut().find(|(name, _)| *name == effect) {
+        Some((_, count)) => *count += 1,
+        None => counts.push((effect, 1)),
+    });
     #[cfg(not(debug_assertions))]
-    let _ = stage;
+    let _ = effect;
 }
 
-/// How often each stage ran on this thread, in the order of [`STAGES`]; none in a build that does
-/// not count.
-pub fn counts() -> Option<[u64; STAGES.len()]> {
+/// How often `effect` did its work on this thread; none in a build that does not count.
+pub fn count_of(effect: &str) -> Option<u64> {
     #[cfg(debug_assertions)]
-    return Some(COUNTS.with(|counts| std::array::from_fn(|i| counts[i].get())));
+    return Some(COUNTS.with_borrow(|counts| {
+        counts.iter().find(|(name, _)| *name == effect).map_or(0, |(_, count)| *count)
+    }));
+    #[cfg(not(debug_assertions))]
+    {
+        let _ = effect;
+        None
+    }
+}
+
+/// How often any effect did its work on this thread; none in a build that does not count.
+pub fn total() -> Option<u64> {
+    #[cfg(debug_assertions)]
+    return Some(COUNTS.with_borrow(|counts| counts.iter().map(|(_, count)| count).sum()));
     #[cfg(not(debug_assertions))]
     None
 }

@@ -1,31 +1,24 @@
 //! The fingertip, put together from the effects a scene names.
 
 use super::converter::{Converter, Parts, Signals};
-use super::effects::Effects;
-use super::electrodes::Electrodes;
-use super::fluid::FluidEffect;
-use super::friction::{Bristle, FrictionEffect};
+use super::counter::count;
+use super::effects::effect::Step;
+use super::effects::electrodes::Electrodes;
+use super::effects::skin::{Pressed, Skin, SkinEffect};
+use super::effects::{EffectStates, Effects};
 use super::lattice::Lattice;
 use super::load::{Load, PressError};
 use super::profile::Profile;
 use super::samples::spread;
-use super::skin::{Pressed, Skin, SkinEffect};
-use super::thermal::{Heat, ThermalEffect};
-use super::timing::TimingEffect;
 use crate::geometry::bvh::MeshBvh;
 use crate::robot::finger::TipMotion;
 use crate::robot::finger::frame::Frame;
 use crate::robot::finger::shape::Finger;
-use crate::sim::finger::counter;
-use crate::sim::finger::counter::Stage;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
 /// Longest step: beyond it a frame's signals would be mostly interpolated (chosen).
 const LONGEST_STEP_S: f64 = 1.0;
-
-/// No stage: what [`FingertipState::step`] leaves out.
-const NOTHING: usize = usize::MAX;
 
 /// What never changes about a fingertip; shared by trials.
 #[derive(Clone, Debug)]
@@ -33,11 +26,7 @@ pub struct Fingertip {
     skin: Option<Skin>,
     lattice: Option<Lattice>,
     electrodes: Option<Electrodes>,
-    fluid: Option<FluidEffect>,
-    thermal: Option<ThermalEffect>,
-    friction: Option<FrictionEffect>,
-    timing: Option<TimingEffect>,
-    sends_frames: bool,
+    effects: Effects,
 }
 
 impl Fingertip {
@@ -58,11 +47,7 @@ impl Fingertip {
             skin,
             lattice: shell.map(|(lattice, _)| lattice),
             electrodes,
-            fluid: effects.fluid.clone(),
-            thermal: effects.thermal.clone(),
-            friction: effects.friction.clone(),
-            timing: effects.timing.clone(),
-            sends_frames: effects.sends_frames(),
+            effects: effects.clone(),
         }
     }
 
@@ -88,12 +73,7 @@ impl Fingertip {
     }
 
     fn parts(&self) -> Parts<'_> {
-        Parts {
-            electrodes: self.electrodes.as_ref(),
-            fluid: self.fluid.as_ref(),
-            thermal: self.thermal.as_ref(),
-            timing: self.timing.as_ref(),
-        }
+        Parts { electrodes: self.electrodes.as_ref(), effects: &self.effects }
     }
 }
 
@@ -127,27 +107,25 @@ pub struct FingertipState {
     pressed: Option<Pressed>,
     /// How far a skin that is simulated elsewhere moved inwards at each sample; empty at rest.
     shell_m: Vec<f64>,
-    bristle: Option<Bristle>,
-    heat: Option<Heat>,
+    effects: EffectStates,
     converter: Option<Converter>,
 }
 
 impl FingertipState {
     /// At the start of a trial, untouched; `rng` is the only randomness.
     pub fn new(tip: &Fingertip, rng: &ChaCha8Rng) -> Self {
-        let mut feel = Self {
+        let mut state = Self {
             time_s: 0.0,
             pressed: tip.skin.as_ref().map(Skin::relaxed),
             shell_m: Vec::new(),
-            bristle: tip.friction.as_ref().map(|_| Bristle::default()),
-            heat: tip.thermal.as_ref().map(Heat::new),
+            effects: EffectStates::new(&tip.effects),
             converter: None,
         };
-        if tip.sends_frames {
-            let untouched = feel.signals::<NOTHING>(tip, 0.0);
-            feel.converter = Some(Converter::new(&tip.parts(), untouched, rng));
+        if tip.effects.sends_frames() {
+            let untouched = state.signals(tip, 0.0);
+            state.converter = Some(Converter::new(&tip.parts(), untouched, rng));
         }
-        feel
+        state
     }
 
     /// Since the start of the trial.
@@ -171,26 +149,11 @@ impl FingertipState {
         motion: &TipMotion,
         dt_s: f64,
     ) -> Result<Load, FingertipError> {
-        self.step_without::<NOTHING>(tip, object, motion, dt_s)
-    }
-
-    /// As [`step`](Self::step), in code from which the [`Stage`] numbered `OFF` is left out by the compiler:
-    /// what the switch of an effect that is off costs is measured against it.
-    ///
-    /// # Errors
-    /// As [`step`](Self::step).
-    pub fn step_without<const OFF: usize>(
-        &mut self,
-        tip: &Fingertip,
-        object: &MeshBvh,
-        motion: &TipMotion,
-        dt_s: f64,
-    ) -> Result<Load, FingertipError> {
         self.accept(motion, dt_s)?;
         let time_s = self.time_s;
         let load = match (&tip.skin, &mut self.pressed) {
             (Some(skin), Some(pressed)) => {
-                counter::count(Stage::Skin);
+                count("skin");
                 skin.press(object, &motion.x_wt, pressed).map_err(|error| match error {
                     PressError::NotFinite => {
                         FingertipError::NotFinite { time_s, dt_s, motion: Box::new(*motion) }
@@ -202,7 +165,7 @@ impl FingertipState {
             }
             _ => Load::default(),
         };
-        Ok(self.advance::<OFF>(tip, load, motion, dt_s))
+        Ok(self.advance(tip, load, motion, dt_s))
     }
 
     /// The same for a skin that is simulated elsewhere: `load` is what the object does to it at the
@@ -221,7 +184,7 @@ impl FingertipState {
         self.accept(motion, dt_s)?;
         self.shell_m.clear();
         self.shell_m.extend_from_slice(inward_m);
-        Ok(self.advance::<NOTHING>(tip, load, motion, dt_s))
+        Ok(self.advance(tip, load, motion, dt_s))
     }
 
     fn accept(&self, motion: &TipMotion, dt_s: f64) -> Result<(), FingertipError> {
@@ -232,30 +195,12 @@ impl FingertipState {
     }
 
     /// What follows from the load on the skin.
-    fn advance<const OFF: usize>(
-        &mut self,
-        tip: &Fingertip,
-        mut load: Load,
-        motion: &TipMotion,
-        dt_s: f64,
-    ) -> Load {
+    fn advance(&mut self, tip: &Fingertip, mut load: Load, motion: &TipMotion, dt_s: f64) -> Load {
         self.time_s += dt_s;
-        if OFF != Stage::Friction as usize
-            && let (Some(friction), Some(bristle)) = (&tip.friction, &mut self.bristle)
-        {
-            counter::count(Stage::Friction);
-            let velocity = [&motion.linear_w, &motion.angular_w];
-            bristle.step(friction, &motion.x_wt, velocity, dt_s, &mut load);
-        }
-        if OFF != Stage::Thermal as usize
-            && let (Some(thermal), Some(heat)) = (&tip.thermal, &mut self.heat)
-        {
-            counter::count(Stage::Thermal);
-            heat.step(thermal, load.area_m2, dt_s);
-        }
-        let signals = self.converter.is_some().then(|| self.signals::<OFF>(tip, load.pressure_pa));
+        self.effects.on_load(&tip.effects, &Step { motion, dt_s }, &mut load);
+        let signals = self.converter.is_some().then(|| self.signals(tip, load.pressure_pa));
         if let (Some(converter), Some(signals)) = (&mut self.converter, signals) {
-            converter.advance::<OFF>(&tip.parts(), self.time_s, &signals);
+            converter.advance(&tip.parts(), self.time_s, &signals);
         }
         load
     }
@@ -263,9 +208,7 @@ impl FingertipState {
     /// Bytes of this trial's state: what an effect that is off does not hold.
     pub fn bytes(&self) -> usize {
         let pressed = self.pressed.as_ref().map_or(0, Pressed::bytes);
-        let bristle = self.bristle.as_ref().map_or(0, size_of_val);
-        let heat = self.heat.as_ref().map_or(0, size_of_val);
-        pressed + bristle + heat + self.converter.as_ref().map_or(0, Converter::bytes)
+        pressed + self.effects.bytes() + self.converter.as_ref().map_or(0, Converter::bytes)
     }
 
     /// The oldest tactile frame that has arrived and was not asked for yet.
@@ -273,21 +216,17 @@ impl FingertipState {
         self.converter.as_mut()?.frame()
     }
 
-    fn signals<const OFF: usize>(&self, tip: &Fingertip, pressure_pa: f64) -> Signals {
+    fn signals(&self, tip: &Fingertip, pressure_pa: f64) -> Signals {
         let mut signals = Signals { pressure_pa, ..Signals::default() };
         let mut conductivity = 1.0;
-        if OFF != Stage::Thermal as usize
-            && let (Some(thermal), Some(heat)) = (&tip.thermal, &self.heat)
-        {
+        if let (Some(thermal), Some(heat)) = (&tip.effects.thermal, &self.effects.thermal) {
             signals.temperature_c = heat.temperature_c;
             signals.warming_c_s = heat.warming_c_s();
             conductivity = heat.conductivity(thermal);
         }
         let moved_m = self.pressed.as_ref().map_or(&self.shell_m[..], Pressed::moved_m);
-        if OFF != Stage::Electrodes as usize
-            && let Some(electrodes) = &tip.electrodes
-        {
-            counter::count(Stage::Electrodes);
+        if let Some(electrodes) = &tip.electrodes {
+            count("electrodes");
             signals.electrode_counts = electrodes.counts_over(moved_m, conductivity);
         }
         signals

@@ -1,7 +1,7 @@
-//! The shell of `[flex]` as triangles: where its nodes are, and what their motion is at the points of
-//! the skin over which electrodes sense.
+//! The shell of `[flex]` as triangles: where its nodes are, and what their motion is at the points
+//! of the skin over which electrodes sense.
 
-use super::flex::FlexEffect;
+use super::effects::flex::FlexEffect;
 use super::profile::Profile;
 use super::samples::SkinSample;
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -39,8 +39,8 @@ struct Grid {
 }
 
 impl Grid {
-    /// Half of the cells are before the origin of `T`, where the profile bends most, in equal steps of
-    /// an arc, and an even number, so that the corner at 45° is a node.
+    /// Half of the cells are before the origin of `T`, where the profile bends most, in equal steps
+    /// of an arc, and an even number, so that the corner at 45° is a node.
     fn new(profile: &Profile, effect: &FlexEffect) -> Self {
         let (radius_m, length_m) = (profile.radius_m, profile.length_m);
         let arc = 2 * effect.along.div_ceil(4);

@@ -1,9 +1,9 @@
 //! A finger pressed on a flat plate: recordings of it, and the same in simulation.
 
-use super::electrodes::{Electrodes, ElectrodesEffect};
+use super::effects::electrodes::{Electrodes, ElectrodesEffect};
+use super::effects::skin::{Pressed, Skin, SkinEffect};
 use super::load::{Load, PressError};
 use super::profile::Profile;
-use super::skin::{Pressed, Skin, SkinEffect};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::mesh::Mesh;
 use crate::robot::finger::frame::ELECTRODES;

@@ -8,7 +8,8 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 
 /// Outer radius at the sides that all other lengths here belong to.
 const SIDE_M: f64 = 7.0e-3;
-/// Radius of the rigid core: cylinder and hemisphere (electrode table of TAMS biotac_gazebo_plugin).
+/// Radius of the rigid core: cylinder and hemisphere (electrode table of TAMS
+/// biotac_gazebo_plugin).
 pub const CORE_M: f64 = 5.08e-3;
 /// Distance of the core's flat facet, which carries E7 to E10, from the origin (same table).
 const FACET_M: f64 = 4.3994e-3;
@@ -19,7 +20,8 @@ const SKIN_M: f64 = 1.6e-3;
 /// The pad at the pulp is this much thicker than the sides, most at `BULGE_X_M`: 8.31 mm.
 const BULGE_M: f64 = 1.31e-3;
 const BULGE_X_M: f64 = -7.0e-3;
-/// How the bulge flattens, bulge = `BULGE_M` − c (x − `BULGE_X_M`)²: 8.02 mm at x = 0 and 8.03 mm at −13.6.
+/// How the bulge flattens, bulge = `BULGE_M` − c (x − `BULGE_X_M`)²: 8.02 mm at x = 0 and 8.03 mm
+/// at −13.6.
 const BULGE_FALL_PER_M: f64 = 6.0;
 /// The tip's corner, 45° from −z: 8.72 mm there, 8.30 mm at 30°, almost nothing at 0.
 const CORNER_M: f64 = 1.175e-3;
@@ -60,7 +62,8 @@ impl Profile {
         Self { length_m: finger.length_m, radius_m: finger.radius_m, shaped: true }
     }
 
-    /// A capsule whose layers are everywhere those of the BioTac's sides: a shape with closed forms.
+    /// A capsule whose layers are everywhere those of the BioTac's sides: a shape with closed
+    /// forms.
     pub fn capsule(finger: &Finger) -> Self {
         Self { shaped: false, ..Self::biotac(finger) }
     }

@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 /// Golden section of a turn: successive points never line up.
 const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 
-/// Step of the central differences over the skin: along it as a part of the samples' distance, which
-/// near the apex is where the profile bends; around it in radians.
+/// Step of the central differences over the skin: along it as a part of the samples' distance,
+/// which near the apex is where the profile bends; around it in radians.
 const STEP: f64 = 0.05;
 const STEP_RAD: f64 = 1e-4;
 

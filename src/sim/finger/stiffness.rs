@@ -1,7 +1,7 @@
 //! How stiff the skin is at most: what decides how long a step of a simulated body may be.
 
+use super::effects::skin::Skin;
 use super::plate;
-use super::skin::Skin;
 use nalgebra::Vector3;
 
 /// Presses between the first touch and the largest force (chosen: the law is linear between

@@ -10,8 +10,8 @@ use nalgebra::{Point3, Vector3};
 const BOARD_M: f64 = 0.02;
 const RIM_M: f64 = 0.1;
 
-/// From the middle of all there is towards a spectator beside the finger, who also sees the object's
-/// front.
+/// From the middle of all there is towards a spectator beside the finger, who also sees the
+/// object's front.
 const BESIDE: Vector3<f64> = Vector3::new(1.08, 0.45, 0.36);
 
 /// Two cameras: `front` sees the object from in front and above, `whole` from beside the finger

@@ -1,13 +1,13 @@
 //! The skin as a shell of finite elements, and what it meets.
 //!
-//! The finger stands still, `T` is MuJoCo's world, and the object moves: nodes on a moving body would
-//! cost MuJoCo the preconditioner of its implicit step. The object is met node by node, each a ball as
-//! thick as the skin against a plane of its own that the caller lays on the object. MuJoCo's own
-//! collision of a shell with a height field turned contacts around, of a shell with a mesh takes its
-//! convex hull.
+//! The finger stands still, `T` is MuJoCo's world, and the object moves: nodes on a moving body
+//! would cost MuJoCo the preconditioner of its implicit step. The object is met node by node, each
+//! a ball as thick as the skin against a plane of its own that the caller lays on the object.
+//! MuJoCo's own collision of a shell with a height field turned contacts around, of a shell with a
+//! mesh takes its convex hull.
 
 use crate::sim::Environment;
-use crate::sim::finger::flex::FlexEffect;
+use crate::sim::finger::effects::flex::FlexEffect;
 use crate::sim::finger::lattice::{Lattice, Node};
 use std::fmt::Write;
 
@@ -27,8 +27,8 @@ const MEMORY: &str = "512M";
 /// A free node's inertia: its slides never turn it.
 const INERTIA_KG_M2: f64 = 1e-9;
 
-/// The fingertip's shell at rest in `T`, and a mocap body with a plane, z outwards, for each of its free
-/// nodes; none for a scene without `[effects.flex]`.
+/// The fingertip's shell at rest in `T`, and a mocap body with a plane, z outwards, for each of its
+/// free nodes; none for a scene without `[effects.flex]`.
 ///
 /// Each free node is a body with a ball and slides along x, y, z, in the order of
 /// [`Lattice::nodes`]; bodies, geoms and mocap bodies of nodes come before all others. A tendon

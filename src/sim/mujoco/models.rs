@@ -25,8 +25,8 @@ impl Models {
     /// With the scene's time step, or part of it where that is too long for the skin.
     ///
     /// # Errors
-    /// If MuJoCo refuses the world, no step is short enough for its skin, or the object has no inside
-    /// where the scene's collision needs one.
+    /// If MuJoCo refuses the world, no step is short enough for its skin, or the object has no
+    /// inside where the scene's collision needs one.
     pub fn new(environment: &Environment) -> Result<Self, ModelError> {
         let step_s = environment.scene().solver.step_s;
         let whole = Self::at(environment, step_s)?;

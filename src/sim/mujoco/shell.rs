@@ -30,8 +30,8 @@ const LEAST_FORCE_N: f64 = 1e-9;
 pub struct FlexShell {
     environment: Arc<Environment>,
     data: MjData<Arc<MjModel>>,
-    /// On every slide: what holds the shell in its own shape. MuJoCo's bending is that of a plate that
-    /// is flat at rest, and linear, so this force makes it that of the shell.
+    /// On every slide: what holds the shell in its own shape. MuJoCo's bending is that of a plate
+    /// that is flat at rest, and linear, so this force makes it that of the shell.
     held_n: Vec<f64>,
     /// What each free node stands for.
     areas_m2: Vec<f64>,
@@ -247,7 +247,8 @@ impl Shell for FlexShell {
     }
 }
 
-/// Between opposite attitudes there is no middle; they count as opposite from this sine on (chosen).
+/// Between opposite attitudes there is no middle; they count as opposite from this sine on
+/// (chosen).
 const TURN_MIN: f64 = 1e-6;
 
 /// A plane here, facing z, is below the whole finger: it meets nothing.

@@ -1,129 +1,119 @@
-//! What an effect that is off still costs: the scene without it, beside code that does not have it.
+//! What the effects that are switched off still cost: a finger without them, beside a twin written
+//! out by hand in which nothing can be switched.
 
 use crate::backend::{Reading, Wrench};
 use crate::experiment::statistics::{median, median_interval};
 use crate::geometry::bvh::MeshBvh;
 use crate::math::seed;
-use crate::robot::finger::TipMotion;
+use crate::robot::finger::frame::FRAME_S;
+use crate::robot::finger::{Frame, TipMotion};
 use crate::sim::environment::{EnvironmentError, Shape};
-use crate::sim::finger::counter::Stage;
-use crate::sim::finger::{Effects, Fingertip, FingertipError, FingertipState, Load};
+use crate::sim::finger::effects::fluid::FluidEffect;
+use crate::sim::finger::effects::skin::{Pressed, Skin};
+use crate::sim::finger::load::PressError;
+use crate::sim::finger::{Effects, Load};
 use crate::sim::simulated_finger::SimulatedFinger;
 use crate::sim::{Environment, Scene};
+use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Timed pieces for each pair that is asked for: one pass over the poses is shorter than the slices in
-/// which a busy machine hands out its cores, so that few pieces are interrupted and the median is not
-/// (chosen).
+/// Timed pieces for each pair that is asked for: one pass over the poses is shorter than the slices
+/// in which a busy machine hands out its cores, so that few pieces are interrupted and the median
+/// is not (chosen).
 const PIECES: usize = 8;
 
-/// Simulated time from pose to pose; chosen, a tactile frame.
-const STEP_S: f64 = 0.01;
+/// Stream of the fluid's noise, that of the finger it is the twin of.
+const FLUID_STREAM: u64 = 2;
 
-type Step =
-    fn(&mut FingertipState, &Fingertip, &MeshBvh, &TipMotion, f64) -> Result<Load, FingertipError>;
+/// A skin with fluid under it and the frames of its pressure, and no code for anything else.
+pub struct BareFinger<'a> {
+    skin: &'a Skin,
+    pressed: Pressed,
+    fluid: FluidEffect,
+    rng: ChaCha8Rng,
+    time_s: f64,
+}
 
-/// Steps of the finger from which the compiler has left one stage out.
-const WITHOUT: [(&str, Step); 6] = [
-    ("fluid", FingertipState::step_without::<{ Stage::Fluid as usize }>),
-    ("fluid.vibration", FingertipState::step_without::<{ Stage::Vibration as usize }>),
-    ("electrodes", FingertipState::step_without::<{ Stage::Electrodes as usize }>),
-    ("thermal", FingertipState::step_without::<{ Stage::Thermal as usize }>),
-    ("friction", FingertipState::step_without::<{ Stage::Friction as usize }>),
-    ("timing", FingertipState::step_without::<{ Stage::Timing as usize }>),
-];
-
-/// Time of the finger in `world`, from which the effect `name` is left out, over the time of the same
-/// finger in code that does not know this effect: median of `pairs` interleaved runs over `poses`, and
-/// its 95 % interval. None where an effect that is off leaves no code behind: nothing wraps a body
-/// without delay, and bodies are different programs.
-pub fn ratio(
-    name: &str,
-    environment: &Arc<Environment>,
-    poses: &[TipMotion],
-    pairs: usize,
-) -> Option<(f64, [f64; 2])> {
-    let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape()) else {
-        return None;
-    };
-    let fresh = || FingertipState::new(tip, &seed::stream(0, 0, "finger"));
-    let (mut usual, mut bare) = (fresh(), fresh());
-    if let Some((_, without)) = WITHOUT.iter().find(|(known, _)| *known == name) {
-        let switched: Step = FingertipState::step;
-        return paired(
-            poses,
-            pairs,
-            [
-                &mut |pose| see(black_box(*without)(&mut bare, tip, bvh, pose, STEP_S)),
-                &mut |pose| see(black_box(switched)(&mut usual, tip, bvh, pose, STEP_S)),
-            ],
-        );
+impl<'a> BareFinger<'a> {
+    /// Untouched; `rng` as for a [`FingertipState`](crate::sim::finger::FingertipState).
+    pub fn new(skin: &'a Skin, fluid: FluidEffect, rng: &ChaCha8Rng) -> Self {
+        let mut rng = rng.clone();
+        rng.set_stream(FLUID_STREAM);
+        Self { pressed: skin.relaxed(), skin, fluid, rng, time_s: 0.0 }
     }
-    let (mut sense, mut plain) = (
-        SimulatedFinger::new(Arc::clone(environment), 0)?,
-        SimulatedFinger::new(Arc::clone(environment), 0)?,
-    );
-    let mut reading = Reading::default();
-    let mut frames = Vec::new();
-    match name {
-        // The same finger where it is believed to be.
-        "registration" => paired(
-            poses,
-            pairs,
-            [&mut |pose| see(bare.step(tip, bvh, pose, STEP_S)), &mut |pose| {
-                see(sense.step(pose, STEP_S))
-            }],
-        ),
-        // The same reading without a force in it.
-        "wrench" => paired(
-            poses,
-            pairs,
-            [
-                &mut |pose| {
-                    see(plain.step(pose, STEP_S));
-                    frames.clear();
-                    frames.extend(std::iter::from_fn(|| plain.frame()));
-                    see(plain.ideal());
-                },
-                &mut |pose| {
-                    see(sense.step(pose, STEP_S));
-                    sense.report(&Wrench::default(), STEP_S, &mut reading);
-                },
-            ],
-        ),
-        _ => None,
+
+    /// The load in a pose.
+    ///
+    /// # Errors
+    /// As [`Skin::press`].
+    pub fn press(&mut self, object: &MeshBvh, motion: &TipMotion) -> Result<Load, PressError> {
+        self.skin.press(object, &motion.x_wt, &mut self.pressed)
+    }
+
+    /// The tactile frame at the end of a step of [`FRAME_S`] under `load`.
+    pub fn frame(&mut self, load: &Load) -> Frame {
+        self.time_s += FRAME_S;
+        let pdc_counts = Some(self.fluid.pdc_counts(load.pressure_pa, &mut self.rng));
+        Frame { time_s: self.time_s, pdc_counts, ..Frame::default() }
     }
 }
 
-/// What a finger with every effect off but its skin costs beside a skin pressed with nothing around
-/// it.
+/// Time over time: the median of paired runs and its 95 % interval.
+pub type Ratio = (f64, [f64; 2]);
+
+/// Time of `scene`'s finger with every effect off but its skin, and of that with skin and fluid,
+/// each over the time of its [`BareFinger`]: medians of `pairs` interleaved runs over `poses`. None
+/// without such a skin.
 ///
 /// # Errors
 /// If the scene cannot be built.
-pub fn bare_ratio(
+pub fn overheads(
     scene: &Scene,
     poses: &[TipMotion],
     pairs: usize,
-) -> Result<Option<(f64, [f64; 2])>, EnvironmentError> {
-    let mut scene = scene.clone();
-    scene.effects = Effects { skin: scene.effects.skin.take(), ..Effects::default() };
-    let environment = Environment::build(scene)?;
-    let (Some(tip), Shape::Mesh { bvh, .. }) = (environment.fingertip(), environment.shape())
-    else {
-        return Ok(None);
-    };
-    let Some(skin) = tip.skin() else { return Ok(None) };
-    let mut pressed = skin.relaxed();
-    let mut feel = FingertipState::new(tip, &seed::stream(0, 0, "finger"));
-    Ok(paired(
+) -> Result<Option<[Ratio; 2]>, EnvironmentError> {
+    let Effects { skin, fluid, .. } = &scene.effects;
+    let fluid = fluid.clone().unwrap_or_default();
+    let fluid = FluidEffect { vibration: None, ..fluid };
+    let dry = Effects { skin: skin.clone(), ..Effects::default() };
+    let wet = Effects { fluid: Some(fluid.clone()), ..dry.clone() };
+    let mut ratios = Vec::new();
+    for effects in [dry, wet] {
+        let environment = Arc::new(Environment::build(Scene { effects, ..scene.clone() })?);
+        ratios.extend(overhead(&environment, &fluid, poses, pairs));
+    }
+    Ok(<[Ratio; 2]>::try_from(ratios).ok())
+}
+
+fn overhead(
+    environment: &Arc<Environment>,
+    fluid: &FluidEffect,
+    poses: &[TipMotion],
+    pairs: usize,
+) -> Option<Ratio> {
+    let Shape::Mesh { bvh, .. } = environment.shape() else { return None };
+    let skin = environment.fingertip()?.skin()?;
+    let is_wet = environment.scene().effects.fluid.is_some();
+    let mut bare = BareFinger::new(skin, fluid.clone(), &seed::stream(0, 0, "finger"));
+    let mut finger = SimulatedFinger::new(Arc::clone(environment), 0)?;
+    let mut reading = Reading::default();
+    paired(
         poses,
         pairs,
-        [&mut |pose| see(skin.press(bvh, &pose.x_wt, &mut pressed)), &mut |pose| {
-            see(feel.step(tip, bvh, pose, STEP_S))
-        }],
-    ))
+        [
+            &mut |pose| match (bare.press(bvh, pose), is_wet) {
+                (Ok(load), true) => see((load, bare.frame(&load))),
+                (load, _) => see(load),
+            },
+            // Every pose is a frame later than the one before and brings one.
+            &mut |pose| {
+                see(finger.step(pose, FRAME_S));
+                finger.report(&Wrench::default(), FRAME_S, &mut reading);
+            },
+        ],
+    )
 }
 
 /// Keeps the compiler from leaving out what nobody looks at.
@@ -131,13 +121,13 @@ fn see<T>(result: T) {
     let _ = black_box(result);
 }
 
-/// Time of the second over that of the first. Which goes first alternates, so that what else the machine
-/// does falls on both alike.
+/// Time of the second over that of the first. Which goes first alternates, so that what else the
+/// machine does falls on both alike.
 fn paired(
     poses: &[TipMotion],
     pairs: usize,
     runs: [&mut dyn FnMut(&TipMotion); 2],
-) -> Option<(f64, [f64; 2])> {
+) -> Option<Ratio> {
     let mut ratios = Vec::with_capacity(PIECES * pairs);
     for i in 0..PIECES * pairs {
         let mut taken_s = [0.0; 2];

@@ -5,8 +5,8 @@ use crate::sim::collision::Collision;
 use crate::sim::scene::Body;
 use crate::sim::solver::Integrator;
 
-/// Targets of a rung of which a touch takes seconds; chosen: a Sobol sequence begins with places all
-/// over the zone.
+/// Targets of a rung of which a touch takes seconds; chosen: a Sobol sequence begins with places
+/// all over the zone.
 const FEW: usize = 8;
 
 /// Fastest approach of a rigid finger: stopped at once, it ends in an overload from about 5 mm/s on

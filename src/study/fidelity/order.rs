@@ -1,6 +1,6 @@
 //! How fast the error falls with the resolution, everything else being held.
 
-use super::reference_load::quiet;
+use super::reference_load::noise_free;
 use super::rung::{Rung, Senses};
 use super::touches::{MeasureError, Touches, touch_all};
 use crate::experiment::statistics::mean;
@@ -48,8 +48,8 @@ impl Order {
     }
 
     /// Its lines of `orders.csv`.
-    pub fn steps(&self) -> impl Iterator<Item = Step> {
-        self.errors.iter().map(|(resolution, force_mean_n)| Step {
+    pub fn records(&self) -> impl Iterator<Item = OrderRecord> {
+        self.errors.iter().map(|(resolution, force_mean_n)| OrderRecord {
             resolution_in: self.name,
             resolution: *resolution,
             force_mean_n: *force_mean_n,
@@ -61,7 +61,7 @@ impl Order {
 
 /// A line of `orders.csv`: one resolution of an [`Order`].
 #[derive(Serialize)]
-pub struct Step {
+pub struct OrderRecord {
     resolution_in: &'static str,
     resolution: f64,
     force_mean_n: f64,
@@ -82,7 +82,7 @@ pub fn in_time_step(
     let mut runs: Vec<(f64, Touches)> = Vec::new();
     for period_s in PERIODS_S {
         let rung = Rung::new(Body::Kinematic, Senses::Dry, STEPPED_SAMPLES, period_s);
-        let environment = Arc::new(Environment::build(quiet(&rung.apply(scene)))?);
+        let environment = Arc::new(Environment::build(noise_free(&rung.apply(scene)))?);
         match touch_all(&environment, targets, 0, tick)? {
             Some(touches) => runs.push((period_s, touches)),
             None => return Ok(None),
@@ -90,7 +90,7 @@ pub fn in_time_step(
     }
     let Some((_, finest)) = runs.pop() else { return Ok(None) };
     let errors = runs.iter().map(|(period_s, touches)| {
-        let pairs = touches.felt.iter().zip(&finest.felt);
+        let pairs = touches.loads.iter().zip(&finest.loads);
         let apart: Vec<f64> = pairs
             .filter_map(|(a, b)| Some((a.as_ref()?.force_n - b.as_ref()?.force_n).abs()))
             .collect();

@@ -1,5 +1,5 @@
-//! How the finger was loaded when it was read: the touch's movement, gone through again without
-//! noise.
+//! The load on the finger when a touch was read: a fresh finger is led along the recorded movement
+//! once more, with sensors without noise.
 
 use crate::backend::trace::Tick;
 use crate::math::seed;
@@ -15,7 +15,7 @@ use crate::sim::simulator::Simulator;
 /// rounding, far below a tick of any approach.
 const STILL_M: f64 = 1e-7;
 
-/// How the finger was loaded.
+/// The load on the finger at the end of its rest on the object.
 #[derive(Clone, Debug)]
 pub struct ReferenceLoad {
     /// Where it stood.
@@ -28,8 +28,8 @@ pub struct ReferenceLoad {
     pub electrode_counts: Option<[f64; ELECTRODES]>,
 }
 
-/// `scene` with sensors that neither rush, drift nor round.
-pub fn quiet(scene: &Scene) -> Scene {
+/// `scene` with sensors that add no noise, do not drift and do not round.
+pub fn noise_free(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     let effects = &mut scene.effects;
     if let Some(electrodes) = &mut effects.electrodes {
@@ -48,9 +48,9 @@ pub fn quiet(scene: &Scene) -> Scene {
     scene
 }
 
-/// What the finger of a [`quiet`] world felt at the end of its rest on the object; none without
-/// a skin, or if it touched nothing.
-pub fn felt(simulator: &Simulator, ticks: &[Tick]) -> Option<ReferenceLoad> {
+/// The load on the finger of a [`noise_free`] scene that moved as `ticks` say, at the end of its
+/// rest on the object; none without a skin, or if it touched nothing.
+pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<ReferenceLoad> {
     let environment = simulator.environment();
     let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape()) else {
         return None;
@@ -60,7 +60,7 @@ pub fn felt(simulator: &Simulator, ticks: &[Tick]) -> Option<ReferenceLoad> {
     let mut shell = simulator.shell().ok()?;
     let deepest_m = ticks.iter().map(height_m).fold(f64::INFINITY, f64::min);
     let last = ticks.iter().rposition(|tick| height_m(tick) <= deepest_m + STILL_M)?;
-    let mut feel = FingertipState::new(tip, &seed::stream(0, 0, "finger"));
+    let mut state = FingertipState::new(tip, &seed::stream(0, 0, "finger"));
     let mut before_s = ticks.first()?.time_s;
     let (mut rest, mut now) = (None, Frame::default());
     let mut load = Default::default();
@@ -70,11 +70,11 @@ pub fn felt(simulator: &Simulator, ticks: &[Tick]) -> Option<ReferenceLoad> {
         load = match &mut shell {
             Some(shell) => {
                 let pressed = shell.step(&tick.motion.x_wt, dt_s).ok()?;
-                feel.step_loaded(tip, pressed, &tick.motion, dt_s).ok()?
+                state.step_loaded(tip, pressed, &tick.motion, dt_s).ok()?
             }
-            None => feel.step(tip, bvh, &tick.motion, dt_s).ok()?,
+            None => state.step(tip, bvh, &tick.motion, dt_s).ok()?,
         };
-        while let Some(frame) = feel.frame() {
+        while let Some(frame) = state.frame() {
             rest.get_or_insert_with(|| frame.clone());
             now = frame;
         }

@@ -2,7 +2,7 @@
 
 use crate::sim::Scene;
 use crate::sim::collision::Collision;
-use crate::sim::finger::flex::FlexEffect;
+use crate::sim::finger::effects::flex::FlexEffect;
 use crate::sim::scene::Body;
 use crate::sim::solver::Integrator;
 

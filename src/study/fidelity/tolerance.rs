@@ -1,7 +1,8 @@
 //! An error that is good enough, and the cheapest rung that keeps within it.
 
 use super::ladder::is_reference;
-use super::row::{Row, Spread};
+use super::rung_result::RungResult;
+use super::spread::Spread;
 use std::fmt;
 use std::str::FromStr;
 
@@ -18,15 +19,15 @@ struct Unit {
     name: &'static str,
     /// SI units per unit.
     size: f64,
-    error: fn(&Row) -> Option<Spread>,
+    error: fn(&RungResult) -> Option<Spread>,
 }
 
 /// What a tolerance may be given in, longest names first.
 const UNITS: [Unit; 4] = [
-    Unit { name: "counts", size: 1.0, error: |row| row.electrode_counts },
-    Unit { name: "mm", size: 1e-3, error: |row| row.off_reference_m },
-    Unit { name: "um", size: 1e-6, error: |row| row.off_reference_m },
-    Unit { name: "N", size: 1.0, error: |row| row.force_n },
+    Unit { name: "counts", size: 1.0, error: |rung| rung.electrode_counts },
+    Unit { name: "mm", size: 1e-3, error: |rung| rung.off_reference_m },
+    Unit { name: "um", size: 1e-6, error: |rung| rung.off_reference_m },
+    Unit { name: "N", size: 1.0, error: |rung| rung.force_n },
 ];
 
 impl FromStr for Tolerance {
@@ -50,22 +51,22 @@ impl fmt::Display for Tolerance {
 }
 
 impl Tolerance {
-    /// 95 % of a row's errors lie within this many of the tolerance's unit.
-    pub fn error(&self, row: &Row) -> Option<f64> {
-        (self.unit.error)(row).map(|spread| spread.p95 / self.unit.size)
+    /// 95 % of a rung's errors lie within this many of the tolerance's unit.
+    pub fn error(&self, rung: &RungResult) -> Option<f64> {
+        (self.unit.error)(rung).map(|spread| spread.p95 / self.unit.size)
     }
 
-    /// The cheapest row within it; the reference, whose error is unknown, is left out.
-    pub fn cheapest<'a>(&self, rows: &'a [Row]) -> Option<&'a Row> {
+    /// The cheapest rung within it; the reference, whose error is unknown, is left out.
+    pub fn cheapest<'a>(&self, rows: &'a [RungResult]) -> Option<&'a RungResult> {
         rows.iter()
-            .filter(|row| !is_reference(&row.rung))
-            .filter(|row| self.error(row).is_some_and(|error| error <= self.value))
+            .filter(|rung| !is_reference(&rung.rung))
+            .filter(|rung| self.error(rung).is_some_and(|error| error <= self.value))
             .min_by(|a, b| a.wall_s.total_cmp(&b.wall_s))
     }
 
     /// The smallest error of all rows but the reference.
-    pub fn least(&self, rows: &[Row]) -> Option<f64> {
-        let others = rows.iter().filter(|row| !is_reference(&row.rung));
-        others.filter_map(|row| self.error(row)).min_by(f64::total_cmp)
+    pub fn least(&self, rows: &[RungResult]) -> Option<f64> {
+        let others = rows.iter().filter(|rung| !is_reference(&rung.rung));
+        others.filter_map(|rung| self.error(rung)).min_by(f64::total_cmp)
     }
 }

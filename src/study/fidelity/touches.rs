@@ -1,6 +1,6 @@
 //! Touches with one scene: what they found, how the finger was loaded, and what they cost.
 
-use super::reference_load::{ReferenceLoad, felt, quiet};
+use super::reference_load::{ReferenceLoad, noise_free, reference_load};
 use crate::backend::Fault;
 use crate::backend::trace::Trace;
 use crate::experiment::statistics::median;
@@ -28,7 +28,7 @@ pub struct Touches {
     /// What each touch found; none where it missed or faulted.
     pub contacts: Vec<Option<Contact>>,
     /// How the finger was loaded when it was read.
-    pub felt: Vec<Option<ReferenceLoad>>,
+    pub loads: Vec<Option<ReferenceLoad>>,
     /// Median wall time of a touch.
     pub wall_s: f64,
     /// Simulated time of a touch, in a body that has any.
@@ -74,7 +74,7 @@ pub fn touch_all(
     tick: &mut dyn FnMut() -> bool,
 ) -> Result<Option<Touches>, MeasureError> {
     let simulator = Simulator::new(Arc::clone(environment))?;
-    let hushed = hushed(&simulator)?;
+    let noise_free = without_noise(&simulator)?;
     let mut ticks = None;
     let mut traced: Box<dyn Probe> = match (simulator.body()?, environment.chain()) {
         (Some(body), Some(chain)) => {
@@ -87,7 +87,7 @@ pub fn touch_all(
     let mut timed = simulator.probe(seed)?;
     let mut touches = Touches {
         contacts: Vec::new(),
-        felt: Vec::new(),
+        loads: Vec::new(),
         wall_s: f64::NAN,
         simulated_s: None,
         faults: 0,
@@ -108,12 +108,12 @@ pub fn touch_all(
             if let (Some(first), Some(last)) = (log.first(), log.last()) {
                 simulated_s.push(last.time_s - first.time_s);
             }
-            touches.felt.push(contact.as_ref().and_then(|_| felt(&hushed, &log)));
+            touches.loads.push(contact.as_ref().and_then(|_| reference_load(&noise_free, &log)));
         } else {
-            touches.felt.push(None);
+            touches.loads.push(None);
         }
         touches.contacts.push(contact);
-        walls_s.push(time(timed.as_mut(), &environment.task().approach(target)));
+        walls_s.push(wall_time_s(timed.as_mut(), &environment.task().approach(target)));
         if !tick() {
             return Ok(None);
         }
@@ -124,8 +124,8 @@ pub fn touch_all(
 }
 
 /// The same scene without noise.
-fn hushed(simulator: &Simulator) -> Result<Simulator, MeasureError> {
-    let scene = quiet(simulator.environment().scene());
+fn without_noise(simulator: &Simulator) -> Result<Simulator, MeasureError> {
+    let scene = noise_free(simulator.environment().scene());
     match scene == *simulator.environment().scene() {
         true => Ok(simulator.clone()),
         false => Ok(Simulator::new(Arc::new(Environment::build(scene)?))?),
@@ -133,7 +133,7 @@ fn hushed(simulator: &Simulator) -> Result<Simulator, MeasureError> {
 }
 
 /// Wall time of a touch: the mean over as many as take long enough to be measured.
-fn time(probe: &mut dyn Probe, approach: &Approach) -> f64 {
+fn wall_time_s(probe: &mut dyn Probe, approach: &Approach) -> f64 {
     let begun = Instant::now();
     let mut count = 0;
     loop {
@@ -150,8 +150,8 @@ fn time(probe: &mut dyn Probe, approach: &Approach) -> f64 {
 /// which every rung shares, are left out.
 pub fn finger_bytes(environment: &Environment) -> usize {
     let Some(tip) = environment.fingertip() else { return 0 };
-    let feel = crate::sim::finger::FingertipState::new(tip, &seed::stream(0, 0, "finger"));
-    tip.bytes() + feel.bytes()
+    let state = crate::sim::finger::FingertipState::new(tip, &seed::stream(0, 0, "finger"));
+    tip.bytes() + state.bytes()
 }
 
 /// Root mean square error of the surface that a belief makes of these contacts; none where

@@ -1,7 +1,7 @@
 //! The PA-10 carrying the finger where arms are weak.
 
 use super::case::{Case, Outcome, case};
-use super::checked_touch::deed;
+use super::checked_touch::touch_solid;
 use super::solids::{mesh, wall};
 use super::wall::scene;
 use crate::robot::arm::ArmSettings;
@@ -87,5 +87,5 @@ pub(super) fn reach(scene: Scene, [x, y, z]: [f64; 3], arm: ArmSettings) -> Outc
     zone.z_m = Some([z - 0.03, z + 0.03]);
     zone.datum_y_m = y;
     let Some(mesh) = mesh(wall(0.03), [x, y, z]) else { return Outcome::Wrong("no mesh".into()) };
-    deed(Scene { zone, arm: Some(arm), ..scene }, mesh, &[x, z]).on_surface(1e-3)
+    touch_solid(Scene { zone, arm: Some(arm), ..scene }, mesh, &[x, z]).on_surface(1e-3)
 }

@@ -1,9 +1,10 @@
 //! The Gaussian process on data that break others.
 
-use super::case::{Case, Outcome, all, case, hold};
+use super::case::{Case, Outcome, all, case, require};
+use crate::gp::SearchBox;
 use crate::gp::kernel::{Hyperparameters, SquaredExponential};
 use crate::gp::posterior::Scratch;
-use crate::gp::{Mean, Observations, Posterior, SearchBox};
+use crate::gp::{Mean, Observations, Posterior};
 use crate::math::optimize;
 use crate::math::optimize::Stop;
 
@@ -195,9 +196,9 @@ fn laws(at: Hyperparameters, touches: &[(f64, f64)], misfit: f64) -> Outcome {
         let mean = more.mean(&place, &mut scratch);
         let [before, after] = [&fewer, &more].map(|p| p.variance(&place, &mut scratch));
         let outcome = all([
-            hold(mean.is_finite() && after.is_finite(), || format!("not finite at {place:?}")),
-            hold((0.0..=prior * (1.0 + 1e-9)).contains(&after), || format!("variance {after}")),
-            hold(after <= before + slack, || format!("variance grew: {before} to {after}")),
+            require(mean.is_finite() && after.is_finite(), || format!("not finite at {place:?}")),
+            require((0.0..=prior * (1.0 + 1e-9)).contains(&after), || format!("variance {after}")),
+            require(after <= before + slack, || format!("variance grew: {before} to {after}")),
         ]);
         if outcome != Outcome::Stable {
             return outcome;
@@ -210,5 +211,5 @@ fn laws(at: Hyperparameters, touches: &[(f64, f64)], misfit: f64) -> Outcome {
         .iter()
         .map(|(x, y)| (more.mean(&[*x], &mut scratch) - y).abs() / range)
         .fold(0.0, f64::max);
-    hold(worst <= misfit, || format!("misses its touches by {worst:.3} of their range"))
+    require(worst <= misfit, || format!("misses its touches by {worst:.3} of their range"))
 }

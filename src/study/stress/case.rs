@@ -4,20 +4,20 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What is varied beside the severity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Difficulty {
+pub enum TimeAxis {
     /// Nothing; what moves does so at [`nominal_s`](Self::nominal_s).
-    Nothing,
+    Untimed,
     /// The control period.
     Period,
     /// The time step of a body with masses.
     Step,
 }
 
-impl Difficulty {
+impl TimeAxis {
     /// Its values.
     pub fn values_s(self) -> &'static [f64] {
         match self {
-            Self::Nothing => &[0.01],
+            Self::Untimed => &[0.01],
             Self::Period => &[0.00025, 0.001, 0.002, 0.005, 0.01, 0.02],
             Self::Step => &[0.00025, 0.0005, 0.001, 0.002],
         }
@@ -26,7 +26,7 @@ impl Difficulty {
     /// The value of a scene that says nothing, and of every case in the tests.
     pub fn nominal_s(self) -> f64 {
         match self {
-            Self::Nothing | Self::Period => 0.01,
+            Self::Untimed | Self::Period => 0.01,
             Self::Step => 0.002,
         }
     }
@@ -34,7 +34,7 @@ impl Difficulty {
     /// As tables name it.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Nothing => "",
+            Self::Untimed => "",
             Self::Period => "control period",
             Self::Step => "time step",
         }
@@ -56,7 +56,7 @@ pub struct Case {
     /// Why it may be wrong beyond these without a fault; empty if it may not.
     pub known: &'static str,
     /// What else matters.
-    pub axis: Difficulty,
+    pub axis: TimeAxis,
     /// Runs it at a severity and a value of the axis.
     pub law: fn(f64, f64) -> Outcome,
 }
@@ -93,19 +93,19 @@ pub(super) const fn case(
     (severities, holds): (&'static [f64], usize),
     law: fn(f64, f64) -> Outcome,
 ) -> Case {
-    Case { name, why, severity, severities, holds, known: "", axis: Difficulty::Nothing, law }
+    Case { name, why, severity, severities, holds, known: "", axis: TimeAxis::Untimed, law }
 }
 
 impl Case {
     /// The same, run at every control period.
     pub(super) const fn timed(self) -> Self {
-        Self { axis: Difficulty::Period, ..self }
+        Self { axis: TimeAxis::Period, ..self }
     }
 
     /// The same, run at every time step.
     #[cfg(feature = "mujoco")]
     pub(super) const fn stepped(self) -> Self {
-        Self { axis: Difficulty::Step, ..self }
+        Self { axis: TimeAxis::Step, ..self }
     }
 
     /// The same, which beyond its severities may be wrong without a fault, and `why`.
@@ -127,8 +127,8 @@ impl Case {
     }
 }
 
-/// Stable if `condition`, else wrong with `what`.
-pub(super) fn hold(condition: bool, what: impl FnOnce() -> String) -> Outcome {
+/// Stable if `condition` is true, else wrong with `what`.
+pub(super) fn require(condition: bool, what: impl FnOnce() -> String) -> Outcome {
     if condition { Outcome::Stable } else { Outcome::Wrong(what()) }
 }
 

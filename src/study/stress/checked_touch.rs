@@ -1,6 +1,6 @@
-//! One touch of a solid, and what every touch is held to.
+//! One touch of a solid, and the laws that every touch must keep.
 
-use super::case::{Outcome, all, hold};
+use super::case::{Outcome, all, require};
 use crate::backend::trace::{Tick, Trace};
 use crate::backend::{Backend, Fault};
 use crate::explore::probe::{Contact, Probe, Touch};
@@ -9,7 +9,7 @@ use crate::geometry::mesh::Mesh;
 use crate::sim::environment::{EnvironmentError, Shape};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
-use crate::study::fidelity::reference_load::{ReferenceLoad, felt};
+use crate::study::fidelity::reference_load::{ReferenceLoad, reference_load};
 use std::sync::Arc;
 
 /// One touch and what came of it.
@@ -18,18 +18,18 @@ pub(super) struct CheckedTouch {
     pub touch: Result<Touch, Fault>,
     environment: Option<Arc<Environment>>,
     /// How the finger was loaded when it was read.
-    pub felt: Option<ReferenceLoad>,
+    pub load: Option<ReferenceLoad>,
     ticks: Vec<Tick>,
     refused: Option<String>,
 }
 
 /// Touches `target` of `mesh`, with sensors without noise but for what the scene raises.
-pub(super) fn deed(scene: Scene, mesh: Mesh, target: &[f64]) -> CheckedTouch {
-    deed_with(scene, mesh, target, |body| body)
+pub(super) fn touch_solid(scene: Scene, mesh: Mesh, target: &[f64]) -> CheckedTouch {
+    touch_solid_with(scene, mesh, target, |body| body)
 }
 
-/// As [`deed`], with the body put into another.
-pub(super) fn deed_with(
+/// As [`touch_solid`], with the body put into another.
+pub(super) fn touch_solid_with(
     scene: Scene,
     mesh: Mesh,
     target: &[f64],
@@ -42,7 +42,7 @@ pub(super) fn deed_with(
             "refused: approach faster than {limit_m_s:.4} m/s"
         ));
     }
-    let environment = match around(scene, mesh) {
+    let environment = match environment_of(scene, mesh) {
         Ok(environment) => environment,
         Err(error) => return CheckedTouch::not_done(&error.to_string()),
     };
@@ -60,12 +60,15 @@ pub(super) fn deed_with(
     let ticks = ticks.take();
     // The object is not in a file, so its world cannot be built again without noise; force and
     // pose need no sensor.
-    let felt = felt(&simulator, &ticks);
-    CheckedTouch { touch, environment: Some(environment), felt, ticks, refused: None }
+    let load = reference_load(&simulator, &ticks);
+    CheckedTouch { touch, environment: Some(environment), load, ticks, refused: None }
 }
 
 /// `scene` with `mesh` as its object.
-pub(super) fn around(scene: Scene, mesh: Mesh) -> Result<Arc<Environment>, EnvironmentError> {
+pub(super) fn environment_of(
+    scene: Scene,
+    mesh: Mesh,
+) -> Result<Arc<Environment>, EnvironmentError> {
     let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
     Environment::around(scene, shape).map(Arc::new)
 }
@@ -76,7 +79,7 @@ impl CheckedTouch {
         Self {
             touch: Err(Fault::Refused { values: Vec::new() }),
             environment: None,
-            felt: None,
+            load: None,
             ticks: Vec::new(),
             refused: Some(why.into()),
         }
@@ -107,8 +110,8 @@ impl CheckedTouch {
         let near = match (&self.touch, self.off_surface_m()) {
             (Err(fault), _) => return Outcome::Faulted(fault.to_string()),
             (Ok(Touch::Contact(contact)), Some(off_m)) => all([
-                hold((contact.normal_w.norm() - 1.0).abs() < 1e-6, || "normal not unit".into()),
-                hold(off_m <= tolerance_m, || format!("{:.3} mm off the surface", 1e3 * off_m)),
+                require((contact.normal_w.norm() - 1.0).abs() < 1e-6, || "normal not unit".into()),
+                require(off_m <= tolerance_m, || format!("{:.3} mm off the surface", 1e3 * off_m)),
             ]),
             _ => Outcome::Stable,
         };
@@ -127,19 +130,21 @@ impl CheckedTouch {
         // Corrections of the path come on top of travel.
         let limit_m_s = touch.travel_m_s.max(touch.approach_m_s) + CORRECTION_M_S;
         let fastest = self.ticks.iter().map(|tick| tick.motion.linear_w.norm()).fold(0.0, f64::max);
-        hold(fastest <= limit_m_s, || format!("{fastest:.3} m/s, allowed {limit_m_s:.3}"))
+        require(fastest <= limit_m_s, || format!("{fastest:.3} m/s, allowed {limit_m_s:.3}"))
     }
 
     /// The tip's centre keeps away from the object by what the core measures.
     fn keeps_apart(&self) -> Outcome {
-        let Some((environment, felt)) = self.environment.as_ref().zip(self.felt.as_ref()) else {
+        let Some((environment, load)) = self.environment.as_ref().zip(self.load.as_ref()) else {
             return Outcome::Stable;
         };
         let Shape::Mesh { bvh, .. } = environment.shape() else { return Outcome::Stable };
-        let centre = felt.motion.x_wt.translation.vector.into();
+        let centre = load.motion.x_wt.translation.vector.into();
         let apart_m = bvh.closest_point(&centre).distance_m;
         let least_m = CORE_SHARE * environment.scene().finger.radius_m;
-        hold(apart_m >= least_m, || format!("the tip is {:.2} mm from the object", 1e3 * apart_m))
+        require(apart_m >= least_m, || {
+            format!("the tip is {:.2} mm from the object", 1e3 * apart_m)
+        })
     }
 
     /// Whether `other`, moved by `by_m` along x and y, met the same within `tolerance_m` and a
@@ -147,10 +152,13 @@ impl CheckedTouch {
     pub(super) fn agrees(&self, other: &Self, by_m: f64, tolerance_m: f64) -> Outcome {
         let (Some(a), Some(b)) = (self.contact(), other.contact()) else { return Outcome::Stable };
         let shift_m = (b.p_wc - a.p_wc - nalgebra::Vector3::new(by_m, by_m, 0.0)).norm();
-        let [force, other_n] = [self, other].map(|d| d.felt.as_ref().map_or(0.0, |f| f.force_n));
+        let [force, other_n] =
+            [self, other].map(|touch| touch.load.as_ref().map_or(0.0, |load| load.force_n));
         all([
-            hold(shift_m <= tolerance_m, || format!("contact moved by {:.4} mm", 1e3 * shift_m)),
-            hold((force - other_n).abs() <= 1e-3 * force, || format!("{other_n} N, not {force} N")),
+            require(shift_m <= tolerance_m, || format!("contact moved by {:.4} mm", 1e3 * shift_m)),
+            require((force - other_n).abs() <= 1e-3 * force, || {
+                format!("{other_n} N, not {force} N")
+            }),
         ])
     }
 }

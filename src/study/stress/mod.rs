@@ -1,35 +1,36 @@
-//! Hard cases, each at rising severity until it breaks.
+//! Where does it break, and does it say so? Hard cases, each at rising severity.
 //!
-//! `case` says what a case is and how its outcome is judged; `press`, `shapes`, `touch`, `arm`,
-//! `sensor`, `belief` and, for a body with masses, `dynamic` and `hold` have the cases, one function per
-//! law; `solids` makes their meshes.
+//! `case` says what a case is and how its outcome is judged. The cases, one function for each law:
+//! `force_law` drives a finger pose by pose, `shapes`, `wall`, `arm` and `sensor` touch as a scene
+//! does, `belief` fits; with masses, `dynamic` touches and `stiff_press` presses along a given
+//! path. `finger_on_wall`, `checked_touch` and `solids` are what they share.
 
 mod arm;
 mod belief;
-mod bench;
 pub mod case;
 mod checked_touch;
 #[cfg(feature = "mujoco")]
 mod dynamic;
-#[cfg(feature = "mujoco")]
-pub mod hold;
-mod press;
+mod finger_on_wall;
+mod force_law;
 mod sensor;
 mod shapes;
 mod solids;
+#[cfg(feature = "mujoco")]
+pub mod stiff_press;
 mod wall;
 
-pub use case::{Case, Difficulty, Outcome, Verdict};
+pub use case::{Case, Outcome, TimeAxis, Verdict};
 
 /// Every case; a group adds its own.
 pub fn cases() -> impl Iterator<Item = &'static Case> {
     [
-        press::CASES,
+        force_law::CASES,
         shapes::CASES,
         wall::CASES,
         arm::CASES,
         #[cfg(feature = "mujoco")]
-        hold::CASES,
+        stiff_press::CASES,
         #[cfg(feature = "mujoco")]
         dynamic::CASES,
         sensor::CASES,

@@ -1,7 +1,7 @@
 //! A sensor or a joint that fails in the middle of a touch.
 
 use super::case::{Case, Outcome, case};
-use super::checked_touch::deed_with;
+use super::checked_touch::touch_solid_with;
 use super::solids::{mesh, wall};
 use super::wall::scene;
 use crate::backend::fault_injector::{Failure, FaultInjector};
@@ -62,5 +62,5 @@ fn broken(failure: Failure, from_tick: f64, period_s: f64) -> Outcome {
     // within the 3 mm that a real BioTac is good for.
     let mut scene = scene(period_s);
     scene.effects.electrodes = Some(Default::default());
-    deed_with(scene, mesh, &[0.02, 0.01], wrap).on_surface(3e-3)
+    touch_solid_with(scene, mesh, &[0.02, 0.01], wrap).on_surface(3e-3)
 }

@@ -1,7 +1,7 @@
 //! Objects that are hard to touch, each touched as a scene touches.
 
-use super::case::{Case, Outcome, all, case, hold};
-use super::checked_touch::{CheckedTouch, deed};
+use super::case::{Case, Outcome, all, case, require};
+use super::checked_touch::{CheckedTouch, touch_solid};
 use super::solids::{ball, block, both, mesh, needle, sheet, wall};
 use super::wall::scene;
 use crate::geometry::mesh::Mesh;
@@ -136,13 +136,13 @@ fn on(mesh: Option<Mesh>, target: [f64; 2], period_s: f64, tolerance_mm: f64) ->
 /// The same in another scene.
 fn on_in(scene: Scene, mesh: Option<Mesh>, target: [f64; 2], tolerance_mm: f64) -> Outcome {
     let Some(mesh) = mesh else { return Outcome::Wrong("no mesh".into()) };
-    deed(scene, mesh, &target).on_surface(1e-3 * tolerance_mm)
+    touch_solid(scene, mesh, &target).on_surface(1e-3 * tolerance_mm)
 }
 
 pub(super) fn graze(overlap_mm: f64, scene: Scene) -> Outcome {
     let Some(mesh) = mesh(wall(0.03), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
     // Whether so little is felt is the sensor's choice; what it must not do is feel it elsewhere.
-    deed(scene, mesh, &[0.037 - 1e-3 * overlap_mm, 0.0]).on_surface_or_missed(1e-3)
+    touch_solid(scene, mesh, &[0.037 - 1e-3 * overlap_mm, 0.0]).on_surface_or_missed(1e-3)
 }
 
 pub(super) fn slot(width_mm: f64, scene: Scene) -> Outcome {
@@ -176,7 +176,7 @@ fn border(inside_mm: f64, period_s: f64) -> Outcome {
     let Some(mesh) = mesh(sheet(0.03, [4; 2], |_, _| 0.0), [0.0; 3]) else {
         return Outcome::Wrong("no mesh".into());
     };
-    deed(scene(period_s), mesh, &[0.03 - 1e-3 * inside_mm, 0.0]).on_surface_or_missed(1e-3)
+    touch_solid(scene(period_s), mesh, &[0.03 - 1e-3 * inside_mm, 0.0]).on_surface_or_missed(1e-3)
 }
 
 fn inverted(share: f64, period_s: f64) -> Outcome {
@@ -206,7 +206,7 @@ fn far(distance_m: f64, period_s: f64) -> Outcome {
         scene.zone.x_m = scene.zone.x_m.map(|x| x + by_m);
         scene.zone.datum_y_m += by_m;
         let solid = ball(Point3::new(0.0, -0.02, 0.0), 0.02, 40);
-        mesh(solid, [by_m, by_m, 0.0]).map(|mesh| deed(scene, mesh, &[by_m, 0.0]))
+        mesh(solid, [by_m, by_m, 0.0]).map(|mesh| touch_solid(scene, mesh, &[by_m, 0.0]))
     });
     let (Some(near), Some(far)) = (near, far) else { return Outcome::Wrong("no mesh".into()) };
     all([far.on_surface(1e-3), near.agrees(&far, distance_m, 1e-4)])
@@ -217,8 +217,9 @@ fn same_as_wall(mesh: Option<Mesh>, period_s: f64, tolerance_m: f64) -> Outcome 
     let (Some(mesh), Some(plain)) = (mesh, super::solids::mesh(wall(0.05), [0.0; 3])) else {
         return Outcome::Wrong("no mesh".into());
     };
-    let plain: CheckedTouch = deed(scene(period_s), plain, &[0.0, 0.0]);
-    let other = deed(scene(period_s), mesh, &[0.0, 0.0]);
-    let tops = hold(other.contact().is_some() == plain.contact().is_some(), || "no contact".into());
+    let plain: CheckedTouch = touch_solid(scene(period_s), plain, &[0.0, 0.0]);
+    let other = touch_solid(scene(period_s), mesh, &[0.0, 0.0]);
+    let tops =
+        require(other.contact().is_some() == plain.contact().is_some(), || "no contact".into());
     all([other.on_surface(1e-3), tops, plain.agrees(&other, 0.0, tolerance_m)])
 }

@@ -1,17 +1,17 @@
 //! Whole touches of a wall.
 
-use super::bench::stiffen;
-use super::case::{Case, Outcome, case, hold};
-use super::checked_touch::{CheckedTouch, around, deed};
+use super::case::{Case, Outcome, case, require};
+use super::checked_touch::{CheckedTouch, environment_of, touch_solid};
+use super::finger_on_wall::stiffen;
 use super::solids::{mesh, wall};
 use crate::explore::probe::{Contact, Touch};
 use crate::robot::finger::Finger;
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
-use crate::sim::finger::timing::TimingEffect;
+use crate::sim::finger::effects::timing::TimingEffect;
 use crate::sim::scene::Body;
 use crate::sim::simulator::Simulator;
-use crate::study::fidelity::reference_load::quiet;
+use crate::study::fidelity::reference_load::noise_free;
 use crate::task::Zone;
 use crate::task::touch::TouchSettings;
 use std::sync::Arc;
@@ -105,7 +105,7 @@ pub(super) const CASES: &[Case] = &[
         |limit, period_s| {
             let mut scene = scene(period_s);
             scene.touch.pressure_limit_counts = limit;
-            wall_deed(scene).on_surface_or_missed(1e-3)
+            touch_wall(scene).on_surface_or_missed(1e-3)
         },
     )
     .timed(),
@@ -120,8 +120,8 @@ pub(super) const CASES: &[Case] = &[
             let Some(mesh) = mesh(wall(0.03), [0.0; 3]) else {
                 return Outcome::Wrong("no mesh".into());
             };
-            let deed = deed(scene, mesh, &[0.03 + 1e-3 * mm, 0.0]);
-            hold(deed.touch == Ok(Touch::Miss), || format!("{:?}", deed.touch))
+            let touched = touch_solid(scene, mesh, &[0.03 + 1e-3 * mm, 0.0]);
+            require(touched.touch == Ok(Touch::Miss), || format!("{:?}", touched.touch))
         },
     ),
 ];
@@ -150,24 +150,26 @@ fn skin(period_s: f64, times: f64) -> Scene {
     scene
 }
 
-pub(super) fn wall_deed(scene: Scene) -> CheckedTouch {
+pub(super) fn touch_wall(scene: Scene) -> CheckedTouch {
     match mesh(wall(0.05), [0.0; 3]) {
-        Some(mesh) => deed(scene, mesh, &[0.0, 0.0]),
+        Some(mesh) => touch_solid(scene, mesh, &[0.0, 0.0]),
         None => CheckedTouch::not_done("no mesh"),
     }
 }
 
 pub(super) fn on_wall(scene: Scene) -> Outcome {
-    wall_deed(scene).on_surface(1e-3)
+    touch_wall(scene).on_surface(1e-3)
 }
 
 /// The same target again and again gives the same contact, but for a tactile frame of approach:
 /// sums of ticks round, and a frame falls to the tick before or after.
 fn many(count: f64, period_s: f64) -> Outcome {
-    let mut scene = quiet(&scene(period_s));
+    let mut scene = noise_free(&scene(period_s));
     scene.effects.skin.get_or_insert_default().samples = 125;
     let Some(mesh) = mesh(wall(0.05), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
-    let Ok(environment) = around(scene, mesh) else { return Outcome::Wrong("no world".into()) };
+    let Ok(environment) = environment_of(scene, mesh) else {
+        return Outcome::Wrong("no world".into());
+    };
     let simulator = match Simulator::new(Arc::clone(&environment)) {
         Ok(simulator) => simulator,
         Err(error) => return Outcome::Faulted(error.to_string()),
@@ -195,11 +197,12 @@ fn many(count: f64, period_s: f64) -> Outcome {
 /// Within what the finger travels in a tick and a tactile frame of the touch at 0.25 ms.
 fn refined(times: f64, _: f64) -> Outcome {
     let [fine, coarse] =
-        [0.00025, 0.0025 * times].map(|period_s| wall_deed(quiet(&scene(period_s))));
-    let depth = |deed: &CheckedTouch| deed.felt.as_ref().map(|felt| felt.motion.x_wt.translation.y);
+        [0.00025, 0.0025 * times].map(|period_s| touch_wall(noise_free(&scene(period_s))));
+    let depth =
+        |touched: &CheckedTouch| touched.load.as_ref().map(|load| load.motion.x_wt.translation.y);
     let (Some(a), Some(b)) = (depth(&fine), depth(&coarse)) else {
         return Outcome::Wrong("no contact".into());
     };
     let travel_m = 0.02 * (0.0025 * times + 0.01);
-    hold((a - b).abs() <= 1.5 * travel_m, || format!("{:.3} mm apart", 1e3 * (a - b).abs()))
+    require((a - b).abs() <= 1.5 * travel_m, || format!("{:.3} mm apart", 1e3 * (a - b).abs()))
 }

@@ -60,7 +60,7 @@ pub fn run(text: &str) -> Run {
         .flat_map(|trial| experiment.planners.iter().map(move |planner| (trial, planner)))
         .map(|(trial, planner)| row(&experiment, trial, planner))
         .collect();
-    Run { experiment, truth, rows }
+    Run { experiment, truth, rows, unlisted: 0 }
 }
 
 fn row(experiment: &Experiment, trial: u32, planner: &str) -> TrialRow {

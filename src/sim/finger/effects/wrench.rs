@@ -1,7 +1,9 @@
 //! The force/torque sensor at the finger's mount: bias, drift, noise and resolution.
 
-use super::noise::normal;
+use super::effect::Effect;
 use crate::config::{Checked, Rules};
+use crate::sim::finger::counter::count;
+use crate::sim::finger::noise::normal;
 use nalgebra::Vector6;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -64,6 +66,12 @@ impl Checked for WrenchEffect {
     }
 }
 
+impl Effect for WrenchEffect {
+    type State = ();
+
+    fn start(&self) {}
+}
+
 /// The sensor during one trial.
 #[derive(Clone, Debug)]
 pub struct Gauge {
@@ -82,6 +90,7 @@ impl Gauge {
 
     /// What it says `dt_s` after the last reading of a load: forces, then torques.
     pub fn read(&mut self, effect: &WrenchEffect, load: &Vector6<f64>, dt_s: f64) -> Vector6<f64> {
+        count("wrench");
         let noise = effect.noise_n.iter().chain(&effect.noise_nm);
         let steps = effect.resolution_n.iter().chain(&effect.resolution_nm);
         let walk = dt_s.max(0.0).sqrt();

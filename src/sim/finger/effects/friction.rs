@@ -1,7 +1,8 @@
 //! Stick and slip: one elastic bristle between skin and object, dragged along at Coulomb's limit.
 
-use super::load::Load;
+use super::effect::{Effect, OnLoad};
 use crate::config::{Checked, Rules};
+use crate::sim::finger::load::Load;
 use nalgebra::{Isometry3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +28,19 @@ impl Checked for FrictionEffect {
     fn check(&self, rules: &mut Rules) {
         rules.number("coefficient", self.coefficient, 0.0..=10.0);
         rules.number("stiffness_n_m", self.stiffness_n_m, 1.0..=1e9);
+    }
+}
+
+impl Effect for FrictionEffect {
+    type State = Bristle;
+
+    const ON_LOAD: Option<OnLoad<Self>> = Some(|effect, bristle, step, load| {
+        let velocity = [&step.motion.linear_w, &step.motion.angular_w];
+        bristle.step(effect, &step.motion.x_wt, velocity, step.dt_s, load);
+    });
+
+    fn start(&self) -> Bristle {
+        Bristle::default()
     }
 }
 

@@ -1,38 +1,37 @@
 //! Touches to equal error, as tables of the page and as a file.
 
-use super::paired::{Table, with_interval};
-use super::replay::digits;
-use super::table::write_lines;
-use crate::experiment::comparison::BASELINES;
-use crate::experiment::equal_error::{ERRORS, EqualError, Estimate};
+use super::{Table, write_csv};
+use crate::experiment::equal_error::{EqualError, Estimate, errors};
 use crate::experiment::store::Run;
+use crate::report::number::{digits, with_interval};
 use serde::Serialize;
 use std::path::Path;
 
-/// A table for each baseline that ran: a line for each other planner, a column for each error.
+/// A table for each baseline: a line for each other planner, a column for each error.
 pub fn tables(run: &Run, found: &[EqualError]) -> Vec<Table> {
     let most = run.experiment.touches;
     let table = |baseline: &str| {
         let of_baseline: Vec<&EqualError> =
             found.iter().filter(|equal| equal.baseline == baseline).collect();
-        let shown = |error: &str| of_baseline.iter().find(|equal| equal.measure.name == error);
-        let errors: Vec<_> = ERRORS.iter().filter_map(|error| shown(error.name)).collect();
+        let shown = |error: &str| of_baseline.iter().find(|equal| equal.measure.id == error);
+        let errors: Vec<_> = errors().filter_map(|error| shown(error.id)).collect();
         let head = |equal: &&&EqualError| {
-            let (unit, per_si) = equal.measure.shown_in;
+            let unit = equal.measure.unit;
             format!(
-                "{}: {} {unit}, {baseline} {}",
+                "{}: {} {}, {baseline} {}",
                 equal.measure.title,
-                digits(per_si * equal.goal),
+                digits(unit.per_si * equal.goal),
+                unit.symbol,
                 touches(equal.baseline_touches, most)
             )
         };
         let lines = run.experiment.planners.iter().filter_map(|planner| {
             let of = |error: &str| {
                 let is_it =
-                    |equal: &&&EqualError| equal.planner == planner && equal.measure.name == error;
+                    |equal: &&&EqualError| equal.planner == planner && equal.measure.id == error;
                 of_baseline.iter().find(is_it).map(|equal| cell(equal, most))
             };
-            let cells: Vec<_> = errors.iter().map(|error| of(error.measure.name)).collect();
+            let cells: Vec<_> = errors.iter().map(|error| of(error.measure.id)).collect();
             cells.iter().any(Option::is_some).then(|| {
                 let cells = cells.into_iter().map(|cell| cell.unwrap_or("-".into()));
                 std::iter::once(planner.clone()).chain(cells).collect()
@@ -42,24 +41,25 @@ pub fn tables(run: &Run, found: &[EqualError]) -> Vec<Table> {
         let first = format!("to the error of {baseline}");
         Table { header: std::iter::once(first).chain(errors.iter().map(head)).collect(), lines }
     };
-    BASELINES.into_iter().map(table).filter(|table| !table.lines.is_empty()).collect()
+    let baselines = run.experiment.baselines().into_iter();
+    baselines.map(table).filter(|table| !table.lines.is_empty()).collect()
 }
 
 /// What the cells are.
 pub fn note(run: &Run) -> String {
     format!(
-        "Touches, initial ones included, after which a planner\u{2019}s median error stays at or below \
-         the one in the column\u{2019}s head, which is the baseline\u{2019}s after {} touches; behind \
-         \u{d7} their ratio to the baseline\u{2019}s own count, and that of the lateral ways after the \
-         initial touches. All with the 95 % interval of a bootstrap over trials: a planner saves \
+        "Touches, initial ones included, after which a planner\u{2019}s median error stays at or \
+         below the one in the column\u{2019}s head, which is the baseline\u{2019}s after {} touches; \
+         behind \u{d7} their ratio to the baseline\u{2019}s own count, and that of the lateral ways \
+         after the initial touches. All with the 95 % interval of a bootstrap over trials: a planner saves \
          touches for certain where the ratio\u{2019}s interval stays below 1.",
         run.experiment.goal_touches()
     )
 }
 
-/// A line of `equal_error.csv`; a count or ratio is left out where the error is not reached.
+/// A record of `equal_error.csv`; a count or ratio is left out where the error is not reached.
 #[derive(Serialize)]
-struct Line<'a> {
+struct EqualErrorRecord<'a> {
     planner: &'a str,
     baseline: &'a str,
     measure: &'a str,
@@ -81,13 +81,13 @@ struct Line<'a> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn write_csv(found: &[EqualError], folder: &Path) -> anyhow::Result<()> {
+pub fn write(found: &[EqualError], folder: &Path) -> anyhow::Result<()> {
     let finite = |value: f64| value.is_finite().then_some(value);
     let end = |estimate: &Estimate, end: usize| finite(estimate.interval?[end]);
-    let lines = found.iter().map(|equal| Line {
+    let records = found.iter().map(|equal| EqualErrorRecord {
         planner: equal.planner,
         baseline: equal.baseline,
-        measure: equal.measure.name,
+        measure: equal.measure.id,
         trials: equal.trials,
         goal: equal.goal,
         baseline_touches: finite(equal.baseline_touches),
@@ -101,7 +101,7 @@ pub fn write_csv(found: &[EqualError], folder: &Path) -> anyhow::Result<()> {
         path_ratio_low: end(&equal.path_ratio, 0),
         path_ratio_high: end(&equal.path_ratio, 1),
     });
-    write_lines(&folder.join("equal_error.csv"), lines)
+    write_csv(&folder.join("equal_error.csv"), records)
 }
 
 fn cell(equal: &EqualError, most: u32) -> String {

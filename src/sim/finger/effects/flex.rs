@@ -1,10 +1,12 @@
 //! A skin of finite elements: the settings of a shell that MuJoCo bends and stretches.
 
+use super::effect::{Effect, Needs};
+use super::switch::Switch;
 use crate::config::{Checked, Rules};
 use serde::{Deserialize, Serialize};
 
-/// Table `[flex]`: the skin as a shell of triangles over the pad, clamped along the nail and behind,
-/// instead of the columns of `[skin]`; the expensive reference.
+/// Table `[flex]`: the skin as a shell of triangles over the pad, clamped along the nail and
+/// behind, instead of the columns of `[skin]`; the expensive reference.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FlexEffect {
@@ -27,10 +29,10 @@ pub struct FlexEffect {
 }
 
 impl Default for FlexEffect {
-    /// Modulus and Poisson's ratio: NVlabs/biotac_sim. Core: that of `[skin]`, 1.4e9, in series with
-    /// the modulus over 1.6 mm of skin. The rest is chosen. Mass: some fifty times the silicone's,
-    /// which a skin at rest does not feel, while MuJoCo's contacts are the stiffer the heavier it is.
-    /// Damping: as much as lets a press come to rest within a tenth of a second.
+    /// Modulus and Poisson's ratio: NVlabs/biotac_sim. Core: that of `[skin]`, 1.4e9, in series
+    /// with the modulus over 1.6 mm of skin. The rest is chosen. Mass: some fifty times the
+    /// silicone's, which a skin at rest does not feel, while MuJoCo's contacts are the stiffer the
+    /// heavier it is. Damping: as much as lets a press come to rest within a tenth of a second.
     fn default() -> Self {
         Self {
             along: 12,
@@ -57,5 +59,23 @@ impl Checked for FlexEffect {
         rules.number("damping_s", self.damping_s, 0.0..=0.1);
         rules.number("mass_kg", self.mass_kg, 1e-3..=10.0);
         rules.number("step_s", self.step_s, 1e-5..=2e-3);
+    }
+}
+
+impl Effect for FlexEffect {
+    type State = ();
+
+    const NEEDS: Needs = Needs::Nothing;
+
+    fn start(&self) {}
+
+    /// `[skin]` is the skin of a finger with everything.
+    fn complete() -> Option<Self> {
+        None
+    }
+
+    /// None: one skin instead of the other is another fidelity, not an effect switched on.
+    fn switches() -> Vec<Switch<Option<Self>>> {
+        Vec::new()
     }
 }

@@ -1,10 +1,10 @@
-//! A body with masses that presses its finger on a wall along a path given in time, so that runs
-//! with different time steps can be compared tick by tick.
+//! How stiff a skin may be for the time step: a body with masses presses its finger on a wall along
+//! a path given in time, and its force is held against that of a run with shorter steps.
 
-use super::bench::{Bench, stiffen};
-use super::case::{Case, Outcome, all, case, hold};
-use super::checked_touch::around;
+use super::case::{Case, Outcome, all, case, require};
+use super::checked_touch::environment_of;
 use super::dynamic::{APPROACH_M_S, with_masses};
+use super::finger_on_wall::{FingerOnWall, stiffen};
 use super::solids::{mesh, wall};
 use crate::backend::{Backend, Command, Fault, Reading};
 use crate::explore::control::{Controller, Goal};
@@ -58,7 +58,8 @@ pub(super) const CASES: &[Case] = &[
     ),
 ];
 
-/// Steps are divided as the skin needs it, so stiffness must not matter until no step is short enough.
+/// Steps are divided as the skin needs it, so stiffness must not matter until no step is short
+/// enough.
 const STIFF: (&[f64], usize) = (&[1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 1e6], 7);
 
 /// Force that the finger is pressed with; chosen, that of a usual touch.
@@ -71,17 +72,17 @@ pub const TOLERANCE: f64 = 0.05;
 /// [`StepLimit`](crate::sim::mujoco::StepLimit) is then within a percent of the exact one.
 const FINER: f64 = 8.0;
 
-/// Time pressed until the force is at rest: four times 0.2 s, in which the controller takes back all but
-/// a third of an error; and the end of it that is looked at (chosen).
+/// Time pressed until the force is at rest: four times 0.2 s, in which the controller takes back
+/// all but a third of an error; and the end of it that is looked at (chosen).
 const REST_S: f64 = 0.8;
 const LOOK_S: f64 = 0.1;
 
-/// Time pressed in which the peak has passed: five times the 0.04 s that the servos of the arm take to
-/// stop.
+/// Time pressed in which the peak has passed: five times the 0.04 s that the servos of the arm take
+/// to stop.
 const PEAK_S: f64 = 0.2;
 
 /// A finger at home in front of a wall, and where to press it.
-struct Rig {
+struct WallPress {
     environment: Arc<Environment>,
     start: Isometry3<f64>,
     /// Way until the skin is pressed with [`FORCE_N`].
@@ -90,7 +91,7 @@ struct Rig {
 
 /// What the wall did to the finger.
 #[derive(Clone, Copy, Debug)]
-struct Force {
+struct PressForce {
     /// Largest.
     peak_n: f64,
     /// Mean at the end, and the difference between largest and smallest there.
@@ -98,7 +99,7 @@ struct Force {
     ripple_n: f64,
 }
 
-impl Rig {
+impl WallPress {
     /// With a skin `times` stiffer; none if it cannot be built.
     fn new(times: f64, step_s: f64, arm: bool) -> Option<Self> {
         let mut scene = with_masses(step_s);
@@ -115,10 +116,10 @@ impl Rig {
         scene.zone.x_m = [x - 0.03, x + 0.03];
         scene.zone.z_m = Some([z - 0.03, z + 0.03]);
         scene.zone.datum_y_m = y;
-        let bench = Bench::new(&scene.effects, 1.0)?;
-        let depth_m = depth_m(&bench)?;
-        let pressed_y_m = y + bench.at(depth_m, 0.0).x_wt.translation.y;
-        let environment = around(scene, mesh(wall(0.05), face_w)?).ok()?;
+        let setup = FingerOnWall::new(&scene.effects, 1.0)?;
+        let depth_m = depth_m(&setup)?;
+        let pressed_y_m = y + setup.at(depth_m, 0.0).x_wt.translation.y;
+        let environment = environment_of(scene, mesh(wall(0.05), face_w)?).ok()?;
         let chain = environment.chain()?;
         let start = chain.forward(&chain.home);
         Some(Self { environment, start, way_m: start.translation.y - pressed_y_m })
@@ -158,7 +159,7 @@ impl Rig {
     }
 
     /// The force in steps of `step_s`, pressed for `pressed_s`.
-    fn force(&self, step_s: f64, pressed_s: f64) -> Result<Force, String> {
+    fn force(&self, step_s: f64, pressed_s: f64) -> Result<PressForce, String> {
         let models = Models::at(&self.environment, step_s).map_err(|error| error.to_string())?;
         let mut body = Dynamic::new(&self.environment, &models).map_err(|_| "no body")?;
         let resting_s = self.way_m / APPROACH_M_S + pressed_s - LOOK_S;
@@ -173,7 +174,7 @@ impl Rig {
         let rest_n = resting.iter().sum::<f64>() / resting.len() as f64;
         let most_n = resting.iter().copied().fold(f64::MIN, f64::max);
         let least_n = resting.iter().copied().fold(f64::MAX, f64::min);
-        Ok(Force { peak_n, rest_n, ripple_n: most_n - least_n })
+        Ok(PressForce { peak_n, rest_n, ripple_n: most_n - least_n })
     }
 }
 
@@ -182,21 +183,21 @@ fn force_n(reading: &Reading) -> f64 {
 }
 
 /// Where the skin bears [`FORCE_N`].
-fn depth_m(bench: &Bench) -> Option<f64> {
-    let (mut low_m, mut high_m) = (0.0, bench.finger.radius_m / 2.0);
+fn depth_m(setup: &FingerOnWall) -> Option<f64> {
+    let (mut low_m, mut high_m) = (0.0, setup.finger.radius_m / 2.0);
     for _ in 0..50 {
         let middle_m = 0.5 * (low_m + high_m);
-        match bench.force_n(middle_m) {
+        match setup.force_n(middle_m) {
             Ok(force_n) if force_n < FORCE_N => low_m = middle_m,
             _ => high_m = middle_m,
         }
     }
-    (bench.force_n(low_m).ok()? > 0.5 * FORCE_N).then_some(low_m)
+    (setup.force_n(low_m).ok()? > 0.5 * FORCE_N).then_some(low_m)
 }
 
-/// By how much the force is off that of a refined run, as shares of its own.
+/// By how much the force is deviation that of a refined run, as shares of its own.
 #[derive(Clone, Copy, Debug)]
-struct Off {
+struct ForceDeviation {
     /// The largest.
     peak: f64,
     /// At rest.
@@ -205,34 +206,34 @@ struct Off {
     ripple: f64,
 }
 
-/// Presses the finger of a stage or an arm for `pressed_s`, its skin `times` stiffer. `divided` lets
-/// the time step be divided as a scene's is; else it is taken as given.
+/// Presses the finger of a stage or an arm for `pressed_s`, its skin `times` stiffer. `divided`
+/// lets the time step be divided as a scene's is; else it is taken as given.
 ///
 /// # Errors
 /// Why it is refused, or the fault with time and state.
-fn off(
+fn force_deviation(
     times: f64,
     (step_s, divided): (f64, bool),
     arm: bool,
     pressed_s: f64,
-) -> Result<Off, String> {
-    let rig = Rig::new(times, step_s, arm).ok_or("no rig")?;
-    let models = Models::new(&rig.environment).map_err(|error| error.to_string())?;
+) -> Result<ForceDeviation, String> {
+    let press = WallPress::new(times, step_s, arm).ok_or("nothing to press")?;
+    let models = Models::new(&press.environment).map_err(|error| error.to_string())?;
     let limited_s = models.plant.opt().timestep;
-    let run = rig.force(if divided { limited_s } else { step_s }, pressed_s)?;
-    let exact = rig.force(limited_s / FINER, pressed_s)?;
-    let off = Off {
+    let run = press.force(if divided { limited_s } else { step_s }, pressed_s)?;
+    let exact = press.force(limited_s / FINER, pressed_s)?;
+    let deviation = ForceDeviation {
         peak: run.peak_n / exact.peak_n - 1.0,
         rest: run.rest_n / exact.rest_n - 1.0,
         ripple: (run.ripple_n - exact.ripple_n) / exact.rest_n,
     };
-    match [off.peak, off.rest, off.ripple].iter().all(|part| part.is_finite()) {
-        true => Ok(off),
+    match [deviation.peak, deviation.rest, deviation.ripple].iter().all(|part| part.is_finite()) {
+        true => Ok(deviation),
         false => Err(format!("{run:?} beside {exact:?}")),
     }
 }
 
-impl Off {
+impl ForceDeviation {
     fn is_at_rest(&self) -> bool {
         self.rest.abs() <= TOLERANCE && self.ripple.abs() <= TOLERANCE
     }
@@ -247,9 +248,9 @@ impl Off {
 
 /// How much stiffer than a BioTac's a skin may be.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Margin {
-    /// Times stiffer, the largest whose force at rest is within [`TOLERANCE`] of a refined run's, as are
-    /// all below.
+pub struct StiffnessMargin {
+    /// Times stiffer, the largest whose force at rest is within [`TOLERANCE`] of a refined run's,
+    /// as are all below.
     pub times: f64,
     /// The next that was tried and what came of it; none if all were within.
     pub beyond: Option<(f64, String)>,
@@ -261,15 +262,15 @@ const TIMES: [f64; 15] =
 
 /// The margin of the PA-10 in steps of `step_s`, `divided` as a scene's are or as given. 0 times if
 /// not even the default skin is within.
-pub fn margin(step_s: f64, divided: bool) -> Margin {
-    let mut margin = Margin { times: 0.0, beyond: None };
+pub fn stiffness_margin(step_s: f64, divided: bool) -> StiffnessMargin {
+    let mut margin = StiffnessMargin { times: 0.0, beyond: None };
     for times in TIMES {
-        let why = match off(times, (step_s, divided), true, REST_S) {
-            Ok(off) if off.is_at_rest() => {
+        let why = match force_deviation(times, (step_s, divided), true, REST_S) {
+            Ok(deviation) if deviation.is_at_rest() => {
                 margin.times = times;
                 continue;
             }
-            Ok(off) => off.words(),
+            Ok(deviation) => deviation.words(),
             Err(words) => words,
         };
         margin.beyond = Some((times, why));
@@ -280,16 +281,16 @@ pub fn margin(step_s: f64, divided: bool) -> Margin {
 
 /// Finite, and at rest within [`TOLERANCE`] of a refined run: force and what it goes up and down.
 fn at_rest(times: f64, step_s: f64, arm: bool) -> Outcome {
-    match off(times, (step_s, true), arm, REST_S) {
-        Ok(off) => hold(off.is_at_rest(), || off.words()),
+    match force_deviation(times, (step_s, true), arm, REST_S) {
+        Ok(deviation) => require(deviation.is_at_rest(), || deviation.words()),
         Err(words) => Outcome::Faulted(words),
     }
 }
 
 /// The same of the largest force on the way.
 fn at_peak(times: f64, step_s: f64, arm: bool) -> Outcome {
-    match off(times, (step_s, true), arm, PEAK_S) {
-        Ok(off) => hold(off.peak.abs() <= TOLERANCE, || off.words()),
+    match force_deviation(times, (step_s, true), arm, PEAK_S) {
+        Ok(deviation) => require(deviation.peak.abs() <= TOLERANCE, || deviation.words()),
         Err(words) => Outcome::Faulted(words),
     }
 }
@@ -297,14 +298,16 @@ fn at_peak(times: f64, step_s: f64, arm: bool) -> Outcome {
 /// Pressed, then told to stand still: where it stood after a second it stands at the end, within a
 /// hundredth of the depth, and nothing moves faster than the last of it would.
 fn long(ticks: f64) -> Outcome {
-    let Some(rig) = Rig::new(1.0, 0.002, true) else { return Outcome::Wrong("no rig".into()) };
+    let Some(press) = WallPress::new(1.0, 0.002, true) else {
+        return Outcome::Wrong("nothing to press".into());
+    };
     let run = || -> Result<Outcome, Fault> {
         let lost = Fault::Lost { time_s: 0.0 };
-        let models = Models::at(&rig.environment, 0.002).map_err(|_| lost.clone())?;
-        let mut body = Dynamic::new(&rig.environment, &models)?;
-        let chain = rig.environment.chain().ok_or(lost)?;
+        let models = Models::at(&press.environment, 0.002).map_err(|_| lost.clone())?;
+        let mut body = Dynamic::new(&press.environment, &models)?;
+        let chain = press.environment.chain().ok_or(lost)?;
         let mut last = Reading::default();
-        rig.press(&mut body, REST_S, &mut |reading| last.clone_from(reading))?;
+        press.press(&mut body, REST_S, &mut |reading| last.clone_from(reading))?;
         let still = Command { qdot: vec![0.0; last.q.len()] };
         let mut after = |ticks: u32| -> Result<Reading, Fault> {
             (1..ticks).try_for_each(|_| body.step(&still).map(drop))?;
@@ -319,9 +322,9 @@ fn long(ticks: f64) -> Outcome {
         let change = (force_n(&last) - force_n(&first)).abs() / force_n(&first);
         let fastest = last.qdot.iter().fold(0.0_f64, |most, qdot| most.max(qdot.abs()));
         Ok(all([
-            hold(moved_m <= CREEP_M, || format!("crept by {:.4} mm", 1e3 * moved_m)),
-            hold(change <= 0.01, || format!("force changed by {:.2} %", 100.0 * change)),
-            hold(fastest <= STILL, || format!("{fastest:.1e} rad/s at rest")),
+            require(moved_m <= CREEP_M, || format!("crept by {:.4} mm", 1e3 * moved_m)),
+            require(change <= 0.01, || format!("force changed by {:.2} %", 100.0 * change)),
+            require(fastest <= STILL, || format!("{fastest:.1e} rad/s at rest")),
         ]))
     };
     run().unwrap_or_else(|fault| Outcome::Faulted(fault.to_string()))

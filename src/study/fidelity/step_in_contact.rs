@@ -1,8 +1,8 @@
-//! How fast the error of a body with masses falls with its step while the finger is pressed: one
-//! fixed motion is commanded, whatever is felt.
+//! How fast the error of a body with masses falls with its time step in contact: the same commands
+//! press the finger, whatever its force.
 
 use super::order::{Order, STEPPED_SAMPLES};
-use super::reference_load::quiet;
+use super::reference_load::noise_free;
 use super::rung::{Rung, Senses};
 use super::touches::MeasureError;
 use crate::backend::Command;
@@ -16,8 +16,8 @@ use std::sync::Arc;
 /// As tables name this order.
 pub const NAME: &str = "step in contact";
 
-/// Steps compared with the last; chosen: the longest that is allowed, halved again and again, and an
-/// eighth of the shortest.
+/// Steps compared with the last; chosen: the longest that is allowed, halved again and again, and
+/// an eighth of the shortest.
 const STEPS_S: [f64; 6] = [2e-3, 1e-3, 0.5e-3, 0.25e-3, 0.125e-3, 0.015_625e-3];
 
 /// Control ticks: commands change with these, whatever the step.
@@ -31,8 +31,8 @@ const PRESS_S: f64 = 0.2;
 const TRAVEL_M_S: f64 = 0.05;
 const NEAR_M: f64 = 3e-3;
 
-/// In the step of a dry finger on a stage, pressed 1 mm into the middle of the zone: the force of the
-/// skin is that at the step's start and the joints' speeds those at its end, so the error is of
+/// In the step of a dry finger on a stage, pressed 1 mm into the middle of the zone: the force of
+/// the skin is that at the step's start and the joints' speeds those at its end, so the error is of
 /// first order. None where the middle is no surface, or in a build without MuJoCo.
 ///
 /// # Errors
@@ -42,7 +42,7 @@ pub fn in_step(scene: &Scene) -> Result<Option<Order>, MeasureError> {
     if !rung.is_built() {
         return Ok(None);
     }
-    let mut scene = quiet(&rung.apply(scene));
+    let mut scene = noise_free(&rung.apply(scene));
     scene.arm = None;
     let mut runs: Vec<(f64, Vec<f64>)> = Vec::new();
     for step_s in STEPS_S {

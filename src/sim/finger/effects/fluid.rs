@@ -1,8 +1,10 @@
 //! What the pressure sensor makes of the fluid: PDC (static) and PAC (vibration).
 
-use super::noise::normal;
+use super::effect::Effect;
+use super::switch::Switch;
 use crate::config::{Checked, Rules};
 use crate::robot::finger::frame::FULL_SCALE_COUNTS;
+use crate::sim::finger::noise::normal;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -31,9 +33,10 @@ pub struct FluidEffect {
 }
 
 impl Default for FluidEffect {
-    /// Stiffness: chosen, 10 kPa compress hoses and bubbles by 1 mm³, little beside the 100 mm³ that
-    /// 2 N displace. Baseline: chosen amid 1326 to 2695 (recordings of RuihanGao/BioTacSP_setup and
-    /// I-Quotient-Robotics/syntouch_btd_decode), noise from the same: up to half a count.
+    /// Stiffness: chosen, 10 kPa compress hoses and bubbles by 1 mm³, little beside the 100 mm³
+    /// that 2 N displace. Baseline: chosen amid 1326 to 2695 (recordings of
+    /// RuihanGao/BioTacSP_setup and I-Quotient-Robotics/syntouch_btd_decode), noise from the same:
+    /// up to half a count.
     fn default() -> Self {
         Self {
             stiffness_pa_m3: 1e13,
@@ -53,6 +56,29 @@ impl Checked for FluidEffect {
         if let Some(vibration) = &self.vibration {
             rules.table("vibration", vibration);
         }
+    }
+}
+
+impl Effect for FluidEffect {
+    type State = ();
+
+    const FILLS_FRAMES: bool = true;
+
+    fn start(&self) {}
+
+    fn complete() -> Option<Self> {
+        Some(Self { vibration: Some(VibrationEffect::default()), ..Self::default() })
+    }
+
+    /// All of it, and its vibration, which brings the fluid with it.
+    fn switches() -> Vec<Switch<Option<Self>>> {
+        let is_on = |fluid: &Option<Self>| fluid.as_ref().is_some_and(|f| f.vibration.is_some());
+        let set = |fluid: &mut Option<Self>, on| match (fluid, on) {
+            (fluid, true) => fluid.get_or_insert_default().vibration = Some(Default::default()),
+            (Some(fluid), false) => fluid.vibration = None,
+            (None, false) => {}
+        };
+        vec![Switch::table(), Switch::new("vibration", is_on, set)]
     }
 }
 
@@ -89,7 +115,7 @@ impl Checked for VibrationEffect {
 
 impl FluidEffect {
     /// PDC at a pressure above rest.
-    pub(super) fn pdc_counts(&self, pressure_pa: f64, rng: &mut impl Rng) -> f64 {
+    pub fn pdc_counts(&self, pressure_pa: f64, rng: &mut impl Rng) -> f64 {
         self.convert(self.baseline_counts + pressure_pa / PDC_PA, self.noise_counts, rng)
     }
 
@@ -110,7 +136,7 @@ pub struct Filter {
 
 impl Filter {
     /// PAC `dt_s` after the last one.
-    pub(super) fn pac_counts(
+    pub fn pac_counts(
         &mut self,
         (fluid, vibration): (&FluidEffect, &VibrationEffect),
         pressure_pa: f64,

@@ -2,7 +2,7 @@
 
 use super::axes;
 use super::axes::Length;
-use super::canvas::{Anchor, Area, Canvas, Point};
+use super::canvas::{Anchor, Area, Canvas, PointPx};
 use super::relief::{Space, View};
 use super::style;
 use super::style::{FAINT_INK, SMALL_PX, TEXT_PX};
@@ -11,7 +11,7 @@ use super::style::{FAINT_INK, SMALL_PX, TEXT_PX};
 const TITLE_PX: f64 = 42.0;
 
 /// A panel.
-pub struct Sheet {
+pub struct ReliefPanel {
     /// How its space lies on it.
     pub view: View,
     /// What is drawn on it.
@@ -20,7 +20,7 @@ pub struct Sheet {
     unit: Length,
 }
 
-impl Sheet {
+impl ReliefPanel {
     /// Fits a space into an area.
     pub fn new(unit: Length, area: Area, space: Space) -> Self {
         let inner = Area {
@@ -46,7 +46,7 @@ impl Sheet {
         canvas.polygon(back_wall.map(|[x, z]| corner(x, back, z)), &stroke);
         let floor = [[x0, back], [x1, back], [x1, front], [x0, front]];
         canvas.polygon(floor.map(|[x, height]| corner(x, height, z0)), &stroke);
-        let label = |canvas: &mut Canvas, at: Point, words: &str, shift: Point, anchor| {
+        let label = |canvas: &mut Canvas, at: PointPx, words: &str, shift: PointPx, anchor| {
             let at = [at[0] + shift[0], at[1] + shift[1]];
             canvas.coloured_text(at, words, SMALL_PX, anchor, FAINT_INK);
         };

@@ -1,8 +1,9 @@
 //! The thermistor in a heated finger: TDC (temperature) and TAC (its change).
 
-use super::noise::normal;
+use super::effect::{Effect, OnLoad};
 use crate::config::{Checked, Rules};
 use crate::robot::finger::frame::FULL_SCALE_COUNTS;
+use crate::sim::finger::noise::normal;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -40,11 +41,11 @@ pub struct ThermalEffect {
 }
 
 impl Default for ThermalEffect {
-    /// Temperatures: within the 25.7 to 35.3 °C a warming BioTac showed (mattmongeon's BioTac page);
-    /// the object's: a room. Noise and TAC's baseline: I-Quotient-Robotics/syntouch_btd_decode and
-    /// RuihanGao/BioTacSP_setup recordings. Time constant and area: chosen so that a contact
-    /// of 100 mm² moves TAC by the recorded 57 counts. Conductivity: 2 % per kelvin, as salt
-    /// water (chosen).
+    /// Temperatures: within the 25.7 to 35.3 °C a warming BioTac showed (mattmongeon's BioTac
+    /// page); the object's: a room. Noise and TAC's baseline:
+    /// I-Quotient-Robotics/syntouch_btd_decode and RuihanGao/BioTacSP_setup recordings. Time
+    /// constant and area: chosen so that a contact of 100 mm² moves TAC by the recorded 57 counts.
+    /// Conductivity: 2 % per kelvin, as salt water (chosen).
     fn default() -> Self {
         Self {
             start_c: 31.0,
@@ -75,16 +76,30 @@ impl Checked for ThermalEffect {
     }
 }
 
+impl Effect for ThermalEffect {
+    type State = Heat;
+
+    const FILLS_FRAMES: bool = true;
+
+    /// The load stays; its area cools the fluid.
+    const ON_LOAD: Option<OnLoad<Self>> =
+        Some(|effect, heat, step, load| heat.step(effect, load.area_m2, step.dt_s));
+
+    fn start(&self) -> Heat {
+        Heat::new(self)
+    }
+}
+
 impl ThermalEffect {
     /// TDC at a temperature: the inverse of the SynTouch BioTac SP manual's
     /// T = 4025 / ln((155183 − 46555 r) / r) − 273.15, r = TDC / 4095.
-    pub(super) fn tdc_counts(&self, temperature_c: f64, rng: &mut impl Rng) -> f64 {
+    pub fn tdc_counts(&self, temperature_c: f64, rng: &mut impl Rng) -> f64 {
         let ratio = 155_183.0 / ((4025.0 / (temperature_c + 273.15)).exp() + 46_555.0);
         self.convert(FULL_SCALE_COUNTS * ratio, self.tdc_noise_counts, rng)
     }
 
     /// TAC at a rate of warming: cooling raises it.
-    pub(super) fn tac_counts(&self, warming_c_s: f64, rng: &mut impl Rng) -> f64 {
+    pub fn tac_counts(&self, warming_c_s: f64, rng: &mut impl Rng) -> f64 {
         let counts = self.tac_baseline_counts - warming_c_s / TAC_C_S;
         self.convert(counts, self.tac_noise_counts, rng)
     }

@@ -1,9 +1,14 @@
 //! When a BioTac samples which channel, and when its frames arrive.
 
+use super::effect::{Effect, Needs};
+use super::switch::Switch;
 use crate::backend::delay::DELAY_MAX_S;
 use crate::config::{Checked, Rules};
 use crate::robot::finger::frame::ELECTRODES;
 use serde::{Deserialize, Serialize};
+
+/// A delay of commands that is more than a control tick of any body (chosen).
+const LONG_DELAY_S: f64 = 0.02;
 
 /// Table `[timing]`: channels are sampled one after the other, frames arrive in batches, commands
 /// late. Without it a frame is sampled at once, every 10 ms, and arrives then, and a command holds
@@ -34,6 +39,30 @@ impl Checked for TimingEffect {
             || "1 to 100".into(),
         );
         rules.number("control_delay_s", self.control_delay_s, 0.0..=DELAY_MAX_S);
+    }
+}
+
+impl Effect for TimingEffect {
+    type State = ();
+
+    const NEEDS: Needs = Needs::Frames;
+
+    fn start(&self) {}
+
+    /// All of it, and a delay of commands alone: with frames as near to those without timing as a
+    /// table can say it, each by itself.
+    fn switches() -> Vec<Switch<Option<Self>>> {
+        let is_on =
+            |timing: &Option<Self>| timing.as_ref().is_some_and(|t| t.control_delay_s > 0.0);
+        let set = |timing: &mut Option<Self>, on| match (timing, on) {
+            (Some(timing), true) => timing.control_delay_s = LONG_DELAY_S,
+            (Some(timing), false) => timing.control_delay_s = 0.0,
+            (timing, true) => {
+                *timing = Some(Self { batch_frames: 1, control_delay_s: LONG_DELAY_S });
+            }
+            (None, false) => {}
+        };
+        vec![Switch::table(), Switch::new("control_delay_s", is_on, set)]
     }
 }
 

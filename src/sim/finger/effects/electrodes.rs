@@ -1,11 +1,12 @@
 //! The impedance electrodes: where the fluid over one grows thin, its counts fall.
 
-use super::noise::normal;
-use super::samples::SkinSample;
+use super::effect::Effect;
 use super::skin::Pressed;
 use crate::config::{Checked, Rules};
 use crate::robot::finger::electrode_table;
 use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
+use crate::sim::finger::noise::normal;
+use crate::sim::finger::samples::SkinSample;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -42,8 +43,8 @@ pub struct ElectrodesEffect {
 impl Default for ElectrodesEffect {
     /// Baselines and noise: MiaoLi/syntouchcontact recordings, sensor F2. The recorded standard
     /// deviations contain drift; three quarters of them match the differences between frames
-    /// (2.1 to 5.8 counts). Drift: 6 to 16 counts over 11 s. Spread: fitted by `calibration` to the same
-    /// sensor on a flat plate. Exponent: the gap's resistance grows with its inverse.
+    /// (2.1 to 5.8 counts). Drift: 6 to 16 counts over 11 s. Spread: fitted by `calibration` to the
+    /// same sensor on a flat plate. Exponent: the gap's resistance grows with its inverse.
     fn default() -> Self {
         Self {
             baseline_counts: electrode_table::BASELINES_COUNTS,
@@ -65,6 +66,14 @@ impl Checked for ElectrodesEffect {
         rules.number("noise", self.noise, 0.0..=1e3);
         rules.number("drift_counts", self.drift_counts, 0.0..=1e3);
     }
+}
+
+impl Effect for ElectrodesEffect {
+    type State = ();
+
+    const FILLS_FRAMES: bool = true;
+
+    fn start(&self) {}
 }
 
 /// The electrodes over a skin; never change.
@@ -105,7 +114,7 @@ impl Electrodes {
     }
 
     /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         size_of_val(self)
             + self.weights.iter().map(|near| size_of_val(near.as_slice())).sum::<usize>()
     }
@@ -117,7 +126,7 @@ impl Electrodes {
     }
 
     /// The same over samples whose skin moved inwards by `inward_m`, one each, or none at rest.
-    pub(super) fn counts_over(&self, inward_m: &[f64], conductivity: f64) -> [f64; ELECTRODES] {
+    pub fn counts_over(&self, inward_m: &[f64], conductivity: f64) -> [f64; ELECTRODES] {
         // An untouched skin is the usual case and needs no sums.
         let moved = |weights: &[(usize, f64)]| match inward_m.is_empty() {
             true => 0.0,
@@ -134,7 +143,7 @@ impl Electrodes {
     }
 
     /// What the converter makes of ideal counts, with `drift_counts` on top.
-    pub(super) fn convert(
+    pub fn convert(
         &self,
         i: usize,
         ideal_counts: f64,
@@ -153,7 +162,7 @@ impl Electrodes {
     }
 
     /// The common drift after another `duration_s`.
-    pub(super) fn drifted(&self, drift_counts: f64, duration_s: f64, rng: &mut impl Rng) -> f64 {
+    pub fn drifted(&self, drift_counts: f64, duration_s: f64, rng: &mut impl Rng) -> f64 {
         if self.effect.drift_counts == 0.0 {
             return drift_counts;
         }

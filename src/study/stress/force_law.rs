@@ -1,7 +1,7 @@
-//! The finger's law of force, driven pose by pose.
+//! How force follows from the finger's pose: laws of press, release, slip and rest.
 
-use super::bench::{Bench, finite, on_bench, on_bench_of, stiffen};
-use super::case::{Case, Outcome, all, case, hold};
+use super::case::{Case, Outcome, all, case, require};
+use super::finger_on_wall::{FingerOnWall, is_finite, stiffen, with_finger, with_finger_of_size};
 use crate::math::seed;
 use crate::robot::finger::TipMotion;
 use crate::sim::finger::{Effects, FingertipError};
@@ -111,13 +111,13 @@ fn effects() -> Effects {
 
 /// Force grows with depth and pushes the finger away.
 fn deep(depth_mm: f64, _: f64) -> Outcome {
-    on_bench(&effects(), |bench| {
+    with_finger(&effects(), |setup| {
         let mut before_n = 0.0;
         for i in 1..=20 {
-            let motion = bench.at(1e-3 * depth_mm * f64::from(i) / 20.0, 0.0);
-            let load = bench.press(&mut bench.feel(), &motion, 0.01)?;
+            let motion = setup.at(1e-3 * depth_mm * f64::from(i) / 20.0, 0.0);
+            let load = setup.press(&mut setup.untouched(), &motion, 0.01)?;
             let force_w = motion.x_wt.rotation * load.force_n;
-            let grows = force_w.y >= before_n * (1.0 - 1e-9) && finite(&load);
+            let grows = force_w.y >= before_n * (1.0 - 1e-9) && is_finite(&load);
             if !grows {
                 return Ok(Outcome::Wrong(format!("{before_n} N, then {} N deeper", force_w.y)));
             }
@@ -130,17 +130,17 @@ fn deep(depth_mm: f64, _: f64) -> Outcome {
 /// The same poses in and out give the same forces to the bit, and the work done is the energy
 /// stored within what the steps can resolve.
 fn release(steps: f64, _: f64) -> Outcome {
-    on_bench(&Effects { friction: None, ..effects() }, |bench| {
+    with_finger(&Effects { friction: None, ..effects() }, |setup| {
         let steps = steps as u32;
         let depth_m = |i: u32| 1e-3 * f64::from(i) / f64::from(steps);
-        let mut feel = bench.feel();
+        let mut state = setup.untouched();
         let mut forces = Vec::new();
         for i in (0..=steps).chain((0..=steps).rev()) {
-            forces.push(bench.press(&mut feel, &bench.at(depth_m(i), 0.0), 0.001)?);
+            forces.push(setup.press(&mut state, &setup.at(depth_m(i), 0.0), 0.001)?);
         }
         let same = forces.iter().zip(forces.iter().rev()).all(|(a, b)| a == b);
         let stored_j = forces[steps as usize].energy_j;
-        let rotation = bench.finger.r_at();
+        let rotation = setup.finger.r_at();
         let work_j: f64 = (forces[..=steps as usize].windows(2))
             .map(|pair| (rotation * (pair[0].force_n + pair[1].force_n)).y / 2.0 * depth_m(1))
             .sum();
@@ -148,8 +148,8 @@ fn release(steps: f64, _: f64) -> Outcome {
         // 1/n of the work.
         let near = (work_j - stored_j).abs() <= stored_j * (0.02 + 1.0 / f64::from(steps));
         Ok(all([
-            hold(same, || "release differs from press".into()),
-            hold(near, || format!("work {work_j} J, stored {stored_j} J")),
+            require(same, || "release differs from press".into()),
+            require(near, || format!("work {work_j} J, stored {stored_j} J")),
         ]))
     })
 }
@@ -157,13 +157,15 @@ fn release(steps: f64, _: f64) -> Outcome {
 /// Pressed in, dragged aside and back, and released: friction and skin take work, never give it.
 fn friction_loop(coefficient: f64, period_s: f64) -> Outcome {
     let mut effects = effects();
-    effects.friction =
-        Some(crate::sim::finger::friction::FrictionEffect { coefficient, ..Default::default() });
-    on_bench(&effects, |bench| {
+    effects.friction = Some(crate::sim::finger::effects::friction::FrictionEffect {
+        coefficient,
+        ..Default::default()
+    });
+    with_finger(&effects, |setup| {
         let speed_m_s = 0.02;
         let corners: [(f64, f64); 6] =
             [(0.0, 0.0), (1.0, 0.0), (1.0, 5.0), (1.0, -5.0), (1.0, 0.0), (0.0, 0.0)];
-        let (mut feel, mut taken_j, mut scale_j) = (bench.feel(), 0.0, 0.0);
+        let (mut state, mut taken_j, mut scale_j) = (setup.untouched(), 0.0, 0.0);
         for pair in corners.windows(2) {
             let ((d0, x0), (d1, x1)) = (pair[0], pair[1]);
             let length_m = 1e-3 * f64::max((d1 - d0).abs(), (x1 - x0).abs());
@@ -173,36 +175,36 @@ fn friction_loop(coefficient: f64, period_s: f64) -> Outcome {
             for i in 1..=count {
                 let part = f64::from(i) / f64::from(count);
                 let mut motion =
-                    bench.at(1e-3 * (d0 + (d1 - d0) * part), 1e-3 * (x0 + (x1 - x0) * part));
+                    setup.at(1e-3 * (d0 + (d1 - d0) * part), 1e-3 * (x0 + (x1 - x0) * part));
                 motion.linear_w = move_w / period_s;
-                let load = bench.press(&mut feel, &motion, period_s)?;
+                let load = setup.press(&mut state, &motion, period_s)?;
                 taken_j -= (motion.x_wt.rotation * load.force_n).dot(&move_w);
                 scale_j += load.force_n.norm() * move_w.norm();
-                if !finite(&load) {
+                if !is_finite(&load) {
                     return Ok(Outcome::Wrong("not finite".into()));
                 }
             }
         }
         // Taking the force at the end of each step overrates what pressing costs and underrates
         // what release gives: the sum may not be below minus a rounding.
-        Ok(hold(taken_j >= -1e-3 * scale_j, || format!("gained {} J of {scale_j} J", -taken_j)))
+        Ok(require(taken_j >= -1e-3 * scale_j, || format!("gained {} J of {scale_j} J", -taken_j)))
     })
 }
 
 /// Whatever the speed, tangential force stays within Coulomb's limit.
 fn slip(speed_m_s: f64, period_s: f64) -> Outcome {
-    on_bench(&effects(), |bench| {
-        let mut feel = bench.feel();
-        let dry = bench.force_n(1e-3)?;
+    with_finger(&effects(), |setup| {
+        let mut state = setup.untouched();
+        let dry = setup.force_n(1e-3)?;
         let coefficient = 0.783;
-        let mut motion = bench.at(1e-3, 0.0);
+        let mut motion = setup.at(1e-3, 0.0);
         for i in 0..200 {
             let sign = if i % 7 < 4 { 1.0 } else { -1.0 };
             motion.linear_w = Vector3::new(sign * speed_m_s, 0.0, 0.3 * speed_m_s);
-            let load = bench.press(&mut feel, &motion, period_s)?;
+            let load = setup.press(&mut state, &motion, period_s)?;
             let force_w = motion.x_wt.rotation * load.force_n;
             let drag_n = force_w.x.hypot(force_w.z);
-            if !finite(&load) || drag_n > coefficient * dry * 1.05 + 1e-9 {
+            if !is_finite(&load) || drag_n > coefficient * dry * 1.05 + 1e-9 {
                 return Ok(Outcome::Wrong(format!("{drag_n} N of drag on {dry} N")));
             }
         }
@@ -216,12 +218,12 @@ fn held(count: f64, period_s: f64) -> Outcome {
     if let Some(skin) = &mut effects.skin {
         skin.samples = 125;
     }
-    on_bench(&effects, |bench| {
-        let (mut feel, motion) = (bench.feel(), bench.at(5e-4, 0.0));
-        let first = bench.press(&mut feel, &motion, period_s)?;
+    with_finger(&effects, |setup| {
+        let (mut state, motion) = (setup.untouched(), setup.at(5e-4, 0.0));
+        let first = setup.press(&mut state, &motion, period_s)?;
         for i in 1..count as u64 {
-            let load = bench.press(&mut feel, &motion, period_s)?;
-            while let Some(frame) = feel.frame() {
+            let load = setup.press(&mut state, &motion, period_s)?;
+            while let Some(frame) = state.frame() {
                 if !frame.is_finite() {
                     return Ok(Outcome::Wrong(format!("frame not finite after {i} ticks")));
                 }
@@ -236,11 +238,11 @@ fn held(count: f64, period_s: f64) -> Outcome {
 
 /// Every signal of any tick is finite and within its range.
 fn ticks(tick_s: f64, _: f64) -> Outcome {
-    on_bench(&effects(), |bench| {
-        let (mut feel, motion) = (bench.feel(), bench.at(1e-3, 0.0));
+    with_finger(&effects(), |setup| {
+        let (mut state, motion) = (setup.untouched(), setup.at(1e-3, 0.0));
         for _ in 0..200 {
-            bench.press(&mut feel, &motion, tick_s)?;
-            while let Some(frame) = feel.frame() {
+            setup.press(&mut state, &motion, tick_s)?;
+            while let Some(frame) = state.frame() {
                 let tdc = frame.tdc_counts.unwrap_or(0.0);
                 if !frame.is_finite() || !(0.0..=4095.0).contains(&tdc) {
                     return Ok(Outcome::Wrong(format!("{frame:?}")));
@@ -253,16 +255,16 @@ fn ticks(tick_s: f64, _: f64) -> Outcome {
 
 /// Poses all around and in the wall: a finite load or a fault that says where.
 fn poses(count: f64, _: f64) -> Outcome {
-    on_bench(&effects(), |bench| {
+    with_finger(&effects(), |setup| {
         let mut rng = seed::stream(0, 0, "poses");
-        let mut feel = bench.feel();
+        let mut state = setup.untouched();
         for _ in 0..count as u64 {
             let mut number = || 2.0 * rng.random::<f64>() - 1.0;
             let p_wt = Vector3::from_fn(|_, _| 0.06 * number());
             let turn = Vector3::from_fn(|_, _| 3.0 * number());
             let motion = TipMotion::at(Isometry3::new(p_wt, turn));
-            match bench.press(&mut feel, &motion, 0.001) {
-                Ok(load) if finite(&load) => {}
+            match setup.press(&mut state, &motion, 0.001) {
+                Ok(load) if is_finite(&load) => {}
                 Ok(load) => return Ok(Outcome::Wrong(format!("{load:?} at {p_wt:?}"))),
                 Err(FingertipError::Inside { .. }) if p_wt.y < 0.0 => {}
                 Err(error) => return Ok(Outcome::Wrong(error.to_string())),
@@ -274,8 +276,8 @@ fn poses(count: f64, _: f64) -> Outcome {
 
 /// A pose or velocity with a NaN is refused, and the next good one felt as if nothing had been.
 fn nan(component: f64, _: f64) -> Outcome {
-    on_bench(&effects(), |bench| {
-        let (mut feel, good) = (bench.feel(), bench.at(1e-3, 0.0));
+    with_finger(&effects(), |setup| {
+        let (mut state, good) = (setup.untouched(), setup.at(1e-3, 0.0));
         let mut bad = good;
         match component as usize {
             0 => bad.x_wt.translation.vector.x = f64::NAN,
@@ -285,10 +287,10 @@ fn nan(component: f64, _: f64) -> Outcome {
             4 => bad.x_wt.rotation.as_mut_unchecked().coords.x = f64::NAN,
             _ => bad.linear_w = Vector3::repeat(f64::NAN),
         }
-        let refused = bench.press(&mut feel, &bad, 0.01).is_err();
-        let after = bench.press(&mut feel, &good, 0.01)?;
-        let clean = bench.press(&mut bench.feel(), &good, 0.01)?;
-        Ok(hold(refused && after == clean, || "a number that is none got through".into()))
+        let refused = setup.press(&mut state, &bad, 0.01).is_err();
+        let after = setup.press(&mut state, &good, 0.01)?;
+        let clean = setup.press(&mut setup.untouched(), &good, 0.01)?;
+        Ok(require(refused && after == clean, || "a number that is none got through".into()))
     })
 }
 
@@ -296,18 +298,18 @@ fn nan(component: f64, _: f64) -> Outcome {
 fn laws_of(stiffer: f64, size: f64, effects: &Effects) -> Outcome {
     let mut effects = effects.clone();
     stiffen(&mut effects, stiffer);
-    on_bench_of(&effects, size, |bench| {
+    with_finger_of_size(&effects, size, |setup| {
         let mut before_n = 0.0;
         for depth_mm in [0.01, 0.1, 0.5, 1.0, 2.0, 3.0] {
-            let motion = bench.at(1e-3 * depth_mm * size, 0.0);
-            let load = bench.press(&mut bench.feel(), &motion, 0.01)?;
+            let motion = setup.at(1e-3 * depth_mm * size, 0.0);
+            let load = setup.press(&mut setup.untouched(), &motion, 0.01)?;
             let force_n = load.force_n.norm();
-            if !finite(&load) || force_n < before_n || load.pressure_pa < 0.0 {
+            if !is_finite(&load) || force_n < before_n || load.pressure_pa < 0.0 {
                 return Ok(Outcome::Wrong(format!("{force_n} N at {depth_mm} mm: {load:?}")));
             }
             before_n = force_n;
         }
-        Ok(hold(before_n > 0.0, || "no force at all".into()))
+        Ok(require(before_n > 0.0, || "no force at all".into()))
     })
 }
 
@@ -318,10 +320,10 @@ fn few_points(count: f64, _: f64) -> Outcome {
         if let Some(skin) = &mut effects.skin {
             skin.samples = samples;
         }
-        Bench::new(&effects, 1.0).and_then(|bench| bench.force_n(1e-3).ok())
+        FingerOnWall::new(&effects, 1.0).and_then(|setup| setup.force_n(1e-3).ok())
     };
     let (Some(coarse), Some(fine)) = (force_n(count as usize), force_n(16_000)) else {
         return Outcome::Wrong("no force".into());
     };
-    hold((coarse - fine).abs() < 0.2 * fine, || format!("{coarse:.3} N instead of {fine:.3} N"))
+    require((coarse - fine).abs() < 0.2 * fine, || format!("{coarse:.3} N instead of {fine:.3} N"))
 }

@@ -1,9 +1,9 @@
-//! A rung's row: its errors against the truth and the reference, and its price.
+//! What came of a rung: its errors against the truth and the reference, and its price.
 
 use super::reference_load::ReferenceLoad;
 use super::rung::Rung;
+use super::spread::Spread;
 use super::touches::Touches;
-use crate::experiment::statistics::{mean, mean_interval};
 use crate::explore::probe::Contact;
 use crate::sim::Environment;
 use crate::sim::collision::Collision;
@@ -12,35 +12,9 @@ use crate::sim::scene::Body;
 use nalgebra::Point3;
 use serde::Serialize;
 
-/// Mean, 95 % quantile and largest of some errors, with the mean's 95 % bootstrap interval.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spread {
-    /// Mean.
-    pub mean: f64,
-    /// Of the mean.
-    pub interval: [f64; 2],
-    /// 95 % lie at or below.
-    pub p95: f64,
-    /// The largest.
-    pub max: f64,
-}
-
-impl Spread {
-    /// Of some values; none of nothing.
-    pub fn of(values: &[f64]) -> Option<Self> {
-        let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-        sorted.sort_by(f64::total_cmp);
-        let max = *sorted.last()?;
-        let rank = (0.95 * (sorted.len() - 1) as f64).ceil() as usize;
-        let mean = mean(&sorted);
-        let interval = mean_interval(&sorted, 0).unwrap_or([mean; 2]);
-        Some(Self { mean, interval, p95: sorted[rank], max })
-    }
-}
-
 /// Errors and price of one rung.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct RungResult {
     /// Which.
     pub rung: Rung,
     /// Targets touched.
@@ -70,33 +44,33 @@ pub struct Row {
 }
 
 /// Errors of `touches` against the object's surface and those of the reference.
-pub fn row(
+pub fn rung_result(
     (rung, environment): (Rung, &Environment),
     touches: &Touches,
     reference: &Touches,
     surface_rmse_m: Option<f64>,
-) -> Row {
+) -> RungResult {
     let pairs = || touches.contacts.iter().zip(&reference.contacts);
     let shifts: Vec<f64> =
         pairs().filter_map(|(a, b)| Some((a.as_ref()?.p_wc - b.as_ref()?.p_wc).norm())).collect();
     let off: Vec<f64> =
         touches.contacts.iter().flatten().filter_map(|c| off_surface_m(environment, c)).collect();
-    let felt = |difference: &dyn Fn(&ReferenceLoad, &ReferenceLoad) -> Option<f64>| {
-        let values: Vec<f64> = (touches.felt.iter().zip(&reference.felt))
+    let spread = |difference: &dyn Fn(&ReferenceLoad, &ReferenceLoad) -> Option<f64>| {
+        let values: Vec<f64> = (touches.loads.iter().zip(&reference.loads))
             .filter_map(|(a, b)| difference(a.as_ref()?, b.as_ref()?))
             .collect();
         Spread::of(&values)
     };
-    Row {
+    RungResult {
         rung,
         touches: touches.contacts.len(),
         contacts: touches.contacts.iter().flatten().count(),
         faults: touches.faults,
         off_truth_m: Spread::of(&off),
         off_reference_m: Spread::of(&shifts),
-        force_n: felt(&|a, b| Some((a.force_n - b.force_n).abs())),
-        pdc_counts: felt(&|a, b| Some((a.pdc_counts? - b.pdc_counts?).abs())),
-        electrode_counts: felt(&electrodes_apart),
+        force_n: spread(&|a, b| Some((a.force_n - b.force_n).abs())),
+        pdc_counts: spread(&|a, b| Some((a.pdc_counts? - b.pdc_counts?).abs())),
+        electrode_counts: spread(&electrode_rms_counts),
         surface_rmse_m,
         wall_s: touches.wall_s,
         real_time_factor: touches.simulated_s.map(|simulated_s| simulated_s / touches.wall_s),
@@ -105,7 +79,7 @@ pub fn row(
 }
 
 /// Root mean square difference over the electrodes.
-pub fn electrodes_apart(a: &ReferenceLoad, b: &ReferenceLoad) -> Option<f64> {
+pub fn electrode_rms_counts(a: &ReferenceLoad, b: &ReferenceLoad) -> Option<f64> {
     let (a, b) = (a.electrode_counts?, b.electrode_counts?);
     let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum();
     Some((squares / a.len() as f64).sqrt())
@@ -123,7 +97,7 @@ pub fn off_surface_m(environment: &Environment, contact: &Contact) -> Option<f64
 
 /// A line of `fidelity.csv`.
 #[derive(Serialize)]
-pub struct Line {
+pub struct RungRecord {
     rung: String,
     body: &'static str,
     senses: &'static str,
@@ -157,13 +131,13 @@ pub struct Line {
     finger_bytes: usize,
 }
 
-impl From<&Row> for Line {
-    fn from(row: &Row) -> Self {
+impl From<&RungResult> for RungRecord {
+    fn from(result: &RungResult) -> Self {
         let mean = |spread: Option<Spread>| spread.map(|spread| spread.mean);
         let p95 = |spread: Option<Spread>| spread.map(|spread| spread.p95);
         let max = |spread: Option<Spread>| spread.map(|spread| spread.max);
-        let Row { rung, off_truth_m, off_reference_m, force_n, .. } = row;
-        let (pdc, electrodes) = (row.pdc_counts, row.electrode_counts);
+        let RungResult { rung, off_truth_m, off_reference_m, force_n, .. } = result;
+        let (pdc, electrodes) = (result.pdc_counts, result.electrode_counts);
         Self {
             rung: rung.name(),
             body: rung.body.name(),
@@ -172,9 +146,9 @@ impl From<&Row> for Line {
             period_s: rung.period_s,
             integrator: if rung.body == Body::Dynamic { rung.integrator.name() } else { "" },
             collision: rung.collision.map(Collision::name),
-            touches: row.touches,
-            contacts: row.contacts,
-            faults: row.faults,
+            touches: result.touches,
+            contacts: result.contacts,
+            faults: result.faults,
             off_truth_mean_m: mean(*off_truth_m),
             off_truth_95_m: p95(*off_truth_m),
             off_truth_max_m: max(*off_truth_m),
@@ -192,10 +166,10 @@ impl From<&Row> for Line {
             electrodes_mean_counts: mean(electrodes),
             electrodes_95_counts: p95(electrodes),
             electrodes_max_counts: max(electrodes),
-            surface_rmse_m: row.surface_rmse_m,
-            wall_per_touch_s: row.wall_s,
-            real_time_factor: row.real_time_factor,
-            finger_bytes: row.finger_bytes,
+            surface_rmse_m: result.surface_rmse_m,
+            wall_per_touch_s: result.wall_s,
+            real_time_factor: result.real_time_factor,
+            finger_bytes: result.finger_bytes,
         }
     }
 }

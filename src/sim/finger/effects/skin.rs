@@ -1,14 +1,15 @@
 //! The soft skin: an elastic foundation against the exact mesh, coupled by the fluid under it.
 
-use super::cavity;
-use super::cavity::SkinContact;
-use super::column::Column;
-use super::load::{Load, PressError};
-use super::profile::Profile;
-use super::samples::{SkinSample, spread};
+use super::effect::{Effect, Needs};
 use crate::config::{Checked, Rules};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::sweep::Capsule;
+use crate::sim::finger::cavity;
+use crate::sim::finger::cavity::SkinContact;
+use crate::sim::finger::column::Column;
+use crate::sim::finger::load::{Load, PressError};
+use crate::sim::finger::profile::Profile;
+use crate::sim::finger::samples::{SkinSample, spread};
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -46,8 +47,8 @@ pub struct SkinEffect {
 }
 
 impl Default for SkinEffect {
-    /// Modulus E: NVlabs/biotac_sim. Inflation: that of a thin-walled tube, E t / R², with the skin's
-    /// thickness t = 1.6 mm and the sides' radius R = 7 mm. Flattening and core: fitted by
+    /// Modulus E: NVlabs/biotac_sim. Inflation: that of a thin-walled tube, E t / R², with the
+    /// skin's thickness t = 1.6 mm and the sides' radius R = 7 mm. Flattening and core: fitted by
     /// `calibration` to the MiaoLi/syntouchcontact recordings of sensor F2 on a flat plate. The fit
     /// is flat: half or twice a value costs a few counts.
     fn default() -> Self {
@@ -71,6 +72,14 @@ impl Checked for SkinEffect {
         rules.number("inflate_pa_m", self.inflate_pa_m, 1e5..=1e12);
         rules.number("core_pa_m", self.core_pa_m, 1e3..=1e12);
     }
+}
+
+impl Effect for SkinEffect {
+    type State = ();
+
+    const NEEDS: Needs = Needs::Nothing;
+
+    fn start(&self) {}
 }
 
 /// A fingertip's skin; never changes.
@@ -116,7 +125,7 @@ pub struct Pressed {
 
 impl Pressed {
     /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         let numbers = self.inward_m.capacity() + self.indentation_m.capacity();
         self.touches.capacity() * size_of::<SkinContact>() + numbers * size_of::<f64>()
     }
@@ -186,7 +195,7 @@ impl Skin {
     }
 
     /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         self.samples.len() * (size_of::<SkinSample>() + size_of::<f64>())
             + self.patches.len() * size_of::<Patch>()
     }

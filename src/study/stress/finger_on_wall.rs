@@ -1,4 +1,4 @@
-//! A finger pressed on a wall, pose by pose.
+//! A finger in front of a wall, put into one pose after another by hand: no servo, no body.
 
 use super::case::Outcome;
 use super::solids::{mesh, wall};
@@ -12,7 +12,7 @@ use crate::sim::finger::{Effects, Fingertip, FingertipError, FingertipState, Loa
 use nalgebra::{Isometry3, Vector3};
 
 /// A finger over a wall, its tip pointing at it as in a touch.
-pub(super) struct Bench {
+pub(super) struct FingerOnWall {
     tip: Fingertip,
     wall: MeshBvh,
     /// Its hull.
@@ -21,7 +21,7 @@ pub(super) struct Bench {
     touching_m: f64,
 }
 
-impl Bench {
+impl FingerOnWall {
     /// With these effects; `size` times a BioTac.
     pub(super) fn new(effects: &Effects, size: f64) -> Option<Self> {
         let standard = Finger::default();
@@ -31,14 +31,14 @@ impl Bench {
             ..standard
         };
         let wall = MeshBvh::new(mesh(wall(0.05 * size), [0.0; 3])?);
-        let mut bench =
+        let mut setup =
             Self { tip: Fingertip::new(&finger, effects), wall, finger, touching_m: 0.0 };
-        let rotation = bench.finger.r_at();
+        let rotation = setup.finger.r_at();
         // From more points than any case has, so that depth means the same for all.
-        let fine = spread(&Profile::biotac(&bench.finger), 16_000);
+        let fine = spread(&Profile::biotac(&setup.finger), 16_000);
         let lowest = fine.iter().map(|sample| (rotation * sample.point()).y);
-        bench.touching_m = -lowest.fold(0.0, f64::min);
-        Some(bench)
+        setup.touching_m = -lowest.fold(0.0, f64::min);
+        Some(setup)
     }
 
     /// Standing `depth_m` inside the wall, `x_m` beside its middle.
@@ -47,49 +47,49 @@ impl Bench {
         TipMotion::at(Isometry3::from_parts(p_wt.into(), self.finger.r_at()))
     }
 
-    /// A finger's memory, untouched.
-    pub(super) fn feel(&self) -> FingertipState {
+    /// The state of an untouched finger.
+    pub(super) fn untouched(&self) -> FingertipState {
         FingertipState::new(&self.tip, &seed::stream(0, 0, "finger"))
     }
 
     /// What the wall does to it.
     pub(super) fn press(
         &self,
-        feel: &mut FingertipState,
+        state: &mut FingertipState,
         motion: &TipMotion,
         dt_s: f64,
     ) -> Result<Load, FingertipError> {
-        feel.step(&self.tip, &self.wall, motion, dt_s)
+        state.step(&self.tip, &self.wall, motion, dt_s)
     }
 
     /// The force at a depth.
     pub(super) fn force_n(&self, depth_m: f64) -> Result<f64, FingertipError> {
-        Ok(self.press(&mut self.feel(), &self.at(depth_m, 0.0), 0.01)?.force_n.norm())
+        Ok(self.press(&mut self.untouched(), &self.at(depth_m, 0.0), 0.01)?.force_n.norm())
     }
 }
 
 /// Runs `law`; its fault is the outcome.
-pub(super) fn on_bench(
+pub(super) fn with_finger(
     effects: &Effects,
-    law: impl FnOnce(&Bench) -> Result<Outcome, FingertipError>,
+    law: impl FnOnce(&FingerOnWall) -> Result<Outcome, FingertipError>,
 ) -> Outcome {
-    on_bench_of(effects, 1.0, law)
+    with_finger_of_size(effects, 1.0, law)
 }
 
 /// The same with a finger of another size.
-pub(super) fn on_bench_of(
+pub(super) fn with_finger_of_size(
     effects: &Effects,
     size: f64,
-    law: impl FnOnce(&Bench) -> Result<Outcome, FingertipError>,
+    law: impl FnOnce(&FingerOnWall) -> Result<Outcome, FingertipError>,
 ) -> Outcome {
-    match Bench::new(effects, size) {
-        Some(bench) => law(&bench).unwrap_or_else(|fault| Outcome::Faulted(fault.to_string())),
-        None => Outcome::Wrong("no bench".into()),
+    match FingerOnWall::new(effects, size) {
+        Some(setup) => law(&setup).unwrap_or_else(|fault| Outcome::Faulted(fault.to_string())),
+        None => Outcome::Wrong("no wall".into()),
     }
 }
 
 /// Whether every number of a load is one.
-pub(super) fn finite(load: &Load) -> bool {
+pub(super) fn is_finite(load: &Load) -> bool {
     let vectors = [&load.force_n, &load.torque_nm, &load.normal_t, &load.centre_t.coords];
     vectors.iter().all(|vector| vector.iter().all(|number| number.is_finite()))
         && load.energy_j.is_finite()

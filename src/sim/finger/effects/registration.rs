@@ -1,13 +1,14 @@
 //! What is not where it is believed to be: the finger on its mount, the object in the world.
 
-use super::noise::normal;
+use super::effect::Effect;
 use crate::config::{Checked, Rules};
+use crate::sim::finger::noise::normal;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-/// Table `[registration]`: errors that stay through a trial, drawn anew for each. Forward kinematics
-/// and the truth know nothing of them.
+/// Table `[registration]`: errors that stay through a trial, drawn anew for each. Forward
+/// kinematics and the truth know nothing of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegistrationEffect {
@@ -35,6 +36,12 @@ impl Checked for RegistrationEffect {
         rules.number("object_m", self.object_m, 0.0..=0.1);
         rules.number("object_deg", self.object_deg, 0.0..=45.0);
     }
+}
+
+impl Effect for RegistrationEffect {
+    type State = ();
+
+    fn start(&self) {}
 }
 
 /// The errors of one trial.

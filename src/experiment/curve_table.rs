@@ -1,0 +1,86 @@
+//! The curves as a table with intervals, which `summary.csv` holds.
+
+use super::comparison::paired;
+use super::experiment::Experiment;
+use super::measure::{MEASURES, Measure};
+use super::row::TrialRow;
+use super::statistics::median_interval;
+use super::summary;
+use super::summary::CurvePoint;
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
+
+/// One planner after one number of touches.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CurveRecord {
+    /// Which planner, after how many touches, over how many trials.
+    pub point: CurvePoint,
+    /// Every other column with its value, the same columns in every record of a run: of each
+    /// measure its mean with the standard error, or its median with the 95 % bootstrap interval;
+    /// of an error also how it differs from each baseline's in the same trial (mean, 95 %
+    /// bootstrap interval, share of trials in which it is less).
+    pub values: Vec<(String, Option<f64>)>,
+}
+
+/// A record for each planner and touch count.
+pub fn curve_table(experiment: &Experiment, rows: &[TrialRow]) -> Vec<CurveRecord> {
+    let points: Vec<CurvePoint> = (experiment.planners.iter())
+        .flat_map(|planner| summary::curve(experiment, rows, planner))
+        .collect();
+    points.par_iter().map(|point| record(experiment, rows, point)).collect()
+}
+
+fn record(experiment: &Experiment, rows: &[TrialRow], point: &CurvePoint) -> CurveRecord {
+    let mut values = Vec::new();
+    for measure in MEASURES {
+        values.extend(aggregates(experiment, rows, point, measure));
+        for baseline in experiment.baselines().into_iter().filter(|_| measure.is_error) {
+            values.extend(differences(experiment, rows, (point, baseline), measure));
+        }
+    }
+    CurveRecord { point: point.clone(), values }
+}
+
+fn aggregates(
+    experiment: &Experiment,
+    rows: &[TrialRow],
+    point: &CurvePoint,
+    measure: &Measure,
+) -> Vec<(String, Option<f64>)> {
+    let summary = point.of(measure);
+    let mut values = Vec::new();
+    if measure.aggregate.has_mean() {
+        values.push((measure.column("mean"), summary.map(|summary| summary.mean)));
+        values.push((measure.column("se"), summary.and_then(|summary| summary.error)));
+    }
+    if measure.aggregate.has_median() {
+        let all: Vec<f64> = summary::fitted(rows, &point.planner, point.touches)
+            .into_iter()
+            .filter_map(|row| (measure.of)(row, point.touches))
+            .collect();
+        let interval = median_interval(&all, experiment.seed);
+        values.push((measure.column("median"), summary.map(|summary| summary.median)));
+        values.push((measure.column("median_low"), interval.map(|[low, _]| low)));
+        values.push((measure.column("median_high"), interval.map(|[_, high]| high)));
+    }
+    values
+}
+
+fn differences(
+    experiment: &Experiment,
+    rows: &[TrialRow],
+    (point, baseline): (&CurvePoint, &str),
+    measure: &Measure,
+) -> [(String, Option<f64>); 4] {
+    let planners = [point.planner.as_str(), baseline];
+    let paired = (point.planner != baseline)
+        .then(|| paired(experiment, rows, planners, point.touches, measure))
+        .flatten();
+    let end = |end: usize| Some(paired?.interval?[end]);
+    let column = |end: &str| measure.column(&format!("minus_{baseline}{end}"));
+    [
+        (column(""), paired.map(|paired| paired.mean)),
+        (column("_low"), end(0)),
+        (column("_high"), end(1)),
+        (format!("{}_won_against_{baseline}", measure.stem()), paired.map(|paired| paired.won)),
+    ]
+}

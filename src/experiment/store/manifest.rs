@@ -1,0 +1,41 @@
+//! `manifest.json`: the programs that wrote a run.
+
+use super::error::{StoreError, io_error};
+use super::file::write_whole;
+use serde::Serialize;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// File that says what ran a run.
+pub const MANIFEST: &str = "manifest.json";
+
+/// What ran an experiment.
+#[derive(Clone, Debug, Serialize)]
+pub struct Manifest {
+    /// Of this program.
+    pub version: &'static str,
+    /// Of this program's sources, if they were built from a repository.
+    pub commit: &'static str,
+    /// Of the physics engine this program is linked with, if any.
+    pub mujoco: Option<String>,
+    /// Processor architecture and operating system.
+    pub platform: String,
+    /// Vector extensions of this processor; the last bits of a factorisation depend on them.
+    pub cpu_features: Vec<&'static str>,
+    /// Root of all randomness.
+    pub seed: u64,
+}
+
+/// Adds `manifest` to the list of programs that wrote a run, unless the last one was the same.
+pub(super) fn sign(path: &Path, manifest: &Manifest) -> Result<(), StoreError> {
+    let to_value = |text: String| serde_json::from_str::<Vec<serde_json::Value>>(&text).ok();
+    let mut signed = fs::read_to_string(path).ok().and_then(to_value).unwrap_or_default();
+    let new = serde_json::to_value(manifest).map_err(io::Error::from).map_err(io_error(path))?;
+    if signed.last() != Some(&new) {
+        signed.push(new);
+        let text = serde_json::to_string_pretty(&signed).map_err(io::Error::from);
+        write_whole(path, &text.map_err(io_error(path))?)?;
+    }
+    Ok(())
+}

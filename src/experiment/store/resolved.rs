@@ -1,0 +1,60 @@
+//! `resolved.toml`: the experiment of a run with every default written out.
+
+use super::error::StoreError;
+use super::file::{same, write_changed};
+use crate::experiment::experiment::Experiment;
+use std::path::{Component, Path, PathBuf};
+
+/// File of a run's settings, defaults written out.
+pub const RESOLVED: &str = "resolved.toml";
+
+/// The experiment with every default written out.
+pub fn resolved(experiment: &Experiment) -> String {
+    let text = toml::to_string(experiment).unwrap_or_default();
+    format!(
+        "# Every setting of this run, defaults written out. It can be run again as it is.\n{text}"
+    )
+}
+
+/// Reads the experiment of a run's folder, after `--set` assignments.
+pub(super) fn read(folder: &Path, sets: &[String]) -> Result<Experiment, StoreError> {
+    Ok(Experiment::load(&folder.join(RESOLVED), sets)?)
+}
+
+/// Writes the experiment into a run's folder, unless it stands there already.
+pub(super) fn write(folder: &Path, experiment: &Experiment) -> Result<(), StoreError> {
+    write_changed(&folder.join(RESOLVED), &saved(experiment, folder))
+}
+
+/// Insists that the run in `folder` is one whose rows are `experiment`'s too.
+pub(super) fn same_run(folder: &Path, experiment: &Experiment) -> Result<(), StoreError> {
+    let found = read(folder, &[])?;
+    let identity = |experiment: &Experiment| saved(&experiment.identity(), folder);
+    same(folder, RESOLVED, [&identity(&found), &identity(experiment)])
+}
+
+/// Insists that a `--set` assignment changes only what is shown.
+pub(super) fn only_shown(set: &str) -> Result<(), StoreError> {
+    let key = set.split_once('=').map(|(key, _)| key.trim());
+    match key.is_none_or(|key| key == "question" || key.starts_with("report.")) {
+        true => Ok(()),
+        false => Err(StoreError::DecidesRows { text: set.into() }),
+    }
+}
+
+/// As [`resolved`], with the mesh's path relative to the run's folder, so that both may move.
+fn saved(experiment: &Experiment, folder: &Path) -> String {
+    let mut experiment = experiment.clone();
+    if let (Some(object), Ok(folder)) = (&mut experiment.scene.object, folder.canonicalize()) {
+        let mesh = object.mesh.canonicalize().unwrap_or_else(|_| object.mesh.clone());
+        object.mesh = relative(&mesh, &folder);
+    }
+    resolved(&experiment)
+}
+
+/// `path` as seen from `folder`, both absolute.
+fn relative(path: &Path, folder: &Path) -> PathBuf {
+    let shared = path.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
+    let up = folder.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(path.components().skip(shared)).collect()
+}

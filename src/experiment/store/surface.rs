@@ -1,0 +1,69 @@
+//! `surface.csv`: the truth of a run on its test grid.
+
+use super::error::{StoreError, io_error};
+use super::file::{same, write_whole};
+use crate::experiment::experiment::Experiment;
+use crate::experiment::truth::Truth;
+use crate::task::Zone;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// File of the true surface.
+pub(super) const SURFACE: &str = "surface.csv";
+
+/// Writes the truth, or, if the folder has it already, insists that it is the same.
+pub(super) fn write_or_compare(
+    folder: &Path,
+    experiment: &Experiment,
+    truth: &Truth,
+) -> Result<(), StoreError> {
+    let (path, wanted) = (folder.join(SURFACE), text(experiment, truth));
+    match fs::read_to_string(&path) {
+        Ok(found) => same(folder, SURFACE, [&found, &wanted]),
+        Err(cause) if cause.kind() == io::ErrorKind::NotFound => write_whole(&path, &wanted),
+        Err(cause) => Err(StoreError::Io { path, cause }),
+    }
+}
+
+/// The truth as the file holds it.
+fn text(experiment: &Experiment, truth: &Truth) -> String {
+    let mut text =
+        String::from(if experiment.scene.zone.dimension() == 1 { "x_m" } else { "x_m,z_m" });
+    text += ",height_m,is_reachable\n";
+    for (i, place) in truth.places.iter().enumerate() {
+        for coordinate in place {
+            text += &format!("{coordinate},");
+        }
+        let height = truth.heights_m[i].map_or(String::new(), |height| height.to_string());
+        text += &format!("{height},{}\n", u8::from(truth.is_reachable[i]));
+    }
+    text
+}
+
+/// Reads the file back.
+pub(super) fn read(path: &Path, zone: &Zone) -> Result<Truth, StoreError> {
+    let bad =
+        |line: usize, message: String| StoreError::BadRow { path: path.into(), line, message };
+    let text = fs::read_to_string(path).map_err(io_error(path))?;
+    let (mut places, mut heights_m, mut is_reachable) = (Vec::new(), Vec::new(), Vec::new());
+    for (i, record) in csv::Reader::from_reader(text.as_bytes()).records().enumerate() {
+        let record = record.map_err(|error| bad(i + 2, error.to_string()))?;
+        let number = |field: &str| {
+            let number = field.parse::<f64>().ok().filter(|number| number.is_finite());
+            number.ok_or_else(|| bad(i + 2, format!("\"{field}\" is not a number")))
+        };
+        let mut fields = record.iter();
+        let reachable = fields.next_back().map(number).transpose()? == Some(1.0);
+        let height =
+            fields.next_back().filter(|field| !field.is_empty()).map(number).transpose()?;
+        let place = fields.map(number).collect::<Result<Vec<f64>, _>>()?;
+        if place.len() != zone.dimension() {
+            return Err(bad(i + 2, format!("{} coordinates", place.len())));
+        }
+        places.push(place);
+        heights_m.push(height);
+        is_reachable.push(reachable);
+    }
+    Ok(Truth::new(zone, places, heights_m, is_reachable))
+}

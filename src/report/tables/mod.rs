@@ -1,0 +1,37 @@
+//! The tables of a run, on its page and in its folder: each measure a line or a column.
+
+pub mod claims;
+pub mod comparison;
+pub mod equal_error;
+pub mod summary;
+
+use crate::experiment::measure::Measure;
+use anyhow::Context;
+use serde::Serialize;
+use std::path::Path;
+
+/// A table of the page.
+pub struct Table {
+    /// Column heads.
+    pub header: Vec<String>,
+    /// Its lines, a cell for each head.
+    pub lines: Vec<Vec<String>>,
+}
+
+/// A measure with the unit it is shown in.
+fn titled(measure: &Measure) -> String {
+    match measure.unit.symbol {
+        "" => measure.title.into(),
+        unit => format!("{}, {unit}", measure.title),
+    }
+}
+
+/// Writes records as CSV, their fields as its header.
+fn write_csv<T: Serialize>(path: &Path, records: impl Iterator<Item = T>) -> anyhow::Result<()> {
+    let place = || path.display().to_string();
+    let mut writer = csv::Writer::from_path(path).with_context(place)?;
+    for record in records {
+        writer.serialize(record).with_context(place)?;
+    }
+    writer.flush().with_context(place)
+}

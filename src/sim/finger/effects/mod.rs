@@ -1,0 +1,81 @@
+//! The optional physics of the finger: a scene simulates what it names and pays for nothing else.
+//!
+//! An effect is a file here, which implements [`Effect`], and a line in the table below. Key and
+//! rules in the scene's file, presence in [`Effects`], memory during a trial, hook on the load,
+//! switch and row in a study of effects follow from that line.
+
+pub mod effect;
+pub mod electrodes;
+pub mod flex;
+pub mod fluid;
+pub mod friction;
+pub mod registration;
+pub mod skin;
+pub mod switch;
+mod table;
+pub mod thermal;
+pub mod timing;
+pub mod wrench;
+
+use super::counter::count;
+use super::load::Load;
+use crate::config::{Checked, Rules};
+use effect::{Effect, Needs, Step};
+use switch::Switch;
+
+// What an effect needs stands above it.
+table::effects! {
+    /// A soft skin; without it there is no load and no tactile frame.
+    skin: skin::SkinEffect,
+    /// A skin of finite elements instead of that one.
+    flex: flex::FlexEffect,
+    /// Liquid under the skin and its pressure; without it the finger is dry and its skin's
+    /// points do not know of each other.
+    fluid: fluid::FluidEffect,
+    /// The impedance electrodes.
+    electrodes: electrodes::ElectrodesEffect,
+    /// Heat.
+    thermal: thermal::ThermalEffect,
+    /// Tangential forces.
+    friction: friction::FrictionEffect,
+    /// The force/torque sensor behind the finger.
+    wrench: wrench::WrenchEffect,
+    /// Errors of the finger's and the object's place.
+    registration: registration::RegistrationEffect,
+    /// Skew and latency of the tactile frames, delay of commands.
+    timing: timing::TimingEffect,
+}
+
+impl Effects {
+    /// Whether there is a skin of either kind.
+    pub fn is_soft(&self) -> bool {
+        self.skin.is_some() || self.flex.is_some()
+    }
+
+    /// Whether what `needs` asks for is there.
+    fn supports(&self, needs: Needs) -> bool {
+        match needs {
+            Needs::Nothing => true,
+            Needs::Skin => self.is_soft(),
+            Needs::Frames => self.sends_frames(),
+        }
+    }
+
+    fn check_skins(&self, rules: &mut Rules) {
+        let one = self.skin.is_none() || self.flex.is_none();
+        rules.require("flex", "(given)", one, || "no [flex] beside a [skin]: one skin".into());
+    }
+}
+
+/// Why `name` may not be there; `filling` says of each effect whether it fills frames.
+fn missing(name: &str, needs: Needs, filling: &[(&str, bool)]) -> String {
+    match needs {
+        Needs::Frames => {
+            let fills = filling.iter().filter(|(_, fills)| *fills);
+            let keys: Vec<String> = fills.map(|(key, _)| format!("[{key}]")).collect();
+            let (last, others) = keys.split_last().map_or(("", &[][..]), |(l, o)| (l.as_str(), o));
+            format!("no [{name}] without {} or {last}", others.join(", "))
+        }
+        Needs::Nothing | Needs::Skin => format!("no [{name}] without a [skin]"),
+    }
+}

@@ -1,0 +1,107 @@
+//! What follows from the table of effects: settings, rules, switches, and a trial's memory.
+
+/// From one line for each effect, `name: Type` under its documentation, makes
+/// [`Effects`](crate::sim::finger::Effects) and `EffectStates`, and all that goes through every
+/// effect. Everything is resolved when it is compiled: an effect without a hook leaves no code.
+macro_rules! effects {
+    ($($(#[$doc:meta])* $name:ident: $Effect:ty,)*) => {
+        /// One optional table each; an absent one has no state and costs no work.
+        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct Effects {
+            $(
+                $(#[$doc])*
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub $name: Option<$Effect>,
+            )*
+        }
+
+        impl Effects {
+            /// Every effect with its defaults; of the two skins the cheap one.
+            pub fn all() -> Self {
+                Self { $($name: <$Effect>::complete(),)* }
+            }
+
+            /// Whether a tactile frame has anything in it.
+            pub fn sends_frames(&self) -> bool {
+                let fills = [$(<$Effect>::FILLS_FRAMES && self.$name.is_some(),)*];
+                self.is_soft() && fills.contains(&true)
+            }
+
+            /// Takes out every effect that means nothing without one that is not there.
+            pub fn drop_unsupported(&mut self) {
+                $(
+                    if !self.supports(<$Effect>::NEEDS) {
+                        self.$name = None;
+                    }
+                )*
+            }
+
+            /// Every switch, in the table's order.
+            pub fn switches() -> Vec<Switch<Self>> {
+                let mut all = Vec::new();
+                $(
+                    all.extend(<$Effect>::switches().into_iter().map(|switch| {
+                        let name = stringify!($name);
+                        switch.within(name, |all: &Self| &all.$name, |all| &mut all.$name)
+                    }));
+                )*
+                all
+            }
+        }
+
+        impl Checked for Effects {
+            fn check(&self, rules: &mut Rules) {
+                $(
+                    if let Some(effect) = &self.$name {
+                        rules.table(stringify!($name), effect);
+                    }
+                )*
+                self.check_skins(rules);
+                let filling = [$((stringify!($name), <$Effect>::FILLS_FRAMES),)*];
+                $(
+                    let fits = self.$name.is_none() || self.supports(<$Effect>::NEEDS);
+                    rules.require(stringify!($name), "(given)", fits, || {
+                        missing(stringify!($name), <$Effect>::NEEDS, &filling)
+                    });
+                )*
+            }
+        }
+
+        /// What the effects of one finger remember during one trial.
+        #[derive(Clone, Debug)]
+        pub struct EffectStates {
+            $(
+                $(#[$doc])*
+                pub $name: Option<<$Effect as Effect>::State>,
+            )*
+        }
+
+        impl EffectStates {
+            /// At the start of a trial.
+            pub fn new(effects: &Effects) -> Self {
+                Self { $($name: effects.$name.as_ref().map(Effect::start),)* }
+            }
+
+            /// Lets every effect that has something to do with it change the load, in the table's
+            /// order.
+            #[inline]
+            pub fn on_load(&mut self, effects: &Effects, step: &Step, load: &mut Load) {
+                $(
+                    if let Some(act) = <$Effect>::ON_LOAD
+                        && let (Some(effect), Some(state)) = (&effects.$name, &mut self.$name)
+                    {
+                        count(stringify!($name));
+                        act(effect, state, step, load);
+                    }
+                )*
+            }
+
+            /// Bytes held: what an effect that is off does not hold.
+            pub fn bytes(&self) -> usize {
+                [$(self.$name.as_ref().map_or(0, size_of_val),)*].iter().sum()
+            }
+        }
+    };
+}
+pub(super) use effects;

@@ -1,0 +1,154 @@
+//! What the table of effects promises.
+
+use palpate::math::seed;
+use palpate::robot::finger::TipMotion;
+use palpate::robot::finger::frame::FRAME_S;
+use palpate::sim::environment::Shape;
+use palpate::sim::finger::counter;
+use palpate::sim::finger::effects::switch::Switch;
+use palpate::sim::finger::{Effects, FingertipState};
+use palpate::sim::simulator::Simulator;
+use palpate::sim::{Environment, Scene};
+use palpate::study::effects::overhead::BareFinger;
+use palpate::study::effects::{switched, switches};
+use std::path::Path;
+use std::sync::Arc;
+
+fn scene(sets: &[&str]) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
+    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
+    Scene::load(&path, &sets).unwrap()
+}
+
+/// Every switch turns the other way and back, and changes nothing but itself and what means
+/// nothing without it.
+#[test]
+fn a_switch_is_what_it_says() {
+    let scene = scene(&["effects.timing={}"]);
+    for switch in switches() {
+        let other = switched(&scene, &switch);
+        assert_ne!(switch.is_on(&scene), switch.is_on(&other), "{}", switch.name);
+        assert!(Environment::build(other.clone()).is_ok(), "{}", switch.name);
+        let mut again = other.clone();
+        switch.set(&mut again, switch.is_on(&scene));
+        assert_eq!(switch.is_on(&scene), switch.is_on(&again), "{}", switch.name);
+        for beside in switches().iter().filter(|beside| !beside.name.contains(&switch.name)) {
+            let lost = beside.is_on(&scene) && !beside.is_on(&other);
+            let kept = switch.name.contains(&beside.name) || !lost;
+            let needed = switch.name == "skin" || beside.name.starts_with("timing");
+            assert!(kept || needed, "{} takes {} out", switch.name, beside.name);
+        }
+    }
+}
+
+/// Every key of the scene's `[effects]` can be switched, but for the second skin.
+#[test]
+fn every_effect_of_a_scene_has_its_switch() {
+    let mut effects = Effects::all();
+    effects.flex = Some(Default::default());
+    let keys = toml::Table::try_from(&effects).unwrap();
+    let switches = Effects::switches();
+    for key in keys.keys().filter(|key| *key != "flex") {
+        let whole = switches.iter().find(|switch| switch.name == *key).unwrap();
+        assert!(whole.is_on(&Effects::all()), "{key}");
+        let mut without = Effects::all();
+        whole.set(&mut without, false);
+        assert!(!toml::Table::try_from(&without).unwrap().contains_key(key), "{key}");
+    }
+    let wholes = switches.iter().filter(|switch| !switch.name.contains('.')).count();
+    assert_eq!(wholes + 1, keys.len());
+}
+
+/// What is dropped for want of what it needs is what a scene with it would be refused for.
+#[test]
+fn effects_without_what_they_need_are_refused_and_dropped() {
+    let accepted = |effects: &Effects| {
+        let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+        let with = Scene { effects: effects.clone(), ..scene(&["body=\"dynamic\""]) };
+        std::fs::write(file.path(), toml::to_string(&with).unwrap()).unwrap();
+        Scene::load(file.path(), &[])
+    };
+    let alone = |switch: &Switch<Effects>| {
+        let mut effects = Effects::default();
+        switch.set(&mut effects, true);
+        effects
+    };
+    for switch in Effects::switches() {
+        let orphan = alone(&switch);
+        let mut kept = orphan.clone();
+        kept.drop_unsupported();
+        let loaded = accepted(&orphan);
+        assert_eq!(loaded.is_ok(), kept == orphan, "{}: {loaded:?}", switch.name);
+        assert_eq!(switch.name == "skin", kept == orphan, "{}", switch.name);
+        let key = switch.name.split('.').next().unwrap();
+        let names_it = |error: String| error.contains(&format!("no [{key}] without"));
+        assert!(loaded.err().is_none_or(|error| names_it(error.to_string())), "{}", switch.name);
+    }
+}
+
+/// Effects that a skin alone can be given, and whose state is the fingertip's.
+const BESIDE_SKIN: [&str; 5] = ["fluid", "fluid.vibration", "electrodes", "thermal", "friction"];
+
+#[test]
+fn an_effect_that_is_off_has_no_state_and_does_no_work() {
+    let dry = scene(&["effects={skin={}}"]);
+    let bytes = |scene: &Scene| {
+        let environment = Environment::build(scene.clone()).unwrap();
+        let rng = seed::stream(0, 0, "test");
+        FingertipState::new(environment.fingertip().unwrap(), &rng).bytes()
+    };
+    let touched = |scene: &Scene| {
+        let environment = Arc::new(Environment::build(scene.clone()).unwrap());
+        let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(0).unwrap();
+        probe.touch(&environment.task().approach(&[0.0, 0.5])).unwrap();
+    };
+    let worked = |scene: &Scene, effect: &str| {
+        let before = counter::count_of(effect).unwrap();
+        touched(scene);
+        counter::count_of(effect).unwrap() - before
+    };
+    let all = counter::total().unwrap();
+    let skin = worked(&dry, "skin");
+    assert!(skin > 0);
+    assert_eq!(counter::total().unwrap() - all, skin, "something else did work too");
+    for switch in switches().iter().filter(|switch| BESIDE_SKIN.contains(&&switch.name[..])) {
+        let with = switched(&dry, switch);
+        assert!(switch.is_on(&with), "{}", switch.name);
+        assert!(bytes(&with) > bytes(&dry), "{}", switch.name);
+        assert!(worked(&with, &switch.name) > 0, "{}", switch.name);
+        assert_eq!(switched(&with, switch).effects.skin, dry.effects.skin);
+    }
+}
+
+/// The twin that times are compared with does what the finger does with all else switched off: the
+/// same loads to the bit and the same frames, so that comparing their times compares nothing else.
+#[test]
+fn the_bare_twin_feels_what_the_finger_feels() {
+    let scene = scene(&["effects={skin={}, fluid={}}"]);
+    let environment = Environment::build(scene.clone()).unwrap();
+    let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip().unwrap(), environment.shape())
+    else {
+        panic!()
+    };
+    let rng = seed::stream(0, 0, "test");
+    let fluid = scene.effects.fluid.unwrap();
+    let mut twin = BareFinger::new(tip.skin().unwrap(), fluid, &rng);
+    let mut finger = FingertipState::new(tip, &rng);
+    let mut x_wt = environment.chain().unwrap().forward(&environment.chain().unwrap().home);
+    let mut pressed = 0;
+    for _ in 0..300 {
+        x_wt.translation.y -= 1e-4;
+        let motion = TipMotion::at(x_wt);
+        let load = finger.step(tip, bvh, &motion, FRAME_S).unwrap();
+        assert_eq!(twin.press(bvh, &motion).unwrap(), load);
+        let (own, frame) = (twin.frame(&load), finger.frame().unwrap());
+        assert!((own.time_s - frame.time_s).abs() < 1e-9, "{} {}", own.time_s, frame.time_s);
+        assert_eq!(own.pdc_counts, frame.pdc_counts);
+        assert_eq!((frame.electrode_counts, frame.pac_counts), (None, None));
+        pressed += i32::from(load.force_n.norm() > 0.0);
+        if load.force_n.norm() > 5.0 {
+            break;
+        }
+    }
+    assert!(pressed > 3);
+}
