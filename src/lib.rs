@@ -19,7 +19,6 @@
 //! robot's base, z up; the finger moves along -y to touch. Frame `T` is the fingertip: origin
 //! at the centre of its hemisphere, +x distal, -z out of the pad. `p_WC` names the point C in
 //! frame W, `X_WT` the pose of T in W; in code they are written `p_wc` and `x_wt`.
-#![warn(missing_docs)]
 
 pub mod backend;
 pub mod cli;

@@ -1,5 +1,6 @@
 //! What values may be: written once, used for the check and for the message.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::RangeInclusive;
 
@@ -11,12 +12,29 @@ pub(super) type Violation = (String, String, String);
 pub struct Rules {
     prefix: String,
     pub(super) violation: Option<Violation>,
+    /// What is allowed under each key, if that is asked for.
+    record: Option<BTreeMap<String, String>>,
 }
 
 impl Rules {
+    /// What is allowed under each key of `checked`, as messages say it: ranges and names, not what
+    /// one key demands of another.
+    pub fn of(checked: &impl Checked) -> BTreeMap<String, String> {
+        let mut rules = Self { record: Some(BTreeMap::new()), ..Self::default() };
+        checked.check(&mut rules);
+        rules.record.unwrap_or_default()
+    }
+
+    fn note(&mut self, key: &str, allowed: impl FnOnce() -> String) {
+        if let Some(record) = &mut self.record {
+            record.insert(format!("{}{key}", self.prefix), allowed());
+        }
+    }
+
     /// `key` must be a number in `allowed`; NaN never is.
     pub fn number(&mut self, key: &str, value: f64, allowed: RangeInclusive<f64>) {
         let described = || format!("{} to {}", allowed.start(), allowed.end());
+        self.note(key, described);
         self.require(key, value, allowed.contains(&value), described);
     }
 
@@ -37,6 +55,7 @@ impl Rules {
 
     /// `key` must be one of `names`.
     pub fn one_of(&mut self, key: &str, value: &str, names: &[&str]) {
+        self.note(key, || names.join(", "));
         let known = names.contains(&value);
         self.require(key, format!("\"{value}\""), known, || format!("one of {}", names.join(", ")));
     }

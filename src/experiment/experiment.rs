@@ -11,11 +11,12 @@ use crate::explore::belief::GpSettings;
 use crate::explore::planner;
 use crate::explore::planner::PlanningSettings;
 use crate::sim::Scene;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// An experiment with everything that decides its results, and how they are shown.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// Names its run folder and its page.

@@ -1,10 +1,11 @@
 //! How near a belief is to the true surface.
 
 use crate::math::normal::BAND_95;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Agreement of a belief with the truth on the grid.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Metrics {
     /// Eq. 5 of Yi et al. 2016: Σ f·f̂ / sqrt(Σ f² · Σ f̂²). Not centred: a constant scores
     /// high wherever the heights' mean outweighs their spread.

@@ -3,10 +3,11 @@
 use super::measure::MEASURES;
 use crate::config::{Checked, Rules};
 use crate::explore::planner;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What the report shows.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReportSettings {
     /// Touch counts after which beliefs are drawn, those that occur; none: a third, two thirds
@@ -31,7 +32,7 @@ pub struct ReportSettings {
 }
 
 /// What a publication says of an experiment.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Claim {
     /// Where: its figure or section.

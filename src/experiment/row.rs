@@ -3,10 +3,11 @@
 use super::metrics::Metrics;
 use crate::explore::planner::Stall;
 use crate::gp::fit::Fit;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One trial of one planner. Holds no wall time, so that it is the same bytes on every run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TrialRow {
     /// Which trial; trials of the same number share initial touches.
     pub trial: u32,
@@ -20,7 +21,7 @@ pub struct TrialRow {
 }
 
 /// One touch and the belief after it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TouchRow {
     /// Where the finger was sent: (x) or (x, z) in `W`.
     pub target: Vec<f64>,

@@ -11,10 +11,11 @@ use crate::gp::posterior::{Posterior, Scratch};
 use crate::gp::{LogNormal, Mean, Observation, Observations, Range, SearchBox, Slope};
 use crate::task::Zone;
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How the Gaussian process is fitted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GpSettings {
     /// Name of the kernel.
@@ -42,7 +43,7 @@ pub struct GpSettings {
 }
 
 /// Log-normal priors, in the units of the ranges; left out, every value is as probable.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Priors {
     /// Of each length scale.

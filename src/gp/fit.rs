@@ -5,10 +5,11 @@ use super::observations::Observations;
 use super::search::{Peak, Search};
 use super::search_box::SearchBox;
 use crate::math::optimize::Stop;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What a fit found.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fit {
     /// The most probable hyperparameters.
     #[serde(flatten)]

@@ -2,10 +2,11 @@
 
 use super::dense::Dense;
 use super::observations::Observations;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How the prior mean is chosen in a fit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Mean {
     /// 0, as in Yi et al. 2016.

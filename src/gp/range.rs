@@ -1,5 +1,6 @@
 //! What a hyperparameter may be, and what it probably is.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Bounds of a positive hyperparameter and, if something is known of it, its prior.
@@ -21,7 +22,7 @@ impl From<(f64, f64)> for Range {
 
 /// A log-normal prior: ln x is normal about ln `median`, and two thirds of x lie within a factor
 /// `spread` of it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LogNormal {
     /// Half of the values are smaller.

@@ -1,5 +1,6 @@
 //! Maximisation in a box: DIRECT finds the hill, L-BFGS climbs it (NLopt).
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Whether this build has optimisers (feature `nlopt`). Without them [`direct`] and [`lbfgs`]
@@ -7,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub const BUILT: bool = cfg!(feature = "nlopt");
 
 /// Why an optimiser returned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
     /// The value or the argument no longer changed.

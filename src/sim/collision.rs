@@ -1,10 +1,11 @@
 //! As what the object is met by a finger without skin, which MuJoCo lets collide.
 
 use crate::config::{Checked, Rules};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A geometry of the object, of those that MuJoCo knows; `docs/dynamic.md` says how exact each is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Collision {
     /// A height field over the zone, from rays along −y onto the mesh.
@@ -28,7 +29,7 @@ impl Collision {
 }
 
 /// Table `[solver.sdf]`: contact with a signed distance field is searched by gradient descent.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sdf {
     /// Most iterations of one descent.

@@ -1,10 +1,11 @@
 //! Analytic one-dimensional surfaces that are touched without a finger.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// A surface y = f(x).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Function {
     /// Eq. 4 of Yi et al. 2016: sin(ωx) + 1 for |x| ≤ 1, and 1 beyond, with ω = 4π.

@@ -11,11 +11,12 @@ use crate::sim::finger::profile::Profile;
 use crate::task::touch::TouchSettings;
 use crate::task::zone::Zone;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// A scene means one thing: everything that decides what a touch returns stands in it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// What carries out a touch.
@@ -54,7 +55,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 }
 
 /// How faithfully a touch is carried out, cheapest first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Body {
     /// An analytic surface is read where it is asked.
@@ -80,7 +81,7 @@ impl Body {
 }
 
 /// A mesh and where it stands.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Object {
     /// Its file: .obj, .gltf or .glb, relative to the scene's file.
@@ -108,7 +109,7 @@ fn one() -> f64 {
 }
 
 /// Unit of a mesh file's numbers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, JsonSchema)]
 pub enum Unit {
     /// Metres, as glTF prescribes.
     #[default]

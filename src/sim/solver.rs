@@ -2,6 +2,7 @@
 
 use super::collision::{Collision, Sdf};
 use crate::config::{Checked, Rules};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Longest step: the servos' gains are chosen for it (`models/pa10/SOURCE.md`).
@@ -17,7 +18,7 @@ const LONGEST_EXPLICIT_STEP_S: f64 = 0.001;
 const ROUNDING: f64 = 1e-6;
 
 /// Table `[solver]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SolverSettings {
     /// Time step; a control period is one or several. The force of the skin is that of the step's
@@ -47,7 +48,7 @@ impl Default for SolverSettings {
 
 /// MuJoCo's integrators that step rigid bodies. All are of first order here, whatever their own
 /// order: skin and servo integral are held through a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Integrator {
     /// Implicit in the joints' velocities but for Coriolis and centripetal forces.

@@ -4,10 +4,11 @@
 use crate::config::{Checked, Rules};
 use crate::robot::finger::contact_point::Detection;
 use crate::robot::finger::frame::FRAME_S;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Table `[touch]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TouchSettings {
     /// Duration of one control tick; left out, that of the body:
@@ -40,7 +41,7 @@ pub struct TouchSettings {
 }
 
 /// Which estimate from the electrodes counts as the point of contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ContactEstimate {
     /// The centroid of Eq. 1, projected onto the skin.

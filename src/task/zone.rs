@@ -2,6 +2,7 @@
 
 use crate::config::{Checked, Rules};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// An interval of x, or a rectangle of (x, z), in the frame `Z` of the zone; heights are y above a
@@ -10,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// `Z` stands at [`position_m`](Self::position_m) in `W`, turned by
 /// [`rotation_deg`](Self::rotation_deg). Left out, it is `W`: the object is then explored along −y of
 /// the robot's base. A zone turned by −90° about z explores its side towards +x.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Zone {
     /// Smallest and largest x.

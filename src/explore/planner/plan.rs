@@ -5,6 +5,7 @@ use crate::explore::belief::Belief;
 use crate::task::Zone;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A planner's choice.
@@ -21,7 +22,7 @@ pub struct Plan {
 
 /// Why a planner's own rule could not decide; the target is then random, because any fixed
 /// pattern may be just the one the surface hides behind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Stall {
     /// The belief is sure of the best place: that it is the best one is rounding.

@@ -1,10 +1,11 @@
 //! What the planners' rules depend on.
 
 use crate::config::{Checked, Rules};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How planners search, and the settings of single ones under their names.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlanningSettings {
     /// Evaluations of the acquisition function that DIRECT may spend on one plan.
@@ -42,7 +43,7 @@ impl Default for PlanningSettings {
 }
 
 /// Settings of `integrated_variance`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct IntegratedVarianceSettings {
     /// Places over which the variance is summed.
@@ -57,7 +58,7 @@ impl Default for IntegratedVarianceSettings {
 }
 
 /// Settings of `slope`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SlopeSettings {
     /// Weight of the slope; at 0 the planner is `active`.
@@ -72,7 +73,7 @@ impl Default for SlopeSettings {
 }
 
 /// Settings of `travel`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TravelSettings {
     /// Touches planned together; with 1 the planner is `active`.
@@ -88,7 +89,7 @@ impl Default for TravelSettings {
 }
 
 /// Settings of `ucb`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct UcbSettings {
     /// Standard deviations κ above the mean.
@@ -103,7 +104,7 @@ impl Default for UcbSettings {
 }
 
 /// Settings of `pi` and `ei`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImprovementSettings {
     /// What a place must exceed the highest contact by, in standard deviations of the signal.

@@ -9,6 +9,7 @@ pub use radial::{Kernel, Radial};
 pub use squared_exponential::SquaredExponential;
 
 use super::observations::NoiseRatio;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Every kernel by name; one line adds one.
@@ -24,7 +25,7 @@ pub fn by_name(name: &str) -> Option<&'static dyn Kernel> {
 }
 
 /// What a fit chooses: k(a, b) = signal_sd² · c(r²(a, b)) + noise_sd² · [a is b].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Hyperparameters {
     /// Standard deviation of the surface around its mean, in the unit of the heights.
     pub signal_sd: f64,

@@ -2,10 +2,11 @@
 
 use super::chain::{Joint, Kind};
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Link lengths. The manufacturer built two generations; `models/pa10/SOURCE.md` compares them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Links {
     /// PA-10-7C, flange at 1.317 m (mlogoth/PA10, `pa10_csl.urdf.xacro`).
     #[default]

@@ -4,11 +4,12 @@ use super::chain::{Chain, Joints};
 use super::pa10::Links;
 use crate::config::{Checked, Rules};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
 /// A PA-10 with the finger along its flange's axis.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmSettings {
     /// Link lengths: `"C"` or `"A"`.

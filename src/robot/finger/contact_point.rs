@@ -5,6 +5,7 @@ use super::frame::FULL_SCALE_COUNTS;
 use super::frame::{ELECTRODES, Frame};
 use crate::config::{Checked, Rules};
 use nalgebra::{Point3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Radius of the cylinder and sphere that stand for the skin (tams_biotac).
@@ -80,7 +81,7 @@ pub fn locate(tare: &Tare, frame: &Frame) -> Option<PointOfContact> {
 }
 
 /// When a rise of fluid pressure counts as contact.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Detection {
     /// Rise of PDC above its tare.

@@ -2,10 +2,11 @@
 
 use crate::config::{Checked, Rules};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Shape and attitude of the finger.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Finger {
     /// Radius of cylinder and hemisphere.

@@ -8,6 +8,7 @@ use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use crate::sim::finger::noise::normal;
 use crate::sim::finger::samples::SkinSample;
 use rand::Rng;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The resistor an electrode divides its voltage with (SynTouch BioTac SP manual, §5.1).
@@ -21,7 +22,7 @@ const FILM: f64 = 1.0 / 40.0;
 const REACH: f64 = 3.0;
 
 /// Table `[electrodes]`: 19 impedances through the fluid.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ElectrodesEffect {
     /// What E1 to E19 read untouched.

@@ -3,11 +3,12 @@
 use super::effect::{Effect, Needs};
 use super::switch::Switch;
 use crate::config::{Checked, Rules};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Table `[flex]`: the skin as a shell of triangles over the pad, clamped along the nail and
 /// behind, instead of the columns of `[skin]`; the expensive reference.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FlexEffect {
     /// Cells along the finger, half of them over the cylinder and half over the tip's arc.

@@ -6,6 +6,7 @@ use crate::config::{Checked, Rules};
 use crate::robot::finger::frame::FULL_SCALE_COUNTS;
 use crate::sim::finger::noise::normal;
 use rand::Rng;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -16,7 +17,7 @@ const PDC_PA: f64 = 36.5;
 const PAC_PA: f64 = 0.37;
 
 /// Table `[fluid]`: the liquid under the skin and the sensor of its pressure.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FluidEffect {
     /// Pressure per volume the fluid is compressed by, in Pa/m³.
@@ -83,7 +84,7 @@ impl Effect for FluidEffect {
 }
 
 /// Table `[fluid.vibration]`: the amplified, band-passed pressure at 2.2 kHz.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct VibrationEffect {
     /// PAC at rest.

@@ -4,10 +4,11 @@ use super::effect::{Effect, OnLoad};
 use crate::config::{Checked, Rules};
 use crate::sim::finger::load::Load;
 use nalgebra::{Isometry3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Table `[friction]`: tangential force of the skin.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FrictionEffect {
     /// Coulomb's coefficient.

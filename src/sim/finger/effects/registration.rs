@@ -5,11 +5,12 @@ use crate::config::{Checked, Rules};
 use crate::sim::finger::noise::normal;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::Rng;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Table `[registration]`: errors that stay through a trial, drawn anew for each. Forward
 /// kinematics and the truth know nothing of them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegistrationEffect {
     /// Standard deviation of the fingertip's place on its mount, along each axis.

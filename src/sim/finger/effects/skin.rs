@@ -11,6 +11,7 @@ use crate::sim::finger::load::{Load, PressError};
 use crate::sim::finger::profile::Profile;
 use crate::sim::finger::samples::{SkinSample, spread};
 use nalgebra::{Isometry3, Point3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -31,7 +32,7 @@ const SECTORS: usize = 8;
 const INNER: f64 = 0.5;
 
 /// Table `[skin]`: an elastic foundation over the exact mesh.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SkinEffect {
     /// Points of the skin.

@@ -6,7 +6,7 @@
 macro_rules! effects {
     ($($(#[$doc:meta])* $name:ident: $Effect:ty,)*) => {
         /// One optional table each; an absent one has no state and costs no work.
-        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct Effects {
             $(

@@ -5,6 +5,7 @@ use crate::config::{Checked, Rules};
 use crate::robot::finger::frame::FULL_SCALE_COUNTS;
 use crate::sim::finger::noise::normal;
 use rand::Rng;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -15,7 +16,7 @@ const TAC_C_S: f64 = 1e-3;
 const TAC_HZ: f64 = 0.45;
 
 /// Table `[thermal]`: a warm finger that a cold object cools.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ThermalEffect {
     /// The fluid's temperature when a trial starts.

@@ -5,6 +5,7 @@ use super::switch::Switch;
 use crate::backend::delay::DELAY_MAX_S;
 use crate::config::{Checked, Rules};
 use crate::robot::finger::frame::ELECTRODES;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A delay of commands that is more than a control tick of any body (chosen).
@@ -13,7 +14,7 @@ const LONG_DELAY_S: f64 = 0.02;
 /// Table `[timing]`: channels are sampled one after the other, frames arrive in batches, commands
 /// late. Without it a frame is sampled at once, every 10 ms, and arrives then, and a command holds
 /// from the tick on in which it is given.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TimingEffect {
     /// Frames that arrive together, when the last of them is complete.

@@ -6,11 +6,12 @@ use crate::sim::finger::counter::count;
 use crate::sim::finger::noise::normal;
 use nalgebra::Vector6;
 use rand_chacha::ChaCha8Rng;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Table `[wrench]`: what a force/torque sensor makes of the load on it, in its own frame: z along
 /// the finger, distal. Without it a body has no such sensor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WrenchEffect {
     /// Standard deviation of each reading: forces along x, y, z.
