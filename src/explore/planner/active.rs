@@ -1,6 +1,8 @@
 //! Algorithm 1 of Yi et al. 2016: touch where the belief's standard deviation is largest.
 
-use super::{Belief, Entry, Plan, Planner, Search};
+use super::plan::{Entry, Plan, Planner};
+use super::search::Search;
+use crate::explore::belief::Belief;
 use crate::gp::posterior::Scratch;
 
 pub(super) const ENTRY: Entry = Entry {

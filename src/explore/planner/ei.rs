@@ -1,6 +1,9 @@
 //! Seek the highest point by the expected improvement (Mockus et al. 1978).
 
-use super::{Belief, Entry, Plan, Planner, Search, improvement};
+use super::improvement;
+use super::plan::{Entry, Plan, Planner};
+use super::search::Search;
+use crate::explore::belief::Belief;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "ei",

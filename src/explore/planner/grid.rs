@@ -5,7 +5,8 @@
 //! a trial may end at any touch. Each axis sees few distinct coordinates: a surface whose period
 //! the lattice shares is not seen until a finer level.
 
-use super::{Belief, Entry, Plan, Planner};
+use super::plan::{Entry, Plan, Planner};
+use crate::explore::belief::Belief;
 use crate::task::Zone;
 
 pub(super) const ENTRY: Entry = Entry {

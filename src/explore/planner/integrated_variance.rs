@@ -1,7 +1,10 @@
 //! Touch where the variance of the whole surface falls most: the active learning of Cohn (1996),
 //! also called integrated variance reduction.
 
-use super::{Belief, Entry, Plan, Planner, Search, sobol};
+use super::plan::{Entry, Plan, Planner};
+use super::search::Search;
+use super::sobol;
+use crate::explore::belief::Belief;
 use crate::gp::reduction::Reduction;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -3,7 +3,10 @@
 //! Φ(z) grows with z = (μ − best − margin) / σ, and z itself still tells places apart where Φ is
 //! 0 in floating point; so z is maximised.
 
-use super::{Belief, Entry, Plan, Planner, Search, improvement};
+use super::improvement;
+use super::plan::{Entry, Plan, Planner};
+use super::search::Search;
+use crate::explore::belief::Belief;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "pi",

@@ -1,6 +1,8 @@
 //! Uniformly random targets: the paper's baseline.
 
-use super::{Belief, Entry, Plan, Planner, PlanningSettings, uniform};
+use super::plan::{Entry, Plan, Planner, uniform};
+use super::settings::PlanningSettings;
+use crate::explore::belief::Belief;
 use crate::task::Zone;
 use rand_chacha::ChaCha8Rng;
 

@@ -1,6 +1,8 @@
 //! Where an acquisition function is largest: DIRECT finds its hills, L-BFGS climbs them.
 
-use super::{Belief, Plan, PlanningSettings, Stall, uniform};
+use super::plan::{Plan, Stall, uniform};
+use super::settings::PlanningSettings;
+use crate::explore::belief::Belief;
 use crate::gp::posterior::Scratch;
 use crate::math::optimize;
 use crate::math::optimize::Bounds;

@@ -2,7 +2,10 @@
 //!
 //! α(x) = σ(x)·(1 + w·|∇μ(x)| / mean|∇μ|), the mean taken over the zone.
 
-use super::{Belief, Entry, Plan, Planner, Search, sobol};
+use super::plan::{Entry, Plan, Planner};
+use super::search::Search;
+use super::sobol;
+use crate::explore::belief::Belief;
 use crate::gp::Posterior;
 use crate::gp::posterior::Scratch;
 

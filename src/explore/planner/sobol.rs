@@ -1,6 +1,8 @@
 //! A scrambled Sobol sequence: evenly spread targets without any model.
 
-use super::{Belief, Entry, Plan, Planner, PlanningSettings};
+use super::plan::{Entry, Plan, Planner};
+use super::settings::PlanningSettings;
+use crate::explore::belief::Belief;
 use crate::task::Zone;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

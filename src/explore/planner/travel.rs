@@ -6,7 +6,9 @@
 //! them; then the next tour is planned with what was learnt. Every tour has the place where σ is
 //! largest, so that none is put off for ever.
 
-use super::{Belief, Entry, Plan, Planner, Search};
+use super::plan::{Entry, Plan, Planner};
+use super::search::Search;
+use crate::explore::belief::Belief;
 use crate::gp::posterior::Scratch;
 
 pub(super) const ENTRY: Entry = Entry {

@@ -1,6 +1,8 @@
 //! Seek the highest point by its upper confidence bound (Srinivas et al. 2010): μ + κ·σ.
 
-use super::{Belief, Entry, Plan, Planner, Search};
+use super::plan::{Entry, Plan, Planner};
+use super::search::Search;
+use crate::explore::belief::Belief;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "ucb",
