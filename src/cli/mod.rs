@@ -6,6 +6,7 @@ mod effects;
 mod export;
 mod fidelity;
 mod progress;
+mod reference;
 mod report;
 mod run;
 mod scan;
@@ -17,6 +18,8 @@ use crate::experiment::{Experiment, Simulation};
 use crate::explore::planner::PLANNERS;
 use crate::sim::Environment;
 use crate::sim::simulator::Simulator;
+pub use reference::reference;
+
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -65,6 +68,8 @@ enum Command {
     Effects(effects::Args),
     /// Run hard cases at rising severity until they break.
     Stress(stress::Args),
+    /// Print every command, setting and column as Markdown.
+    Reference(reference::Args),
     /// Fit the finger's constants to recordings of it on a flat plate.
     Calibrate(calibrate::Args),
 }
@@ -98,6 +103,7 @@ pub fn main() -> ExitCode {
         Command::Effects(args) => effects::run(&args),
         Command::Stress(args) => stress::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::Reference(args) => reference::run(&args),
     };
     match outcome {
         Ok(Ending::Done) => ExitCode::SUCCESS,

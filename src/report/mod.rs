@@ -11,6 +11,7 @@ pub mod page;
 pub mod pareto;
 pub mod png;
 pub mod points;
+pub mod reference;
 pub mod relief;
 pub mod relief_panel;
 pub mod replay;

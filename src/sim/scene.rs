@@ -109,7 +109,9 @@ fn one() -> f64 {
 }
 
 /// Unit of a mesh file's numbers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, JsonSchema,
+)]
 pub enum Unit {
     /// Metres, as glTF prescribes.
     #[default]

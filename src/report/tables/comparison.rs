@@ -5,6 +5,7 @@ use crate::experiment::comparison::Comparison;
 use crate::experiment::measure::{Direction, MEASURES, Measure};
 use crate::experiment::store::Run;
 use crate::report::number::{digits, with_interval};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::Path;
 
@@ -56,16 +57,24 @@ pub fn note(run: &Run) -> String {
 }
 
 /// A record of `comparison.csv`.
-#[derive(Serialize)]
-struct ComparisonRecord<'a> {
-    planner: &'a str,
-    baseline: &'a str,
-    measure: &'a str,
-    trials: usize,
-    difference: f64,
-    difference_low: Option<f64>,
-    difference_high: Option<f64>,
-    won: f64,
+#[derive(Serialize, JsonSchema)]
+pub struct ComparisonRecord<'a> {
+    /// Which planner.
+    pub planner: &'a str,
+    /// Against which.
+    pub baseline: &'a str,
+    /// In which measure.
+    pub measure: &'a str,
+    /// Trials that both finished.
+    pub trials: usize,
+    /// Mean of the planner's value minus the baseline's, in the same trial.
+    pub difference: f64,
+    /// Lower end of its 95 % bootstrap interval.
+    pub difference_low: Option<f64>,
+    /// Upper end.
+    pub difference_high: Option<f64>,
+    /// Share of the trials in which the planner is better; a tie is half.
+    pub won: f64,
 }
 
 /// Writes `comparison.csv`: a line per planner, baseline and measure after the last touch.

@@ -4,6 +4,7 @@ use super::{Table, write_csv};
 use crate::experiment::equal_error::{EqualError, Estimate, errors};
 use crate::experiment::store::Run;
 use crate::report::number::{digits, with_interval};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::Path;
 
@@ -58,23 +59,38 @@ pub fn note(run: &Run) -> String {
 }
 
 /// A record of `equal_error.csv`; a count or ratio is left out where the error is not reached.
-#[derive(Serialize)]
-struct EqualErrorRecord<'a> {
-    planner: &'a str,
-    baseline: &'a str,
-    measure: &'a str,
-    trials: usize,
-    goal: f64,
-    baseline_touches: Option<f64>,
-    touches: Option<f64>,
-    touches_low: Option<f64>,
-    touches_high: Option<f64>,
-    ratio: Option<f64>,
-    ratio_low: Option<f64>,
-    ratio_high: Option<f64>,
-    path_ratio: Option<f64>,
-    path_ratio_low: Option<f64>,
-    path_ratio_high: Option<f64>,
+#[derive(Serialize, JsonSchema)]
+pub struct EqualErrorRecord<'a> {
+    /// Which planner.
+    pub planner: &'a str,
+    /// Whose error is the goal.
+    pub baseline: &'a str,
+    /// Which error.
+    pub measure: &'a str,
+    /// Trials that both finished.
+    pub trials: usize,
+    /// The baseline's median error after the goal's touches.
+    pub goal: f64,
+    /// Touches until the baseline itself has met it; empty: never.
+    pub baseline_touches: Option<f64>,
+    /// Touches until the planner has.
+    pub touches: Option<f64>,
+    /// Lower end of its 95 % bootstrap interval.
+    pub touches_low: Option<f64>,
+    /// Upper end.
+    pub touches_high: Option<f64>,
+    /// The planner's touches over the baseline's.
+    pub ratio: Option<f64>,
+    /// Lower end.
+    pub ratio_low: Option<f64>,
+    /// Upper end.
+    pub ratio_high: Option<f64>,
+    /// The planner's lateral way after the initial touches over the baseline's.
+    pub path_ratio: Option<f64>,
+    /// Lower end.
+    pub path_ratio_low: Option<f64>,
+    /// Upper end.
+    pub path_ratio_high: Option<f64>,
 }
 
 /// Writes `equal_error.csv`: a line per planner, baseline and error.

@@ -1,0 +1,241 @@
+//! The reference of settings and files, drawn from the types that read and write them.
+
+use crate::config::Rules;
+use crate::experiment::Experiment;
+use crate::experiment::measure::{Direction, MEASURES};
+use crate::experiment::row::TrialRow;
+use crate::sim::finger::Effects;
+use schemars::{JsonSchema, schema_for};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// An experiment with every table there is: what is allowed in it follows from its own rules.
+const COMPLETE: &str = r#"
+name = "reference"
+planners = ["active"]
+trials = 1
+initial_touches = 1
+touches = 1
+grid = 2
+[gp]
+noise_sd_m = 1e-3
+[gp.prior]
+length_scale = { median = 1, spread = 2 }
+noise = { median = 1, spread = 2 }
+signal = { median = 1, spread = 2 }
+[[report.claims]]
+place = ""
+says = ""
+touches = 1
+measures = ["r"]
+[scene]
+body = "dynamic"
+[scene.zone]
+x_m = [0, 1]
+z_m = [0, 1]
+depth_m = [0, 1]
+[scene.object]
+mesh = "object.glb"
+truth = "bird"
+[scene.touch]
+period_s = 0.01
+[scene.arm]
+"#;
+
+/// One setting of an experiment's file.
+struct Setting {
+    key: String,
+    kind: String,
+    /// As the file would say it; none where it must be given or is left out.
+    default: Option<String>,
+    allowed: Option<String>,
+    words: String,
+}
+
+/// Every setting of an experiment, table by table, as Markdown.
+pub fn settings() -> String {
+    let schema = schema_for!(Experiment).to_value();
+    let mut walk = Walk { root: &schema, allowed: allowed(), found: Vec::new() };
+    walk.table("", &schema);
+    let mut text = String::new();
+    let mut table = None;
+    for setting in &walk.found {
+        let here = setting.key.rsplit_once('.').map_or("", |(table, _)| table);
+        if table != Some(here) {
+            let title = if here.is_empty() { "the experiment".into() } else { format!("`{here}`") };
+            text += &format!(
+                "\n### {title}\n\n| key | type | default | allowed | what |\n|---|---|---|---|---|\n"
+            );
+            table = Some(here);
+        }
+        let Setting { key, kind, default, allowed, words } = setting;
+        let code =
+            |text: &Option<String>| text.as_ref().map_or(String::new(), |t| format!("`{t}`"));
+        let allowed = allowed.clone().unwrap_or_default();
+        text +=
+            &format!("| `{key}` | {kind} | {} | {allowed} | {} |\n", code(default), cell(words));
+    }
+    text
+}
+
+fn allowed() -> BTreeMap<String, String> {
+    let Ok(mut complete) = toml::from_str::<Experiment>(COMPLETE) else { return BTreeMap::new() };
+    complete.scene.effects = Effects::all();
+    let rules = Rules::of(&complete).into_iter();
+    // What holds for every entry is said of the whole.
+    rules.map(|(key, allowed)| (whole(&key), allowed)).collect()
+}
+
+/// `key` without the numbers of its entries.
+fn whole(key: &str) -> String {
+    let parts = key.split('[').map(|part| part.split_once(']').map_or(part, |(_, rest)| rest));
+    parts.collect()
+}
+
+/// Goes through a schema, table by table.
+struct Walk<'a> {
+    root: &'a Value,
+    allowed: BTreeMap<String, String>,
+    found: Vec<Setting>,
+}
+
+impl<'a> Walk<'a> {
+    fn table(&mut self, prefix: &str, schema: &'a Value) {
+        let Some(properties) = schema["properties"].as_object() else { return };
+        let mut tables = Vec::new();
+        for (name, property) in properties {
+            let key = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
+            let inner = self.resolved(property);
+            let entries = self.resolved(&inner["items"]);
+            if inner["properties"].is_object() {
+                tables.push((key, inner));
+                continue;
+            }
+            if entries["properties"].is_object() {
+                tables.push((key, entries));
+                continue;
+            }
+            let is_required = schema["required"]
+                .as_array()
+                .is_some_and(|names| names.iter().any(|known| known == name));
+            let default = &property["default"];
+            self.found.push(Setting {
+                kind: kind(inner, entries),
+                default: (!is_required && !default.is_null()).then(|| default.to_string()),
+                allowed: self.allowed.get(&key).cloned().or_else(|| names(inner)),
+                words: words(property, inner),
+                key,
+            });
+        }
+        for (key, inner) in tables {
+            self.table(&key, inner);
+        }
+    }
+
+    /// What a reference, or a value that may be left out, stands for.
+    fn resolved(&self, schema: &'a Value) -> &'a Value {
+        let options = schema["anyOf"].as_array().or(schema["allOf"].as_array());
+        let inner = options.and_then(|all| all.iter().find(|one| one["type"] != "null"));
+        let schema = inner.unwrap_or(schema);
+        match schema["$ref"].as_str().and_then(|path| path.strip_prefix("#/")) {
+            Some(path) => path.split('/').fold(self.root, |at, name| &at[name]),
+            None => schema,
+        }
+    }
+}
+
+fn kind(schema: &Value, entries: &Value) -> String {
+    let plain = |schema: &Value| match &schema["type"] {
+        Value::String(name) => name.clone(),
+        Value::Array(names) => {
+            let name = names.iter().filter_map(Value::as_str).find(|name| *name != "null");
+            name.unwrap_or_default().into()
+        }
+        _ => "string".into(),
+    };
+    match plain(schema).as_str() {
+        "array" => {
+            let count = schema["maxItems"].as_u64().filter(|_| !schema["minItems"].is_null());
+            let of = plain(entries);
+            count.map_or_else(|| format!("list of {of}s"), |count| format!("{count} {of}s"))
+        }
+        name => name.into(),
+    }
+}
+
+/// The names that a choice has.
+fn names(schema: &Value) -> Option<String> {
+    let options = schema["oneOf"].as_array()?;
+    let names = options.iter().flat_map(|option| match &option["const"] {
+        Value::Null => option["enum"].as_array().cloned().unwrap_or_default(),
+        one => vec![one.clone()],
+    });
+    let names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
+    (!names.is_empty()).then(|| names.join(", "))
+}
+
+/// The first paragraph of a documentation.
+fn words(property: &Value, inner: &Value) -> String {
+    let text = property["description"].as_str().or(inner["description"].as_str()).unwrap_or("");
+    text.split("\n\n").next().unwrap_or("").into()
+}
+
+fn cell(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|")
+}
+
+/// The table of measures as Markdown: what `summary.csv` holds of each.
+pub fn measures() -> String {
+    let mut text = String::from(
+        "| measure | what | in files | better | columns of `summary.csv` |\n|---|---|---|---|---|\n",
+    );
+    for measure in MEASURES {
+        let better = match measure.direction {
+            Direction::Less => "less",
+            Direction::More => "more",
+            Direction::Neither => "neither",
+        };
+        let mut columns = Vec::new();
+        if measure.aggregate.has_mean() {
+            columns.extend([measure.column("mean"), measure.column("se")]);
+        }
+        if measure.aggregate.has_median() {
+            let ends = ["median", "median_low", "median_high"];
+            columns.extend(ends.map(|end| measure.column(end)));
+        }
+        let columns: Vec<String> = columns.iter().map(|name| format!("`{name}`")).collect();
+        let unit = match measure.unit.suffix {
+            "_m" => "m",
+            "_s" => "s",
+            _ => "",
+        };
+        let title = cell(measure.title);
+        text += &format!(
+            "| `{}` | {title} | {unit} | {better} | {} |\n",
+            measure.id,
+            columns.join(", ")
+        );
+    }
+    text
+}
+
+/// The fields of a file's records as Markdown.
+pub fn fields<T: JsonSchema>() -> String {
+    let schema = schema_for!(T).to_value();
+    let mut text = String::from("| field | what |\n|---|---|\n");
+    for (name, property) in schema["properties"].as_object().into_iter().flatten() {
+        text += &format!("| `{name}` | {} |\n", cell(&words(property, &Value::Null)));
+    }
+    text
+}
+
+/// The fields of a line of `trials.jsonl`, and of each of its touches.
+pub fn rows() -> String {
+    let touch = fields::<crate::experiment::row::TouchRow>();
+    let metrics = fields::<crate::experiment::metrics::Metrics>();
+    let fit = fields::<crate::gp::fit::Fit>();
+    format!(
+        "{}\nEach of `touches`:\n\n{touch}\nIts `metrics`:\n\n{metrics}\nIts `fit`:\n\n{fit}",
+        fields::<TrialRow>()
+    )
+}
