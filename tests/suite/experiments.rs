@@ -33,21 +33,29 @@ fn after(experiment: &Experiment, rows: &[TrialRow], planner: &str, touches: u32
     curve.into_iter().find(|point| point.touches == touches).unwrap()
 }
 
+/// The curve counts as found at this correlation (chosen); a trial that stalls for good ends below.
+/// Measured: the worst of 50 trials ends at 0.9994.
+const FOUND: f64 = 0.99;
+
 /// The paper: "almost reaches 1 after 23 touches". Global maximum likelihood on a dense grid, an
 /// independent implementation, gives 0.989 at 23, 0.994 at 25 and 0.9986 at 30 (20 trials).
 #[test]
 fn toy_active_finds_the_curve_by_the_touches_of_the_paper() {
     let (experiment, rows) = run("toy.toml", &["planners=[\"active\", \"random\"]"]);
     assert_eq!((experiment.trials, experiment.initial_touches, experiment.touches), (50, 3, 50));
-    let active = |touches| after(&experiment, &rows, "active", touches).of(&R).unwrap().mean;
-    assert!(active(23) >= 0.98, "{}", active(23));
-    assert!(active(25) >= 0.99, "{}", active(25));
-    assert!(active(35) >= 0.999, "{}", active(35));
-    let random = after(&experiment, &rows, "random", 23).of(&R).unwrap().mean;
-    assert!(random < 0.965, "{random}");
+    // No more than two standard errors of the mean below that implementation.
+    let r = |planner, touches| after(&experiment, &rows, planner, touches).of(&R).unwrap();
+    for (touches, theirs) in [(23, 0.989), (25, 0.994), (30, 0.9986)] {
+        let (mean, error) = (r("active", touches).mean, r("active", touches).error.unwrap());
+        assert!(mean >= theirs - 2.0 * error, "{touches}: {mean} ± {error}");
+    }
+    // Ahead of random by more than three standard errors of the difference.
+    let [active, random] = ["active", "random"].map(|planner| r(planner, 23));
+    let error = active.error.unwrap().hypot(random.error.unwrap());
+    assert!(active.mean - random.mean > 3.0 * error, "{} {}", active.mean, random.mean);
     for row in of_planner(&rows, "active") {
         let r = row.touches.last().unwrap().metrics.unwrap().r;
-        assert!(r >= 0.95, "trial {} ends at {r}", row.trial);
+        assert!(r >= FOUND, "trial {} ends at {r}", row.trial);
     }
 }
 
@@ -59,12 +67,16 @@ fn toy_constant_starts_stall_visibly_and_recover() {
     let constant =
         |row: &&TrialRow| row.touches[..3].iter().all(|touch| touch.contact.unwrap()[1] == 1.0);
     let starts: Vec<&TrialRow> = rows.iter().filter(constant).collect();
-    assert!(starts.len() >= 3, "one start in eight is constant: {}", starts.len());
-    assert!(starts.iter().all(|row| row.touches.last().unwrap().metrics.unwrap().r > 0.99));
+    // One start in eight reads this height three times: 6.25 of 50, with a standard deviation of
+    // 2.3; two of these below are 1.6.
+    assert!(starts.len() >= 2, "{} constant starts", starts.len());
+    assert!(starts.iter().all(|row| row.touches.last().unwrap().metrics.unwrap().r >= FOUND));
     let stalls = rows.iter().flat_map(|row| &row.touches).filter(|touch| touch.stall.is_some());
     assert!(stalls.count() > 0);
 }
 
+/// Measured: 0.26 mm against 0.50 mm, a half; two thirds leave room for the rounding of other
+/// machines. The object is straight along z, and every trial learns the longer scale along it.
 #[test]
 fn container_active_needs_two_thirds_of_the_error_and_learns_the_straight_axis() {
     let (experiment, rows) = run("container.toml", &["planners=[\"active\", \"random\"]"]);
@@ -76,15 +88,17 @@ fn container_active_needs_two_thirds_of_the_error_and_learns_the_straight_axis()
             &row.touches.last().unwrap().fit.as_ref().unwrap().hyperparameters.length_scales;
         lengths[1] > lengths[0]
     });
-    assert!(longer_along_z.count() * 10 >= rows.len() * 9);
+    assert_eq!(longer_along_z.count(), rows.len());
 }
 
-/// Ten of the fifty trials.
+/// Ten of the fifty trials. Measured: 1.5 mm against 3.2 mm, a half; two thirds, as on the
+/// container.
 #[test]
 fn bird_active_is_better_in_the_outer_tenth() {
     let (experiment, rows) = run("bird.toml", &["planners=[\"active\", \"random\"]", "trials=10"]);
     let edge = |planner| after(&experiment, &rows, planner, 120).of(&EDGE_RMSE).unwrap().median;
-    assert!(edge("active") < edge("random"), "{} {}", edge("active"), edge("random"));
+    let (active, random) = (edge("active"), edge("random"));
+    assert!(active <= random * 2.0 / 3.0, "{active} {random}");
 }
 
 /// A zone that looks past the object at its sides: those targets are misses, and a planner that
@@ -101,7 +115,7 @@ fn targets_past_the_object_are_missed_once_and_not_asked_for_again() {
     let (experiment, rows) = run("container.toml", &sets);
     for row in &rows {
         let misses = row.touches.iter().filter(|touch| touch.contact.is_none()).count();
-        assert!((5..50).contains(&misses), "{misses} misses");
+        assert!(misses > 0, "the zone does not look past the object");
         for (i, touch) in row.touches.iter().enumerate() {
             for earlier in row.touches[..i].iter().filter(|earlier| earlier.contact.is_none()) {
                 let distance = experiment.scene.zone.distance(&touch.target, &earlier.target);
@@ -109,12 +123,14 @@ fn targets_past_the_object_are_missed_once_and_not_asked_for_again() {
             }
         }
         let last = row.touches.last().unwrap().metrics.unwrap();
-        assert!(last.rmse_m < 0.004, "{}", last.rmse_m);
+        // Measured: 1.3 and 1.4 mm, with 25 contacts among the 60 touches.
+        assert!(last.rmse_m < 0.002, "{}", last.rmse_m);
     }
 }
 
 /// At most two fifths of the way of `active` for at most a fifth more touches to equal error, with
-/// the same settings on toy and container. No target is asked for twice.
+/// the same settings on toy and container: what the planner is offered for. No target is asked for
+/// twice. Measured: 1.11 and 1.00 times the touches, 0.20 and 0.32 of the way.
 #[test]
 fn travel_saves_three_fifths_of_the_way_for_a_fifth_more_touches() {
     let both = "planners=[\"active\", \"travel\"]";

@@ -1,11 +1,14 @@
 //! What the ladder of fidelities promises.
 
+use nalgebra::Vector3;
 use palpate::sim::collision::Collision;
 use palpate::sim::finger::Effects;
+use palpate::sim::finger::profile::Profile;
+use palpate::sim::probe::rest_y_m;
 use palpate::sim::{Environment, Scene};
 use palpate::study::fidelity::ladder::{DIAGONAL, RUNGS, is_diagonal};
 use palpate::study::fidelity::order;
-use palpate::study::fidelity::reference_load::noise_free;
+use palpate::study::fidelity::reference_load::{ReferenceLoad, noise_free};
 use palpate::study::fidelity::rung::Senses;
 use palpate::study::fidelity::spread::Spread;
 #[cfg(feature = "mujoco")]
@@ -38,12 +41,15 @@ fn every_rung_is_a_scene_that_can_be_built_and_saved() {
     assert_eq!(on, DIAGONAL.len());
 }
 
+/// The bar tells an order of one from no fall at all and from two. Measured with these targets:
+/// 1.31 in the time step, which scatters, for how late within a tick a touch is told depends on
+/// where the tick falls; 1.13 in the points.
 #[test]
 fn the_error_falls_with_the_resolution_as_it_should() {
     let scene = scene(&[]);
     let targets = targets(&scene, 6, 0);
     let order = order::in_time_step(&scene, &targets, &mut || true).unwrap().unwrap();
-    assert!((order.observed - order.expected).abs() < 0.4, "{order:?}");
+    assert!((order.observed - order.expected).abs() < 0.5, "{order:?}");
     let environment = Arc::new(Environment::build(noise_free(&scene)).unwrap());
     let touches = touch_all(&environment, &targets, 0, &mut || true).unwrap().unwrap();
     let poses: Vec<_> = touches.loads.iter().flatten().map(|load| load.motion).collect();
@@ -53,7 +59,7 @@ fn the_error_falls_with_the_resolution_as_it_should() {
 }
 
 /// Explicit in the skin's force, semi-implicit in the joints: of first order. The bar tells it from
-/// an order of a half and of two.
+/// an order of a half and of two. Measured: 1.06 and 1.08.
 #[test]
 #[cfg(feature = "mujoco")]
 fn with_masses_the_error_in_contact_falls_with_the_step() {
@@ -106,11 +112,36 @@ fn an_approach_that_would_press_past_the_skin_is_refused_with_its_limit() {
     let error = load(&["touch.approach_m_s=0.5"]).unwrap_err().to_string();
     let limit_m_s = scene(&[]).approach_limit_m_s().unwrap();
     assert!(error.contains("touch.approach_m_s") && error.contains("at most 0.0"), "{error}");
-    assert!((0.03..0.12).contains(&limit_m_s), "{limit_m_s}");
     let slower = format!("touch.approach_m_s={}", 0.999 * limit_m_s);
     assert!(load(&[&slower]).is_ok());
     // Coarser ticks and more frames leave less; a body that is not moved has no limit.
     let coarser = scene(&["touch.period_s=0.02"]).approach_limit_m_s().unwrap();
     assert!(coarser < limit_m_s);
     assert!(load(&["touch.approach_m_s=0.5", "body=\"cast\""]).is_ok());
+}
+
+/// At the fastest approach that is allowed the finger comes to rest within its skin and fluid, and
+/// deeper than at a quarter of it; half as fast again is too fast for a contact.
+#[test]
+fn at_the_limit_of_approach_the_skin_is_not_used_up() {
+    let mut scene = noise_free(&scene(&[]));
+    let limit_m_s = scene.approach_limit_m_s().unwrap();
+    let ahead_t = scene.finger.attitude_w().inverse() * -Vector3::y();
+    let layers = Profile::biotac(&scene.finger).layers(0.0, &ahead_t);
+    let targets = targets(&scene, 4, 0);
+    let mut depths_m = |share: f64| -> Vec<Option<f64>> {
+        scene.touch.approach_m_s = share * limit_m_s;
+        let environment = Arc::new(Environment::build(scene.clone()).unwrap());
+        let touches = touch_all(&environment, &targets, 0, &mut || true).unwrap().unwrap();
+        let rest_m = targets.iter().map(|target| rest_y_m(&environment, target).unwrap());
+        let depth_m = |(rest_m, load): (f64, &Option<ReferenceLoad>)| {
+            Some(rest_m - load.as_ref()?.motion.x_wt.translation.y)
+        };
+        rest_m.zip(&touches.loads).map(depth_m).collect()
+    };
+    let slow: Vec<f64> = depths_m(0.25).into_iter().map(Option::unwrap).collect();
+    let fast: Vec<f64> = depths_m(0.999).into_iter().map(Option::unwrap).collect();
+    assert!(slow.iter().zip(&fast).all(|(slow, fast)| slow < fast), "{slow:?} {fast:?}");
+    assert!(fast.iter().all(|depth_m| *depth_m < layers.skin_m + layers.gap_m), "{fast:?}");
+    assert!(depths_m(1.5).iter().any(Option::is_none));
 }

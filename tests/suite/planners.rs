@@ -41,7 +41,8 @@ fn make(name: &str, zone: &Zone) -> Box<dyn planner::Planner> {
     (entry.make)(zone, &PlanningSettings::default(), seed::stream(1, 0, name))
 }
 
-/// The slow twin of DIRECT and L-BFGS is a dense grid.
+/// The slow twin of DIRECT and L-BFGS is a dense grid. Measured: the plan is never below the grid's
+/// best; a thousandth leaves room for the rounding of other machines.
 #[test]
 fn active_finds_the_largest_explorable_variance() {
     for (zone, per_side) in [(&LINE, 2001), (&SQUARE, 81)] {
@@ -59,7 +60,7 @@ fn active_finds_the_largest_explorable_variance() {
                 .fold(0.0, f64::max);
             let share = plan.sd_m.unwrap() / best;
             plans += 1;
-            near += usize::from(share > 0.98);
+            near += usize::from(share > 0.999);
             worst = worst.min(share);
         }
         assert_eq!((plans, near), (40, 40), "{} dimensions, worst {worst}", zone.dimension());
@@ -114,7 +115,8 @@ fn a_belief_without_any_contact_still_plans() {
     }
 }
 
-/// The slow twin takes the candidate in and looks at every reference again.
+/// The slow twin takes the candidate in and looks at every reference again. Two ways to round the
+/// same numbers: they differ by less than 1e-9 of the prior variance.
 #[test]
 fn reduction_is_what_a_refit_with_the_candidate_finds() {
     for (zone, noisy) in [(&LINE, false), (&SQUARE, true)] {
@@ -138,12 +140,13 @@ fn reduction_is_what_a_refit_with_the_candidate_finds() {
                 });
                 let twin = falls.sum::<f64>() / references.len() as f64;
                 let found = reduction.at(&place, &mut scratch);
-                assert!((found - twin).abs() < 1e-7 * signal2, "{found} {twin}");
+                assert!((found - twin).abs() < 1e-8 * signal2, "{found} {twin}");
             }
         }
     }
 }
 
+/// The difference errs by rounding over its step of a millionth. Measured: below 1e-7 of the scale.
 #[test]
 fn mean_gradient_is_its_central_difference() {
     for zone in [&LINE, &SQUARE] {
@@ -165,7 +168,7 @@ fn mean_gradient_is_its_central_difference() {
                 let step = 1e-6 * extent;
                 let twin = (at(step) - at(-step)) / (2.0 * step);
                 let scale = surface.hyperparameters().signal_sd / extent;
-                assert!((gradient[axis] - twin).abs() < 1e-5 * scale, "{gradient:?} {twin}");
+                assert!((gradient[axis] - twin).abs() < 1e-6 * scale, "{gradient:?} {twin}");
             }
         }
     }
@@ -174,7 +177,8 @@ fn mean_gradient_is_its_central_difference() {
 /// What a place is worth.
 type Formula<'a> = Box<dyn Fn(&[f64], &mut Scratch) -> f64 + 'a>;
 
-/// A planner's plan against a dense grid of its formula, written out again.
+/// A planner's plan against a dense grid of its formula, written out again, as a share of the way
+/// from the grid's worst to its best. Measured: at least 0.9990.
 fn finds(name: &str, formula: impl for<'a> Fn(&'a Belief, &[Vec<f64>]) -> Formula<'a>) {
     for (zone, per_side) in [(&LINE, 1001), (&SQUARE, 61)] {
         for trial in 0..8 {
@@ -190,7 +194,7 @@ fn finds(name: &str, formula: impl for<'a> Fn(&'a Belief, &[Vec<f64>]) -> Formul
             let best = values.iter().copied().fold(f64::MIN, f64::max);
             let worst = values.iter().copied().fold(f64::MAX, f64::min);
             let share = (worth(&plan.target, &mut scratch) - worst) / (best - worst);
-            assert!(share > 0.97, "{name}, {} d, {trial}: {share}", zone.dimension());
+            assert!(share > 0.998, "{name}, {} d, {trial}: {share}", zone.dimension());
         }
     }
 }
