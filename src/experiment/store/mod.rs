@@ -21,7 +21,7 @@ pub use manifest::{MANIFEST, Manifest};
 pub use resolved::{RESOLVED, resolved};
 
 use self::error::io_error;
-use self::file::{remove, write_changed};
+use self::file::remove;
 use self::surface::SURFACE;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::row::TrialRow;
@@ -125,6 +125,9 @@ impl RunFolder {
     pub fn sort(self, experiment: &Experiment) -> Result<(), StoreError> {
         let file = self.path.join(TRIALS);
         let (mut rows, _) = rows::read(&file, experiment)?;
+        if rows::is_sorted(&rows, experiment) {
+            return Ok(());
+        }
         rows::sort(&mut rows, experiment);
         let mut text = String::new();
         for row in &rows {
@@ -132,7 +135,7 @@ impl RunFolder {
                 &serde_json::to_string(row).map_err(io::Error::from).map_err(io_error(&file))?;
             text.push('\n');
         }
-        write_changed(&file, &text)
+        write_whole(&file, &text)
     }
 }
 
