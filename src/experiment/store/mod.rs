@@ -92,7 +92,9 @@ impl RunFolder {
         }
         surface::write_or_compare(path, experiment, truth)?;
         let (mut rows, good_bytes) = rows::read(&file, experiment)?;
-        trials.set_len(good_bytes).map_err(io_error(&file))?;
+        if trials.metadata().map_err(io_error(&file))?.len() > good_bytes {
+            trials.set_len(good_bytes).map_err(io_error(&file))?;
+        }
         resolved::write(path, experiment)?;
         rows.retain(|row| experiment.lists(row));
         let unsigned = Some(manifest.clone());
