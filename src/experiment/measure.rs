@@ -22,7 +22,7 @@ pub struct Measure {
     /// What is told of it over many trials.
     pub aggregate: Aggregate,
     /// How it is drawn over touches.
-    pub panel: Panel,
+    pub scale: Scale,
     /// Whether it stands in the summary on the terminal and on the page.
     pub is_tabled: bool,
     /// Whether it is an error, so that planners are compared in it after every touch, and in the
@@ -79,18 +79,18 @@ impl Aggregate {
     }
 }
 
-/// A panel of the convergence figure.
+/// How a measure is drawn over touches, in a panel of its own.
 #[derive(Clone, Copy, Debug)]
-pub enum Panel {
-    /// None.
-    None,
-    /// With a linear axis.
+pub enum Scale {
+    /// Not at all.
+    Undrawn,
+    /// On a linear axis.
     Linear,
-    /// With a linear axis that shows 1, the best there is.
+    /// On a linear axis that shows 1, the best there is.
     UpToOne,
-    /// With a logarithmic axis.
+    /// On a logarithmic axis.
     Log,
-    /// The same with another measure dotted beside it; none where that has no value.
+    /// The same with another measure dotted beside it; not at all where that has no value.
     LogBeside(&'static Measure),
 }
 
@@ -105,21 +105,21 @@ const HONEST: f64 = 0.95;
 
 /// Eq. 5 of Yi et al. 2016.
 pub const R: Measure =
-    more("r", "R (Eq. 5)", CORRELATION, |row, n| Some(metrics(row, n)?.r)).drawn(Panel::UpToOne);
+    more("r", "R (Eq. 5)", CORRELATION, |row, n| Some(metrics(row, n)?.r)).drawn(Scale::UpToOne);
 /// The same after subtracting each one's mean.
 pub const CENTRED_R: Measure =
     more("centred_r", "centred R", CORRELATION, |row, n| Some(metrics(row, n)?.centred_r))
-        .drawn(Panel::UpToOne);
+        .drawn(Scale::UpToOne);
 /// Root mean square error.
 pub const RMSE: Measure = less("rmse_m", "RMSE", MM, |row, n| Some(metrics(row, n)?.rmse_m))
     .told(Aggregate::Both)
-    .drawn(Panel::Log)
+    .drawn(Scale::Log)
     .error();
 /// Root mean square error in the outer tenth of the zone.
 pub const EDGE_RMSE: Measure =
     less("edge_rmse_m", "RMSE in the outer tenth", MM, |row, n| metrics(row, n)?.edge_rmse_m)
         .told(Aggregate::Median)
-        .drawn(Panel::Log)
+        .drawn(Scale::Log)
         .error();
 /// Root mean square error where the finger cannot touch the surface.
 const UNREACHABLE_RMSE: Measure =
@@ -127,12 +127,12 @@ const UNREACHABLE_RMSE: Measure =
         metrics(row, n)?.unreachable_rmse_m
     })
     .told(Aggregate::Median)
-    .drawn(Panel::None)
+    .drawn(Scale::Undrawn)
     .untabled();
 /// Share of the truth inside the 95 % band.
 pub const COVERAGE: Measure =
     fact("coverage", "share in the 95 % band", PLAIN, |row, n| metrics(row, n)?.coverage)
-        .drawn(Panel::UpToOne);
+        .drawn(Scale::UpToOne);
 
 /// Every measure, in the order of columns and panels; one line to add one.
 pub static MEASURES: &[Measure] = &[
@@ -144,24 +144,25 @@ pub static MEASURES: &[Measure] = &[
         metrics(row, n)?.reachable_rmse_m
     })
     .told(Aggregate::Median)
-    .drawn(Panel::LogBeside(&UNREACHABLE_RMSE))
+    .drawn(Scale::LogBeside(&UNREACHABLE_RMSE))
     .untabled()
     .error(),
     UNREACHABLE_RMSE,
     less("max_error_m", "largest error", MM, |row, n| Some(metrics(row, n)?.max_error_m))
         .told(Aggregate::Median)
-        .drawn(Panel::None),
+        .drawn(Scale::Undrawn),
     COVERAGE,
     less("coverage_off", "share in the 95 % band, away from 0.95", PLAIN, |row, n| {
         Some((metrics(row, n)?.coverage? - HONEST).abs())
     })
-    .drawn(Panel::None)
+    .drawn(Scale::Undrawn)
     .untabled(),
-    less("nlpd", "NLPD", PLAIN, |row, n| metrics(row, n)?.nlpd).drawn(Panel::None),
+    less("nlpd", "NLPD", PLAIN, |row, n| metrics(row, n)?.nlpd).drawn(Scale::Undrawn),
     less("path_m", "lateral travel", METRES, TrialRow::path_m),
-    less("time_s", "time of the body", SECONDS, |row, n| touch(row, n)?.time_s).drawn(Panel::None),
-    length_scale("length_scale_x_m", "length scale along x", |row, n| scale(row, n, 0)),
-    length_scale("length_scale_z_m", "length scale along z", |row, n| scale(row, n, 1)),
+    less("time_s", "time of the body", SECONDS, |row, n| touch(row, n)?.time_s)
+        .drawn(Scale::Undrawn),
+    length_scale("length_scale_x_m", "length scale along x", |row, n| length_along(row, n, 0)),
+    length_scale("length_scale_z_m", "length scale along z", |row, n| length_along(row, n, 1)),
 ];
 
 /// The measure of a name in files.
@@ -185,9 +186,9 @@ impl Measure {
         Self { aggregate, ..self }
     }
 
-    /// With this panel.
-    const fn drawn(self, panel: Panel) -> Self {
-        Self { panel, ..self }
+    /// Drawn like this.
+    const fn drawn(self, scale: Scale) -> Self {
+        Self { scale, ..self }
     }
 
     /// In files only.
@@ -217,7 +218,7 @@ const fn less(id: &'static str, title: &'static str, unit: Unit, of: Value) -> M
         unit,
         direction: Direction::Less,
         aggregate: Aggregate::Mean,
-        panel: Panel::Linear,
+        scale: Scale::Linear,
         is_tabled: true,
         is_error: false,
         of,
@@ -235,7 +236,7 @@ const fn fact(id: &'static str, title: &'static str, unit: Unit, of: Value) -> M
 }
 
 const fn length_scale(id: &'static str, title: &'static str, of: Value) -> Measure {
-    fact(id, title, MM, of).told(Aggregate::Median).drawn(Panel::None).untabled()
+    fact(id, title, MM, of).told(Aggregate::Median).drawn(Scale::Undrawn).untabled()
 }
 
 fn touch(row: &TrialRow, count: u32) -> Option<&TouchRow> {
@@ -246,7 +247,7 @@ fn metrics(row: &TrialRow, count: u32) -> Option<&Metrics> {
     touch(row, count)?.metrics.as_ref()
 }
 
-fn scale(row: &TrialRow, count: u32, axis: usize) -> Option<f64> {
+fn length_along(row: &TrialRow, count: u32, axis: usize) -> Option<f64> {
     let fit = touch(row, count)?.fit.as_ref()?;
     fit.hyperparameters.length_scales.get(axis).copied()
 }

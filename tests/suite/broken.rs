@@ -140,6 +140,8 @@ fn broken_experiments_are_refused_with_file_line_key_and_remedy() {
         ("[3]", "[3]\ntrial = 1", &["small.toml:14", "report.trial", "0 to 0"]),
         ("[3]", "[1,1,1,1,1,1,1,1,1]", &["small.toml:13", "report.touch_counts", "at most 8"]),
         ("[3]", "[3]\nplanners = [\"x\"]", &["small.toml:14", "report.planners[0]"]),
+        ("[3]", "[3]\nbaselines = [\"x\"]", &["small.toml:14", "report.baselines[0]", "sobol"]),
+        ("[3]", "[3]\nbaselines = \"sobol\"", &["small.toml:14", "report.baselines"]),
         ("[report]", "[planning]\ndirect_evaluations = 0\n[report]", &["small.toml:13"]),
         ("[report]", "[[report]]", &["small.toml:12", "report"]),
     ];
@@ -284,15 +286,29 @@ fn damaged_run_folders_are_refused_and_lose_nothing() {
     fs::write(&trials, &rows).unwrap();
     fs::write(&trials, [rows.as_slice(), rows.as_slice()].concat()).unwrap();
     accepted.refuse("the same trial twice", &run(&[]), &["trials.jsonl:2", "twice"]);
-    let other = String::from_utf8(rows.clone()).unwrap().replace("\"trial\":0", "\"trial\":7");
-    fs::write(&trials, other).unwrap();
-    accepted.refuse("a trial of another run", &run(&[]), &["trials.jsonl:1", "no trial 7"]);
+    assert!(run(&["--set", "touches=2", "--out", "runs/shorter"]).status.success());
+    fs::copy(folder.path().join("runs/shorter/trials.jsonl"), &trials).unwrap();
+    accepted.refuse("a trial of another run", &run(&[]), &["trials.jsonl:1", "2 touches of 3"]);
     fs::write(&trials, &rows).unwrap();
     let locked = fs::File::open(&trials).unwrap();
     locked.lock().unwrap();
     accepted.refuse("a folder being written", &run(&["--fresh"]), &["another run"]);
+    let set = |set: &str| palpate(folder.path(), &["report", "runs/small", "--set", set]);
+    accepted.refuse("the same, by its report", &set("question=why"), &["another run"]);
     locked.unlock().unwrap();
     assert_eq!(fs::read(&trials).unwrap(), rows);
+    let resolved = fs::read(folder.path().join("runs/small/resolved.toml")).unwrap();
+    for (assignment, says) in [
+        ("trials=2", ["--set trials=2", "`report.…`", "`question`"]),
+        ("reports.trial=0", ["--set reports.trial=0", "`report.…`", "`question`"]),
+        ("report.trial=1", ["--set report.trial=1", "`report.trial`", "0 to 0"]),
+        ("report.trail=0", ["--set report.trail=0", "`report.trail`", "did you mean `trial`"]),
+        ("report.baselines=[\"x\"]", ["--set report.baselines", "report.baselines[0]", "sobol"]),
+        ("question", ["--set question", "key=value", ""]),
+    ] {
+        accepted.refuse(assignment, &set(assignment), &says);
+    }
+    assert_eq!(fs::read(folder.path().join("runs/small/resolved.toml")).unwrap(), resolved);
     fs::write(folder.path().join("runs/small/surface.csv"), "x_m,z_m,height_m\n1,2,x\n").unwrap();
     let report = palpate(folder.path(), &["report", "runs/small"]);
     let none = palpate(folder.path(), &["report", "."]);

@@ -2,6 +2,7 @@
 
 use crate::common::runs::{CURVE, SURFACE, run};
 use palpate::experiment::analysis::Analysis;
+use palpate::experiment::measure::{Direction, MEASURES, Scale};
 use palpate::experiment::report_settings::Claim;
 use palpate::experiment::store::Run;
 use palpate::report;
@@ -9,7 +10,7 @@ use palpate::report::axes::Axis;
 use palpate::report::png;
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::{Options, Tree};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
@@ -147,7 +148,8 @@ fn ticks_are_round() {
     assert!(labels(Axis::linear(0.0, 1e-320, 5.0)).len() < 10);
 }
 
-/// Twice the error of `active` at every count, so twice its touches; each table in words and as a file.
+/// Twice the error of `active` at every count, so twice its touches; each table in words and as a
+/// file.
 #[test]
 fn planners_are_compared_in_every_measure_and_in_touches_to_equal_error() {
     let mut run = run(SURFACE);
@@ -190,11 +192,96 @@ fn claims_stand_beside_what_came_out() {
     run.experiment.report.claims = vec![claim(10, "it is <accurate>"), claim(99, "it is nowhere")];
     let files = drawn(&run);
     let page = text(&files, "report.html");
-    assert!(
-        page.contains(
-            "it is &lt;accurate&gt;</td><td>10 touches</td><td>RMSE, mm</td><td>2.00</td>"
-        )
-    );
-    assert!(page.contains("<td>length scale along z, mm</td><td>42.0</td>"));
+    let told = "<td>10 touches</td><td>median RMSE, mm</td><td>2.000</td>";
+    assert!(page.contains(&format!("it is &lt;accurate&gt;</td>{told}")));
+    assert!(page.contains("<td>median length scale along z, mm</td><td>42.000</td>"));
     assert!(!page.contains("it is nowhere"));
+}
+
+/// What follows from the table of measures does so for each of them: columns, comparison, panel,
+/// column of the page, claim.
+#[test]
+fn a_measure_is_told_wherever_measures_are() {
+    let mut run = run(SURFACE);
+    for touch in run.rows.iter_mut().flat_map(|row| &mut row.touches) {
+        touch.time_s = Some(1.0);
+        touch.metrics.iter_mut().for_each(|metrics| metrics.unreachable_rmse_m = Some(0.1));
+    }
+    run.experiment.report.claims = vec![Claim {
+        place: "here".into(),
+        says: "everything".into(),
+        touches: 10,
+        measures: MEASURES.iter().map(|measure| measure.id.into()).collect(),
+    }];
+    let (folder, analysis) = (tempfile::tempdir().unwrap(), Analysis::of(&run));
+    report::write_tables(&run, &analysis, folder.path()).unwrap();
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    let (summary, comparison) = (read("summary.csv"), read("comparison.csv"));
+    let columns: Vec<&str> = summary.lines().next().unwrap().split(',').collect();
+    let files = drawn(&run);
+    let (page, figure) = (text(&files, "report.html"), text(&files, "convergence.svg"));
+    let (claims, tables) = page.split_once("over the trials.").unwrap();
+    for measure in MEASURES {
+        let has = |statistic: &str| columns.contains(&measure.column(statistic).as_str());
+        let aggregate = measure.aggregate;
+        assert_eq!(["mean", "se"].map(has), [aggregate.has_mean(); 2], "{measure:?}");
+        let ends = ["median", "median_low", "median_high"];
+        assert_eq!(ends.map(has), [aggregate.has_median(); 3], "{measure:?}");
+        assert_eq!(has("minus_random_low"), measure.is_error, "{measure:?}");
+        let is_compared = measure.direction != Direction::Neither;
+        assert_eq!(comparison.contains(&format!(",{},", measure.id)), is_compared, "{measure:?}");
+        let is_drawn = !matches!(measure.scale, Scale::Undrawn);
+        let (title, unit) = (measure.title, measure.unit.symbol);
+        let unit = |before: &str, after: &str| match unit {
+            "" => String::new(),
+            unit => format!("{before}{unit}{after}"),
+        };
+        let panel = format!(">{title}{}: ", unit(" (", ")"));
+        assert_eq!(figure.contains(&panel), is_drawn, "{measure:?}");
+        let head = format!("{title}{}", unit(", ", ""));
+        assert!(claims.contains(&format!(" {head}</td>")), "{measure:?}");
+        assert_eq!(tables.contains(&format!(" {head}</th>")), measure.is_tabled, "{measure:?}");
+    }
+    assert!(summary.lines().all(|line| line.split(',').count() == columns.len()));
+    let rows = run.experiment.planners.len() * (20 - 5 + 1);
+    assert_eq!(summary.lines().count(), 1 + rows);
+}
+
+/// Planners are held against the baselines asked for, against the paper's if nobody asks, and
+/// against each other where neither of these ran; what is asked for and did not run is no baseline.
+#[test]
+fn planners_are_held_against_their_baselines() {
+    let asked = |planners: [&str; 3], baselines: &[&str]| {
+        let mut run = run(SURFACE);
+        run.experiment.planners = planners.map(String::from).to_vec();
+        run.experiment.report.baselines = baselines.iter().map(|name| (*name).into()).collect();
+        for (i, row) in run.rows.iter_mut().enumerate() {
+            row.planner = planners[i % 2].into();
+        }
+        let (folder, analysis) = (tempfile::tempdir().unwrap(), Analysis::of(&run));
+        report::write_tables(&run, &analysis, folder.path()).unwrap();
+        let page = text(&drawn(&run), "report.html").to_owned();
+        ["comparison.csv", "equal_error.csv"].map(|name| {
+            let file = fs::read_to_string(folder.path().join(name)).unwrap();
+            let pairs = file.lines().skip(1).map(|line| {
+                let mut fields = line.split(',').map(String::from);
+                [fields.next().unwrap(), fields.next().unwrap()]
+            });
+            let pairs: BTreeSet<[String; 2]> = pairs.collect();
+            for [_, baseline] in &pairs {
+                assert!(page.contains(&format!("<th>minus {baseline}</th>")), "{baseline}");
+                assert!(page.contains(&format!("<th>to the error of {baseline}</th>")));
+            }
+            pairs.into_iter().map(|pair| pair.join(" ")).collect::<Vec<_>>()
+        })
+    };
+    fn same(pairs: &[&str]) -> [Vec<String>; 2] {
+        [(); 2].map(|()| pairs.iter().map(|pair| pair.to_string()).collect())
+    }
+    let fields = ["sobol", "slope", "grid"];
+    assert_eq!(asked(fields, &[]), same(&["slope sobol", "sobol slope"]));
+    assert_eq!(asked(fields, &["sobol"]), same(&["slope sobol"]));
+    assert_eq!(asked(fields, &["travel"]), same(&["slope sobol", "sobol slope"]));
+    assert_eq!(asked(["sobol", "random", "grid"], &[]), same(&["sobol random"]));
+    assert_eq!(asked(["sobol", "random", "grid"], &["sobol"]), same(&["random sobol"]));
 }

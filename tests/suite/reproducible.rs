@@ -1,4 +1,5 @@
-//! The same bytes for any number of threads, after a kill, and after an interrupt.
+//! The same bytes for any number of threads, after a kill, after an interrupt, and however often
+//! trials and planners are added; what is only shown changes no row.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,24 +8,33 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-fn start(out: &Path, arguments: &[&str]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_palpate"))
+fn command(out: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
+    command
         .args(["run", "experiments/toy.toml", "--set", "trials=20", "--no-report"])
         .args(["--set", "touches=35"])
         .arg("--out")
         .arg(out)
         .args(if arguments.contains(&"--threads") { &[][..] } else { &["--threads", "2"] })
         .args(arguments)
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap()
+        .current_dir(env!("CARGO_MANIFEST_DIR"));
+    command
+}
+
+fn start(out: &Path, arguments: &[&str]) -> Child {
+    command(out, arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 
 fn finish(out: &Path, arguments: &[&str]) -> Vec<u8> {
     assert!(start(out, arguments).wait().unwrap().success());
     fs::read(trials(out)).unwrap()
+}
+
+/// What a whole run prints.
+fn output(out: &Path, arguments: &[&str]) -> String {
+    let output = command(out, arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
 }
 
 fn trials(out: &Path) -> PathBuf {
@@ -102,4 +112,60 @@ fn the_resolved_settings_are_the_run() {
     assert!(first == fs::read(folder.path().join("again/trials.jsonl")).unwrap());
     let twin = fs::read(folder.path().join("again/resolved.toml")).unwrap();
     assert!(fs::read(resolved).unwrap() == twin);
+}
+
+#[test]
+fn trials_and_planners_added_later_give_the_bytes_of_a_run_at_once() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("grown");
+    let few = ["--set", "trials=2", "--set", "planners=[\"random\"]"];
+    let more = ["--set", "trials=5", "--set", "planners=[\"random\"]"];
+    let all = ["--set", "trials=5", "--set", "planners=[\"active\", \"random\", \"sobol\"]"];
+    let begun = finish(&out, &few);
+    assert_eq!(begun.iter().filter(|&&byte| byte == b'\n').count(), 2);
+    finish(&out, &more);
+    let grown = finish(&out, &all);
+    assert!(grown == finish(&folder.path().join("whole"), &all));
+    let resolved = |run: &str| fs::read(folder.path().join(run).join("resolved.toml")).unwrap();
+    assert!(resolved("grown") == resolved("whole"));
+    // What is no longer listed is not shown, but kept, and is there when it is listed again.
+    for fewer in [&few, &more] {
+        assert!(finish(&out, fewer) == grown);
+    }
+    let summary = fs::read_to_string(out.join("summary.csv")).unwrap();
+    assert!(!summary.contains("active") && summary.contains("\nrandom,35,5,"), "{summary}");
+    let again = output(&out, &all);
+    assert!(again.contains("\n0 trials in ") && again.contains("15 were there"), "{again}");
+    assert!(fs::read(trials(&out)).unwrap() == grown);
+}
+
+#[test]
+fn what_is_shown_changes_without_a_trial() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("shown");
+    let two = ["--set", "trials=2"];
+    finish(&out, &two);
+    let read = |name: &str| fs::read_to_string(out.join(name)).unwrap();
+    let state = || (read("trials.jsonl"), fs::metadata(trials(&out)).unwrap().modified().unwrap());
+    let (rows, resolved, manifest) = (state(), read("resolved.toml"), read("manifest.json"));
+    let again = output(&out, &[&two[..], &["--set", "report.trial=1"]].concat());
+    assert!(again.contains("\n0 trials in "), "{again}");
+    assert!(read("resolved.toml").contains("\ntrial = 1\n"));
+    let drawn = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(["report", "--set", "report.baselines=[\"sobol\"]", "--set", "question=Why?"])
+        .arg(&out)
+        .output()
+        .unwrap();
+    assert!(drawn.status.success(), "{}", String::from_utf8_lossy(&drawn.stderr));
+    let set = read("resolved.toml");
+    for line in ["question = \"Why?\"", "trial = 1", "baselines = [\"sobol\"]"] {
+        assert!(set.lines().any(|found| found == line), "{line}: {set}");
+    }
+    assert!(read("report.html").contains("<p class=\"question\">Why?</p>"));
+    let comparison = read("comparison.csv");
+    assert!(comparison.lines().skip(1).all(|line| line.split(',').nth(1) == Some("sobol")));
+    assert!(comparison.contains("active,sobol,rmse_m,2,"), "{comparison}");
+    finish(&out, &two);
+    assert_eq!(read("resolved.toml"), resolved);
+    assert!(state() == rows && read("manifest.json") == manifest);
 }

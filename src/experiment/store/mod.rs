@@ -21,7 +21,7 @@ pub use manifest::{MANIFEST, Manifest};
 pub use resolved::{RESOLVED, resolved};
 
 use self::error::io_error;
-use self::file::{remove, write_changed};
+use self::file::remove;
 use self::surface::SURFACE;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::row::TrialRow;
@@ -92,7 +92,9 @@ impl RunFolder {
         }
         surface::write_or_compare(path, experiment, truth)?;
         let (mut rows, good_bytes) = rows::read(&file, experiment)?;
-        trials.set_len(good_bytes).map_err(io_error(&file))?;
+        if trials.metadata().map_err(io_error(&file))?.len() > good_bytes {
+            trials.set_len(good_bytes).map_err(io_error(&file))?;
+        }
         resolved::write(path, experiment)?;
         rows.retain(|row| experiment.lists(row));
         let unsigned = Some(manifest.clone());
@@ -125,6 +127,9 @@ impl RunFolder {
     pub fn sort(self, experiment: &Experiment) -> Result<(), StoreError> {
         let file = self.path.join(TRIALS);
         let (mut rows, _) = rows::read(&file, experiment)?;
+        if rows::is_sorted(&rows, experiment) {
+            return Ok(());
+        }
         rows::sort(&mut rows, experiment);
         let mut text = String::new();
         for row in &rows {
@@ -132,7 +137,7 @@ impl RunFolder {
                 &serde_json::to_string(row).map_err(io::Error::from).map_err(io_error(&file))?;
             text.push('\n');
         }
-        write_changed(&file, &text)
+        write_whole(&file, &text)
     }
 }
 

@@ -45,12 +45,16 @@ fn belongs(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
 
 /// Puts rows in order of trial, and of the experiment's planners, those not listed last.
 pub(super) fn sort(rows: &mut [TrialRow], experiment: &Experiment) {
-    let rank = |name: &str| {
-        let listed = experiment.planners.iter().position(|planner| planner == name);
-        listed.unwrap_or(experiment.planners.len())
-    };
-    rows.sort_by(|a, b| {
-        let key = |row: &'_ TrialRow| (row.trial, rank(&row.planner));
-        key(a).cmp(&key(b)).then_with(|| a.planner.cmp(&b.planner))
-    });
+    rows.sort_by(|a, b| key(a, experiment).cmp(&key(b, experiment)));
+}
+
+/// Whether the rows that the experiment lists stand in order; the others may stand anywhere.
+pub(super) fn is_sorted(rows: &[TrialRow], experiment: &Experiment) -> bool {
+    let listed = rows.iter().filter(|row| experiment.lists(row));
+    listed.map(|row| key(row, experiment)).is_sorted()
+}
+
+fn key<'a>(row: &'a TrialRow, experiment: &Experiment) -> (u32, usize, &'a str) {
+    let listed = experiment.planners.iter().position(|planner| *planner == row.planner);
+    (row.trial, listed.unwrap_or(experiment.planners.len()), &row.planner)
 }

@@ -1,13 +1,12 @@
 //! Errors against touches, Fig. 4 of Yi et al. 2016.
 
 use super::Figure;
-use crate::experiment::measure::{Aggregate, MEASURES, Measure, Panel, R};
+use crate::experiment::measure::{Aggregate, MEASURES, Measure, R, Scale};
 use crate::experiment::metrics;
 use crate::experiment::store::Run;
 use crate::experiment::summary;
 use crate::experiment::summary::CurvePoint;
-use crate::report::axes;
-use crate::report::axes::{Axis, Swatch, legend};
+use crate::report::axes::{Axis, Panel, Swatch, legend};
 use crate::report::canvas::{Anchor, Area, Canvas};
 use crate::report::style;
 use crate::report::style::{FAINT_INK, SMALL_PX};
@@ -56,10 +55,10 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let points = || curves.iter().flat_map(|(_, points)| points);
     let shown: Vec<&Measure> = MEASURES
         .iter()
-        .filter(|measure| match measure.panel {
-            Panel::None => false,
-            Panel::LogBeside(other) => points().any(|point| point.of(other).is_some()),
-            Panel::Linear | Panel::UpToOne | Panel::Log => true,
+        .filter(|measure| match measure.scale {
+            Scale::Undrawn => false,
+            Scale::LogBeside(other) => points().any(|point| point.of(other).is_some()),
+            Scale::Linear | Scale::UpToOne | Scale::Log => true,
         })
         .filter(|measure| points().any(|point| point.of(measure).is_some()))
         .collect();
@@ -93,8 +92,8 @@ fn draw_measure(canvas: &mut Canvas, area: Area, run: &Run, measure: &Measure, c
     let error = |point: &CurvePoint| {
         point.of(measure)?.error.filter(|_| !has_median).map(|error| per_si * error)
     };
-    let beside = |point: &CurvePoint| match measure.panel {
-        Panel::LogBeside(other) => Some(other.unit.per_si * point.of(other)?.median),
+    let beside = |point: &CurvePoint| match measure.scale {
+        Scale::LogBeside(other) => Some(other.unit.per_si * point.of(other)?.median),
         _ if measure.aggregate == Aggregate::Both => mean(point),
         _ => None,
     };
@@ -102,16 +101,20 @@ fn draw_measure(canvas: &mut Canvas, area: Area, run: &Run, measure: &Measure, c
     let constant = constant_r(run).filter(|_| measure.id == R.id);
 
     let points = || curves.iter().flat_map(|(_, points)| points);
-    let lowest = |point: &CurvePoint| Some(value(point)? - error(point).unwrap_or(0.0));
-    let values = points().filter_map(lowest).chain(points().filter_map(value)).chain(constant);
-    let y = match measure.panel {
-        Panel::Log | Panel::LogBeside(_) => Axis::log(values.chain(points().filter_map(beside))),
-        Panel::UpToOne => Axis::around(values.chain([1.0]), 0.04, 5.0),
-        Panel::Linear | Panel::None => Axis::around(values, 0.04, 5.0),
+    let end = |sign: f64| {
+        move |point: &CurvePoint| Some(value(point)? + sign * error(point).unwrap_or(0.0))
+    };
+    let values = points().filter_map(end(-1.0)).chain(points().filter_map(value)).chain(constant);
+    let y = match measure.scale {
+        Scale::Log | Scale::LogBeside(_) => Axis::log(values.chain(points().filter_map(beside))),
+        Scale::UpToOne => Axis::around(values.chain([1.0]), 0.04, 5.0),
+        Scale::Linear | Scale::Undrawn => {
+            Axis::around(values.chain(points().filter_map(end(1.0))), 0.04, 5.0)
+        }
     };
     let Some(y) = y else { return };
     let experiment = &run.experiment;
-    let panel = axes::Panel { area, x: Axis::linear(0.0, experiment.touches.into(), 6.0), y };
+    let panel = Panel { area, x: Axis::linear(0.0, experiment.touches.into(), 6.0), y };
     panel.frame(canvas);
     panel.label(canvas, &title(measure), "touches", "");
     let end_of_initial = panel.at(experiment.initial_touches.into(), 0.0)[0];
@@ -131,8 +134,8 @@ fn title(measure: &Measure) -> String {
         "" => String::new(),
         symbol => format!(" ({symbol})"),
     };
-    let told = match (measure.panel, measure.aggregate) {
-        (Panel::LogBeside(other), _) => format!("median; dotted: {}", other.title),
+    let told = match (measure.scale, measure.aggregate) {
+        (Scale::LogBeside(other), _) => format!("median; dotted: {}", other.title),
         (_, Aggregate::Both) => "median, and mean (dotted)".into(),
         (_, Aggregate::Median) => "median".into(),
         (_, Aggregate::Mean) => "mean".into(),
@@ -141,7 +144,7 @@ fn title(measure: &Measure) -> String {
 }
 
 /// A dashed line at what any constant scores.
-fn draw_constant(canvas: &mut Canvas, panel: &axes::Panel, touches: u32, score: f64) {
+fn draw_constant(canvas: &mut Canvas, panel: &Panel, touches: u32, score: f64) {
     let at = panel.at(touches.into(), score);
     canvas.line([[panel.area.left, at[1]], at], &style::dashed(FAINT_INK, 1.0, "5 4"));
     let words = format!("any constant: {score:.3}");
@@ -153,7 +156,7 @@ fn draw_constant(canvas: &mut Canvas, panel: &axes::Panel, touches: u32, score: 
 /// A curve with the band of its errors, and a dotted one beside it.
 fn draw_curve(
     canvas: &mut Canvas,
-    panel: &axes::Panel,
+    panel: &Panel,
     points: &[CurvePoint],
     [value, error, beside]: [Value; 3],
     colour: &str,
