@@ -44,7 +44,7 @@ fn toy_active_finds_the_curve_by_the_touches_of_the_paper() {
     let (experiment, rows) = run("toy.toml", &["planners=[\"active\", \"random\"]"]);
     assert_eq!((experiment.trials, experiment.initial_touches, experiment.touches), (50, 3, 50));
     // No more than two standard errors of the mean below that implementation.
-    let r = |planner, touches| after(&experiment, &rows, planner, touches).of(&R).unwrap();
+    let r = |planner, touches| *after(&experiment, &rows, planner, touches).of(&R).unwrap();
     for (touches, theirs) in [(23, 0.989), (25, 0.994), (30, 0.9986)] {
         let (mean, error) = (r("active", touches).mean, r("active", touches).error.unwrap());
         assert!(mean >= theirs - 2.0 * error, "{touches}: {mean} ± {error}");

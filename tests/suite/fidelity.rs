@@ -1,10 +1,9 @@
 //! What the ladder of fidelities promises.
 
-use nalgebra::Vector3;
 use palpate::sim::collision::Collision;
 use palpate::sim::finger::Effects;
 use palpate::sim::finger::profile::Profile;
-use palpate::sim::probe::rest_y_m;
+use palpate::sim::probe::rest;
 use palpate::sim::{Environment, Scene};
 use palpate::study::fidelity::ladder::{DIAGONAL, RUNGS, is_diagonal};
 use palpate::study::fidelity::order;
@@ -126,14 +125,16 @@ fn an_approach_that_would_press_past_the_skin_is_refused_with_its_limit() {
 fn at_the_limit_of_approach_the_skin_is_not_used_up() {
     let mut scene = noise_free(&scene(&[]));
     let limit_m_s = scene.approach_limit_m_s().unwrap();
-    let ahead_t = scene.finger.attitude_w().inverse() * -Vector3::y();
+    let ahead_t = scene.finger.ahead_t();
     let layers = Profile::biotac(&scene.finger).layers(0.0, &ahead_t);
     let targets = targets(&scene, 4, 0);
     let mut depths_m = |share: f64| -> Vec<Option<f64>> {
         scene.touch.approach_m_s = share * limit_m_s;
         let environment = Arc::new(Environment::build(scene.clone()).unwrap());
         let touches = touch_all(&environment, &targets, 0, &mut || true).unwrap().unwrap();
-        let rest_m = targets.iter().map(|target| rest_y_m(&environment, target).unwrap());
+        let task = environment.task();
+        let rest = |target: &Vec<f64>| rest(&environment, &task.approach(target)).unwrap().p_wt;
+        let rest_m = targets.iter().map(|target| rest(target).y);
         let depth_m = |(rest_m, load): (f64, &Option<ReferenceLoad>)| {
             Some(rest_m - load.as_ref()?.motion.x_wt.translation.y)
         };
