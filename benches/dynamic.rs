@@ -1,4 +1,5 @@
-//! What a touch of a dynamic body costs, and what of it each part does; one thread, best of several.
+//! What a touch of a dynamic body costs, and what of it each part does; one thread, best of
+//! several.
 
 use nalgebra::Isometry3;
 use palpate::backend::Command;

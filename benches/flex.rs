@@ -1,5 +1,5 @@
-//! The skin as finite elements beside the elastic foundation: `cargo bench --bench flex`. Prints the
-//! table of `docs/dynamic.md`.
+//! The skin as finite elements beside the elastic foundation: `cargo bench --bench flex`. Prints
+//! the table of `docs/dynamic.md`.
 
 #[path = "../tests/suite/common/presses.rs"]
 #[allow(dead_code)]

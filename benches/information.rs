@@ -1,9 +1,10 @@
 //! What a touch tells beside its height: contact normals and swept free space, each against the
-//! same trials without, with the body's own contacts (exact, or found by electrodes) and with the errors of
-//! an estimate added.
+//! same trials without, with the body's own contacts (exact, or found by electrodes) and with the
+//! errors of an estimate added.
 //!
-//! `cargo bench --bench information -- toy container bird` prints a table of each experiment; a number
-//! after a name is its trials, and `own` or `estimated`, `active` or `slope` leaves the others out.
+//! `cargo bench --bench information -- toy container bird` prints a table of each experiment; a
+//! number after a name is its trials, and `own` or `estimated`, `active` or `slope` leaves the
+//! others out.
 
 use nalgebra::{Rotation3, Unit, Vector3};
 use palpate::backend::Fault;
@@ -22,8 +23,9 @@ use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 use std::time::Instant;
 
-/// Tilt about either tangent, normal about 0: with two of them the median angle is 1.177 times this,
-/// 17°, the middle of what a real BioTac's estimate has on a flat plate (MiaoLi/syntouchcontact recordings).
+/// Tilt about either tangent, normal about 0: with two of them the median angle is 1.177 times
+/// this, 17°, the middle of what a real BioTac's estimate has on a flat plate
+/// (MiaoLi/syntouchcontact recordings).
 const TILT_RAD: f64 = 0.252;
 /// Error of each coordinate of the contact; chosen.
 const PLACE_SD_M: f64 = 1e-3;

@@ -2,9 +2,9 @@
 //!
 //! The goal is the baseline's median error after some touches, the last ones unless the report's
 //! settings say otherwise. A planner has met it from the first count on from which its own median
-//! stays at or below up to the goal's touches, or else from the first one after them at which it is.
-//! All of it, goal, counts, ways and their ratios, is found again in every sample of the trials, the
-//! same sample for both planners: that is what the intervals are of.
+//! stays at or below up to the goal's touches, or else from the first one after them at which it
+//! is. All of it, goal, counts, ways and their ratios, is found again in every sample of the
+//! trials, the same sample for both planners: that is what the intervals are of.
 
 use super::comparison::pairs;
 use super::experiment::Experiment;

@@ -1,8 +1,8 @@
 //! The table of measures: what trials are judged by, and how each of them is told.
 //!
-//! A measure is a line of [`MEASURES`]. The columns of `summary.csv` with their intervals, the lines
-//! of `comparison.csv`, the panels of the convergence figure, the tables of the page and the names
-//! that a claim may use all follow from that line.
+//! A measure is a line of [`MEASURES`]. The columns of `summary.csv` with their intervals, the
+//! lines of `comparison.csv`, the panels of the convergence figure, the tables of the page and the
+//! names that a claim may use all follow from that line.
 
 use super::metrics::Metrics;
 use super::row::{TouchRow, TrialRow};

@@ -117,8 +117,8 @@ impl Checked for GpSettings {
 /// unreached; chosen well above rounding, below any grid a figure shows.
 const REACHED_WITHIN: f64 = 1e-3;
 
-/// A normal whose y in the zone is smaller is dropped: the slope that follows from it is nearly infinite, and a
-/// small error of the normal changes its sign. Chosen, 87° from the approach.
+/// A normal whose y in the zone is smaller is dropped: the slope that follows from it is nearly
+/// infinite, and a small error of the normal changes its sign. Chosen, 87° from the approach.
 const NORMAL_Y_MIN: f64 = 0.05;
 
 /// The belief of one trial.
@@ -182,11 +182,11 @@ impl Belief {
         }
     }
 
-    /// The slopes (g_x, g_z) = (−n_x, −n_z) / n_y that a normal n means, if they are asked for, and how
-    /// much noisier they are than those of a surface square to the approach.
+    /// The slopes (g_x, g_z) = (−n_x, −n_z) / n_y that a normal n means, if they are asked for, and
+    /// how much noisier they are than those of a surface square to the approach.
     ///
-    /// Of an error dθ of the normal, √(1 + g²)·dθ reaches the slope across the steepest way and
-    /// (1 + g²)·dθ that along it. The smaller is taken for both, chosen: with the larger, a curve as
+    /// Of an error dθ of the normal, √(1 + g²)·dθ reaches the slope across the steepest way and (1
+    /// + g²)·dθ that along it. The smaller is taken for both, chosen: with the larger, a curve as
     /// steep as the toy is passed off as noise.
     fn slope(&self, normal_w: &Vector3<f64>) -> Option<(Vec<f64>, f64)> {
         let normal_z = self.zone.x_wz().inverse_transform_vector(normal_w);

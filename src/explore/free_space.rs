@@ -8,12 +8,12 @@
 //! * mean μ − σ²·h / √(σ² + n²)
 //! * variance σ² − σ⁴·h·(z + h) / (σ² + n²)
 //!
-//! and the height with the noise that would have brought N(μ, σ²) there is observed. Mean and variance
-//! are then those of the cut distribution at that place, and follow from it elsewhere; unless that noise
-//! were below n, which it then is: a belief that contradicts the bound by many standard deviations is
-//! wrong, and a sharp correction of it would swing elsewhere. Bounds that the
-//! mean keeps are left out, though they too would lower it a little; the fit of the hyperparameters
-//! does not see the bounds.
+//! and the height with the noise that would have brought N(μ, σ²) there is observed. Mean and
+//! variance are then those of the cut distribution at that place, and follow from it elsewhere;
+//! unless that noise were below n, which it then is: a belief that contradicts the bound by many
+//! standard deviations is wrong, and a sharp correction of it would swing elsewhere. Bounds that
+//! the mean keeps are left out, though they too would lower it a little; the fit of the
+//! hyperparameters does not see the bounds.
 
 use super::probe::Swept;
 use crate::gp::posterior::Scratch;
@@ -21,11 +21,12 @@ use crate::gp::{Hyperparameters, Observation, Posterior};
 use crate::math::normal;
 use crate::task::Zone;
 
-/// Places along each side at which the bound is kept; chosen, finer than a fingertip in any zone that
-/// takes more than a few touches.
+/// Places along each side at which the bound is kept; chosen, finer than a fingertip in any zone
+/// that takes more than a few touches.
 const PER_SIDE: usize = 41;
 
-/// Places at which a belief is cut at most; chosen, a few for every touch that can still violate one.
+/// Places at which a belief is cut at most; chosen, a few for every touch that can still violate
+/// one.
 const CUTS_MAX: usize = 16;
 
 /// Least softness of a bound, as a fraction of the signal's standard deviation; chosen, the largest
@@ -53,8 +54,8 @@ impl Ceiling {
         }
     }
 
-    /// Cuts the belief where its mean is above the bound by more than its softness, where most first,
-    /// at each place once.
+    /// Cuts the belief where its mean is above the bound by more than its softness, where most
+    /// first, at each place once.
     pub(super) fn cut(&self, belief: &mut Posterior) {
         let &Hyperparameters { noise_sd, signal_sd, .. } = belief.hyperparameters();
         let soft_sd = noise_sd.max(SOFTNESS_MIN * signal_sd);

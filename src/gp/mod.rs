@@ -57,7 +57,8 @@
 //! | [`likelihood`] | how well hyperparameters explain the observations |
 //! | [`fit`], [`search_box`], [`range`] | the most likely hyperparameters, and where to seek them |
 //! | [`reduction`] | how much one more observation would tell |
-//! | [`covariance`], [`dense`], [`cholesky`] | the covariance matrix, factored whole or row by row |
+//! | [`covariance`], [`dense`], [`cholesky`] | the covariance matrix, factored whole or row by row
+//! |
 
 pub mod batch;
 pub mod cholesky;

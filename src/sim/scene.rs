@@ -46,8 +46,8 @@ pub struct Scene {
     pub touch: TouchSettings,
 }
 
-/// A force must stand this many standard deviations of its noise above it to say contact: an approach
-/// is a thousand readings (chosen).
+/// A force must stand this many standard deviations of its noise above it to say contact: an
+/// approach is a thousand readings (chosen).
 const SDS_OF_CONTACT: f64 = 5.0;
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {

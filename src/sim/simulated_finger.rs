@@ -108,9 +108,9 @@ impl SimulatedFinger {
         Ok(misplaced.as_ref().map_or(wrench, |misplaced| wrench.moved(&misplaced.finger)))
     }
 
-    /// Writes into `reading` what a control tick of `period_s` brought: the frames that arrived, what
-    /// a force/torque sensor under the load `mount` (in `T`) says, and the load where no sensor
-    /// tells it.
+    /// Writes into `reading` what a control tick of `period_s` brought: the frames that arrived,
+    /// what a force/torque sensor under the load `mount` (in `T`) says, and the load where no
+    /// sensor tells it.
     pub fn report(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
         reading.frames.clear();
         reading.frames.extend(std::iter::from_fn(|| self.frame()));

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 /// datum, and the finger comes along −y.
 ///
 /// `Z` stands at [`position_m`](Self::position_m) in `W`, turned by
-/// [`rotation_deg`](Self::rotation_deg). Left out, it is `W`: the object is then explored along −y of
-/// the robot's base. A zone turned by −90° about z explores its side towards +x.
+/// [`rotation_deg`](Self::rotation_deg). Left out, it is `W`: the object is then explored along −y
+/// of the robot's base. A zone turned by −90° about z explores its side towards +x.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Zone {
@@ -24,9 +24,9 @@ pub struct Zone {
     #[serde(default)]
     pub datum_y_m: f64,
     /// Nearest and farthest depth at which there may be something to touch, along the approach from
-    /// the origin of `Z`: depth = −y. The finger keeps its stand-off from the nearest and turns back
-    /// behind the farthest. Left out, a simulation takes what its object spans; a real robot must be
-    /// told.
+    /// the origin of `Z`: depth = −y. The finger keeps its stand-off from the nearest and turns
+    /// back behind the farthest. Left out, a simulation takes what its object spans; a real robot
+    /// must be told.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_m: Option<[f64; 2]>,
     /// Where the origin of `Z` stands in `W`.

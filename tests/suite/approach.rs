@@ -57,8 +57,8 @@ fn a_side_is_the_same_from_wherever_it_is_explored() {
         Translation3::new(0.1, -0.2, 0.05),
         UnitQuaternion::from_euler_angles(0.4, -0.3, 2.1),
     );
-    // The rigid hull is exact; the soft finger of a stage feels the same mesh in other axes, in ticks
-    // of the same length, so both are apart by rounding only.
+    // The rigid hull is exact; the soft finger of a stage feels the same mesh in other axes, in
+    // ticks of the same length, so both are apart by rounding only.
     for (name, sets) in [
         ("bird.toml", &[][..]),
         ("container.toml", &[]),

@@ -295,8 +295,8 @@ fn a_recording_that_cannot_be_written_is_a_fault() {
     assert!(matches!(fault, Fault::Unrecorded { .. }), "{fault}");
 }
 
-/// Watching changes no reading and shows the last; the body is never ahead of the clock by more than
-/// the sleep it saves up, and it stops when nobody watches any more.
+/// Watching changes no reading and shows the last; the body is never ahead of the clock by more
+/// than the sleep it saves up, and it stops when nobody watches any more.
 #[test]
 fn a_watched_body_is_the_same_body_at_the_pace_of_the_clock() {
     let simulator = Simulator::new(environment(&[EFFECTS_DRY])).unwrap();

@@ -112,9 +112,9 @@ fn pressed_to_the_same_depth_forces_and_places_are_the_kinematic_ones() {
     assert!(force < 1e-3 && place < 1e-5, "{force} {place}");
 }
 
-/// The same approach, detection and rest. Servos take 40 ms (arm) to stop the finger, by which it ends
-/// deeper; what remains after ten time constants of the controller (0.2 s) is what a tick of a slow
-/// approach makes of depth.
+/// The same approach, detection and rest. Servos take 40 ms (arm) to stop the finger, by which it
+/// ends deeper; what remains after ten time constants of the controller (0.2 s) is what a tick of a
+/// slow approach makes of depth.
 #[test]
 fn a_slow_touch_is_the_kinematic_one() {
     let slow = [
@@ -236,8 +236,8 @@ fn a_finger_without_skin_finds_the_surface() {
     }
 }
 
-/// The limit is √(m / k). A skin whose every constant is 100 times larger bears 100 times the force at
-/// the same depth, so with the limit of force 100 times larger that of the step is a tenth.
+/// The limit is √(m / k). A skin whose every constant is 100 times larger bears 100 times the force
+/// at the same depth, so with the limit of force 100 times larger that of the step is a tenth.
 #[test]
 fn a_step_too_long_for_the_skin_is_divided_or_refused_with_the_longest_that_is_not() {
     let soft = environment("container_finger.toml", &[ARM, DYNAMIC, DRY]);

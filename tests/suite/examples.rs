@@ -5,8 +5,8 @@ mod own_backend;
 #[path = "../../examples/own_planner.rs"]
 mod own_planner;
 
-/// The servo over a body written by hand, with nothing of the simulator: contacts lie on the wall to
-/// what a tick of the approach presses it in, and the belief knows the plane.
+/// The servo over a body written by hand, with nothing of the simulator: contacts lie on the wall
+/// to what a tick of the approach presses it in, and the belief knows the plane.
 #[test]
 fn the_servo_drives_a_body_that_no_simulator_made() {
     let source = include_str!("../../examples/own_backend.rs");

@@ -40,7 +40,8 @@ fn force_and_pressure_grow_with_depth() {
     }
 }
 
-/// Finite elements converge: halving the cells changes the force by less than the refinement before.
+/// Finite elements converge: halving the cells changes the force by less than the refinement
+/// before.
 #[test]
 fn force_converges_with_resolution() {
     let [coarse, middle, fine] =

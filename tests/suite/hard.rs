@@ -45,8 +45,9 @@ fn search_box(touches: &Observations, side: f64, noisiest: f64) -> SearchBox {
 /// Fits, and holds the laws that no data set may break: every number finite, σ no larger than the
 /// prior, and nowhere surer than n touches of that very place would make it.
 ///
-/// The last because an estimate Σ wᵢ·yᵢ errs by the noise's ‖w‖² and, each height having the prior's
-/// deviation s, by at least s²·(1 − √n·‖w‖)²; their sum is least at s²·noise² / (noise² + n·s²).
+/// The last because an estimate Σ wᵢ·yᵢ errs by the noise's ‖w‖² and, each height having the
+/// prior's deviation s, by at least s²·(1 − √n·‖w‖)²; their sum is least at s²·noise² / (noise² +
+/// n·s²).
 fn believe(name: &str, touches: &Observations, middle: f64, side: f64) -> (Fit, Posterior) {
     believe_with(name, touches, middle, side, 1e-2)
 }

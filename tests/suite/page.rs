@@ -12,7 +12,8 @@ use std::process::Command;
 
 const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
 
-/// Acts on the page and leaves a fingerprint of the picture, and the words below it, after each act.
+/// Acts on the page and leaves a fingerprint of the picture, and the words below it, after each
+/// act.
 const DRIVER: &str = r#"
 const explorer = document.getElementById("explorer");
 const log = document.createElement("pre");

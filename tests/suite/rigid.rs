@@ -56,8 +56,9 @@ fn touch(mesh: Mesh, collision: Collision, targets: &[[f64; 2]]) -> Vec<Contact>
     targets.iter().map(&mut touch).collect()
 }
 
-/// How coarsely a geometry knows an object of this size: not at all, by the cells of the height field
-/// (101 over the zone and twice the finger's hull), or by those of MuJoCo's octree (64 a side).
+/// How coarsely a geometry knows an object of this size: not at all, by the cells of the height
+/// field (101 over the zone and twice the finger's hull), or by those of MuJoCo's octree (64 a
+/// side).
 fn cell_m(collision: Collision, size_m: f64) -> f64 {
     match collision {
         Collision::Hull => 0.0,
@@ -68,8 +69,8 @@ fn cell_m(collision: Collision, size_m: f64) -> f64 {
 
 const ALL: [Collision; 3] = [Collision::HeightField, Collision::Hull, Collision::Sdf];
 
-/// Under a ball that rests on it, how far a contact yields: its force at the alarm, of some newtons,
-/// over a stiffness of thousands of newtons per metre.
+/// Under a ball that rests on it, how far a contact yields: its force at the alarm, of some
+/// newtons, over a stiffness of thousands of newtons per metre.
 const YIELD_M: f64 = 5e-4;
 
 /// On a convex object all geometries agree with the ball's formula, and push it outwards.
@@ -92,8 +93,8 @@ fn every_geometry_meets_a_ball_where_it_is_and_pushes_away_from_it() {
     }
 }
 
-/// A block with a groove of 90° along x, 20 mm deep: a ball of radius r rests on both its sides r √2
-/// above its bottom, where the hull has a lid.
+/// A block with a groove of 90° along x, 20 mm deep: a ball of radius r rests on both its sides r
+/// √2 above its bottom, where the hull has a lid.
 fn groove() -> Mesh {
     let profile = [
         [-0.04, -0.04],
@@ -158,14 +159,14 @@ fn a_distance_needs_an_inside() {
     assert_eq!(refused("solver.collision=\"hull\""), None);
 }
 
-/// Amplitude and frequency of a motion that every joint is told at once: its speed never changes faster
-/// than by 2π · 2 Hz · 0.3 rad/s = 3.8 rad/s².
+/// Amplitude and frequency of a motion that every joint is told at once: its speed never changes
+/// faster than by 2π · 2 Hz · 0.3 rad/s = 3.8 rad/s².
 const SWING_RAD_S: f64 = 0.3;
 const SWING_HZ: f64 = 2.0;
 const SWING_RAD_S2: f64 = std::f64::consts::TAU * SWING_HZ * SWING_RAD_S;
 
-/// The fastest change of a joint's speed, rad/s², once an arm has got into its swing, over postures all
-/// over the joints' ranges.
+/// The fastest change of a joint's speed, rad/s², once an arm has got into its swing, over postures
+/// all over the joints' ranges.
 fn jerkiest(integrator: Integrator, step_s: f64) -> f64 {
     let mut scene = scene("container_pa10.toml", &[]);
     (scene.solver.integrator, scene.solver.step_s) = (integrator, step_s);
@@ -194,8 +195,8 @@ fn jerkiest(integrator: Integrator, step_s: f64) -> f64 {
 }
 
 /// Linear theory of what the limit on explicit steps keeps: below 2 over the largest rate of the
-/// servos, the largest eigenvalue of M⁻¹ diag(kv), Euler's steps are stable, below 2.79 Runge and Kutta's.
-/// At 1 ms both are in every posture, at 2 ms neither.
+/// servos, the largest eigenvalue of M⁻¹ diag(kv), Euler's steps are stable, below 2.79 Runge and
+/// Kutta's. At 1 ms both are in every posture, at 2 ms neither.
 #[test]
 fn explicit_steps_are_as_short_as_the_stiffest_servo_needs() {
     for links in ["arm={links=\"C\"}", "arm={links=\"A\"}"] {
@@ -225,8 +226,8 @@ fn explicit_steps_are_as_short_as_the_stiffest_servo_needs() {
     }
 }
 
-/// With every integrator and step that is allowed the arm follows a slow swing about as gently as it
-/// is told. With Euler's steps of 2 ms, which are refused, some motor chatters.
+/// With every integrator and step that is allowed the arm follows a slow swing about as gently as
+/// it is told. With Euler's steps of 2 ms, which are refused, some motor chatters.
 #[test]
 fn no_integrator_makes_the_servos_chatter() {
     use Integrator::{Euler, Implicit, ImplicitFast, Rk4};
@@ -268,9 +269,9 @@ fn every_integrator_presses_alike() -> Result<(), Fault> {
     Ok(())
 }
 
-/// Why `[solver]` has neither iterations nor tolerance: where one finger touches and seven joints rub,
-/// one iteration of MuJoCo's solver finds the force that a hundred do, to the last digits of its
-/// default tolerance.
+/// Why `[solver]` has neither iterations nor tolerance: where one finger touches and seven joints
+/// rub, one iteration of MuJoCo's solver finds the force that a hundred do, to the last digits of
+/// its default tolerance.
 #[test]
 fn one_iteration_finds_the_force_of_contact() {
     let scene = scene("bird_finger.toml", &["body=\"dynamic\"", "effects={}"]);

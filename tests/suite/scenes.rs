@@ -104,7 +104,8 @@ fn mujoco_compiles_the_generated_model() {
     assert!(mujoco::compile("<mujoco><worldbody><geom/></worldbody></mujoco>").is_err());
 }
 
-/// A setting that would change nothing, or be unstable, is refused with its key and what is allowed.
+/// A setting that would change nothing, or be unstable, is refused with its key and what is
+/// allowed.
 #[test]
 fn solver_settings_that_mean_nothing_are_refused() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird_pa10.toml");

@@ -99,8 +99,8 @@ fn the_mean_has_the_slope_that_was_observed() {
 /// Half the way between two near heights that stand for a slope.
 const HALF: f64 = 1e-3;
 
-/// Every touch as four heights around it. With errors of n each, their mean has an error of n / 2 and
-/// a difference over its way, a slope, one of n·√2 / way, independent of it.
+/// Every touch as four heights around it. With errors of n each, their mean has an error of n / 2
+/// and a difference over its way, a slope, one of n·√2 / way, independent of it.
 fn crosses(touches: &[Touch]) -> Observations {
     let mut crosses = Observations::new(2);
     for Touch { place, height, slope, .. } in touches {

@@ -65,8 +65,8 @@ pub fn rest(environment: &Environment, approach: &Approach) -> Option<Rest> {
     Some(Rest { p_wt: start_w + ahead_w.scale(hit.travel_m), hit })
 }
 
-/// How far in front of all that may be touched and behind it the centre of the fingertip's hemisphere
-/// sets out and turns back.
+/// How far in front of all that may be touched and behind it the centre of the fingertip's
+/// hemisphere sets out and turns back.
 fn reach_m(environment: &Environment) -> f64 {
     let finger = &environment.scene().finger;
     finger.radius_m + finger.length_m + CLEARANCE_M

@@ -205,7 +205,8 @@ const GIVES_WAY_M: f64 = 1.5e-3;
 const SILENCE_S: f64 = 0.15;
 
 impl Probe for Servo {
-    /// The centre of the fingertip's hemisphere travels to the stand-off and goes the approach's way.
+    /// The centre of the fingertip's hemisphere travels to the stand-off and goes the approach's
+    /// way.
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         refuse_unless_finite(approach)?;
         let TouchSettings { travel_m_s, approach_m_s, frames, .. } = self.settings;
