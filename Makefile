@@ -10,7 +10,7 @@ PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementat
 FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
 PALPATE := target/release/palpate
 
-.PHONY: demo paper paper-dynamic paper-planners test page-test lint bench contacts growth bench-peers setup tools clean
+.PHONY: demo paper paper-dynamic paper-planners test page-test reference lint bench contacts growth bench-peers setup tools clean
 
 demo: setup
 	cargo build --release --locked
@@ -42,6 +42,10 @@ test: setup
 # The report page in a browser; fails where there is no Chromium.
 page-test: setup
 	PALPATE_PAGE_TEST=1 cargo test --locked --test suite page
+
+# docs/reference.md, from the code; a test holds it to what the code says.
+reference: setup
+	PALPATE_WRITE_REFERENCE=1 cargo test --locked --test suite reference::
 
 lint: setup
 	cargo fmt --check

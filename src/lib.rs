@@ -1,24 +1,31 @@
 //! Palpate: a testbed for active touch.
 //!
 //! A robot finger explores an object it cannot see; a Gaussian process keeps a belief of its
-//! surface; a planner picks the next place to touch. The folders are floors, and a module
-//! imports only from floors below its own:
+//! surface; a planner picks the next place to touch. The folders are rooms on floors, and a file
+//! imports only from its own room and from floors below:
 //!
-//! | floor | folder | what it holds |
+//! | floor | rooms | what they hold |
 //! |---|---|---|
-//! | 6 | `faces` | command line, figures, report page |
-//! | 5 | `trials` | experiment, trial, runner, store, metrics |
-//! | 4 | `conduct` | probe (one touch), planner, belief, arm control |
-//! | 3 | `bodies` | what is commanded and read: simulators, recordings, the real arm |
-//! | 2 | `world` | scene, its configuration, its MuJoCo model |
-//! | 1 | `things` | arm, finger |
-//! | 0 | `ground` | geometry, Gaussian process, optimisers, seeds |
+//! | 9 | [`cli`] | commands |
+//! | 8 | [`report`] | tables, figures, the page: drawn from rows and studies |
+//! | 7 | [`study`] | fidelity, effects, hard cases: questions asked of many touches |
+//! | 6 | [`experiment`] | experiment, trial, runner, store, measures, statistics, truth |
+//! | 5 | [`sim`] | what only a simulator knows: object, effects, physics of the finger, bodies |
+//! | 4 | [`explore`] | what the robot does: belief, planner, probe, control |
+//! | 3 | [`task`], [`backend`] | what the robot is told; what is commanded and read |
+//! | 2 | [`robot`], [`gp`] | arm and finger; Gaussian processes |
+//! | 1 | [`geometry`], [`config`], [`math`] | know nothing of each other |
+//!
+//! [`experiment::Simulation`] is the front door: from an experiment's file to its trials. What
+//! stands below `sim` is what runs on a real arm: a [`Servo`](explore::probe::servo::Servo) is made
+//! of a task, a robot and any [`Backend`](backend::Backend), and cannot see the object.
 //!
 //! # Units and frames
-//! Everything is SI, and names end with the unit (`depth_m`). Frame `W` is the world: the
-//! robot's base, z up; the finger moves along -y to touch. Frame `T` is the fingertip: origin
-//! at the centre of its hemisphere, +x distal, -z out of the pad. `p_WC` names the point C in
-//! frame W, `X_WT` the pose of T in W; in code they are written `p_wc` and `x_wt`.
+//! Everything is SI, and names end with the unit (`depth_m`). Frame `W` is the world: the robot's
+//! base, z up. Frame `Z` is the zone's: the finger moves along its −y to touch, which is −y of `W`
+//! unless the zone has a pose. Frame `T` is the fingertip: origin at the centre of its hemisphere,
+//! +x distal, −z out of the pad. `p_WC` names the point C in frame W, `X_WT` the pose of T in W,
+//! `R_WT` its attitude; in code they are written `p_wc`, `x_wt`, `r_wt`.
 
 pub mod backend;
 pub mod cli;

@@ -1,6 +1,6 @@
 //! `palpate calibrate`.
 
-use super::{Ending, print};
+use super::terminal::{Ending, print};
 use crate::sim::finger::calibration::{Free, Model, Residual, fit, residual};
 use crate::sim::finger::effects::Effects;
 use crate::sim::finger::effects::fluid::FluidEffect;

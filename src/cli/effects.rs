@@ -2,7 +2,7 @@
 
 use super::columns::{aligned, cell};
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::{Ending, print};
+use super::terminal::{Ending, print};
 use crate::experiment::statistics::Paired;
 use crate::report::number::with_interval;
 use crate::sim::Scene;

@@ -1,6 +1,6 @@
 //! `palpate export`.
 
-use super::{Ending, print};
+use super::terminal::{Ending, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
 use crate::gp::posterior::Scratch;

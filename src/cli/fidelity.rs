@@ -2,7 +2,7 @@
 
 use super::columns::{aligned, cell, duration, write_csv, write_figure};
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::{Ending, print};
+use super::terminal::{Ending, print};
 use crate::experiment::store::write_whole;
 use crate::report::pareto;
 use crate::sim::Scene;

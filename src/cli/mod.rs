@@ -5,6 +5,7 @@ mod columns;
 mod effects;
 mod export;
 mod fidelity;
+mod prepare;
 mod progress;
 mod reference;
 mod report;
@@ -12,18 +13,13 @@ mod run;
 mod scan;
 mod show;
 mod stress;
+mod terminal;
 mod watch;
 
-use crate::experiment::{Experiment, Simulation};
 use crate::explore::planner::PLANNERS;
-use crate::sim::Environment;
-use crate::sim::simulator::Simulator;
-pub use reference::reference;
-
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
-use std::io::{self, Write};
 use std::process::ExitCode;
-use std::sync::Arc;
+use terminal::{Ending, print};
 
 /// A testbed for active touch: a robot finger explores an object it cannot see.
 #[derive(Parser)]
@@ -74,14 +70,6 @@ enum Command {
     Calibrate(calibrate::Args),
 }
 
-/// How a command ended, if it did not fail.
-enum Ending {
-    Done,
-    /// What was tested did not hold.
-    Failed,
-    Interrupted,
-}
-
 /// Runs the program on the process's arguments.
 pub fn main() -> ExitCode {
     let command = Cli::command().mut_subcommand("run", |run| {
@@ -103,7 +91,7 @@ pub fn main() -> ExitCode {
         Command::Effects(args) => effects::run(&args),
         Command::Stress(args) => stress::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
-        Command::Reference(args) => reference::run(&args),
+        Command::Reference(_) => print(reference().trim_end()).map(|()| Ending::Done),
     };
     match outcome {
         Ok(Ending::Done) => ExitCode::SUCCESS,
@@ -116,29 +104,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Makes an experiment ready to run, and says on standard error what is not simulated as it asks.
-fn simulation(experiment: Experiment) -> anyhow::Result<Simulation> {
-    let simulation = Simulation::new(experiment)?;
-    tell(simulation.simulator());
-    Ok(simulation)
-}
-
-/// Makes an environment ready for bodies, and says on standard error what is not simulated as its
-/// scene asks.
-fn simulator(environment: &Arc<Environment>) -> anyhow::Result<Simulator> {
-    let simulator = Simulator::new(Arc::clone(environment))?;
-    tell(&simulator);
-    Ok(simulator)
-}
-
-fn tell(simulator: &Simulator) {
-    simulator.notice().iter().for_each(|notice| eprintln!("note: {notice}"));
-}
-
-/// Prints to standard output; a reader who has gone away is no error.
-fn print(text: &str) -> anyhow::Result<()> {
-    match writeln!(io::stdout(), "{text}") {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(()),
-    }
+/// Commands, settings and columns as Markdown: what `docs/reference.md` holds.
+pub fn reference() -> String {
+    reference::text(&Cli::command())
 }

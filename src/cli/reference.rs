@@ -1,22 +1,16 @@
 //! `palpate reference`.
 
-use super::{Cli, Ending, print};
 use crate::report::reference::{fields, measures, rows, settings};
 use crate::report::tables::comparison::ComparisonRecord;
 use crate::report::tables::equal_error::EqualErrorRecord;
-use clap::CommandFactory;
+use clap::Command;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  palpate reference > reference.md")]
 pub(super) struct Args {}
 
-pub(super) fn run(_: &Args) -> anyhow::Result<Ending> {
-    print(reference().trim_end())?;
-    Ok(Ending::Done)
-}
-
 /// Commands, settings and columns as Markdown, from the code that has them.
-pub fn reference() -> String {
+pub(super) fn text(program: &Command) -> String {
     format!(
         "# Reference\n\nWritten by `palpate reference`; `make reference` writes it again.\n\n\
          ## Commands\n{}\n\
@@ -29,7 +23,7 @@ pub fn reference() -> String {
          ## `comparison.csv`\n\n{}\n\
          ## `equal_error.csv`\n\n{}\n\
          ## `trials.jsonl`\n\nOne line for each trial.\n\n{}",
-        commands(),
+        commands(program),
         settings(),
         measures(),
         fields::<ComparisonRecord>(),
@@ -39,9 +33,9 @@ pub fn reference() -> String {
 }
 
 /// The help of every command.
-fn commands() -> String {
+fn commands(program: &Command) -> String {
     let mut text = String::new();
-    for command in Cli::command().get_subcommands() {
+    for command in program.get_subcommands() {
         let name = command.get_name();
         let mut command = command.clone().bin_name(format!("palpate {name}")).term_width(100);
         let help = command.render_long_help().to_string();

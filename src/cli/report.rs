@@ -1,6 +1,6 @@
 //! `palpate report`.
 
-use super::{Ending, print};
+use super::terminal::{Ending, print};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::store::{self, Run};
 use crate::report;

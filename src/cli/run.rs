@@ -1,7 +1,8 @@
 //! `palpate run`.
 
+use super::prepare::simulation;
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::{Ending, print, simulation};
+use super::terminal::{Ending, print};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner;

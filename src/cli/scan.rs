@@ -1,7 +1,8 @@
 //! `palpate scan`.
 
+use super::prepare::simulator;
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::{Ending, print, simulator};
+use super::terminal::{Ending, print};
 use crate::experiment::scan;
 use crate::experiment::scan::ScanTouch;
 use crate::experiment::store::write_whole;

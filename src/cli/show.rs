@@ -1,6 +1,6 @@
 //! `palpate show`.
 
-use super::{Ending, print};
+use super::terminal::{Ending, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::store;
 use crate::experiment::store::Run;

@@ -2,7 +2,7 @@
 
 use super::columns::{aligned, write_csv, write_figure};
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::{Ending, print};
+use super::terminal::{Ending, print};
 use crate::report::severity;
 use crate::report::severity::{CaseVerdicts, short};
 use crate::study::stress::{Case, Outcome, Verdict, cases};

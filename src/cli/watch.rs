@@ -1,7 +1,8 @@
 //! `palpate watch`.
 
+use super::prepare::simulation;
 use super::show::is_experiment;
-use super::{Ending, print, simulation};
+use super::terminal::{Ending, print};
 use crate::backend::Fault;
 use crate::backend::watched::{Sight, Watched};
 use crate::experiment::experiment::Experiment;

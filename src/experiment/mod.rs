@@ -1,4 +1,24 @@
 //! Experiments, their trials, and the folder their results lie in.
+//!
+//! [`Experiment`] is what is run, read from a file or made; [`Simulation`] is the way from it to its
+//! trials; each trial is a row, and everything else is told from rows.
+//!
+//! ```
+//! use palpate::experiment::{Experiment, Simulation, measure};
+//! use palpate::explore::planner;
+//!
+//! # let folder = env!("CARGO_MANIFEST_DIR");
+//! # std::env::set_current_dir(folder)?;
+//! let sets = ["touches=8".into()];
+//! let experiment = Experiment::load("experiments/toy.toml".as_ref(), &sets)?;
+//! let simulation = Simulation::new(experiment)?;
+//! let active = planner::by_name("active").expect("it is there");
+//! let row = simulation.trial(active, 0);
+//! assert_eq!((row.touches.len(), row.failure.clone()), (8, None));
+//! let rmse = (measure::RMSE.of)(&row, 8).expect("it was measured");
+//! assert!(rmse > 0.0 && rmse < 1.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod analysis;
 pub mod comparison;

@@ -17,18 +17,6 @@ use thiserror::Error;
 
 /// An experiment with everything that its trials share: the scene built, its models compiled, the
 /// truth sampled. It never changes, and threads share it.
-///
-/// ```no_run
-/// use palpate::experiment::{Experiment, Simulation};
-/// use palpate::explore::planner;
-///
-/// let experiment = Experiment::load("experiments/toy.toml".as_ref(), &[])?;
-/// let simulation = Simulation::new(experiment)?;
-/// let active = planner::by_name("active").expect("it is there");
-/// let row = simulation.trial(active, 0);
-/// println!("{} touches", row.touches.len());
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub struct Simulation {
     experiment: Experiment,
     simulator: Simulator,

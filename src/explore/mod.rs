@@ -1,4 +1,36 @@
 //! What the robot does, on the bench as in simulation: touch, believe, plan.
+//!
+//! A [`Belief`](belief::Belief) takes in touches and is asked by a [`Planner`](planner::Planner)
+//! where it is unsure; a [`Probe`](probe::Probe) goes the way of an approach. Nothing here knows
+//! where the object is.
+//!
+//! ```
+//! use nalgebra::Vector3;
+//! use palpate::explore::belief::{Belief, GpSettings};
+//! use palpate::explore::planner::{self, PlanningSettings};
+//! use palpate::explore::probe::{Contact, Touch};
+//! use palpate::math::seed;
+//! use palpate::task::Zone;
+//!
+//! // An interval of x, 20 cm wide; the surface there is y = 0.1·x².
+//! let zone = Zone::new([-0.1, 0.1], None);
+//! let mut belief = Belief::new(zone.clone(), GpSettings::default());
+//! let touch_at = |x_m: f64| {
+//!     let p_wc = zone.point(&[x_m], 0.1 * x_m * x_m);
+//!     Touch::Contact(Contact { p_wc, normal_w: Vector3::y() })
+//! };
+//! for x_m in [-0.09, -0.02, 0.05] {
+//!     belief.observe(&[x_m], &touch_at(x_m));
+//! }
+//! belief.refit()?;
+//!
+//! let active = planner::by_name("active").expect("it is there");
+//! let random = seed::stream(1, 0, "planner");
+//! let mut planner = (active.make)(&zone, &PlanningSettings::default(), random);
+//! let plan = planner.plan(&belief);
+//! assert!(zone.contains(&plan.target));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod belief;
 pub mod control;

@@ -20,7 +20,7 @@ pub mod severity;
 pub mod style;
 pub mod tables;
 
-pub use figures::{FIGURES, Figure};
+pub use figures::{Drawing, FIGURES, Figure};
 
 use crate::experiment::analysis::Analysis;
 use crate::experiment::curve_table::curve_table;
@@ -29,14 +29,6 @@ use anyhow::Context;
 use std::fs;
 use std::io;
 use std::path::Path;
-
-/// A figure of one run as it was drawn.
-pub struct Drawing {
-    /// Which figure.
-    pub figure: &'static Figure,
-    /// Its SVG.
-    pub svg: String,
-}
 
 /// Writes the run's tables into its folder: `summary.csv`, `comparison.csv`, `equal_error.csv`.
 ///

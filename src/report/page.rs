@@ -1,8 +1,9 @@
 //! The page of a run: one file that needs nothing beside it.
 
 use super::canvas::escape;
+use super::figures::Drawing;
+use super::findings;
 use super::tables::{Table, claims, comparison, equal_error, summary};
-use super::{Drawing, findings};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::store::Run;
 

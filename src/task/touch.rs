@@ -11,13 +11,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TouchSettings {
-    /// Duration of one control tick; left out, that of the body:
-    /// [`Scene::period_s`](super::Scene::period_s).
+    /// Duration of one control tick; left out, that of the body.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
     /// Speed of travel in front of the object, and of the way back.
     pub travel_m_s: f64,
-    /// Speed of the approach along −y.
+    /// Speed of the approach.
     pub approach_m_s: f64,
     /// Distance kept between the finger's hull and the object's foremost point while travelling.
     pub standoff_m: f64,

@@ -95,12 +95,9 @@ impl Tree {
                 found.extend(self.absolute(module, &path).map(|path| (is_passed_on, path)));
             }
         }
-        for start in ["crate::", "super::"] {
-            for (at, _) in rest.match_indices(start) {
-                let is_path = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
-                let path: String = rest[at..].chars().take_while(|&c| is_path(c)).collect();
-                found.extend(self.absolute(module, &path).map(|path| (false, path)));
-            }
+        let is_path = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
+        for path in rest.split(|c| !is_path(c)).filter(|path| path.contains("::")) {
+            found.extend(self.absolute(module, path).map(|path| (false, path)));
         }
         found
     }

@@ -39,6 +39,7 @@ mod page;
 mod planners;
 mod probes;
 mod reach;
+mod reference;
 mod report;
 #[cfg(feature = "nlopt")]
 mod reproducible;

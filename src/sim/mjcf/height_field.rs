@@ -1,7 +1,7 @@
 //! The object as a height field over the zone: a surface that is explored along one direction is
 //! one, and MuJoCo collides it as it is.
 
-use super::{CONTACT, list, pose};
+use super::text::{CONTACT, list, pose};
 use crate::sim::Environment;
 use crate::sim::environment::{CLEARANCE_M, Shape};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};

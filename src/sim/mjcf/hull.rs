@@ -1,6 +1,7 @@
 //! The object as the convex hull of its mesh, as MuJoCo collides any mesh: every hollow is filled.
 
-use super::{CONTACT, mesh};
+use super::mesh;
+use super::text::CONTACT;
 use crate::sim::Environment;
 
 /// Asset and geom of the hull, which MuJoCo computes.

@@ -7,14 +7,15 @@ mod robot;
 mod scenery;
 mod sdf;
 mod shell;
+mod text;
 
 pub use shell::flex;
 
 use super::collision::Collision;
 use super::environment::Environment;
 use super::solver::Integrator;
-use nalgebra::Isometry3;
-use std::fmt::{Display, Write};
+use std::fmt::Write;
+use text::list;
 
 /// Time step of a model that is only looked at; chosen, the period of the PA-10's servo.
 const PICTURE_STEP_S: f64 = 0.002;
@@ -83,11 +84,6 @@ fn obstacle(environment: &Environment) -> Option<String> {
     }
 }
 
-/// Attributes of the two geoms that collide: without friction, yielding as mount and gears of an
-/// arm would: an arm that has to stop at once would be stopped by force (chosen).
-const CONTACT: &str =
-    r#"contype="1" conaffinity="1" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
-
 /// As MJCF spells it.
 fn keyword(integrator: Integrator) -> &'static str {
     match integrator {
@@ -96,15 +92,4 @@ fn keyword(integrator: Integrator) -> &'static str {
         Integrator::Euler => "Euler",
         Integrator::Rk4 => "RK4",
     }
-}
-
-fn list<T: Display>(numbers: impl IntoIterator<Item = T>) -> String {
-    let texts: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();
-    texts.join(" ")
-}
-
-/// A pose as attributes.
-fn pose(x: &Isometry3<f64>) -> String {
-    let q = x.rotation.quaternion();
-    format!(r#"pos="{}" quat="{}""#, list(x.translation.vector.iter()), list([q.w, q.i, q.j, q.k]))
 }

@@ -1,6 +1,6 @@
 //! The arm or the stage with the finger on it.
 
-use super::{CONTACT, pose};
+use super::text::{CONTACT, pose};
 use crate::robot::arm::settings::TOOL_KG;
 use crate::robot::arm::{Chain, Links};
 use crate::robot::finger::Finger;

@@ -1,7 +1,7 @@
 //! What stands around: the object on its board, the floor, the camera, the lights.
 
-use super::list;
 use super::mesh::asset;
+use super::text::list;
 use crate::geometry::mesh::Mesh;
 use crate::robot::arm::Chain;
 use nalgebra::{Point3, Vector3};

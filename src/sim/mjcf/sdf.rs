@@ -1,6 +1,7 @@
 //! The object as the signed distance field of its mesh, interpolated in MuJoCo's octree.
 
-use super::{CONTACT, mesh};
+use super::mesh;
+use super::text::CONTACT;
 use crate::sim::Environment;
 
 /// Options of the search for contact, asset and geom.

@@ -116,7 +116,7 @@ fn shell(lattice: &Lattice, effect: &FlexEffect) -> String {
     format!(
         r#"<flex name="skin" dim="2" radius="{radius_m}" body="{bodies}" vertex="{vertices}" element="{elements}"><elasticity young="{young_pa}" poisson="{poisson}" damping="{damping_s}" thickness="{thickness_m}" elastic2d="both"/><contact selfcollide="none" {UNTOUCHED}/></flex>"#,
         radius_m = thickness_m / 2.0,
-        elements = super::list(lattice.triangles().iter().flatten()),
+        elements = super::text::list(lattice.triangles().iter().flatten()),
     )
 }
 

@@ -1,0 +1,21 @@
+//! Pieces of MJCF that several parts write.
+
+use nalgebra::Isometry3;
+use std::fmt::Display;
+
+/// Attributes of the two geoms that collide: without friction, yielding as mount and gears of an
+/// arm would: an arm that has to stop at once would be stopped by force (chosen).
+pub(super) const CONTACT: &str =
+    r#"contype="1" conaffinity="1" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
+
+/// Numbers with spaces between them.
+pub(super) fn list<T: Display>(numbers: impl IntoIterator<Item = T>) -> String {
+    let texts: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();
+    texts.join(" ")
+}
+
+/// A pose as attributes.
+pub(super) fn pose(x: &Isometry3<f64>) -> String {
+    let q = x.rotation.quaternion();
+    format!(r#"pos="{}" quat="{}""#, list(x.translation.vector.iter()), list([q.w, q.i, q.j, q.k]))
+}
