@@ -118,17 +118,18 @@ fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
     let predictions = replay.surface.predict(places.iter().map(Vec::as_slice));
     let mut scratch = Scratch::default();
     let mut slope = [0.0; 2];
+    let r_wz = zone.x_wz().rotation;
     let points = places.iter().zip(&predictions).map(|(place, prediction)| {
         replay.surface.mean_gradient(place, &mut slope, &mut scratch);
-        let normal = Vector3::new(-slope[0], 1.0, -slope[1]).normalize();
-        (zone.point(place, prediction.mean), normal)
+        let normal_z = Vector3::new(-slope[0], 1.0, -slope[1]).normalize();
+        (zone.point(place, prediction.mean), r_wz * normal_z)
     });
     let points = points.collect();
     let deviations_m: Vec<f64> = predictions.iter().map(|p| p.variance.sqrt()).collect();
     let largest_m = deviations_m.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let colour = |deviation_m: f64| style::deviation_rgb(deviation_m / largest_m);
     let corners = (1..grid).flat_map(|j| (1..grid).map(move |i| j * grid + i));
-    // Counter-clockwise seen from +y, whence the finger comes.
+    // Counter-clockwise seen from where the finger comes.
     let triangles = corners.flat_map(|here| {
         let [before, below, both] = [here - 1, here - grid, here - grid - 1];
         [[both, before, here], [both, here, below]]
@@ -143,8 +144,8 @@ fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
                 run.experiment.name,
                 replay.touches.len()
             ),
-            "metres in the frame W of the robot's base: z up, touched along -y".into(),
-            "sigma_m: standard deviation of the height y".into(),
+            zone.frame_words(),
+            "sigma_m: standard deviation of the height along the approach".into(),
         ],
         points,
         deviations: deviations_m.iter().map(|&sd_m| (sd_m, colour(sd_m))).collect(),

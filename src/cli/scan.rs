@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
                 "Palpate {}: {name} touched on a grid of {columns} x {rows}",
                 env!("CARGO_PKG_VERSION")
             ),
-            "metres in the frame W of the robot's base: z up, touched along -y".into(),
+            environment.task().zone().frame_words(),
         ],
         points: points.collect(),
         ..Points::default()

@@ -49,7 +49,7 @@ impl<'a> Replay<'a> {
                 touch.target.len(),
                 zone.dimension()
             );
-            belief.observe(&touch.target, &met(touch));
+            belief.observe(&touch.target, &met(zone, touch));
             if let Some(tip) = touch.tip {
                 let finger = experiment.scene.finger.clone();
                 belief.observe_swept(&Swept { finger, p_wt: Point3::from(tip) });
@@ -91,7 +91,7 @@ pub fn row<'a>(run: &'a Run, planner: &str) -> Option<&'a TrialRow> {
 /// The place (x) or (x, z) of a touch and its height above the datum; none for a miss.
 pub fn contact(zone: &Zone, touch: &TouchRow) -> Option<(Vec<f64>, f64)> {
     let p_wc = Point3::from(touch.contact?);
-    Some((zone.place(&p_wc), p_wc.y - zone.datum_y_m))
+    Some((zone.place(&p_wc), zone.height_m(&p_wc)))
 }
 
 /// Every height that a drawing of beliefs of `planners` should have room for: true ones and
@@ -108,12 +108,12 @@ pub fn heights_m<'a>(
     run.truth.heights_m.iter().flatten().copied().chain(touched)
 }
 
-fn met(touch: &TouchRow) -> Touch {
+fn met(zone: &Zone, touch: &TouchRow) -> Touch {
     match touch.contact {
         // A normal that is not recorded was not observed.
         Some(p_wc) => Touch::Contact(Contact {
             p_wc: Point3::from(p_wc),
-            normal_w: touch.normal.map_or(Vector3::y(), Vector3::from),
+            normal_w: touch.normal.map_or_else(|| zone.up_w(), Vector3::from),
         }),
         None => Touch::Miss,
     }

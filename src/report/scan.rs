@@ -25,8 +25,11 @@ pub fn picture(
 ) -> Option<String> {
     let zone = &environment.scene().zone;
     let unit = Length::of(zone);
+    // Everything is drawn in the zone's frame.
+    let x_zw = zone.x_wz().inverse();
+    let mesh = &mesh.transformed(&x_zw);
     let height_m = |y: f64| y - zone.datum_y_m;
-    let felt = || points.iter().map(|(point, _)| height_m(point.y));
+    let felt = || points.iter().map(|(p_w, _)| zone.height_m(p_w));
     let (low, high) = mesh.bounds();
     // Out to whole units, so that the ends of the axes are short to read.
     let around = |low: f64, high: f64| {
@@ -63,7 +66,10 @@ pub fn picture(
     panel.frame(&mut canvas, &format!("{} points of contact", points.len()), "");
     let mut seen: Vec<_> = points
         .iter()
-        .map(|(point, normal)| ([point.x, height_m(point.y), point.z], *normal))
+        .map(|(p_w, normal_w)| {
+            let (p_z, normal_z) = (x_zw * p_w, x_zw.rotation * normal_w);
+            ([p_z.x, height_m(p_z.y), p_z.z], normal_z)
+        })
         .collect();
     seen.sort_by(|(a, _), (b, _)| panel.view.nearness(*a).total_cmp(&panel.view.nearness(*b)));
     for (point, normal) in seen {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Collision {
-    /// A height field over the zone, from rays along −y onto the mesh.
+    /// A height field over the zone, from rays along the approach onto the mesh.
     #[default]
     HeightField,
     /// The mesh's convex hull.

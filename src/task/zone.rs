@@ -128,6 +128,14 @@ impl Zone {
         Point3::new(place.first().copied().unwrap_or(0.0), y_m, z)
     }
 
+    /// In which frame points of this zone are written, and how they were touched, for a file's head.
+    pub fn frame_words(&self) -> String {
+        let [x, y, z] = (-self.up_w()).into();
+        let tidy = |part: f64| (part * 1e6).round() / 1e6 + 0.0;
+        let (x, y, z) = (tidy(x), tidy(y), tidy(z));
+        format!("metres in the frame W of the robot's base: z up, touched along ({x}, {y}, {z})")
+    }
+
     /// The unit vector of `W` along which heights grow: against the approach.
     pub fn up_w(&self) -> Vector3<f64> {
         self.x_wz().rotation * Vector3::y()

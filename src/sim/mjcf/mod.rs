@@ -44,7 +44,7 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     let shown = mode == Mode::Picture;
     let collides = !shown && environment.scene().collides();
     let scenery = match shown {
-        true => scenery::scenery(mesh, &chain),
+        true => scenery::scenery(mesh, environment.task().zone(), &chain),
         false if collides => obstacle(environment)?,
         false => String::new(),
     };

@@ -1,10 +1,11 @@
 //! What stands around: the object on its board, the floor, the camera, the lights.
 
 use super::mesh::asset;
-use super::text::list;
+use super::text::{list, pose};
 use crate::geometry::mesh::Mesh;
 use crate::robot::arm::Chain;
-use nalgebra::{Point3, Vector3};
+use crate::task::Zone;
+use nalgebra::{Point3, Translation3, Vector3};
 
 /// Thickness of the board that the object is fixed to, and how far it reaches beyond it.
 const BOARD_M: f64 = 0.02;
@@ -16,14 +17,19 @@ const BESIDE: Vector3<f64> = Vector3::new(1.08, 0.45, 0.36);
 
 /// Two cameras: `front` sees the object from in front and above, `whole` from beside the finger
 /// all there is.
-pub(super) fn scenery(mesh: &Mesh, chain: &Chain) -> String {
-    let (low, high) = mesh.bounds();
-    let middle = nalgebra::center(&low, &high);
+pub(super) fn scenery(mesh: &Mesh, zone: &Zone, chain: &Chain) -> String {
+    // The board stands behind the object as the finger sees it.
+    let x_wz = zone.x_wz();
+    let (low, high) = mesh.transformed(&x_wz.inverse()).bounds();
+    let middle_z = nalgebra::center(&low, &high);
     let half = (high - low) / 2.0;
-    // The board stands on the floor and overlaps the object.
-    let (foot_z, top_z) = ((low.z - RIM_M).min(0.0), high.z + RIM_M);
-    let board = Point3::new(middle.x, low.y - BOARD_M / 2.0, (foot_z + top_z) / 2.0);
-    let front = middle + Vector3::new(0.9, 2.2, 0.7) * (4.0 * half.norm());
+    // An upright one stands on the floor; every one overlaps the object.
+    let is_upright = (x_wz.rotation * Vector3::z()).z > 1.0 - 1e-9;
+    let floor_z = if is_upright { -x_wz.translation.z } else { f64::INFINITY };
+    let (foot_z, top_z) = ((low.z - RIM_M).min(floor_z), high.z + RIM_M);
+    let board = Translation3::new(middle_z.x, low.y - BOARD_M / 2.0, (foot_z + top_z) / 2.0);
+    let middle = x_wz * middle_z;
+    let front = middle + x_wz.rotation * Vector3::new(0.9, 2.2, 0.7) * (4.0 * half.norm());
     // From the robot's foot to the object, or the object alone if the stage carries the finger.
     let foot = if chain.turns() { Point3::from(chain.base.translation.vector) } else { middle };
     let between = nalgebra::center(&foot, &middle) + Vector3::z() * (0.3 * (foot - middle).norm());
@@ -57,13 +63,13 @@ pub(super) fn scenery(mesh: &Mesh, chain: &Chain) -> String {
     <body name="object">
       <geom name="object" type="mesh" mesh="object" material="porcelain"/>
     </body>
-    <geom name="board" type="box" pos="{board}" size="{board_size}" material="wood"/>
+    <geom name="board" type="box" {board} size="{board_size}" material="wood"/>
   </worldbody>
 "#,
         front = list(front.iter()),
         between = list(between.iter()),
         whole = list(whole.iter()),
-        board = list(board.iter()),
+        board = pose(&(x_wz * board)),
         board_size = list([half.x + RIM_M, BOARD_M / 2.0, (top_z - foot_z) / 2.0]),
     )
 }
