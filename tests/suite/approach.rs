@@ -1,6 +1,7 @@
 //! A zone may look at its object from any side.
 
 use crate::common::shapes::Dice;
+use crate::common::shipped::scene;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use palpate::explore::probe::Touch;
 use palpate::sim::simulator::Simulator;
@@ -9,12 +10,6 @@ use palpate::task::Zone;
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
-
-fn scene(name: &str, sets: &[&str]) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
-    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-    Scene::load(&path, &sets).unwrap()
-}
 
 /// The scene with object and zone turned together about `W`'s origin.
 fn turned(scene: &Scene, x_ww: &Isometry3<f64>) -> Scene {

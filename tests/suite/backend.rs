@@ -1,5 +1,6 @@
 //! What every body promises, asked of each of them and of each with a wrapper around it.
 
+use crate::common::shipped;
 use palpate::backend::delay::Delayed;
 use palpate::backend::limits::Limited;
 use palpate::backend::recorder::Recorder;
@@ -20,9 +21,7 @@ const EVERYTHING: &str = "effects={skin={}, fluid={}, electrodes={}, thermal={},
      wrench={}, registration={}}";
 
 fn environment(sets: &[&str]) -> Arc<Environment> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
-    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-    Arc::new(Environment::build(Scene::load(&path, &sets).unwrap()).unwrap())
+    shipped::environment("container_finger.toml", sets)
 }
 
 /// Puts a wrapper around a body.

@@ -1,5 +1,6 @@
 //! The dynamic body: against the kinematic one, in its speed, its limits and its force of contact.
 
+use crate::common::shipped::{contact, environment};
 use nalgebra::{Isometry3, Translation3};
 use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
 use palpate::explore::control::{Controller, Goal};
@@ -17,19 +18,6 @@ const ARM: &str = "arm={links=\"C\"}";
 const DYNAMIC: &str = "body=\"dynamic\"";
 const DRY: &str = "effects={skin={}}";
 const WET: &str = "effects={skin={}, fluid={}}";
-
-fn environment(name: &str, sets: &[&str]) -> Arc<Environment> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
-    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-    Arc::new(Environment::build(Scene::load(&path, &sets).unwrap()).unwrap())
-}
-
-fn contact(touch: Touch) -> Contact {
-    match touch {
-        Touch::Contact(contact) => contact,
-        other => panic!("{other:?}"),
-    }
-}
 
 /// Keeps every reading of a body.
 struct Tap {

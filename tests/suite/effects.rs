@@ -1,5 +1,6 @@
 //! What the table of effects promises.
 
+use crate::common::shipped;
 use palpate::math::seed;
 use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::frame::FRAME_S;
@@ -15,9 +16,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 fn scene(sets: &[&str]) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
-    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-    Scene::load(&path, &sets).unwrap()
+    shipped::scene("container_finger.toml", sets)
 }
 
 /// Every switch turns the other way and back, and changes nothing but itself and what means

@@ -1,5 +1,6 @@
 //! What the ladder of fidelities promises.
 
+use crate::common::shipped;
 use palpate::sim::collision::Collision;
 use palpate::sim::finger::Effects;
 use palpate::sim::finger::profile::Profile;
@@ -19,9 +20,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 fn scene(sets: &[&str]) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
-    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-    Scene::load(&path, &sets).unwrap()
+    shipped::scene("container_finger.toml", sets)
 }
 
 #[test]

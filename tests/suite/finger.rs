@@ -1,5 +1,6 @@
 //! The soft fingertip against closed forms, energy, a slow twin and everything that can go wrong.
 
+use crate::common::shipped::near;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -37,11 +38,6 @@ fn biotac(samples: usize, cavity_pa_m3: f64) -> Skin {
 
 fn press(skin: &Skin, bvh: &MeshBvh, x_wt: &Isometry3<f64>) -> Load {
     skin.press(bvh, x_wt, &mut skin.relaxed()).unwrap()
-}
-
-#[track_caller]
-fn near(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "found {found}, expected {expected}");
 }
 
 /// Stiffness of a dry column until its gap closes.

@@ -1,6 +1,7 @@
 //! The fingertip's measures, its settings, and that a step does not allocate.
 
 use crate::common::counting::allocations;
+use crate::common::shipped::near;
 use std::f64::consts::PI;
 
 use crate::common::shapes::*;
@@ -13,11 +14,6 @@ use palpate::robot::finger::electrode_table::{normals_t, positions_t};
 use palpate::sim::finger::profile::{CORE_M, Profile};
 use palpate::sim::finger::samples::spread;
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
-
-#[track_caller]
-fn near(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "found {found}, expected {expected}");
-}
 
 #[test]
 fn a_step_does_not_allocate_even_if_nobody_reads_the_frames() {

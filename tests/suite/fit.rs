@@ -1,5 +1,6 @@
 //! Fits reach the global maximum of the likelihood.
 
+use crate::common::shipped::toy;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::gp::kernel::SquaredExponential;
@@ -8,10 +9,6 @@ use palpate::gp::{LogNormal, Mean, Observations, Range, Scale, SearchBox};
 use std::path::Path;
 
 static KERNEL: SquaredExponential = SquaredExponential;
-
-fn toy(x: f64) -> f64 {
-    if x.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x).sin() + 1.0 } else { 1.0 }
-}
 
 /// The ranges of noise and signal that a belief searches by default.
 fn search_box(mean: Mean, length_scales: Vec<Range>) -> SearchBox {

@@ -1,5 +1,6 @@
 //! Rays, nearest points and sweeps against analytic laws and slow twins.
 
+use crate::common::shipped::near;
 use std::sync::Arc;
 
 use crate::common::shapes::*;
@@ -8,11 +9,6 @@ use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::geometry::sweep::{Capsule, Sweep};
 use proptest::prelude::*;
-
-#[track_caller]
-fn near(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance, "found {found}, expected {expected}");
-}
 
 fn unit_box() -> MeshBvh {
     MeshBvh::new(box_mesh(point(-1.0, -1.0, -1.0), point(1.0, 1.0, 1.0)))

@@ -3,6 +3,7 @@
 //! Measured on such cases elsewhere: one library panics on a single touch and returns σ = 0 on a
 //! flat plate, another explains smooth data away as noise, a third predicts NaN after a NaN touch.
 
+use crate::common::shipped::toy;
 use palpate::gp::covariance::CovarianceError;
 use palpate::gp::fit::Fit;
 use palpate::gp::kernel::SquaredExponential;
@@ -11,10 +12,6 @@ use palpate::gp::{Mean, Observations, Posterior, SearchBox};
 use palpate::math::optimize::Stop;
 
 static KERNEL: SquaredExponential = SquaredExponential;
-
-fn toy(x: f64) -> f64 {
-    if x.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x).sin() + 1.0 } else { 1.0 }
-}
 
 /// `count` irregular places on [-2, 2].
 fn spread(count: u32) -> Vec<f64> {

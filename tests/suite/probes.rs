@@ -1,5 +1,6 @@
 //! One touch: the finger's hull against the exact mesh, and the analytic curve.
 
+use crate::common::shipped::environment;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::geometry::sweep::Capsule;
 use palpate::sim::environment::Shape;
@@ -8,12 +9,6 @@ use palpate::sim::{Environment, Scene};
 use proptest::prelude::*;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
-
-fn environment(name: &str, sets: &[&str]) -> Arc<Environment> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
-    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-    Arc::new(Environment::build(Scene::load(&path, &sets).unwrap()).unwrap())
-}
 
 fn open(environment: &Arc<Environment>) -> Box<dyn Probe> {
     Simulator::new(Arc::clone(environment)).unwrap().probe(0).unwrap()

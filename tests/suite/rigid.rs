@@ -1,6 +1,7 @@
 //! A finger without skin, against the object in each geometry that MuJoCo knows, and how its steps
 //! are made.
 
+use crate::common::shipped::scene;
 use mujoco_rs::wrappers::mj_data::MjData;
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 use palpate::backend::{Command, Fault, Wrench};
@@ -22,12 +23,6 @@ const RADIUS_M: f64 = 0.007;
 
 /// Half the side of the zone.
 const HALF_M: f64 = 0.02;
-
-fn scene(name: &str, sets: &[&str]) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
-    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-    Scene::load(&path, &sets).unwrap()
-}
 
 /// Touches `mesh` with a ball on a stage.
 fn touch(mesh: Mesh, collision: Collision, targets: &[[f64; 2]]) -> Vec<Contact> {

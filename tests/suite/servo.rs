@@ -1,5 +1,6 @@
 //! One touch by a body that moves and feels, held to what it promises.
 
+use crate::common::shipped::{contact, environment};
 use palpate::backend::{Backend, Capabilities, Command, Fault, Quantity, Reading};
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::sim::environment::Shape;
@@ -9,25 +10,12 @@ use palpate::sim::{Environment, Scene};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-fn environment(name: &str, sets: &[&str]) -> Arc<Environment> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
-    let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-    Arc::new(Environment::build(Scene::load(&path, &sets).unwrap()).unwrap())
-}
-
 fn simulator(environment: &Arc<Environment>, seed: u64) -> Box<dyn Probe> {
     Simulator::new(Arc::clone(environment)).unwrap().probe(seed).unwrap()
 }
 
 fn touch(environment: &Arc<Environment>, seed: u64, target: &[f64]) -> Result<Touch, Fault> {
     simulator(environment, seed).touch(&environment.task().approach(target))
-}
-
-fn contact(touch: Touch) -> Contact {
-    match touch {
-        Touch::Contact(contact) => contact,
-        other => panic!("{other:?}"),
-    }
 }
 
 /// Distance of a touch's contact from the mesh.

@@ -6,3 +6,4 @@ pub mod counting;
 pub mod presses;
 pub mod runs;
 pub mod shapes;
+pub mod shipped;
