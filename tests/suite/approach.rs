@@ -8,7 +8,6 @@ use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::task::Zone;
 use proptest::prelude::*;
-use std::path::Path;
 use std::sync::Arc;
 
 /// The scene with object and zone turned together about `W`'s origin.

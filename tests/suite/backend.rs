@@ -7,9 +7,8 @@ use palpate::backend::recorder::Recorder;
 use palpate::backend::watched::Watched;
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::robot::arm::Chain;
+use palpate::sim::Environment;
 use palpate::sim::simulator::Simulator;
-use palpate::sim::{Environment, Scene};
-use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 #[cfg(feature = "mujoco")]

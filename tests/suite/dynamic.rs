@@ -4,7 +4,7 @@ use crate::common::shipped::{contact, environment};
 use nalgebra::{Isometry3, Translation3};
 use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
 use palpate::explore::control::{Controller, Goal};
-use palpate::explore::probe::{Contact, Probe, Touch};
+use palpate::explore::probe::{Probe, Touch};
 use palpate::sim::environment::Shape;
 use palpate::sim::mujoco::{Models, StepLimit};
 use palpate::sim::probe::rest;

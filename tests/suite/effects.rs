@@ -12,7 +12,6 @@ use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::study::effects::overhead::BareFinger;
 use palpate::study::effects::{switched, switches};
-use std::path::Path;
 use std::sync::Arc;
 
 fn scene(sets: &[&str]) -> Scene {

@@ -3,11 +3,10 @@
 use crate::common::shipped::environment;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::geometry::sweep::Capsule;
+use palpate::sim::Environment;
 use palpate::sim::environment::Shape;
 use palpate::sim::simulator::Simulator;
-use palpate::sim::{Environment, Scene};
 use proptest::prelude::*;
-use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
 fn open(environment: &Arc<Environment>) -> Box<dyn Probe> {

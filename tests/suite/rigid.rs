@@ -8,6 +8,7 @@ use palpate::backend::{Command, Fault, Wrench};
 use palpate::explore::probe::{Contact, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
+use palpate::sim::Environment;
 use palpate::sim::collision::Collision;
 use palpate::sim::environment::Shape;
 use palpate::sim::mjcf;
@@ -15,8 +16,6 @@ use palpate::sim::mjcf::Mode;
 use palpate::sim::mujoco::{Models, Plant, compile};
 use palpate::sim::simulator::Simulator;
 use palpate::sim::solver::Integrator;
-use palpate::sim::{Environment, Scene};
-use std::path::Path;
 use std::sync::Arc;
 
 const RADIUS_M: f64 = 0.007;

@@ -3,11 +3,10 @@
 use crate::common::shipped::{contact, environment};
 use palpate::backend::{Backend, Capabilities, Command, Fault, Quantity, Reading};
 use palpate::explore::probe::{Contact, Probe, Touch};
+use palpate::sim::Environment;
 use palpate::sim::environment::Shape;
 use palpate::sim::kinematic::Kinematic;
 use palpate::sim::simulator::Simulator;
-use palpate::sim::{Environment, Scene};
-use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 fn simulator(environment: &Arc<Environment>, seed: u64) -> Box<dyn Probe> {
