@@ -61,11 +61,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let stop = stop_on_interrupt("rows")?;
     let bar = progress_bar(&name, "rows", grid[1] as u64, 0);
     let simulator = simulator(&environment)?;
-    let felt = scan::scan(&simulator, grid, args.threads.into(), &stop, &|| step(&bar))?;
+    let touches = scan::scan(&simulator, grid, args.threads.into(), &stop, &|| step(&bar))?;
     bar.finish_and_clear();
-    let Some(felt) = felt else { return Ok(Ending::Interrupted) };
+    let Some(touches) = touches else { return Ok(Ending::Interrupted) };
 
-    let points = felt.iter().filter_map(|felt| match &felt.touch {
+    let points = touches.iter().filter_map(|one| match &one.touch {
         Ok(Touch::Contact(contact)) => Some((contact.p_wc, contact.normal_w)),
         _ => None,
     });
@@ -83,27 +83,27 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     };
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     write_whole(&folder.join("cloud.ply"), &cloud.ply())?;
-    write_whole(&folder.join("cloud.csv"), &csv(&felt))?;
+    write_whole(&folder.join("cloud.csv"), &csv(&touches))?;
     if let Some(svg) = drawing::picture(&environment, mesh, &cloud.points) {
         write_whole(&folder.join("scan.svg"), &svg)?;
         let path = folder.join("scan.png");
         std::fs::write(&path, png::render(&svg)?).with_context(|| path.display().to_string())?;
     }
-    let faults = felt.iter().filter(|felt| felt.touch.is_err()).count();
+    let faults = touches.iter().filter(|one| one.touch.is_err()).count();
     print(&format!(
         "{name}: {} points of contact, {} misses, {faults} faults\nfolder: {}",
         cloud.points.len(),
-        felt.len() - cloud.points.len() - faults,
+        touches.len() - cloud.points.len() - faults,
         folder.display()
     ))?;
     Ok(Ending::Done)
 }
 
 /// A line per target: where it was, how the touch ended, and the contact with its normal.
-fn csv(felt: &[ScanTouch]) -> String {
+fn csv(touches: &[ScanTouch]) -> String {
     let mut text =
         String::from("target_x_m,target_z_m,outcome,x_m,y_m,z_m,normal_x,normal_y,normal_z\n");
-    for ScanTouch { target, touch } in felt {
+    for ScanTouch { target, touch } in touches {
         let place = target.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         let ending = match touch {
             Ok(Touch::Contact(contact)) => {

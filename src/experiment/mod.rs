@@ -1,7 +1,7 @@
 //! Experiments, their trials, and the folder their results lie in.
 //!
-//! [`Experiment`] is what is run, read from a file or made; [`Simulation`] is the way from it to its
-//! trials; each trial is a row, and everything else is told from rows.
+//! [`Experiment`] is what is run, read from a file or made; [`Simulation`] is the way from it to
+//! its trials; each trial is a row, and everything else is told from rows.
 //!
 //! ```
 //! use palpate::experiment::{Experiment, Simulation, measure};

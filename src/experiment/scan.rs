@@ -51,7 +51,7 @@ pub fn scan(
             return None;
         }
         let mut probe = simulator.probe(j as u64);
-        let felt = (0..columns).map(|i| {
+        let touches = (0..columns).map(|i| {
             let target = zone.at(&[share(i, columns), share(j, rows)]);
             let touch = match &mut probe {
                 Ok(probe) => probe.touch(&task.approach(&target)),
@@ -59,11 +59,11 @@ pub fn scan(
             };
             ScanTouch { touch, target }
         });
-        let felt: Vec<ScanTouch> = felt.collect();
+        let touches: Vec<ScanTouch> = touches.collect();
         progress();
-        Some(felt)
+        Some(touches)
     };
-    let felt: Option<Vec<Vec<ScanTouch>>> =
+    let touches: Option<Vec<Vec<ScanTouch>>> =
         pool(threads)?.install(|| (0..rows).into_par_iter().map(row).collect());
-    Ok(felt.map(|rows| rows.into_iter().flatten().collect()))
+    Ok(touches.map(|rows| rows.into_iter().flatten().collect()))
 }

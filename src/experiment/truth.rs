@@ -26,7 +26,7 @@ pub struct Truth {
 const CALIBRATED: usize = 4;
 
 impl Truth {
-    /// Reads the world's surface on a grid of `per_side` places along each side of the zone.
+    /// Reads the environment's surface on a grid of `per_side` places along each side of the zone.
     pub fn sample(environment: &Environment, per_side: usize) -> Self {
         let places = environment.scene().zone.grid(per_side);
         let heights_m: Vec<_> =

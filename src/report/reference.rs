@@ -13,9 +13,9 @@ use std::collections::BTreeMap;
 const COMPLETE: &str = r#"
 name = "reference"
 planners = ["active"]
-trials = 1
+trials = 1000000
 initial_touches = 1
-touches = 1
+touches = 2000
 grid = 2
 [gp]
 noise_sd_m = 1e-3
@@ -26,7 +26,7 @@ signal = { median = 1, spread = 2 }
 [[report.claims]]
 place = ""
 says = ""
-touches = 1
+touches = 2000
 measures = ["r"]
 [scene]
 body = "dynamic"

@@ -29,13 +29,13 @@ pub fn picture(
     let x_zw = zone.x_wz().inverse();
     let mesh = &mesh.transformed(&x_zw);
     let height_m = |y: f64| y - zone.datum_y_m;
-    let felt = || points.iter().map(|(p_w, _)| zone.height_m(p_w));
+    let heights_m = || points.iter().map(|(p_w, _)| zone.height_m(p_w));
     let (low, high) = mesh.bounds();
     // Out to whole units, so that the ends of the axes are short to read.
     let around = |low: f64, high: f64| {
         [(low * unit.per_m).floor() / unit.per_m, (high * unit.per_m).ceil() / unit.per_m]
     };
-    let inside = Axis::around(felt(), 0.04, 5.0)?;
+    let inside = Axis::around(heights_m(), 0.04, 5.0)?;
 
     let mut canvas = Canvas::new(2.0 * PANEL.0, PANEL.1 + FOOT_PX);
     let area =

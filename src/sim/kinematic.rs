@@ -11,7 +11,7 @@ use std::sync::Arc;
 pub struct Kinematic {
     chain: Chain,
     capabilities: Capabilities,
-    sense: SimulatedFinger,
+    finger: SimulatedFinger,
     q: Joints,
     tick: u64,
     reading: Reading,
@@ -24,11 +24,12 @@ impl Kinematic {
     /// [`Fault::Lacks`] in an environment without an object or without a soft finger.
     pub fn new(environment: &Arc<Environment>) -> Result<Self, Fault> {
         let chain = environment.chain().ok_or(Fault::Lacks { part: "an object" })?;
-        let sense = SimulatedFinger::new(Arc::clone(environment), 0);
-        let sense = sense.ok_or(Fault::Lacks { part: "a soft finger" })?;
+        let finger = SimulatedFinger::new(Arc::clone(environment), 0);
+        let finger = finger.ok_or(Fault::Lacks { part: "a soft finger" })?;
         let capabilities = Capabilities::of(&chain, environment.scene().period_s());
         let q = chain.home;
-        let mut body = Self { chain, capabilities, sense, q, tick: 0, reading: Reading::default() };
+        let mut body =
+            Self { chain, capabilities, finger, q, tick: 0, reading: Reading::default() };
         body.report(&Wrench::default(), &Joints::zeros());
         Ok(body)
     }
@@ -47,7 +48,7 @@ impl Kinematic {
         copy(&mut self.reading.q, &self.q);
         copy(&mut self.reading.qdot, qdot);
         copy(&mut self.reading.applied.qdot, qdot);
-        self.sense.report(load, self.capabilities.period_s, &mut self.reading);
+        self.finger.report(load, self.capabilities.period_s, &mut self.reading);
     }
 }
 
@@ -57,7 +58,7 @@ impl Backend for Kinematic {
     }
 
     fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
-        self.sense.reset(seed);
+        self.finger.reset(seed);
         self.q = self.chain.home;
         self.tick = 0;
         self.report(&Wrench::default(), &Joints::zeros());
@@ -75,7 +76,7 @@ impl Backend for Kinematic {
         let qdot = (q - self.q) / period_s;
         let (x_wt, jacobian) = self.chain.jacobian(&q);
         let motion = TipMotion::moving(x_wt, &(jacobian * qdot));
-        let load = self.sense.step(&motion, period_s)?;
+        let load = self.finger.step(&motion, period_s)?;
         self.q = q;
         self.tick += 1;
         self.report(&load, &qdot);

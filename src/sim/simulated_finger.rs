@@ -35,15 +35,15 @@ pub struct SimulatedFinger {
     shell: Option<Box<dyn Shell>>,
     /// Pose of `T` in the frame of the force/torque sensor.
     x_mt: Isometry3<f64>,
-    trial: Trial,
+    drawn: Drawn,
     load: Load,
     /// Whether the fluid tells of contact and the electrodes of its place.
     has_sensor: bool,
 }
 
-/// What a trial's seed decides.
-struct Trial {
-    feel: FingertipState,
+/// What is drawn for one trial by its seed.
+struct Drawn {
+    state: FingertipState,
     gauge: Option<Gauge>,
     misplaced: Option<Misplaced>,
 }
@@ -57,12 +57,12 @@ struct Misplaced {
 }
 
 impl SimulatedFinger {
-    /// Untouched; none in a world without a soft finger.
+    /// Untouched; none in an environment without a soft finger.
     pub fn new(environment: Arc<Environment>, seed: u64) -> Option<Self> {
         let effects = &environment.scene().effects;
         Some(Self {
             x_mt: environment.chain()?.tool,
-            trial: Trial::new(&environment, environment.fingertip()?, seed),
+            drawn: Drawn::new(&environment, environment.fingertip()?, seed),
             shell: None,
             load: Load::default(),
             has_sensor: effects.fluid.is_some() && effects.electrodes.is_some(),
@@ -81,7 +81,7 @@ impl SimulatedFinger {
             shell.reset();
         }
         if let Some(tip) = self.environment.fingertip() {
-            self.trial = Trial::new(&self.environment, tip, seed);
+            self.drawn = Drawn::new(&self.environment, tip, seed);
             self.load = Load::default();
         }
     }
@@ -97,11 +97,11 @@ impl SimulatedFinger {
         else {
             return Ok(Wrench::default());
         };
-        let Trial { feel, misplaced, .. } = &mut self.trial;
+        let Drawn { state, misplaced, .. } = &mut self.drawn;
         let motion = misplaced.as_ref().map_or(*motion, |misplaced| misplaced.motion(motion));
         self.load = match &mut self.shell {
-            Some(shell) => feel.step_loaded(tip, shell.step(&motion.x_wt, dt_s)?, &motion, dt_s),
-            None => feel.step(tip, bvh, &motion, dt_s),
+            Some(shell) => state.step_loaded(tip, shell.step(&motion.x_wt, dt_s)?, &motion, dt_s),
+            None => state.step(tip, bvh, &motion, dt_s),
         }
         .map_err(fault)?;
         let wrench = Wrench { force_n: self.load.force_n, torque_nm: self.load.torque_nm };
@@ -115,7 +115,7 @@ impl SimulatedFinger {
         reading.frames.clear();
         reading.frames.extend(std::iter::from_fn(|| self.frame()));
         let effect = self.environment.scene().effects.wrench.as_ref();
-        reading.wrench = self.trial.gauge.as_mut().zip(effect).map(|(gauge, effect)| {
+        reading.wrench = self.drawn.gauge.as_mut().zip(effect).map(|(gauge, effect)| {
             let Wrench { force_n: f, torque_nm: t } = mount.moved(&self.x_mt);
             let said = gauge.read(effect, &Vector6::new(f.x, f.y, f.z, t.x, t.y, t.z), period_s);
             let said = Wrench {
@@ -129,7 +129,7 @@ impl SimulatedFinger {
 
     /// The oldest tactile frame that has arrived and was not asked for yet.
     pub fn frame(&mut self) -> Option<Frame> {
-        self.trial.feel.frame()
+        self.drawn.state.frame()
     }
 
     /// The load where no sensor tells it.
@@ -156,25 +156,25 @@ impl Misplaced {
     }
 }
 
-impl Trial {
+impl Drawn {
     fn new(environment: &Environment, tip: &Fingertip, seed: u64) -> Self {
         let stream = |purpose| seed::stream(seed, 0, purpose);
         let scene = environment.scene();
         let effects = &scene.effects;
-        let mut trial = Self {
-            feel: FingertipState::new(tip, &stream("finger")),
+        let mut drawn = Self {
+            state: FingertipState::new(tip, &stream("finger")),
             gauge: effects.wrench.as_ref().map(|effect| Gauge::new(effect, stream("wrench"))),
             misplaced: None,
         };
         if let (Some(effect), Some(object)) = (&effects.registration, &scene.object) {
             let error = Registration::new(effect, &mut stream("registration"));
             let x_wo = object.x_wo();
-            trial.misplaced = Some(Misplaced {
+            drawn.misplaced = Some(Misplaced {
                 finger: error.finger,
                 object: x_wo * error.object.inverse() * x_wo.inverse(),
             });
         }
-        trial
+        drawn
     }
 }
 

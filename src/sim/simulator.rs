@@ -1,4 +1,5 @@
-//! What the trials of an experiment share: the world, and what is compiled from it once.
+//! What the trials of an experiment share: the environment, and what is compiled from it once;
+//! it makes their bodies and probes.
 
 use super::kinematic::Kinematic;
 #[cfg(feature = "mujoco")]

@@ -19,7 +19,7 @@ pub struct Dynamic {
     capabilities: Capabilities,
     plant: Plant,
     /// None for a finger without skin, which MuJoCo lets collide.
-    sense: Option<SimulatedFinger>,
+    finger: Option<SimulatedFinger>,
     wrench: Wrench,
     steps: u32,
     tick: u64,
@@ -34,14 +34,14 @@ impl Dynamic {
     pub fn new(environment: &Arc<Environment>, models: &Models) -> Result<Self, Fault> {
         let chain = environment.chain().ok_or(Fault::Lacks { part: "an object" })?;
         let period_s = environment.scene().period_s();
-        let mut sense = SimulatedFinger::new(Arc::clone(environment), 0);
-        if let (Some(sense), Some(shell)) = (&mut sense, models.shell(environment)?) {
-            sense.wear(shell);
+        let mut finger = SimulatedFinger::new(Arc::clone(environment), 0);
+        if let (Some(finger), Some(shell)) = (&mut finger, models.shell(environment)?) {
+            finger.wear(shell);
         }
         let mut body = Self {
             capabilities: Capabilities::of(&chain, period_s),
             plant: Plant::new(Arc::clone(&models.plant))?,
-            sense,
+            finger,
             wrench: Wrench::default(),
             steps: (period_s / models.plant.opt().timestep).round() as u32,
             tick: 0,
@@ -69,9 +69,9 @@ impl Dynamic {
     fn advance(&mut self) -> Result<(), Fault> {
         let step_s = self.plant.step_s();
         self.plant.step(&self.reading.applied.qdot, &self.wrench)?;
-        let Some(sense) = &mut self.sense else { return Ok(()) };
+        let Some(finger) = &mut self.finger else { return Ok(()) };
         let motion = TipMotion::moving(self.plant.tip(), &self.plant.tip_twist());
-        self.wrench = sense.step(&motion, step_s)?;
+        self.wrench = finger.step(&motion, step_s)?;
         Ok(())
     }
 
@@ -95,8 +95,8 @@ impl Dynamic {
         reading.q.extend_from_slice(plant.q());
         reading.qdot.clear();
         reading.qdot.extend_from_slice(plant.qdot());
-        match &mut self.sense {
-            Some(sense) => sense.report(&plant.mount(), self.capabilities.period_s, reading),
+        match &mut self.finger {
+            Some(finger) => finger.report(&plant.mount(), self.capabilities.period_s, reading),
             None => reading.ideal = plant.contact(),
         }
     }
@@ -110,8 +110,8 @@ impl Backend for Dynamic {
     fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
         let joints = self.chain.joints.len();
         self.plant.reset(self.chain.start())?;
-        if let Some(sense) = &mut self.sense {
-            sense.reset(seed);
+        if let Some(finger) = &mut self.finger {
+            finger.reset(seed);
         }
         (self.wrench, self.tick) = (Wrench::default(), 0);
         self.reading.applied.qdot.clear();

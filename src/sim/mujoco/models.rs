@@ -1,4 +1,4 @@
-//! What MuJoCo compiles of a world, once for all trials.
+//! What MuJoCo compiles of an environment, once for all trials.
 
 use super::{FlexShell, ModelError, Substeps, compile};
 use crate::sim::Environment;
@@ -25,7 +25,7 @@ impl Models {
     /// With the scene's time step, or part of it where that is too long for the skin.
     ///
     /// # Errors
-    /// If MuJoCo refuses the world, no step is short enough for its skin, or the object has no
+    /// If MuJoCo refuses the scene, no step is short enough for its skin, or the object has no
     /// inside where the scene's collision needs one.
     pub fn new(environment: &Environment) -> Result<Self, ModelError> {
         let step_s = environment.scene().solver.step_s;
@@ -42,7 +42,7 @@ impl Models {
     /// With a time step of `step_s`, whatever the skin needs.
     ///
     /// # Errors
-    /// If MuJoCo refuses the world, or the object has no inside where the scene's collision needs
+    /// If MuJoCo refuses the scene, or the object has no inside where the scene's collision needs
     /// one.
     pub fn at(environment: &Environment, step_s: f64) -> Result<Self, ModelError> {
         check_inside(environment)?;
@@ -51,7 +51,7 @@ impl Models {
         Ok(Self { plant, flex: FlexShell::model(environment)?, substeps: None })
     }
 
-    /// The skin of `[effects.flex]`, at rest; none if the world has none.
+    /// The skin of `[effects.flex]`, at rest; none if the scene has none.
     ///
     /// # Errors
     /// If memory is short.

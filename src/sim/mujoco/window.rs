@@ -49,7 +49,7 @@ impl Window {
     /// Opens it on the picture of `world`.
     ///
     /// # Errors
-    /// If the world has nothing to show, or there is no display with OpenGL.
+    /// If the environment has nothing to show, or there is no display with OpenGL.
     pub fn open(environment: &Environment, title: &str) -> Result<Self, WindowError> {
         let picture = mjcf::scene(environment, Mode::Picture);
         let picture = picture.ok_or(ModelError::Lacks { part: "an object" })?;

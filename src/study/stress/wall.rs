@@ -168,7 +168,7 @@ fn many(count: f64, period_s: f64) -> Outcome {
     scene.effects.skin.get_or_insert_default().samples = 125;
     let Some(mesh) = mesh(wall(0.05), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
     let Ok(environment) = environment_of(scene, mesh) else {
-        return Outcome::Wrong("no world".into());
+        return Outcome::Wrong("no environment".into());
     };
     let simulator = match Simulator::new(Arc::clone(&environment)) {
         Ok(simulator) => simulator,

@@ -79,11 +79,11 @@ impl ContactMonitor {
         {
             return Some(ApproachEnd::Overload);
         }
-        let felt = match pressure {
+        let is_felt = match pressure {
             Some(_) => self.touching,
             None => self.force_n > self.settings.detection_n,
         };
-        felt.then_some(ApproachEnd::Contact)
+        is_felt.then_some(ApproachEnd::Contact)
     }
 
     /// What was felt since [`forget`](Self::forget) is the rest.
