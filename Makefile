@@ -12,6 +12,8 @@ PALPATE := target/release/palpate
 
 .PHONY: demo paper paper-dynamic paper-planners test page-test reference lint bench contacts growth bench-peers setup tools clean
 
+EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
+
 demo: setup
 	cargo build --release --locked
 	$(PALPATE) run experiments/demo.toml
@@ -38,6 +40,7 @@ paper-planners: setup
 
 test: setup
 	cargo test --locked
+	for example in $(EXAMPLES); do cargo run --quiet --locked --example $$example || exit; done
 
 # The report page in a browser; fails where there is no Chromium.
 page-test: setup
