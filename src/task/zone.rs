@@ -128,7 +128,8 @@ impl Zone {
         Point3::new(place.first().copied().unwrap_or(0.0), y_m, z)
     }
 
-    /// In which frame points of this zone are written, and how they were touched, for a file's head.
+    /// In which frame points of this zone are written, and how they were touched: the head of a
+    /// file.
     pub fn frame_words(&self) -> String {
         let [x, y, z] = (-self.up_w()).into();
         let tidy = |part: f64| (part * 1e6).round() / 1e6 + 0.0;

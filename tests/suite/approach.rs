@@ -27,9 +27,12 @@ fn turned(scene: &Scene, x_ww: &Isometry3<f64>) -> Scene {
 fn found(scene: Scene, targets: &[Vec<f64>]) -> Vec<Option<[f64; 6]>> {
     let environment = Arc::new(Environment::build(scene).unwrap());
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
-    let mut probe = simulator.probe(3).unwrap();
     let zone = environment.task().zone();
-    let touch = |target: &Vec<f64>| match probe.touch(&environment.task().approach(target)).unwrap()
+    // A body of its own for each: ways back are whole numbers of ticks, whose last one hangs on
+    // rounding, and the next touch would begin beside where it did.
+    let touch = |target: &Vec<f64>| match (simulator.probe(3).unwrap())
+        .touch(&environment.task().approach(target))
+        .unwrap()
     {
         Touch::Contact(contact) => {
             let place = zone.place(&contact.p_wc);
