@@ -158,7 +158,6 @@ pub static MEASURES: &[Measure] = &[
     .drawn(Scale::Undrawn)
     .untabled(),
     less("nlpd", "NLPD", PLAIN, |row, n| metrics(row, n)?.nlpd).drawn(Scale::Undrawn),
-    less("jitter", "jitter of the covariance", PLAIN, |row, n| Some(touch(row, n)?.jitter)),
     less("path_m", "lateral travel", METRES, TrialRow::path_m),
     less("time_s", "time of the body", SECONDS, |row, n| touch(row, n)?.time_s)
         .drawn(Scale::Undrawn),
