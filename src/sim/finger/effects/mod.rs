@@ -9,7 +9,6 @@ pub mod electrodes;
 pub mod flex;
 pub mod fluid;
 pub mod friction;
-pub mod gain;
 pub mod registration;
 pub mod skin;
 pub mod switch;
@@ -39,8 +38,6 @@ table::effects! {
     thermal: thermal::ThermalEffect,
     /// Tangential forces.
     friction: friction::FrictionEffect,
-    /// A factor on the load.
-    gain: gain::GainEffect,
     /// The force/torque sensor behind the finger.
     wrench: wrench::WrenchEffect,
     /// Errors of the finger's and the object's place.
