@@ -1,11 +1,14 @@
 //! A thing that can be put into something and taken out alone.
 
+/// Puts something into a `T`, or takes it out.
+type Set<T> = Box<dyn Fn(&mut T, bool)>;
+
 /// A switch in a `T`.
 pub struct Switch<T> {
     /// As in the scene's file.
     pub name: String,
     is_on: Box<dyn Fn(&T) -> bool>,
-    set: Box<dyn Fn(&mut T, bool)>,
+    set: Set<T>,
 }
 
 impl<T: 'static> Switch<T> {
