@@ -144,7 +144,7 @@ fn compare(name: &str, trials: u32, is_own: bool, planner: &str) {
         let heights = baseline.get_or_insert_with(|| rows.clone());
         let rmse = |metrics: &Metrics| unit * metrics.rmse_m;
         let both: Vec<TrialRow> = heights.iter().chain(&rows).cloned().collect();
-        let equal = equal_error(&experiment, &both, [belief, BELIEFS[0].0], &RMSE);
+        let equal = equal_error(experiment, &both, [belief, BELIEFS[0].0], &RMSE);
         let equal = equal.filter(|_| belief != BELIEFS[0].0).map_or(String::new(), |equal| {
             format!("{} × {}", shown(&equal.touches, 0), shown(&equal.ratio, 2))
         });
