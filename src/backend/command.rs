@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Joint velocities for the next tick.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Command {
-    /// One entry per joint, in the order of [`Capabilities::joints`]: rad/s, or m/s where the
-    /// joint slides.
+    /// One entry per joint, in the order of [`Capabilities::joints`](super::Capabilities::joints):
+    /// rad/s, or m/s where the joint slides.
     pub qdot: Vec<f64>,
 }
