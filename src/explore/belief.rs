@@ -186,8 +186,8 @@ impl Belief {
     /// how much noisier they are than those of a surface square to the approach.
     ///
     /// Of an error dθ of the normal, √(1 + g²)·dθ reaches the slope across the steepest way and
-    /// (1 + g²)·dθ that along it. The smaller is taken for both, chosen: with the larger, a curve as
-    /// steep as the toy is passed off as noise.
+    /// (1 + g²)·dθ that along it. The smaller is taken for both, chosen: with the larger, a curve
+    /// as steep as the toy is passed off as noise.
     fn slope(&self, normal_w: &Vector3<f64>) -> Option<(Vec<f64>, f64)> {
         let normal_z = self.zone.x_wz().inverse_transform_vector(normal_w);
         let is_usable = self.settings.normals
