@@ -1,12 +1,11 @@
 //! One control tick of a body: what it is told, what it can do, and the trait.
 
-use crate::robot::arm::chain::MAX_JOINTS;
-use crate::robot::arm::{Chain, Joints};
-use serde::{Deserialize, Serialize};
-
 use super::command::Command;
 use super::fault::Fault;
 use super::reading::Reading;
+use crate::robot::arm::chain::MAX_JOINTS;
+use crate::robot::arm::{Chain, Joints};
+use serde::{Deserialize, Serialize};
 
 /// What a body can do, known before it is connected.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,6 +36,15 @@ impl Capabilities {
             resettable: true,
             real_time: false,
         }
+    }
+
+    /// Whether the body moves the joints of `chain`.
+    ///
+    /// # Errors
+    /// [`Fault::Joints`] if their numbers differ.
+    pub fn fit(&self, chain: &Chain) -> Result<(), Fault> {
+        let (expected, found) = (chain.joints.len(), self.joints.len());
+        if expected == found { Ok(()) } else { Err(Fault::Joints { expected, found }) }
     }
 
     /// The command as numbers, one for each joint.

@@ -3,6 +3,7 @@
 use super::{Backend, Capabilities, Command, Fault, Reading};
 use crate::math::seed;
 use crate::robot::finger::Frame;
+use crate::robot::finger::frame::FULL_SCALE_COUNTS;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
@@ -71,9 +72,9 @@ impl FaultInjector {
             }
             Failure::Saturated => {
                 for frame in &mut reading.frames {
-                    frame.pdc_counts = frame.pdc_counts.map(|_| FULL_COUNTS);
+                    frame.pdc_counts = frame.pdc_counts.map(|_| FULL_SCALE_COUNTS);
                     frame.electrode_counts =
-                        frame.electrode_counts.map(|all| all.map(|_| FULL_COUNTS));
+                        frame.electrode_counts.map(|all| all.map(|_| FULL_SCALE_COUNTS));
                 }
             }
             Failure::Lost(share) => reading.frames.retain(|_| rng.random::<f64>() >= share),
@@ -89,7 +90,7 @@ impl FaultInjector {
                     if let Some(pdc) = &mut frame.pdc_counts
                         && rng.random::<f64>() < share
                     {
-                        *pdc = FULL_COUNTS * rng.random::<f64>();
+                        *pdc = FULL_SCALE_COUNTS * rng.random::<f64>();
                     }
                 }
             }
@@ -97,9 +98,6 @@ impl FaultInjector {
         }
     }
 }
-
-/// End of the converter's range.
-const FULL_COUNTS: f64 = 4095.0;
 
 impl Backend for FaultInjector {
     fn capabilities(&self) -> &Capabilities {

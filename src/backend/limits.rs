@@ -33,11 +33,8 @@ impl Limited {
     /// # Errors
     /// [`Fault::Joints`] if their numbers of joints differ.
     pub fn new(inner: Box<dyn Backend>, chain: Chain) -> Result<Self, Fault> {
-        let count = inner.capabilities().joints.len();
-        if count != chain.joints.len() {
-            return Err(Fault::Joints { expected: chain.joints.len(), found: count });
-        }
-        let command = Command { qdot: vec![0.0; count] };
+        inner.capabilities().fit(&chain)?;
+        let command = Command { qdot: vec![0.0; chain.joints.len()] };
         let q = chain.start().to_vec();
         Ok(Self { inner, chain, command, q, time_s: 0.0, silent_ticks: 0, fault: None })
     }

@@ -49,8 +49,8 @@ fn aggregates(
     let summary = point.of(measure);
     let mut values = Vec::new();
     if measure.aggregate.has_mean() {
-        values.push((measure.column("mean"), summary.map(|summary| summary.mean)));
-        values.push((measure.column("se"), summary.and_then(|summary| summary.error)));
+        values.push(summary.map(|summary| summary.mean));
+        values.push(summary.and_then(|summary| summary.error));
     }
     if measure.aggregate.has_median() {
         let all: Vec<f64> = summary::fitted(rows, &point.planner, point.touches)
@@ -58,11 +58,11 @@ fn aggregates(
             .filter_map(|row| (measure.of)(row, point.touches))
             .collect();
         let interval = median_interval(&all, experiment.seed);
-        values.push((measure.column("median"), summary.map(|summary| summary.median)));
-        values.push((measure.column("median_low"), interval.map(|[low, _]| low)));
-        values.push((measure.column("median_high"), interval.map(|[_, high]| high)));
+        values.push(summary.map(|summary| summary.median));
+        values.push(interval.map(|[low, _]| low));
+        values.push(interval.map(|[_, high]| high));
     }
-    values
+    measure.columns().into_iter().zip(values).collect()
 }
 
 fn differences(

@@ -171,6 +171,19 @@ pub fn by_id(id: &str) -> Option<&'static Measure> {
 }
 
 impl Measure {
+    /// The columns of what is told of it over many trials: its mean with the standard error, its
+    /// median with the ends of its interval.
+    pub fn columns(&self) -> Vec<String> {
+        let mut statistics = Vec::new();
+        if self.aggregate.has_mean() {
+            statistics.extend(["mean", "se"]);
+        }
+        if self.aggregate.has_median() {
+            statistics.extend(["median", "median_low", "median_high"]);
+        }
+        statistics.into_iter().map(|statistic| self.column(statistic)).collect()
+    }
+
     /// A column of a file that holds `statistic` of it: the statistic stands before the unit.
     pub fn column(&self, statistic: &str) -> String {
         format!("{}_{statistic}{}", self.stem(), self.unit.suffix)

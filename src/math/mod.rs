@@ -2,5 +2,6 @@
 
 pub mod normal;
 pub mod optimize;
+pub mod pose;
 pub mod seed;
 pub mod simd;

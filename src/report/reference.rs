@@ -195,20 +195,9 @@ pub fn measures() -> String {
             Direction::More => "more",
             Direction::Neither => "neither",
         };
-        let mut columns = Vec::new();
-        if measure.aggregate.has_mean() {
-            columns.extend([measure.column("mean"), measure.column("se")]);
-        }
-        if measure.aggregate.has_median() {
-            let ends = ["median", "median_low", "median_high"];
-            columns.extend(ends.map(|end| measure.column(end)));
-        }
+        let columns = measure.columns();
         let columns: Vec<String> = columns.iter().map(|name| format!("`{name}`")).collect();
-        let unit = match measure.unit.suffix {
-            "_m" => "m",
-            "_s" => "s",
-            _ => "",
-        };
+        let unit = measure.unit.suffix.trim_start_matches('_');
         let title = cell(measure.title);
         text += &format!(
             "| `{}` | {title} | {unit} | {better} | {} |\n",

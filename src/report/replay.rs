@@ -113,7 +113,7 @@ fn met(zone: &Zone, touch: &TouchRow) -> Touch {
         // A normal that is not recorded was not observed.
         Some(p_wc) => Touch::Contact(Contact {
             p_wc: Point3::from(p_wc),
-            normal_w: touch.normal.map_or_else(|| zone.up_w(), Vector3::from),
+            normal_w: touch.normal.map_or_else(|| -zone.ahead_w().into_inner(), Vector3::from),
         }),
         None => Touch::Miss,
     }

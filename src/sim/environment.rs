@@ -157,8 +157,7 @@ impl Environment {
             Shape::Function(function) => place.first().map(|&x| function.height_m(x)),
             Shape::Mesh { bvh, .. } => {
                 let zone = &self.scene.zone;
-                let approach = self.task.approach(place);
-                let ahead_w = approach.direction_w();
+                let ahead_w = zone.ahead_w();
                 let [near_m, far_m] = self.task.depth_m();
                 let start_y_m = -near_m + CLEARANCE_M;
                 let start_w = zone.x_wz() * zone.local(place, start_y_m);

@@ -4,13 +4,14 @@ use super::function::Function;
 use super::solver::SolverSettings;
 use crate::config::{Checked, ConfigError, Loader, Rules};
 use crate::geometry::surfaces;
+use crate::math::pose::pose;
 use crate::robot::arm::ArmSettings;
 use crate::robot::finger::Finger;
 use crate::sim::finger::Effects;
 use crate::sim::finger::profile::Profile;
 use crate::task::touch::TouchSettings;
 use crate::task::zone::Zone;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::Isometry3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -147,11 +148,7 @@ impl Unit {
 impl Object {
     /// Pose of the mesh's frame in `W`.
     pub fn x_wo(&self) -> Isometry3<f64> {
-        let [roll, pitch, yaw] = self.rotation_deg.map(f64::to_radians);
-        Isometry3::from_parts(
-            Translation3::from(self.position_m),
-            UnitQuaternion::from_euler_angles(roll, pitch, yaw),
-        )
+        pose(self.position_m, self.rotation_deg)
     }
 }
 

@@ -1,7 +1,8 @@
 //! The rectangle that is explored.
 
 use crate::config::{Checked, Rules};
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use crate::math::pose::pose;
+use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -99,11 +100,7 @@ impl Zone {
 
     /// Pose of `Z` in `W`.
     pub fn x_wz(&self) -> Isometry3<f64> {
-        let [roll, pitch, yaw] = self.rotation_deg.map(f64::to_radians);
-        Isometry3::from_parts(
-            Translation3::from(self.position_m),
-            UnitQuaternion::from_euler_angles(roll, pitch, yaw),
-        )
+        pose(self.position_m, self.rotation_deg)
     }
 
     /// The place (x) or (x, z) of a point in `W`.
@@ -131,15 +128,15 @@ impl Zone {
     /// In which frame points of this zone are written, and how they were touched: the head of a
     /// file.
     pub fn frame_words(&self) -> String {
-        let [x, y, z] = (-self.up_w()).into();
+        let [x, y, z] = self.ahead_w().into_inner().into();
         let tidy = |part: f64| (part * 1e6).round() / 1e6 + 0.0;
         let (x, y, z) = (tidy(x), tidy(y), tidy(z));
         format!("metres in the frame W of the robot's base: z up, touched along ({x}, {y}, {z})")
     }
 
-    /// The unit vector of `W` along which heights grow: against the approach.
-    pub fn up_w(&self) -> Vector3<f64> {
-        self.x_wz().rotation * Vector3::y()
+    /// Which way the finger goes, in `W`: against the growing heights.
+    pub fn ahead_w(&self) -> UnitVector3<f64> {
+        UnitVector3::new_unchecked(self.x_wz().rotation * -Vector3::y())
     }
 
     /// An even grid with `per_side` places along each side, edges included, x varying fastest.

@@ -131,7 +131,7 @@ proptest! {
         let approach = task.approach(&place);
         let way = approach.p_far_w - approach.p_near_w;
         prop_assert!((way - approach.direction_w().scale(0.3)).norm() < 1e-12);
-        prop_assert!((approach.direction_w().into_inner() + zone.up_w()).norm() < 1e-15);
+        prop_assert!((approach.direction_w().into_inner() - zone.ahead_w().into_inner()).norm() < 1e-15);
         for p_w in [approach.p_near_w, approach.p_far_w] {
             prop_assert!(zone.distance(&zone.place(&p_w), &place) < 1e-11);
         }

@@ -104,8 +104,7 @@ impl Tree {
 
     fn absolute(&self, module: &Module, path: &str) -> Option<Module> {
         let path = path.split(" as ").next().unwrap();
-        let mut parts: Vec<&str> = path.split("::").filter(|part| !part.is_empty()).collect();
-        parts.retain(|part| *part != "self" || parts_are_one(path));
+        let parts: Vec<&str> = path.split("::").filter(|part| !part.is_empty()).collect();
         let mut from = match parts.first() {
             Some(&"crate") => Module::new(),
             Some(&"super") => module.clone(),
@@ -158,10 +157,6 @@ impl Tree {
         };
         self.texts.keys().map(|module| (module.clone(), to(module))).collect()
     }
-}
-
-fn parts_are_one(path: &str) -> bool {
-    path.starts_with("self")
 }
 
 fn is_import(line: &str) -> bool {

@@ -3,6 +3,7 @@
 use super::chain::{Chain, Joints};
 use super::pa10::Links;
 use crate::config::{Checked, Rules};
+use crate::math::pose::pose;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -48,12 +49,8 @@ impl Default for ArmSettings {
 impl ArmSettings {
     /// The arm as a chain from `W` to `T`.
     pub fn chain(&self) -> Chain {
-        let [roll, pitch, yaw] = self.base_rotation_deg.map(f64::to_radians);
         Chain {
-            base: Isometry3::from_parts(
-                Translation3::from(self.base_position_m),
-                UnitQuaternion::from_euler_angles(roll, pitch, yaw),
-            ),
+            base: pose(self.base_position_m, self.base_rotation_deg),
             joints: self.links.joints().into(),
             flange: Translation3::new(0.0, 0.0, self.links.flange_m()).into(),
             tool: tool(self.mount_m),

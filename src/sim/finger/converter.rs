@@ -5,8 +5,7 @@ use super::effects::Effects;
 use super::effects::electrodes::Electrodes;
 use super::effects::fluid::Filter;
 use super::effects::timing::{Channel, channel};
-use crate::robot::finger::frame::{ELECTRODES, Frame, VIBRATIONS};
-use crate::robot::finger::frame::{SLOTS, SLOTS_HZ};
+use crate::robot::finger::frame::{ELECTRODES, FRAME_S, Frame, SLOTS, SLOTS_HZ, VIBRATIONS};
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 
@@ -192,8 +191,7 @@ impl Converter {
     fn finish(&mut self, parts: &Parts, time_s: f64) {
         self.frame.time_s = time_s;
         if let (Some(electrodes), Some(rng)) = (parts.electrodes, &mut self.electrodes_rng) {
-            let frame_s = SLOTS as f64 / SLOTS_HZ;
-            self.drift_counts = electrodes.drifted(self.drift_counts, frame_s, rng);
+            self.drift_counts = electrodes.drifted(self.drift_counts, FRAME_S, rng);
         }
         let mut batch = 1;
         if let Some(timing) = &parts.effects.timing {

@@ -4,7 +4,7 @@
 use super::text::{CONTACT, list, pose};
 use crate::sim::Environment;
 use crate::sim::environment::{CLEARANCE_M, Shape};
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
 /// Heights along each side. On the bird, 101 were measured to place a finger's contact within
@@ -25,7 +25,7 @@ pub(super) fn obstacle(environment: &Environment) -> Option<String> {
     let at =
         |[low, high]: [f64; 2], i: usize| low + (high - low) * i as f64 / (PER_SIDE - 1) as f64;
     let x_wz = scene.zone.x_wz();
-    let ahead_w = UnitVector3::new_unchecked(-scene.zone.up_w());
+    let ahead_w = scene.zone.ahead_w();
     let [near_m, far_m] = environment.task().depth_m();
     let start_y_m = -near_m + CLEARANCE_M;
     let heights: Vec<Option<f64>> = (0..PER_SIDE * PER_SIDE)

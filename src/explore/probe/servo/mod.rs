@@ -53,17 +53,14 @@ impl Servo {
         mut body: Box<dyn Backend>,
         seed: u64,
     ) -> Result<Self, Fault> {
-        let (expected, found) = (robot.chain.joints.len(), body.capabilities().joints.len());
-        if expected != found {
-            return Err(Fault::Joints { expected, found });
-        }
+        body.capabilities().fit(&robot.chain)?;
         let control = Controller::new(robot.chain.clone(), body.capabilities().period_s)
             .map_err(|cause| Fault::NoCommand { time_s: 0.0, cause })?;
         let mut state = State::default();
         state.take(body.reset(seed)?)?;
         Ok(Self {
             monitor: ContactMonitor::new(&settings),
-            command: Command { qdot: vec![0.0; expected] },
+            command: Command { qdot: vec![0.0; robot.chain.joints.len()] },
             robot,
             body,
             control,

@@ -1,0 +1,13 @@
+//! Poses as files give them.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+
+/// The pose of a frame whose origin stands at `position_m`, turned by `rotation_deg` about the
+/// fixed axes x, then y, then z.
+pub fn pose(position_m: [f64; 3], rotation_deg: [f64; 3]) -> Isometry3<f64> {
+    let [roll, pitch, yaw] = rotation_deg.map(f64::to_radians);
+    Isometry3::from_parts(
+        Translation3::from(position_m),
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+    )
+}
