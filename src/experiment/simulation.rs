@@ -7,11 +7,12 @@ use super::truth::Truth;
 use crate::backend::Fault;
 use crate::explore::planner;
 use crate::explore::probe::Probe;
-use crate::math::optimize;
+use crate::math::{optimize, seed};
 use crate::sim::Environment;
 use crate::sim::environment::EnvironmentError;
 use crate::sim::simulator::{Simulator, SimulatorError};
 use crate::task::Task;
+use rand::RngExt;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -112,7 +113,7 @@ impl Simulation {
 
     /// Seed of all the randomness of a trial's body.
     pub fn body_seed(&self, trial: u32) -> u64 {
-        trial::body_seed(&self.experiment, trial)
+        seed::stream(self.experiment.seed, trial.into(), "body").random()
     }
 
     /// What touches in a trial.

@@ -9,12 +9,6 @@ use crate::explore::planner::{Plan, uniform};
 use crate::explore::probe::{Probe, Touch};
 use crate::math::seed;
 use crate::task::Task;
-use rand::RngExt;
-
-/// Seed of all the randomness of a trial's body.
-pub fn body_seed(experiment: &Experiment, trial: u32) -> u64 {
-    seed::stream(experiment.seed, trial.into(), "body").random()
-}
 
 /// Runs one trial of `planner` from start to end with the touches of `probe`.
 ///

@@ -63,6 +63,18 @@ pub enum EnvironmentError {
         /// The object's extent.
         depth_m: [f64; 2],
     },
+    /// The object reaches out of the zone's depth range towards the finger, which would set out
+    /// inside it.
+    #[error(
+        "zone.depth_m begins at {near_m} m, but over the zone the object begins at {front_m} m: allowed is a \
+         nearest depth of at most that"
+    )]
+    InFront {
+        /// Nearest depth that the zone gives.
+        near_m: f64,
+        /// Where the object is first met.
+        front_m: f64,
+    },
     /// The zone is not complete.
     #[error(transparent)]
     Task(#[from] TaskError),
@@ -92,8 +104,9 @@ impl Environment {
         let extent = extent(&scene.zone, &shape);
         scene.zone.depth_m.get_or_insert([-extent.high.y, -extent.low.y]);
         let task = Task::new(scene.zone.clone(), scene.touch.clone(), &scene.finger)?;
-        if matches!(shape, Shape::Mesh { .. }) {
+        if let Shape::Mesh { bvh, .. } = &shape {
             check_overlap(&task, &extent)?;
+            check_front(&task, bvh, -extent.high.y)?;
         }
         let fingertip =
             (scene.effects.is_soft()).then(|| Fingertip::new(&scene.finger, &scene.effects));
@@ -234,6 +247,29 @@ fn check_overlap(task: &Task, extent: &Extent) -> Result<(), EnvironmentError> {
             depth_m: [-high.y, -low.y],
         }),
         false => Ok(()),
+    }
+}
+
+/// Places along each side of the zone over which the object is looked for in front of its range;
+/// chosen, as many as a shipped experiment's test grid.
+const FRONT_PER_SIDE: usize = 41;
+
+/// Over the zone nothing of the object, which begins at a depth of `object_m`, may be in front of
+/// the nearest depth.
+fn check_front(task: &Task, bvh: &MeshBvh, object_m: f64) -> Result<(), EnvironmentError> {
+    let (zone, [near_m, _]) = (task.zone(), task.depth_m());
+    if near_m <= object_m {
+        return Ok(());
+    }
+    let (x_wz, ahead_w) = (zone.x_wz(), zone.ahead_w());
+    let start_m = object_m - CLEARANCE_M;
+    let met_m = zone.grid(FRONT_PER_SIDE).into_iter().filter_map(|place| {
+        let start_w = x_wz * zone.local(&place, -start_m);
+        Some(start_m + bvh.ray(&start_w, &ahead_w, near_m - start_m)?.distance_m)
+    });
+    match met_m.reduce(f64::min) {
+        Some(front_m) if front_m < near_m => Err(EnvironmentError::InFront { near_m, front_m }),
+        _ => Ok(()),
     }
 }
 

@@ -15,7 +15,7 @@ use crate::sim::scene::Body;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// A world with everything ready to put bodies into it.
+/// An environment with everything ready to put bodies into it.
 #[derive(Clone)]
 pub struct Simulator {
     environment: Arc<Environment>,
@@ -23,7 +23,7 @@ pub struct Simulator {
     models: Option<mujoco::Models>,
 }
 
-/// A world that no body can be put into.
+/// An environment that no body can be put into.
 #[derive(Debug, Error)]
 pub enum SimulatorError {
     /// Its physics cannot be simulated.
@@ -57,7 +57,7 @@ impl Simulator {
         }
     }
 
-    /// The world.
+    /// The environment.
     pub fn environment(&self) -> &Arc<Environment> {
         &self.environment
     }

@@ -151,12 +151,15 @@ fn a_zone_without_depth_is_no_task() {
     assert!(error.to_string().contains("zone.depth_m"), "{error}");
 }
 
-/// A depth range of one's own: in front of it and behind it nothing is looked for.
+/// A depth range of one's own: the object must be in it, and not in front of it.
 #[test]
 fn a_depth_range_beside_the_object_is_refused() {
     let build = |set: &str| Environment::build(scene("bird.toml", &[set]));
     let error = build("zone.depth_m=[0.0, 0.1]").err().unwrap().to_string();
     assert!(error.contains("depth"), "{error}");
+    // The bird's breast is nearer than its middle, from which heights are measured.
+    let error = build("zone.depth_m=[0.65, 0.8]").err().unwrap().to_string();
+    assert!(error.contains("begins at 0.65 m"), "{error}");
     let own = build("zone.depth_m=[0.4, 0.8]").unwrap();
     assert_eq!(own.scene().zone.depth_m, Some([0.4, 0.8]));
 }

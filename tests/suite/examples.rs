@@ -5,15 +5,14 @@ mod own_backend;
 #[path = "../../examples/own_planner.rs"]
 mod own_planner;
 
-/// The servo over a body written by hand, with nothing of the simulator: contacts lie on the wall
-/// to what a tick of the approach presses it in, and the belief knows the plane.
+/// The servo over a body written by hand, with nothing of the simulator: contacts lie on the wall,
+/// for what this body feels is exact, and the belief knows the plane.
 #[test]
 fn the_servo_drives_a_body_that_no_simulator_made() {
     let source = include_str!("../../examples/own_backend.rs");
     assert!(!source.contains("palpate::sim") && !source.contains("palpate::experiment"));
     let (belief, worst_m) = own_backend::explore(15).unwrap();
-    // 20 mm/s in ticks of 10 ms: one tick until contact is told, and what the stop takes.
-    assert!(worst_m < 1e-3, "{worst_m}");
+    assert!(worst_m < 1e-12, "{worst_m}");
     assert_eq!(belief.targets().len(), 15);
     let surface = belief.surface().unwrap();
     let mut scratch = Default::default();

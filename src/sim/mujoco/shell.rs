@@ -49,7 +49,7 @@ pub struct FlexShell {
 }
 
 impl FlexShell {
-    /// The world's shell, compiled once for all trials; none if its finger has no such skin.
+    /// The environment's shell, compiled once for all trials; none if its finger has no such skin.
     ///
     /// # Errors
     /// If MuJoCo refuses it.
@@ -60,7 +60,7 @@ impl FlexShell {
     /// At rest.
     ///
     /// # Errors
-    /// If `model` is not the shell of this world, or memory is short.
+    /// If `model` is not the shell of this environment, or memory is short.
     pub fn new(environment: Arc<Environment>, model: Arc<MjModel>) -> Result<Self, ModelError> {
         let lattice = lattice(&environment).ok_or(ModelError::Lacks { part: "a shell" })?;
         let free = lattice.nodes().iter().filter(|node| !node.clamped);

@@ -35,7 +35,7 @@ pub struct StepLimit {
 }
 
 impl StepLimit {
-    /// Of a model of `world`; none without a skin.
+    /// Of a model of `environment`; none without a skin.
     ///
     /// A force that is explicit in the position of a mass m is stable in steps below `2 √(m / k)`;
     /// half of that is the limit, because a hollow object presses more skin at once than the

@@ -46,7 +46,7 @@ pub struct Window {
 }
 
 impl Window {
-    /// Opens it on the picture of `world`.
+    /// Opens it on the picture of `environment`.
     ///
     /// # Errors
     /// If the environment has nothing to show, or there is no display with OpenGL.

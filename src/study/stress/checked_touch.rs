@@ -58,8 +58,8 @@ pub(super) fn touch_solid_with(
     let touch =
         (simulator.servo(wrap(Box::new(trace)), 1)).and_then(|mut servo| servo.touch(&approach));
     let ticks = ticks.take();
-    // The object is not in a file, so its world cannot be built again without noise; force and
-    // pose need no sensor.
+    // The object is not in a file, so its environment cannot be built again without noise; force
+    // and pose need no sensor.
     let load = reference_load(&simulator, &ticks);
     CheckedTouch { touch, environment: Some(environment), load, ticks, refused: None }
 }
