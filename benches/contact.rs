@@ -110,7 +110,7 @@ fn true_rest(environment: &Environment, target: Vec<f64>) -> Option<Rest> {
     let scene = environment.scene();
     let lift = |dx_m: f64, dz_m: f64| {
         let height_m = environment.true_height_m(&[target[0] + dx_m, target[1] + dz_m])?;
-        let y_m = scene.zone.datum_y_m + height_m;
+        let y_m = scene.zone.datum_y_m() + height_m;
         Some((y_m - scene.finger.front_m(dx_m, dz_m)?, dx_m, dz_m, y_m))
     };
     let reach_m = scene.finger.radius_m + scene.finger.length_m;

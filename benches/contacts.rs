@@ -65,7 +65,7 @@ fn touch(
     }
     let mean = Tare::of(&frames[frames.len().checked_sub(5)?..]);
     let mean = Frame { electrode_counts: mean.electrode_counts, ..Frame::default() };
-    let found = locate(&tare?, &mean)?;
+    let found = locate(&Finger::default(), &tare?, &mean)?;
     Some(Error {
         point_m: found.surface_t - load.centre_t,
         normal_deg: found.normal_t.angle(&-load.normal_t).to_degrees(),

@@ -1,25 +1,24 @@
-//! From files to what runs: notices of what is simulated otherwise go to standard error.
+//! From files to what runs: it is refused what cannot be, and said on standard error what may not be
+//! meant.
 
+use super::terminal::note;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::Environment;
 use crate::sim::simulator::Simulator;
 use std::sync::Arc;
 
-/// Makes an experiment ready to run, and says on standard error what is not simulated as it asks.
+/// Makes an experiment ready to run.
 pub(super) fn simulation(experiment: Experiment) -> anyhow::Result<Simulation> {
     let simulation = Simulation::new(experiment)?;
-    tell(simulation.simulator());
+    simulation.simulator().check_reach()?;
+    simulation.notices().iter().for_each(note);
     Ok(simulation)
 }
 
-/// Makes an environment ready for bodies, and says on standard error what is not simulated as its
-/// scene asks.
+/// Makes an environment ready for bodies.
 pub(super) fn simulator(environment: &Arc<Environment>) -> anyhow::Result<Simulator> {
     let simulator = Simulator::new(Arc::clone(environment))?;
-    tell(&simulator);
+    simulator.check_reach()?;
+    simulator.notices().iter().for_each(note);
     Ok(simulator)
-}
-
-fn tell(simulator: &Simulator) {
-    simulator.notice().iter().for_each(|notice| eprintln!("note: {notice}"));
 }

@@ -2,7 +2,7 @@
 
 use super::prepare::simulation;
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::terminal::{Ending, print};
+use super::terminal::{Ending, note, print};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner;
@@ -87,7 +87,23 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         text += &format!("\nreport: {}", path.join("report.html").display());
     }
     print(&text)?;
-    Ok(if finished { Ending::Done } else { Ending::Interrupted })
+    Ok(match tell_failures(&run) {
+        _ if !finished => Ending::Interrupted,
+        true => Ending::Failed,
+        false => Ending::Done,
+    })
+}
+
+/// Says on standard error how many trials failed and why the first did; whether all of them did.
+fn tell_failures(run: &Run) -> bool {
+    let failed = || run.rows.iter().filter_map(|row| Some((row, row.failure.as_ref()?)));
+    let Some((row, reason)) = failed().next() else { return false };
+    let (count, of) = (failed().count(), run.rows.len());
+    note(format!(
+        "{count} of {of} trials failed, the first ({}, trial {}) because of: {reason}",
+        row.planner, row.trial
+    ));
+    count == of
 }
 
 fn manifest(experiment: &Experiment) -> Manifest {

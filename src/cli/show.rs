@@ -1,7 +1,9 @@
 //! `palpate show`.
 
-use super::terminal::{Ending, print};
+use super::prepare::simulator;
+use super::terminal::{Ending, note, print};
 use crate::experiment::experiment::Experiment;
+use crate::experiment::notice;
 use crate::experiment::store;
 use crate::experiment::store::Run;
 use crate::experiment::truth::Truth;
@@ -12,6 +14,7 @@ use crate::sim::scene::Unit;
 use crate::sim::{Scene, mjcf};
 use anyhow::{Context, bail};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -87,8 +90,10 @@ const GRID: usize = 41;
 fn scene(args: &Args) -> anyhow::Result<String> {
     let scene = Scene::load(&args.path, &args.set)?;
     let mut text = toml::to_string(&scene).context("cannot write the scene")?;
-    let environment = Environment::build(scene)?;
+    let environment = Arc::new(Environment::build(scene)?);
+    simulator(&environment)?;
     let truth = Truth::sample(&environment, GRID);
+    notice::of_truth(environment.task().zone(), &truth).iter().for_each(note);
     text +=
         &format!("\nsurface in the zone: {} of {} test places", truth.count(), truth.places.len());
     let heights = || truth.heights_m.iter().flatten().copied();

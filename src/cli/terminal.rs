@@ -1,5 +1,6 @@
 //! What a command says, and how it ends.
 
+use std::fmt;
 use std::io::{self, Write};
 
 /// How a command ended, if it did not fail.
@@ -10,6 +11,11 @@ pub(super) enum Ending {
     Failed,
     /// The person who began it stopped it.
     Interrupted,
+}
+
+/// Says on standard error what a user may want to know; one who does not listen is no error.
+pub(super) fn note(text: impl fmt::Display) {
+    let _ = writeln!(io::stderr(), "note: {text}");
 }
 
 /// Prints to standard output; a reader who has gone away is no error.

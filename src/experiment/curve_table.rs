@@ -14,11 +14,24 @@ use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 pub struct CurveRecord {
     /// Which planner, after how many touches, over how many trials.
     pub point: CurvePoint,
-    /// Every other column with its value, the same columns in every record of a run: of each
-    /// measure its mean with the standard error, or its median with the 95 % bootstrap interval;
-    /// of an error also how it differs from each baseline's in the same trial (mean, 95 %
-    /// bootstrap interval, share of trials in which it is less).
-    pub values: Vec<(String, Option<f64>)>,
+    /// Its values in the [`columns`] of the run.
+    pub values: Vec<Option<f64>>,
+}
+
+/// The columns of a run's records: of each measure its mean with the standard error, or its median
+/// with the 95 % bootstrap interval; of an error also how it differs from each baseline's in the
+/// same trial (mean, 95 % bootstrap interval, share of trials in which it is less).
+pub fn columns(experiment: &Experiment) -> Vec<String> {
+    let of_measure = |measure: &'static Measure| {
+        let baselines = experiment.baselines().into_iter().filter(|_| measure.is_error);
+        let differences = baselines.flat_map(|baseline| {
+            let column = |end: &str| measure.column(&format!("minus_{baseline}{end}"));
+            let won = format!("{}_won_against_{baseline}", measure.stem());
+            [column(""), column("_low"), column("_high"), won]
+        });
+        measure.columns().into_iter().chain(differences.collect::<Vec<_>>())
+    };
+    MEASURES.iter().flat_map(of_measure).collect()
 }
 
 /// A record for each planner and touch count.
@@ -45,7 +58,7 @@ fn aggregates(
     rows: &[TrialRow],
     point: &CurvePoint,
     measure: &Measure,
-) -> Vec<(String, Option<f64>)> {
+) -> Vec<Option<f64>> {
     let summary = point.of(measure);
     let mut values = Vec::new();
     if measure.aggregate.has_mean() {
@@ -62,7 +75,7 @@ fn aggregates(
         values.push(interval.map(|[low, _]| low));
         values.push(interval.map(|[_, high]| high));
     }
-    measure.columns().into_iter().zip(values).collect()
+    values
 }
 
 fn differences(
@@ -70,17 +83,11 @@ fn differences(
     rows: &[TrialRow],
     (point, baseline): (&CurvePoint, &str),
     measure: &Measure,
-) -> [(String, Option<f64>); 4] {
+) -> [Option<f64>; 4] {
     let planners = [point.planner.as_str(), baseline];
     let paired = (point.planner != baseline)
         .then(|| paired(experiment, rows, planners, point.touches, measure))
         .flatten();
     let end = |end: usize| Some(paired?.interval?[end]);
-    let column = |end: &str| measure.column(&format!("minus_{baseline}{end}"));
-    [
-        (column(""), paired.map(|paired| paired.mean)),
-        (column("_low"), end(0)),
-        (column("_high"), end(1)),
-        (format!("{}_won_against_{baseline}", measure.stem()), paired.map(|paired| paired.won)),
-    ]
+    [paired.map(|paired| paired.mean), end(0), end(1), paired.map(|paired| paired.won)]
 }

@@ -138,6 +138,15 @@ impl Experiment {
         goal.clamp(self.initial_touches, self.touches)
     }
 
+    /// Touch counts that stand in tables: those drawn, and the last.
+    pub fn tabled_touch_counts(&self) -> Vec<u32> {
+        let mut counts = self.drawn_touch_counts();
+        if counts.last() != Some(&self.touches) {
+            counts.push(self.touches);
+        }
+        counts
+    }
+
     /// Touch counts after which beliefs are drawn.
     pub fn drawn_touch_counts(&self) -> Vec<u32> {
         let possible = self.initial_touches..=self.touches;

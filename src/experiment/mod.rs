@@ -28,6 +28,7 @@ pub mod equal_error;
 pub mod experiment;
 pub mod measure;
 pub mod metrics;
+pub mod notice;
 pub mod report_settings;
 pub mod row;
 pub mod runner;

@@ -1,6 +1,7 @@
 //! From an experiment to its trials: the one way that everything goes which runs a simulation.
 
 use super::experiment::Experiment;
+use super::notice;
 use super::row::TrialRow;
 use super::trial;
 use super::truth::Truth;
@@ -99,6 +100,13 @@ impl Simulation {
     /// What makes the trials' bodies.
     pub fn simulator(&self) -> &Simulator {
         &self.simulator
+    }
+
+    /// What of the experiment may not be meant.
+    pub fn notices(&self) -> Vec<String> {
+        let scene = self.simulator.notices().into_iter().map(|notice| notice.to_string());
+        let truth = notice::of_truth(self.task().zone(), &self.truth).into_iter();
+        scene.chain(truth.map(|notice| notice.to_string())).collect()
     }
 
     /// The truth on the test grid.

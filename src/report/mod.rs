@@ -23,7 +23,6 @@ pub mod tables;
 pub use figures::{Drawing, FIGURES, Figure};
 
 use crate::experiment::analysis::Analysis;
-use crate::experiment::curve_table::curve_table;
 use crate::experiment::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
 use anyhow::Context;
 use std::fs;
@@ -35,7 +34,7 @@ use std::path::Path;
 /// # Errors
 /// If a file cannot be written.
 pub fn write_tables(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()> {
-    tables::summary::write(&curve_table(&run.experiment, &run.rows), folder)?;
+    tables::summary::write(run, folder)?;
     tables::comparison::write(&analysis.comparisons, folder)?;
     tables::equal_error::write(&analysis.equal_errors, folder)
 }

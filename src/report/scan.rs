@@ -28,7 +28,7 @@ pub fn picture(
     // Everything is drawn in the zone's frame.
     let x_zw = zone.x_wz().inverse();
     let mesh = &mesh.transformed(&x_zw);
-    let height_m = |y: f64| y - zone.datum_y_m;
+    let height_m = |y: f64| y - zone.datum_y_m();
     let heights_m = || points.iter().map(|(p_w, _)| zone.height_m(p_w));
     let (low, high) = mesh.bounds();
     // Out to whole units, so that the ends of the axes are short to read.
@@ -47,7 +47,7 @@ pub fn picture(
     };
     let panel = ReliefPanel::new(unit, area(0.0), space);
     panel.frame(&mut canvas, "the object, and the zone on it", "");
-    Relief::of_mesh(&panel.view, mesh, zone.datum_y_m, &inside).draw(&mut canvas);
+    Relief::of_mesh(&panel.view, mesh, zone.datum_y_m(), &inside).draw(&mut canvas);
     for side in rim(zone) {
         let on_surface = side.iter().map(|place| {
             environment

@@ -1,7 +1,8 @@
 //! What never changes during a trial, shared by all threads.
 
 use super::function::Function;
-use super::scene::{Body, Object, Scene};
+use super::notice::{Notice, SizeMismatch};
+use super::scene::{Body, Object, Scene, Unit};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::error::MeshError;
 use crate::geometry::implicit::Implicit;
@@ -15,6 +16,7 @@ use crate::robot::arm::stage::stage;
 use crate::sim::finger::Fingertip;
 use crate::task::{Task, TaskError, Zone};
 use nalgebra::Point3;
+use std::borrow::Cow;
 use thiserror::Error;
 
 /// A scene with its mesh loaded and its search tree built.
@@ -23,6 +25,7 @@ pub struct Environment {
     shape: Shape,
     task: Task,
     fingertip: Option<Fingertip>,
+    notices: Vec<Notice>,
 }
 
 /// What is touched.
@@ -53,7 +56,8 @@ pub enum EnvironmentError {
     /// The object lies wholly beside the zone, or before or behind its depth range.
     #[error(
         "the object has no surface in the zone: in the zone's frame it spans x {} to {} m, z {} to {} m and \
-         depth {} to {} m", x_m[0], x_m[1], z_m[0], z_m[1], depth_m[0], depth_m[1]
+         depth {} to {} m{}", x_m[0], x_m[1], z_m[0], z_m[1], depth_m[0], depth_m[1],
+        size.map(|size| format!("; {size}")).unwrap_or_default()
     )]
     OutsideZone {
         /// The object's extent.
@@ -62,6 +66,8 @@ pub enum EnvironmentError {
         z_m: [f64; 2],
         /// The object's extent.
         depth_m: [f64; 2],
+        /// How its size differs from the zone's, if it does much.
+        size: Option<SizeMismatch>,
     },
     /// The object reaches out of the zone's depth range towards the finger, which would set out
     /// inside it.
@@ -101,16 +107,34 @@ impl Environment {
     /// # Errors
     /// If the shape lies wholly outside the zone.
     pub fn around(mut scene: Scene, shape: Shape) -> Result<Self, EnvironmentError> {
-        let extent = extent(&scene.zone, &shape);
-        scene.zone.depth_m.get_or_insert([-extent.high.y, -extent.low.y]);
-        let task = Task::new(scene.zone.clone(), scene.touch.clone(), &scene.finger)?;
-        if let Shape::Mesh { bvh, .. } = &shape {
-            check_overlap(&task, &extent)?;
-            check_front(&task, bvh, -extent.high.y)?;
+        let mut notices = Vec::new();
+        if let Cow::Owned(effects) = scene.felt_effects() {
+            scene.effects = effects;
+            notices.push(Notice::DefaultFinger);
         }
+        let extent = extent(&scene.zone, &shape);
+        let depth_m = *scene.zone.depth_m.get_or_insert([-extent.high.y, -extent.low.y]);
+        let middle_y_m = match &shape {
+            Shape::Function(_) => 0.0,
+            Shape::Mesh { bvh, .. } => {
+                let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
+                let size = SizeMismatch::between(&scene.zone, unit, (&extent.low, &extent.high));
+                check_overlap(&scene.zone, depth_m, &extent, size)?;
+                check_front(&scene.zone, bvh, depth_m[0], -extent.high.y)?;
+                notices.extend(size.map(Notice::Size));
+                middle_y_m(&scene.zone, bvh, depth_m)
+            }
+        };
+        scene.zone.datum_y_m.get_or_insert(middle_y_m);
+        let task = Task::new(scene.zone.clone(), scene.touch.clone(), &scene.finger)?;
         let fingertip =
             (scene.effects.is_soft()).then(|| Fingertip::new(&scene.finger, &scene.effects));
-        Ok(Self { scene, shape, task, fingertip })
+        Ok(Self { scene, shape, task, fingertip, notices })
+    }
+
+    /// What may not be meant.
+    pub fn notices(&self) -> &[Notice] {
+        &self.notices
     }
 
     /// The scene it was built from, with what it left to the object written out.
@@ -186,7 +210,7 @@ impl Environment {
                     }
                     None => bvh.ray(&start_w, &ahead_w, reach_m).map(|hit| hit.distance_m),
                 };
-                distance_m.map(|distance| start_y_m - distance - zone.datum_y_m)
+                distance_m.map(|distance| start_y_m - distance - zone.datum_y_m())
             }
         }
     }
@@ -216,7 +240,7 @@ struct Extent {
 fn extent(zone: &Zone, shape: &Shape) -> Extent {
     match shape {
         Shape::Function(function) => {
-            let [low, high] = function.heights_m().map(|height_m| zone.datum_y_m + height_m);
+            let [low, high] = function.heights_m().map(|height_m| zone.datum_y_m() + height_m);
             let [at_low, at_high] = [0.0, 1.0].map(|end| zone.at(&[end, end]));
             Extent { low: zone.local(&at_low, low), high: zone.local(&at_high, high) }
         }
@@ -234,10 +258,13 @@ fn extent(zone: &Zone, shape: &Shape) -> Extent {
     }
 }
 
-fn check_overlap(task: &Task, extent: &Extent) -> Result<(), EnvironmentError> {
-    let Extent { low, high } = extent;
-    let [x, z] = [task.zone().x_m, task.zone().z_m.unwrap_or([0.0; 2])];
-    let [near_m, far_m] = task.depth_m();
+fn check_overlap(
+    zone: &Zone,
+    [near_m, far_m]: [f64; 2],
+    Extent { low, high }: &Extent,
+    size: Option<SizeMismatch>,
+) -> Result<(), EnvironmentError> {
+    let [x, z] = [zone.x_m, zone.z_m.unwrap_or([0.0; 2])];
     let is_beside = x[1] < low.x || x[0] > high.x || z[1] < low.z || z[0] > high.z;
     let is_before_or_behind = -high.y > far_m || -low.y < near_m;
     match is_beside || is_before_or_behind {
@@ -245,32 +272,53 @@ fn check_overlap(task: &Task, extent: &Extent) -> Result<(), EnvironmentError> {
             x_m: [low.x, high.x],
             z_m: [low.z, high.z],
             depth_m: [-high.y, -low.y],
+            size,
         }),
         false => Ok(()),
     }
 }
 
-/// Places along each side of the zone over which the object is looked for in front of its range;
-/// chosen, as many as a shipped experiment's test grid.
-const FRONT_PER_SIDE: usize = 41;
+/// Places along each side of the zone over which the object is looked for; chosen, as many as a
+/// shipped experiment's test grid.
+const LOOKED_FOR_PER_SIDE: usize = 41;
+
+/// Depths at which the object is first met between two, over those places of the zone where it is.
+fn met_m(zone: &Zone, bvh: &MeshBvh, [from_m, to_m]: [f64; 2]) -> impl Iterator<Item = f64> {
+    let (x_wz, ahead_w) = (zone.x_wz(), zone.ahead_w());
+    zone.grid(LOOKED_FOR_PER_SIDE).into_iter().filter_map(move |place| {
+        let start_w = x_wz * zone.local(&place, -from_m);
+        Some(from_m + bvh.ray(&start_w, &ahead_w, to_m - from_m)?.distance_m)
+    })
+}
 
 /// Over the zone nothing of the object, which begins at a depth of `object_m`, may be in front of
 /// the nearest depth.
-fn check_front(task: &Task, bvh: &MeshBvh, object_m: f64) -> Result<(), EnvironmentError> {
-    let (zone, [near_m, _]) = (task.zone(), task.depth_m());
+fn check_front(
+    zone: &Zone,
+    bvh: &MeshBvh,
+    near_m: f64,
+    object_m: f64,
+) -> Result<(), EnvironmentError> {
     if near_m <= object_m {
         return Ok(());
     }
-    let (x_wz, ahead_w) = (zone.x_wz(), zone.ahead_w());
-    let start_m = object_m - CLEARANCE_M;
-    let met_m = zone.grid(FRONT_PER_SIDE).into_iter().filter_map(|place| {
-        let start_w = x_wz * zone.local(&place, -start_m);
-        Some(start_m + bvh.ray(&start_w, &ahead_w, near_m - start_m)?.distance_m)
-    });
-    match met_m.reduce(f64::min) {
+    match met_m(zone, bvh, [object_m - CLEARANCE_M, near_m]).reduce(f64::min) {
         Some(front_m) if front_m < near_m => Err(EnvironmentError::InFront { near_m, front_m }),
         _ => Ok(()),
     }
+}
+
+/// The middle of what the surface spans over the zone; of the depth range where there is none.
+fn middle_y_m(zone: &Zone, bvh: &MeshBvh, depth_m @ [near_m, far_m]: [f64; 2]) -> f64 {
+    let met_m: Vec<f64> = met_m(zone, bvh, [near_m - CLEARANCE_M, far_m + CLEARANCE_M]).collect();
+    let [near_m, far_m] = match met_m.is_empty() {
+        true => depth_m,
+        false => [
+            met_m.iter().copied().fold(f64::INFINITY, f64::min),
+            met_m.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        ],
+    };
+    -0.5 * (near_m + far_m)
 }
 
 /// Distance in front of and behind what may be touched at which rays begin and end.

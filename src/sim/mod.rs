@@ -8,6 +8,7 @@ pub mod kinematic;
 pub mod mjcf;
 #[cfg(feature = "mujoco")]
 pub mod mujoco;
+pub mod notice;
 pub mod probe;
 pub mod reach;
 pub mod scene;

@@ -65,7 +65,7 @@ pub fn is_reachable(
                 Some(tip_y_m + front_m)
             });
             let lowest_y_m = envelope_y_m.fold(f64::INFINITY, f64::min);
-            lowest_y_m - zone.datum_y_m - height_m <= TOLERANCE_M + missed_m
+            lowest_y_m - zone.datum_y_m() - height_m <= TOLERANCE_M + missed_m
         })
         .collect()
 }

@@ -14,6 +14,8 @@ use crate::task::zone::Zone;
 use nalgebra::Isometry3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// A scene means one thing: everything that decides what a touch returns stands in it.
@@ -145,6 +147,19 @@ impl Unit {
     }
 }
 
+impl fmt::Display for Unit {
+    /// As a scene file names it.
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::M => "m",
+            Self::Cm => "cm",
+            Self::Mm => "mm",
+            Self::Um => "um",
+            Self::In => "in",
+        })
+    }
+}
+
 impl Object {
     /// Pose of the mesh's frame in `W`.
     pub fn x_wo(&self) -> Isometry3<f64> {
@@ -223,10 +238,10 @@ impl Checked for Scene {
                     .into()
             });
         }
-        let feels = self.body != Body::Kinematic || self.effects.skin.is_some();
+        let feels = self.body != Body::Kinematic || self.felt_effects().skin.is_some();
         rules.require("effects.skin", "(none)", feels, || {
             "a table, because body = \"kinematic\" feels with a soft skin (a rigid finger is \
-             body = \"cast\")"
+             body = \"cast\"; without any [effects] it has a BioTac's)"
                 .into()
         });
         let stepped = self.body == Body::Dynamic || self.effects.flex.is_none();
@@ -277,6 +292,15 @@ impl Scene {
         })
     }
 
+    /// The effects, or those of a BioTac (skin, fluid and electrodes, with their defaults) where the
+    /// body must feel and the scene names none.
+    pub fn felt_effects(&self) -> Cow<'_, Effects> {
+        match self.body == Body::Kinematic && self.effects == Effects::default() {
+            true => Cow::Owned(Effects::biotac()),
+            false => Cow::Borrowed(&self.effects),
+        }
+    }
+
     /// Whether MuJoCo lets the finger collide with the object: it does where no skin says what the
     /// object does to it.
     pub fn collides(&self) -> bool {
@@ -286,13 +310,14 @@ impl Scene {
     /// Fastest approach at which contact is told before skin and fluid are used up in front of the
     /// tip; none for a body that is not moved through contact.
     pub fn approach_limit_m_s(&self) -> Option<f64> {
-        if self.body != Body::Kinematic || self.effects.skin.is_none() {
+        let effects = self.felt_effects();
+        if self.body != Body::Kinematic || effects.skin.is_none() {
             return None;
         }
         let ahead_t = self.finger.ahead_t();
         let layers = Profile::biotac(&self.finger).layers(0.0, &ahead_t);
-        let batch = self.effects.timing.as_ref().map_or(1, |timing| timing.batch_frames);
-        let told_by_frames = self.effects.fluid.is_some().then_some(batch);
+        let batch = effects.timing.as_ref().map_or(1, |timing| timing.batch_frames);
+        let told_by_frames = effects.fluid.is_some().then_some(batch);
         let depth_m = layers.skin_m + layers.gap_m;
         Some(self.touch.approach_limit_m_s(self.period_s(), told_by_frames, depth_m))
     }

@@ -4,12 +4,13 @@
 use super::kinematic::Kinematic;
 #[cfg(feature = "mujoco")]
 use super::mujoco;
+use super::notice::Notice;
 use super::probe::{Cast, FunctionProbe};
 use super::simulated_finger::Shell;
 use crate::backend::delay::Delayed;
 use crate::backend::{Backend, Fault};
 use crate::explore::probe::Probe;
-use crate::explore::probe::servo::Servo;
+use crate::explore::probe::servo::{OutOfReach, Servo, check_reach};
 use crate::sim::Environment;
 use crate::sim::scene::Body;
 use std::sync::Arc;
@@ -62,13 +63,29 @@ impl Simulator {
         &self.environment
     }
 
-    /// What is simulated otherwise than the scene asks, and why.
-    pub fn notice(&self) -> Option<String> {
+    /// What of the scene may not be meant, and what is simulated otherwise than it asks.
+    pub fn notices(&self) -> Vec<Notice> {
+        #[allow(unused_mut)] // Only the physics engine changes what a scene asks.
+        let mut notices = self.environment.notices().to_vec();
         #[cfg(feature = "mujoco")]
-        if let Some(models) = &self.models {
-            return models.substeps.map(|substeps| substeps.to_string());
+        if let Some(substeps) = self.models.as_ref().and_then(|models| models.substeps.as_ref()) {
+            notices.push(Notice::Steps(substeps.to_string()));
         }
-        None
+        notices
+    }
+
+    /// Whether the scene's arm or stage can touch over all of its zone.
+    ///
+    /// # Errors
+    /// If it cannot.
+    pub fn check_reach(&self) -> Result<(), OutOfReach> {
+        let environment = &self.environment;
+        match (environment.scene().body, environment.robot()) {
+            (Body::Kinematic | Body::Dynamic, Some(robot)) => {
+                check_reach(&robot, environment.task())
+            }
+            _ => Ok(()),
+        }
     }
 
     /// A skin of finite elements, at rest; none if the scene's finger has none.

@@ -21,9 +21,10 @@ pub struct Zone {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z_m: Option<[f64; 2]>,
     /// The y from which heights are measured. A zero-mean belief returns to it away from all
-    /// touches, and Eq. 5 depends on it.
-    #[serde(default)]
-    pub datum_y_m: f64,
+    /// touches, and Eq. 5 depends on it. Left out, a simulation takes the middle of what the
+    /// object's surface spans over the zone; a function and a real robot take 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub datum_y_m: Option<f64>,
     /// Nearest and farthest depth at which there may be something to touch, along the approach from
     /// the origin of `Z`: depth = −y. The finger keeps its stand-off from the nearest and turns
     /// back behind the farthest. Left out, a simulation takes what its object spans; a real robot
@@ -56,7 +57,9 @@ impl Checked for Zone {
                 format!("at least {SIDE_MIN_M} m wide")
             });
         }
-        rules.number("datum_y_m", self.datum_y_m, -REACH_M..=REACH_M);
+        if let Some(datum_y_m) = self.datum_y_m {
+            rules.number("datum_y_m", datum_y_m, -REACH_M..=REACH_M);
+        }
         if let Some(depth_m) = self.depth_m {
             rules.interval("depth_m", depth_m, -REACH_M..=REACH_M);
         }
@@ -69,7 +72,12 @@ impl Zone {
     /// An interval of x or a rectangle of (x, z) in `W`, heights measured from y = 0.
     pub const fn new(x_m: [f64; 2], z_m: Option<[f64; 2]>) -> Self {
         let (position_m, rotation_deg) = ([0.0; 3], [0.0; 3]);
-        Self { x_m, z_m, datum_y_m: 0.0, depth_m: None, position_m, rotation_deg }
+        Self { x_m, z_m, datum_y_m: None, depth_m: None, position_m, rotation_deg }
+    }
+
+    /// The y from which heights are measured: what it says, or 0.
+    pub fn datum_y_m(&self) -> f64 {
+        self.datum_y_m.unwrap_or(0.0)
     }
 
     /// Number of coordinates of a place: 1 or 2.
@@ -111,12 +119,12 @@ impl Zone {
 
     /// How high a point of `W` is above the datum.
     pub fn height_m(&self, p_w: &Point3<f64>) -> f64 {
-        self.x_wz().inverse_transform_point(p_w).y - self.datum_y_m
+        self.x_wz().inverse_transform_point(p_w).y - self.datum_y_m()
     }
 
     /// The point of `W` at `place` and `height_m` above the datum.
     pub fn point(&self, place: &[f64], height_m: f64) -> Point3<f64> {
-        self.x_wz() * self.local(place, self.datum_y_m + height_m)
+        self.x_wz() * self.local(place, self.datum_y_m() + height_m)
     }
 
     /// The point of `Z` at `place` and `y_m`; z = 0 in an interval.

@@ -119,7 +119,7 @@ proptest! {
         let mut zone = Zone::new([-0.2, 0.3], Some([0.1, 0.5]));
         zone.position_m = dice.vector().into();
         zone.rotation_deg = (dice.vector() * 180.0).into();
-        zone.datum_y_m = dice.roll();
+        zone.datum_y_m = Some(dice.roll());
         zone.depth_m = Some([-0.1, 0.2]);
         let place = zone.at(&[0.5 + 0.5 * dice.roll(), 0.5 + 0.5 * dice.roll()]);
         let height_m = dice.roll();
@@ -135,7 +135,7 @@ proptest! {
         for p_w in [approach.p_near_w, approach.p_far_w] {
             prop_assert!(zone.distance(&zone.place(&p_w), &place) < 1e-11);
         }
-        prop_assert!((zone.height_m(&approach.p_near_w) + zone.datum_y_m - 0.1).abs() < 1e-12);
+        prop_assert!((zone.height_m(&approach.p_near_w) + zone.datum_y_m() - 0.1).abs() < 1e-12);
         let level = approach.level_with(&Point3::origin().coords, &approach.p_far_w.coords);
         prop_assert!((level - approach.p_far_w.coords).dot(&approach.direction_w()).abs() < 1e-12);
         prop_assert!(level.cross(&approach.direction_w()).norm() < 1e-12);

@@ -260,7 +260,8 @@ fn a_step_too_long_for_the_skin_is_divided_or_refused_with_the_longest_that_is_n
     assert!(divided_s <= substeps.limit.limit_s && 2.0 * divided_s > substeps.limit.limit_s);
     assert_eq!(divided_s, 0.002 / f64::from(substeps.count));
     let simulator = Simulator::new(Arc::new(environment)).unwrap();
-    let text = simulator.notice().unwrap();
+    let [notice] = &simulator.notices()[..] else { panic!() };
+    let text = notice.to_string();
     let limit = format!("at most {:.2e} s", substeps.limit.limit_s);
     assert!(text.contains("solver.step_s = 0.002 is divided") && text.contains(&limit), "{text}");
 
@@ -269,7 +270,7 @@ fn a_step_too_long_for_the_skin_is_divided_or_refused_with_the_longest_that_is_n
         text.contains("solver.step_s = 0.002 is too long") && text.contains("at most"),
         "{text}"
     );
-    assert_eq!(Simulator::new(soft).unwrap().notice(), None);
+    assert_eq!(Simulator::new(soft).unwrap().notices(), []);
 }
 
 #[test]

@@ -37,7 +37,7 @@ fn a_step_does_not_allocate_even_if_nobody_reads_the_frames() {
 
 #[test]
 fn electrodes_lie_on_the_core_with_its_normals() {
-    for (i, (p, n)) in positions_t().iter().zip(normals_t()).enumerate() {
+    for (i, (p, n)) in positions_t(1.0).iter().zip(normals_t()).enumerate() {
         let axis = nalgebra::Point3::new(p.x.min(0.0), 0.0, 0.0);
         if (6..10).contains(&i) {
             near(p.coords.dot(&n), 4.3994e-3, 1e-6);

@@ -301,7 +301,8 @@ fn the_point_of_contact_is_within_3_mm_and_its_normal_within_the_measured_band()
                 let slide_m = slip_m * dice.roll().abs();
                 motion.linear_w = Vector3::new(turn.cos(), turn.sin(), 0.0) * slide_m / 0.01;
                 let load = feel.step(&tip, &bvh, &motion, 0.01).unwrap();
-                let Some(contact) = locate(&tare, &feel.frame().unwrap()) else {
+                let Some(contact) = locate(&Finger::default(), &tare, &feel.frame().unwrap())
+                else {
                     panic!("{load:?}")
                 };
                 squares += (contact.surface_t - load.centre_t).norm_squared();

@@ -16,7 +16,8 @@ use palpate::task::Zone;
 use std::path::Path;
 use std::sync::Arc;
 
-const SQUARE: Zone = Zone { datum_y_m: -0.6, ..Zone::new([-0.05, 0.05], Some([-0.05, 0.05])) };
+const SQUARE: Zone =
+    Zone { datum_y_m: Some(-0.6), ..Zone::new([-0.05, 0.05], Some([-0.05, 0.05])) };
 
 fn load(name: &str, sets: &[&str]) -> Result<Experiment, String> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments").join(name);
@@ -83,7 +84,7 @@ fn a_bound_lowers_the_mean_under_it_and_leaves_the_variance_honest() {
             }
         }
         let finger = Finger { length_m: 0.0, ..Finger::default() };
-        let p_wt = Point3::new(0.0, SQUARE.datum_y_m + 0.02 + finger.radius_m, 0.0);
+        let p_wt = Point3::new(0.0, SQUARE.datum_y_m() + 0.02 + finger.radius_m, 0.0);
         belief.observe_swept(&Swept { finger, p_wt });
         belief.refit().unwrap();
         belief.surface().unwrap().clone()

@@ -13,7 +13,7 @@ use palpate::math::{normal, seed};
 use palpate::task::Zone;
 use rand::RngExt;
 
-const SQUARE: Zone = Zone { datum_y_m: -0.6, ..Zone::new([-0.05, 0.05], Some([0.4, 0.52])) };
+const SQUARE: Zone = Zone { datum_y_m: Some(-0.6), ..Zone::new([-0.05, 0.05], Some([0.4, 0.52])) };
 const LINE: Zone = Zone::new([-2.0, 2.0], None);
 
 /// A belief after `count` touches of a bumpy surface; every `elsewhere`-th contact lies beside

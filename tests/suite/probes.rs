@@ -54,7 +54,7 @@ fn a_thin_probe_finds_the_nose_that_the_finger_cannot_enter_beside() {
     // Just beside the nose, whose radius is about 3 mm.
     let beside = [0.005, 0.528];
     let truth = BIRD.true_height_m(&beside).unwrap();
-    let datum = BIRD.scene().zone.datum_y_m;
+    let datum = BIRD.scene().zone.datum_y_m();
     assert!((contact(&thin, &beside).p_wc.y - datum - truth).abs() < 1e-3);
     let finger = contact(&BIRD, &beside);
     assert!(finger.p_wc.y - datum - truth > 5e-3, "the finger stays on the nose");

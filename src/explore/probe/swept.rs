@@ -27,7 +27,7 @@ impl Swept {
         places.map(move |place| {
             let p_z = zone.local(place, 0.0);
             let front_m = self.finger.front_m(p_z.x - p_zt.x, p_z.z - p_zt.z)?;
-            Some(p_zt.y + front_m - zone.datum_y_m)
+            Some(p_zt.y + front_m - zone.datum_y_m())
         })
     }
 }

@@ -7,6 +7,7 @@ pub mod summary;
 
 use crate::experiment::measure::Measure;
 use anyhow::Context;
+use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
 use std::path::Path;
 
@@ -26,10 +27,17 @@ fn titled(measure: &Measure) -> String {
     }
 }
 
-/// Writes records as CSV, their fields as its header.
-fn write_csv<T: Serialize>(path: &Path, records: impl Iterator<Item = T>) -> anyhow::Result<()> {
+/// Writes records as CSV, their fields as its header, also where there is no record.
+pub fn write_csv<T: Serialize + JsonSchema>(
+    path: &Path,
+    records: impl IntoIterator<Item = T>,
+) -> anyhow::Result<()> {
     let place = || path.display().to_string();
-    let mut writer = csv::Writer::from_path(path).with_context(place)?;
+    let mut writer =
+        csv::WriterBuilder::new().has_headers(false).from_path(path).with_context(place)?;
+    let schema = schema_for!(T).to_value();
+    let fields = schema["properties"].as_object().into_iter().flat_map(|fields| fields.keys());
+    writer.write_record(fields).with_context(place)?;
     for record in records {
         writer.serialize(record).with_context(place)?;
     }

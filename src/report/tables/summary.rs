@@ -1,8 +1,9 @@
 //! The curves as a table of the page and of the terminal, and as a file.
 
 use super::{Table, titled};
-use crate::experiment::curve_table::CurveRecord;
+use crate::experiment::curve_table::{CurveRecord, columns, curve_table};
 use crate::experiment::measure::{MEASURES, Measure};
+use crate::experiment::notice;
 use crate::experiment::store::Run;
 use crate::experiment::summary;
 use crate::experiment::summary::{CurvePoint, Events};
@@ -45,7 +46,7 @@ impl Column {
     }
 }
 
-/// A line per planner and drawn touch count; columns that nothing stands in are left out.
+/// A line per planner and tabled touch count; columns that nothing stands in are left out.
 pub fn table(run: &Run) -> Table {
     with_heads(run, |column| column.named(&titled(column.measure)))
 }
@@ -59,7 +60,7 @@ fn with_heads(run: &Run, head: impl Fn(&Column) -> String) -> Table {
     let curves: Vec<Vec<CurvePoint>> = (run.experiment.planners.iter())
         .map(|planner| summary::curve(&run.experiment, &run.rows, planner))
         .collect();
-    let counts = run.experiment.drawn_touch_counts().into_iter();
+    let counts = run.experiment.tabled_touch_counts().into_iter();
     let points: Vec<&CurvePoint> = counts
         .flat_map(|count| curves.iter().flatten().filter(move |point| point.touches == count))
         .collect();
@@ -93,6 +94,7 @@ pub fn text(run: &Run) -> String {
         text = text.trim_end().to_owned() + "\n";
     }
     happened(run).iter().for_each(|line| text += &format!("{line}\n"));
+    notice::of_run(run).iter().for_each(|notice| text += &format!("note: {notice}\n"));
     text.trim_end().into()
 }
 
@@ -113,18 +115,14 @@ pub fn happened(run: &Run) -> Vec<String> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn write(records: &[CurveRecord], folder: &Path) -> anyhow::Result<()> {
+pub fn write(run: &Run, folder: &Path) -> anyhow::Result<()> {
     let path = folder.join("summary.csv");
     let place = || path.display().to_string();
     let mut writer =
         csv::WriterBuilder::new().has_headers(false).from_path(&path).with_context(place)?;
-    for (i, CurveRecord { point, values }) in records.iter().enumerate() {
-        if i == 0 {
-            let names = values.iter().map(|(name, _)| name.as_str());
-            let header = ["planner", "touches", "trials"].into_iter().chain(names);
-            writer.write_record(header).with_context(place)?;
-        }
-        let values: Vec<Option<f64>> = values.iter().map(|(_, value)| *value).collect();
+    let header = ["planner", "touches", "trials"].map(String::from).into_iter();
+    writer.write_record(header.chain(columns(&run.experiment))).with_context(place)?;
+    for CurveRecord { point, values } in curve_table(&run.experiment, &run.rows) {
         let record = (&point.planner, point.touches, point.trials, values);
         writer.serialize(record).with_context(place)?;
     }

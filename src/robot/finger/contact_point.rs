@@ -3,13 +3,11 @@
 use super::electrode_table;
 use super::frame::FULL_SCALE_COUNTS;
 use super::frame::{ELECTRODES, Frame};
+use super::shape::Finger;
 use crate::config::{Checked, Rules};
 use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// Radius of the cylinder and sphere that stand for the skin (tams_biotac).
-pub const SURFACE_M: f64 = 7.0e-3;
 
 /// Electrodes that fell by less than this in all say nothing of a place (chosen: below the noise
 /// of 19 electrodes).
@@ -49,7 +47,8 @@ impl Tare {
 pub struct PointOfContact {
     /// Weighted mean of the electrodes' positions: inside the core.
     pub centroid_t: Point3<f64>,
-    /// That, projected onto the skin: a sphere for x > 0, else a cylinder.
+    /// That, projected onto the skin: a sphere for x > 0, else a cylinder, of the finger's radius
+    /// (tams_biotac: 7 mm).
     pub surface_t: Point3<f64>,
     /// Outward normal of the skin there; minus it estimates the direction of the force.
     pub normal_t: Vector3<f64>,
@@ -59,12 +58,12 @@ pub struct PointOfContact {
 /// p = Σ eᵢ² pᵢ / Σ eᵢ² with eᵢ the fall of electrode i, normalised by its tare.
 ///
 /// Only electrodes that fell count, as in tams_biotac: fluid that a contact pushes aside makes
-/// others rise on the far side, and they would draw the centroid into the core. None
-/// without electrodes, or if none fell.
-pub fn locate(tare: &Tare, frame: &Frame) -> Option<PointOfContact> {
+/// others rise on the far side, and they would draw the centroid into the core. Their positions are
+/// a BioTac's in the size of `finger`. None without electrodes, or if none fell.
+pub fn locate(finger: &Finger, tare: &Tare, frame: &Frame) -> Option<PointOfContact> {
     let (rest, now) = (tare.electrode_counts?, frame.electrode_counts?);
     let (mut sum, mut weights, mut fall_counts) = (Vector3::zeros(), 0.0, 0.0);
-    for (i, position) in electrode_table::positions_t().iter().enumerate() {
+    for (i, position) in electrode_table::positions_t(finger.scale()).iter().enumerate() {
         let fall = (rest[i] - now[i]).clamp(0.0, FULL_SCALE_COUNTS);
         let weight = (fall / rest[i].max(1.0)).powi(2);
         sum += position.coords * weight;
@@ -77,7 +76,7 @@ pub fn locate(tare: &Tare, frame: &Frame) -> Option<PointOfContact> {
     let centroid_t = Point3::from(sum / weights);
     let axis_t = Point3::new(centroid_t.x.min(0.0), 0.0, 0.0);
     let normal_t = (centroid_t - axis_t).try_normalize(0.0)?;
-    Some(PointOfContact { centroid_t, surface_t: axis_t + normal_t * SURFACE_M, normal_t })
+    Some(PointOfContact { centroid_t, surface_t: axis_t + normal_t * finger.radius_m, normal_t })
 }
 
 /// When a rise of fluid pressure counts as contact.

@@ -65,9 +65,9 @@ pub const NOISE_COUNTS: [f64; ELECTRODES] = [
     5.18, 4.15, 3.56,
 ];
 
-/// Positions on the core, in `T`, in metres.
-pub fn positions_t() -> [Point3<f64>; ELECTRODES] {
-    POSITIONS_MM.map(|p| Point3::from(Vector3::from(p) * 1e-3))
+/// Positions on the core, in `T`, in metres, of a finger `scale` times as large as a BioTac.
+pub fn positions_t(scale: f64) -> [Point3<f64>; ELECTRODES] {
+    POSITIONS_MM.map(|p| Point3::from(Vector3::from(p) * 1e-3 * scale))
 }
 
 /// Outward normals of the core at the electrodes, in `T`.

@@ -5,11 +5,16 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Outer radius of a BioTac's sides (NVIDIA's FEM mesh of the sensor), to which its electrode table
+/// and its layers belong.
+pub const BIOTAC_RADIUS_M: f64 = 7.0e-3;
+
 /// Shape and attitude of the finger.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Finger {
-    /// Radius of cylinder and hemisphere.
+    /// Radius of cylinder and hemisphere. A soft finger of another radius than a BioTac's 7 mm is
+    /// one in another size: skin, fluid, electrodes and where they place a contact scale with it.
     pub radius_m: f64,
     /// Length of the cylinder behind the hemisphere's centre.
     pub length_m: f64,
@@ -23,11 +28,16 @@ impl Default for Finger {
     /// is 28 mm long (NVIDIA's FEM mesh of the sensor). The pitch is chosen, half-way between
     /// touching with the tip's apex and with the pad.
     fn default() -> Self {
-        Self { radius_m: 0.007, length_m: 0.021, pitch_deg: 45.0 }
+        Self { radius_m: BIOTAC_RADIUS_M, length_m: 0.021, pitch_deg: 45.0 }
     }
 }
 
 impl Finger {
+    /// Every length of a BioTac is multiplied by this.
+    pub fn scale(&self) -> f64 {
+        self.radius_m / BIOTAC_RADIUS_M
+    }
+
     /// From the hemisphere's centre (origin of `T`) to the cylinder's far end, in a frame `A` along
     /// whose −y the finger approaches.
     ///

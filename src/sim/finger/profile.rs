@@ -3,11 +3,9 @@
 //! All figures are from the FEM mesh of NVlabs/biotac_sim unless said otherwise. Behind the
 //! origin of `T` (x ≤ 0) rays leave the axis at right angles; before it they leave the origin.
 
-use crate::robot::finger::shape::Finger;
+use crate::robot::finger::shape::{BIOTAC_RADIUS_M, Finger};
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-/// Outer radius at the sides that all other lengths here belong to.
-const SIDE_M: f64 = 7.0e-3;
 /// Radius of the rigid core: cylinder and hemisphere (electrode table of TAMS
 /// biotac_gazebo_plugin).
 pub const CORE_M: f64 = 5.08e-3;
@@ -70,7 +68,7 @@ impl Profile {
 
     /// Every length of the BioTac is multiplied by this.
     pub fn scale(&self) -> f64 {
-        self.radius_m / SIDE_M
+        self.radius_m / BIOTAC_RADIUS_M
     }
 
     /// Layers along the ray that leaves the axis at `x_m` ≤ 0 in direction `d`.
@@ -88,7 +86,7 @@ impl Profile {
         let off_m = x_m / scale - BULGE_X_M;
         let bulge_m = (BULGE_M - BULGE_FALL_PER_M * off_m * off_m).max(0.0);
         let corner = (d.x - d.z) * std::f64::consts::FRAC_1_SQRT_2;
-        let mut outer_m = SIDE_M + bulge_m * (-d.z).max(0.0);
+        let mut outer_m = BIOTAC_RADIUS_M + bulge_m * (-d.z).max(0.0);
         let mut core_m = CORE_M;
         if d.x > 0.0 {
             outer_m += CORNER_M * ((corner - 1.0) / CORNER_WIDTH).exp() - APEX_M * d.x * d.x;

@@ -85,7 +85,7 @@ pub(super) fn reach(scene: Scene, [x, y, z]: [f64; 3], arm: ArmSettings) -> Outc
     let mut zone = scene.zone.clone();
     zone.x_m = [x - 0.03, x + 0.03];
     zone.z_m = Some([z - 0.03, z + 0.03]);
-    zone.datum_y_m = y;
+    zone.datum_y_m = Some(y);
     let Some(mesh) = mesh(wall(0.03), [x, y, z]) else { return Outcome::Wrong("no mesh".into()) };
     touch_solid(Scene { zone, arm: Some(arm), ..scene }, mesh, &[x, z]).on_surface(1e-3)
 }

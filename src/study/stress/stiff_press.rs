@@ -115,7 +115,7 @@ impl WallPress {
         let [x, y, z] = face_w;
         scene.zone.x_m = [x - 0.03, x + 0.03];
         scene.zone.z_m = Some([z - 0.03, z + 0.03]);
-        scene.zone.datum_y_m = y;
+        scene.zone.datum_y_m = Some(y);
         let setup = FingerOnWall::new(&scene.effects, 1.0)?;
         let depth_m = depth_m(&setup)?;
         let pressed_y_m = y + setup.at(depth_m, 0.0).x_wt.translation.y;

@@ -3,7 +3,7 @@
 use crate::backend::{IdealContact, Reading};
 use crate::robot::finger::contact_point;
 use crate::robot::finger::contact_point::Detector;
-use crate::robot::finger::{Frame, Tare};
+use crate::robot::finger::{Finger, Frame, Tare};
 use crate::task::touch::{ContactEstimate, TouchSettings};
 use nalgebra::{Point3, Vector3};
 
@@ -112,13 +112,17 @@ impl ContactMonitor {
     /// The point of contact in `T` and the object's normal there, towards the finger: by Eq. 1
     /// from the frames since [`forget`](Self::forget), or the exact one where there are no
     /// electrodes.
-    pub(super) fn contact(&self, point: ContactEstimate) -> Option<(Point3<f64>, Vector3<f64>)> {
+    pub(super) fn contact(
+        &self,
+        finger: &Finger,
+        point: ContactEstimate,
+    ) -> Option<(Point3<f64>, Vector3<f64>)> {
         if let Some(IdealContact { p_tc, normal_t, .. }) = self.ideal {
             return Some((p_tc, normal_t));
         }
         let mean = Tare::of(&self.frames);
         let mean = Frame { electrode_counts: mean.electrode_counts, ..Frame::default() };
-        let found = contact_point::locate(self.tare.as_ref()?, &mean)?;
+        let found = contact_point::locate(finger, self.tare.as_ref()?, &mean)?;
         let p_tc = match point {
             ContactEstimate::Skin => found.surface_t,
             ContactEstimate::Electrodes => found.centroid_t,

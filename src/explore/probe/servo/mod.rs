@@ -2,6 +2,7 @@
 
 mod contact_monitor;
 mod trajectory;
+mod way;
 
 use super::{Contact, Probe, Swept, Touch, refuse_unless_finite};
 use crate::backend::{Backend, Command, Fault, Reading};
@@ -14,13 +15,13 @@ use crate::task::touch::TouchSettings;
 use contact_monitor::{ApproachEnd, ContactMonitor};
 use nalgebra::Isometry3;
 use trajectory::StraightPath;
+use way::{standoff, turning_point};
+
+pub use way::{OutOfReach, check_reach};
 
 /// A movement has arrived when the tip is this near to its end; chosen: below what a touch
 /// resolves.
 const ARRIVED_M: f64 = 5e-5;
-
-/// Distance that the finger's hull goes beyond the farthest depth before it turns back; chosen.
-const BEYOND_M: f64 = 0.01;
 
 /// Drives any [`Backend`] through touches. The same code drives simulators, recordings and the
 /// real arm: it knows the robot, how to touch, and what it is told of each touch.
@@ -154,22 +155,6 @@ impl Servo {
         Ok(None)
     }
 
-    /// The tip in front of all that may be touched.
-    fn standoff(&self, approach: &Approach) -> Isometry3<f64> {
-        let back_w = -approach.direction_w().into_inner();
-        let bulge_w = back_w * self.robot.finger.bulge_m();
-        let p_wt = approach.p_near_w + bulge_w + back_w * self.settings.standoff_m;
-        Isometry3::from_parts(p_wt.into(), approach.r_wt())
-    }
-
-    /// The tip behind all that may be touched.
-    fn turning_point(&self, approach: &Approach) -> Isometry3<f64> {
-        let ahead_w = approach.direction_w().into_inner();
-        let hull_w = ahead_w * self.robot.finger.radius_m;
-        let p_wt = approach.p_far_w + hull_w + ahead_w * BEYOND_M;
-        Isometry3::from_parts(p_wt.into(), approach.r_wt())
-    }
-
     /// Stops, settles where contact was told, and reads it: what the finger overran while its
     /// servos stopped it is taken back, so that the depth does not depend on them.
     fn read(&mut self, approach: &Approach) -> Result<Option<Contact>, Fault> {
@@ -187,9 +172,8 @@ impl Servo {
             return Ok(None);
         }
         let x_wt = self.x_wt();
-        Ok(self.monitor.contact(self.settings.point).map(|(p_tc, normal_t)| Contact {
-            p_wc: x_wt * p_tc,
-            normal_w: x_wt.rotation * normal_t,
+        Ok(self.monitor.contact(&self.robot.finger, self.settings.point).map(|(p_tc, normal_t)| {
+            Contact { p_wc: x_wt * p_tc, normal_w: x_wt.rotation * normal_t }
         }))
     }
 }
@@ -207,11 +191,11 @@ impl Probe for Servo {
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         refuse_unless_finite(approach)?;
         let TouchSettings { travel_m_s, approach_m_s, frames, .. } = self.settings;
-        let above = self.standoff(approach);
+        let above = standoff(&self.robot, self.settings.standoff_m, approach);
         self.go("the stand-off", above, travel_m_s, false)?;
         self.rest(above, frames)?;
         self.monitor.tare();
-        let below = self.turning_point(approach);
+        let below = turning_point(&self.robot, approach);
         let end = self.go("the object", below, approach_m_s, true)?;
         let ahead_w = approach.direction_w();
         let reached_w = self.x_wt().translation.vector - ahead_w.scale(GIVES_WAY_M);

@@ -90,11 +90,11 @@ pub struct Electrodes {
 impl Electrodes {
     /// Electrodes under `samples`, whose lengths are `scale` times a BioTac's.
     pub fn new(effect: &ElectrodesEffect, samples: &[SkinSample], scale: f64) -> Self {
-        let weights = electrode_table::positions_t().map(|electrode| {
+        let weights = electrode_table::positions_t(scale).map(|electrode| {
             let from = |sample: &SkinSample| {
                 let layers = &sample.layers;
                 let core_m = layers.outer_m - layers.skin_m - layers.gap_m;
-                (sample.start + sample.direction.scale(core_m) - electrode * scale).norm()
+                (sample.start + sample.direction.scale(core_m) - electrode).norm()
             };
             let nearest_m = samples.iter().map(from).fold(f64::INFINITY, f64::min);
             let spread_m = effect.spread_m * scale;

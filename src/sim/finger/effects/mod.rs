@@ -47,6 +47,16 @@ table::effects! {
 }
 
 impl Effects {
+    /// What a BioTac cannot be without: skin, fluid and electrodes, with their defaults.
+    pub fn biotac() -> Self {
+        Self {
+            skin: Some(skin::SkinEffect::default()),
+            fluid: Some(fluid::FluidEffect::default()),
+            electrodes: Some(electrodes::ElectrodesEffect::default()),
+            ..Self::default()
+        }
+    }
+
     /// Whether there is a skin of either kind.
     pub fn is_soft(&self) -> bool {
         self.skin.is_some() || self.flex.is_some()

@@ -1,0 +1,158 @@
+//! What a reader must know before he believes the numbers of an experiment.
+
+use super::experiment::Experiment;
+use super::measure::{CENTRED_R, Measure, R};
+use super::row::{TrialRow, of_planner};
+use super::store::Run;
+use super::summary;
+use super::truth::Truth;
+use crate::task::Zone;
+use std::fmt;
+
+/// Something that makes the numbers of an experiment mean less than they seem to; its `Display`
+/// says so and what to do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Notice {
+    /// The measures look at a small part of the zone only.
+    FewPlaces {
+        /// Test places with a surface.
+        with: usize,
+        /// All test places.
+        of: usize,
+    },
+    /// The finger can touch a small part of the surface only.
+    FewReachable {
+        /// Test places where it can.
+        reachable: usize,
+        /// Test places with a surface.
+        of: usize,
+    },
+    /// Heights are measured from far away.
+    FarDatum {
+        /// The datum.
+        datum_y_m: f64,
+        /// The y of the lowest and highest surface.
+        surface_y_m: [f64; 2],
+        /// Distance between them.
+        away_m: f64,
+        /// Widest side of the zone.
+        zone_m: f64,
+    },
+    /// A planner's touches mostly met nothing.
+    FewContacts {
+        /// Whose.
+        planner: String,
+        /// Touches that met something.
+        contacts: usize,
+        /// All touches.
+        of: usize,
+    },
+    /// Eq. 5 cannot tell these beliefs apart.
+    BlindR {
+        /// Planners whose R is high and whose centred R is low.
+        planners: Vec<String>,
+        /// Their smallest mean R.
+        r: f64,
+        /// Their smallest mean centred R.
+        centred_r: f64,
+    },
+}
+
+/// Share of places or touches below which they are few; chosen.
+const FEW: f64 = 0.25;
+
+/// An R above the first with a centred R below the second says nothing; chosen.
+const HIGH_R: f64 = 0.999;
+const LOW_CENTRED_R: f64 = 0.9;
+
+/// What `truth` says of an experiment in `zone` before it is run.
+pub fn of_truth(zone: &Zone, truth: &Truth) -> Vec<Notice> {
+    let count = truth.count();
+    let few = |part: usize, of: usize| (part as f64) < FEW * of as f64;
+    let places = few(count, truth.places.len())
+        .then_some(Notice::FewPlaces { with: count, of: truth.places.len() });
+    let reachable = truth.is_reachable.iter().filter(|&&is_reachable| is_reachable).count();
+    let reached = few(reachable, count).then_some(Notice::FewReachable { reachable, of: count });
+    places.into_iter().chain(reached).chain(far_datum(zone, truth)).collect()
+}
+
+/// The same and what its rows say.
+pub fn of_run(run: &Run) -> Vec<Notice> {
+    let Run { experiment, truth, rows, .. } = run;
+    let mut notices = of_truth(&experiment.scene.zone, truth);
+    notices.extend(experiment.planners.iter().filter_map(|planner| few_contacts(rows, planner)));
+    notices.extend(blind_r(experiment, rows));
+    notices
+}
+
+fn far_datum(zone: &Zone, truth: &Truth) -> Option<Notice> {
+    let heights_m = || truth.heights_m.iter().flatten().copied();
+    let (low_m, high_m) = (heights_m().reduce(f64::min)?, heights_m().reduce(f64::max)?);
+    let away_m = low_m.max(-high_m);
+    let zone_m = zone.extents_m().into_iter().fold(0.0, f64::max);
+    let datum_y_m = zone.datum_y_m();
+    let surface_y_m = [datum_y_m + low_m, datum_y_m + high_m];
+    (away_m > zone_m).then_some(Notice::FarDatum { datum_y_m, surface_y_m, away_m, zone_m })
+}
+
+fn few_contacts(rows: &[TrialRow], planner: &str) -> Option<Notice> {
+    let touches = || of_planner(rows, planner).flat_map(|row| &row.touches);
+    let contacts = touches().filter(|touch| touch.contact.is_some()).count();
+    let of = touches().count();
+    let is_few = (contacts as f64) < FEW * of as f64;
+    is_few.then(|| Notice::FewContacts { planner: planner.into(), contacts, of })
+}
+
+fn blind_r(experiment: &Experiment, rows: &[TrialRow]) -> Option<Notice> {
+    let last = |planner: &String| {
+        let curve = summary::curve(experiment, rows, planner);
+        let mean = |measure: &Measure| Some(curve.last()?.of(measure)?.mean);
+        Some((planner.clone(), mean(&R)?, mean(&CENTRED_R)?))
+    };
+    let is_blind =
+        |(_, r, centred_r): &(String, f64, f64)| *r > HIGH_R && *centred_r < LOW_CENTRED_R;
+    let blind: Vec<_> = experiment.planners.iter().filter_map(last).filter(is_blind).collect();
+    let smallest = |of: fn(&(String, f64, f64)) -> f64| blind.iter().map(of).reduce(f64::min);
+    Some(Notice::BlindR {
+        r: smallest(|(_, r, _)| *r)?,
+        centred_r: smallest(|(_, _, centred_r)| *centred_r)?,
+        planners: blind.iter().map(|(planner, ..)| planner.clone()).collect(),
+    })
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::FewPlaces { with, of } => write!(
+                f,
+                "only {with} of {of} test places have a surface, and the measures look at no \
+                 others: the object fills a small part of the zone (scene.zone, object.unit, \
+                 object.position_m)"
+            ),
+            Self::FewReachable { reachable, of } => write!(
+                f,
+                "the finger can touch only {reachable} of {of} test places with a surface: it is \
+                 too thick or too steep for this object (finger.radius_m, finger.pitch_deg)"
+            ),
+            Self::FarDatum { datum_y_m, surface_y_m: [low, high], away_m, zone_m } => write!(
+                f,
+                "zone.datum_y_m = {datum_y_m} lies {:.1} mm from the surface (y {low:.4} to \
+                 {high:.4} m), and the zone is {:.1} mm wide: R (Eq. 5) is near 1 for any belief, \
+                 and a zero-mean belief falls back to the datum; left out, it is {:.4}",
+                1e3 * away_m,
+                1e3 * zone_m,
+                0.5 * (low + high)
+            ),
+            Self::FewContacts { planner, contacts, of } => write!(
+                f,
+                "{planner}: only {contacts} of {of} touches met the object or could be read"
+            ),
+            Self::BlindR { planners, r, centred_r } => write!(
+                f,
+                "R (Eq. 5) of {} is above {r:.4} while centred R is as low as {centred_r:.2}: here \
+                 R cannot tell a belief from a constant height; judge by centred R and RMSE",
+                planners.join(", ")
+            ),
+        }
+    }
+}
