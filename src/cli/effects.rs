@@ -1,8 +1,9 @@
 //! `palpate effects`.
 
 use super::columns::{aligned, cell};
+use super::find::{SCENES, find};
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::terminal::{Ending, print};
+use super::terminal::{Ending, Talk, print};
 use crate::experiment::statistics::Paired;
 use crate::report::number::with_interval;
 use crate::sim::Scene;
@@ -44,8 +45,8 @@ pub(super) struct Args {
     trial_touches: u16,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
-    let scene = Scene::load(&args.scene, &args.set)?;
+pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+    let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
     if matches!(scene.body, Body::Function | Body::Cast) {
         let (path, body) = (args.scene.display(), scene.body.name());
         bail!("{path}: body = \"{body}\" has no effects; effects need body = \"kinematic\"");
@@ -57,9 +58,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     };
     let stop = stop_on_interrupt("effect")?;
     let switches = switches();
-    let bar = progress_bar("effects", "effects", switches.len() as u64 + 1, 0);
+    let bar = progress_bar(talk, "effects", "effects", switches.len() as u64 + 1, 0);
     let mut go_on = || {
-        step(&bar);
+        step(talk, &bar);
         !stop.load(Ordering::Relaxed)
     };
     let targets = targets(&scene, args.touches.into(), 0);

@@ -1,8 +1,10 @@
 //! `palpate fidelity`.
 
 use super::columns::{aligned, cell, duration, write_csv, write_figure};
+use super::find::{SCENES, find};
+use super::output::Force;
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::terminal::{Ending, print};
+use super::terminal::{Ending, Talk, print};
 use crate::experiment::store::write_whole;
 use crate::report::pareto;
 use crate::sim::Scene;
@@ -13,7 +15,7 @@ use crate::study::fidelity::order::{Order, OrderRecord};
 use crate::study::fidelity::rung_result::{RungRecord, RungResult};
 use crate::study::fidelity::spread::Spread;
 use crate::study::fidelity::tolerance::Tolerance;
-use anyhow::{Context, bail};
+use anyhow::bail;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -45,21 +47,23 @@ pub(super) struct Args {
     /// Folder for the results [default: runs/fidelity-SCENE].
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
-    let scene = Scene::load(&args.scene, &args.set)?;
+pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+    let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
     if scene.object.is_none() {
         bail!("{}: a ladder needs a scene with an object to touch", args.scene.display());
     }
     let name = args.scene.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("runs/fidelity-{name}")));
-    std::fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
+    args.force.claim_folder(&out, "fidelity.csv")?;
     let count = usize::from(args.touches);
     let stop = stop_on_interrupt("touches")?;
-    let bar = progress_bar("fidelity", "touches", comparison::pieces(count) as u64, 0);
+    let bar = progress_bar(talk, "fidelity", "touches", comparison::pieces(count) as u64, 0);
     let ladder = compare_rungs(&scene, count, args.seed, &mut || {
-        step(&bar);
+        step(talk, &bar);
         !stop.load(Ordering::Relaxed)
     })?;
     bar.finish_and_clear();

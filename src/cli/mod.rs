@@ -2,9 +2,14 @@
 
 mod calibrate;
 mod columns;
+mod completions;
 mod effects;
 mod export;
 mod fidelity;
+mod find;
+mod list;
+mod new;
+mod output;
 mod prepare;
 mod progress;
 mod reference;
@@ -19,19 +24,22 @@ mod watch;
 use crate::explore::planner::PLANNERS;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
-use terminal::{Ending, print};
+use terminal::{Ending, Talk, print};
 
 /// A testbed for active touch: a robot finger explores an object it cannot see.
 #[derive(Parser)]
 #[command(version, after_help = EXAMPLES, arg_required_else_help = true)]
 struct Cli {
+    #[command(flatten)]
+    talk: Talk,
     #[command(subcommand)]
     command: Command,
 }
 
 const EXAMPLES: &str = "\
 Examples:
-  palpate run experiments/toy.toml          run an experiment and write its report
+  palpate run toy                           run experiments/toy.toml and write its report
+  palpate new my-part.stl                   write an experiment for a mesh of your own
   palpate run experiments/bird.toml --set trials=4 --set planners='[\"active\"]'
   palpate report runs/toy                   draw the figures again, without running
   palpate show my-part.obj --unit mm        check a mesh before exploring it
@@ -46,6 +54,8 @@ again to continue.";
 
 #[derive(Subcommand)]
 enum Command {
+    /// Write a scene and an experiment for a mesh, ready to run.
+    New(new::Args),
     /// Run an experiment: planners × trials, then its report.
     Run(run::Args),
     /// Draw a run's figures and page again from its rows.
@@ -64,6 +74,10 @@ enum Command {
     Effects(effects::Args),
     /// Run hard cases at rising severity until they break.
     Stress(stress::Args),
+    /// List experiments, scenes, planners, measures and effects.
+    List(list::Args),
+    /// Print a script with which a shell completes commands.
+    Completions(completions::Args),
     /// Print every command, setting and column as Markdown.
     Reference(reference::Args),
     /// Fit the finger's constants to recordings of it on a flat plate.
@@ -81,16 +95,19 @@ pub fn main() -> ExitCode {
     });
     let cli = Cli::from_arg_matches(&command.get_matches()).unwrap_or_else(|error| error.exit());
     let outcome = match cli.command {
-        Command::Run(args) => run::run(&args),
+        Command::New(args) => new::run(&args),
+        Command::Run(args) => run::run(&args, cli.talk),
         Command::Report(args) => report::run(&args),
-        Command::Show(args) => show::run(&args),
-        Command::Scan(args) => scan::run(&args),
-        Command::Watch(args) => watch::run(&args),
+        Command::Show(args) => show::run(&args, cli.talk),
+        Command::Scan(args) => scan::run(&args, cli.talk),
+        Command::Watch(args) => watch::run(&args, cli.talk),
         Command::Export(args) => export::run(&args),
-        Command::Fidelity(args) => fidelity::run(&args),
-        Command::Effects(args) => effects::run(&args),
-        Command::Stress(args) => stress::run(&args),
+        Command::Fidelity(args) => fidelity::run(&args, cli.talk),
+        Command::Effects(args) => effects::run(&args, cli.talk),
+        Command::Stress(args) => stress::run(&args, cli.talk),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::List(args) => list::run(&args),
+        Command::Completions(args) => completions::run(&args, Cli::command()),
         Command::Reference(_) => print(reference().trim_end()).map(|()| Ending::Done),
     };
     match outcome {
@@ -98,7 +115,7 @@ pub fn main() -> ExitCode {
         Ok(Ending::Failed) => ExitCode::FAILURE,
         Ok(Ending::Interrupted) => ExitCode::from(130),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            terminal::error(format!("{error:#}"));
             ExitCode::from(2)
         }
     }

@@ -1,10 +1,12 @@
 //! How far a long command has come, and how it is stopped.
 
+use super::terminal::Talk;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 /// A flag that the first Ctrl-C raises, to stop after the `pieces` of work in hand; the second
 /// ends the program at once.
@@ -15,15 +17,28 @@ pub(super) fn stop_on_interrupt(pieces: &'static str) -> anyhow::Result<Arc<Atom
         if raised.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        eprintln!("stopping after the {pieces} in hand; Ctrl-C again to stop at once");
+        let _ = writeln!(
+            io::stderr(),
+            "stopping after the {pieces} in hand; Ctrl-C again to stop at once"
+        );
     };
     ctrlc::set_handler(handler).context("cannot listen for Ctrl-C")?;
     Ok(stop)
 }
 
 /// A bar over `total` pieces of work.
-pub(super) fn progress_bar(name: &str, pieces: &str, total: u64, done: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
+pub(super) fn progress_bar(
+    talk: Talk,
+    name: &str,
+    pieces: &str,
+    total: u64,
+    done: u64,
+) -> ProgressBar {
+    let target = match talk.quiet {
+        true => ProgressDrawTarget::hidden(),
+        false => ProgressDrawTarget::stderr(),
+    };
+    let bar = ProgressBar::with_draw_target(Some(total), target);
     let template =
         format!("{{prefix}} {{wide_bar}} {{pos}}/{{len}} {pieces}, {{elapsed}} gone, {{eta}} left");
     if let Ok(style) = ProgressStyle::with_template(&template) {
@@ -36,13 +51,19 @@ pub(super) fn progress_bar(name: &str, pieces: &str, total: u64, done: u64) -> P
     bar
 }
 
-/// Moves the bar; where no terminal shows it, says so in a line for each tenth.
-pub(super) fn step(bar: &ProgressBar) {
+/// Work that is done sooner needs no lines of progress; chosen.
+const SOON: Duration = Duration::from_secs(2);
+
+/// Moves the bar; where no terminal shows it, says so in a line for each tenth of what takes long.
+pub(super) fn step(talk: Talk, bar: &ProgressBar) {
     bar.inc(1);
     let (position, total) = (bar.position(), bar.length().unwrap_or(0));
     let tenth = |count: u64| count * 10 / total.max(1);
-    if !std::io::stderr().is_terminal() && tenth(position) > tenth(position - 1) {
+    let is_due = tenth(position) > tenth(position - 1) && position < total;
+    if is_due && !talk.quiet && bar.elapsed() > SOON && !io::stderr().is_terminal() {
         let (name, pieces) = (bar.prefix(), bar.message());
-        eprintln!("{name}: {position} of {total} {pieces}, {:.0?} left", bar.eta());
+        let left_s = bar.eta().as_secs().max(1);
+        let _ =
+            writeln!(io::stderr(), "{name}: {position} of {total} {pieces}, about {left_s} s left");
     }
 }

@@ -1,8 +1,9 @@
 //! `palpate run`.
 
+use super::find::{EXPERIMENTS, find};
 use super::prepare::simulation;
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::terminal::{Ending, note, print};
+use super::terminal::{Ending, Talk, error, print};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner;
@@ -25,7 +26,7 @@ again. Whatever else is changed wants another folder (--out) or a new start (--f
 
 #[derive(clap::Args)]
 pub(super) struct Args {
-    /// Experiment file (TOML).
+    /// Experiment file (TOML), or the name of one in experiments/.
     experiment: PathBuf,
     /// Change one setting: a dotted key and a TOML value; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
@@ -42,11 +43,14 @@ pub(super) struct Args {
     /// Write rows and summary only, no figures.
     #[arg(long)]
     no_report: bool,
+    /// Print the summary as JSON instead of a table.
+    #[arg(long)]
+    json: bool,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
-    let experiment = Experiment::load(&args.experiment, &args.set)?;
-    let simulation = simulation(experiment)?;
+pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+    let experiment = Experiment::load(&find(&args.experiment, EXPERIMENTS)?, &args.set)?;
+    let simulation = simulation(experiment, talk)?;
     let experiment = simulation.experiment();
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&experiment.name));
     let manifest = manifest(experiment);
@@ -55,11 +59,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let stop = stop_on_interrupt("trials")?;
 
     let total = u64::from(experiment.trials) * experiment.planners.len() as u64;
-    let bar = progress_bar(&experiment.name, "trials", total, done.len() as u64);
+    let bar = progress_bar(talk, &experiment.name, "trials", total, done.len() as u64);
     let begun = Instant::now();
     let count =
         runner::run(&simulation, (&mut folder, &done), args.threads.into(), &stop, &|_| {
-            step(&bar)
+            step(talk, &bar)
         })?;
     bar.finish_and_clear();
     folder.sort(experiment)?;
@@ -86,8 +90,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
             .context("the rows are safe, but the report failed")?;
         text += &format!("\nreport: {}", path.join("report.html").display());
     }
-    print(&text)?;
-    Ok(match tell_failures(&run) {
+    match args.json {
+        true => print(&format!("{:#}", report::tables::summary::json(&run)))?,
+        false => print(&text)?,
+    }
+    Ok(match tell_failures(&run, talk) {
         _ if !finished => Ending::Interrupted,
         true => Ending::Failed,
         false => Ending::Done,
@@ -95,14 +102,18 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
 }
 
 /// Says on standard error how many trials failed and why the first did; whether all of them did.
-fn tell_failures(run: &Run) -> bool {
+fn tell_failures(run: &Run, talk: Talk) -> bool {
     let failed = || run.rows.iter().filter_map(|row| Some((row, row.failure.as_ref()?)));
     let Some((row, reason)) = failed().next() else { return false };
     let (count, of) = (failed().count(), run.rows.len());
-    note(format!(
-        "{count} of {of} trials failed, the first ({}, trial {}) because of: {reason}",
+    let words = format!(
+        "{count} of {of} trials failed, the first ({}, trial {}): {reason}",
         row.planner, row.trial
-    ));
+    );
+    match count == of {
+        true => error(words),
+        false => talk.note(words),
+    }
     count == of
 }
 

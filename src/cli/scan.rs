@@ -1,8 +1,10 @@
 //! `palpate scan`.
 
+use super::find::{SCENES, find};
+use super::output::Force;
 use super::prepare::simulator;
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::terminal::{Ending, print};
+use super::terminal::{Ending, Talk, print};
 use crate::experiment::scan;
 use crate::experiment::scan::ScanTouch;
 use crate::experiment::store::write_whole;
@@ -24,7 +26,7 @@ Writes cloud.ply (points of contact with normals), cloud.csv (also targets that 
 scan.svg and scan.png (the object beside the cloud). Ctrl-C stops it without writing anything; the \
 files do not depend on the number of threads.")]
 pub(super) struct Args {
-    /// A scene (.toml) with an object.
+    /// A scene (.toml) with an object, or the name of one in scenes/.
     scene: PathBuf,
     /// Targets along x and along z [default: square cells, 81 along the longer side].
     #[arg(long, value_name = "NxM", value_parser = grid)]
@@ -38,6 +40,8 @@ pub(super) struct Args {
     /// Threads; 0 means all cores.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
+    #[command(flatten)]
+    force: Force,
 }
 
 /// Most targets along a side.
@@ -50,18 +54,20 @@ fn grid(text: &str) -> Result<[usize; 2], String> {
         .ok_or(format!("allowed is NxM, as in 41x51, each 2 to {SIDE_MAX}"))
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
-    let environment = Arc::new(Environment::build(Scene::load(&args.scene, &args.set)?)?);
+pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+    let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
+    let environment = Arc::new(Environment::build(scene)?);
     let mesh = environment.mesh().with_context(|| {
         format!("{} has no object, so there is no surface to scan", args.scene.display())
     })?;
     let name = args.scene.file_stem().unwrap_or_default().to_string_lossy();
     let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(format!("{name}-scan")));
+    args.force.claim_folder(&folder, "cloud.ply")?;
     let grid = args.grid.unwrap_or_else(|| scan::default_grid(&environment.scene().zone));
     let stop = stop_on_interrupt("rows")?;
-    let bar = progress_bar(&name, "rows", grid[1] as u64, 0);
-    let simulator = simulator(&environment)?;
-    let touches = scan::scan(&simulator, grid, args.threads.into(), &stop, &|| step(&bar))?;
+    let bar = progress_bar(talk, &name, "rows", grid[1] as u64, 0);
+    let simulator = simulator(&environment, talk)?;
+    let touches = scan::scan(&simulator, grid, args.threads.into(), &stop, &|| step(talk, &bar))?;
     bar.finish_and_clear();
     let Some(touches) = touches else { return Ok(Ending::Interrupted) };
 
@@ -81,7 +87,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         points: points.collect(),
         ..Points::default()
     };
-    std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     write_whole(&folder.join("cloud.ply"), &cloud.ply())?;
     write_whole(&folder.join("cloud.csv"), &csv(&touches))?;
     if let Some(svg) = drawing::picture(&environment, mesh, &cloud.points) {

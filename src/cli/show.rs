@@ -1,7 +1,8 @@
 //! `palpate show`.
 
+use super::output::Force;
 use super::prepare::simulator;
-use super::terminal::{Ending, note, print};
+use super::terminal::{Ending, Talk, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::notice;
 use crate::experiment::store;
@@ -9,6 +10,7 @@ use crate::experiment::store::Run;
 use crate::experiment::truth::Truth;
 use crate::geometry::import::import;
 use crate::report;
+use crate::report::png;
 use crate::sim::environment::{Environment, Shape};
 use crate::sim::scene::Unit;
 use crate::sim::{Scene, mjcf};
@@ -22,7 +24,8 @@ Examples:
   palpate show models/bird.glb
   palpate show my-part.obj --unit mm
   palpate show scenes/container.toml --mjcf container.xml    for MuJoCo's own viewer
-  palpate show scenes/container.toml --png container.png     a picture of it
+  palpate show scenes/container.toml --png container.png     a picture of the zone on the object
+  palpate show scenes/bird_pa10.toml --render bird.png       the whole scene with its robot
   palpate show experiments/toy.toml --set seed=1             every setting, defaults included
   palpate show runs/toy")]
 pub(super) struct Args {
@@ -37,18 +40,32 @@ pub(super) struct Args {
     /// Write a scene as MJCF, the format of MuJoCo.
     #[arg(long, value_name = "FILE")]
     mjcf: Option<PathBuf>,
-    /// Draw a scene (needs a build with `--features render`).
+    /// Draw a scene's object with the zone on it.
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
+    /// Draw a scene with its robot by MuJoCo (needs a build with `--features render`).
+    #[arg(long, value_name = "FILE")]
+    render: Option<PathBuf>,
+    /// Print the summary of a run's folder as JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    force: Force,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let extension = args.path.extension().and_then(|extension| extension.to_str());
     let is_scene = extension == Some("toml") && !is_experiment(&args.path);
-    for (option, given) in [("--mjcf", args.mjcf.is_some()), ("--png", args.png.is_some())] {
-        if given && !is_scene {
+    let files = [("--mjcf", &args.mjcf), ("--png", &args.png), ("--render", &args.render)];
+    for (option, file) in files {
+        let Some(file) = file else { continue };
+        if !is_scene {
             bail!("{option} goes with a scene (.toml), and {} is none", args.path.display());
         }
+        args.force.claim(file)?;
+    }
+    if args.json && !args.path.is_dir() {
+        bail!("--json goes with a run's folder, and {} is none", args.path.display());
     }
     if !args.path.exists() {
         bail!("{}: no such file or folder", args.path.display());
@@ -64,12 +81,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         );
     }
     let text = match extension {
-        _ if args.path.is_dir() => report::tables::summary::text(&Run::read(&args.path)?),
-        Some("toml") if is_scene => scene(args)?,
+        _ if args.path.is_dir() => run_folder(&Run::read(&args.path)?, args.json),
+        Some("toml") if is_scene => scene(args, talk)?,
         Some("toml") => store::resolved(&Experiment::load(&args.path, &args.set)?),
         _ => {
             let (_, report) = import(&args.path, args.unit.unwrap_or_default().metres())?;
-            format!("{}\n{report}", args.path.display())
+            format!(
+                "{}\n{report}\nto explore it: palpate new {}",
+                args.path.display(),
+                args.path.display()
+            )
         }
     };
     print(text.trim_end())?;
@@ -87,13 +108,20 @@ pub(super) fn is_experiment(path: &Path) -> bool {
 /// Test places along each side of the zone from which a scene's heights are described.
 const GRID: usize = 41;
 
-fn scene(args: &Args) -> anyhow::Result<String> {
+fn run_folder(run: &Run, json: bool) -> String {
+    match json {
+        true => format!("{:#}", report::tables::summary::json(run)),
+        false => report::tables::summary::text(run),
+    }
+}
+
+fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
     let scene = Scene::load(&args.path, &args.set)?;
     let mut text = toml::to_string(&scene).context("cannot write the scene")?;
     let environment = Arc::new(Environment::build(scene)?);
-    simulator(&environment)?;
+    simulator(&environment, talk)?;
     let truth = Truth::sample(&environment, GRID);
-    notice::of_truth(environment.task().zone(), &truth).iter().for_each(note);
+    notice::of_truth(environment.task().zone(), &truth).iter().for_each(|notice| talk.note(notice));
     text +=
         &format!("\nsurface in the zone: {} of {} test places", truth.count(), truth.places.len());
     let heights = || truth.heights_m.iter().flatten().copied();
@@ -105,17 +133,23 @@ fn scene(args: &Args) -> anyhow::Result<String> {
     if let Shape::Mesh { report, .. } = environment.shape() {
         text += &format!("{report}\n");
     }
+    if let Some(path) = &args.png {
+        let svg = report::zone::picture(&environment)
+            .context("this scene has no object with a zone on it to draw")?;
+        std::fs::write(path, png::render(&svg)?).with_context(|| path.display().to_string())?;
+        text += &format!("picture: {}\n", path.display());
+    }
     if let Some(model) = mjcf::scene(&environment, mjcf::Mode::Picture) {
         text += &compiled(&model);
         if let Some(path) = &args.mjcf {
             store::write_whole(path, &model)?;
             text += &format!("\nMJCF: {}", path.display());
         }
-        if let Some(path) = &args.png {
+        if let Some(path) = &args.render {
             draw(&model, path)?;
             text += &format!("\npicture: {}", path.display());
         }
-    } else if args.mjcf.is_some() || args.png.is_some() {
+    } else if args.mjcf.is_some() || args.render.is_some() {
         bail!("this scene has no mesh, so there is nothing to write as MJCF or to draw");
     }
     Ok(text)

@@ -1,12 +1,13 @@
 //! `palpate stress`.
 
 use super::columns::{aligned, write_csv, write_figure};
+use super::output::Force;
 use super::progress::{progress_bar, step, stop_on_interrupt};
-use super::terminal::{Ending, print};
+use super::terminal::{Ending, Talk, print};
 use crate::report::severity;
 use crate::report::severity::{CaseVerdicts, short};
 use crate::study::stress::{Case, Outcome, Verdict, cases};
-use anyhow::{Context, bail};
+use anyhow::bail;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -37,6 +38,8 @@ pub(super) struct Args {
     /// Folder for table and map.
     #[arg(long, default_value = "runs/stress", value_name = "FOLDER")]
     out: PathBuf,
+    #[command(flatten)]
+    force: Force,
 }
 
 /// A line of `stress.csv`.
@@ -52,7 +55,7 @@ struct CaseRecord<'a> {
     words: &'a str,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let wanted = args.case.as_deref().unwrap_or("");
     let chosen: Vec<&Case> = cases().filter(|case| case.name.contains(wanted)).collect();
     if chosen.is_empty() {
@@ -78,13 +81,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
             ranks.flat_map(move |rank| case.axis.values_s().iter().map(move |&s| (i, rank, s)))
         })
         .collect();
-    let bar = progress_bar("stress", "runs", jobs.len() as u64, 0);
+    let bar = progress_bar(talk, "stress", "runs", jobs.len() as u64, 0);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.into()).build()?;
     let verdicts: Vec<Option<Verdict>> = pool.install(|| {
         (jobs.par_iter())
             .map(|&(i, rank, axis_s)| {
                 let verdict = (!stop.load(Ordering::Relaxed)).then(|| chosen[i].run(rank, axis_s));
-                step(&bar);
+                step(talk, &bar);
                 verdict
             })
             .collect()
@@ -134,7 +137,7 @@ fn margins() -> String {
 }
 
 fn report(ran: &[CaseVerdicts], args: &Args) -> anyhow::Result<()> {
-    std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
+    args.force.claim_folder(&args.out, "stress.csv")?;
     let mut lines = Vec::new();
     for (case, verdicts) in ran {
         lines.extend(verdicts.iter().map(|verdict| line(case, verdict)));

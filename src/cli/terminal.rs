@@ -1,5 +1,6 @@
 //! What a command says, and how it ends.
 
+use anstyle::{AnsiColor, Style};
 use std::fmt;
 use std::io::{self, Write};
 
@@ -13,9 +14,31 @@ pub(super) enum Ending {
     Interrupted,
 }
 
-/// Says on standard error what a user may want to know; one who does not listen is no error.
-pub(super) fn note(text: impl fmt::Display) {
-    let _ = writeln!(io::stderr(), "note: {text}");
+/// How much a command says beside its result.
+#[derive(Clone, Copy, clap::Args)]
+pub(super) struct Talk {
+    /// Say nothing on standard error but errors: no notes, no progress.
+    #[arg(long, short, global = true)]
+    pub(super) quiet: bool,
+}
+
+impl Talk {
+    /// Says on standard error what a user may want to know.
+    pub(super) fn note(self, text: impl fmt::Display) {
+        if !self.quiet {
+            say(AnsiColor::Yellow.on_default().bold(), "note", text);
+        }
+    }
+}
+
+/// Says on standard error why a command could not do what it was asked.
+pub(super) fn error(text: impl fmt::Display) {
+    say(AnsiColor::Red.on_default().bold(), "error", text);
+}
+
+/// A line on standard error, coloured on a terminal; one who does not listen is no error.
+fn say(style: Style, kind: &str, text: impl fmt::Display) {
+    let _ = writeln!(anstream::stderr(), "{style}{kind}:{style:#} {text}");
 }
 
 /// Prints to standard output; a reader who has gone away is no error.

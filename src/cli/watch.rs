@@ -1,8 +1,9 @@
 //! `palpate watch`.
 
+use super::find::{SCENES, find};
 use super::prepare::simulation;
 use super::show::is_experiment;
-use super::terminal::{Ending, print};
+use super::terminal::{Ending, Talk, print};
 use crate::backend::Fault;
 use crate::backend::watched::{Sight, Watched};
 use crate::experiment::experiment::Experiment;
@@ -54,10 +55,10 @@ fn speed(text: &str) -> Result<f64, String> {
     speed.ok_or("allowed is 0.01 to 100".into())
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let experiment = experiment(args)?;
     let planner = planner(args, &experiment)?;
-    let simulation = simulation(experiment)?;
+    let simulation = simulation(experiment, talk)?;
     let Some(body) = simulation.simulator().body()? else {
         let (path, body) = (args.path.display(), simulation.experiment().scene.body.name());
         bail!(
@@ -85,9 +86,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
 }
 
 fn experiment(args: &Args) -> anyhow::Result<Experiment> {
-    let mut experiment = match is_experiment(&args.path) {
-        true => Experiment::load(&args.path, &args.set)?,
-        false => Experiment::on(&Scene::load(&args.path, &args.set)?, &["active"], 1, TOUCHES),
+    let path = find(&args.path, SCENES)?;
+    let mut experiment = match is_experiment(&path) {
+        true => Experiment::load(&path, &args.set)?,
+        false => Experiment::on(&Scene::load(&path, &args.set)?, &["active"], 1, TOUCHES),
     };
     if let Some(touches) = args.touches {
         experiment.touches = touches;

@@ -7,6 +7,7 @@ pub mod figures;
 pub mod findings;
 pub mod heat_map;
 pub mod number;
+pub mod object_panel;
 pub mod page;
 pub mod pareto;
 pub mod png;
@@ -19,6 +20,7 @@ pub mod scan;
 pub mod severity;
 pub mod style;
 pub mod tables;
+pub mod zone;
 
 pub use figures::{Drawing, FIGURES, Figure};
 

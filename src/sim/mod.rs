@@ -9,6 +9,7 @@ pub mod mjcf;
 #[cfg(feature = "mujoco")]
 pub mod mujoco;
 pub mod notice;
+pub mod placement;
 pub mod probe;
 pub mod reach;
 pub mod scene;

@@ -9,6 +9,7 @@ use crate::experiment::summary;
 use crate::experiment::summary::{CurvePoint, Events};
 use crate::report::number::{shown, with_error};
 use anyhow::Context;
+use serde_json::{Map, Value, json};
 use std::path::Path;
 
 /// A column: a measure over the trials.
@@ -96,6 +97,31 @@ pub fn text(run: &Run) -> String {
     happened(run).iter().for_each(|line| text += &format!("{line}\n"));
     notice::of_run(run).iter().for_each(|notice| text += &format!("note: {notice}\n"));
     text.trim_end().into()
+}
+
+/// The summary for programs: of each planner and tabled touch count the columns of `summary.csv`,
+/// and what a reader should know.
+pub fn json(run: &Run) -> Value {
+    let counts = run.experiment.tabled_touch_counts();
+    let columns = columns(&run.experiment);
+    let lines = curve_table(&run.experiment, &run.rows);
+    let lines = lines.into_iter().filter(|record| counts.contains(&record.point.touches));
+    let lines = lines.map(|CurveRecord { point, values }| {
+        let values: Map<String, Value> =
+            columns.iter().cloned().zip(values.into_iter().map(Value::from)).collect();
+        json!({
+            "planner": point.planner, "touches": point.touches, "trials": point.trials,
+            "measures": values,
+        })
+    });
+    let notices = notice::of_run(run);
+    json!({
+        "name": run.experiment.name,
+        "trials": run.rows.len(),
+        "failed": run.rows.iter().filter(|row| row.failure.is_some()).count(),
+        "summary": lines.collect::<Vec<_>>(),
+        "notes": notices.iter().map(ToString::to_string).chain(happened(run)).collect::<Vec<_>>(),
+    })
 }
 
 /// What happened to the trials besides their errors, a line each.

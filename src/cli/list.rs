@@ -1,0 +1,104 @@
+//! `palpate list`.
+
+use super::find::{EXPERIMENTS, SCENES, find, names};
+use super::terminal::{Ending, print};
+use crate::experiment::Experiment;
+use crate::experiment::measure::MEASURES;
+use crate::explore::planner::PLANNERS;
+use crate::sim::Scene;
+use crate::sim::finger::Effects;
+use schemars::schema_for;
+use std::path::Path;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate list                 everything that has a name
+  palpate list planners")]
+pub(super) struct Args {
+    /// What to list [default: all].
+    kind: Option<Kind>,
+}
+
+/// What can be listed.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Kind {
+    /// Files in experiments/, here or beside the program.
+    Experiments,
+    /// Files in scenes/.
+    Scenes,
+    /// Planners that an experiment may name.
+    Planners,
+    /// What trials are judged by.
+    Measures,
+    /// Tables of [effects] in a scene.
+    Effects,
+}
+
+/// Each kind with its lines: name and what it is.
+type Lister = fn() -> Vec<[String; 2]>;
+const KINDS: &[(Kind, &str, Lister)] = &[
+    (Kind::Experiments, "experiments (palpate run NAME)", experiments),
+    (Kind::Scenes, "scenes (palpate scan NAME, watch, fidelity, effects)", scenes),
+    (Kind::Planners, "planners (planners = [\"NAME\"])", planners),
+    (Kind::Measures, "measures", measures),
+    (Kind::Effects, "effects ([effects.NAME])", effects),
+];
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let wanted = KINDS.iter().filter(|(kind, ..)| args.kind.is_none_or(|wanted| wanted == *kind));
+    let sections: Vec<String> = wanted
+        .map(|(_, title, lines)| {
+            let lines = lines();
+            let indented = lines.into_iter().map(|[name, about]| [format!("  {name}"), about]);
+            format!("{title}\n{}", left(&indented.collect::<Vec<_>>()))
+        })
+        .collect();
+    print(sections.join("\n").trim_end())?;
+    Ok(Ending::Done)
+}
+
+fn experiments() -> Vec<[String; 2]> {
+    let about = |name: &String| {
+        let loaded = find(Path::new(name), EXPERIMENTS)
+            .and_then(|path| Ok(Experiment::load(&path, &[])?.question));
+        [name.clone(), loaded.unwrap_or_else(|error| format!("{error:#}"))]
+    };
+    names(EXPERIMENTS).iter().map(about).collect()
+}
+
+fn scenes() -> Vec<[String; 2]> {
+    let about = |name: &String| {
+        let loaded = find(Path::new(name), SCENES).and_then(|path| {
+            let scene = Scene::load(&path, &[])?;
+            Ok(format!("body = \"{}\"", scene.body.name()))
+        });
+        [name.clone(), loaded.unwrap_or_else(|error| format!("{error:#}"))]
+    };
+    names(SCENES).iter().map(about).collect()
+}
+
+fn planners() -> Vec<[String; 2]> {
+    PLANNERS.iter().map(|planner| [planner.name, planner.about].map(String::from)).collect()
+}
+
+fn measures() -> Vec<[String; 2]> {
+    MEASURES.iter().map(|measure| [measure.id, measure.title].map(String::from)).collect()
+}
+
+fn effects() -> Vec<[String; 2]> {
+    let schema = schema_for!(Effects).to_value();
+    let tables = schema["properties"].as_object().into_iter().flatten();
+    tables
+        .map(|(name, table)| {
+            let about = table["description"].as_str().unwrap_or_default().replace('\n', " ");
+            [name.clone(), about]
+        })
+        .collect()
+}
+
+/// Cells in aligned columns, all to the left.
+fn left(lines: &[[String; 2]]) -> String {
+    let width = lines.iter().map(|[name, _]| name.chars().count()).max().unwrap_or(0);
+    lines.iter().map(|[name, about]| format!("{name:<width$}  {about}\n")).collect()
+}

@@ -1,0 +1,253 @@
+//! `palpate new`.
+
+use super::output::Force;
+use super::terminal::{Ending, print};
+use crate::experiment::store::write_whole;
+use crate::geometry::bvh::MeshBvh;
+use crate::geometry::import::import;
+use crate::geometry::mesh::Mesh;
+use crate::math::pose::pose;
+use crate::sim::placement::{self, Facing, Found, Side, Up};
+use crate::sim::scene::Unit;
+use anyhow::{Context, ensure};
+use clap::ValueEnum;
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate new my-part.stl
+  palpate new my-part.obj --side top --finger soft
+  palpate new scan.ply --unit in --up z --out my-experiments
+
+Looks at the mesh, asks nothing, and writes an experiment, NAME.toml, and its scene, NAME-scene.toml, \
+that run as they are; every guess is said and stands in the scene to be changed. glTF is in metres with y \
+up by its specification; the other formats say neither: they are read in the first of mm, m and cm in \
+which a finger can explore them, and scaled to 0.15 m if there is none. OBJ is taken to have y up, STL and \
+PLY z.")]
+pub(super) struct Args {
+    /// A mesh.
+    mesh: PathBuf,
+    /// Side that faces the finger.
+    #[arg(long, value_enum, default_value_t)]
+    side: Side,
+    /// Axis of the file that is up [default: y for glTF and OBJ, z for others].
+    #[arg(long, value_enum)]
+    up: Option<Up>,
+    /// Unit of the file's numbers [default: guessed].
+    #[arg(long, value_enum)]
+    unit: Option<Unit>,
+    /// What touches.
+    #[arg(long, value_enum, default_value_t)]
+    finger: FingerKind,
+    /// Folder for both files.
+    #[arg(long, value_name = "FOLDER", default_value = ".")]
+    out: PathBuf,
+    #[command(flatten)]
+    force: Force,
+}
+
+/// What touches.
+#[derive(Clone, Copy, Default, PartialEq, clap::ValueEnum)]
+enum FingerKind {
+    /// A rigid fingertip, swept to first contact: body = "cast".
+    #[default]
+    Rigid,
+    /// A soft BioTac on a stage: body = "kinematic".
+    Soft,
+    /// A soft BioTac on a Mitsubishi PA-10, stepped by MuJoCo: body = "dynamic".
+    Arm,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let name = name(&args.mesh)?;
+    let [experiment, scene] =
+        ["", "-scene"].map(|what| args.out.join(format!("{name}{what}.toml")));
+    args.force.claim_new(&experiment)?;
+    args.force.claim_new(&scene)?;
+    let guess = Guess::of(args)?;
+    std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
+    write_whole(&scene, &guess.scene(args)?)?;
+    let scene_name = format!("{name}-scene.toml");
+    write_whole(&experiment, &experiment_text(&name, &scene_name, args))?;
+    print(&format!(
+        "{}\nwrote {} and {}\n\nnext\n  palpate show {} --png {name}.png    to see the zone on it\n  \
+         palpate run {}{}",
+        guess.words(args),
+        scene.display(),
+        experiment.display(),
+        scene.display(),
+        experiment.display(),
+        match args.finger {
+            FingerKind::Rigid => "    a few seconds",
+            FingerKind::Soft => "    about ten seconds",
+            FingerKind::Arm => "    about a minute",
+        }
+    ))?;
+    Ok(Ending::Done)
+}
+
+/// The mesh's name as that of an experiment.
+fn name(mesh: &Path) -> anyhow::Result<String> {
+    let stem = mesh.file_stem().unwrap_or_default().to_string_lossy();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    let name: String = stem.chars().map(|c| if is_plain(c) { c } else { '-' }).take(80).collect();
+    let name = name.trim_matches(['-', '.']);
+    ensure!(!name.is_empty(), "{}: a name with a letter or digit is needed", mesh.display());
+    Ok(name.into())
+}
+
+/// What is made of a mesh.
+struct Guess {
+    up: Up,
+    unit: Unit,
+    scale: f64,
+    size_mm: [f64; 3],
+    position_m: [f64; 3],
+    rotation_deg: [f64; 3],
+    found: Found,
+}
+
+impl Guess {
+    fn of(args: &Args) -> anyhow::Result<Self> {
+        let extension = args.mesh.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let is_gltf = ["gltf", "glb"].contains(&extension.as_str());
+        let up = args.up.unwrap_or(if is_gltf || extension == "obj" { Up::Y } else { Up::Z });
+        // In the middle of all units, so that the largest and the smallest can be read.
+        let (mut mesh, _) = import(&args.mesh, Unit::Mm.metres())?;
+        let extent = |mesh: &Mesh| {
+            let (low, high) = mesh.bounds();
+            high - low
+        };
+        let unit = args.unit.or(is_gltf.then_some(Unit::M));
+        let (unit, scale) = placement::size(extent(&mesh).max() / Unit::Mm.metres(), unit);
+        if (unit, scale) != (Unit::Mm, 1.0) {
+            (mesh, _) = import(&args.mesh, unit.metres() * scale)?;
+        }
+        let size_mm = (extent(&mesh) * 1e3).into();
+        let facing = if is_gltf { Facing::of_gltf(up) } else { Facing::of(up) };
+        let rotation_deg = placement::rotation_deg(facing, args.side);
+        let turned = mesh.transformed(&pose([0.0; 3], rotation_deg));
+        let position_m = placement::position_m(&turned);
+        let bvh = MeshBvh::new(turned.transformed(&pose(position_m, [0.0; 3])));
+        let found = placement::zone(&bvh).with_context(|| {
+            format!("{} shows no surface from that side; try --side or --up", args.mesh.display())
+        })?;
+        Ok(Self { up, unit, scale, size_mm, position_m, rotation_deg, found })
+    }
+
+    /// The scene as a file for people.
+    fn scene(&self, args: &Args) -> anyhow::Result<String> {
+        let Self { unit, scale, position_m, rotation_deg, found, .. } = self;
+        let Found { zone, filled } = found;
+        let mesh = match args.mesh.is_relative() && args.out.as_os_str() == "." {
+            true => args.mesh.clone(),
+            false => std::path::absolute(&args.mesh)?,
+        };
+        let mesh = toml::Value::from(mesh.to_string_lossy().into_owned());
+        let (body, tables) = match args.finger {
+            FingerKind::Rigid => ("cast", ""),
+            FingerKind::Soft => ("kinematic", SOFT),
+            FingerKind::Arm => ("dynamic", ARM),
+        };
+        let [x_m, z_m] = [zone.x_m, zone.z_m.unwrap_or_default()];
+        let datum_y_m = zone.datum_y_m();
+        let depth_m = zone.depth_m.unwrap_or_default();
+        Ok(format!(
+            "# {}, as `palpate new` guessed it; every number may be changed.\n\
+             body = \"{body}\"\n\n\
+             [object]\n\
+             mesh = {mesh}\n\
+             unit = \"{unit}\"                 # of the file's numbers: m, cm, mm, um, in\n\
+             scale = {scale:?}                 # on top of the unit\n\
+             position_m = {position_m:?}    # of the mesh's origin, in the frame of the robot's base\n\
+             rotation_deg = {rotation_deg:?}    # about the base's x, then y, then z: the side that faces +y is touched\n\n\
+             [zone]                      # touched along -y; {:.0} % of it have a surface\n\
+             x_m = {x_m:?}\n\
+             z_m = {z_m:?}\n\
+             datum_y_m = {datum_y_m:?}          # heights are measured from here: the middle of the surface\n\
+             depth_m = {depth_m:?}    # nearest and farthest -y at which there may be something\n{tables}",
+            args.mesh.file_name().unwrap_or_default().to_string_lossy(),
+            100.0 * filled,
+        ))
+    }
+
+    /// What was guessed, for the terminal.
+    fn words(&self, args: &Args) -> String {
+        let Self { up, unit, scale, size_mm: [x, y, z], found, .. } = self;
+        let scaled = match *scale {
+            1.0 => String::new(),
+            scale => format!(", scaled by {scale} to a size that a finger can explore"),
+        };
+        let named = |value: &dyn ValueName| value.name();
+        let [width, height] = [found.zone.x_m, found.zone.z_m.unwrap_or_default()]
+            .map(|[low, high]| 1e3 * (high - low));
+        let [near, far] = found.zone.depth_m.unwrap_or_default();
+        format!(
+            "{}: read in {unit}{scaled}: {x:.1} x {y:.1} x {z:.1} mm, {} up; its {} faces the finger\n\
+             zone {width:.0} x {height:.0} mm, {:.0} mm deep, {:.0} % of it have a surface",
+            args.mesh.display(),
+            named(up),
+            named(&args.side),
+            1e3 * (far - near),
+            100.0 * found.filled
+        )
+    }
+}
+
+/// As the command line names it.
+trait ValueName {
+    fn name(&self) -> String;
+}
+
+impl<T: ValueEnum> ValueName for T {
+    fn name(&self) -> String {
+        self.to_possible_value().map_or(String::new(), |value| value.get_name().into())
+    }
+}
+
+/// Tables of a soft finger.
+const SOFT: &str = "
+# A BioTac: its skin, the fluid under it and 19 electrodes, which say where it touches.
+[touch]
+press_m = 0.0004
+
+[effects.skin]
+[effects.fluid]
+[effects.electrodes]
+";
+
+/// Tables of an arm with a soft finger.
+const ARM: &str = "
+[arm]                       # a Mitsubishi PA-10; its base is the origin
+
+# A BioTac: its skin, the fluid under it and 19 electrodes, which say where it touches.
+[touch]
+approach_m_s = 0.015        # slower than a stage: the servos need 0.04 s to stop the finger
+press_m = 0.0004
+
+[effects.skin]
+[effects.fluid]
+[effects.electrodes]
+";
+
+fn experiment_text(name: &str, scene: &str, args: &Args) -> String {
+    // What contacts that electrodes locate are off the surface, RMS (docs/finger.md).
+    let noise = match args.finger {
+        FingerKind::Rigid => "",
+        FingerKind::Soft | FingerKind::Arm => {
+            "\n[gp]\nnoise_sd_m = 0.0003         # of contacts that electrodes locate\n"
+        }
+    };
+    format!(
+        "name = \"{name}\"\n\
+         question = \"Which planner explores {name} best?\"\n\
+         scene = \"{scene}\"\n\
+         planners = [\"active\", \"random\", \"sobol\"]\n\
+         trials = 12                 # of each planner\n\
+         seed = 1\n\
+         initial_touches = 5         # random ones that all planners share\n\
+         touches = 40                # of a trial in all\n\
+         grid = 41                   # test places along each side of the zone\n{noise}"
+    )
+}

@@ -1,0 +1,79 @@
+//! Files and folders that a command is told to write: nobody else's is replaced unasked.
+
+use anyhow::{Context, bail};
+use std::fs::{self, File};
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+
+/// Whether a file that Palpate did not write may be replaced.
+#[derive(Clone, Copy, clap::Args)]
+pub(super) struct Force {
+    /// Replace a file that Palpate did not write, or write into a folder of other things.
+    #[arg(long)]
+    force: bool,
+}
+
+/// What every file that Palpate writes says in its first bytes.
+const MARK: &[u8] = b"palpate";
+
+/// In how many; chosen, longer than any header.
+const HEAD: u64 = 1024;
+
+impl Force {
+    /// Makes sure that `path` may be written: it is not there, or Palpate wrote it, or it is a file
+    /// and `--force` is given.
+    ///
+    /// # Errors
+    /// If it may not.
+    pub(super) fn claim(self, path: &Path) -> anyhow::Result<()> {
+        let name = path.display();
+        let kind = match fs::metadata(path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+            Err(error) => return Err(error).with_context(|| name.to_string()),
+            Ok(kind) => kind,
+        };
+        if !kind.is_file() {
+            bail!("{name} is a folder, a device or a pipe; allowed is the name of a file");
+        }
+        let mut head = Vec::new();
+        let file = File::open(path).with_context(|| name.to_string())?;
+        file.take(HEAD).read_to_end(&mut head).with_context(|| name.to_string())?;
+        head.make_ascii_lowercase();
+        let is_ours = head.windows(MARK.len()).any(|part| part == MARK);
+        if !is_ours && !self.force {
+            bail!("{name} is there, and Palpate did not write it: --force replaces it");
+        }
+        Ok(())
+    }
+
+    /// Makes sure that `path`, which people go on to edit, is not there or may be replaced.
+    ///
+    /// # Errors
+    /// If it is there without `--force`, or is no file.
+    pub(super) fn claim_new(self, path: &Path) -> anyhow::Result<()> {
+        self.claim(path)?;
+        if path.exists() && !self.force {
+            bail!("{} is there: --force replaces it", path.display());
+        }
+        Ok(())
+    }
+
+    /// Makes sure that `path` may be filled with results of which `own` is one, and makes it: it is
+    /// not there, empty, or has that file, or `--force` is given.
+    ///
+    /// # Errors
+    /// If it may not, or cannot be made.
+    pub(super) fn claim_folder(self, path: &Path, own: &str) -> anyhow::Result<()> {
+        let name = || path.display().to_string();
+        fs::create_dir_all(path).with_context(name)?;
+        let is_empty = fs::read_dir(path).with_context(name)?.next().is_none();
+        if !is_empty && !path.join(own).is_file() && !self.force {
+            bail!(
+                "{} holds other things and no {own}: name a new folder, or write beside them with \
+                 --force",
+                name()
+            );
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,57 @@
+//! A panel with the object in the zone's frame and the zone's rim on it.
+
+use super::axes::{Axis, Length};
+use super::canvas::{Area, Canvas};
+use super::relief::{Relief, Space};
+use super::relief_panel::ReliefPanel;
+use super::style;
+use super::style::LATER;
+use crate::geometry::mesh::Mesh;
+use crate::sim::Environment;
+use crate::task::Zone;
+
+/// Places along each side of the zone's rim; more would not show.
+const PLACES: usize = 90;
+
+/// Draws the object into `area`, its heights above the datum coloured along `axis`.
+pub fn draw(
+    canvas: &mut Canvas,
+    area: Area,
+    (environment, mesh): (&Environment, &Mesh),
+    axis: &Axis,
+) {
+    let zone = environment.task().zone();
+    let unit = Length::of(zone);
+    let mesh = &mesh.transformed(&zone.x_wz().inverse());
+    let (low, high) = mesh.bounds();
+    // Out to whole units, so that the ends of the axes are short to read.
+    let around = |low: f64, high: f64| {
+        [(low * unit.per_m).floor() / unit.per_m, (high * unit.per_m).ceil() / unit.per_m]
+    };
+    let space = Space {
+        x_m: around(low.x, high.x),
+        z_m: around(low.z, high.z),
+        height_m: [low.y, high.y].map(|y_m| y_m - zone.datum_y_m()),
+    };
+    let panel = ReliefPanel::new(unit, area, space);
+    panel.frame(canvas, "the object, and the zone on it", "");
+    Relief::of_mesh(&panel.view, mesh, zone.datum_y_m(), axis).draw(canvas);
+    for side in rim(zone) {
+        let on_surface = side.iter().map(|place| {
+            let height_m = environment.true_height_m(place)?;
+            Some(panel.view.at([place[0], height_m, place[1]]))
+        });
+        let on_surface: Vec<_> = on_surface.collect();
+        for part in on_surface.split(Option::is_none) {
+            canvas.line(part.iter().flatten().copied(), &style::stroke(LATER, 2.0));
+        }
+    }
+}
+
+/// The zone's four sides as places.
+fn rim(zone: &Zone) -> [Vec<Vec<f64>>; 4] {
+    let side = |at: fn(f64) -> [f64; 2]| -> Vec<Vec<f64>> {
+        (0..=PLACES).map(|i| zone.at(&at(i as f64 / PLACES as f64))).collect()
+    };
+    [side(|t| [t, 0.0]), side(|t| [1.0, t]), side(|t| [t, 1.0]), side(|t| [0.0, t])]
+}
