@@ -21,7 +21,7 @@ pub enum Fault {
         found: usize,
     },
     /// What was read is not a number.
-    #[error("bad reading at {time_s} s: {quantity} is {values:?}")]
+    #[error("bad reading at {time_s:.3} s: {quantity} is {values:?}")]
     BadReading {
         /// When.
         time_s: f64,
@@ -31,7 +31,7 @@ pub enum Fault {
         values: Vec<f64>,
     },
     /// The controller has no command for where the arm stands and shall go.
-    #[error("no command at {time_s} s: {cause}")]
+    #[error("no command at {time_s:.3} s: {cause}")]
     NoCommand {
         /// When.
         time_s: f64,
@@ -40,7 +40,7 @@ pub enum Fault {
     },
     /// No posture within the joint limits brings the tip to where it was sent.
     #[error(
-        "out of reach at {time_s} s: on the way to {phase} the tip stays {:.1} mm and {:.1} deg away",
+        "out of reach at {time_s:.3} s: on the way to {phase} the tip stays {:.1} mm and {:.1} deg away",
         1e3 * distance_m, angle_rad.to_degrees()
     )]
     OutOfReach {
@@ -54,7 +54,7 @@ pub enum Fault {
         angle_rad: f64,
     },
     /// The state is no longer finite or left its limits.
-    #[error("diverged at {time_s} s: {state:?}")]
+    #[error("diverged at {time_s:.3} s: {state:.3?}")]
     Diverged {
         /// When.
         time_s: f64,
@@ -62,7 +62,7 @@ pub enum Fault {
         state: Vec<f64>,
     },
     /// The fingertip's centre is inside the object: the skin no longer keeps them apart.
-    #[error("at {time_s} s the finger is inside the object, its tip at {p_wt:?}")]
+    #[error("at {time_s:.3} s the finger is inside the object, its tip at {p_wt:.4?}")]
     Inside {
         /// When.
         time_s: f64,
@@ -71,7 +71,7 @@ pub enum Fault {
     },
     /// A movement within reach did not end in its time: something is in the way, or the joints do
     /// not follow.
-    #[error("at {time_s} s the movement to {phase} has not ended; joints at {q:?}")]
+    #[error("at {time_s:.3} s the movement to {phase} has not ended; joints at {q:.3?}")]
     Late {
         /// Where it led.
         phase: &'static str,
@@ -81,7 +81,7 @@ pub enum Fault {
         q: Vec<f64>,
     },
     /// A recording cannot be written: what cannot be kept is not done.
-    #[error("the recording fails at {time_s} s: {message}")]
+    #[error("the recording fails at {time_s:.3} s: {message}")]
     Unrecorded {
         /// When.
         time_s: f64,
@@ -89,13 +89,13 @@ pub enum Fault {
         message: String,
     },
     /// Whoever watched it had it stopped.
-    #[error("stopped at {time_s} s")]
+    #[error("stopped at {time_s:.3} s")]
     Stopped {
         /// When.
         time_s: f64,
     },
     /// The body stopped answering.
-    #[error("no answer since {time_s} s")]
+    #[error("no answer since {time_s:.3} s")]
     Lost {
         /// When it last answered.
         time_s: f64,

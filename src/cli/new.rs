@@ -47,6 +47,17 @@ pub(super) struct Args {
     force: Force,
 }
 
+impl Args {
+    /// A file in the folder asked for.
+    fn beside(&self, file: String) -> PathBuf {
+        if self.is_here() { file.into() } else { self.out.join(file) }
+    }
+
+    fn is_here(&self) -> bool {
+        self.out.as_os_str() == "."
+    }
+}
+
 /// What touches.
 #[derive(Clone, Copy, Default, PartialEq, clap::ValueEnum)]
 enum FingerKind {
@@ -61,8 +72,7 @@ enum FingerKind {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let name = name(&args.mesh)?;
-    let [experiment, scene] =
-        ["", "-scene"].map(|what| args.out.join(format!("{name}{what}.toml")));
+    let [experiment, scene] = ["", "-scene"].map(|what| args.beside(format!("{name}{what}.toml")));
     args.force.claim_new(&experiment)?;
     args.force.claim_new(&scene)?;
     let guess = Guess::of(args)?;
@@ -140,7 +150,7 @@ impl Guess {
     fn scene(&self, args: &Args) -> anyhow::Result<String> {
         let Self { unit, scale, position_m, rotation_deg, found, .. } = self;
         let Found { zone, filled } = found;
-        let mesh = match args.mesh.is_relative() && args.out.as_os_str() == "." {
+        let mesh = match args.mesh.is_relative() && args.is_here() {
             true => args.mesh.clone(),
             false => std::path::absolute(&args.mesh)?,
         };

@@ -37,6 +37,9 @@ pub fn draw(
     panel.frame(canvas, "the object, and the zone on it", "");
     Relief::of_mesh(&panel.view, mesh, zone.datum_y_m(), axis).draw(canvas);
     for side in rim(zone) {
+        // Where the zone looks past the object, its rim is seen at the height of the datum.
+        let at_datum = side.iter().map(|place| panel.view.at([place[0], 0.0, place[1]]));
+        canvas.line(at_datum, &style::stroke(LATER, 0.6));
         let on_surface = side.iter().map(|place| {
             let height_m = environment.true_height_m(place)?;
             Some(panel.view.at([place[0], height_m, place[1]]))

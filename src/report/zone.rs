@@ -24,7 +24,7 @@ pub fn picture(environment: &Environment) -> Option<String> {
     let mut canvas = Canvas::new(PANEL.0, PANEL.1 + FOOT_PX);
     let area = Area { left: 0.0, top: 8.0, width: PANEL.0, height: PANEL.1 };
     object_panel::draw(&mut canvas, area, (environment, mesh), &axis);
-    let bar = Area { left: 130.0, top: PANEL.1 + 20.0, width: 300.0, height: 13.0 };
+    let bar = Area { left: 210.0, top: PANEL.1 + 20.0, width: 300.0, height: 13.0 };
     let (low, high) = axis.range();
     let scale = Axis::linear(low * unit.per_m, high * unit.per_m, 6.0);
     let words = format!("height above the datum ({})", unit.symbol);

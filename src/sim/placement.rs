@@ -131,8 +131,9 @@ fn tenth_mm(length_m: f64) -> f64 {
 /// Rays along each side of an object's silhouette; chosen.
 const RAYS: usize = 61;
 
-/// Share of a zone that has a surface; chosen, so that a rounded corner costs no row of places.
-const FILLED: f64 = 0.9;
+/// Share of a zone that has a surface; chosen, so that a rounded corner costs no row of places and no
+/// touch is spent on a rim.
+const FILLED: f64 = 0.98;
 
 /// Room behind the farthest surface of a zone; chosen.
 const BEHIND_M: f64 = 0.005;
@@ -146,7 +147,7 @@ pub struct Found {
     pub filled: f64,
 }
 
-/// The largest rectangle of the silhouette, seen along −y, of which nine tenths have a surface; its
+/// The largest rectangle of the silhouette, seen along −y, of which almost all has a surface; its
 /// datum in the middle of that surface, its depth from the object's front to a little behind the
 /// farthest surface. None if there is no surface along the approach.
 pub fn zone(bvh: &MeshBvh) -> Option<Found> {
