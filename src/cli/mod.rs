@@ -19,7 +19,7 @@ mod watch;
 use crate::explore::planner::PLANNERS;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
-use terminal::{Ending, print};
+use terminal::{Ending, print, tell};
 
 /// A testbed for active touch: a robot finger explores an object it cannot see.
 #[derive(Parser)]
@@ -98,7 +98,7 @@ pub fn main() -> ExitCode {
         Ok(Ending::Failed) => ExitCode::FAILURE,
         Ok(Ending::Interrupted) => ExitCode::from(130),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            tell(&format!("error: {error:#}"));
             ExitCode::from(2)
         }
     }

@@ -1,5 +1,6 @@
 //! From files to what runs: notices of what is simulated otherwise go to standard error.
 
+use super::terminal;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::Environment;
 use crate::sim::simulator::Simulator;
@@ -21,5 +22,5 @@ pub(super) fn simulator(environment: &Arc<Environment>) -> anyhow::Result<Simula
 }
 
 fn tell(simulator: &Simulator) {
-    simulator.notice().iter().for_each(|notice| eprintln!("note: {notice}"));
+    simulator.notice().iter().for_each(|notice| terminal::tell(&format!("note: {notice}")));
 }

@@ -1,5 +1,6 @@
 //! How far a long command has come, and how it is stopped.
 
+use super::terminal::tell;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
@@ -15,7 +16,7 @@ pub(super) fn stop_on_interrupt(pieces: &'static str) -> anyhow::Result<Arc<Atom
         if raised.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        eprintln!("stopping after the {pieces} in hand; Ctrl-C again to stop at once");
+        tell(&format!("stopping after the {pieces} in hand; Ctrl-C again to stop at once"));
     };
     ctrlc::set_handler(handler).context("cannot listen for Ctrl-C")?;
     Ok(stop)
@@ -43,6 +44,6 @@ pub(super) fn step(bar: &ProgressBar) {
     let tenth = |count: u64| count * 10 / total.max(1);
     if !std::io::stderr().is_terminal() && tenth(position) > tenth(position - 1) {
         let (name, pieces) = (bar.prefix(), bar.message());
-        eprintln!("{name}: {position} of {total} {pieces}, {:.0?} left", bar.eta());
+        tell(&format!("{name}: {position} of {total} {pieces}, {:.0?} left", bar.eta()));
     }
 }

@@ -1,5 +1,6 @@
 //! What a command says, and how it ends.
 
+use anyhow::Context;
 use std::io::{self, Write};
 
 /// How a command ended, if it did not fail.
@@ -15,7 +16,15 @@ pub(super) enum Ending {
 /// Prints to standard output; a reader who has gone away is no error.
 pub(super) fn print(text: &str) -> anyhow::Result<()> {
     match writeln!(io::stdout(), "{text}") {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(error).context("standard output")
+        }
         _ => Ok(()),
     }
+}
+
+/// Prints to standard error. There is no one to tell that it cannot be written, and no work is
+/// worth less for that.
+pub(super) fn tell(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
 }
