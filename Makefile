@@ -10,7 +10,7 @@ PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementat
 FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
 PALPATE := target/release/palpate
 
-.PHONY: demo paper paper-dynamic paper-planners test page-test reference lint bench contacts growth bench-peers setup tools clean
+.PHONY: demo paper paper-dynamic paper-planners test page-test fuzz reference lint bench contacts growth bench-peers setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -45,6 +45,13 @@ test: setup
 # The report page in a browser; fails where there is no Chromium.
 page-test: setup
 	PALPATE_PAGE_TEST=1 cargo test --locked --test suite page
+
+# Valid files and settings, altered at random: no panic, no hang, no silence. Takes about an hour.
+FUZZ := 100000
+
+fuzz: setup
+	PALPATE_FUZZ=$(FUZZ) cargo test --locked --test suite fuzz::
+	PALPATE_FUZZ=$(FUZZ) cargo test --locked --test suite folders::kills
 
 # docs/reference.md, from the code; a test holds it to what the code says.
 reference: setup

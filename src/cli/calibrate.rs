@@ -1,6 +1,7 @@
 //! `palpate calibrate`.
 
 use super::terminal::{Ending, print};
+use crate::files;
 use crate::sim::finger::calibration::{Free, Model, Residual, fit, residual};
 use crate::sim::finger::effects::Effects;
 use crate::sim::finger::effects::fluid::FluidEffect;
@@ -24,8 +25,8 @@ pub struct Args {
 
 pub fn run(args: &Args) -> anyhow::Result<Ending> {
     let name = args.recordings.display();
-    let text =
-        std::fs::read_to_string(&args.recordings).with_context(|| format!("cannot read {name}"))?;
+    let text = files::text(&args.recordings, files::TEXT_MAX)
+        .with_context(|| format!("cannot read {name}"))?;
     let recordings: Recordings =
         serde_json::from_str(&text).with_context(|| format!("{name} is not a recording"))?;
     let free = if args.attitude_only { Free::Attitude } else { Free::Constants };

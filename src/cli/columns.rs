@@ -42,9 +42,10 @@ pub(super) fn duration(s: f64) -> String {
 
 /// Writes lines as CSV.
 pub(super) fn write_csv<T: Serialize>(path: &Path, lines: &[T]) -> anyhow::Result<()> {
-    let mut writer = csv::Writer::from_path(path).with_context(|| path.display().to_string())?;
-    lines.iter().try_for_each(|line| writer.serialize(line))?;
-    writer.flush().with_context(|| path.display().to_string())
+    let place = || path.display().to_string();
+    let mut writer = csv::Writer::from_path(path).with_context(place)?;
+    lines.iter().try_for_each(|line| writer.serialize(line)).with_context(place)?;
+    writer.flush().with_context(place)
 }
 
 /// Writes a drawing as SVG and PNG.

@@ -1,9 +1,9 @@
 //! How far a long command has come, and how it is stopped.
 
-use super::terminal::Talk;
+use super::terminal::{Talk, tell};
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -17,10 +17,7 @@ pub(super) fn stop_on_interrupt(pieces: &'static str) -> anyhow::Result<Arc<Atom
         if raised.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        let _ = writeln!(
-            io::stderr(),
-            "stopping after the {pieces} in hand; Ctrl-C again to stop at once"
-        );
+        tell(&format!("stopping after the {pieces} in hand; Ctrl-C again to stop at once"));
     };
     ctrlc::set_handler(handler).context("cannot listen for Ctrl-C")?;
     Ok(stop)
@@ -63,7 +60,6 @@ pub(super) fn step(talk: Talk, bar: &ProgressBar) {
     if is_due && !talk.quiet && bar.elapsed() > SOON && !io::stderr().is_terminal() {
         let (name, pieces) = (bar.prefix(), bar.message());
         let left_s = bar.eta().as_secs().max(1);
-        let _ =
-            writeln!(io::stderr(), "{name}: {position} of {total} {pieces}, about {left_s} s left");
+        tell(&format!("{name}: {position} of {total} {pieces}, about {left_s} s left"));
     }
 }

@@ -8,7 +8,8 @@ use crate::experiment::notice;
 use crate::experiment::store;
 use crate::experiment::store::Run;
 use crate::experiment::truth::Truth;
-use crate::geometry::import::import;
+use crate::files;
+use crate::geometry::import::{Buffers, import_with};
 use crate::report;
 use crate::report::png;
 use crate::sim::environment::{Environment, Shape};
@@ -29,11 +30,14 @@ Examples:
   palpate show experiments/toy.toml --set seed=1             every setting, defaults included
   palpate show runs/toy")]
 pub(super) struct Args {
-    /// A mesh (.obj, .gltf, .glb), a scene or an experiment (.toml), or a run's folder.
+    /// A mesh (.obj, .gltf, .glb, .stl, .ply), a scene or an experiment (.toml), or a run's folder.
     path: PathBuf,
     /// Unit of a mesh file's numbers [default: m].
     #[arg(long, value_name = "UNIT")]
     unit: Option<Unit>,
+    /// Let a .gltf mesh name buffers outside its own folder; a scene says object.outside_buffers.
+    #[arg(long)]
+    outside_buffers: bool,
     /// Change one setting of a scene or experiment; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -71,6 +75,9 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         bail!("{}: no such file or folder", args.path.display());
     }
     let is_toml = extension == Some("toml");
+    if args.outside_buffers && (is_toml || args.path.is_dir()) {
+        bail!("--outside-buffers goes with a mesh; a scene says object.outside_buffers = true");
+    }
     if args.unit.is_some() && (is_toml || args.path.is_dir()) {
         bail!("--unit goes with a mesh; a scene names the unit of its own: object.unit");
     }
@@ -85,12 +92,14 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         Some("toml") if is_scene => scene(args, talk)?,
         Some("toml") => store::resolved(&Experiment::load(&args.path, &args.set)?),
         _ => {
-            let (_, report) = import(&args.path, args.unit.unwrap_or_default().metres())?;
-            format!(
-                "{}\n{report}\nto explore it: palpate new {}",
-                args.path.display(),
-                args.path.display()
-            )
+            let buffers = match args.outside_buffers {
+                true => Buffers::Anywhere,
+                false => Buffers::Beside,
+            };
+            let metres = args.unit.unwrap_or_default().metres();
+            let (_, report) = import_with(&args.path, metres, buffers)?;
+            let path = args.path.display();
+            format!("{path}\n{report}\nto explore it: palpate new {path}")
         }
     };
     print(text.trim_end())?;
@@ -99,7 +108,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
 
 /// An experiment names planners, a scene does not; a file that is neither is read as a scene.
 pub(super) fn is_experiment(path: &Path) -> bool {
-    std::fs::read_to_string(path)
+    files::text(path, files::TEXT_MAX)
         .ok()
         .and_then(|text| text.parse::<toml::Table>().ok())
         .is_some_and(|table| table.contains_key("planners") || table.contains_key("scene"))

@@ -1,6 +1,7 @@
 //! What a command says, and how it ends.
 
 use anstyle::{AnsiColor, Style};
+use anyhow::Context;
 use std::fmt;
 use std::io::{self, Write};
 
@@ -44,7 +45,15 @@ fn say(style: Style, kind: &str, text: impl fmt::Display) {
 /// Prints to standard output; a reader who has gone away is no error.
 pub(super) fn print(text: &str) -> anyhow::Result<()> {
     match writeln!(io::stdout(), "{text}") {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(error).context("standard output")
+        }
         _ => Ok(()),
     }
+}
+
+/// Prints to standard error. There is no one to tell that it cannot be written, and no work is
+/// worth less for that.
+pub(super) fn tell(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
 }

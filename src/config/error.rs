@@ -1,5 +1,6 @@
 //! What can be wrong with a configuration, and where.
 
+use super::words::brief;
 use std::fmt;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -23,7 +24,7 @@ impl fmt::Display for Origin {
         match self {
             Self::File { path, line: Some(line) } => write!(f, "{}:{line}", path.display()),
             Self::File { path, line: None } => write!(f, "{}", path.display()),
-            Self::Set(text) => write!(f, "--set {text}"),
+            Self::Set(text) => write!(f, "--set {}", brief(text)),
         }
     }
 }
@@ -59,7 +60,25 @@ pub enum ConfigError {
         /// All keys known there.
         allowed: Vec<String>,
     },
-    /// A value of the wrong type, a missing key, or an unknown choice.
+    /// A key that must be there.
+    #[error("{origin}: `{key}` is missing")]
+    Missing {
+        /// Where.
+        origin: Origin,
+        /// The key.
+        key: String,
+    },
+    /// The file is one of another kind.
+    #[error("{}: this is {found}; {remedy}", path.display())]
+    Other {
+        /// The file.
+        path: PathBuf,
+        /// What it holds.
+        found: &'static str,
+        /// What to do with it.
+        remedy: &'static str,
+    },
+    /// A value of the wrong type, or an unknown choice.
     #[error("{origin}: `{key}`{}: {message}", shown(value))]
     Invalid {
         /// Where.
@@ -72,7 +91,7 @@ pub enum ConfigError {
         message: String,
     },
     /// A value that is not allowed.
-    #[error("{origin}: `{key}` = {value}: allowed is {allowed}")]
+    #[error("{origin}: `{key}` = {}: allowed is {allowed}", brief(value))]
     NotAllowed {
         /// Where.
         origin: Origin,
@@ -85,7 +104,8 @@ pub enum ConfigError {
     },
     /// A `--set` that is not `key=value`, or whose key leads through a value.
     #[error(
-        "--set {text}: write it as key=value, with dots between tables, as in gp.noise=[1e-4,0.1]"
+        "--set {}: write it as key=value, with dots between tables, as in gp.noise=[1e-4,0.1]",
+        brief(text)
     )]
     Assignment {
         /// As typed.
@@ -98,5 +118,5 @@ fn did_you_mean(nearest: &Option<String>) -> String {
 }
 
 fn shown(value: &Option<String>) -> String {
-    value.as_ref().map_or(String::new(), |value| format!(" = {value}"))
+    value.as_ref().map_or(String::new(), |value| format!(" = {}", brief(value)))
 }

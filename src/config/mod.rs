@@ -2,10 +2,12 @@
 
 mod error;
 mod rules;
+pub mod words;
 
 pub use error::{ConfigError, Origin};
 pub use rules::{Checked, Rules};
 
+use crate::files;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -17,6 +19,13 @@ struct Source {
     prefix: String,
     document: toml_edit::Document<String>,
 }
+
+/// Most tables around a key that is set; chosen beyond any that there is, because tables within
+/// tables are walked by recursion.
+const DEPTH_MAX: usize = 16;
+
+/// A word that no setting knows.
+const UNKNOWN: &str = "\u{0}";
 
 /// A configuration while it is put together.
 pub struct Loader {
@@ -35,6 +44,17 @@ impl Loader {
         let (table, document) = parse(path)?;
         let source = Source { path: path.into(), prefix: String::new(), document };
         Ok(Self { table, sources: vec![source], sets: Vec::new() })
+    }
+
+    /// Whether the file itself, or an assignment so far, has the key.
+    pub fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
+    }
+
+    /// That what was read is `found`, and not what was asked for.
+    pub fn other(&self, found: &'static str, remedy: &'static str) -> ConfigError {
+        let path = self.sources.first().map(|source| source.path.clone()).unwrap_or_default();
+        ConfigError::Other { path, found, remedy }
     }
 
     /// If `key` names a file, puts that file's table in its place.
@@ -74,6 +94,9 @@ impl Loader {
             .unwrap_or_else(|| Value::String(value.into()));
         let mut parts: Vec<&str> = key.split('.').collect();
         let last = parts.pop().filter(|last| !last.is_empty()).ok_or_else(refused)?;
+        if parts.len() > DEPTH_MAX {
+            return Err(refused());
+        }
         let mut table = &mut self.table;
         for part in parts {
             let entry = table.entry(part).or_insert_with(|| Value::Table(Table::new()));
@@ -106,8 +129,9 @@ impl Loader {
     /// # Errors
     /// The first thing that is wrong, with its origin.
     pub fn finish<T: DeserializeOwned + Checked>(self) -> Result<T, ConfigError> {
-        let config: T = serde_path_to_error::deserialize(self.table.clone())
-            .map_err(|error| self.explain(&error.path().to_string(), error.inner().message()))?;
+        let config: T = serde_path_to_error::deserialize(self.table.clone()).map_err(|error| {
+            self.explain::<T>(&error.path().to_string(), error.inner().message())
+        })?;
         let mut rules = Rules::default();
         config.check(&mut rules);
         match rules.violation {
@@ -118,7 +142,7 @@ impl Loader {
         }
     }
 
-    fn explain(&self, path: &str, message: &str) -> ConfigError {
+    fn explain<T: DeserializeOwned>(&self, path: &str, message: &str) -> ConfigError {
         let mut names = message.split('`').skip(1).step_by(2).map(String::from);
         if message.starts_with("unknown field") {
             let unknown = names.next().unwrap_or_default();
@@ -127,12 +151,32 @@ impl Loader {
             let nearest = nearest(key.rsplit('.').next().unwrap_or(&key), &allowed);
             return ConfigError::UnknownKey { origin: self.origin(&key), key, nearest, allowed };
         }
-        let key = match names.next() {
-            Some(missing) if message.starts_with("missing field") => join(path, &missing),
-            _ => path.into(),
-        };
+        if let (true, Some(missing)) = (message.starts_with("missing field"), names.next()) {
+            let key = join(path, &missing);
+            return ConfigError::Missing { origin: self.origin(&key), key };
+        }
+        let key = String::from(path);
         let value = self.value(&key).map(|value| value.to_string());
-        ConfigError::Invalid { origin: self.origin(&key), key, value, message: message.into() }
+        let allowed = words::allowed(message).or_else(|| self.choices::<T>(&key));
+        let message =
+            allowed.map_or_else(|| message.to_owned(), |allowed| format!("allowed is {allowed}"));
+        ConfigError::Invalid { origin: self.origin(&key), key, value, message }
+    }
+
+    /// The names of which `key` must be one, told by asking for one that there is not.
+    fn choices<T: DeserializeOwned>(&self, key: &str) -> Option<String> {
+        let mut table = self.table.clone();
+        let mut parts = steps(key);
+        let mut value = table.get_mut(parts.next()?)?;
+        for part in parts {
+            value = match part.parse::<usize>() {
+                Ok(index) => value.as_array_mut()?.get_mut(index)?,
+                Err(_) => value.as_table_mut()?.get_mut(part)?,
+            };
+        }
+        *value = Value::String(UNKNOWN.into());
+        let error = serde_path_to_error::deserialize::<_, T>(table).err()?;
+        words::allowed(error.inner().message()).filter(|_| error.path().to_string() == key)
     }
 
     fn value(&self, key: &str) -> Option<&Value> {
@@ -214,7 +258,7 @@ fn line_of(document: &toml_edit::Document<String>, key: &str) -> Option<usize> {
 
 fn parse(path: &Path) -> Result<(Table, toml_edit::Document<String>), ConfigError> {
     let unreadable = |cause| ConfigError::Unreadable { path: path.into(), cause };
-    let text = std::fs::read_to_string(path).map_err(unreadable)?;
+    let text = files::text(path, files::TEXT_MAX).map_err(unreadable)?;
     let document = toml_edit::Document::parse(text.clone()).map_err(|error| {
         let line = error
             .span()

@@ -82,6 +82,13 @@ impl Experiment {
     /// The first thing that is wrong, with its place.
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
         let mut loader = Loader::read(path)?;
+        if !loader.has("scene") && !loader.has("planners") && loader.has("zone") {
+            return Err(loader.other(
+                "a scene",
+                "palpate show and scan take it as it is; to run it, name it in an experiment: \
+                 scene = \"FILE\" (palpate new MESH writes both)",
+            ));
+        }
         // `--set scene=FILE` chooses the file; the other assignments then edit what it holds.
         let (scene, others): (Vec<_>, Vec<_>) =
             sets.iter().partition(|set| set.split('=').next().map(str::trim) == Some("scene"));
@@ -170,11 +177,12 @@ impl Checked for Experiment {
     fn check(&self, rules: &mut Rules) {
         let simple = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
         let named = !self.name.is_empty()
-            && !self.name.starts_with('.')
+            && !self.name.starts_with(['.', '-'])
             && self.name.len() <= 100
             && self.name.chars().all(simple);
         rules.require("name", format!("\"{}\"", self.name), named, || {
-            "1 to 100 letters, digits, - _ . (it names a folder)".into()
+            "1 to 100 letters, digits, - _ . that do not begin with - or . (it names a folder)"
+                .into()
         });
         let known: Vec<&str> = planner::PLANNERS.iter().map(|entry| entry.name).collect();
         rules.require("planners", "[]", !self.planners.is_empty(), || known.join(", "));

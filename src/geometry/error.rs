@@ -48,6 +48,33 @@ pub enum MeshFault {
         /// What is there, cut if long.
         found: String,
     },
+    /// A binary STL file is not as long as its number of triangles asks for.
+    #[error(
+        "STL: {actual} bytes, which is no text that begins with \"solid\", and binary with {count} triangles \
+         takes {needed}"
+    )]
+    StlLength {
+        /// The number of triangles it states, or 0 if it is too short to.
+        count: u32,
+        /// The bytes these take.
+        needed: u64,
+        /// The bytes that are there.
+        actual: usize,
+    },
+    /// The STL parser refuses the file as a whole.
+    #[error("STL: {0}")]
+    Stl(io::Error),
+    /// The PLY file itself is at fault.
+    #[error(transparent)]
+    Ply(#[from] PlyFault),
+    /// A cloud of points, as a scan writes it.
+    #[error(
+        "holds {points} points and no faces, as a scan does; to be touched it needs a surface: a mesh"
+    )]
+    PointsOnly {
+        /// How many points.
+        points: usize,
+    },
     /// The OBJ parser refuses the file as a whole.
     #[error("OBJ: {0}")]
     Obj(#[from] tobj::LoadError),
@@ -116,6 +143,37 @@ pub enum MeshFault {
     AllDegenerate {
         /// How many triangles there were.
         triangles: usize,
+    },
+}
+
+/// What is wrong with a PLY file.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum PlyFault {
+    /// An element is declared more often than the file has bytes.
+    #[error("PLY: declares {count} of element \"{element}\", more than the file has bytes")]
+    Count {
+        /// The element.
+        element: String,
+        /// How many are declared.
+        count: usize,
+    },
+    /// An element lacks what it is read for.
+    #[error("PLY: element \"{element}\" has no {needed}")]
+    Lacks {
+        /// The element.
+        element: String,
+        /// The properties it needs.
+        needed: &'static str,
+    },
+    /// Binary elements cannot be parsed.
+    #[error("PLY: {0}")]
+    Binary(String),
+    /// The header declares less than the file holds.
+    #[error("PLY: holds {left} bytes more than its header declares")]
+    Rest {
+        /// How many bytes are left over.
+        left: usize,
     },
 }
 
@@ -235,13 +293,22 @@ pub enum BufferFault {
     /// The document refers to the binary chunk, and there is none.
     #[error("the file has no binary chunk")]
     NoChunk,
-    /// The URI is neither a base64 data URI nor a relative path.
-    #[error("its URI is neither base64 data nor a relative path")]
+    /// The URI is neither a base64 data URI nor a path.
+    #[error("its URI is neither base64 data nor a path")]
     Uri,
     /// The data URI is not valid base64.
     #[error("base64: {0}")]
     Base64(#[from] base64::DecodeError),
-    /// The file beside the document cannot be read.
+    /// The file lies outside the document's folder.
+    #[error(
+        "{} lies outside the mesh's folder; if that is meant, allow it by object.outside_buffers = true in a \
+         scene, or by --outside-buffers", path.display()
+    )]
+    Outside {
+        /// The file, without links.
+        path: PathBuf,
+    },
+    /// The file cannot be read.
     #[error("{} cannot be read: {error}", path.display())]
     File {
         /// The file.

@@ -26,6 +26,7 @@ pub use figures::{Drawing, FIGURES, Figure};
 
 use crate::experiment::analysis::Analysis;
 use crate::experiment::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
+use crate::files;
 use anyhow::Context;
 use std::fs;
 use std::io;
@@ -55,7 +56,7 @@ pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()
         write_figure(&path, svg.as_deref()).with_context(|| path.display().to_string())?;
         drawings.extend(svg.map(|svg| Drawing { figure, svg }));
     }
-    let text = |name| fs::read_to_string(folder.join(name)).ok();
+    let text = |name| files::text(&folder.join(name), files::TEXT_MAX).ok();
     let (settings, manifest) = (text(RESOLVED), text(MANIFEST));
     let explorer = explorer::section(run)?;
     let files = [settings.as_deref(), manifest.as_deref()];

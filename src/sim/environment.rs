@@ -6,7 +6,7 @@ use super::scene::{Body, Object, Scene, Unit};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::error::MeshError;
 use crate::geometry::implicit::Implicit;
-use crate::geometry::import::import;
+use crate::geometry::import::import_with;
 use crate::geometry::mesh::Mesh;
 use crate::geometry::report::MeshReport;
 use crate::geometry::surfaces;
@@ -97,7 +97,8 @@ impl Environment {
             return Self::around(scene, Shape::Function(function));
         }
         let object = scene.object.as_ref().ok_or(EnvironmentError::Missing { part: "object" })?;
-        let (mesh, report) = import(&object.mesh, object.unit.metres() * object.scale)?;
+        let (mesh, report) =
+            import_with(&object.mesh, object.unit.metres() * object.scale, object.buffers())?;
         let bvh = MeshBvh::new(mesh.transformed(&object.x_wo()));
         Self::around(scene, Shape::Mesh { bvh, report: report.into() })
     }

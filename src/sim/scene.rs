@@ -3,6 +3,7 @@
 use super::function::Function;
 use super::solver::SolverSettings;
 use crate::config::{Checked, ConfigError, Loader, Rules};
+use crate::geometry::import::Buffers;
 use crate::geometry::surfaces;
 use crate::math::pose::pose;
 use crate::robot::arm::ArmSettings;
@@ -87,8 +88,11 @@ impl Body {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Object {
-    /// Its file: .obj, .gltf or .glb, relative to the scene's file.
+    /// Its file: .obj, .gltf, .glb, .stl or .ply, relative to the scene's file.
     pub mesh: PathBuf,
+    /// Whether a .gltf file may name buffers outside its own folder.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub outside_buffers: bool,
     /// Unit of the file's numbers.
     #[serde(default)]
     pub unit: Unit,
@@ -161,6 +165,14 @@ impl fmt::Display for Unit {
 }
 
 impl Object {
+    /// Where buffers of its mesh may lie.
+    pub fn buffers(&self) -> Buffers {
+        match self.outside_buffers {
+            true => Buffers::Anywhere,
+            false => Buffers::Beside,
+        }
+    }
+
     /// Pose of the mesh's frame in `W`.
     pub fn x_wo(&self) -> Isometry3<f64> {
         pose(self.position_m, self.rotation_deg)
@@ -170,7 +182,9 @@ impl Object {
 impl Checked for Object {
     fn check(&self, rules: &mut Rules) {
         let named = !self.mesh.as_os_str().is_empty();
-        rules.require("mesh", "\"\"", named, || "the name of an .obj, .gltf or .glb file".into());
+        rules.require("mesh", "\"\"", named, || {
+            "the name of an .obj, .gltf, .glb, .stl or .ply file".into()
+        });
         rules.number("scale", self.scale, 1e-9..=1e9);
         rules.numbers("position_m", &self.position_m, -1e3..=1e3);
         rules.numbers("rotation_deg", &self.rotation_deg, -360.0..=360.0);
@@ -328,6 +342,13 @@ impl Scene {
     /// The first thing that is wrong, with its place.
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
         let mut loader = Loader::read(path)?;
+        if loader.has("planners") || loader.has("scene") {
+            return Err(loader.other(
+                "an experiment",
+                "a scene is wanted here, as its key `scene` names one; palpate run, show and watch \
+                 take an experiment",
+            ));
+        }
         sets.iter().try_for_each(|set| loader.set(set))?;
         loader.resolve_path("object.mesh");
         loader.finish()

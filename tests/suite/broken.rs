@@ -1,17 +1,9 @@
 //! Broken input through the real program: a clear error, exit code 2, never a panic.
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
-use tempfile::TempDir;
+use std::process::Output;
 
-fn palpate(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_palpate"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("the program starts")
-}
+use crate::common::program::{EXPERIMENT, SCENE, folder, palpate};
 
 /// Cases that were not refused as they should.
 #[derive(Default)]
@@ -34,42 +26,6 @@ impl Drop for Accepted {
     fn drop(&mut self) {
         assert!(self.0.is_empty() || std::thread::panicking(), "\n{}", self.0.join("\n"));
     }
-}
-
-const MESH: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
-
-const SCENE: &str = "body = \"cast\"
-
-[object]
-mesh = \"mesh.obj\"
-
-[zone]
-x_m = [0.1, 0.4]
-z_m = [0.1, 0.4]
-";
-
-const EXPERIMENT: &str = "name = \"small\"
-scene = \"scene.toml\"
-planners = [\"random\"]
-trials = 1
-initial_touches = 2
-touches = 3
-grid = 5
-
-[gp]
-noise = [1e-4, 1e-2]
-
-[report]
-touch_counts = [3]
-";
-
-/// A folder with a mesh, a scene and an experiment that work.
-fn folder() -> TempDir {
-    let folder = TempDir::new().unwrap();
-    for (name, text) in [("mesh.obj", MESH), ("scene.toml", SCENE), ("small.toml", EXPERIMENT)] {
-        fs::write(folder.path().join(name), text).unwrap();
-    }
-    folder
 }
 
 #[test]
@@ -109,6 +65,7 @@ fn broken_experiments_are_refused_with_file_line_key_and_remedy() {
         ("name = \"small\"", "name = \"\"", &["small.toml:1", "name"]),
         ("name = \"small\"", "name = \"../up\"", &["small.toml:1", "../up", "letters"]),
         ("name = \"small\"", "name = \"a/b\"", &["small.toml:1", "a/b"]),
+        ("name = \"small\"", "name = \"-rf\"", &["small.toml:1", "-rf", "do not begin with -"]),
         ("name = \"small\"", "name = 7", &["small.toml:1", "name", "7"]),
         ("name = \"small\"", "nmae = \"small\"", &["nmae", "did you mean `name`"]),
         ("[\"random\"]", "[]", &["small.toml:3", "planners", "active, random, sobol"]),
@@ -175,7 +132,7 @@ fn broken_scenes_are_refused_with_file_line_key_and_remedy() {
         ("\"mesh.obj\"", "\"mush.obj\"", &["mush.obj", "cannot be read"]),
         ("\"mesh.obj\"", "\"\"", &["scene.toml:4", "object.mesh"]),
         ("\"mesh.obj\"", "\".\"", &["cannot be read"]),
-        ("\"mesh.obj\"", "\"scene.toml\"", &["scene.toml", "supported: obj, gltf, glb"]),
+        ("\"mesh.obj\"", "\"scene.toml\"", &["scene.toml", "obj, gltf, glb, stl, ply"]),
         ("\"mesh.obj\"", "3", &["scene.toml:4", "object.mesh"]),
         ("[object]", "[obejct]", &["scene.toml:3", "obejct", "did you mean `object`"]),
         ("[object]", "[object]\nunit = \"km\"", &["scene.toml:4", "object.unit", "km", "mm"]),
@@ -234,7 +191,10 @@ fn broken_command_lines_are_refused() {
         (&["run", "none.toml"], &["none.toml"]),
         (&["run", "."], &["."]),
         (&["run", "mesh.obj"], &["mesh.obj", "not valid TOML"]),
-        (&["run", "scene.toml"], &["scene.toml", "unknown key"]),
+        (&["run", "scene.toml"], &["scene.toml", "this is a scene", "palpate show"]),
+        (&["scan", "small.toml"], &["small.toml", "this is an experiment", "palpate run"]),
+        (&["fidelity", "small.toml"], &["small.toml", "this is an experiment"]),
+        (&["effects", "small.toml"], &["small.toml", "this is an experiment"]),
         (&["run", "small.toml", "--set", "trials"], &["--set trials", "key=value"]),
         (&["run", "small.toml", "--set", "=3"], &["--set =3", "key=value"]),
         (&["run", "small.toml", "--set", "trials=0"], &["--set trials=0", "1 to 1000000"]),

@@ -16,6 +16,7 @@ mod examples;
 #[cfg(feature = "nlopt")]
 mod experiments;
 mod fidelity;
+mod files;
 mod finger;
 mod finger_parts;
 mod finger_signals;
@@ -24,6 +25,11 @@ mod fit;
 #[cfg(feature = "mujoco")]
 mod flex;
 mod floors;
+#[cfg(feature = "nlopt")]
+mod folders;
+mod formats;
+#[cfg(feature = "nlopt")]
+mod fuzz;
 mod geometry;
 mod gp;
 #[cfg(feature = "nlopt")]
@@ -33,6 +39,7 @@ mod import;
 mod information;
 mod memory;
 mod meshes;
+mod messages;
 mod models;
 mod page;
 #[cfg(feature = "nlopt")]

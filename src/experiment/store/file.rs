@@ -1,6 +1,6 @@
 //! Files of a run's folder: written whole or not at all.
 
-use super::error::{StoreError, io_error};
+use super::error::StoreError;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -10,11 +10,20 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// If it cannot be written.
 pub fn write_whole(path: &Path, text: &str) -> Result<(), StoreError> {
+    let partial = partial(path);
+    let written = fs::write(&partial, text).and_then(|()| fs::rename(&partial, path));
+    written.map_err(|cause| {
+        // What a full disk has taken of it is in the way there.
+        let _ = fs::remove_file(&partial);
+        StoreError::Io { path: path.into(), cause }
+    })
+}
+
+/// Where a file is written until it is whole.
+pub(super) fn partial(path: &Path) -> PathBuf {
     let mut partial = path.as_os_str().to_owned();
     partial.push(".part");
-    let partial = PathBuf::from(partial);
-    fs::write(&partial, text).map_err(io_error(&partial))?;
-    fs::rename(&partial, path).map_err(io_error(path))
+    partial.into()
 }
 
 /// As [`write_whole`], unless the file says that already.

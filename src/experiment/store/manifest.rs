@@ -2,8 +2,8 @@
 
 use super::error::{StoreError, io_error};
 use super::file::write_whole;
+use crate::files;
 use serde::Serialize;
-use std::fs;
 use std::io;
 use std::path::Path;
 
@@ -30,7 +30,7 @@ pub struct Manifest {
 /// Adds `manifest` to the list of programs that wrote a run, unless the last one was the same.
 pub(super) fn sign(path: &Path, manifest: &Manifest) -> Result<(), StoreError> {
     let to_value = |text: String| serde_json::from_str::<Vec<serde_json::Value>>(&text).ok();
-    let mut signed = fs::read_to_string(path).ok().and_then(to_value).unwrap_or_default();
+    let mut signed = files::text(path, files::TEXT_MAX).ok().and_then(to_value).unwrap_or_default();
     let new = serde_json::to_value(manifest).map_err(io::Error::from).map_err(io_error(path))?;
     if signed.last() != Some(&new) {
         signed.push(new);

@@ -7,6 +7,9 @@
 //! A folder holds the rows of one [identity](Experiment::identity). It may be opened with more
 //! trials, other planners or another report: `resolved.toml` then says so, and what is missing is
 //! run. Rows that are no longer listed stay in `trials.jsonl`, so no change loses a trial.
+//!
+//! `resolved.toml` is the mark of a run's folder: it is written first and never removed. A folder
+//! that has it and no row yet, or at most the pieces of it that a crash leaves, is begun anew.
 
 mod error;
 mod file;
@@ -21,7 +24,7 @@ pub use manifest::{MANIFEST, Manifest};
 pub use resolved::{RESOLVED, resolved};
 
 use self::error::io_error;
-use self::file::remove;
+use self::file::{partial, remove};
 use self::surface::SURFACE;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::row::TrialRow;
@@ -57,7 +60,7 @@ pub struct Run {
 
 impl RunFolder {
     /// Opens `path` for `experiment`: makes it, or continues what was begun there, or, if
-    /// `fresh`, throws that away.
+    /// `fresh` or if that has no row yet, throws it away.
     ///
     /// Returns the rows that are already there of those that the experiment lists. A last line cut
     /// short by a crash is dropped.
@@ -81,15 +84,13 @@ impl RunFolder {
             .open(&file)
             .map_err(io_error(&file))?;
         lock(&trials, path)?;
-        if fresh {
+        if fresh || !rows::has_some(&trials).map_err(io_error(&file))? {
             trials.set_len(0).map_err(io_error(&file))?;
+            // First of all, as the mark of a run's folder.
+            resolved::write(path, experiment)?;
             clear(path)?;
         }
-        match path.join(RESOLVED).exists() {
-            true => resolved::same_run(path, experiment)?,
-            // First of all, as the mark of a run's folder.
-            false => resolved::write(path, experiment)?,
-        }
+        resolved::same_run(path, experiment)?;
         surface::write_or_compare(path, experiment, truth)?;
         let (mut rows, good_bytes) = rows::read(&file, experiment)?;
         if trials.metadata().map_err(io_error(&file))?.len() > good_bytes {
@@ -149,7 +150,7 @@ impl Run {
     pub fn read(path: &Path) -> Result<Self, StoreError> {
         require_run(path)?;
         let experiment = resolved::read(path, &[])?;
-        let truth = surface::read(&path.join(SURFACE), &experiment.scene.zone)?;
+        let truth = surface::read(&path.join(SURFACE), &experiment)?;
         let (mut rows, _) = rows::read(&path.join(TRIALS), &experiment)?;
         let all = rows.len();
         rows.retain(|row| experiment.lists(row));
@@ -193,27 +194,36 @@ fn require_run(path: &Path) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// Removes what an earlier run wrote, the mark of a run's folder last.
+/// Removes what an earlier run wrote but its mark. Figures are drawn again; others' files beside
+/// them are not ours to remove.
 fn clear(path: &Path) -> Result<(), StoreError> {
-    for name in
-        ["report.html", "summary.csv", "comparison.csv", "equal_error.csv", MANIFEST, SURFACE]
-    {
-        remove(&path.join(name))?;
-    }
-    // Figures are drawn again; others' files beside them are not ours to remove.
-    remove(&path.join(RESOLVED))
+    ["report.html", "summary.csv", "comparison.csv", "equal_error.csv", MANIFEST, SURFACE]
+        .iter()
+        .try_for_each(|name| remove(&path.join(name)))
 }
 
-/// A folder that is not empty must hold a run, or at most the empty beginning of one.
+/// A folder that is not empty must hold a run, or at most what a crash leaves of a beginning: no
+/// rows, and of `resolved.toml` nothing or a part.
 fn refuse_foreign(path: &Path) -> Result<(), StoreError> {
-    if path.join(RESOLVED).exists() {
+    let length = |name: &str| {
+        let found = fs::metadata(path.join(name)).ok();
+        found.filter(fs::Metadata::is_file).map(|found| found.len())
+    };
+    let foreign = || StoreError::Foreign { path: path.into() };
+    if path.join(TRIALS).exists() && length(TRIALS).is_none() {
+        return Err(foreign());
+    }
+    let has_rows = length(TRIALS).is_some_and(|length| length > 0);
+    if resolved::is_ours(path) || has_rows && length(RESOLVED).is_some() {
         return Ok(());
     }
+    let part = partial(Path::new(RESOLVED));
     for entry in fs::read_dir(path).map_err(io_error(path))? {
-        let entry = entry.map_err(io_error(path))?;
-        let is_empty = entry.metadata().is_ok_and(|metadata| metadata.len() == 0);
-        if entry.file_name() != TRIALS || !is_empty {
-            return Err(StoreError::Foreign { path: path.into() });
+        let name = entry.map_err(io_error(path))?.file_name();
+        let is_empty = name.to_str().and_then(length) == Some(0);
+        let is_left = *part == *name || is_empty && (name == TRIALS || name == RESOLVED);
+        if !is_left {
+            return Err(foreign());
         }
     }
     Ok(())

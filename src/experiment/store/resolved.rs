@@ -3,6 +3,7 @@
 use super::error::StoreError;
 use super::file::{same, write_changed};
 use crate::experiment::experiment::Experiment;
+use crate::files;
 use std::path::{Component, Path, PathBuf};
 
 /// File of a run's settings, defaults written out.
@@ -11,9 +12,17 @@ pub const RESOLVED: &str = "resolved.toml";
 /// The experiment with every default written out.
 pub fn resolved(experiment: &Experiment) -> String {
     let text = toml::to_string(experiment).unwrap_or_default();
-    format!(
-        "# Every setting of this run, defaults written out. It can be run again as it is.\n{text}"
-    )
+    format!("{TITLE}\n{text}")
+}
+
+/// First line of every `resolved.toml`.
+const TITLE: &str =
+    "# Every setting of this run, defaults written out. It can be run again as it is.";
+
+/// Whether a folder has a `resolved.toml` of this program.
+pub(super) fn is_ours(folder: &Path) -> bool {
+    let text = files::text(&folder.join(RESOLVED), files::TEXT_MAX);
+    text.is_ok_and(|text| text.starts_with(TITLE))
 }
 
 /// Reads the experiment of a run's folder, after `--set` assignments.

@@ -4,8 +4,7 @@ use super::error::{StoreError, io_error};
 use super::file::{same, write_whole};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::truth::Truth;
-use crate::task::Zone;
-use std::fs;
+use crate::files;
 use std::io;
 use std::path::Path;
 
@@ -19,7 +18,7 @@ pub(super) fn write_or_compare(
     truth: &Truth,
 ) -> Result<(), StoreError> {
     let (path, wanted) = (folder.join(SURFACE), text(experiment, truth));
-    match fs::read_to_string(&path) {
+    match files::text(&path, u64::MAX) {
         Ok(found) => same(folder, SURFACE, [&found, &wanted]),
         Err(cause) if cause.kind() == io::ErrorKind::NotFound => write_whole(&path, &wanted),
         Err(cause) => Err(StoreError::Io { path, cause }),
@@ -41,11 +40,12 @@ fn text(experiment: &Experiment, truth: &Truth) -> String {
     text
 }
 
-/// Reads the file back.
-pub(super) fn read(path: &Path, zone: &Zone) -> Result<Truth, StoreError> {
+/// Reads back what [`write_or_compare`] wrote for `experiment`.
+pub(super) fn read(path: &Path, experiment: &Experiment) -> Result<Truth, StoreError> {
+    let zone = &experiment.scene.zone;
     let bad =
         |line: usize, message: String| StoreError::BadRow { path: path.into(), line, message };
-    let text = fs::read_to_string(path).map_err(io_error(path))?;
+    let text = files::text(path, u64::MAX).map_err(io_error(path))?;
     let (mut places, mut heights_m, mut is_reachable) = (Vec::new(), Vec::new(), Vec::new());
     for (i, record) in csv::Reader::from_reader(text.as_bytes()).records().enumerate() {
         let record = record.map_err(|error| bad(i + 2, error.to_string()))?;
@@ -64,6 +64,10 @@ pub(super) fn read(path: &Path, zone: &Zone) -> Result<Truth, StoreError> {
         places.push(place);
         heights_m.push(height);
         is_reachable.push(reachable);
+    }
+    let wanted = (experiment.grid as usize).pow(zone.dimension() as u32);
+    if places.len() != wanted {
+        return Err(bad(places.len() + 1, format!("{} test places of {wanted}", places.len())));
     }
     Ok(Truth::new(zone, places, heights_m, is_reachable))
 }

@@ -3,7 +3,8 @@
 //! Every offset, stride and count is checked against the bytes that are really there before
 //! anything is read or allocated.
 
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf, absolute};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -11,7 +12,8 @@ use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
-use super::file;
+use super::{BYTES_MAX, Buffers, Source};
+use crate::files;
 use crate::geometry::error::{BufferFault, GltfFault};
 
 /// A glTF document and the bytes of its buffers.
@@ -36,13 +38,17 @@ impl<'a> Elements<'a> {
 }
 
 impl Document {
-    /// Fetches the buffers of `root`: from the binary chunk, from data URIs, or from files
-    /// beside the document at `path`.
-    pub fn load(path: &Path, root: Root, mut chunk: Option<Vec<u8>>) -> Result<Self, GltfFault> {
+    /// Fetches the buffers of `root`: from the binary chunk, from data URIs, or from files.
+    pub fn load(
+        source: &Source,
+        root: Root,
+        mut chunk: Option<Vec<u8>>,
+    ) -> Result<Self, GltfFault> {
         let mut buffers = Vec::with_capacity(root.buffers.len());
+        let mut left = BYTES_MAX;
         for (number, buffer) in root.buffers.iter().enumerate() {
             let bytes = match &buffer.uri {
-                Some(uri) => fetch(path, uri),
+                Some(uri) => fetch(source, uri, left),
                 None => chunk.take().ok_or(BufferFault::NoChunk),
             };
             let declared = buffer.byte_length.0;
@@ -50,7 +56,10 @@ impl Document {
                 actual if declared > actual as u64 => Err(BufferFault::Short { declared, actual }),
                 _ => Ok(bytes),
             });
-            buffers.push(checked.map_err(|reason| GltfFault::Buffer { buffer: number, reason })?);
+            let bytes = checked.map_err(|reason| GltfFault::Buffer { buffer: number, reason })?;
+            // Many buffers may name one large file.
+            left = left.saturating_sub(bytes.len() as u64);
+            buffers.push(bytes);
         }
         Ok(Self { root, buffers })
     }
@@ -207,18 +216,29 @@ fn unsigned(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |number, &byte| (number << 8) | u32::from(byte))
 }
 
-fn fetch(document: &Path, uri: &str) -> Result<Vec<u8>, BufferFault> {
+fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, BufferFault> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (_, encoded) = data.split_once(";base64,").ok_or(BufferFault::Uri)?;
         return Ok(STANDARD.decode(encoded)?);
     }
     let name = percent_decoded(uri).ok_or(BufferFault::Uri)?;
-    let relative = Path::new(&name);
-    if name.contains("://") || relative.is_absolute() {
+    if name.contains("://") {
         return Err(BufferFault::Uri);
     }
-    let path = document.with_file_name("").join(relative);
-    file::read(&path).map_err(|error| BufferFault::File { path, error })
+    let path = source.path.with_file_name("").join(&name);
+    let unreadable = |error| BufferFault::File { path: path.clone(), error };
+    // Where it is in truth: `..` and links may lead anywhere.
+    let real = path.canonicalize().map_err(unreadable)?;
+    let folder = folder(source.path).map_err(unreadable)?;
+    if source.buffers == Buffers::Beside && !real.starts_with(folder) {
+        return Err(BufferFault::Outside { path: real });
+    }
+    files::bytes(&real, most).map_err(unreadable)
+}
+
+/// The folder that a file is named in, without links.
+fn folder(file: &Path) -> io::Result<PathBuf> {
+    absolute(file)?.with_file_name("").canonicalize()
 }
 
 /// `%20` and its like replaced by the bytes they stand for; `None` if that is not UTF-8.

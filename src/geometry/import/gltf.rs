@@ -5,15 +5,15 @@
 //! Only the JSON model of the `gltf` crate is used: its readers and its validation panic on some
 //! broken documents.
 
-use std::path::Path;
-
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::scene::Node;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Mesh, Root};
 use nalgebra::{Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
 
+use super::Source;
 use super::accessor::{Document, find};
+use crate::files::unmarked;
 use crate::geometry::error::{GltfFault, MeshFault};
 use crate::geometry::raw::RawMesh;
 
@@ -30,14 +30,14 @@ const UPRIGHT: Matrix4<f64> = Matrix4::new(
      0.0, 0.0, 0.0, 1.0,
 );
 
-/// Reads a glTF file; `path` is where files it refers to are looked for.
-pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<RawMesh, MeshFault> {
-    let (root, chunk) = parse(bytes)?;
+/// Reads a glTF file.
+pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
+    let (root, chunk) = parse(source.bytes)?;
     let harmless = |name: &&String| HARMLESS_EXTENSIONS.iter().any(|known| name.starts_with(known));
     if let Some(name) = root.extensions_required.iter().find(|name| !harmless(name)) {
         return Err(GltfFault::Extension(name.clone()).into());
     }
-    let document = Document::load(path, root, chunk)?;
+    let document = Document::load(source, root, chunk)?;
     let mut raw = RawMesh::default();
     for (node, x_sn) in placed_nodes(&document.root)? {
         if let Some(mesh) = find(&document.root.nodes, "node", node)?.mesh {
@@ -49,7 +49,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<RawMesh, MeshFault> {
 
 fn parse(bytes: &[u8]) -> Result<(Root, Option<Vec<u8>>), GltfFault> {
     if !bytes.starts_with(b"glTF") {
-        return Ok((Root::from_slice(bytes)?, None));
+        return Ok((Root::from_slice(unmarked(bytes))?, None));
     }
     // The crate subtracts the header's size from the stated length without looking.
     if let Some(&[a, b, c, d]) = bytes.get(8..12).and_then(<[u8]>::first_chunk) {

@@ -8,31 +8,77 @@ use super::mesh::Mesh;
 use super::raw::RawMesh;
 use super::repair::repair;
 use super::report::MeshReport;
+use crate::files;
 
 mod accessor;
-mod file;
 mod gltf;
 mod obj;
+mod ply;
+mod stl;
 
-/// Reads the bytes of a file; the path is for files it refers to.
-type Reader = fn(&Path, &[u8]) -> Result<RawMesh, MeshFault>;
+/// Where the buffers of a glTF document may lie.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Buffers {
+    /// In the folder of the document or below it, so that a mesh from a stranger opens no other
+    /// file.
+    #[default]
+    Beside,
+    /// Anywhere.
+    Anywhere,
+}
+
+/// A file that is read.
+struct Source<'a> {
+    path: &'a Path,
+    bytes: &'a [u8],
+    buffers: Buffers,
+}
+
+type Reader = fn(&Source) -> Result<RawMesh, MeshFault>;
 
 /// Extensions, in lower case, and who reads them.
-const FORMATS: &[(&str, Reader)] = &[("obj", obj::read), ("gltf", gltf::read), ("glb", gltf::read)];
+const FORMATS: &[(&str, Reader)] = &[
+    ("obj", obj::read),
+    ("gltf", gltf::read),
+    ("glb", gltf::read),
+    ("stl", stl::read),
+    ("ply", ply::read),
+];
 
-/// Reads a mesh file, scales it by `metres_per_unit` and repairs it.
+/// Most bytes of a mesh file, and of all buffers it refers to; chosen: the most triangles that are
+/// accepted take 1.3 GB as the longest of texts, an STL.
+const BYTES_MAX: u64 = 2 << 30;
+
+/// Reads a mesh file, scales it by `metres_per_unit` and repairs it. Buffers that a glTF document
+/// refers to must lie [beside](Buffers::Beside) it.
 ///
-/// The extension decides the format: OBJ, glTF (`.gltf` or `.glb`). A glTF file is in metres by
-/// its specification; the scale multiplies all the same.
+/// The extension decides the format: OBJ, glTF (`.gltf` or `.glb`), STL, PLY. A glTF file is in
+/// metres by its specification; the scale multiplies all the same.
 ///
 /// # Errors
 /// [`MeshError`] says which file, and what is wrong with it.
 pub fn import(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshReport), MeshError> {
-    read_and_repair(path, metres_per_unit)
+    import_with(path, metres_per_unit, Buffers::Beside)
+}
+
+/// As [`import`], with buffers where `buffers` allows them.
+///
+/// # Errors
+/// [`MeshError`] says which file, and what is wrong with it.
+pub fn import_with(
+    path: &Path,
+    metres_per_unit: f64,
+    buffers: Buffers,
+) -> Result<(Mesh, MeshReport), MeshError> {
+    read_and_repair(path, metres_per_unit, buffers)
         .map_err(|fault| MeshError { path: path.to_owned(), fault })
 }
 
-fn read_and_repair(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshReport), MeshFault> {
+fn read_and_repair(
+    path: &Path,
+    metres_per_unit: f64,
+    buffers: Buffers,
+) -> Result<(Mesh, MeshReport), MeshFault> {
     if !(metres_per_unit > 0.0 && metres_per_unit.is_finite()) {
         return Err(MeshFault::BadScale { metres_per_unit });
     }
@@ -44,7 +90,13 @@ fn read_and_repair(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshRepor
         let supported = FORMATS.iter().map(|(known, _)| *known).collect();
         return Err(MeshFault::UnsupportedExtension { extension, supported });
     };
-    let mut raw = read(path, &file::read(path)?)?;
+    let bytes = files::bytes(path, BYTES_MAX)?;
+    let mut raw = read(&Source { path, bytes: &bytes, buffers })?;
     raw.scale(metres_per_unit);
     repair(raw)
+}
+
+/// A line as a message shows it: long ones cut.
+fn cut(line: &str) -> String {
+    line.trim().chars().take(60).collect()
 }

@@ -2,16 +2,16 @@
 //! objects and groups become one mesh; materials, normals, texture coordinates, colours, points
 //! and lines are ignored.
 
-use std::path::Path;
-
 use nalgebra::Point3;
 
+use super::{Source, cut};
+use crate::files::unmarked;
 use crate::geometry::error::MeshFault;
 use crate::geometry::raw::RawMesh;
 
 /// Reads an OBJ file.
-pub(super) fn read(_path: &Path, bytes: &[u8]) -> Result<RawMesh, MeshFault> {
-    let text = geometry_only(&String::from_utf8_lossy(bytes))?;
+pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
+    let text = geometry_only(&String::from_utf8_lossy(unmarked(source.bytes)))?;
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
@@ -56,6 +56,9 @@ fn geometry_only(text: &str) -> Result<String, MeshFault> {
             }
             Some("f") => {
                 kept.push('f');
+                if words.clone().next().is_none() {
+                    return Err(syntax(number, "f and vertex indices", line));
+                }
                 for word in words {
                     let index = word.split('/').next().unwrap_or_default();
                     check_index(number, line, index, seen, vertices)?;
@@ -87,6 +90,5 @@ fn check_index(
 }
 
 fn syntax(line: usize, expected: &'static str, found: &str) -> MeshFault {
-    let found = found.trim().chars().take(60).collect();
-    MeshFault::Line { line, expected, found }
+    MeshFault::Line { line, expected, found: cut(found) }
 }

@@ -4,6 +4,7 @@ pub mod counting;
 #[cfg(feature = "mujoco")]
 #[allow(dead_code)] // The bench of finite elements uses the rest.
 pub mod presses;
+pub mod program;
 pub mod runs;
 pub mod shapes;
 pub mod shipped;

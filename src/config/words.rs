@@ -1,0 +1,45 @@
+//! What messages say of values, in the words of those who write settings.
+
+/// Most characters of a value that a message repeats; chosen.
+const SHOWN_MAX: usize = 60;
+
+/// A value as a message shows it: long numbers in powers of ten, other long ones cut.
+pub fn brief(text: &str) -> String {
+    if text.chars().count() <= SHOWN_MAX {
+        return text.into();
+    }
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => format!("{number:e}"),
+        _ => text.chars().take(SHOWN_MAX).chain(['…']).collect(),
+    }
+}
+
+/// What a parser that complains with `message` would have taken, if that can be told: it names the
+/// types of the language it is written in.
+pub fn allowed(message: &str) -> Option<String> {
+    let (_, expected) = message.rsplit_once("expected ")?;
+    let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
+    if message.starts_with("unknown variant") && !names.is_empty() {
+        return Some(names.join(", "));
+    }
+    let length = |text: &str| text.split(' ').next().and_then(|n| n.parse::<usize>().ok());
+    Some(match expected {
+        "u8" => format!("a whole number from 0 to {}", u8::MAX),
+        "u16" => format!("a whole number from 0 to {}", u16::MAX),
+        "u32" => format!("a whole number from 0 to {}", u32::MAX),
+        "u64" | "usize" => "a whole number, 0 or more".into(),
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".into(),
+        "f32" | "f64" => "a number".into(),
+        "a boolean" => "true or false".into(),
+        "a string" | "path string" => "text in quotes".into(),
+        "a sequence" => "a list in brackets".into(),
+        "a map" => "a table".into(),
+        "fewer elements in array" => "a shorter list".into(),
+        _ if expected.starts_with("struct ") => "a table".into(),
+        _ => {
+            let count = expected.strip_prefix("an array of length ");
+            let count = count.or(expected.strip_prefix("a tuple of size ")).and_then(length)?;
+            format!("a list of {count} values")
+        }
+    })
+}

@@ -1,0 +1,143 @@
+//! PLY, as text or binary of either byte order. Polygons become triangle fans, as those of OBJ;
+//! what a file holds beside positions and faces is ignored.
+
+use nalgebra::Point3;
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
+use ply_rs_bw::ply::PropertyAccessResult::{Ignored, Set, UnsupportedType};
+use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
+
+use super::{Source, cut};
+use crate::files::unmarked;
+use crate::geometry::error::{MeshFault, PlyFault};
+use crate::geometry::raw::RawMesh;
+
+/// The properties of a position.
+const AXES: [&str; 3] = ["x", "y", "z"];
+/// What programs call the list of a face's vertices.
+const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// Reads a PLY file.
+pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
+    let bytes = unmarked(source.bytes);
+    let mut reader = Reader::new(bytes);
+    let header = Parser::<Other>::new().read_header(&mut reader);
+    let header = header.map_err(|error| fault(&error, bytes, &Encoding::Ascii))?;
+    let (mut vertices, mut faces) = (Vec::<Vertex>::new(), Vec::<Face>::new());
+    for (name, element) in &header.elements {
+        // Each takes a byte at least, unless it has no properties.
+        if element.count > bytes.len() {
+            return Err(PlyFault::Count { element: name.clone(), count: element.count }.into());
+        }
+        let has = |property: &str| element.properties.contains_key(property);
+        let place = |error: ParseError| fault(&error, bytes, &header.encoding);
+        match name.as_str() {
+            "vertex" => {
+                require(element, AXES.iter().all(|axis| has(axis)), "x, y and z")?;
+                let read = Parser::new().read_payload_for_element(&mut reader, element, &header);
+                vertices = read.map_err(place)?;
+            }
+            "face" => {
+                require(element, CORNERS.iter().any(|list| has(list)), CORNERS[0])?;
+                let read = Parser::new().read_payload_for_element(&mut reader, element, &header);
+                faces = read.map_err(place)?;
+            }
+            _ => {
+                let others = Parser::<Other>::new();
+                others.read_payload_for_element(&mut reader, element, &header).map_err(place)?;
+            }
+        }
+    }
+    let left = reader.into_inner().trim_ascii().len();
+    if left > 0 {
+        return Err(PlyFault::Rest { left }.into());
+    }
+    if faces.is_empty() && !vertices.is_empty() {
+        return Err(MeshFault::PointsOnly { points: vertices.len() });
+    }
+    let mut raw = RawMesh::default();
+    raw.skipped_primitives = faces.iter().filter(|face| face.0.len() < 3).count();
+    let fans = faces.iter().filter_map(|Face(corners)| corners.split_first());
+    let triangles =
+        fans.flat_map(|(&hub, rim)| rim.array_windows().map(move |&[b, c]| [hub, b, c]));
+    raw.add_part("PLY", vertices.iter().map(|vertex| Point3::from(vertex.0)), triangles)?;
+    Ok(raw)
+}
+
+/// Insists that an element has the properties it needs.
+fn require(element: &ElementDef, has: bool, needed: &'static str) -> Result<(), PlyFault> {
+    match has {
+        true => Ok(()),
+        false => Err(PlyFault::Lacks { element: element.name.clone(), needed }),
+    }
+}
+
+/// The fault with its line, if that lies in text.
+fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> MeshFault {
+    match error.line().filter(|_| *encoding == Encoding::Ascii) {
+        Some(line) => {
+            let found = bytes.split(|&byte| byte == b'\n').nth(line.saturating_sub(1));
+            let found = cut(&String::from_utf8_lossy(found.unwrap_or_default()));
+            MeshFault::Line { line, expected: "PLY as its header declares it", found }
+        }
+        None => {
+            let words = error.to_string();
+            PlyFault::Binary(words.lines().next().unwrap_or_default().into()).into()
+        }
+    }
+}
+
+/// A position.
+struct Vertex([f64; 3]);
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self([f64::NAN; 3])
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let Some(axis) = AXES.iter().position(|axis| *axis == name) else { return Ignored };
+        self.0[axis] = match property {
+            Property::Char(number) => number.into(),
+            Property::UChar(number) => number.into(),
+            Property::Short(number) => number.into(),
+            Property::UShort(number) => number.into(),
+            Property::Int(number) => number.into(),
+            Property::UInt(number) => number.into(),
+            Property::Float(number) => number.into(),
+            Property::Double(number) => number,
+            _ => return UnsupportedType,
+        };
+        Set
+    }
+}
+
+/// The vertices around a polygon.
+struct Face(Vec<u32>);
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self(Vec::new())
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        if !CORNERS.contains(&name) {
+            return Ignored;
+        }
+        let Some(corners) = property.to_u32_list() else { return UnsupportedType };
+        self.0 = corners;
+        Set
+    }
+}
+
+/// What is passed over.
+struct Other;
+
+impl PropertyAccess for Other {
+    fn new() -> Self {
+        Self
+    }
+
+    fn set_property(&mut self, _: &str, _: Property) -> PropertyAccessResult {
+        Ignored
+    }
+}

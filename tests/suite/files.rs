@@ -1,0 +1,185 @@
+//! Files that are named to the program: read if they are regular files, with a byte order mark or
+//! without, and refused in words otherwise; streams that cannot be written stop no work.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use crate::common::program::{
+    EXPERIMENT, MESH, SCENE, command, ended, fails, folder, palpate, said, succeeds,
+};
+
+fn marked(text: &str) -> Vec<u8> {
+    [b"\xef\xbb\xbf", text.as_bytes()].concat()
+}
+
+#[test]
+fn a_byte_order_mark_changes_nothing() {
+    let folder = folder();
+    let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
+    let recordings = include_str!("../data/biotac_flat_plate.json");
+    write("plain.json", recordings.as_bytes());
+    write("marked.json", &marked(recordings));
+    let calibrate = |name| succeeds(folder.path(), &["calibrate", name, "--attitude-only"]);
+    assert_eq!(calibrate("plain.json"), calibrate("marked.json"));
+    let show = |name| succeeds(folder.path(), &["show", name]);
+    let [mesh, scene, experiment] = ["mesh.obj", "scene.toml", "small.toml"].map(show);
+    assert!(mesh.contains("triangles           4 of 4"), "{mesh}");
+    write("mesh.obj", &marked(MESH));
+    write("scene.toml", &marked(SCENE));
+    write("small.toml", &marked(EXPERIMENT));
+    assert_eq!([mesh, scene, experiment], ["mesh.obj", "scene.toml", "small.toml"].map(show));
+    write("other.toml", &[0xff, 0xfe, b'n', 0, b'a', 0]);
+    fails(folder.path(), &["run", "other.toml"], &["other.toml", "not UTF-8"]);
+}
+
+#[test]
+fn what_may_never_end_is_refused_by_every_reader() {
+    let folder = folder();
+    let pipe = folder.path().join("pipe.toml");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    symlink(&pipe, folder.path().join("pipe.obj")).unwrap();
+    symlink("/dev/zero", folder.path().join("zero.toml")).unwrap();
+    symlink("/dev/zero", folder.path().join("zero.stl")).unwrap();
+    let says = ["not a regular file"];
+    for arguments in [
+        &["run", "pipe.toml"][..],
+        &["run", "zero.toml"],
+        &["run", "/dev/zero"],
+        &["run", "small.toml", "--set", "scene=zero.toml"],
+        &["run", "small.toml", "--set", "scene.object.mesh=pipe.obj"],
+        &["show", "zero.toml"],
+        &["show", "pipe.obj"],
+        &["show", "zero.stl"],
+        &["scan", "pipe.toml"],
+        &["watch", "zero.toml"],
+        &["calibrate", "zero.toml"],
+        &["calibrate", "pipe.toml"],
+    ] {
+        fails(folder.path(), arguments, &says);
+    }
+    let huge = fs::File::create(folder.path().join("huge.toml")).unwrap();
+    huge.set_len(1 << 40).unwrap();
+    fails(folder.path(), &["run", "huge.toml"], &["huge.toml", "larger than"]);
+}
+
+#[test]
+#[cfg(feature = "nlopt")]
+fn streams_that_cannot_be_written_stop_no_work() {
+    let full = || Stdio::from(fs::File::options().write(true).open("/dev/full").unwrap());
+    let folder = folder();
+    let run = |out: &str, stderr: Stdio| {
+        let mut command = command(folder.path(), &["run", "small.toml", "--out", out]);
+        // Notes of progress go to standard error, one for each tenth of the trials.
+        command.args(["--set", "trials=12"]).stderr(stderr).status().unwrap()
+    };
+    assert!(run("full", full()).success());
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    assert!(run("closed", writer.into()).success());
+    let rows = |out: &str| fs::read(folder.path().join(out).join("trials.jsonl")).unwrap();
+    assert_eq!(rows("full"), rows("closed"));
+    assert_eq!(rows("full").iter().filter(|&&byte| byte == b'\n').count(), 12);
+    let status = command(folder.path(), &["run", "none.toml"]).stderr(full()).status().unwrap();
+    assert_eq!(status.code(), Some(2), "an error that nobody can read is still one");
+    // Nor is a full standard output a panic, or silent.
+    let mut shown = command(folder.path(), &["show", "mesh.obj"]);
+    let shown = shown.stdout(full()).stderr(Stdio::piped()).spawn().unwrap();
+    let shown = shown.wait_with_output().unwrap();
+    assert_eq!(shown.status.code(), Some(2));
+    assert!(said(&shown).starts_with("error: standard output: "), "{}", said(&shown));
+}
+
+/// The program with files of at most `blocks` of 512 bytes, as if the disk were full beyond.
+#[cfg(feature = "nlopt")]
+fn on_a_small_disk(folder: &Path, blocks: u32, arguments: &str) -> std::process::Output {
+    let program = env!("CARGO_BIN_EXE_palpate");
+    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec {program} {arguments}");
+    let mut command = Command::new("sh");
+    command.args(["-c", &script]).current_dir(folder).stdin(Stdio::null());
+    ended(&mut command, arguments)
+}
+
+#[test]
+#[cfg(feature = "nlopt")]
+fn a_full_disk_is_named_with_its_file_and_the_run_resumes() {
+    let folder = folder();
+    let whole = succeeds(folder.path(), &["run", "small.toml", "--out", "whole"]);
+    assert!(whole.contains("report"), "{whole}");
+    for (blocks, file) in [(0, "resolved.toml"), (2, "resolved.toml"), (8, "figures")] {
+        let output = on_a_small_disk(folder.path(), blocks, "run small.toml");
+        let message = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{blocks}: {message}");
+        assert!(message.contains("runs/small/") && message.contains(file), "{blocks}: {message}");
+        for fresh in [&[][..], &["--fresh"]] {
+            let arguments = [&["run", "small.toml", "--no-report"], fresh].concat();
+            let resumed = palpate(folder.path(), &arguments);
+            assert!(resumed.status.success(), "{blocks}: {}", said(&resumed));
+        }
+        fs::remove_dir_all(folder.path().join("runs")).unwrap();
+    }
+    let output = on_a_small_disk(folder.path(), 0, "show scene.toml --mjcf scene.xml");
+    assert!(said(&output).starts_with("error: scene.xml: "), "{}", said(&output));
+    assert!(!folder.path().join("scene.xml.part").exists());
+}
+
+const DOCUMENT: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "scene": 0,
+"nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+"bufferViews": [{"buffer": 0, "byteLength": 36}],
+"buffers": [{"byteLength": 36, "uri": "URI"}]}"#;
+
+/// How one triangle is shown.
+const ONE: &str = "triangles           1 of 1";
+
+#[test]
+fn gltf_buffers_outside_the_folder_are_read_by_leave_only() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let corners = [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let corners: Vec<u8> = corners.iter().flat_map(|number| number.to_le_bytes()).collect();
+    fs::create_dir_all(at("inner/below")).unwrap();
+    for file in ["outside.bin", "inner/beside.bin", "inner/below/beneath.bin"] {
+        fs::write(at(file), &corners).unwrap();
+    }
+    symlink(at("outside.bin"), at("inner/link.bin")).unwrap();
+    symlink("below/beneath.bin", at("inner/within.bin")).unwrap();
+    symlink(folder.path(), at("inner/up")).unwrap();
+    let scene = SCENE.replace("mesh.obj", "inner/mesh.gltf");
+    fs::write(at("gltf.toml"), &scene).unwrap();
+    let show = ["show", "inner/mesh.gltf"];
+    for uri in
+        ["beside.bin", "./beside.bin", "below/beneath.bin", "below/../beside.bin", "within.bin"]
+    {
+        fs::write(at("inner/mesh.gltf"), DOCUMENT.replace("URI", uri)).unwrap();
+        assert!(succeeds(folder.path(), &show).contains(ONE), "{uri}");
+        // The document's folder may be the current one.
+        succeeds(&at("inner"), &["show", "mesh.gltf"]);
+    }
+    let absolute = at("outside.bin").display().to_string();
+    for uri in [
+        "../outside.bin",
+        "%2e%2e/outside.bin",
+        "..%2Foutside.bin",
+        "link.bin",
+        "up/outside.bin",
+        &absolute,
+    ] {
+        fs::write(at("inner/mesh.gltf"), DOCUMENT.replace("URI", uri)).unwrap();
+        let says =
+            ["outside.bin lies outside", "object.outside_buffers = true", "--outside-buffers"];
+        fails(folder.path(), &show, &says);
+        fails(folder.path(), &["scan", "gltf.toml"], &says);
+        let shown = succeeds(folder.path(), &[&show[..], &["--outside-buffers"]].concat());
+        assert!(shown.contains(ONE), "{uri}: {shown}");
+        // A single triangle in the plane z = 0 has nothing over the zone, but it was read.
+        let set = ["show", "gltf.toml", "--set", "object.outside_buffers=true"];
+        let output = palpate(folder.path(), &set);
+        assert!(!said(&output).contains("outside_buffers"), "{uri}: {}", said(&output));
+    }
+    fs::write(at("inner/mesh.gltf"), DOCUMENT.replace("URI", "../../../../../../etc/passwd"))
+        .unwrap();
+    fails(folder.path(), &show, &["/etc/passwd lies outside the mesh's folder"]);
+    fails(folder.path(), &["show", "scene.toml", "--outside-buffers"], &["goes with a mesh"]);
+}

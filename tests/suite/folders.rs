@@ -1,0 +1,141 @@
+//! A run's folder that a crash or a full disk left at any moment resumes, or is begun anew by the
+//! same command; what others put into a folder is never touched.
+
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tempfile::TempDir;
+
+use crate::common::program::{command, fails, folder, said, succeeds};
+
+/// Kills of one test; `PALPATE_FUZZ` asks for more.
+const KILLS: u32 = 100;
+
+fn run(folder: &Path, out: &Path, more: &[&str]) -> std::process::Output {
+    let mut command =
+        command(folder, &["run", "small.toml", "--threads", "1", "--set", "trials=4"]);
+    command.arg("--out").arg(out).args(more).output().unwrap()
+}
+
+#[test]
+fn kills_at_random_moments_of_the_first_second_all_resume() {
+    let folder = folder();
+    let started = Instant::now();
+    assert!(run(folder.path(), &folder.path().join("whole"), &[]).status.success());
+    // A run that is over sooner is killed in all of its life.
+    let longest = started.elapsed().min(Duration::from_secs(1));
+    let whole = fs::read(folder.path().join("whole/trials.jsonl")).unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(13);
+    let kills =
+        std::env::var("PALPATE_FUZZ").map_or(KILLS, |count| count.parse::<u32>().unwrap() / 100);
+    for kill in 0..kills.max(KILLS) {
+        let out = folder.path().join(format!("killed-{kill}"));
+        let fresh: &[&str] = if kill % 4 == 3 { &["--fresh"] } else { &[] };
+        // Some are killed a second time, while they begin anew or resume.
+        for arguments in [&[][..], fresh].iter().take(1 + kill as usize % 2) {
+            let mut child = command(folder.path(), &["run", "small.toml", "--set", "trials=4"]);
+            child.arg("--out").arg(&out).args(*arguments);
+            let mut child = child
+                .stdout(std::process::Stdio::null())
+                .stderr(std::process::Stdio::null())
+                .spawn()
+                .unwrap();
+            std::thread::sleep(longest.mul_f64(random.random()));
+            child.kill().unwrap();
+            child.wait().unwrap();
+        }
+        let more: &[&str] =
+            if kill % 10 == 9 { &["--fresh", "--no-report"] } else { &["--no-report"] };
+        let resumed = run(folder.path(), &out, more);
+        let left = || {
+            fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>()
+        };
+        assert!(resumed.status.success(), "kill {kill}: {} {:?}", said(&resumed), left());
+        assert!(fs::read(out.join("trials.jsonl")).unwrap() == whole, "kill {kill}");
+        fs::remove_dir_all(&out).unwrap();
+    }
+}
+
+/// A folder as a crash leaves it: files and how many of their bytes.
+type Left = &'static [(&'static str, &'static [u8])];
+
+const BEGINNINGS: [Left; 8] = [
+    &[],
+    &[("trials.jsonl", b"")],
+    &[("trials.jsonl", b""), ("resolved.toml.part", b"")],
+    &[("trials.jsonl", b""), ("resolved.toml.part", b"# Every setting of th")],
+    &[("trials.jsonl", b""), ("resolved.toml", b"")],
+    &[("trials.jsonl", b"{\"trial\":0,\"pla"), ("resolved.toml", b"RESOLVED")],
+    &[("trials.jsonl", b""), ("resolved.toml", b"RESOLVED"), ("surface.csv.part", b"x_m,z")],
+    &[("trials.jsonl", b""), ("resolved.toml", b"RESOLVED"), ("surface.csv", b"SURFACE")],
+];
+
+#[test]
+fn every_beginning_that_a_crash_leaves_is_begun_anew() {
+    let folder = folder();
+    let whole = folder.path().join("whole");
+    assert!(run(folder.path(), &whole, &["--no-report"]).status.success());
+    let other = folder.path().join("other");
+    assert!(run(folder.path(), &other, &["--set", "seed=1", "--no-report"]).status.success());
+    let rows = fs::read(whole.join("trials.jsonl")).unwrap();
+    for (i, beginning) in BEGINNINGS.iter().enumerate() {
+        // What was begun may be another experiment, as long as nothing of it was run.
+        for begun in [&whole, &other] {
+            for fresh in [&["--no-report"][..], &["--no-report", "--fresh"]] {
+                let out = TempDir::new_in(folder.path()).unwrap();
+                for (name, bytes) in *beginning {
+                    let bytes = match *bytes {
+                        b"RESOLVED" => fs::read(begun.join("resolved.toml")).unwrap(),
+                        b"SURFACE" => fs::read(begun.join("surface.csv")).unwrap(),
+                        bytes => bytes.to_vec(),
+                    };
+                    fs::write(out.path().join(name), bytes).unwrap();
+                }
+                let output = run(folder.path(), out.path(), fresh);
+                assert!(output.status.success(), "{i} {fresh:?}: {}", said(&output));
+                assert!(fs::read(out.path().join("trials.jsonl")).unwrap() == rows, "{i}");
+            }
+        }
+    }
+    // With rows it is not taken: another run's rows are lost by --fresh only.
+    let refused = run(folder.path(), &other, &[]);
+    assert!(said(&refused).contains("holds another experiment"), "{}", said(&refused));
+}
+
+#[test]
+fn what_others_put_into_a_folder_is_not_touched() {
+    let folder = folder();
+    let foreign: [&[(&str, &str)]; 7] = [
+        &[("notes.txt", "mine")],
+        &[("resolved.toml", "mine = 1\n")],
+        &[("resolved.toml", "mine = 1\n"), ("trials.jsonl", "")],
+        &[("resolved.toml.part", "half"), ("notes.txt", "mine")],
+        &[("trials.jsonl", "mine\n")],
+        &[("trials.jsonl", ""), ("surface.csv", "mine\n")],
+        &[("figures", "mine")],
+    ];
+    for (i, files) in foreign.iter().enumerate() {
+        let out = folder.path().join(format!("foreign-{i}"));
+        fs::create_dir(&out).unwrap();
+        for (name, text) in *files {
+            fs::write(out.join(name), text).unwrap();
+        }
+        let out_name = out.to_str().unwrap();
+        for fresh in [&[][..], &["--fresh"]] {
+            let arguments = [&["run", "small.toml", "--out", out_name], fresh].concat();
+            fails(folder.path(), &arguments, &["this folder holds something else", "--out"]);
+        }
+        assert_eq!(fs::read_dir(&out).unwrap().count(), files.len(), "{i}");
+        for (name, text) in *files {
+            assert_eq!(fs::read_to_string(out.join(name)).unwrap(), *text, "{i}: {name}");
+        }
+    }
+    // Beside a run's own files they stay, whatever is begun anew.
+    succeeds(folder.path(), &["run", "small.toml", "--no-report"]);
+    fs::write(folder.path().join("runs/small/notes.txt"), "mine").unwrap();
+    succeeds(folder.path(), &["run", "small.toml", "--no-report", "--fresh", "--set", "seed=3"]);
+    assert_eq!(fs::read_to_string(folder.path().join("runs/small/notes.txt")).unwrap(), "mine");
+}
