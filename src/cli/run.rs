@@ -1,6 +1,6 @@
 //! `palpate run`.
 
-use super::prepare::simulation;
+use super::prepare::{bound_threads, simulation};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, print};
 use crate::experiment::analysis::Analysis;
@@ -46,6 +46,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let experiment = Experiment::load(&args.experiment, &args.set)?;
+    bound_threads(args.threads)?;
     let simulation = simulation(experiment)?;
     let experiment = simulation.experiment();
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&experiment.name));

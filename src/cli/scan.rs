@@ -1,6 +1,6 @@
 //! `palpate scan`.
 
-use super::prepare::simulator;
+use super::prepare::{environment, simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, print};
 use crate::experiment::scan;
@@ -9,7 +9,7 @@ use crate::experiment::store::write_whole;
 use crate::explore::probe::Touch;
 use crate::report::points::Points;
 use crate::report::{png, scan as drawing};
-use crate::sim::{Environment, Scene};
+use crate::sim::Scene;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -51,7 +51,7 @@ fn grid(text: &str) -> Result<[usize; 2], String> {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
-    let environment = Arc::new(Environment::build(Scene::load(&args.scene, &args.set)?)?);
+    let environment = Arc::new(environment(Scene::load(&args.scene, &args.set)?)?);
     let mesh = environment.mesh().with_context(|| {
         format!("{} has no object, so there is no surface to scan", args.scene.display())
     })?;

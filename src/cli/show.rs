@@ -1,5 +1,6 @@
 //! `palpate show`.
 
+use super::prepare::{environment, with_patience};
 use super::terminal::{Ending, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::store;
@@ -7,7 +8,7 @@ use crate::experiment::store::Run;
 use crate::experiment::truth::Truth;
 use crate::geometry::import::import;
 use crate::report;
-use crate::sim::environment::{Environment, Shape};
+use crate::sim::environment::Shape;
 use crate::sim::scene::Unit;
 use crate::sim::{Scene, mjcf};
 use anyhow::{Context, bail};
@@ -65,8 +66,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         Some("toml") if is_scene => scene(args)?,
         Some("toml") => store::resolved(&Experiment::load(&args.path, &args.set)?),
         _ => {
-            let (_, report) = import(&args.path, args.unit.unwrap_or_default().metres())?;
-            format!("{}\n{report}", args.path.display())
+            let path = args.path.display();
+            let (_, report) = with_patience(|tell| {
+                tell(&format!("reading {path}"));
+                import(&args.path, args.unit.unwrap_or_default().metres())
+            })?;
+            format!("{path}\n{report}")
         }
     };
     print(text.trim_end())?;
@@ -87,8 +92,11 @@ const GRID: usize = 41;
 fn scene(args: &Args) -> anyhow::Result<String> {
     let scene = Scene::load(&args.path, &args.set)?;
     let mut text = toml::to_string(&scene).context("cannot write the scene")?;
-    let environment = Environment::build(scene)?;
-    let truth = Truth::sample(&environment, GRID);
+    let environment = environment(scene)?;
+    let truth = with_patience(|tell| {
+        tell("looking where the finger can touch the surface");
+        Truth::sample(&environment, GRID)
+    });
     text +=
         &format!("\nsurface in the zone: {} of {} test places", truth.count(), truth.places.len());
     let heights = || truth.heights_m.iter().flatten().copied();
@@ -101,7 +109,10 @@ fn scene(args: &Args) -> anyhow::Result<String> {
         text += &format!("{report}\n");
     }
     if let Some(model) = mjcf::scene(&environment, mjcf::Mode::Picture) {
-        text += &compiled(&model);
+        text += &with_patience(|tell| {
+            tell("compiling the scene");
+            compiled(&model)
+        });
         if let Some(path) = &args.mjcf {
             store::write_whole(path, &model)?;
             text += &format!("\nMJCF: {}", path.display());
