@@ -10,6 +10,7 @@ mod find;
 mod list;
 mod new;
 mod output;
+mod patience;
 mod prepare;
 mod progress;
 mod reference;

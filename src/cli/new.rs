@@ -4,7 +4,7 @@ use super::output::Force;
 use super::terminal::{Ending, print};
 use crate::experiment::store::write_whole;
 use crate::geometry::bvh::MeshBvh;
-use crate::geometry::import::import;
+use crate::geometry::import::{Buffers, import_with};
 use crate::geometry::mesh::Mesh;
 use crate::math::pose::pose;
 use crate::sim::placement::{self, Facing, Found, Side, Up};
@@ -40,6 +40,9 @@ pub(super) struct Args {
     /// What touches.
     #[arg(long, value_enum, default_value_t)]
     finger: FingerKind,
+    /// Let a glTF mesh read buffers outside its own folder.
+    #[arg(long)]
+    outside_buffers: bool,
     /// Folder for both files.
     #[arg(long, value_name = "FOLDER", default_value = ".")]
     out: PathBuf,
@@ -51,6 +54,11 @@ impl Args {
     /// A file in the folder asked for.
     fn beside(&self, file: String) -> PathBuf {
         if self.is_here() { file.into() } else { self.out.join(file) }
+    }
+
+    fn read(&self, metres_per_unit: f64) -> anyhow::Result<Mesh> {
+        let buffers = if self.outside_buffers { Buffers::Anywhere } else { Buffers::Beside };
+        Ok(import_with(&self.mesh, metres_per_unit, buffers)?.0)
     }
 
     fn is_here(&self) -> bool {
@@ -124,7 +132,7 @@ impl Guess {
         let is_gltf = ["gltf", "glb"].contains(&extension.as_str());
         let up = args.up.unwrap_or(if is_gltf || extension == "obj" { Up::Y } else { Up::Z });
         // In the middle of all units, so that the largest and the smallest can be read.
-        let (mut mesh, _) = import(&args.mesh, Unit::Mm.metres())?;
+        let mut mesh = args.read(Unit::Mm.metres())?;
         let extent = |mesh: &Mesh| {
             let (low, high) = mesh.bounds();
             high - low
@@ -132,7 +140,7 @@ impl Guess {
         let unit = args.unit.or(is_gltf.then_some(Unit::M));
         let (unit, scale) = placement::size(extent(&mesh).max() / Unit::Mm.metres(), unit);
         if (unit, scale) != (Unit::Mm, 1.0) {
-            (mesh, _) = import(&args.mesh, unit.metres() * scale)?;
+            mesh = args.read(unit.metres() * scale)?;
         }
         let size_mm = (extent(&mesh) * 1e3).into();
         let facing = if is_gltf { Facing::of_gltf(up) } else { Facing::of(up) };
@@ -161,6 +169,10 @@ impl Guess {
             FingerKind::Arm => ("dynamic", ARM),
         };
         let [x_m, z_m] = [zone.x_m, zone.z_m.unwrap_or_default()];
+        let outside = match args.outside_buffers {
+            true => "outside_buffers = true\n",
+            false => "",
+        };
         let datum_y_m = zone.datum_y_m();
         let depth_m = zone.depth_m.unwrap_or_default();
         Ok(format!(
@@ -169,7 +181,7 @@ impl Guess {
              [object]\n\
              mesh = {mesh}\n\
              unit = \"{unit}\"                 # of the file's numbers: m, cm, mm, um, in\n\
-             scale = {scale:?}                 # on top of the unit\n\
+             scale = {scale:?}                 # on top of the unit\n{outside}\
              position_m = {position_m:?}    # of the mesh's origin, in the frame of the robot's base\n\
              rotation_deg = {rotation_deg:?}    # about the base's x, then y, then z: the side that faces +y is touched\n\n\
              [zone]                      # touched along -y; {:.0} % of it have a surface\n\

@@ -1,18 +1,31 @@
 //! From files to what runs: it is refused what cannot be, and said on standard error what may not be
 //! meant.
 
+use super::patience::with_patience;
 use super::terminal::Talk;
 use crate::experiment::{Experiment, Simulation};
-use crate::sim::Environment;
 use crate::sim::simulator::Simulator;
+use crate::sim::{Environment, Scene};
+use anyhow::Context;
 use std::sync::Arc;
+
+/// Bounds the threads of all that follows; 0 means all cores.
+pub(super) fn bound_threads(threads: u16) -> anyhow::Result<()> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+    pool.build_global().with_context(|| format!("cannot start {threads} threads"))
+}
 
 /// Makes an experiment ready to run.
 pub(super) fn simulation(experiment: Experiment, talk: Talk) -> anyhow::Result<Simulation> {
-    let simulation = Simulation::new(experiment)?;
+    let simulation = with_patience(talk, |tell| Simulation::new_telling(experiment, tell))?;
     simulation.simulator().check_reach()?;
     simulation.notices().iter().for_each(|notice| talk.note(notice));
     Ok(simulation)
+}
+
+/// Loads what a scene names.
+pub(super) fn environment(scene: Scene, talk: Talk) -> anyhow::Result<Arc<Environment>> {
+    Ok(Arc::new(with_patience(talk, |tell| Environment::build_telling(scene, tell))?))
 }
 
 /// Makes an environment ready for bodies.

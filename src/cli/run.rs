@@ -1,7 +1,7 @@
 //! `palpate run`.
 
 use super::find::{EXPERIMENTS, find};
-use super::prepare::simulation;
+use super::prepare::{bound_threads, simulation};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, error, print};
 use crate::experiment::analysis::Analysis;
@@ -50,6 +50,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let experiment = Experiment::load(&find(&args.experiment, EXPERIMENTS)?, &args.set)?;
+    bound_threads(args.threads)?;
     let simulation = simulation(experiment, talk)?;
     let experiment = simulation.experiment();
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&experiment.name));

@@ -2,7 +2,7 @@
 
 use super::find::{SCENES, find};
 use super::output::Force;
-use super::prepare::simulator;
+use super::prepare::{environment, simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::scan;
@@ -11,10 +11,9 @@ use crate::experiment::store::write_whole;
 use crate::explore::probe::Touch;
 use crate::report::points::Points;
 use crate::report::{png, scan as drawing};
-use crate::sim::{Environment, Scene};
+use crate::sim::Scene;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -56,7 +55,7 @@ fn grid(text: &str) -> Result<[usize; 2], String> {
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
-    let environment = Arc::new(Environment::build(scene)?);
+    let environment = environment(scene, talk)?;
     let mesh = environment.mesh().with_context(|| {
         format!("{} has no object, so there is no surface to scan", args.scene.display())
     })?;

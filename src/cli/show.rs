@@ -1,7 +1,8 @@
 //! `palpate show`.
 
 use super::output::Force;
-use super::prepare::simulator;
+use super::patience::with_patience;
+use super::prepare::{environment, simulator};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::notice;
@@ -12,12 +13,11 @@ use crate::files;
 use crate::geometry::import::{Buffers, import_with};
 use crate::report;
 use crate::report::png;
-use crate::sim::environment::{Environment, Shape};
+use crate::sim::environment::Shape;
 use crate::sim::scene::Unit;
 use crate::sim::{Scene, mjcf};
 use anyhow::{Context, bail};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -97,8 +97,11 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
                 false => Buffers::Beside,
             };
             let metres = args.unit.unwrap_or_default().metres();
-            let (_, report) = import_with(&args.path, metres, buffers)?;
             let path = args.path.display();
+            let (_, report) = with_patience(talk, |tell| {
+                tell(&format!("reading {path}"));
+                import_with(&args.path, metres, buffers)
+            })?;
             format!("{path}\n{report}\nto explore it: palpate new {path}")
         }
     };
@@ -127,9 +130,12 @@ fn run_folder(run: &Run, json: bool) -> String {
 fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
     let scene = Scene::load(&args.path, &args.set)?;
     let mut text = toml::to_string(&scene).context("cannot write the scene")?;
-    let environment = Arc::new(Environment::build(scene)?);
+    let environment = environment(scene, talk)?;
     simulator(&environment, talk)?;
-    let truth = Truth::sample(&environment, GRID);
+    let truth = with_patience(talk, |tell| {
+        tell("looking where the finger can touch the surface");
+        Truth::sample(&environment, GRID)
+    });
     notice::of_truth(environment.task().zone(), &truth).iter().for_each(|notice| talk.note(notice));
     text +=
         &format!("\nsurface in the zone: {} of {} test places", truth.count(), truth.places.len());
@@ -149,7 +155,10 @@ fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
         text += &format!("picture: {}\n", path.display());
     }
     if let Some(model) = mjcf::scene(&environment, mjcf::Mode::Picture) {
-        text += &compiled(&model);
+        text += &with_patience(talk, |tell| {
+            tell("compiling the scene");
+            compiled(&model)
+        });
         if let Some(path) = &args.mjcf {
             store::write_whole(path, &model)?;
             text += &format!("\nMJCF: {}", path.display());

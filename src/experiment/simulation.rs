@@ -51,8 +51,23 @@ impl Simulation {
     /// # Errors
     /// If the scene cannot be built or simulated, or the zone has no surface.
     pub fn new(experiment: Experiment) -> Result<Self, SimulationError> {
-        let environment = Environment::build(experiment.scene.clone())?;
-        Self::within(experiment, Arc::new(environment))
+        Self::new_telling(experiment, &|_| ())
+    }
+
+    /// As [`new`](Self::new); `tell` is called with the name of each step that may take long, as it
+    /// begins.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn new_telling(
+        experiment: Experiment,
+        tell: &dyn Fn(&str),
+    ) -> Result<Self, SimulationError> {
+        let environment = Environment::build_telling(experiment.scene.clone(), tell)?;
+        tell("looking where the finger can touch the surface");
+        let truth = Truth::sample(&environment, experiment.grid as usize);
+        tell("compiling the model");
+        Self::against(experiment, Arc::new(environment), truth)
     }
 
     /// As [`new`](Self::new), in an environment that is there already; its scene takes the place of

@@ -12,12 +12,16 @@ use nalgebra::{Isometry3, Point3};
 pub struct Mesh {
     vertices: Vec<Point3<f64>>,
     triangles: Vec<[u32; 3]>,
+    bounds: (Point3<f64>, Point3<f64>),
 }
 
 impl Mesh {
     /// The caller promises what the type promises.
     pub(super) fn from_sound_parts(vertices: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Self {
-        Self { vertices, triangles }
+        let first = vertices[0];
+        let bounds = (vertices.iter())
+            .fold((first, first), |(low, high), vertex| (low.inf(vertex), high.sup(vertex)));
+        Self { vertices, triangles, bounds }
     }
 
     /// Vertex positions, in metres.
@@ -44,12 +48,10 @@ impl Mesh {
         (0..self.triangles.len()).map(|triangle| self.corners(triangle))
     }
 
-    /// The smallest axis-aligned box around the mesh: least and greatest corner, in metres.
+    /// The smallest axis-aligned box around the mesh: least and greatest corner, in metres. Known
+    /// beforehand, however many vertices there are.
     pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
-        let first = self.vertices[0];
-        self.vertices
-            .iter()
-            .fold((first, first), |(low, high), vertex| (low.inf(vertex), high.sup(vertex)))
+        self.bounds
     }
 
     /// Surface area, in m²: half the sum of ‖(b − a) × (c − a)‖.
@@ -71,9 +73,7 @@ impl Mesh {
 
     /// The mesh moved by the finite pose `x_wm`: a vertex p in M becomes `x_wm` p in W.
     pub fn transformed(&self, x_wm: &Isometry3<f64>) -> Self {
-        Self {
-            vertices: self.vertices.iter().map(|vertex| x_wm * vertex).collect(),
-            triangles: self.triangles.clone(),
-        }
+        let vertices = self.vertices.iter().map(|vertex| x_wm * vertex).collect();
+        Self::from_sound_parts(vertices, self.triangles.clone())
     }
 }

@@ -1,8 +1,6 @@
 //! From whatever an importer read to a [`Mesh`] that can be trusted.
 
-use std::collections::HashMap;
-use std::collections::HashSet;
-
+use foldhash::{HashMap, HashMapExt, HashSet, HashSetExt};
 use nalgebra::Point3;
 
 use super::element::Element;

@@ -21,6 +21,7 @@ pub(super) struct Topology {
 }
 
 /// One side of a triangle, as an edge from its lower to its higher vertex.
+#[derive(Clone, Default)]
 struct Side {
     edge: (u32, u32),
     triangle: u32,
@@ -63,25 +64,42 @@ pub(super) fn orient(triangles: &[[u32; 3]], signed_volume: impl Fn(u32) -> f64)
     found
 }
 
+/// The sides of all triangles by edge, of one edge by triangle. Sorted into the lower vertices
+/// first, which leaves a handful for each to compare.
 fn sorted_sides(triangles: &[[u32; 3]]) -> Vec<Side> {
-    let mut sides: Vec<Side> = triangles
-        .iter()
-        .enumerate()
-        .flat_map(|(triangle, corners)| {
-            (0..3u8).map(move |side| {
-                let from = corners[usize::from(side)];
-                let to = corners[usize::from(side + 1) % 3];
-                Side {
-                    edge: (from.min(to), from.max(to)),
-                    triangle: triangle as u32,
-                    side,
-                    ascending: from < to,
-                }
-            })
+    let sides = |triangle: usize| {
+        let corners = triangles[triangle];
+        (0..3u8).map(move |side| {
+            let from = corners[usize::from(side)];
+            let to = corners[usize::from(side + 1) % 3];
+            Side {
+                edge: (from.min(to), from.max(to)),
+                triangle: triangle as u32,
+                side,
+                ascending: from < to,
+            }
         })
-        .collect();
-    sides.sort_unstable_by_key(|side| (side.edge, side.triangle));
-    sides
+    };
+    let all = || (0..triangles.len()).flat_map(sides);
+    let vertices = triangles.iter().flatten().max().map_or(0, |&last| last as usize + 1);
+    let mut ends = vec![0; vertices];
+    all().for_each(|side| ends[side.edge.0 as usize] += 1);
+    let mut begin = 0;
+    for end in &mut ends {
+        begin += std::mem::replace(end, begin);
+    }
+    let mut sorted = vec![Side::default(); 3 * triangles.len()];
+    for side in all() {
+        let end = &mut ends[side.edge.0 as usize];
+        sorted[*end] = side;
+        *end += 1;
+    }
+    let mut begin = 0;
+    for end in ends {
+        sorted[begin..end].sort_unstable_by_key(|side| (side.edge.1, side.triangle));
+        begin = end;
+    }
+    sorted
 }
 
 fn edges(sides: &[Side]) -> impl Iterator<Item = &[Side]> {

@@ -92,13 +92,24 @@ impl Environment {
     /// # Errors
     /// If the mesh is unusable or lies wholly outside the zone.
     pub fn build(scene: Scene) -> Result<Self, EnvironmentError> {
+        Self::build_telling(scene, &|_| ())
+    }
+
+    /// As [`build`](Self::build); `tell` is called with the name of each step that takes long for
+    /// a large mesh, as it begins.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    pub fn build_telling(scene: Scene, tell: &dyn Fn(&str)) -> Result<Self, EnvironmentError> {
         if scene.body == Body::Function {
             let function = scene.function.ok_or(EnvironmentError::Missing { part: "function" })?;
             return Self::around(scene, Shape::Function(function));
         }
         let object = scene.object.as_ref().ok_or(EnvironmentError::Missing { part: "object" })?;
+        tell(&format!("reading {}", object.mesh.display()));
         let (mesh, report) =
             import_with(&object.mesh, object.unit.metres() * object.scale, object.buffers())?;
+        tell("building the search tree");
         let bvh = MeshBvh::new(mesh.transformed(&object.x_wo()));
         Self::around(scene, Shape::Mesh { bvh, report: report.into() })
     }

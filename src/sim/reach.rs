@@ -4,10 +4,12 @@
 //! Fingers resting on the surface all over the zone leave below them the morphological closing of
 //! the surface by the finger's hull; the surface is reachable where it touches that envelope.
 
+use super::environment::{CLEARANCE_M, Shape};
 use super::probe::rest;
 use crate::sim::Environment;
 use crate::sim::scene::Body;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Height between surface and envelope that still counts as touching; chosen, a tenth of the
 /// smallest errors that a belief reaches.
@@ -16,6 +18,9 @@ const TOLERANCE_M: f64 = 1e-4;
 /// Fingers along a radius, and most of them along a side of the zone; chosen.
 const PER_RADIUS: f64 = 8.0;
 const PER_SIDE_MAX: f64 = 128.0;
+
+/// More than rounding can take off a finger's width.
+const ROUNDING_M: f64 = 1e-9;
 
 /// Whether the finger, sent to some target in the zone, can touch the surface at each of `places`
 /// with the true height above the datum in `heights_m`; a place without a surface is none.
@@ -27,45 +32,141 @@ pub fn is_reachable(
     if environment.scene().body == Body::Function {
         return heights_m.iter().map(Option::is_some).collect();
     }
-    let zone = &environment.scene().zone;
-    let finger = &environment.scene().finger;
-    let steps: Vec<usize> = (zone.extents_m().iter())
-        .map(|side| (side * PER_RADIUS / finger.radius_m).clamp(1.0, PER_SIDE_MAX).ceil() as usize)
-        .collect();
-    let targets: Vec<Vec<f64>> = (0..steps.iter().map(|steps| steps + 1).product::<usize>())
-        .map(|index| {
-            let mut rest = index;
-            let fractions = steps.iter().map(|&steps| {
-                let digit = rest % (steps + 1);
-                rest /= steps + 1;
-                digit as f64 / steps as f64
-            });
-            zone.at(&fractions.collect::<Vec<_>>())
-        })
-        .collect();
-    let x_zw = zone.x_wz().inverse();
-    let fingers: Vec<(Vec<f64>, f64)> = targets
-        .into_par_iter()
-        .filter_map(|target| {
-            let rest = rest(environment, &environment.task().approach(&target))?;
-            Some((target, x_zw.transform_point(&rest.p_wt).y))
-        })
-        .collect();
-    // The nearest finger may stand half a step from the one that touches; on a plane that lifts
-    // the sphere off by the square of the distance over twice its radius.
-    let missed_m: f64 = (zone.extents_m().iter().zip(&steps))
-        .map(|(side, &steps)| (side / steps as f64).powi(2) / (8.0 * finger.radius_m))
-        .sum();
+    let fingers = Fingers::new(environment);
+    let lowest_y_m = fingers.lowest_y_m();
     (places.par_iter().zip(heights_m))
-        .map(|(place, height_m)| {
-            let Some(height_m) = height_m else { return false };
-            let envelope_y_m = fingers.iter().filter_map(|(target, tip_y_m)| {
-                let away = |axis: usize| Some(place.get(axis)? - target.get(axis)?);
-                let front_m = finger.front_m(away(0)?, away(1).unwrap_or(0.0))?;
-                Some(tip_y_m + front_m)
-            });
-            let lowest_y_m = envelope_y_m.fold(f64::INFINITY, f64::min);
-            lowest_y_m - zone.datum_y_m() - height_m <= TOLERANCE_M + missed_m
-        })
+        .map(|(place, height_m)| height_m.is_some_and(|m| fingers.touch(place, m, &lowest_y_m)))
         .collect()
+}
+
+/// Fingers all over the zone, each let down onto the object when first asked for.
+struct Fingers<'a> {
+    environment: &'a Environment,
+    /// Their coordinates along each side of the zone; x varies fastest.
+    sides_m: Vec<Vec<f64>>,
+    /// The y in the zone's frame at which each tip rests; none for one that meets nothing.
+    tips_y_m: Vec<OnceLock<Option<f64>>>,
+    /// Height between surface and envelope up to which they touch.
+    tolerance_m: f64,
+}
+
+impl<'a> Fingers<'a> {
+    fn new(environment: &'a Environment) -> Self {
+        let zone = &environment.scene().zone;
+        let radius_m = environment.scene().finger.radius_m;
+        let steps = |side_m: f64| (side_m * PER_RADIUS / radius_m).clamp(1.0, PER_SIDE_MAX).ceil();
+        let sides_m: Vec<Vec<f64>> = (zone.sides())
+            .map(|[low, high]| {
+                let steps = steps(high - low);
+                (0..=steps as usize).map(|i| low + (high - low) * (i as f64 / steps)).collect()
+            })
+            .collect();
+        // The nearest finger may stand half a step from the one that touches; on a plane that lifts
+        // the sphere off by the square of the distance over twice its radius.
+        let missed_m: f64 = (zone.extents_m().into_iter())
+            .map(|side_m| (side_m / steps(side_m)).powi(2) / (8.0 * radius_m))
+            .sum();
+        let count = sides_m.iter().map(Vec::len).product();
+        let tips_y_m = (0..count).map(|_| OnceLock::new()).collect();
+        Self { environment, sides_m, tips_y_m, tolerance_m: TOLERANCE_M + missed_m }
+    }
+
+    /// Whether one of them touches the surface at `place`. Those are asked first that may come
+    /// lowest over it, and those that stay above it not at all, so that few are let down.
+    fn touch(&self, place: &[f64], height_m: f64, lowest_y_m: &[f64]) -> bool {
+        let datum_y_m = self.environment.scene().zone.datum_y_m();
+        let is_touched =
+            |envelope_y_m: f64| envelope_y_m - datum_y_m - height_m <= self.tolerance_m;
+        let mut over: Vec<(f64, usize, f64)> = (self.over(place))
+            .map(|(finger, front_m)| (lowest_y_m[finger] + front_m, finger, front_m))
+            .filter(|&(lowest_y_m, ..)| is_touched(lowest_y_m))
+            .collect();
+        over.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        over.into_iter().any(|(_, finger, front_m)| {
+            self.tip_y_m(finger).is_some_and(|tip_y_m| is_touched(tip_y_m + front_m))
+        })
+    }
+
+    /// For each a y in the zone's frame below which its tip does not come, from the surface at every
+    /// target: no hull lets it through.
+    fn lowest_y_m(&self) -> Vec<f64> {
+        let surface_y_m: Vec<Option<f64>> =
+            (0..self.tips_y_m.len()).into_par_iter().map(|at| self.surface_y_m(at)).collect();
+        let lowest_y_m = |finger| {
+            let fronts = self
+                .under(finger)
+                .filter_map(|(at, front_m)| Some(surface_y_m[at]? - front_m - ROUNDING_M));
+            fronts.fold(f64::NEG_INFINITY, f64::max)
+        };
+        (0..self.tips_y_m.len()).into_par_iter().map(lowest_y_m).collect()
+    }
+
+    /// The fingers whose hull is over `place`, each with the y of its front there relative to its
+    /// tip.
+    fn over(&self, place: &[f64]) -> impl Iterator<Item = (usize, f64)> {
+        let axis_z_m = self.environment.scene().finger.axis_a().z;
+        self.near(place, [axis_z_m.max(0.0), -axis_z_m.min(0.0)]).filter_map(move |finger| {
+            let away = place.iter().zip(self.target(finger)).map(|(at, target)| at - target);
+            Some((finger, self.front_m(away)?))
+        })
+    }
+
+    /// The targets under the hull of `finger`, each with the y of its front there relative to its
+    /// tip.
+    fn under(&self, finger: usize) -> impl Iterator<Item = (usize, f64)> {
+        let axis_z_m = self.environment.scene().finger.axis_a().z;
+        let tip: Vec<f64> = self.target(finger).collect();
+        self.near(&tip, [-axis_z_m.min(0.0), axis_z_m.max(0.0)]).filter_map(move |at| {
+            let away = self.target(at).zip(&tip).map(|(at, tip)| at - tip);
+            Some((at, self.front_m(away)?))
+        })
+    }
+
+    fn front_m(&self, mut away: impl Iterator<Item = f64>) -> Option<f64> {
+        self.environment.scene().finger.front_m(away.next()?, away.next().unwrap_or(0.0))
+    }
+
+    /// The targets within a radius of `place`, along z within `more_m` than that below and above.
+    fn near(&self, place: &[f64], more_m: [f64; 2]) -> impl Iterator<Item = usize> + use<> {
+        let radius_m = self.environment.scene().finger.radius_m + ROUNDING_M;
+        let within = |side: usize, [below_m, above_m]: [f64; 2]| {
+            let (&at, side) = (place.get(side)?, self.sides_m.get(side)?);
+            let first = side.partition_point(|&x| x < at - below_m - radius_m);
+            Some(first..side.partition_point(|&x| x <= at + above_m + radius_m))
+        };
+        let columns = within(0, [0.0; 2]).unwrap_or(0..0);
+        let rows = within(1, more_m).unwrap_or(0..1);
+        let across = self.sides_m.first().map_or(0, Vec::len);
+        rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
+    }
+
+    /// The place that `finger` is sent to.
+    fn target(&self, mut finger: usize) -> impl Iterator<Item = f64> {
+        self.sides_m.iter().map(move |side| {
+            let at = side[finger % side.len()];
+            finger /= side.len();
+            at
+        })
+    }
+
+    /// The y in the zone's frame of the surface at the target of `finger`.
+    fn surface_y_m(&self, finger: usize) -> Option<f64> {
+        let Shape::Mesh { bvh, .. } = self.environment.shape() else { return None };
+        let task = self.environment.task();
+        let zone = task.zone();
+        let [near_m, far_m] = task.depth_m();
+        let target: Vec<f64> = self.target(finger).collect();
+        let start_w = zone.x_wz() * zone.local(&target, CLEARANCE_M - near_m);
+        let hit = bvh.ray(&start_w, &zone.ahead_w(), far_m - near_m + 2.0 * CLEARANCE_M)?;
+        Some(CLEARANCE_M - near_m - hit.distance_m)
+    }
+
+    fn tip_y_m(&self, finger: usize) -> Option<f64> {
+        *self.tips_y_m[finger].get_or_init(|| {
+            let target: Vec<f64> = self.target(finger).collect();
+            let rest = rest(self.environment, &self.environment.task().approach(&target))?;
+            let x_zw = self.environment.scene().zone.x_wz().inverse();
+            Some(x_zw.transform_point(&rest.p_wt).y)
+        })
+    }
 }

@@ -29,6 +29,14 @@ fn box_has_its_measures() {
     let moved = mesh.transformed(&pose);
     near(moved.area_m2(), 22.0, 1e-10);
     near(moved.volume_m3(), 6.0, 1e-10);
+    for mesh in [mesh, moved] {
+        let (low, high) = mesh.bounds();
+        for axis in 0..3 {
+            let along = || mesh.vertices().iter().map(|vertex| vertex[axis]);
+            assert_eq!(Some(low[axis]), along().reduce(f64::min));
+            assert_eq!(Some(high[axis]), along().reduce(f64::max));
+        }
+    }
 }
 
 #[test]

@@ -1,7 +1,14 @@
 //! Where the finger can touch: grooves whose answer is known.
 
+use nalgebra::Point3;
+use palpate::geometry::bvh::MeshBvh;
+use palpate::geometry::mesh::Mesh;
+use palpate::sim::environment::Shape;
+use palpate::sim::probe::rest;
 use palpate::sim::reach;
 use palpate::sim::{Environment, Scene};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
 use std::fs;
 
@@ -85,4 +92,80 @@ fn a_plane_is_all_in_reach_and_nothing_is_beside_the_object() {
     }
     let short = environment(&[(-0.06, 0.0), (0.01, 0.0)], SPHERE);
     assert!(across(&short).iter().all(|(x, is_reachable)| *is_reachable == (*x < 0.01 + 1e-9)));
+}
+
+/// The slow twin lets every finger down and looks at all of them.
+fn by_brute_force(environment: &Environment, places: &[Vec<f64>]) -> Vec<bool> {
+    let (zone, finger) = (&environment.scene().zone, &environment.scene().finger);
+    let steps: Vec<f64> = (zone.extents_m().iter())
+        .map(|side_m| (side_m * 8.0 / finger.radius_m).clamp(1.0, 128.0).ceil())
+        .collect();
+    let missed_m = |side_m: f64, steps: f64| (side_m / steps).powi(2) / (8.0 * finger.radius_m);
+    let missed_m: f64 = zone.extents_m().iter().zip(&steps).map(|(&m, &n)| missed_m(m, n)).sum();
+    let x_zw = zone.x_wz().inverse();
+    let mut fingers = Vec::new();
+    for j in 0..=steps[1] as usize {
+        for i in 0..=steps[0] as usize {
+            let target = zone.at(&[i as f64 / steps[0], j as f64 / steps[1]]);
+            let rest = rest(environment, &environment.task().approach(&target));
+            fingers.extend(rest.map(|rest| (target, (x_zw * rest.p_wt).y)));
+        }
+    }
+    let is_reachable = |place: &Vec<f64>| {
+        let height_m = environment.true_height_m(place)?;
+        let envelope_y_m = fingers.iter().filter_map(|(target, tip_y_m)| {
+            let front_m = finger.front_m(place[0] - target[0], place[1] - target[1])?;
+            Some(tip_y_m + front_m)
+        });
+        let lowest_y_m = envelope_y_m.fold(f64::INFINITY, f64::min);
+        Some(lowest_y_m - zone.datum_y_m() - height_m <= 1e-4 + missed_m)
+    };
+    places.iter().map(|place| is_reachable(place).unwrap_or(false)).collect()
+}
+
+/// Bumps and dents of any height on a turned grid, some of it missing: slopes, overhangs, holes.
+fn random_relief(rng: &mut ChaCha8Rng, rough_m: f64) -> Mesh {
+    const SIDE: usize = 14;
+    let mut number = || rng.random::<f64>() - 0.5;
+    let vertices: Vec<Point3<f64>> = (0..SIDE * SIDE)
+        .map(|k| {
+            let at = |i: usize| (i as f64 / (SIDE - 1) as f64 - 0.5) * 0.05;
+            let (x, z) = (at(k % SIDE) + number() * 0.004, at(k / SIDE) + number() * 0.004);
+            Point3::new(x, rough_m * number(), z)
+        })
+        .collect();
+    let triangles: Vec<[u32; 3]> = (0..(SIDE - 1) * (SIDE - 1))
+        .flat_map(|k| {
+            let corner = (k / (SIDE - 1) * SIDE + k % (SIDE - 1)) as u32;
+            let [right, up] = [corner + 1, corner + SIDE as u32];
+            [[corner, right, up], [right, up + 1, up]]
+        })
+        .filter(|_| rng.random::<f64>() > 0.1)
+        .collect();
+    Mesh::new(&vertices, &triangles).unwrap().0
+}
+
+#[test]
+fn reach_is_what_letting_every_finger_down_finds() {
+    let rng = &mut ChaCha8Rng::seed_from_u64(16);
+    let mut counts = [0; 2];
+    for finger in [SPHERE, "radius_m = 0.003\nlength_m = 0.01\npitch_deg = 60", "pitch_deg = -30"] {
+        for rough_m in [0.001, 0.006, 0.03] {
+            let profile = environment(&[(-0.06, 0.0), (0.06, 0.0)], finger);
+            let mut scene = profile.scene().clone();
+            scene.zone.depth_m = None;
+            scene.zone.rotation_deg = [0.0, 0.0, 20.0 * rng.random::<f64>()];
+            let bvh = MeshBvh::new(random_relief(rng, rough_m));
+            let Shape::Mesh { report, .. } = profile.shape() else { unreachable!() };
+            let shape = Shape::Mesh { bvh, report: report.clone() };
+            let environment = Environment::around(scene, shape).unwrap();
+            let places = environment.scene().zone.grid(15);
+            let heights: Vec<_> =
+                places.iter().map(|place| environment.true_height_m(place)).collect();
+            let fast = reach::is_reachable(&environment, &places, &heights);
+            assert_eq!(fast, by_brute_force(&environment, &places), "{finger} {rough_m}");
+            fast.iter().for_each(|&is_reachable| counts[usize::from(is_reachable)] += 1);
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 300), "{counts:?}");
 }

@@ -63,6 +63,39 @@ fn threads_do_not_change_a_byte() {
     assert_eq!(one.iter().filter(|&&byte| byte == b'\n').count(), 60);
 }
 
+/// Most threads that a run has at once, on a machine of which rayon believes it has 40 cores.
+fn most_threads(out: &Path, threads: &str) -> usize {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(["run", "experiments/container.toml", "--set", "trials=2", "--no-report"])
+        .args(["--threads", threads, "--out"])
+        .arg(out)
+        .env("RAYON_NUM_THREADS", "40")
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let tasks = format!("/proc/{}/task", child.id());
+    let mut most = 0;
+    while child.try_wait().unwrap().is_none() {
+        most = most.max(fs::read_dir(&tasks).map_or(0, Iterator::count));
+        sleep(Duration::from_millis(1));
+    }
+    assert!(child.wait().unwrap().success());
+    most
+}
+
+/// Beside the worker there are the main thread, one that waits for it, and those that listen for
+/// Ctrl-C and for slow steps.
+#[test]
+fn threads_bound_what_comes_before_the_trials_too() {
+    let folder = TempDir::new().unwrap();
+    let all = most_threads(&folder.path().join("all"), "0");
+    assert!(all > 40, "{all}");
+    let one = most_threads(&folder.path().join("one"), "1");
+    assert!(one <= 6, "{one}");
+}
+
 #[test]
 fn a_killed_run_resumes_to_the_same_bytes() {
     let folder = TempDir::new().unwrap();
