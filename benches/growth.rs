@@ -9,8 +9,9 @@ use common::{KERNEL, hyperparameters, search_box, touches};
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::posterior::Scratch;
 use palpate::gp::{Mean, Posterior};
-use palpate::report::axes::{Axis, Panel, Swatch, legend};
+use palpate::report::axes::{Axis, Panel};
 use palpate::report::canvas::{Area, Canvas};
+use palpate::report::legend::{Legend, Swatch};
 use palpate::report::{png, style};
 use std::hint::black_box;
 use std::path::Path;
@@ -51,7 +52,7 @@ fn measure() -> Vec<Curve> {
     let mut likelihood = curve("likelihood with gradient", "#d55e00", 3.0);
     let mut add = curve("adding a touch", "#cc79a7", 2.0);
     let mut query = curve("σ at a place, with gradient", style::TRUTH, 2.0);
-    let mut grid = curve("mean and σ at one of 1000 places", "#009e73", 2.0);
+    let mut grid = curve("mean and σ at one of 1000 places", "#e69f00", 2.0);
     let places: Vec<[f64; 2]> =
         (0..1000).map(|i| [f64::from(i % 32) / 31.0, f64::from(i / 32) / 31.0]).collect();
     for count in COUNTS {
@@ -124,19 +125,20 @@ fn matmul_flops() -> f64 {
 }
 
 fn draw(curves: &[Curve]) -> Option<String> {
-    let mut canvas = Canvas::new(760.0, 470.0);
-    let area = Area { left: 80.0, top: 70.0, width: 640.0, height: 340.0 };
+    let stroke = |curve: &Curve| style::stroke(curve.colour, 2.0);
+    let entries = curves.iter().map(|curve| (Swatch::Line(stroke(curve)), curve.name));
+    let legend = Legend::new(640.0, entries);
+    let area = Area { left: 80.0, top: 50.0 + legend.more_px(), width: 640.0, height: 340.0 };
+    let mut canvas = Canvas::new(760.0, area.bottom() + 60.0);
+    legend.draw(&mut canvas, [80.0, 24.0]);
     let points = || curves.iter().flat_map(|curve| &curve.seconds);
     let x = Axis::log(points().map(|(n, _)| *n))?;
     let y = Axis::log(points().map(|(_, seconds)| *seconds))?;
     let panel = Panel { area, x, y };
     panel.frame(&mut canvas);
     panel.label(&mut canvas, "", "touches n", "seconds");
-    let mut entries = Vec::new();
     for curve in curves {
-        let stroke = style::stroke(curve.colour, 2.0);
-        panel.curve(&mut canvas, &curve.seconds, &stroke);
-        entries.push((Swatch::Line(stroke), curve.name));
+        panel.curve(&mut canvas, &curve.seconds, &stroke(curve));
         if let Some((last, seconds)) = curve.seconds.last() {
             let law = |(n, _): &(f64, f64)| (*n, seconds * (n / last).powf(curve.expected));
             let upper = curve.seconds.iter().filter(|(n, _)| *n >= last / 10.0);
@@ -144,7 +146,6 @@ fn draw(curves: &[Curve]) -> Option<String> {
             panel.curve(&mut canvas, &law, &style::dashed(style::FAINT_INK, 1.0, "4 4"));
         }
     }
-    legend(&mut canvas, [80.0, 28.0], &entries);
     Some(canvas.finish())
 }
 

@@ -1,7 +1,5 @@
 //! Tables on the terminal and in CSV and figure files beside them.
 
-use crate::experiment::store::write_whole;
-use crate::report::png;
 use anyhow::Context;
 use serde::Serialize;
 use std::path::Path;
@@ -46,11 +44,4 @@ pub(super) fn write_csv<T: Serialize>(path: &Path, lines: &[T]) -> anyhow::Resul
     let mut writer = csv::Writer::from_path(path).with_context(place)?;
     lines.iter().try_for_each(|line| writer.serialize(line)).with_context(place)?;
     writer.flush().with_context(place)
-}
-
-/// Writes a drawing as SVG and PNG.
-pub(super) fn write_figure(path: &Path, svg: &str) -> anyhow::Result<()> {
-    write_whole(&path.with_extension("svg"), svg)?;
-    let path = path.with_extension("png");
-    std::fs::write(&path, png::render(svg)?).with_context(|| path.display().to_string())
 }

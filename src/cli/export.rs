@@ -6,7 +6,7 @@ use crate::experiment::store::{Run, write_whole};
 use crate::gp::posterior::Scratch;
 use crate::report::points::Points;
 use crate::report::replay::Replay;
-use crate::report::{figures, png, style};
+use crate::report::{figures, files, style};
 use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
 use std::path::PathBuf;
@@ -17,9 +17,9 @@ Examples:
   palpate export runs/bird --planner active --out bird.ply
   palpate export runs/bird --planner random --trial 3 --touches 60 --out bird.obj
 
-Beside FILE.ply or FILE.obj stands FILE.svg and FILE.png, the belief beside the true surface. In a \
-PLY the standard deviation is the property `sigma_m`; in an OBJ it stands in a comment below its \
-vertex. Both are coloured by it, viridis from 0 to the largest.")]
+Beside FILE.ply or FILE.obj stand FILE.svg, FILE.png and FILE.pdf, the belief beside the true \
+surface. In a PLY the standard deviation is the property `sigma_m`; in an OBJ it stands in a \
+comment below its vertex. Both are coloured by it, viridis from 0 to the largest.")]
 pub(super) struct Args {
     /// A run's folder.
     run: PathBuf,
@@ -67,9 +67,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let mesh = mesh(&run, args, &replay, grid);
     write_whole(&args.out, &write(&mesh))?;
     if let Some(svg) = (figures::SURFACES.draw)(&run)? {
-        write_whole(&args.out.with_extension("svg"), &svg)?;
-        let path = args.out.with_extension("png");
-        std::fs::write(&path, png::render(&svg)?).with_context(|| path.display().to_string())?;
+        files::write(&args.out, &svg)?;
     }
     let largest_m = mesh.deviations.iter().map(|(sd_m, _)| *sd_m).fold(0.0, f64::max);
     print(&format!(

@@ -1,12 +1,12 @@
 //! `palpate fidelity`.
 
-use super::columns::{aligned, cell, duration, write_csv, write_figure};
+use super::columns::{aligned, cell, duration, write_csv};
 use super::find::{SCENES, find};
 use super::output::Force;
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::store::write_whole;
-use crate::report::pareto;
+use crate::report::{files, pareto};
 use crate::sim::Scene;
 use crate::study::fidelity::comparison;
 use crate::study::fidelity::comparison::{LadderComparison, compare_rungs};
@@ -72,7 +72,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let records: Vec<OrderRecord> = ladder.orders.iter().flat_map(Order::records).collect();
     write_csv(&out.join("orders.csv"), &records)?;
     if let Some(svg) = pareto::draw(&ladder) {
-        write_figure(&out.join("fidelity"), &svg)?;
+        files::write(&out.join("fidelity"), &svg)?;
     }
     print(&described(&ladder))?;
     print(&format!("tables and figure in {}", out.display()))?;

@@ -10,7 +10,7 @@ use crate::experiment::scan::ScanTouch;
 use crate::experiment::store::write_whole;
 use crate::explore::probe::Touch;
 use crate::report::points::Points;
-use crate::report::{png, scan as drawing};
+use crate::report::{files, scan as drawing};
 use crate::sim::Scene;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
@@ -22,8 +22,8 @@ Examples:
   palpate scan scenes/bird.toml --grid 41x51 --out runs/bird-scan --set finger.radius_m=0.003
 
 Writes cloud.ply (points of contact with normals), cloud.csv (also targets that were missed), \
-scan.svg and scan.png (the object beside the cloud). Ctrl-C stops it without writing anything; the \
-files do not depend on the number of threads.")]
+scan.svg, scan.png and scan.pdf (the object beside the cloud). Ctrl-C stops it without writing \
+anything; the files do not depend on the number of threads.")]
 pub(super) struct Args {
     /// A scene (.toml) with an object, or the name of one in scenes/.
     scene: PathBuf,
@@ -89,9 +89,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     write_whole(&folder.join("cloud.ply"), &cloud.ply())?;
     write_whole(&folder.join("cloud.csv"), &csv(&touches))?;
     if let Some(svg) = drawing::picture(&environment, mesh, &cloud.points) {
-        write_whole(&folder.join("scan.svg"), &svg)?;
-        let path = folder.join("scan.png");
-        std::fs::write(&path, png::render(&svg)?).with_context(|| path.display().to_string())?;
+        files::write(&folder.join("scan.svg"), &svg)?;
     }
     let faults = touches.iter().filter(|one| one.touch.is_err()).count();
     print(&format!(

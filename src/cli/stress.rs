@@ -1,9 +1,10 @@
 //! `palpate stress`.
 
-use super::columns::{aligned, write_csv, write_figure};
+use super::columns::{aligned, write_csv};
 use super::output::Force;
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
+use crate::report::files;
 use crate::report::severity;
 use crate::report::severity::{CaseVerdicts, short};
 use crate::study::stress::{Case, Outcome, Verdict, cases};
@@ -143,7 +144,7 @@ fn report(ran: &[CaseVerdicts], args: &Args) -> anyhow::Result<()> {
         lines.extend(verdicts.iter().map(|verdict| line(case, verdict)));
     }
     write_csv(&args.out.join("stress.csv"), &lines)?;
-    write_figure(&args.out.join("stress"), &severity::draw(ran))?;
+    files::write(&args.out.join("stress"), &severity::draw(ran))?;
     let mut table = vec![HEADER.map(String::from)];
     table.extend(ran.iter().map(cells));
     let mut text = aligned(&table);

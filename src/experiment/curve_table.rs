@@ -66,16 +66,41 @@ fn aggregates(
         values.push(summary.and_then(|summary| summary.error));
     }
     if measure.aggregate.has_median() {
-        let all: Vec<f64> = summary::fitted(rows, &point.planner, point.touches)
-            .into_iter()
-            .filter_map(|row| (measure.of)(row, point.touches))
-            .collect();
-        let interval = median_interval(&all, experiment.seed);
+        let interval = interval(experiment, rows, point, measure);
         values.push(summary.map(|summary| summary.median));
         values.push(interval.map(|[low, _]| low));
         values.push(interval.map(|[_, high]| high));
     }
     values
+}
+
+/// The 95 % bootstrap interval of the median; none of a single trial.
+fn interval(
+    experiment: &Experiment,
+    rows: &[TrialRow],
+    point: &CurvePoint,
+    measure: &Measure,
+) -> Option<[f64; 2]> {
+    let all: Vec<f64> = summary::fitted(rows, &point.planner, point.touches)
+        .into_iter()
+        .filter_map(|row| (measure.of)(row, point.touches))
+        .collect();
+    median_interval(&all, experiment.seed)
+}
+
+/// How sure what speaks for a measure is: of a median its 95 % bootstrap interval, of a mean one
+/// standard error to either side; none of a single trial.
+pub fn band(
+    experiment: &Experiment,
+    rows: &[TrialRow],
+    point: &CurvePoint,
+    measure: &Measure,
+) -> Option<[f64; 2]> {
+    if measure.aggregate.has_median() {
+        return interval(experiment, rows, point, measure);
+    }
+    let summary = point.of(measure)?;
+    summary.error.map(|error| [summary.mean - error, summary.mean + error])
 }
 
 fn differences(

@@ -34,13 +34,20 @@ pub struct Axis {
     high: f64,
     is_log: bool,
     aim: f64,
+    /// The smallest step from one tick to the next.
+    step_min: f64,
 }
 
 impl Axis {
     /// From `low` to `high`, with about `aim` ticks.
     pub fn linear(low: f64, high: f64, aim: f64) -> Self {
         let (low, high) = if high > low { (low, high) } else { (low - 0.5, low + 0.5) };
-        Self { low, high, is_log: false, aim }
+        Self { low, high, is_log: false, aim, step_min: 0.0 }
+    }
+
+    /// The same for what is counted: ticks are whole numbers.
+    pub fn counts(low: f64, high: f64, aim: f64) -> Self {
+        Self { step_min: 1.0, ..Self::linear(low, high, aim) }
     }
 
     /// Around all `values` with a margin, as a fraction of their range.
@@ -53,7 +60,13 @@ impl Axis {
     /// A logarithmic axis around the positive ones of `values`.
     pub fn log(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let (low, high) = range(values.into_iter().filter(|&value| value > 0.0))?;
-        Some(Self { low: low / 1.25, high: high * 1.25, is_log: true, aim: 5.0 })
+        Some(Self { low: low / 1.25, high: high * 1.25, is_log: true, aim: 5.0, step_min: 0.0 })
+    }
+
+    /// The same middle with a range `times` as long.
+    fn stretched(self, times: f64) -> Self {
+        let [middle, half] = [0.5 * (self.low + self.high), 0.5 * times * (self.high - self.low)];
+        Self { low: middle - half, high: middle + half, ..self }
     }
 
     /// Smallest and largest value.
@@ -77,8 +90,25 @@ impl Axis {
         }
     }
 
+    /// As many of them as stand apart along a side of this length, where each needs `room_px`.
+    fn ticks_along(&self, side_px: f64, room_px: impl Fn(&str) -> f64) -> Vec<(f64, String)> {
+        const APART_PX: f64 = 5.0;
+        let mut axis = self.clone();
+        loop {
+            let ticks = axis.ticks();
+            let is_apart = ticks.windows(2).all(|pair| {
+                let step_px = side_px * (self.fraction(pair[1].0) - self.fraction(pair[0].0));
+                step_px >= 0.5 * (room_px(&pair[0].1) + room_px(&pair[1].1)) + APART_PX
+            });
+            if is_apart || axis.aim < 1.0 {
+                return ticks;
+            }
+            axis.aim *= 0.7;
+        }
+    }
+
     fn linear_ticks(&self) -> Vec<(f64, String)> {
-        let rough = (self.high - self.low) / self.aim;
+        let rough = ((self.high - self.low) / self.aim).max(self.step_min);
         let power = 10f64.powf(rough.log10().floor());
         let step =
             [1.0, 2.0, 5.0, 10.0].map(|digit| digit * power).into_iter().find(|&s| s >= rough);
@@ -120,6 +150,11 @@ pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
+/// About the width of a tick's label: there are no font metrics here.
+fn label_px(words: &str) -> f64 {
+    0.57 * SMALL_PX * words.chars().count() as f64
+}
+
 /// A number without needless decimals, for a label.
 pub fn rounded(value: f64) -> String {
     // Adding zero turns a negative zero into a positive one.
@@ -138,6 +173,21 @@ pub struct Panel {
 }
 
 impl Panel {
+    /// A panel at `most`'s top left and no larger, on whose axes a unit has the same length. A
+    /// side that would be shorter than a label needs shows more of its axis instead.
+    pub fn equal(most: Area, x: Axis, y: Axis) -> Self {
+        const LEAST_PX: f64 = 90.0;
+        let lengths = [&x, &y].map(|axis| axis.high - axis.low);
+        let px_per_unit = (most.width / lengths[0]).min(most.height / lengths[1]);
+        let [width, height] = lengths.map(|length| (length * px_per_unit).max(LEAST_PX));
+        let stretched = |axis: Axis, side_px: f64| {
+            let times = side_px / px_per_unit / (axis.high - axis.low);
+            axis.stretched(times)
+        };
+        let (x, y) = (stretched(x, width), stretched(y, height));
+        Self { area: Area { width, height, ..most }, x, y }
+    }
+
     /// Where a value lies on the sheet.
     pub fn at(&self, x: f64, y: f64) -> PointPx {
         [
@@ -150,12 +200,12 @@ impl Panel {
     pub fn frame(&self, canvas: &mut Canvas) {
         let Area { left, top, .. } = self.area;
         let (right, bottom) = (self.area.right(), self.area.bottom());
-        for (value, label) in self.x.ticks() {
+        for (value, label) in self.x.ticks_along(self.area.width, label_px) {
             let x = self.at(value, 0.0)[0];
             canvas.line([[x, top], [x, bottom]], &style::stroke(GRID, 1.0));
             canvas.text([x, bottom + 16.0], &label, SMALL_PX, Anchor::Middle);
         }
-        for (value, label) in self.y.ticks() {
+        for (value, label) in self.y.ticks_along(self.area.height, |_| SMALL_PX) {
             let y = self.at(0.0, value)[1];
             canvas.line([[left, y], [right, y]], &style::stroke(GRID, 1.0));
             canvas.text([left - 7.0, y + 4.0], &label, SMALL_PX, Anchor::End);
@@ -163,68 +213,49 @@ impl Panel {
         canvas.rect(self.area, &style::stroke(FAINT_INK, 1.0));
     }
 
-    /// What stands above and beside the panel; empty words are left out.
+    /// What stands above and beside the panel, and its letter; empty words are left out.
     pub fn label(&self, canvas: &mut Canvas, title: &str, x: &str, y: &str) {
+        canvas.letter([self.area.left, self.area.top - 9.0]);
+        self.words(canvas, title, x, y);
+    }
+
+    /// The same without a letter.
+    pub fn words(&self, canvas: &mut Canvas, title: &str, x: &str, y: &str) {
         let [centre_x, centre_y] = self.area.centre();
         canvas.text([centre_x, self.area.top - 9.0], title, TEXT_PX, Anchor::Middle);
         canvas.text([centre_x, self.area.bottom() + 35.0], x, TEXT_PX, Anchor::Middle);
-        canvas.upward_text([self.area.left - 46.0, centre_y], y, TEXT_PX);
+        canvas.upward_text([self.area.left - 46.0, centre_y], y, TEXT_PX, INK);
     }
 
-    /// A line through values, cut off at the frame.
+    /// A line through values, cut off at the frame; one that is not finite ends it and begins
+    /// another, one alone is a dot.
     pub fn curve(&self, canvas: &mut Canvas, values: &[(f64, f64)], attributes: &str) {
         canvas.clipped(self.area, |canvas| {
-            canvas.line(values.iter().map(|&(x, y)| self.at(x, y)), attributes);
-        });
-    }
-
-    /// The area between two curves over the same places (x, low, high), cut off at the frame.
-    pub fn band(&self, canvas: &mut Canvas, values: &[(f64, f64, f64)], colour: &str) {
-        let upper = values.iter().map(|&(x, _, high)| self.at(x, high));
-        let lower = values.iter().rev().map(|&(x, low, _)| self.at(x, low));
-        canvas.clipped(self.area, |canvas| {
-            canvas.polygon(upper.chain(lower), &style::fill(colour, 0.22));
-        });
-    }
-}
-
-/// Draws swatches with their words in a row, from `at` to the right.
-pub fn legend(canvas: &mut Canvas, at: PointPx, entries: &[(Swatch, &str)]) {
-    let [mut x, y] = at;
-    for (swatch, words) in entries {
-        swatch.draw(canvas, [x + 11.0, y]);
-        canvas.text([x + 28.0, y + 4.5], words, TEXT_PX, Anchor::Start);
-        // No font metrics here: room for the widest common sans-serif.
-        x += 28.0 + 7.4 * words.chars().count() as f64 + 18.0;
-    }
-}
-
-/// What a legend shows beside its words.
-pub enum Swatch {
-    /// A line with these attributes.
-    Line(String),
-    /// A band in this colour.
-    Band(&'static str),
-    /// A cross in this colour.
-    Cross(&'static str),
-    /// A circle with these attributes.
-    Circle(String),
-    /// A hollow diamond in this colour.
-    Diamond(&'static str),
-}
-
-impl Swatch {
-    fn draw(&self, canvas: &mut Canvas, [x, y]: PointPx) {
-        match self {
-            Self::Line(attributes) => canvas.line([[x - 11.0, y], [x + 11.0, y]], attributes),
-            Self::Band(colour) => {
-                let area = Area { left: x - 11.0, top: y - 6.0, width: 22.0, height: 12.0 };
-                canvas.rect(area, &style::fill(colour, 0.22));
+            for part in values.split(|(_, y)| !y.is_finite()) {
+                match part {
+                    [] => {}
+                    &[(x, y)] => canvas.circle(self.at(x, y), 2.0, attributes),
+                    part => canvas.line(part.iter().map(|&(x, y)| self.at(x, y)), attributes),
+                }
             }
-            Self::Cross(colour) => canvas.cross([x, y], colour),
-            Self::Circle(attributes) => canvas.circle([x, y], 3.6, attributes),
-            Self::Diamond(colour) => canvas.diamond([x, y], &style::stroke(colour, 1.3)),
-        }
+        });
+    }
+
+    /// The area between two curves over the same places (x, low, high), cut off at the frame and
+    /// where they are not finite; at a place alone it is a bar.
+    pub fn band(&self, canvas: &mut Canvas, values: &[(f64, f64, f64)], colour: &str) {
+        canvas.clipped(self.area, |canvas| {
+            for part in values.split(|(_, low, high)| !(low + high).is_finite()) {
+                let upper = part.iter().map(|&(x, _, high)| self.at(x, high));
+                let lower = part.iter().rev().map(|&(x, low, _)| self.at(x, low));
+                let outline = upper.chain(lower);
+                match part.len() {
+                    0 => {}
+                    1 => canvas.line(outline, &style::stroke(colour, 1.2)),
+                    _ => canvas.polygon(outline, &style::fill(colour, style::BAND_OPACITY)),
+                }
+            }
+        });
     }
 }
 

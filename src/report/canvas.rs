@@ -4,7 +4,7 @@
 //! back end takes whole pixels would make steps of smooth curves. Points that are not finite
 //! are left out, so no drawing holds a NaN.
 
-use super::style::{FONT, INK, PAPER};
+use super::style::{FONT, INK, PAPER, TEXT_PX};
 use std::fmt::Write;
 
 /// A point in pixels, x to the right, y down.
@@ -56,12 +56,15 @@ pub struct Canvas {
     width: f64,
     height: f64,
     body: String,
+    /// Where the panels have their letters.
+    letters: Vec<PointPx>,
 }
 
 impl Canvas {
-    /// An empty sheet.
+    /// An empty sheet of whole pixels.
     pub fn new(width: f64, height: f64) -> Self {
-        Self { width, height, body: String::new() }
+        let [width, height] = [width, height].map(f64::ceil);
+        Self { width, height, body: String::new(), letters: Vec::new() }
     }
 
     /// An open line.
@@ -152,10 +155,10 @@ impl Canvas {
         self.words(words, size_px, anchor, colour, &attributes);
     }
 
-    /// Words that read upwards, centred at a point.
-    pub fn upward_text(&mut self, at: PointPx, words: &str, size_px: f64) {
+    /// Words in a colour that read upwards, centred at a point.
+    pub fn upward_text(&mut self, at: PointPx, words: &str, size_px: f64, colour: &str) {
         let attributes = format!(r#"transform="translate({}) rotate(-90)""#, pair(at));
-        self.words(words, size_px, Anchor::Middle, INK, &attributes);
+        self.words(words, size_px, Anchor::Middle, colour, &attributes);
     }
 
     fn words(&mut self, words: &str, size: f64, anchor: Anchor, colour: &str, attributes: &str) {
@@ -164,10 +167,28 @@ impl Canvas {
             Anchor::Middle => "middle",
             Anchor::End => "end",
         };
+        if words.is_empty() {
+            return;
+        }
         let words = escape(words);
         self.push(&format!(
             r#"<text {attributes} font-size="{size}" text-anchor="{anchor}" fill="{colour}">{words}</text>"#
         ));
+    }
+
+    /// The letter of a panel, the next one of the alphabet. A panel alone needs none, so they are
+    /// written when the drawing is finished.
+    pub fn letter(&mut self, at: PointPx) {
+        self.letters.push(at);
+    }
+
+    fn write_letters(&mut self) {
+        let letters = std::mem::take(&mut self.letters);
+        for (i, at) in letters.iter().enumerate().filter(|_| letters.len() > 1) {
+            let attributes =
+                format!(r#"x="{}" y="{}" font-weight="bold""#, number(at[0]), number(at[1]));
+            self.words(&letter(i), TEXT_PX, Anchor::Start, INK, &attributes);
+        }
     }
 
     /// Draws with attributes that everything drawn shares.
@@ -195,7 +216,8 @@ impl Canvas {
     }
 
     /// The whole drawing.
-    pub fn finish(self) -> String {
+    pub fn finish(mut self) -> String {
+        self.write_letters();
         let [width, height] = [self.width, self.height].map(number);
         let mut svg = String::new();
         let _ = write!(
@@ -204,6 +226,15 @@ impl Canvas {
         );
         let _ = write!(svg, "\n<rect width=\"100%\" height=\"100%\" fill=\"{PAPER}\"/>\n");
         svg + &self.body + "</svg>\n"
+    }
+}
+
+/// a to z, then aa, ab and so on.
+fn letter(index: usize) -> String {
+    let last = char::from(b'a' + (index % 26) as u8);
+    match index / 26 {
+        0 => last.into(),
+        more => letter(more - 1) + &last.to_string(),
     }
 }
 

@@ -10,6 +10,14 @@ use crate::experiment::summary::CurvePoint;
 /// The mean of Eq. 5 that counts as found, as where the paper says "almost 1".
 const R_FOUND: f64 = 0.99;
 
+/// What a reader should know before the numbers: a sentence each.
+pub fn notices(run: &Run) -> Vec<String> {
+    let total = run.experiment.trials as usize * run.experiment.planners.len();
+    let is_partial = run.rows.len() < total;
+    let partial = format!("Only {} of {total} trials are finished.", run.rows.len());
+    is_partial.then_some(partial).into_iter().collect()
+}
+
 /// Sentences, the most important first.
 pub fn sentences(run: &Run) -> Vec<String> {
     let planners = &run.experiment.planners;
@@ -19,10 +27,6 @@ pub fn sentences(run: &Run) -> Vec<String> {
         .filter(|(_, points)| !points.is_empty())
         .collect();
     let mut sentences = Vec::new();
-    let total = run.experiment.trials as usize * planners.len();
-    if run.rows.len() < total {
-        sentences.push(format!("Only {} of {total} trials are finished.", run.rows.len()));
-    }
     if curves.is_empty() {
         sentences
             .push("No trial got as far as its first fit, so there is nothing to say yet.".into());
@@ -106,12 +110,17 @@ fn against_baseline(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<Str
 }
 
 /// Shares of the truth that a 95 % band may hold and still count as honest; chosen.
-const HONEST: std::ops::RangeInclusive<f64> = 0.9..=0.98;
+pub(super) const HONEST: std::ops::RangeInclusive<f64> = 0.9..=0.98;
+
+/// The share of the truth that the 95 % band of a curve's last belief holds.
+pub(super) fn share_in_band(points: &[CurvePoint]) -> Option<f64> {
+    Some(points.last()?.of(&COVERAGE)?.mean)
+}
 
 /// Whether the beliefs know how far they are off after the last touch.
 fn honesty(curves: &[(&str, Vec<CurvePoint>)]) -> String {
     let shares = curves.iter().filter_map(|(name, points)| {
-        let share = points.last()?.of(&COVERAGE)?.mean;
+        let share = share_in_band(points)?;
         let verdict = match share {
             share if HONEST.contains(&share) => "",
             share if share < *HONEST.start() => " (too sure)",

@@ -4,12 +4,16 @@ pub mod axes;
 pub mod canvas;
 pub mod explorer;
 pub mod figures;
+pub mod files;
 pub mod findings;
 pub mod heat_map;
+pub mod known;
+pub mod legend;
 pub mod number;
 pub mod object_panel;
 pub mod page;
 pub mod pareto;
+pub mod pdf;
 pub mod png;
 pub mod points;
 pub mod reference;
@@ -20,16 +24,16 @@ pub mod scan;
 pub mod severity;
 pub mod style;
 pub mod tables;
+pub mod tree;
+pub mod verdict;
 pub mod zone;
 
 pub use figures::{Drawing, FIGURES, Figure};
 
 use crate::experiment::analysis::Analysis;
 use crate::experiment::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
-use crate::files;
 use anyhow::Context;
 use std::fs;
-use std::io;
 use std::path::Path;
 
 /// Writes the run's tables into its folder: `summary.csv`, `comparison.csv`, `equal_error.csv`.
@@ -42,7 +46,8 @@ pub fn write_tables(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Re
     tables::equal_error::write(&analysis.equal_errors, folder)
 }
 
-/// Draws everything into the run's folder: `figures/*.svg`, the same as `.png`, `report.html`.
+/// Draws everything into the run's folder: `figures/*.svg`, the same as `.png` and `.pdf`,
+/// `report.html`.
 ///
 /// # Errors
 /// If the rows do not belong to the experiment, or a file cannot be written.
@@ -53,29 +58,17 @@ pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()
     for figure in FIGURES {
         let path = figures.join(figure.name);
         let svg = (figure.draw)(run).with_context(|| path.display().to_string())?;
-        write_figure(&path, svg.as_deref()).with_context(|| path.display().to_string())?;
+        // A figure that does not apply leaves no older one behind.
+        match &svg {
+            Some(svg) => files::write(&path, svg)?,
+            None => files::remove(&path).with_context(|| path.display().to_string())?,
+        }
         drawings.extend(svg.map(|svg| Drawing { figure, svg }));
     }
-    let text = |name| files::text(&folder.join(name), files::TEXT_MAX).ok();
+    let text = |name| crate::files::text(&folder.join(name), crate::files::TEXT_MAX).ok();
     let (settings, manifest) = (text(RESOLVED), text(MANIFEST));
     let explorer = explorer::section(run)?;
     let files = [settings.as_deref(), manifest.as_deref()];
     let html = page::html(run, analysis, &drawings, &explorer, files);
     Ok(write_whole(&folder.join("report.html"), &html)?)
-}
-
-/// Writes a figure in both formats; one that does not apply leaves no older one behind.
-fn write_figure(path: &Path, svg: Option<&str>) -> anyhow::Result<()> {
-    let [vector, raster] = ["svg", "png"].map(|extension| path.with_extension(extension));
-    let Some(svg) = svg else {
-        for file in [vector, raster] {
-            match fs::remove_file(file) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error.into()),
-                _ => {}
-            }
-        }
-        return Ok(());
-    };
-    write_whole(&vector, svg)?;
-    Ok(fs::write(raster, png::render(svg)?)?)
 }

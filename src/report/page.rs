@@ -2,8 +2,11 @@
 
 use super::canvas::escape;
 use super::figures::Drawing;
+use super::files::FORMATS;
 use super::findings;
-use super::tables::{Table, claims, comparison, equal_error, summary};
+use super::style::ON_DARK;
+use super::tables::{Cell, Table, Verdict, claims, comparison, equal_error, summary};
+use super::verdict;
 use crate::experiment::analysis::Analysis;
 use crate::experiment::store::Run;
 
@@ -35,26 +38,47 @@ pub fn html(
         "" => String::new(),
         question => format!("<p class=\"question\">{}</p>\n", escape(question)),
     };
-    let figures: String = drawings.iter().map(|drawing| figure(run, drawing)).collect();
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{name} – Palpate</title>\n<style>{STYLE}</style>\n</head>\n<body>\n\
-         <p class=\"kind\">Palpate run</p>\n<h1>{name}</h1>\n{question}\
-         <section>\n<h2>Found</h2>\n{}</section>\n{}{}{}{}{explorer}{figures}{}{}</body>\n</html>\n",
-        paragraph(&findings::sentences(run)),
+    let parts = [
+        notices(&findings::notices(run)),
+        explorer.into(),
+        found(run, analysis),
         claims_table(run),
         summary_table(run),
         comparison_tables(run, analysis),
         events(run),
-        details("Every setting, defaults written out", settings)
-            + &details("What ran it", manifest),
+        drawings.iter().map(|drawing| figure(run, drawing)).collect(),
+        details("Every setting, defaults written out", settings),
+        details("What ran it", manifest),
         raw_files(drawings),
+    ];
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{name} – Palpate</title>\n<style>{STYLE}{}</style>\n</head>\n<body>\n\
+         <p class=\"kind\">Palpate run</p>\n<h1>{name}</h1>\n{question}{}</body>\n</html>\n",
+        figures_on_dark(),
+        parts.concat(),
     )
 }
 
-fn paragraph(sentences: &[String]) -> String {
-    format!("<p>{}</p>\n", escape(&sentences.join(" ")))
+/// What a reader should know before anything else, a sentence each.
+fn notices(sentences: &[String]) -> String {
+    let items: String = sentences.iter().map(|it| format!("<li>{}</li>\n", escape(it))).collect();
+    match items.is_empty() {
+        true => items,
+        false => format!("<ul class=\"notices\">\n{items}</ul>\n"),
+    }
+}
+
+/// The verdict in words, then its numbers.
+fn found(run: &Run, analysis: &Analysis) -> String {
+    let verdict = match verdict::sentences(run, analysis).join(" ") {
+        words if words.is_empty() => words,
+        words => format!("<p class=\"verdict\">{}</p>\n", escape(&words)),
+    };
+    let numbers = findings::sentences(run);
+    let numbers: String = numbers.iter().map(|it| format!("<p>{}</p>\n", escape(it))).collect();
+    format!("<section>\n<h2>Found</h2>\n{verdict}{numbers}</section>\n")
 }
 
 fn claims_table(run: &Run) -> String {
@@ -91,15 +115,35 @@ fn comparison_tables(run: &Run, analysis: &Analysis) -> String {
 /// A table whose words stand in its first column (`named`), its second (`counted`) or its first
 /// four (`told`).
 fn table_body(table: &Table, class: &str) -> String {
-    let cells = |kind: &str, cells: &[String]| -> String {
-        cells.iter().map(|cell| format!("<{kind}>{}</{kind}>", escape(cell))).collect()
-    };
-    let lines: String =
-        table.lines.iter().map(|line| format!("<tr>{}</tr>\n", cells("td", line))).collect();
+    let head: String =
+        table.header.iter().map(|words| format!("<th>{}</th>", escape(words))).collect();
+    let lines: String = (table.lines.iter())
+        .map(|line| line.iter().enumerate().map(|(i, it)| cell(i, it)).collect::<String>())
+        .map(|cells| format!("<tr>{cells}</tr>\n"))
+        .collect();
+    wide(
+        &format!(
+            "<table class=\"{class}\">\n<thead><tr>{head}</tr></thead>\n\
+             <tbody>\n{lines}</tbody>\n</table>"
+        ),
+        "table",
+    )
+}
+
+/// A cell; the first one is the head of its line.
+fn cell(index: usize, Cell { words, verdict }: &Cell) -> String {
+    let words = escape(words);
+    match verdict.map(Verdict::word) {
+        _ if index == 0 => format!("<th scope=\"row\">{words}</th>"),
+        Some(verdict) => format!("<td class=\"{verdict}\">{words}: {verdict}</td>"),
+        None => format!("<td>{words}</td>"),
+    }
+}
+
+/// What scrolls in its own box where the page is narrower, by keyboard too.
+fn wide(content: &str, what: &str) -> String {
     format!(
-        "<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>{}</tr></thead>\n\
-         <tbody>\n{lines}</tbody>\n</table></div>\n",
-        cells("th", &table.header)
+        "<div class=\"wide\" role=\"region\" aria-label=\"{what}\" tabindex=\"0\">{content}</div>\n"
     )
 }
 
@@ -122,12 +166,14 @@ fn events(run: &Run) -> String {
 
 fn figure(run: &Run, drawing: &Drawing) -> String {
     let name = drawing.figure.name;
+    let links = FORMATS
+        .map(|format| format!("<a href=\"figures/{name}.{format}\">{}</a>", format.to_uppercase()));
     format!(
-        "<figure id=\"{name}\">\n{}<figcaption>{} <span class=\"files\">\
-         <a href=\"figures/{name}.svg\">SVG</a> <a href=\"figures/{name}.png\">PNG</a></span>\
+        "<figure id=\"{name}\">\n{}<figcaption>{} <span class=\"files\">{}</span>\
          </figcaption>\n</figure>\n",
-        drawing.svg,
+        wide(&drawing.svg, "figure"),
         escape(&(drawing.figure.caption)(run)),
+        links.join(" "),
     )
 }
 
@@ -144,39 +190,22 @@ fn raw_files(drawings: &[Drawing]) -> String {
         .map(|(file, what)| format!("<li><a href=\"{file}\">{file}</a>: {what}</li>\n"))
         .collect();
     if !drawings.is_empty() {
-        items += "<li><a href=\"figures/\">figures</a>: each figure as SVG and PNG</li>\n";
+        items += "<li><a href=\"figures/\">figures</a>: each figure as SVG, PNG and PDF</li>\n";
     }
     format!("<section>\n<h2>Files beside this page</h2>\n<ul>\n{items}</ul>\n</section>\n")
 }
 
-const STYLE: &str = "
-:root { color-scheme: light; }
-* { box-sizing: border-box; }
-body { max-width: 1120px; margin: 0 auto; padding: 2.2rem 1.4rem 4rem; color: #222;
-  background: #fff; font: 16px/1.55 system-ui, 'Segoe UI', Helvetica, Arial, sans-serif; }
-.kind { margin: 0; color: #666; font-size: .85rem; letter-spacing: .06em;
-  text-transform: uppercase; }
-h1 { margin: .1rem 0 .4rem; font-size: 2rem; line-height: 1.2; overflow-wrap: anywhere; }
-h2 { margin: 2.2rem 0 .5rem; font-size: 1.15rem; }
-p, li { max-width: 78ch; }
-p { margin: .4rem 0; }
-.question { color: #444; font-size: 1.15rem; }
-.note, figcaption { color: #555; font-size: .9rem; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; margin: 1.4rem 0 .4rem; font-size: .92rem;
-  font-variant-numeric: tabular-nums; white-space: nowrap; }
-th { font-weight: 600; border-bottom: 1.5px solid #222; }
-th, td { padding: .28rem .9rem; text-align: right; }
-.counted :is(th, td):nth-child(2), .named :is(th, td):first-child,
-  .told :is(th, td):nth-child(-n+4) { text-align: left; }
-.told td:nth-child(2) { white-space: normal; min-width: 16rem; }
-tbody tr + tr td { border-top: 1px solid #eee; }
-figure { margin: 2.6rem 0 0; }
-figure > svg { display: block; width: 100%; height: auto; }
-figcaption { max-width: 92ch; margin-top: .5rem; }
-.files a { margin-left: .3rem; }
-a { color: #0b5394; }
-summary { cursor: pointer; }
-pre { overflow-x: auto; padding: .9rem 1rem; background: #f6f6f4; font-size: .85rem;
-  line-height: 1.4; }
-";
+/// Drawings keep their colours for light paper; on dark paper the page gives them others. Touches
+/// on a relief stay, because the relief does.
+fn figures_on_dark() -> String {
+    let rules = ON_DARK.iter().flat_map(|(light, dark)| {
+        ["fill", "stroke"].map(|property| {
+            format!(
+                "figure svg :not(.relief circle)[{property}=\"{light}\"] {{ {property}: {dark}; }}\n"
+            )
+        })
+    });
+    format!("@media (prefers-color-scheme: dark) {{\n{}}}\n", rules.collect::<String>())
+}
+
+const STYLE: &str = include_str!("page.css");

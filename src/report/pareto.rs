@@ -1,9 +1,10 @@
 //! What accuracy costs: errors over wall time, and how they fall with the resolution.
 
-use super::axes::{Axis, Panel, Swatch, legend};
-use super::canvas::{Anchor, Area, Canvas};
+use super::axes::{Axis, Panel};
+use super::canvas::{Area, Canvas};
+use super::legend::{Legend, Swatch};
 use super::style;
-use super::style::{FAINT_INK, INK, PAPER, SMALL_PX};
+use super::style::{FAINT_INK, INK, PAPER};
 use crate::study::fidelity::comparison::LadderComparison;
 use crate::study::fidelity::ladder::is_reference;
 use crate::study::fidelity::order::Order;
@@ -37,9 +38,12 @@ pub fn draw(ladder: &LadderComparison) -> Option<String> {
     let mut canvas = Canvas::new(LEFT_PX + 3.0 * STEP_PX - 60.0, TOPS_PX[1] + PANEL_PX.1 + 54.0);
     let entries: Vec<_> = (FAMILIES.iter())
         .map(|(_, colour, words)| (Swatch::Circle(point(colour)), *words))
-        .chain([(Swatch::Line(style::dashed(INK, 1.3, "5 3")), "front")])
+        .chain([
+            (Swatch::Line(style::dashed(INK, 1.3, "5 3")), "front"),
+            (Swatch::Line(reference_line()), "time of the reference"),
+        ])
         .collect();
-    legend(&mut canvas, [LEFT_PX, 20.0], &entries);
+    Legend::new(LEFT_PX + 2.0 * STEP_PX + PANEL_PX.0, entries).draw(&mut canvas, [LEFT_PX, 20.0]);
     let measures: [(RungError, f64, &str); 3] = [
         (|row| row.off_reference_m, 1e-3, "contact off the reference's (mm)"),
         (|row| row.force_n, 1.0, "force off the reference's (N)"),
@@ -95,8 +99,7 @@ fn cost(
         }
         for row in ladder.rows.iter().filter(|row| is_reference(&row.rung)) {
             let x = at(row, unit)[0];
-            canvas.line([[x, area.top], [x, area.bottom()]], &style::dashed(FAINT_INK, 1.0, "2 3"));
-            canvas.text([x - 5.0, area.top + 14.0], "reference", SMALL_PX, Anchor::End);
+            canvas.line([[x, area.top], [x, area.bottom()]], &reference_line());
         }
     });
     Some(())
@@ -112,7 +115,8 @@ fn convergence(canvas: &mut Canvas, order: &Order, area: Area) {
         step_in_contact::NAME => "steps per second",
         name => name,
     };
-    panel.label(canvas, "", across, "mean error of the force (N)");
+    let words = format!("order {:.2}; dashed: {}", order.observed, order.expected);
+    panel.label(canvas, &words, across, "mean error of the force (N)");
     // The line of the expected order through the middle of the measured points.
     let logs: Vec<f64> = (order.errors.iter())
         .map(|(at, error)| error.ln() + order.expected * at.ln())
@@ -126,8 +130,10 @@ fn convergence(canvas: &mut Canvas, order: &Order, area: Area) {
     for (at, error) in &order.errors {
         canvas.circle(panel.at(*at, *error), 3.6, &point(FAMILIES[3].1));
     }
-    let words = format!("order {:.2}; dashed: {}", order.observed, order.expected);
-    canvas.text([area.right() - 8.0, area.top + 18.0], &words, SMALL_PX, Anchor::End);
+}
+
+fn reference_line() -> String {
+    style::dashed(FAINT_INK, 1.0, "2 3")
 }
 
 fn point(colour: &str) -> String {

@@ -37,11 +37,12 @@ impl ReliefPanel {
     pub fn frame(&self, canvas: &mut Canvas, title: &str, score: &str) {
         let middle = self.area.centre()[0];
         let top = self.area.top;
+        canvas.letter([self.area.left + 4.0, top + 14.0]);
         canvas.text([middle, top + 14.0], title, TEXT_PX, Anchor::Middle);
         canvas.coloured_text([middle, top + 31.0], score, SMALL_PX, Anchor::Middle, FAINT_INK);
         let Space { x_m: [x0, x1], z_m: [z0, z1], height_m: [back, front] } = self.space;
         let corner = |x, height, z| self.view.at([x, height, z]);
-        let stroke = style::stroke("#9a9a9a", 0.9);
+        let stroke = style::stroke(style::FRAME, 0.9);
         let back_wall = [[x0, z0], [x1, z0], [x1, z1], [x0, z1]];
         canvas.polygon(back_wall.map(|[x, z]| corner(x, back, z)), &stroke);
         let floor = [[x0, back], [x1, back], [x1, front], [x0, front]];
@@ -59,6 +60,8 @@ impl ReliefPanel {
         for z in [z0, z1] {
             label(canvas, corner(x1, back, z), &number(z), [-5.0, 4.0], Anchor::End);
         }
-        label(canvas, corner(x1, back, 0.5 * (z0 + z1)), "z", [-8.0, 4.0], Anchor::End);
+        let words = format!("z ({})", self.unit.symbol);
+        let middle = corner(x1, back, 0.5 * (z0 + z1));
+        canvas.upward_text([middle[0] - 8.0, middle[1]], &words, SMALL_PX, FAINT_INK);
     }
 }

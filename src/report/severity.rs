@@ -1,15 +1,20 @@
 //! The map of hard cases: what held at which severity and time step.
 
 use super::canvas::{Anchor, Area, Canvas};
+use super::legend::{Legend, Swatch};
 use super::style;
-use super::style::{FAINT_INK, INK, PAPER, SMALL_PX, TEXT_PX};
+use super::style::{FAINT_INK, INK, PAPER, SMALL_PX};
 use crate::study::stress::{Case, Outcome, Verdict};
 
 /// A case with its verdicts.
 pub type CaseVerdicts = (&'static Case, Vec<Verdict>);
 
 const LEFT_PX: f64 = 232.0;
-const TOP_PX: f64 = 62.0;
+/// The first note's baseline below a legend of one row.
+const TOP_PX: f64 = 45.0;
+const NOTE_PX: f64 = 16.0;
+/// Room for the notes.
+const CELLS_MIN_PX: f64 = 230.0;
 const CELL_PX: (f64, f64) = (66.0, 17.0);
 const GAP_PX: f64 = 3.0;
 
@@ -21,24 +26,27 @@ const COLOURS: [(&str, &str); 4] = [
     ("unexplained", "#d00000"),
 ];
 
+const NOTES: [&str; 2] = [
+    "severity rises to the right; six stripes in a cell: control periods 0.25, 1, 2, 5, 10, 20 ms;",
+    "four: time steps 0.25, 0.5, 1, 2 ms",
+];
+
 /// One line per case, one cell per severity, one stripe per control period or time step where that
 /// matters.
 pub fn draw(ran: &[CaseVerdicts]) -> String {
     let columns = ran.iter().map(|(case, _)| case.severities.len()).max().unwrap_or(1);
-    let width = LEFT_PX + columns as f64 * CELL_PX.0 + 20.0;
-    let mut canvas = Canvas::new(width, TOP_PX + ran.len() as f64 * (CELL_PX.1 + GAP_PX) + 14.0);
-    let mut x = 20.0;
-    for (words, colour) in COLOURS {
-        let area = Area { left: x, top: 12.0, width: 20.0, height: 12.0 };
-        canvas.rect(area, &style::fill(colour, 1.0));
-        canvas.text([x + 26.0, 22.5], words, TEXT_PX, Anchor::Start);
-        x += 46.0 + 7.4 * words.chars().count() as f64;
+    let width = LEFT_PX + (columns as f64 * CELL_PX.0).max(CELLS_MIN_PX) + 20.0;
+    let entries = COLOURS.map(|(words, colour)| (Swatch::Box(colour), words));
+    let legend = Legend::new(width - 40.0, entries);
+    let lines_top = TOP_PX + legend.more_px() + NOTES.len() as f64 * NOTE_PX;
+    let mut canvas = Canvas::new(width, lines_top + ran.len() as f64 * (CELL_PX.1 + GAP_PX) + 14.0);
+    legend.draw(&mut canvas, [20.0, 18.0]);
+    for (line, note) in NOTES.iter().enumerate() {
+        let bottom = TOP_PX + legend.more_px() + line as f64 * NOTE_PX;
+        canvas.text([20.0, bottom], note, SMALL_PX, Anchor::Start);
     }
-    let note = "severity rises to the right; six stripes in a cell: control periods 0.25, 1, 2, 5, 10, \
-                20 ms; four: time steps 0.25, 0.5, 1, 2 ms";
-    canvas.text([20.0, 45.0], note, SMALL_PX, Anchor::Start);
     for (line, (case, verdicts)) in ran.iter().enumerate() {
-        let top = TOP_PX + line as f64 * (CELL_PX.1 + GAP_PX);
+        let top = lines_top + line as f64 * (CELL_PX.1 + GAP_PX);
         canvas.text([LEFT_PX - 8.0, top + 12.5], case.name, SMALL_PX, Anchor::End);
         let stripes = case.axis.values_s().len() as f64;
         for verdict in verdicts {

@@ -17,6 +17,8 @@ pub const FAINT_INK: &str = "#666666";
 pub const GRID: &str = "#e4e4e4";
 /// Paper.
 pub const PAPER: &str = "#ffffff";
+/// The frame of a space in three dimensions.
+pub const FRAME: &str = "#9a9a9a";
 /// The true surface.
 pub const TRUTH: &str = "#009e73";
 /// The same as red, green and blue.
@@ -27,6 +29,9 @@ pub const INITIAL: &str = "#0046c8";
 pub const LATER: &str = "#d00000";
 /// The place where the belief is least sure.
 pub const MAXIMUM: &str = "#000000";
+
+/// How much of its colour a band has.
+pub const BAND_OPACITY: f64 = 0.22;
 
 /// Colours of planners that have none of their own: what is left of Okabe and Ito's, then others
 /// as dark.
@@ -48,6 +53,35 @@ pub fn planner(planners: &[String], name: &str) -> &'static str {
             SPARE[index.unwrap_or(0) % SPARE.len()]
         }
     }
+}
+
+/// What takes the place of a colour of drawings where they stand on dark paper.
+pub const ON_DARK: [(&str, &str); 19] = [
+    (PAPER, "#16191d"),
+    (INK, "#e6e6e6"),
+    (FAINT_INK, "#a4abb2"),
+    (GRID, "#33383f"),
+    (FRAME, "#878e96"),
+    (TRUTH, "#2fc497"),
+    (INITIAL, "#6ea8fe"),
+    (LATER, "#ff6b5e"),
+    (MAXIMUM, "#ffffff"),
+    ("#0072b2", "#4c93e0"),
+    ("#d55e00", "#f08a3c"),
+    ("#cc79a7", "#e09cc2"),
+    ("#e69f00", "#f0c04a"),
+    ("#56b4e9", "#a5dbfa"),
+    ("#7a5195", "#b48ad1"),
+    ("#8c6d31", "#c9a65a"),
+    ("#667788", "#9fb0c0"),
+    ("#2f8f8f", "#5fc4c4"),
+    ("#b0305c", "#f07aa0"),
+];
+
+/// A colour of drawings on light paper and what it is on dark.
+pub fn on_both(colour: &'static str) -> [&'static str; 2] {
+    let dark = ON_DARK.iter().find(|(light, _)| *light == colour).map(|(_, dark)| *dark);
+    [colour, dark.unwrap_or(colour)]
 }
 
 /// Attributes of a line.

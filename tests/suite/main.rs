@@ -16,6 +16,7 @@ mod examples;
 #[cfg(feature = "nlopt")]
 mod experiments;
 mod fidelity;
+mod figures;
 mod files;
 mod finger;
 mod finger_parts;

@@ -54,7 +54,7 @@ fn a_scan_is_the_surface_and_does_not_depend_on_threads() {
         let scene = "scenes/container.toml";
         done(&["scan", scene, "--grid", "7x9", "--threads", threads, "--out", out]);
     }
-    for name in ["cloud.ply", "cloud.csv", "scan.svg", "scan.png"] {
+    for name in ["cloud.ply", "cloud.csv", "scan.svg", "scan.png", "scan.pdf"] {
         assert!(fs::read(one.join(name)).unwrap() == fs::read(two.join(name)).unwrap(), "{name}");
     }
     let (points, faces) = ply(&one.join("cloud.ply"));
@@ -108,7 +108,9 @@ fn a_belief_is_exported_as_it_was_and_mistakes_say_what_is_allowed() {
     let text = fs::read_to_string(&other).unwrap();
     let count = |start: &str| text.lines().filter(|line| line.starts_with(start)).count();
     assert_eq!([count("v "), count("vn "), count("f ")], [121, 121, 200]);
-    assert!(Path::new(&file("belief.png")).is_file() && Path::new(&file("belief.svg")).is_file());
+    for extension in ["svg", "png", "pdf"] {
+        assert!(Path::new(&file(&format!("belief.{extension}"))).is_file(), "{extension}");
+    }
 
     let export = |planner: &str, trial: &str, touches: &str, out: &str| {
         let choice = ["--planner", planner, "--trial", trial, "--touches", touches];

@@ -1,9 +1,11 @@
-//! The page of a run in a browser: what is moved and clicked changes what is drawn.
+//! The page of a run in a browser: what is moved and clicked changes what is drawn, and it fits
+//! and can be read at every width, on light and on dark paper.
 //!
 //! Without a Chromium this is skipped, and says so; `make page-test` insists on one.
 
 use crate::common::runs::{CURVE, SURFACE, run};
 use palpate::experiment::analysis::Analysis;
+use palpate::experiment::store::Run;
 use palpate::report;
 use std::fs;
 use std::io::{self, Write};
@@ -63,19 +65,97 @@ fn browser() -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-/// What the driver wrote after its acts on the page of a made-up run: name, fingerprint, words.
-fn acts(browser: &Path, settings: &str) -> Vec<[String; 3]> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("report.html");
-    let run = run(settings);
-    report::write(&run, &Analysis::of(&run), folder.path()).unwrap();
+/// Says how the page is laid out in a frame of this width to the page around it.
+const SURVEYOR: &str = r##"
+const say = (...words) => parent.postMessage(words.join(" | "), "*");
+addEventListener("error", (event) => say("error: " + event.message));
+// Colours are left to the browser to read.
+const pen = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+function rgba(colour) {
+  pen.clearRect(0, 0, 1, 1);
+  pen.fillStyle = colour;
+  pen.fillRect(0, 0, 1, 1);
+  return [...pen.getImageData(0, 0, 1, 1).data];
+}
+// Relative luminance and contrast as WCAG 2.2 defines them.
+function luminance(colour) {
+  const linear = (part) => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
+  const [r, g, b] = rgba(colour).slice(0, 3).map((part) => linear(part / 255));
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+}
+function contrast(a, b) {
+  const [low, high] = [luminance(a), luminance(b)].sort((x, y) => x - y);
+  return (high + 0.05) / (low + 0.05);
+}
+const style = (element) => getComputedStyle(element);
+function ground(element) {
+  for (; element; element = element.parentElement) {
+    const { backgroundColor } = style(element);
+    if (rgba(backgroundColor)[3] === 255) return backgroundColor;
+  }
+  return "#fff";
+}
+const top = (selector) => document.querySelector(selector).getBoundingClientRect().top;
+addEventListener("load", () => setTimeout(() => {
+  const name = innerWidth;
+  say(name, "overflow", document.documentElement.scrollWidth - document.documentElement.clientWidth);
+  say(name, "dark", luminance(style(document.body).backgroundColor) < 0.1);
+  say(name, "explorer first", top("#explorer") < Math.min(top("table"), top("figure"), top(".verdict")));
+  for (const text of document.querySelectorAll("h1, h2, p, li, th, td, a, summary, label, legend, button, output, figcaption")) {
+    say(name, "words", contrast(style(text).color, ground(text)), text.textContent.slice(0, 40).replace(/\s+/g, " "));
+  }
+  for (const text of document.querySelectorAll("figure text")) {
+    const size = parseFloat(text.getAttribute("font-size")) * Math.hypot(text.getScreenCTM().a, text.getScreenCTM().b);
+    say(name, "figure words", contrast(style(text).fill, ground(text.closest("figure"))), text.textContent);
+    say(name, "figure size", size, text.textContent);
+  }
+  for (const line of document.querySelectorAll("figure svg [stroke-width='2']:not(.relief *)")) {
+    say(name, "curves", contrast(style(line).stroke, ground(line.closest("figure"))), line.getAttribute("stroke"));
+  }
+  for (const box of document.querySelectorAll(".wide")) {
+    const more = box.scrollWidth - box.clientWidth;
+    const what = box.getAttribute("aria-label");
+    say(name, `${what} more`, more);
+    say(name, `${what} cue`, style(box).backgroundAttachment);
+    box.scrollLeft = 1e6;
+    const head = box.querySelector("tbody th");
+    if (head) say(name, "head moved", head.getBoundingClientRect().left - box.getBoundingClientRect().left);
+  }
+  say(name, "end");
+}, 200));
+"##;
+
+/// A page around frames of the page, which writes down what they say.
+fn around(page: &str, widths: &[u32]) -> String {
+    let frames = widths.iter().map(|width| {
+        format!("<iframe src=\"{page}\" style=\"width:{width}px;height:900px;border:0\"></iframe>")
+    });
+    format!(
+        "<!DOCTYPE html><meta charset=\"utf-8\"><pre id=\"log\"></pre><script>\
+         addEventListener(\"message\", ({{ data }}) => \
+         document.getElementById(\"log\").append(data + \"\\n\"));</script>{}",
+        frames.collect::<String>()
+    )
+}
+
+/// The report page of a made-up run in a folder, with a script at its end.
+fn page(folder: &Path, run: &Run, script: &str) -> PathBuf {
+    let path = folder.join("report.html");
+    report::write(run, &Analysis::of(run), folder).unwrap();
     let page = fs::read_to_string(&path).unwrap();
     let page = page.replace("<head>", &format!("<head>{CLOCK}"));
-    fs::write(&path, page.replace("</body>", &format!("<script>{{{DRIVER}}}</script></body>")))
+    fs::write(&path, page.replace("</body>", &format!("<script>{{{script}}}</script></body>")))
         .unwrap();
+    path
+}
+
+/// The lines of the log of a page in a browser, each of as many parts.
+fn log<const N: usize>(browser: &Path, path: &Path, options: &[&str]) -> Vec<[String; N]> {
+    let profile = tempfile::tempdir().unwrap();
     let output = Command::new(browser)
         .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=20000"])
-        .arg(format!("--user-data-dir={}", folder.path().join("profile").display()))
+        .args(options)
+        .arg(format!("--user-data-dir={}", profile.path().display()))
         .arg("--dump-dom")
         .arg(format!("file://{}", path.display()))
         .output()
@@ -86,20 +166,99 @@ fn acts(browser: &Path, settings: &str) -> Vec<[String; 3]> {
     assert!(!log.contains("error:"), "{log}");
     log.lines()
         .map(|line| {
-            let parts: Vec<String> = line.split(" | ").map(String::from).collect();
+            let mut parts: Vec<String> = line.split(" | ").map(String::from).collect();
+            parts.resize(N.max(parts.len()), String::new());
             parts.try_into().unwrap_or_else(|_| panic!("{line}"))
         })
         .collect()
 }
 
-#[test]
-fn what_is_moved_and_clicked_changes_what_is_drawn() {
-    let Some(browser) = browser() else {
+/// The browser, if there is one; where it must be there, it is.
+fn browser_or_note() -> Option<PathBuf> {
+    let browser = browser();
+    if browser.is_none() {
         assert!(std::env::var_os("PALPATE_PAGE_TEST").is_none(), "no Chromium in PATH");
         // Not by a macro: its output would be kept from whoever runs the tests.
         writeln!(io::stderr(), "tests/page.rs: SKIPPED, no Chromium in PATH").unwrap();
-        return;
-    };
+    }
+    browser
+}
+
+/// What the driver wrote after its acts on the page of a made-up run: name, fingerprint, words.
+fn acts(browser: &Path, settings: &str) -> Vec<[String; 3]> {
+    let folder = tempfile::tempdir().unwrap();
+    log(browser, &page(folder.path(), &run(settings), DRIVER), &[])
+}
+
+/// In pixels of the page: what is narrower than a phone, a small window and a large one.
+const WIDTHS: [u32; 3] = [1400, 800, 400];
+
+/// What WCAG 2.2 asks of words (1.4.3, AA) and of what else is to be seen (1.4.11).
+const WORDS_CONTRAST: f64 = 4.5;
+const SHAPE_CONTRAST: f64 = 3.0;
+/// Smallest words of a figure in pixels; chosen as what can be read without a glass.
+const FIGURE_WORDS_PX: f64 = 9.0;
+
+/// At every width, on light and on dark paper: the page does not scroll sideways, tables and figures
+/// do in their boxes, with a cue and the head of the line in place; everything can be read.
+#[test]
+fn the_page_fits_every_width_on_light_and_dark_paper() {
+    let Some(browser) = browser_or_note() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mut run = run(SURFACE);
+    for row in run.rows.iter_mut().filter(|row| row.planner == "random") {
+        let metrics = row.touches.iter_mut().filter_map(|touch| touch.metrics.as_mut());
+        metrics.for_each(|metrics| metrics.rmse_m *= 2.0);
+    }
+    page(folder.path(), &run, SURVEYOR);
+    let outer = folder.path().join("around.html");
+    fs::write(&outer, around("report.html", &WIDTHS)).unwrap();
+    for (is_dark, scheme) in [(false, "1"), (true, "0")] {
+        let scheme = format!("--blink-settings=preferredColorScheme={scheme}");
+        let found: Vec<[String; 4]> = log(&browser, &outer, &[&scheme]);
+        for width in WIDTHS {
+            let said = |what: &str| -> Vec<&[String; 4]> {
+                let width = width.to_string();
+                found.iter().filter(|line| line[0] == width && line[1] == what).collect()
+            };
+            let number = |line: &[String; 4]| line[2].parse::<f64>().unwrap();
+            let place = format!("{width} px, dark {is_dark}");
+            assert_eq!(said("end").len(), 1, "{place}");
+            assert_eq!(said("overflow")[0][2], "0", "{place}");
+            assert_eq!(said("dark")[0][2], is_dark.to_string(), "{place}");
+            assert_eq!(said("explorer first")[0][2], "true", "{place}");
+            let least = [
+                ("words", WORDS_CONTRAST),
+                ("figure words", WORDS_CONTRAST),
+                ("figure size", FIGURE_WORDS_PX),
+            ];
+            for (what, least) in least {
+                assert!(!said(what).is_empty(), "{place}: {what}");
+                for line in said(what) {
+                    assert!(number(line) >= least, "{place}: {line:?}");
+                }
+            }
+            for line in said("curves").into_iter().filter(|_| is_dark) {
+                assert!(number(line) >= SHAPE_CONTRAST, "{place}: {line:?}");
+            }
+            for what in ["table", "figure"] {
+                let wider = said(&format!("{what} more"));
+                let is_wider = wider.iter().any(|line| number(line) > 0.0);
+                assert!(is_wider || width > 400, "{place}: no {what} is wider than the page");
+                for line in said(&format!("{what} cue")) {
+                    assert_eq!(line[2], "local, local, scroll, scroll", "{place}: {what}");
+                }
+            }
+            for line in said("head moved") {
+                assert!(number(line).abs() < 1.0, "{place}: {line:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_moved_and_clicked_changes_what_is_drawn() {
+    let Some(browser) = browser_or_note() else { return };
     let surface = acts(&browser, SURFACE);
     let curve = acts(&browser, CURVE);
     for (acts, unmoved) in [(&surface, &[][..]), (&curve, &["deviation", "error", "turn"][..])] {

@@ -10,8 +10,8 @@ function curveView(canvas) {
   function panel(context, left, top, width, height, [x0, x1], [y0, y1], words) {
     const at = (x, y) => [left + width * (x - x0) / (x1 - x0), top + height * (y1 - y) / (y1 - y0)];
     context.lineWidth = 1;
-    context.strokeStyle = "#e4e4e4";
-    context.fillStyle = "#333";
+    context.strokeStyle = paint("line");
+    context.fillStyle = paint("ink");
     context.beginPath();
     context.textAlign = "center";
     for (const x of roundNumbers(x0, x1, 8)) {
@@ -26,7 +26,7 @@ function curveView(canvas) {
       context.fillText(label(y), left - 7, at(x0, y)[1] + 4);
     }
     context.stroke();
-    context.strokeStyle = "#666";
+    context.strokeStyle = paint("frame");
     context.strokeRect(left, top, width, height);
     context.save();
     context.translate(left - 46, top + height / 2);
@@ -37,16 +37,30 @@ function curveView(canvas) {
     return at;
   }
 
-  function path(context, points) {
-    context.beginPath();
-    for (const point of points) if (!Number.isNaN(point[1])) context.lineTo(...point);
-  }
-
+  // A point that is not a number ends a line and begins another.
   function curve(context, at, values, ink, width) {
-    path(context, xs.map((x, i) => at(x, values[i])));
+    context.beginPath();
+    xs.forEach((x, i) => {
+      if (Number.isNaN(values[i])) return;
+      if (i > 0 && !Number.isNaN(values[i - 1])) context.lineTo(...at(x, values[i]));
+      else context.moveTo(...at(x, values[i]));
+    });
     context.strokeStyle = ink;
     context.lineWidth = width;
     context.stroke();
+  }
+
+  // A band is filled piece by piece, so that it ends where the belief does.
+  function band(context, at, { mean, deviation }, ink) {
+    const rim = (i, sign) => at(xs[i], mean[i] + sign * BAND_SD * deviation[i]);
+    context.beginPath();
+    for (let i = 1; i < xs.length; i++) {
+      if (Number.isNaN(mean[i] + mean[i - 1])) continue;
+      context.moveTo(...rim(i - 1, 1));
+      for (const corner of [rim(i, 1), rim(i, -1), rim(i - 1, -1)]) context.lineTo(...corner);
+    }
+    context.fillStyle = ink;
+    context.fill();
   }
 
   function within(context, left, top, width, height, draw) {
@@ -63,7 +77,7 @@ function curveView(canvas) {
     shown.forEach(([x, h], i) => {
       const [left, top] = at(x, h === null ? data.space[0] : h);
       const arm = i === shown.length - 1 ? 6 : 4;
-      for (const [ink, width] of [["#fff", 4.5], [i < data.initial_touches ? data.colours.initial : data.colours.later, 2]]) {
+      for (const [ink, width] of [[paint("paper"), 4.5], [onPaper(i < data.initial_touches ? data.colours.initial : data.colours.later), 2]]) {
         context.strokeStyle = ink;
         context.lineWidth = width;
         context.beginPath();
@@ -79,26 +93,23 @@ function curveView(canvas) {
   return (state) => {
     const { context, width, height } = pen(canvas);
     const frame = frameOf(state);
-    const ink = data.planners[state.planner].colour;
+    const ink = onPaper(data.planners[state.planner].colours);
     const inner = width - LEFT - RIGHT;
     const tall = 0.7 * (height - TOP - GAP - BOTTOM);
     const short = height - TOP - GAP - BOTTOM - tall;
     const sides = [xs[0], xs[xs.length - 1]];
     const at = panel(context, LEFT, TOP, inner, tall, sides, data.space, "height");
     within(context, LEFT, TOP, inner, tall, () => {
-      const rim = (sign) => xs.map((x, i) => at(x, frame.mean[i] + sign * BAND_SD * frame.deviation[i]));
-      path(context, [...rim(1), ...rim(-1).reverse()]);
-      context.fillStyle = ink + "38";
-      context.fill();
+      band(context, at, frame, ink + "38");
       if (state.truth) curve(context, at, data.truth, `rgb(${data.colours.truth})`, 2.5);
-      curve(context, at, frame.mean, "#222", 1.8);
+      curve(context, at, frame.mean, paint("ink"), 1.8);
       drawTouches(context, at, frame, state.planner);
     });
     const below = TOP + tall + GAP;
     const most = 1.05 * data.deviation_range[1];
     const low = panel(context, LEFT, below, inner, short, sides, [0, most], "σ");
-    within(context, LEFT, below, inner, short, () => curve(context, low, frame.deviation, ink, 2));
-    context.fillStyle = "#333";
+    within(context, LEFT, below, inner, short, () => curve(context, low, frame.deviation.map((value, i) => (Number.isNaN(frame.mean[i]) ? NaN : value)), ink, 2));
+    context.fillStyle = paint("ink");
     context.textAlign = "center";
     context.fillText(`x (${unit})`, LEFT + inner / 2, height - 8);
   };

@@ -24,6 +24,12 @@ function codes(text) {
 
 data.truth = heights(data.truth);
 
+// The page's own colours, for light or for dark paper; data has a pair of each of its colours.
+const dark = window.matchMedia("(prefers-color-scheme: dark)");
+const paint = (name) => getComputedStyle(explorer).getPropertyValue(`--${name}`).trim();
+const onPaper = (pair) => pair[dark.matches ? 1 : 0];
+dark.addEventListener("change", () => draw());
+
 function frameOf(state) {
   const frame = data.planners[state.planner].frames[state.frame];
   if (typeof frame.mean === "string") {

@@ -3,8 +3,10 @@
 use super::code::Code;
 use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
+use crate::gp::batch::Prediction;
 use crate::report::axes;
 use crate::report::axes::{Axis, Length};
+use crate::report::known::Known;
 use crate::report::relief::Space;
 use crate::report::replay;
 use crate::report::replay::Replay;
@@ -51,14 +53,15 @@ struct Colours {
     deviation: &'static [[f64; 3]],
     error: &'static [[f64; 3]],
     truth: [f64; 3],
-    initial: &'static str,
-    later: &'static str,
+    initial: [&'static str; 2],
+    later: [&'static str; 2],
 }
 
 #[derive(Serialize)]
 struct Planner {
     name: String,
-    colour: &'static str,
+    /// Its colour on light and on dark paper.
+    colours: [&'static str; 2],
     /// (x, height, z) of each touch, or of its target if it met nothing.
     contacts: Vec<(f64, Option<f64>, Option<f64>)>,
     frames: Vec<Frame>,
@@ -76,7 +79,8 @@ struct Frame {
 struct Belief {
     touches: u32,
     score: String,
-    means_m: Vec<f64>,
+    /// None where no belief is drawn.
+    means_m: Vec<Option<f64>>,
     deviations_m: Vec<f64>,
 }
 
@@ -138,7 +142,7 @@ pub(super) fn data(run: &Run) -> anyhow::Result<Option<Data>> {
         .unwrap_or(1.0);
     let planners = beliefs.iter().map(|(name, read)| Planner {
         name: (*name).into(),
-        colour: style::planner(&experiment.planners, name),
+        colours: style::on_both(style::planner(&experiment.planners, name)),
         contacts: replay::row(run, name)
             .map_or(&[][..], |row| &row.touches)
             .iter()
@@ -149,7 +153,7 @@ pub(super) fn data(run: &Run) -> anyhow::Result<Option<Data>> {
             .map(|belief| Frame {
                 touches: belief.touches,
                 score: belief.score.clone(),
-                mean: code.heights(belief.means_m.iter().copied()),
+                mean: code.heights(belief.means_m.iter().map(|mean_m| mean_m.unwrap_or(f64::NAN))),
                 deviation: code.deviations(&belief.deviations_m),
             })
             .collect(),
@@ -169,8 +173,8 @@ pub(super) fn data(run: &Run) -> anyhow::Result<Option<Data>> {
             deviation: &style::DEVIATION,
             error: &style::ERROR,
             truth: style::TRUTH_RGB,
-            initial: style::INITIAL,
-            later: style::LATER,
+            initial: style::on_both(style::INITIAL),
+            later: style::on_both(style::LATER),
         },
         planners: planners.collect(),
     }))
@@ -218,10 +222,14 @@ fn belief(
 ) -> anyhow::Result<Option<Belief>> {
     let Some(replay) = Replay::new(run, planner, touches)? else { return Ok(None) };
     let predictions = replay.surface.predict(places.iter().copied());
+    let known = Known::new(run, &replay);
+    let drawn = |(place, prediction): (&&[f64], &Prediction)| {
+        known.at(place, prediction.variance).then_some(prediction.mean)
+    };
     Ok(Some(Belief {
         touches,
         score: replay.score(),
-        means_m: predictions.iter().map(|prediction| prediction.mean).collect(),
+        means_m: places.iter().zip(&predictions).map(drawn).collect(),
         deviations_m: predictions.iter().map(|prediction| prediction.variance.sqrt()).collect(),
     }))
 }

@@ -7,6 +7,7 @@ mod code;
 mod frames;
 
 use super::canvas::escape;
+use super::known;
 use crate::experiment::store::Run;
 
 const SCRIPTS: [&str; 3] =
@@ -49,11 +50,12 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
          <div class=\"time\"><button type=\"button\">Play</button>\
          <input type=\"range\" min=\"0\" max=\"{last}\" value=\"{last}\" aria-label=\"touches\"></div>\n\
          <output></output>\n<p class=\"note\">Trial {}. Blue: the {} initial touches; red: those \
-         the planner chose; the last one is larger. {help}</p>\n\
+         the planner chose; the last one is larger.{} {help}</p>\n\
          <script type=\"application/json\" id=\"explorer-data\">{json}</script>\n\
          <script>\n{}</script>\n</section>\n",
         run.experiment.report.trial,
         run.experiment.initial_touches,
+        known::words(run),
         SCRIPTS.join("\n"),
     ))
 }

@@ -56,7 +56,7 @@ function reliefView(canvas) {
   function projection(width, height) {
     const [a, e] = [turn.azimuth, turn.elevation].map((degrees) => degrees * Math.PI / 180);
     const [sa, ca, se, ce] = [Math.sin(a), Math.cos(a), Math.sin(e), Math.cos(e)];
-    const scale = Math.min((width - 190) / (0.8 * sides[0] + 0.62 * sides[1] * stretch),
+    const scale = Math.min((width - Math.min(190, 0.3 * width)) / (0.8 * sides[0] + 0.62 * sides[1] * stretch),
       (height - 130) / (0.25 * sides[0] + 0.32 * sides[1] * stretch + 0.91 * sides[2]));
     return (x, h, z) => {
       const [dx, dh, dz] = [x - middle[0], (h - middle[1]) * stretch, z - middle[2]];
@@ -69,7 +69,7 @@ function reliefView(canvas) {
   }
 
   // Colours and depths of a height field; `tint` gives the colour of a place.
-  function paint(field, tint, project, width, height) {
+  function render(field, tint, project, width, height) {
     const layer = { depth: new Float32Array(width * height).fill(-Infinity), pixels: new Uint8ClampedArray(4 * width * height) };
     // Per corner: x, y and depth on the canvas, light, height, red, green, blue.
     const corners = Array.from({ length: 8 }, () => new Float32Array(count));
@@ -153,11 +153,11 @@ function reliefView(canvas) {
   // The zone behind the surface and the floor below it, with the ends of their axes.
   function drawSpace(context, project) {
     const [[x0, x1], [h0, h1], [z0, z1]] = ends;
-    context.strokeStyle = "#b4b4b4";
+    context.strokeStyle = paint("frame");
     context.lineWidth = 1;
     line(context, [[x0, z0], [x1, z0], [x1, z1], [x0, z1], [x0, z0]].map(([x, z]) => project(x, h0, z)));
     line(context, [[x0, h0], [x0, h1], [x1, h1], [x1, h0]].map(([x, h]) => project(x, h, z0)));
-    context.fillStyle = "#555";
+    context.fillStyle = paint("faint");
     const write = (text, [x, y], dx, dy, align) => {
       context.textAlign = align;
       context.fillText(text, x + dx, y + dy);
@@ -169,14 +169,18 @@ function reliefView(canvas) {
   }
 
   function drawColours(context, width, height, scale) {
-    const [left, top, length] = [width / 2 - 160, height - 44, 320];
+    // Where there is no room for the words beside the bar, they stand above it.
+    const length = Math.min(320, width - 40);
+    const isNarrow = width < 720;
+    const [left, top] = [(width - length) / 2, height - 44];
     for (let i = 0; i < length; i++) {
       context.fillStyle = `rgb(${colour(scale, i / (length - 1)).map(Math.round)})`;
       context.fillRect(left + i, top, 1.5, 12);
     }
-    context.fillStyle = "#333";
-    context.textAlign = "right";
-    context.fillText(`${scale.words} (${data.unit})`, left - 12, top + 11);
+    context.fillStyle = paint("ink");
+    context.textAlign = isNarrow ? "center" : "right";
+    const [wordsX, wordsY] = isNarrow ? [width / 2, top - 8] : [left - 12, top + 11];
+    context.fillText(`${scale.words} (${data.unit})`, wordsX, wordsY);
     context.textAlign = "center";
     for (const tick of scale.ticks) {
       const fraction = scale.at(tick);
@@ -190,7 +194,9 @@ function reliefView(canvas) {
   function drawTouches(context, project, frame, planner, isHidden) {
     const shown = data.planners[planner].contacts.slice(0, frame.touches);
     shown.forEach(([x, h, z], i) => {
-      const ink = i < data.initial_touches ? data.colours.initial : data.colours.later;
+      const pair = i < data.initial_touches ? data.colours.initial : data.colours.later;
+      // Points lie on the surface, which is as pale on dark paper.
+      const ink = h === null ? onPaper(pair) : pair[0];
       const point = project(x, h === null ? low : Math.min(Math.max(h, low), high), z);
       const isFull = h !== null && !isHidden(point);
       context.beginPath();
@@ -222,8 +228,8 @@ function reliefView(canvas) {
     const dense = turn.isDragged ? 1 : Math.max(ratio, 2);
     const [wide, tall] = [Math.round(width * dense), Math.round(height * dense)];
     const fine = (...point) => project(...point).map((part, axis) => (axis < 2 ? part * dense : part));
-    const layer = paint(frame.mean, (k) => colour(scale, scale.at(shown(k))), fine, wide, tall);
-    if (state.truth) overlay(layer, paint(data.truth, () => data.colours.truth, fine, wide, tall));
+    const layer = render(frame.mean, (k) => colour(scale, scale.at(shown(k))), fine, wide, tall);
+    if (state.truth) overlay(layer, render(data.truth, () => data.colours.truth, fine, wide, tall));
     const sheet = document.createElement("canvas");
     [sheet.width, sheet.height] = [wide, tall];
     sheet.getContext("2d").putImageData(new ImageData(layer.pixels, wide, tall), 0, 0);

@@ -5,14 +5,16 @@ use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
 use crate::explore::belief::Belief;
 use crate::gp::posterior::Scratch;
-use crate::report::axes::{Axis, Length, Panel, Swatch, colour_bar, legend};
+use crate::report::axes::{Axis, Length, Panel, colour_bar};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::heat_map::{CELL_PX, HeatMap};
+use crate::report::heat_map::HeatMap;
+use crate::report::known;
+use crate::report::known::Known;
+use crate::report::legend::{Legend, Swatch};
 use crate::report::replay;
 use crate::report::replay::Replay;
 use crate::report::style;
 use crate::report::style::{INITIAL, LATER};
-use crate::task::Zone;
 
 pub(super) const FIGURE: Figure = Figure { name: "acquisition", caption, draw };
 
@@ -21,9 +23,10 @@ fn caption(run: &Run) -> String {
     format!(
         "Standard deviation that another touch could still remove, before and after one more \
          touch of {planner} in trial {}: the circle marks the largest that \
-         was found. Crosses are points of contact, which may lie beside their targets. \
+         was found. Crosses are points of contact, which may lie beside their targets.{} \
          Corresponds to Fig. 6 of the paper.",
-        run.experiment.report.trial
+        run.experiment.report.trial,
+        known::words(run)
     )
 }
 
@@ -74,142 +77,158 @@ const TOP_PX: f64 = 66.0;
 
 /// Places at which the deviation of a curve is read.
 const STEPS: usize = 300;
-/// Heights of the panels of beliefs and of deviations.
-const CURVE_PX: (f64, f64) = (210.0, 130.0);
+/// Width of a panel, heights of those of beliefs and of deviations.
+const CURVE_PX: (f64, f64, f64) = (420.0, 210.0, 130.0);
+/// Height of a panel of beliefs whose axes are equal, at most.
+const EQUAL_HEIGHT_PX: f64 = 420.0;
+/// From one panel to the next, and from a belief to its deviation.
+const GAPS_PX: (f64, f64) = (66.0, 40.0);
+
+/// A place, the deviation there, and whether it is drawn.
+type Reading = (Vec<f64>, f64, bool);
 
 fn draw_curves(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
-    let unit = Length::of(&run.experiment.scene.zone);
-    let heights = curves::height_axis(run)?;
-    let read: Vec<Vec<(Vec<f64>, f64)>> =
+    let zone = &run.experiment.scene.zone;
+    let unit = Length::of(zone);
+    let read: Vec<Vec<Reading>> =
         replays.iter().map(|replay| read_deviations(run, replay)).collect();
-    let all = read.iter().flatten().map(|(_, sd_m)| sd_m * unit.per_m);
+    let all = read.iter().flatten().map(|(_, sd_m, _)| sd_m * unit.per_m);
     let (_, largest) = Axis::around(all.chain([0.0]), 0.12, 4.0)?.range();
-    let mut canvas = Canvas::new(1000.0, TOP_PX + CURVE_PX.0 + 40.0 + CURVE_PX.1 + 56.0);
     let mut entries = vec![
         (Swatch::Line(style::stroke(style::TRUTH, 2.0)), "true surface"),
         (Swatch::Line(style::stroke(style::INK, 1.6)), "posterior mean"),
+        (Swatch::Band(style::INK), "95 % band"),
         (Swatch::Cross(INITIAL), "initial touch"),
         (Swatch::Cross(LATER), "later touch"),
         (Swatch::Circle(ring(style::MAXIMUM)), "largest deviation found"),
     ];
     entries.extend(miss_entry(run));
-    legend(&mut canvas, [LEFT_PX, 20.0], &entries);
+    let step_px = CURVE_PX.0 + GAPS_PX.0;
+    let width = LEFT_PX + replays.len() as f64 * step_px;
+    let legend = Legend::new(width - LEFT_PX, entries);
+    let top = TOP_PX + legend.more_px();
+    let most = Area { left: LEFT_PX, top, width: CURVE_PX.0, height: CURVE_PX.1 };
+    let shape = curves::belief_panel(zone, curves::height_axis(run)?, most, EQUAL_HEIGHT_PX);
+    let height = shape.area.bottom() + GAPS_PX.1 + CURVE_PX.2 + 56.0;
+    let mut canvas = Canvas::new(width, height);
+    legend.draw(&mut canvas, [LEFT_PX, 20.0]);
     for (column, (replay, read)) in replays.iter().zip(&read).enumerate() {
-        let left = LEFT_PX + column as f64 * 486.0;
-        let area = Area { left, top: TOP_PX, width: 420.0, height: CURVE_PX.0 };
-        let axes = [heights.clone(), Axis::linear(0.0, largest, 4.0)];
-        draw_column(&mut canvas, run, planner, (replay, read), area, axes);
+        let area = Area { left: LEFT_PX + column as f64 * step_px, ..shape.area };
+        let above = Panel { area, x: shape.x.clone(), y: shape.y.clone() };
+        let area = Area { top: area.bottom() + GAPS_PX.1, height: CURVE_PX.2, ..area };
+        let below = Panel { area, x: shape.x.clone(), y: Axis::linear(0.0, largest, 4.0) };
+        draw_column(&mut canvas, run, planner, (replay, read), [above, below]);
     }
     Some(canvas.finish())
 }
 
-/// Places along the zone with their deviations in metres.
-fn read_deviations(run: &Run, replay: &Replay) -> Vec<(Vec<f64>, f64)> {
+/// Deviations along the zone in metres.
+fn read_deviations(run: &Run, replay: &Replay) -> Vec<Reading> {
     let mut scratch = Scratch::default();
-    let mut read = |place: &[f64]| deviation_m(&replay.belief, place, &mut scratch);
+    let known = Known::new(run, replay);
     let places = run.experiment.scene.zone.grid(STEPS).into_iter();
-    places.map(|place| (place.clone(), read(&place))).collect()
+    places.map(|place| reading(place, replay, &known, &mut scratch)).collect()
 }
 
-/// The belief in `area` and its deviation below.
+fn reading(place: Vec<f64>, replay: &Replay, known: &Known, scratch: &mut Scratch) -> Reading {
+    let sd_m = deviation_m(&replay.belief, &place, scratch);
+    let is_drawn = known.at(&place, replay.surface.variance(&place, scratch));
+    (place, sd_m, is_drawn)
+}
+
+/// The belief in the panel above and its deviation in the one below.
 fn draw_column(
     canvas: &mut Canvas,
     run: &Run,
     planner: &str,
-    (replay, read): (&Replay, &[(Vec<f64>, f64)]),
-    area: Area,
-    [heights, deviations]: [Axis; 2],
+    (replay, read): (&Replay, &[Reading]),
+    [above, below]: [Panel; 2],
 ) {
-    let zone = &run.experiment.scene.zone;
-    let unit = Length::of(zone);
+    let unit = Length::of(&run.experiment.scene.zone);
     let colour = style::planner(&run.experiment.planners, planner);
-    let [low, high] = zone.x_m.map(|x| x * unit.per_m);
-    let x = Axis::linear(low, high, 6.0);
     let words = |name: &str| format!("{name} ({})", unit.symbol);
-    let panel = Panel { area, x: x.clone(), y: heights };
-    panel.frame(canvas);
-    panel.label(canvas, &title(planner, replay), "", &words("height"));
-    curves::draw_belief(canvas, &panel, run, replay, colour);
-    let area = Area { top: area.bottom() + 40.0, height: CURVE_PX.1, ..area };
-    let panel = Panel { area, x, y: deviations };
-    panel.frame(canvas);
-    panel.label(canvas, "", &words("x"), &words("deviation"));
-    let curve: Vec<(f64, f64)> =
-        read.iter().map(|(place, sd_m)| (place[0] * unit.per_m, sd_m * unit.per_m)).collect();
-    panel.curve(canvas, &curve, &style::stroke(colour, 1.8));
-    if let Some(place) = maximum(replay, read.iter().cloned()) {
+    above.frame(canvas);
+    above.label(canvas, &title(planner, replay), "", &words("height"));
+    curves::draw_belief(canvas, &above, run, replay, colour);
+    below.frame(canvas);
+    below.label(canvas, "", &words("x"), &words("deviation"));
+    let curve: Vec<(f64, f64)> = read
+        .iter()
+        .map(|(place, sd_m, is_drawn)| (place[0], if *is_drawn { *sd_m } else { f64::NAN }))
+        .map(|(x, sd_m)| (x * unit.per_m, sd_m * unit.per_m))
+        .collect();
+    below.curve(canvas, &curve, &style::stroke(colour, 1.8));
+    let places = read.iter().map(|(place, sd_m, _)| (place.clone(), *sd_m));
+    if let Some(place) = maximum(replay, places) {
         let sd_m = deviation_m(&replay.belief, &place, &mut Scratch::default());
-        let at = panel.at(place[0] * unit.per_m, sd_m * unit.per_m);
-        canvas.circle(at, 6.0, &ring(style::MAXIMUM));
+        let at = below.at(place[0] * unit.per_m, sd_m * unit.per_m);
+        canvas.clipped(below.area, |canvas| canvas.circle(at, 6.0, &ring(style::MAXIMUM)));
     }
 }
 
-const MAP_WIDTH_PX: f64 = 400.0;
-/// Smallest and largest height of a map, for zones that are far from square.
-const MAP_HEIGHT_PX: (f64, f64) = (160.0, 640.0);
+/// Size of a map at most: its axes are equal.
+const MAP_PX: (f64, f64) = (400.0, 640.0);
+/// Least room from one map to the next: below it are the words of the colour bar.
+const MAP_STEP_PX: f64 = 330.0;
 
 fn draw_maps(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
     let zone = &run.experiment.scene.zone;
     let unit = Length::of(zone);
-    let [[x_low, x_high], [z_low, z_high]] = axes_of(zone, unit)?;
-    let height = MAP_WIDTH_PX * (z_high - z_low) / (x_high - x_low);
-    let height = height.clamp(MAP_HEIGHT_PX.0, MAP_HEIGHT_PX.1);
-    let area = Area {
-        left: LEFT_PX,
-        top: TOP_PX,
-        width: MAP_WIDTH_PX,
-        height: (height / CELL_PX).round() * CELL_PX,
-    };
+    let [x, z] = [zone.x_m, zone.z_m?].map(|side| side.map(|end| end * unit.per_m));
+    let mut entries = vec![
+        (Swatch::Cross(INITIAL), "initial touch"),
+        (Swatch::Cross(LATER), "later touch"),
+        (Swatch::Circle(ring(style::MAXIMUM)), "largest deviation found"),
+    ];
+    entries.extend(miss_entry(run));
+    let most = Area { left: LEFT_PX, top: TOP_PX, width: MAP_PX.0, height: MAP_PX.1 };
+    let shape = Panel::equal(most, Axis::linear(x[0], x[1], 5.0), Axis::linear(z[0], z[1], 6.0));
+    let step_px = (shape.area.width + 84.0).max(MAP_STEP_PX);
+    let width = LEFT_PX + 2.0 * step_px;
+    let legend = Legend::new(width - LEFT_PX, entries);
+    let shape = Panel { area: Area { top: TOP_PX + legend.more_px(), ..shape.area }, ..shape };
+    // The zone's part of a panel, all of it unless the zone is far from square.
+    let [[left, bottom], [right, top]] = [shape.at(x[0], z[0]), shape.at(x[1], z[1])];
+    let map_area = Area { left, top, width: right - left, height: bottom - top };
     let maps: Vec<HeatMap> = replays
         .iter()
         .map(|replay| {
-            let mut scratch = Scratch::default();
-            HeatMap::read(zone, area, |place| {
-                unit.per_m * deviation_m(&replay.belief, place, &mut scratch)
+            let (mut scratch, known) = (Scratch::default(), Known::new(run, replay));
+            HeatMap::read(zone, map_area, |place| {
+                let (_, sd_m, is_drawn) = reading(place, replay, &known, &mut scratch);
+                (unit.per_m * sd_m, is_drawn)
             })
         })
         .collect();
     let largest = maps.iter().map(HeatMap::largest).fold(0.0, f64::max);
     let scale = Axis::linear(0.0, largest, 5.0);
-    let mut canvas = Canvas::new(1000.0, area.bottom() + 108.0);
-    let mut entries = vec![
-        (Swatch::Cross(INITIAL), "initial touch"),
-        (Swatch::Cross(LATER), "later touch"),
-        (Swatch::Circle(ring(style::MAXIMUM)), "largest deviation found"),
-    ];
-    entries.extend(miss_entry(run));
-    legend(&mut canvas, [LEFT_PX, 20.0], &entries);
+    let mut canvas = Canvas::new(width, shape.area.bottom() + 108.0);
+    legend.draw(&mut canvas, [LEFT_PX, 20.0]);
     for (column, (replay, map)) in replays.iter().zip(&maps).enumerate() {
-        let area = Area { left: LEFT_PX + column as f64 * (MAP_WIDTH_PX + 84.0), ..area };
-        let panel = Panel {
-            area,
-            x: Axis::linear(x_low, x_high, 5.0),
-            y: Axis::linear(z_low, z_high, 6.0),
-        };
+        let moved = |area: Area| Area { left: area.left + column as f64 * step_px, ..area };
+        let panel = Panel { area: moved(shape.area), x: shape.x.clone(), y: shape.y.clone() };
         panel.frame(&mut canvas);
-        map.draw(&mut canvas, area, |value| style::deviation(scale.fraction(value)));
+        map.draw(&mut canvas, moved(map_area), |value| style::deviation(scale.fraction(value)));
         let words = |name: &str| format!("{name} ({})", unit.symbol);
         panel.label(&mut canvas, &title(planner, replay), &words("x"), &words("z"));
         let on_map = |place: &[f64]| panel.at(place[0] * unit.per_m, place[1] * unit.per_m);
-        for (touch, is_initial) in replay.marks() {
-            let colour = if is_initial { INITIAL } else { LATER };
-            match replay::contact(zone, touch) {
-                Some((place, _)) => canvas.cross(on_map(&place), colour),
-                None => canvas.diamond(on_map(&touch.target), &style::stroke(colour, 1.6)),
+        canvas.clipped(panel.area, |canvas| {
+            for (touch, is_initial) in replay.marks() {
+                let colour = if is_initial { INITIAL } else { LATER };
+                match replay::contact(zone, touch) {
+                    Some((place, _)) => canvas.cross(on_map(&place), colour),
+                    None => canvas.diamond(on_map(&touch.target), &style::stroke(colour, 1.6)),
+                }
             }
-        }
-        if let Some(place) = maximum(replay, map.places(zone)) {
-            canvas.circle(on_map(&place), 7.0, &style::stroke(style::PAPER, 5.0));
-            canvas.circle(on_map(&place), 7.0, &ring(style::MAXIMUM));
-        }
+            if let Some(place) = maximum(replay, map.places(zone)) {
+                canvas.circle(on_map(&place), 7.0, &style::stroke(style::PAPER, 5.0));
+                canvas.circle(on_map(&place), 7.0, &ring(style::MAXIMUM));
+            }
+        });
     }
-    let bar = Area { left: 420.0, top: area.bottom() + 62.0, width: 320.0, height: 13.0 };
+    let top = shape.area.bottom() + 62.0;
+    let bar = Area { left: 0.5 * width - 60.0, top, width: 320.0, height: 13.0 };
     let words = format!("standard deviation ({})", unit.symbol);
     colour_bar(&mut canvas, bar, &scale, &words, style::deviation);
     Some(canvas.finish())
-}
-
-/// Ends of x and z for labels.
-fn axes_of(zone: &Zone, unit: Length) -> Option<[[f64; 2]; 2]> {
-    Some([zone.x_m, zone.z_m?].map(|side| side.map(|end| end * unit.per_m)))
 }

@@ -1,15 +1,18 @@
 //! Errors against touches, Fig. 4 of Yi et al. 2016.
 
 use super::figure::Figure;
+use crate::experiment::curve_table;
 use crate::experiment::measure::{Aggregate, MEASURES, Measure, R, Scale};
 use crate::experiment::metrics;
 use crate::experiment::store::Run;
 use crate::experiment::summary;
 use crate::experiment::summary::CurvePoint;
-use crate::report::axes::{Axis, Panel, Swatch, legend};
-use crate::report::canvas::{Anchor, Area, Canvas};
+use crate::report::axes::{Axis, Panel};
+use crate::report::canvas::{Area, Canvas};
+use crate::report::legend::{Legend, Swatch};
 use crate::report::style;
-use crate::report::style::{FAINT_INK, SMALL_PX};
+use crate::report::style::FAINT_INK;
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 pub(super) const FIGURE: Figure = Figure { name: "convergence", caption, draw };
 
@@ -26,21 +29,25 @@ fn caption(run: &Run) -> String {
         )
     });
     format!(
-        "Agreement with the true surface against touches, over {} trials of each planner; bands \
-         are one standard error of the mean, the vertical line ends the {} initial touches that \
-         all planners share.{score} Corresponds to Fig. 4 of the paper.",
+        "Agreement with the true surface against touches, over {} trials of each planner, from the \
+         first belief on: all planners share the {} initial touches. Bands are one standard error \
+         of a mean and the 95 % bootstrap interval of a median.{score} Corresponds to Fig. 4 of \
+         the paper.",
         run.experiment.trials, run.experiment.initial_touches
     )
 }
 
 const WIDTH: f64 = 1100.0;
+const LEFT_PX: f64 = 70.0;
 const PANEL: (f64, f64) = (446.0, 262.0);
-
-/// What is drawn over touches: a number of each point.
-type Value<'a> = &'a dyn Fn(&CurvePoint) -> Option<f64>;
+const GAP: (f64, f64) = (96.0, 78.0);
 
 /// A planner's colour and curve.
 type Curve = (&'static str, Vec<CurvePoint>);
+
+/// A measure after some touches: (touches, value, what is dotted beside it, its band), in the unit
+/// it is shown in.
+type Reading = (f64, f64, Option<f64>, Option<[f64; 2]>);
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let planners = &run.experiment.planners;
@@ -49,10 +56,9 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         .map(|planner| (style::planner(planners, planner), planner))
         .map(|(colour, planner)| (colour, summary::curve(&run.experiment, &run.rows, planner)))
         .collect();
-    if curves.iter().all(|(_, points)| points.is_empty()) {
-        return Ok(None);
-    }
     let points = || curves.iter().flat_map(|(_, points)| points);
+    let Some(first) = points().map(|point| point.touches).min() else { return Ok(None) };
+    let x = Axis::counts(first.into(), run.experiment.touches.into(), 6.0);
     let shown: Vec<&Measure> = MEASURES
         .iter()
         .filter(|measure| match measure.scale {
@@ -62,121 +68,123 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         })
         .filter(|measure| points().any(|point| point.of(measure).is_some()))
         .collect();
-    let rows = shown.len().div_ceil(2) as f64;
-    let mut canvas = Canvas::new(WIDTH, 54.0 + rows * (PANEL.1 + 78.0));
-    let entries: Vec<(Swatch, &str)> = curves
+    let constant = constant_r(run);
+    let swatches = curves
         .iter()
         .zip(planners)
-        .map(|((colour, _), name)| (Swatch::Line(style::stroke(colour, 2.4)), name.as_str()))
-        .collect();
-    legend(&mut canvas, [70.0, 20.0], &entries);
+        .map(|((colour, _), name)| (Swatch::Line(style::stroke(colour, 2.4)), name.as_str()));
+    let dashed = constant.map(|_| (Swatch::Line(constant_line()), "R of any constant"));
+    let legend = Legend::new(WIDTH - 2.0 * LEFT_PX, swatches.chain(dashed));
+    let top = 66.0 + legend.more_px();
+    let rows = shown.len().div_ceil(2) as f64;
+    let mut canvas = Canvas::new(WIDTH, top - 12.0 + rows * (PANEL.1 + GAP.1));
+    legend.draw(&mut canvas, [LEFT_PX, 20.0]);
     for (i, measure) in shown.into_iter().enumerate() {
         let (column, row) = ((i % 2) as f64, (i / 2) as f64);
         let area = Area {
-            left: 70.0 + column * (PANEL.0 + 96.0),
-            top: 66.0 + row * (PANEL.1 + 78.0),
+            left: LEFT_PX + column * (PANEL.0 + GAP.0),
+            top: top + row * (PANEL.1 + GAP.1),
             width: PANEL.0,
             height: PANEL.1,
         };
-        draw_measure(&mut canvas, area, run, measure, &curves);
+        let constant = constant.filter(|_| measure.id == R.id);
+        draw_measure(&mut canvas, area, run, measure, (&x, &curves, constant));
     }
     Ok(Some(canvas.finish()))
 }
 
-fn draw_measure(canvas: &mut Canvas, area: Area, run: &Run, measure: &Measure, curves: &[Curve]) {
-    let per_si = measure.unit.per_si;
-    let has_median = measure.aggregate.has_median();
-    let mean = |point: &CurvePoint| Some(per_si * point.of(measure)?.mean);
-    let median = |point: &CurvePoint| Some(per_si * point.of(measure)?.median);
-    // A band needs a standard error, which a median has not.
-    let error = |point: &CurvePoint| {
-        point.of(measure)?.error.filter(|_| !has_median).map(|error| per_si * error)
-    };
-    let beside = |point: &CurvePoint| match measure.scale {
-        Scale::LogBeside(other) => Some(other.unit.per_si * point.of(other)?.median),
-        _ if measure.aggregate == Aggregate::Both => mean(point),
-        _ => None,
-    };
-    let value: Value = if has_median { &median } else { &mean };
-    let constant = constant_r(run).filter(|_| measure.id == R.id);
-
-    let points = || curves.iter().flat_map(|(_, points)| points);
-    let end = |sign: f64| {
-        move |point: &CurvePoint| Some(value(point)? + sign * error(point).unwrap_or(0.0))
-    };
-    let values = points().filter_map(end(-1.0)).chain(points().filter_map(value)).chain(constant);
-    let y = match measure.scale {
-        Scale::Log | Scale::LogBeside(_) => Axis::log(values.chain(points().filter_map(beside))),
-        Scale::UpToOne => Axis::around(values.chain([1.0]), 0.04, 5.0),
-        Scale::Linear | Scale::Undrawn => {
-            Axis::around(values.chain(points().filter_map(end(1.0))), 0.04, 5.0)
-        }
-    };
-    let Some(y) = y else { return };
-    let experiment = &run.experiment;
-    let panel = Panel { area, x: Axis::linear(0.0, experiment.touches.into(), 6.0), y };
-    panel.frame(canvas);
-    panel.label(canvas, &title(measure), "touches", "");
-    let end_of_initial = panel.at(experiment.initial_touches.into(), 0.0)[0];
-    let line = [[end_of_initial, area.top], [end_of_initial, area.bottom()]];
-    canvas.line(line, &style::stroke(FAINT_INK, 0.8));
-    if let Some(score) = constant {
-        draw_constant(canvas, &panel, experiment.touches, score);
-    }
-    for (colour, points) in curves {
-        draw_curve(canvas, &panel, points, [value, &error, &beside], colour);
-    }
-}
-
-/// What is drawn, and what dotted beside it.
-fn title(measure: &Measure) -> String {
-    let unit = match measure.unit.symbol {
-        "" => String::new(),
-        symbol => format!(" ({symbol})"),
-    };
-    let told = match (measure.scale, measure.aggregate) {
-        (Scale::LogBeside(other), _) => format!("median; dotted: {}", other.title),
-        (_, Aggregate::Both) => "median, and mean (dotted)".into(),
-        (_, Aggregate::Median) => "median".into(),
-        (_, Aggregate::Mean) => "mean".into(),
-    };
-    format!("{}{unit}: {told}", measure.title)
-}
-
-/// A dashed line at what any constant scores.
-fn draw_constant(canvas: &mut Canvas, panel: &Panel, touches: u32, score: f64) {
-    let at = panel.at(touches.into(), score);
-    canvas.line([[panel.area.left, at[1]], at], &style::dashed(FAINT_INK, 1.0, "5 4"));
-    let words = format!("any constant: {score:.3}");
-    // Below the line, where curves that beat it are not, unless the frame is there.
-    let y = if panel.area.bottom() - at[1] > 20.0 { at[1] + 14.0 } else { at[1] - 6.0 };
-    canvas.coloured_text([at[0] - 6.0, y], &words, SMALL_PX, Anchor::End, FAINT_INK);
-}
-
-/// A curve with the band of its errors, and a dotted one beside it.
-fn draw_curve(
+fn draw_measure(
     canvas: &mut Canvas,
-    panel: &Panel,
-    points: &[CurvePoint],
-    [value, error, beside]: [Value; 3],
-    colour: &str,
+    area: Area,
+    run: &Run,
+    measure: &Measure,
+    (x, curves, constant): (&Axis, &[Curve], Option<f64>),
 ) {
-    let over = |value: Value| -> Vec<(f64, f64)> {
-        points.iter().filter_map(|point| Some((point.touches.into(), value(point)?))).collect()
-    };
-    let band: Vec<(f64, f64, f64)> = points
+    let read: Vec<(&str, Vec<Reading>)> = curves
         .iter()
-        .filter_map(|point| {
-            let (value, error) = (value(point)?, error(point)?);
-            Some((point.touches.into(), value - error, value + error))
+        .map(|(colour, points)| {
+            let of = |point: &CurvePoint| reading(run, measure, point);
+            (*colour, points.par_iter().filter_map(of).collect())
         })
         .collect();
-    if !band.is_empty() {
-        panel.band(canvas, &band, colour);
+    let readings = || read.iter().flat_map(|(_, readings)| readings);
+    let values = readings().flat_map(|(_, value, beside, band)| {
+        let ends = band.iter().flatten().copied();
+        ends.chain([*value]).chain(*beside).collect::<Vec<_>>()
+    });
+    let y = match measure.scale {
+        Scale::Log | Scale::LogBeside(_) => Axis::log(values),
+        // A band may reach beyond the best there is.
+        Scale::UpToOne => {
+            let up_to_one = values.chain(constant).map(|value| value.min(1.0));
+            Axis::around(up_to_one.chain([1.0]), 0.04, 5.0)
+        }
+        Scale::Linear | Scale::Undrawn => Axis::around(values, 0.04, 5.0),
+    };
+    let Some(y) = y else { return };
+    let panel = Panel { area, x: x.clone(), y };
+    panel.frame(canvas);
+    panel.label(canvas, &told(measure), "touches", &named(measure));
+    if let Some(score) = constant {
+        let (low, high) = x.range();
+        panel.curve(canvas, &[(low, score), (high, score)], &constant_line());
     }
-    let dotted = over(beside);
-    if !dotted.is_empty() {
-        panel.curve(canvas, &dotted, &style::dashed(colour, 1.3, "1.5 3"));
+    for (colour, readings) in &read {
+        draw_curve(canvas, &panel, readings, colour);
     }
-    panel.curve(canvas, &over(value), &style::stroke(colour, 2.0));
+}
+
+/// What is drawn of a measure after some touches: where there is one, its median.
+fn reading(run: &Run, measure: &Measure, point: &CurvePoint) -> Option<Reading> {
+    let per_si = measure.unit.per_si;
+    let summary = point.of(measure)?;
+    let value = if measure.aggregate.has_median() { summary.median } else { summary.mean };
+    let beside = match measure.scale {
+        Scale::LogBeside(other) => point.of(other).map(|other| other.median),
+        _ => (measure.aggregate == Aggregate::Both).then_some(summary.mean),
+    };
+    let band = curve_table::band(&run.experiment, &run.rows, point, measure);
+    let in_unit = |value: f64| per_si * value;
+    let touches = point.touches.into();
+    Some((touches, in_unit(value), beside.map(in_unit), band.map(|ends| ends.map(in_unit))))
+}
+
+/// A measure with the unit it is shown in.
+fn named(measure: &Measure) -> String {
+    match measure.unit.symbol {
+        "" => measure.title.into(),
+        symbol => format!("{} ({symbol})", measure.title),
+    }
+}
+
+/// What is drawn of it, and what dotted beside it.
+fn told(measure: &Measure) -> String {
+    match (measure.scale, measure.aggregate) {
+        (Scale::LogBeside(other), _) => format!("median; dotted: {}", other.title),
+        (_, Aggregate::Both) => "median; dotted: mean".into(),
+        (_, Aggregate::Median) => "median".into(),
+        (_, Aggregate::Mean) => "mean".into(),
+    }
+}
+
+/// The line at what any constant scores.
+fn constant_line() -> String {
+    style::dashed(FAINT_INK, 1.0, "5 4")
+}
+
+/// A curve with its band, and a dotted one beside it.
+fn draw_curve(canvas: &mut Canvas, panel: &Panel, readings: &[Reading], colour: &str) {
+    let band: Vec<(f64, f64, f64)> = readings
+        .iter()
+        .filter_map(|(touches, _, _, band)| band.map(|[low, high]| (*touches, low, high)))
+        .collect();
+    panel.band(canvas, &band, colour);
+    let dotted: Vec<(f64, f64)> = readings
+        .iter()
+        .filter_map(|(touches, _, beside, _)| Some((*touches, (*beside)?)))
+        .collect();
+    panel.curve(canvas, &dotted, &style::dashed(colour, 1.3, "1.5 3"));
+    let curve: Vec<(f64, f64)> =
+        readings.iter().map(|(touches, value, ..)| (*touches, *value)).collect();
+    panel.curve(canvas, &curve, &style::stroke(colour, 2.0));
 }

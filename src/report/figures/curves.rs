@@ -2,10 +2,12 @@
 
 use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
-use crate::gp::Posterior;
 use crate::gp::posterior::Scratch;
-use crate::report::axes::{Axis, Length, Panel, Swatch, legend};
+use crate::report::axes::{Axis, Length, MM, Panel};
 use crate::report::canvas::{Anchor, Area, Canvas};
+use crate::report::known;
+use crate::report::known::Known;
+use crate::report::legend::{Legend, Swatch};
 use crate::report::replay;
 use crate::report::replay::Replay;
 use crate::report::style;
@@ -17,9 +19,11 @@ pub(super) const FIGURE: Figure = Figure { name: "curves", caption, draw };
 fn caption(run: &Run) -> String {
     format!(
         "Beliefs of trial {} after some touches: posterior mean, its 95 % band, and the true \
-         surface. Blue crosses are the {} initial touches, red ones those the planner chose. \
+         surface. Blue crosses are the {} initial touches, red ones those the planner chose.{} \
          Corresponds to Fig. 3 of the paper.",
-        run.experiment.report.trial, run.experiment.initial_touches
+        run.experiment.report.trial,
+        run.experiment.initial_touches,
+        known::words(run)
     )
 }
 
@@ -29,6 +33,8 @@ const STEPS: usize = 300;
 const BAND_SD: f64 = 1.96;
 const MARGIN: (f64, f64) = (72.0, 80.0);
 const PANEL: (f64, f64) = (236.0, 188.0);
+/// Height of a panel whose axes are equal, at most.
+const EQUAL_HEIGHT_PX: f64 = 340.0;
 const GAP: (f64, f64) = (22.0, 68.0);
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
@@ -38,21 +44,24 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         return Ok(None);
     }
     let Some(y) = height_axis(run) else { return Ok(None) };
-    let (columns, rows) = (counts.len() as f64, planners.len() as f64);
-    let mut canvas =
-        Canvas::new(MARGIN.0 + columns * (PANEL.0 + GAP.0), MARGIN.1 + rows * (PANEL.1 + GAP.1));
-    draw_legend(&mut canvas, run);
     let unit = Length::of(zone);
+    let most = Area { left: 0.0, top: 0.0, width: PANEL.0, height: PANEL.1 };
+    let panel = belief_panel(zone, y, most, EQUAL_HEIGHT_PX);
+    let step = (PANEL.0 + GAP.0, panel.area.height + GAP.1);
+    let (columns, rows) = (counts.len() as f64, planners.len() as f64);
+    let width = MARGIN.0 + columns * step.0;
+    let legend = Legend::new(width - MARGIN.0, entries(run));
+    let top = MARGIN.1 + legend.more_px();
+    let mut canvas = Canvas::new(width, top + rows * step.1);
+    legend.draw(&mut canvas, [MARGIN.0, 20.0]);
     for (row, planner) in planners.iter().enumerate() {
         for (column, &count) in counts.iter().enumerate() {
             let area = Area {
-                left: MARGIN.0 + column as f64 * (PANEL.0 + GAP.0),
-                top: MARGIN.1 + row as f64 * (PANEL.1 + GAP.1),
-                width: PANEL.0,
-                height: PANEL.1,
+                left: MARGIN.0 + column as f64 * step.0,
+                top: top + row as f64 * step.1,
+                ..panel.area
             };
-            let [low, high] = zone.x_m.map(|x| x * unit.per_m);
-            let panel = Panel { area, x: Axis::linear(low, high, 5.0), y: y.clone() };
+            let panel = Panel { area, x: panel.x.clone(), y: panel.y.clone() };
             let replay = Replay::new(run, planner, count)?;
             let score = match &replay {
                 Some(replay) => replay.score(),
@@ -62,11 +71,13 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             panel.frame(&mut canvas);
             let x_label = if is_last_row { format!("x ({})", unit.symbol) } else { String::new() };
             let y_label = format!("{planner}: height ({})", unit.symbol);
-            let above = [area.centre()[0], area.top - 24.0];
-            canvas.text(above, &format!("{count} touches"), TEXT_PX, Anchor::Middle);
-            let above = [above[0], area.top - 8.0];
+            let middle = area.left + 0.5 * PANEL.0;
+            canvas.letter([area.left, area.top - 24.0]);
+            let words = format!("{count} touches");
+            canvas.text([middle, area.top - 24.0], &words, TEXT_PX, Anchor::Middle);
+            let above = [middle, area.top - 8.0];
             canvas.coloured_text(above, &score, SMALL_PX, Anchor::Middle, FAINT_INK);
-            panel.label(&mut canvas, "", &x_label, if column == 0 { &y_label } else { "" });
+            panel.words(&mut canvas, "", &x_label, if column == 0 { &y_label } else { "" });
             if let Some(replay) = replay {
                 let colour = style::planner(&run.experiment.planners, planner);
                 draw_belief(&mut canvas, &panel, run, &replay, colour);
@@ -76,6 +87,18 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     Ok(Some(canvas.finish()))
 }
 
+/// A panel of heights over the zone, as large as `most`; its axes are equal where both are
+/// millimetres, and then it is as high as that needs, `height_px` at most.
+pub(super) fn belief_panel(zone: &Zone, heights: Axis, most: Area, height_px: f64) -> Panel {
+    let unit = Length::of(zone);
+    let [low, high] = zone.x_m.map(|x| x * unit.per_m);
+    let x = Axis::linear(low, high, 5.0);
+    match unit.symbol == MM.symbol {
+        true => Panel::equal(Area { height: height_px, ..most }, x, heights),
+        false => Panel { area: most, x, y: heights },
+    }
+}
+
 /// Room for the truth and every drawn touch, and nearly as much again for the bands.
 pub(super) fn height_axis(run: &Run) -> Option<Axis> {
     let per_m = Length::of(&run.experiment.scene.zone).per_m;
@@ -83,7 +106,7 @@ pub(super) fn height_axis(run: &Run) -> Option<Axis> {
     Axis::around(heights_m.map(|height_m| height_m * per_m), 0.4, 5.0)
 }
 
-fn draw_legend(canvas: &mut Canvas, run: &Run) {
+fn entries(run: &Run) -> Vec<(Swatch, &'static str)> {
     let mut entries = vec![
         (Swatch::Line(style::stroke(TRUTH, 2.0)), "true surface"),
         (Swatch::Line(style::stroke(INK, 1.6)), "posterior mean"),
@@ -92,7 +115,7 @@ fn draw_legend(canvas: &mut Canvas, run: &Run) {
         (Swatch::Cross(LATER), "later touch"),
     ];
     entries.extend(miss_entry(run));
-    legend(canvas, [MARGIN.0, 20.0], &entries);
+    entries
 }
 
 /// The belief in `panel`: band, truth, mean, touches.
@@ -105,7 +128,7 @@ pub(super) fn draw_belief(
 ) {
     let zone = &run.experiment.scene.zone;
     let per_m = Length::of(zone).per_m;
-    let belief = read(zone, &replay.surface);
+    let belief = read(run, replay);
     let band: Vec<(f64, f64, f64)> = belief
         .iter()
         .map(|&(x, mean, sd)| (x, mean - BAND_SD * sd, mean + BAND_SD * sd))
@@ -113,7 +136,7 @@ pub(super) fn draw_belief(
         .collect();
     panel.band(canvas, &band, colour);
     let truth: Vec<(f64, f64)> = (run.truth.places.iter().zip(&run.truth.heights_m))
-        .filter_map(|(place, height)| Some((place.first()? * per_m, (*height)? * per_m)))
+        .map(|(place, height)| (place[0] * per_m, height.unwrap_or(f64::NAN) * per_m))
         .collect();
     panel.curve(canvas, &truth, &style::stroke(TRUTH, 2.0));
     let mean: Vec<(f64, f64)> =
@@ -135,13 +158,17 @@ pub(super) fn draw_belief(
     });
 }
 
-/// (x, mean, standard deviation) along the zone.
-fn read(zone: &Zone, surface: &Posterior) -> Vec<(f64, f64, f64)> {
+/// (x, mean, standard deviation) along the zone, not finite where the belief is not drawn.
+fn read(run: &Run, replay: &Replay) -> Vec<(f64, f64, f64)> {
     let mut scratch = Scratch::default();
-    (zone.grid(STEPS).into_iter())
+    let known = Known::new(run, replay);
+    (run.experiment.scene.zone.grid(STEPS).into_iter())
         .map(|place| {
-            let mean = surface.mean(&place, &mut scratch);
-            (place[0], mean, surface.variance(&place, &mut scratch).sqrt())
+            let variance = replay.surface.variance(&place, &mut scratch);
+            match known.at(&place, variance) {
+                true => (place[0], replay.surface.mean(&place, &mut scratch), variance.sqrt()),
+                false => (place[0], f64::NAN, f64::NAN),
+            }
         })
         .collect()
 }

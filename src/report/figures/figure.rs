@@ -1,7 +1,7 @@
 //! What a figure of a run is.
 
 use crate::experiment::store::Run;
-use crate::report::axes::Swatch;
+use crate::report::legend::Swatch;
 use crate::report::style::LATER;
 
 /// Something that is drawn from a run.

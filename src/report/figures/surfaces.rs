@@ -4,8 +4,11 @@ use super::figure::{Figure, miss_entry};
 use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
 use crate::gp::posterior::Scratch;
-use crate::report::axes::{Axis, Length, Swatch, colour_bar, legend};
+use crate::report::axes::{Axis, Length, colour_bar};
 use crate::report::canvas::{Area, Canvas, PointPx};
+use crate::report::known;
+use crate::report::known::Known;
+use crate::report::legend::{Legend, Swatch};
 use crate::report::relief::{Relief, Space};
 use crate::report::relief_panel::ReliefPanel;
 use crate::report::replay;
@@ -26,11 +29,15 @@ fn caption(run: &Run) -> String {
     format!(
         "Posterior mean over the zone in trial {} after some touches, and the true object on the \
          right, all in the same view, scale and colours. Blue points are the {} initial touches, \
-         red ones those the planner chose.{stretched} Corresponds to Figs. 5 and 7 of the paper.",
-        run.experiment.report.trial, run.experiment.initial_touches
+         red ones those the planner chose.{stretched}{} Corresponds to Figs. 5 and 7 of the paper.",
+        run.experiment.report.trial,
+        run.experiment.initial_touches,
+        known::words(run)
     )
 }
 
+/// Marks whose colours do not change with the paper's, for the relief's do not.
+const ON_RELIEF: &str = r#"class="relief""#;
 /// Faces along each side of a relief; more would not show at this size.
 const FACES: usize = 40;
 const MARGIN: (f64, f64) = (24.0, 44.0);
@@ -46,12 +53,15 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let grid = Grid::new(run)?;
     let unit = Length::of(&run.experiment.scene.zone);
     let (columns, rows) = (counts.len() as f64 + 1.0, planners.len() as f64);
-    let (width, height) = (columns * PANEL.0, MARGIN.1 + rows * PANEL.1 + FOOT_PX);
+    let width = columns * PANEL.0;
+    let legend = Legend::new(width, entries(run));
+    let top = MARGIN.1 + legend.more_px();
+    let height = top + rows * PANEL.1 + FOOT_PX;
     let mut canvas = Canvas::new(width + 2.0 * MARGIN.0, height);
-    draw_legend(&mut canvas, run);
+    canvas.grouped(ON_RELIEF, |canvas| legend.draw(canvas, [MARGIN.0, 20.0]));
     let area = |row: f64, column: usize| Area {
         left: MARGIN.0 + column as f64 * PANEL.0,
-        top: MARGIN.1 + row * PANEL.1,
+        top: top + row * PANEL.1,
         width: PANEL.0,
         height: PANEL.1,
     };
@@ -67,20 +77,24 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             };
             panel.frame(&mut canvas, &format!("{planner}, {count} touches"), &score);
             if let Some(replay) = replay {
-                let mut scratch = Scratch::default();
-                let heights =
-                    grid.heights(|place, _| Some(replay.surface.mean(place, &mut scratch)));
+                let (mut scratch, known) = (Scratch::default(), Known::new(run, &replay));
+                let heights = grid.heights(|place, _| {
+                    let variance = replay.surface.variance(place, &mut scratch);
+                    known.at(place, variance).then(|| replay.surface.mean(place, &mut scratch))
+                });
                 let relief = Relief::new(&panel.view, &grid.xs, &grid.zs, &heights, &axis);
                 relief.draw(&mut canvas);
-                for (touch, is_initial) in replay.marks() {
-                    mark(&panel, &mut canvas, run, &relief, (touch, is_initial));
-                }
+                canvas.grouped(ON_RELIEF, |canvas| {
+                    for (touch, is_initial) in replay.marks() {
+                        mark(&panel, canvas, run, &relief, (touch, is_initial));
+                    }
+                });
             }
         }
     }
     let panel = ReliefPanel::new(unit, area(0.5 * (rows - 1.0), counts.len()), space);
     panel.frame(&mut canvas, "true object", "");
-    let heights = grid.heights(|_, height| Some(height));
+    let heights = grid.heights(|_, height| height);
     Relief::new(&panel.view, &grid.xs, &grid.zs, &heights, &axis).draw(&mut canvas);
     draw_colour_bar(&mut canvas, run, space, [0.5 * width, height - FOOT_PX + 14.0]);
     Ok(Some(canvas.finish()))
@@ -118,12 +132,15 @@ impl<'a> Grid<'a> {
         Ok(Self { run, side, picked, xs, zs })
     }
 
-    /// A height for each place that has a true one, given that.
-    fn heights(&self, mut height: impl FnMut(&[f64], f64) -> Option<f64>) -> Vec<Option<f64>> {
+    /// A height for each place, given the true one.
+    fn heights(
+        &self,
+        mut height: impl FnMut(&[f64], Option<f64>) -> Option<f64>,
+    ) -> Vec<Option<f64>> {
         let truth = &self.run.truth;
         (self.picked.iter())
             .flat_map(|&j| self.picked.iter().map(move |&i| j * self.side + i))
-            .map(|index| height(&truth.places[index], truth.heights_m[index]?))
+            .map(|index| height(&truth.places[index], truth.heights_m[index]))
             .collect()
     }
 }
@@ -162,14 +179,14 @@ fn hidden(colour: &str) -> String {
     format!(r#"fill="{PAPER}" fill-opacity=".35" stroke="{colour}" stroke-width="1.1""#)
 }
 
-fn draw_legend(canvas: &mut Canvas, run: &Run) {
+fn entries(run: &Run) -> Vec<(Swatch, &'static str)> {
     let mut entries = vec![
         (Swatch::Circle(visible(INITIAL)), "initial touch"),
         (Swatch::Circle(visible(LATER)), "later touch"),
         (Swatch::Circle(hidden(LATER)), "behind the surface"),
     ];
     entries.extend(miss_entry(run));
-    legend(canvas, [MARGIN.0, 20.0], &entries);
+    entries
 }
 
 fn draw_colour_bar(canvas: &mut Canvas, run: &Run, space: Space, [middle, top]: PointPx) {

@@ -3,8 +3,9 @@
 use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
 use crate::experiment::summary::median_shift_m;
-use crate::report::axes::{Axis, Length, Panel, Swatch, legend};
+use crate::report::axes::{Axis, Length, Panel};
 use crate::report::canvas::{Area, Canvas};
+use crate::report::legend::{Legend, Swatch};
 use crate::report::number::digits;
 use crate::report::replay;
 use crate::report::style;
@@ -27,9 +28,12 @@ fn caption(run: &Run) -> String {
     )
 }
 
-const PANEL_PX: (f64, f64) = (300.0, 300.0);
+/// Size of a panel at most: its axes are equal.
+const PANEL_PX: (f64, f64) = (300.0, 380.0);
 const LEFT_PX: f64 = 66.0;
 const TOP_PX: f64 = 66.0;
+/// Room for the words of a legend.
+const WIDTH_MIN_PX: f64 = 420.0;
 /// Share of the zone's side drawn around it: contacts may lie outside.
 const MARGIN: f64 = 0.12;
 
@@ -47,20 +51,25 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         let margin = MARGIN * (high - low);
         Axis::linear((low - margin) * unit.per_m, (high + margin) * unit.per_m, 5.0)
     };
-    let step_px = PANEL_PX.0 + 84.0;
-    let width = LEFT_PX + rows.len() as f64 * step_px;
-    let mut canvas = Canvas::new(width.max(760.0), TOP_PX + PANEL_PX.1 + 60.0);
     let mut entries = vec![
         (Swatch::Circle(ring(LATER)), "target"),
         (Swatch::Circle(point(INITIAL)), "contact of an initial touch"),
         (Swatch::Circle(point(LATER)), "of a later one"),
     ];
     entries.extend(miss_entry(run));
-    legend(&mut canvas, [LEFT_PX, 20.0], &entries);
+    let most = Area { left: LEFT_PX, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };
+    let shape = Panel::equal(most, axis(zone.x_m), axis(z_m));
+    let Area { width: panel_px, height: panel_height_px, .. } = shape.area;
+    let step_px = panel_px + 84.0;
+    let width = (LEFT_PX + rows.len() as f64 * step_px).max(WIDTH_MIN_PX);
+    let legend = Legend::new(width - LEFT_PX, entries);
+    let top = TOP_PX + legend.more_px();
+    let mut canvas = Canvas::new(width, top + panel_height_px + 60.0);
+    legend.draw(&mut canvas, [LEFT_PX, 20.0]);
     for (column, row) in rows.iter().enumerate() {
         let left = LEFT_PX + column as f64 * step_px;
-        let area = Area { left, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };
-        let panel = Panel { area, x: axis(zone.x_m), y: axis(z_m) };
+        let area = Area { left, top, ..shape.area };
+        let panel = Panel { area, x: shape.x.clone(), y: shape.y.clone() };
         panel.frame(&mut canvas);
         let [x, z] = ["x", "z"].map(|name| format!("{name} ({})", unit.symbol));
         panel.label(&mut canvas, &row.planner, &x, if column == 0 { &z } else { "" });

@@ -1,6 +1,6 @@
 //! What a publication says beside what came out, as a table of the page.
 
-use super::{Table, titled};
+use super::{Cell, Table, titled};
 use crate::experiment::measure;
 use crate::experiment::store::Run;
 use crate::experiment::summary::typical;
@@ -25,7 +25,8 @@ pub fn table(run: &Run) -> Option<Table> {
             let start = [once(&claim.place), once(&claim.says)];
             let after =
                 [format!("{} touches", claim.touches), format!("{kind} {}", titled(measure))];
-            lines.push(start.into_iter().chain(after).chain(planners.iter().map(value)).collect());
+            let cells = start.into_iter().chain(after).chain(planners.iter().map(value));
+            lines.push(cells.map(Cell::from).collect());
         }
     }
     let header = head.into_iter().chain(planners.iter().cloned()).collect();

@@ -1,6 +1,6 @@
 //! The planners against their baselines in every measure, as tables of the page and as a file.
 
-use super::{Table, titled, write_csv};
+use super::{Cell, Table, Verdict, titled, write_csv};
 use crate::experiment::comparison::Comparison;
 use crate::experiment::measure::{Direction, MEASURES, Measure};
 use crate::experiment::store::Run;
@@ -17,18 +17,20 @@ pub fn tables(run: &Run, found: &[Comparison]) -> Vec<Table> {
         let others: Vec<&String> = (run.experiment.planners.iter())
             .filter(|name| of_baseline.iter().any(|comparison| comparison.planner == **name))
             .collect();
-        let line = |measure: &Measure| -> Option<Vec<String>> {
+        let line = |measure: &Measure| -> Option<Vec<Cell>> {
             let of = |planner: &str| {
                 let is_it = |comparison: &&&Comparison| {
                     comparison.planner == planner && comparison.measure.id == measure.id
                 };
                 of_baseline.iter().find(is_it)
             };
-            let cells = others.iter().map(|planner| of(planner).map_or("-".into(), |it| cell(it)));
+            let cells = others
+                .iter()
+                .map(|planner| of(planner).map_or("-".to_owned().into(), |it| cell(it)));
             others
                 .iter()
                 .any(|planner| of(planner).is_some())
-                .then(|| std::iter::once(titled(measure)).chain(cells).collect())
+                .then(|| std::iter::once(titled(measure).into()).chain(cells).collect())
         };
         Table {
             header: std::iter::once(format!("minus {baseline}"))
@@ -50,7 +52,8 @@ pub fn note(run: &Run) -> String {
     format!(
         "Differences after {} touches in the same trial: mean, its 95 % bootstrap interval, and \
          the share of trials in which the planner is better; better is more for {}, less for all \
-         else. A difference whose interval contains 0 is not established.",
+         else. Bold, with the word beside it: the interval excludes 0, so the difference is \
+         established.",
         run.experiment.touches,
         more.join(", ")
     )
@@ -96,7 +99,12 @@ pub fn write(found: &[Comparison], folder: &Path) -> anyhow::Result<()> {
     write_csv(&folder.join("comparison.csv"), records)
 }
 
-fn cell(comparison: &Comparison) -> String {
+/// Whether the planner is better or worse for certain.
+pub fn verdict(comparison: &Comparison) -> Option<Verdict> {
+    Verdict::of(comparison.paired.interval, 0.0, comparison.measure.direction)
+}
+
+fn cell(comparison: &Comparison) -> Cell {
     let shown = |value: f64| {
         let value = comparison.measure.unit.per_si * value;
         let sign = if value < 0.0 { "\u{2212}" } else { "" };
@@ -104,5 +112,6 @@ fn cell(comparison: &Comparison) -> String {
     };
     let paired = &comparison.paired;
     let mean = with_interval(paired.mean, paired.interval, &shown);
-    format!("{mean}, {:.0} %", 100.0 * paired.won)
+    let words = format!("{mean}, {:.0} %", 100.0 * paired.won);
+    Cell { words, verdict: verdict(comparison) }
 }

@@ -1,7 +1,8 @@
 //! Touches to equal error, as tables of the page and as a file.
 
-use super::{Table, write_csv};
+use super::{Cell, Table, Verdict, write_csv};
 use crate::experiment::equal_error::{EqualError, Estimate, errors};
+use crate::experiment::measure::Direction;
 use crate::experiment::store::Run;
 use crate::report::number::{digits, with_interval};
 use schemars::JsonSchema;
@@ -34,8 +35,8 @@ pub fn tables(run: &Run, found: &[EqualError]) -> Vec<Table> {
             };
             let cells: Vec<_> = errors.iter().map(|error| of(error.measure.id)).collect();
             cells.iter().any(Option::is_some).then(|| {
-                let cells = cells.into_iter().map(|cell| cell.unwrap_or("-".into()));
-                std::iter::once(planner.clone()).chain(cells).collect()
+                let cells = cells.into_iter().map(|cell| cell.unwrap_or("-".to_owned().into()));
+                std::iter::once(planner.clone().into()).chain(cells).collect()
             })
         });
         let lines = lines.collect();
@@ -52,8 +53,8 @@ pub fn note(run: &Run) -> String {
         "Touches, initial ones included, after which a planner\u{2019}s median error stays at or \
          below the one in the column\u{2019}s head, which is the baseline\u{2019}s after {} touches; \
          behind \u{d7} their ratio to the baseline\u{2019}s own count, and that of the lateral ways \
-         after the initial touches. All with the 95 % interval of a bootstrap over trials: a planner saves \
-         touches for certain where the ratio\u{2019}s interval stays below 1.",
+         after the initial touches. All with the 95 % interval of a bootstrap over trials. Bold, with \
+         the word beside it: the interval of the touches\u{2019} ratio excludes 1.",
         run.experiment.goal_touches()
     )
 }
@@ -120,7 +121,7 @@ pub fn write(found: &[EqualError], folder: &Path) -> anyhow::Result<()> {
     write_csv(&folder.join("equal_error.csv"), records)
 }
 
-fn cell(equal: &EqualError, most: u32) -> String {
+fn cell(equal: &EqualError, most: u32) -> Cell {
     let shown = |estimate: &Estimate, shown: &dyn Fn(f64) -> String| {
         with_interval(estimate.value, estimate.interval, shown)
     };
@@ -128,15 +129,21 @@ fn cell(equal: &EqualError, most: u32) -> String {
     if !equal.touches.value.is_finite() {
         let low = equal.touches.interval.map_or(f64::INFINITY, |[low, _]| low);
         let some = if low.is_finite() { format!(", {low:.0} at least") } else { String::new() };
-        return format!("{}{some}", touches(f64::INFINITY, most));
+        return format!("{}{some}", touches(f64::INFINITY, most)).into();
     }
     let ratio = |ratio: f64| if ratio.is_finite() { format!("{ratio:.2}") } else { "–".into() };
-    format!(
+    let words = format!(
         "{} \u{d7} {}; way \u{d7} {}",
         shown(&equal.touches, &|count| touches(count, most)),
         shown(&equal.ratio, &ratio),
         shown(&equal.path_ratio, &ratio),
-    )
+    );
+    Cell { words, verdict: verdict(equal) }
+}
+
+/// Whether the planner needs fewer or more touches for certain.
+pub fn verdict(equal: &EqualError) -> Option<Verdict> {
+    Verdict::of(equal.ratio.interval, 1.0, Direction::Less)
 }
 
 fn touches(count: f64, most: u32) -> String {

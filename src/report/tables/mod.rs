@@ -5,7 +5,7 @@ pub mod comparison;
 pub mod equal_error;
 pub mod summary;
 
-use crate::experiment::measure::Measure;
+use crate::experiment::measure::{Direction, Measure};
 use anyhow::Context;
 use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
@@ -16,7 +16,53 @@ pub struct Table {
     /// Column heads.
     pub header: Vec<String>,
     /// Its lines, a cell for each head.
-    pub lines: Vec<Vec<String>>,
+    pub lines: Vec<Vec<Cell>>,
+}
+
+/// A cell of a table.
+pub struct Cell {
+    /// What stands in it.
+    pub words: String,
+    /// What it establishes, if it is a comparison that does.
+    pub verdict: Option<Verdict>,
+}
+
+/// What an interval establishes that holds no zero, or of a ratio no one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The planner is better than the one it is held against.
+    Better,
+    /// It is worse.
+    Worse,
+}
+
+impl Verdict {
+    /// Of an interval about `even`, where both are as good and `direction` is better; none if the
+    /// interval holds it.
+    pub fn of(interval: Option<[f64; 2]>, even: f64, direction: Direction) -> Option<Self> {
+        let [low, high] = interval?;
+        let [is_less, is_more] = [high < even, low > even];
+        match direction {
+            Direction::Neither => None,
+            Direction::Less if is_less => Some(Self::Better),
+            Direction::More if is_more => Some(Self::Better),
+            _ => (is_less || is_more).then_some(Self::Worse),
+        }
+    }
+
+    /// In a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Better => "better",
+            Self::Worse => "worse",
+        }
+    }
+}
+
+impl From<String> for Cell {
+    fn from(words: String) -> Self {
+        Self { words, verdict: None }
+    }
 }
 
 /// A measure with the unit it is shown in.

@@ -1,6 +1,6 @@
 //! The curves as a table of the page and of the terminal, and as a file.
 
-use super::{Table, titled};
+use super::{Cell, Table, titled};
 use crate::experiment::curve_table::{CurveRecord, columns, curve_table};
 use crate::experiment::measure::{MEASURES, Measure};
 use crate::experiment::notice;
@@ -72,7 +72,7 @@ fn with_heads(run: &Run, head: impl Fn(&Column) -> String) -> Table {
     let line = |point: &&CurvePoint| {
         let start = [point.touches.to_string(), point.planner.clone()].into_iter();
         let cells = columns.iter().map(|column| column.cell(point).unwrap_or("-".into()));
-        start.chain(cells).collect()
+        start.chain(cells).map(Cell::from).collect()
     };
     Table {
         header: start.chain(columns.iter().map(head)).collect(),
@@ -83,6 +83,8 @@ fn with_heads(run: &Run, head: impl Fn(&Column) -> String) -> Table {
 /// The table for the terminal, then what else happened.
 pub fn text(run: &Run) -> String {
     let Table { header, lines } = with_heads(run, Column::short);
+    let words = |line: Vec<Cell>| line.into_iter().map(|cell| cell.words).collect();
+    let lines: Vec<Vec<String>> = lines.into_iter().map(words).collect();
     let lines = || std::iter::once(&header).chain(&lines);
     let widths: Vec<usize> = (0..header.len())
         .map(|column| lines().map(|line| line[column].chars().count()).max().unwrap_or(0))

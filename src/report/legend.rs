@@ -1,0 +1,79 @@
+//! A legend: swatches with their words, in as many rows as they need.
+
+use super::canvas::{Anchor, Area, Canvas, PointPx};
+use super::style;
+use super::style::TEXT_PX;
+
+/// From one row to the next.
+const ROW_PX: f64 = 20.0;
+/// From an entry to its words, and from its words to the next entry.
+const GAPS_PX: [f64; 2] = [28.0, 18.0];
+/// Width of a letter: there are no font metrics here, so that of the widest common sans-serif.
+const LETTER_PX: f64 = 7.4;
+
+/// Swatches with their words, each in its place.
+pub struct Legend<'a> {
+    /// Each with where it begins, from the left and from the first row.
+    entries: Vec<(PointPx, Swatch, &'a str)>,
+}
+
+impl<'a> Legend<'a> {
+    /// Lays entries out in rows of a width; one that is wider has a row for itself.
+    pub fn new(width_px: f64, entries: impl IntoIterator<Item = (Swatch, &'a str)>) -> Self {
+        let [mut x, mut y] = [0.0; 2];
+        let mut placed = Vec::new();
+        for (swatch, words) in entries {
+            let entry_px = GAPS_PX[0] + LETTER_PX * words.chars().count() as f64;
+            if x > 0.0 && x + entry_px > width_px {
+                [x, y] = [0.0, y + ROW_PX];
+            }
+            placed.push(([x, y], swatch, words));
+            x += entry_px + GAPS_PX[1];
+        }
+        Self { entries: placed }
+    }
+
+    /// Room that the rows below the first need.
+    pub fn more_px(&self) -> f64 {
+        self.entries.last().map_or(0.0, |([_, y], ..)| *y)
+    }
+
+    /// Draws it, the middle of its first row's left end at `at`.
+    pub fn draw(&self, canvas: &mut Canvas, at: PointPx) {
+        for ([x, y], swatch, words) in &self.entries {
+            let [left, middle] = [at[0] + x, at[1] + y];
+            swatch.draw(canvas, [left + 11.0, middle]);
+            canvas.text([left + GAPS_PX[0], middle + 4.5], words, TEXT_PX, Anchor::Start);
+        }
+    }
+}
+
+/// What a legend shows beside its words.
+pub enum Swatch {
+    /// A line with these attributes.
+    Line(String),
+    /// A band in this colour.
+    Band(&'static str),
+    /// A cross in this colour.
+    Cross(&'static str),
+    /// A circle with these attributes.
+    Circle(String),
+    /// A hollow diamond in this colour.
+    Diamond(&'static str),
+    /// A filled box in this colour.
+    Box(&'static str),
+}
+
+impl Swatch {
+    fn draw(&self, canvas: &mut Canvas, [x, y]: PointPx) {
+        let area = Area { left: x - 11.0, top: y - 6.0, width: 22.0, height: 12.0 };
+        match self {
+            Self::Line(attributes) => canvas.line([[x - 11.0, y], [x + 11.0, y]], attributes),
+            Self::Band(colour) => canvas.rect(area, &style::fill(colour, style::BAND_OPACITY)),
+            Self::Cross(colour) => canvas.cross([x, y], colour),
+            Self::Circle(attributes) => canvas.circle([x, y], 3.6, attributes),
+            Self::Diamond(colour) => canvas.diamond([x, y], &style::stroke(colour, 1.3)),
+            Self::Box(colour) => canvas.rect(area, &style::fill(colour, 1.0)),
+        }
+    }
+}

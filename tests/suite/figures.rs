@@ -1,0 +1,267 @@
+//! What holds for every figure: nothing is cut off or printed over, axes say what they are, both
+//! sides of a map have one scale, and no belief is drawn where there is no surface.
+
+use crate::common::runs::{CURVE, SURFACE, run};
+use palpate::experiment::store::Run;
+use palpate::report::known::Known;
+use palpate::report::legend::{Legend, Swatch};
+use palpate::report::replay::Replay;
+use palpate::report::style::{self, ON_DARK};
+use palpate::report::{FIGURES, pdf, tree};
+use resvg::usvg::{Group, Node, Rect};
+
+/// Every figure of a run that applies, by name.
+fn figures(run: &Run) -> Vec<(&'static str, String)> {
+    let drawn = FIGURES.iter().map(|figure| (figure.name, (figure.draw)(run).unwrap()));
+    drawn.filter_map(|(name, svg)| Some((name, svg?))).collect()
+}
+
+fn figure(run: &Run, name: &str) -> String {
+    figures(run).into_iter().find(|(of, _)| *of == name).unwrap().1
+}
+
+/// Runs that differ in what there is to draw.
+fn runs() -> Vec<Run> {
+    let mut short = run(SURFACE);
+    short.experiment.report.touch_counts = vec![20];
+    let mut crowded = run(SURFACE);
+    let names = ["active", "integrated_variance", "slope", "travel", "sobol", "random", "grid"];
+    let row = crowded.rows[0].clone();
+    crowded.experiment.planners = names.map(String::from).to_vec();
+    crowded.rows = names
+        .map(|name| {
+            let mut row = row.clone();
+            row.planner = name.into();
+            row
+        })
+        .to_vec();
+    let small = CURVE.replace("[-2.0, 2.0]", "[-0.05, 0.05]");
+    let flat = SURFACE.replace("[-0.07, 0.07]", "[-0.01, 0.01]");
+    let mut ended = run(SURFACE);
+    ended.rows.iter_mut().for_each(|row| row.touches.truncate(5));
+    vec![run(CURVE), run(SURFACE), short, crowded, run(&small), run(&flat), ended]
+}
+
+/// Every text of a drawing with its box.
+fn texts(svg: &str) -> Vec<(String, Rect)> {
+    fn walk(group: &Group, found: &mut Vec<(String, Rect)>) {
+        for node in group.children() {
+            match node {
+                Node::Group(group) => walk(group, found),
+                Node::Text(text) => {
+                    let words: String = text.chunks().iter().map(|chunk| chunk.text()).collect();
+                    found.push((words, text.abs_bounding_box()));
+                }
+                _ => {}
+            }
+        }
+    }
+    let mut found = Vec::new();
+    walk(tree::read(svg).unwrap().root(), &mut found);
+    found
+}
+
+/// By the metrics of the font that pictures are drawn with.
+#[test]
+fn nothing_written_is_cut_off_or_printed_over() {
+    for run in runs() {
+        for (name, svg) in figures(&run) {
+            let size = tree::read(&svg).unwrap().size();
+            let texts = texts(&svg);
+            assert!(texts.len() > 5, "{name}");
+            for (i, (words, one)) in texts.iter().enumerate() {
+                let is_inside = one.left() >= 0.0
+                    && one.top() >= 0.0
+                    && one.right() <= size.width()
+                    && one.bottom() <= size.height();
+                assert!(is_inside, "{name}: {words} at {one:?} of {size:?}");
+                for (others, other) in &texts[..i] {
+                    let is_apart = one.left() >= other.right()
+                        || other.left() >= one.right()
+                        || one.top() >= other.bottom()
+                        || other.top() >= one.bottom();
+                    assert!(is_apart, "{name}: {words} on {others}: {one:?}, {other:?}");
+                }
+            }
+        }
+    }
+}
+
+/// A legend needs no more room than it is given, unless one entry alone does.
+#[test]
+fn a_legend_has_rows() {
+    let entries = |count: usize| (0..count).map(|_| (Swatch::Cross(style::INK), "ten lettrs"));
+    // 28 + 74 pixels each, and 18 between them.
+    assert_eq!(Legend::new(222.0, entries(2)).more_px(), 0.0);
+    assert_eq!(Legend::new(221.0, entries(2)).more_px(), 20.0);
+    assert_eq!(Legend::new(222.0, entries(5)).more_px(), 40.0);
+    assert_eq!(Legend::new(10.0, entries(3)).more_px(), 40.0);
+    assert_eq!(Legend::new(10.0, entries(0)).more_px(), 0.0);
+}
+
+/// Pixels of a millimetre along the first panel's x and along its other axis, from its ticks.
+fn px_per_mm(svg: &str) -> [f64; 2] {
+    let ticks = |anchor: &str, coordinate: &str| -> Vec<(f64, f64)> {
+        let is_tick = format!("font-size=\"11.5\" text-anchor=\"{anchor}\" fill=\"#222222\">");
+        let lines = svg.lines().filter(|line| line.contains(&is_tick));
+        let read = |line: &str| {
+            let at = line.split(&format!(" {coordinate}=\"")).nth(1)?.split('"').next()?;
+            let words = line.split('>').nth(1)?.split('<').next()?.replace('−', "-");
+            Some((words.parse().ok()?, at.parse().ok()?))
+        };
+        lines.filter_map(read).collect()
+    };
+    [ticks("middle", "x"), ticks("end", "y")].map(|ticks| {
+        // The first two ticks are those of the first panel.
+        let [(low, from), (high, to)] = [ticks[0], ticks[1]];
+        (to - from).abs() / (high - low)
+    })
+}
+
+#[test]
+fn a_millimetre_is_as_long_on_both_axes() {
+    let narrow = SURFACE.replace("[-0.07, 0.07]", "[-0.4, 0.4]");
+    let flat = SURFACE.replace("[-0.07, 0.07]", "[-0.01, 0.01]");
+    let curve = CURVE.replace("[-2.0, 2.0]", "[-0.05, 0.05]");
+    for (settings, names) in [
+        (SURFACE, ["acquisition", "targets"]),
+        (&narrow, ["acquisition", "targets"]),
+        (&flat, ["acquisition", "targets"]),
+        (&curve, ["acquisition", "curves"]),
+    ] {
+        for name in names {
+            let [across, up] = px_per_mm(&figure(&run(settings), name));
+            assert!((across / up - 1.0).abs() < 0.01, "{name} of {settings}: {across}, {up}");
+        }
+    }
+}
+
+/// Over the trials of each planner, from the first touch that has a belief; each panel with the
+/// names of its axes and its letter.
+#[test]
+fn every_measure_has_a_band_from_the_first_belief_on() {
+    let run = run(SURFACE);
+    let svg = figure(&run, "convergence");
+    let panels = svg.matches(">touches</text>").count();
+    assert!(panels >= 6, "{panels}");
+    assert_eq!(
+        svg.matches("fill-opacity=\"0.22\"").count(),
+        panels * run.experiment.planners.len()
+    );
+    assert_eq!(svg.matches("rotate(-90)").count(), panels);
+    let letters: String = (b'a'..).take(panels).map(char::from).collect();
+    let written = svg.lines().filter(|line| line.contains("font-weight=\"bold\""));
+    let written: String = written.filter_map(|line| line.split(['>', '<']).nth(2)).collect();
+    assert_eq!(written, letters);
+    // The frame of the first column is at 70.
+    let curves: Vec<&str> =
+        svg.lines().filter(|line| line.contains("stroke-width=\"2\"")).collect();
+    let at_frame = curves.iter().filter(|line| line.starts_with("<path d=\"M70 ")).count();
+    assert_eq!(at_frame, panels.div_ceil(2) * run.experiment.planners.len());
+}
+
+#[test]
+fn a_belief_is_drawn_where_there_is_a_surface_or_contacts_tell_of_one() {
+    let run = run(SURFACE);
+    let replay = Replay::new(&run, "active", 20).unwrap().unwrap();
+    let known = Known::new(&run, &replay);
+    let prior = replay.surface.hyperparameters().signal_sd.powi(2);
+    let mut beyond = 0;
+    for (place, height) in run.truth.places.iter().zip(&run.truth.heights_m) {
+        let at = |variance: f64| known.at(place, variance);
+        match height {
+            Some(_) => assert!(at(prior), "{place:?}"),
+            None => {
+                beyond += 1;
+                assert!(!at(0.51 * prior), "{place:?}");
+            }
+        }
+    }
+    assert!(beyond > 0);
+    for touch in replay.touches {
+        // The test grid's nearest place, 5 mm apart, has a surface within 46 mm.
+        let is_surface = (0.005 * (touch.target[0] / 0.005).round()).abs() < 0.046;
+        let is_known = known.at(&touch.target, 0.49 * prior);
+        assert_eq!(is_known, touch.contact.is_some() || is_surface, "{:?}", touch.target);
+    }
+    assert!(replay.touches.iter().any(|touch| touch.contact.is_none()));
+}
+
+/// One place keeps its surface, or there would be no range of heights: hardly anything is left.
+#[test]
+fn nothing_is_drawn_of_a_belief_without_a_surface() {
+    for (settings, names) in
+        [(SURFACE, ["surfaces", "acquisition"]), (CURVE, ["curves", "acquisition"])]
+    {
+        let whole = run(settings);
+        let mut nowhere = run(settings);
+        nowhere.truth.heights_m[1..].fill(None);
+        let touches = nowhere.rows.iter_mut().flat_map(|row| &mut row.touches);
+        touches.for_each(|touch| touch.contact = None);
+        for name in names {
+            let drawn = |run: &Run| figures(run).into_iter().find(|(of, _)| *of == name);
+            let [whole, nowhere] = [&whole, &nowhere].map(drawn);
+            let (_, whole) = whole.unwrap();
+            let left = nowhere.map_or(0, |(_, svg)| svg.len());
+            assert!(left < whole.len() / 2, "{name}: {left} of {}", whole.len());
+        }
+    }
+}
+
+#[test]
+fn a_pdf_is_a_page_of_the_size_of_the_drawing_with_words() {
+    for (name, svg) in figures(&run(SURFACE)) {
+        let bytes = pdf::render(&svg).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        assert!(text.starts_with("%PDF-"), "{name}");
+        assert!(text.contains("/Font"), "{name}: words are drawn as outlines");
+        let size = tree::read(&svg).unwrap().size();
+        let numbers = |text: &str| -> Vec<f32> {
+            text.split_whitespace().map(|number| number.parse().unwrap()).collect()
+        };
+        let page = text.split("/MediaBox[").nth(1).unwrap().split(']').next().unwrap();
+        assert_eq!(numbers(page), [0.0, 0.0, size.width(), size.height()], "{name}");
+        assert!(pdf::render(&svg).unwrap() == bytes, "{name}");
+    }
+    assert!(pdf::render("<p>").is_err());
+}
+
+/// Relative luminance as WCAG 2.2 defines it.
+fn luminance(colour: &str) -> f64 {
+    let channel = |from: usize| {
+        let part = f64::from(u8::from_str_radix(&colour[from..from + 2], 16).unwrap()) / 255.0;
+        if part <= 0.04045 { part / 12.92 } else { ((part + 0.055) / 1.055).powf(2.4) }
+    };
+    0.2126 * channel(1) + 0.7152 * channel(3) + 0.0722 * channel(5)
+}
+
+#[test]
+fn colours_on_dark_paper_stand_out_and_differ() {
+    let [_, paper] = style::on_both(style::PAPER);
+    for (i, (light, dark)) in ON_DARK.iter().enumerate() {
+        let contrast = (luminance(dark) + 0.05) / (luminance(paper) + 0.05);
+        let least = match *light {
+            style::PAPER | style::GRID => 1.0,
+            style::INK | style::FAINT_INK => 4.5,
+            _ => 3.0,
+        };
+        assert!(contrast >= least, "{light}: {dark} has {contrast}");
+        assert!(ON_DARK[..i].iter().all(|(other, _)| other != light), "{light}");
+    }
+    let names: Vec<String> = ["active", "random", "sobol"]
+        .into_iter()
+        .map(String::from)
+        .chain((0..8).map(|i| format!("planner {i}")))
+        .collect();
+    for name in &names {
+        let colour = style::planner(&names, name);
+        assert!(ON_DARK.iter().any(|(light, _)| *light == colour), "{name}: {colour}");
+    }
+}
+
+#[test]
+fn zz_growth() {
+    let docs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let svg = std::fs::read_to_string(docs.join("growth.svg")).unwrap();
+    std::fs::write(docs.join("growth.png"), palpate::report::png::render(&svg).unwrap()).unwrap();
+}
