@@ -1,5 +1,6 @@
 //! `palpate export`.
 
+use super::output::Force;
 use super::terminal::{Ending, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
@@ -38,6 +39,8 @@ pub(super) struct Args {
     /// Vertices along each side of the zone [default: the experiment's grid].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=2001))]
     grid: Option<u16>,
+    #[command(flatten)]
+    force: Force,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
@@ -47,6 +50,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
             Some("obj") => Points::obj,
             _ => bail!("--out {}: allowed is a file ending in .ply or .obj", args.out.display()),
         };
+    args.force.claim_all(&args.out, &files::FORMATS)?;
     let mut run = Run::read(&args.run)?;
     ensure!(
         run.experiment.scene.zone.dimension() == 2,

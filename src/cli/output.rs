@@ -26,24 +26,26 @@ impl Force {
     /// # Errors
     /// If it may not.
     pub(super) fn claim(self, path: &Path) -> anyhow::Result<()> {
-        let name = path.display();
-        let kind = match fs::metadata(path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
-            Err(error) => return Err(error).with_context(|| name.to_string()),
-            Ok(kind) => kind,
-        };
-        if !kind.is_file() {
-            bail!("{name} is a folder, a device or a pipe; allowed is the name of a file");
-        }
-        let mut head = Vec::new();
-        let file = File::open(path).with_context(|| name.to_string())?;
-        file.take(HEAD).read_to_end(&mut head).with_context(|| name.to_string())?;
-        head.make_ascii_lowercase();
-        let is_ours = head.windows(MARK.len()).any(|part| part == MARK);
-        if !is_ours && !self.force {
-            bail!("{name} is there, and Palpate did not write it: --force replaces it");
+        if found(path)? == Found::Other && !self.force {
+            bail!(
+                "{} is there, and does not say that Palpate wrote it: --force replaces it",
+                path.display()
+            );
         }
         Ok(())
+    }
+
+    /// The same of `path` and the files beside it that have one of `extensions` instead; if Palpate
+    /// wrote the first, it wrote those.
+    ///
+    /// # Errors
+    /// If one of them may not be written.
+    pub(super) fn claim_all(self, path: &Path, extensions: &[&str]) -> anyhow::Result<()> {
+        self.claim(path)?;
+        if found(path)? == Found::Ours {
+            return Ok(());
+        }
+        extensions.iter().try_for_each(|extension| self.claim(&path.with_extension(extension)))
     }
 
     /// Makes sure that `path`, which people go on to edit, is not there or may be replaced.
@@ -75,5 +77,33 @@ impl Force {
             );
         }
         Ok(())
+    }
+}
+
+/// What is where a file shall be.
+#[derive(PartialEq)]
+enum Found {
+    Nothing,
+    Ours,
+    Other,
+}
+
+fn found(path: &Path) -> anyhow::Result<Found> {
+    let name = path.display();
+    let kind = match fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::Nothing),
+        Err(error) => return Err(error).with_context(|| name.to_string()),
+        Ok(kind) => kind,
+    };
+    if !kind.is_file() {
+        bail!("{name} is a folder, a device or a pipe; allowed is the name of a file");
+    }
+    let mut head = Vec::new();
+    let file = File::open(path).with_context(|| name.to_string())?;
+    file.take(HEAD).read_to_end(&mut head).with_context(|| name.to_string())?;
+    head.make_ascii_lowercase();
+    match head.windows(MARK.len()).any(|part| part == MARK) {
+        true => Ok(Found::Ours),
+        false => Ok(Found::Other),
     }
 }

@@ -224,7 +224,10 @@ impl Canvas {
             svg,
             r#"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="{FONT}">"#
         );
-        let _ = write!(svg, "\n<rect width=\"100%\" height=\"100%\" fill=\"{PAPER}\"/>\n");
+        let _ = write!(
+            svg,
+            "\n<!-- drawn by Palpate -->\n<rect width=\"100%\" height=\"100%\" fill=\"{PAPER}\"/>\n"
+        );
         svg + &self.body + "</svg>\n"
     }
 }

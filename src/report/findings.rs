@@ -3,6 +3,7 @@
 use super::number::{digits, with_error};
 use crate::experiment::measure::{CENTRED_R, COVERAGE, EDGE_RMSE, Measure, R, RMSE};
 use crate::experiment::metrics::constant_r;
+use crate::experiment::notice;
 use crate::experiment::store::Run;
 use crate::experiment::summary;
 use crate::experiment::summary::CurvePoint;
@@ -15,7 +16,8 @@ pub fn notices(run: &Run) -> Vec<String> {
     let total = run.experiment.trials as usize * run.experiment.planners.len();
     let is_partial = run.rows.len() < total;
     let partial = format!("Only {} of {total} trials are finished.", run.rows.len());
-    is_partial.then_some(partial).into_iter().collect()
+    let told = notice::of_run(run).into_iter().map(|notice| notice.to_string());
+    is_partial.then_some(partial).into_iter().chain(told).collect()
 }
 
 /// Sentences, the most important first.

@@ -7,6 +7,7 @@ mod approach;
 mod arm;
 mod backend;
 mod broken;
+mod commands;
 mod control;
 #[cfg(feature = "mujoco")]
 mod dynamic;
@@ -42,6 +43,8 @@ mod memory;
 mod meshes;
 mod messages;
 mod models;
+mod newcomer;
+mod notices;
 mod page;
 #[cfg(feature = "nlopt")]
 mod planners;

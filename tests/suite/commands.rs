@@ -1,0 +1,130 @@
+//! The command line as people know it.
+
+use crate::common::program::{command, ended, fails, folder, palpate, said, succeeds};
+use std::fs;
+use std::path::Path;
+
+#[test]
+fn what_has_a_name_is_listed() {
+    let home = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let all = succeeds(home, &["list"]);
+    for name in ["container_pa10", "bird_thin", "integrated_variance", "rmse_m", "electrodes"] {
+        assert!(all.lines().any(|line| line.trim_start().starts_with(name)), "{name} in {all}");
+    }
+    let planners = succeeds(home, &["list", "planners"]);
+    assert!(planners.contains("sobol") && !planners.contains("rmse_m"), "{planners}");
+    fails(home, &["list", "colours"], &["colours", "planners"]);
+}
+
+#[test]
+fn experiments_and_scenes_are_found_by_name() {
+    let folder = folder();
+    fs::create_dir(folder.path().join("experiments")).unwrap();
+    for name in ["mesh.obj", "scene.toml", "small.toml"] {
+        let inner = folder.path().join("experiments").join(name);
+        fs::rename(folder.path().join(name), inner).unwrap();
+    }
+    fails(folder.path(), &["run", "smal"], &["smal: no such file", "did you mean `small`?"]);
+    let text = succeeds(folder.path(), &["list", "experiments"]);
+    assert!(text.contains("small"), "{text}");
+    if cfg!(feature = "nlopt") {
+        succeeds(folder.path(), &["run", "small", "--no-report"]);
+        assert!(folder.path().join("runs/small/trials.jsonl").is_file());
+    }
+}
+
+#[test]
+fn shells_are_told_how_to_complete() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = succeeds(Path::new("."), &["completions", shell]);
+        assert!(script.contains("fidelity") && script.contains("no-report"), "{shell}");
+    }
+}
+
+#[test]
+#[cfg(feature = "nlopt")]
+fn a_summary_is_told_to_programs() {
+    let folder = folder();
+    let text = succeeds(folder.path(), &["run", "small.toml", "--no-report", "--json"]);
+    let told: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((&told["name"], &told["trials"]), (&"small".into(), &1.into()));
+    let line = &told["summary"][0];
+    assert_eq!((&line["planner"], &line["touches"]), (&"random".into(), &3.into()));
+    let csv = fs::read_to_string(folder.path().join("runs/small/summary.csv")).unwrap();
+    let columns = csv.lines().next().unwrap().split(',').skip(3);
+    let last = csv.lines().last().unwrap().split(',').skip(3);
+    for (column, cell) in columns.zip(last) {
+        assert_eq!(line["measures"][column].as_f64(), cell.parse().ok(), "{column}");
+    }
+    let shown = succeeds(folder.path(), &["show", "runs/small", "--json"]);
+    assert_eq!(serde_json::from_str::<serde_json::Value>(&shown).unwrap(), told);
+}
+
+/// Progress is for what takes long, and for who wants it.
+#[test]
+#[cfg(feature = "nlopt")]
+fn short_work_says_nothing_beside_its_result() {
+    let folder = folder();
+    let output = palpate(folder.path(), &["run", "small.toml", "--no-report"]);
+    assert!(output.status.success() && !said(&output).contains("left"), "{}", said(&output));
+}
+
+#[test]
+fn errors_are_coloured_where_that_is_asked_for_only() {
+    let folder = folder();
+    let plain = said(&palpate(folder.path(), &["run", "none.toml"]));
+    assert!(plain.starts_with("error: ") && !plain.contains('\u{1b}'), "{plain}");
+    let mut coloured = command(folder.path(), &["run", "none.toml"]);
+    let coloured = said(&ended(coloured.env("CLICOLOR_FORCE", "1"), "coloured"));
+    assert!(coloured.contains("\u{1b}[") && coloured.contains("error:"), "{coloured}");
+}
+
+#[test]
+fn files_of_others_are_replaced_by_force_only() {
+    let folder = folder();
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
+    let scene = read("scene.toml");
+    for (option, file) in [
+        ("--mjcf", "scene.toml"),
+        ("--png", "scene.toml"),
+        ("--mjcf", "mesh.obj"),
+        ("--render", "small.toml"),
+    ] {
+        let before = read(file);
+        let says = [file, "--force"];
+        fails(folder.path(), &["show", "scene.toml", option, file], &says);
+        assert_eq!(read(file), before, "{option} {file}");
+    }
+    for special in ["/dev/null", "/dev/full", "."] {
+        for force in [&[][..], &["--force"]] {
+            let arguments = [&["show", "scene.toml", "--mjcf", special], force].concat();
+            fails(folder.path(), &arguments, &["a folder, a device or a pipe"]);
+        }
+    }
+    fs::write(folder.path().join("notes.txt"), "mine").unwrap();
+    let says = ["no cloud.ply", "--force"];
+    fails(folder.path(), &["scan", "scene.toml", "--grid", "3x3", "--out", "."], &says);
+    for force in [&[][..], &[][..]] {
+        let scan = ["scan", "scene.toml", "--grid", "3x3", "--out", "new"];
+        succeeds(folder.path(), &[&scan, force].concat());
+        succeeds(folder.path(), &["show", "scene.toml", "--mjcf", "scene.xml"]);
+    }
+    succeeds(folder.path(), &["show", "scene.toml", "--mjcf", "notes.txt", "--force"]);
+    assert!(read("notes.txt").contains("<mujoco"));
+    assert_eq!(read("scene.toml"), scene);
+}
+
+#[test]
+#[cfg(feature = "nlopt")]
+fn an_exported_belief_replaces_its_own_files_only() {
+    let folder = folder();
+    succeeds(folder.path(), &["run", "small.toml", "--no-report"]);
+    let export = ["export", "runs/small", "--planner", "random", "--out", "it.ply"];
+    fs::write(folder.path().join("it.svg"), "mine").unwrap();
+    fails(folder.path(), &export, &["it.svg is there", "--force"]);
+    assert!(!folder.path().join("it.ply").exists());
+    succeeds(folder.path(), &[&export[..], &["--force"]].concat());
+    succeeds(folder.path(), &export);
+    let onto_mesh = ["export", "runs/small", "--planner", "random", "--out", "mesh.obj"];
+    fails(folder.path(), &onto_mesh, &["mesh.obj is there", "--force"]);
+}
