@@ -15,7 +15,7 @@
 //! | 3 | [`task`], [`backend`] | what the robot is told; what is commanded and read |
 //! | 2 | [`robot`], [`gp`] | arm and finger; Gaussian processes |
 //! | 1 | [`geometry`], [`config`], [`math`] | know nothing of each other |
-//! | 0 | [`files`] | reads what somebody named |
+//! | 0 | [`files`], [`words`] | read what somebody named; how messages put values |
 //!
 //! [`experiment::Simulation`] is the front door: from an experiment's file to its trials. What
 //! stands below `sim` is what runs on a real arm: a [`Servo`](explore::probe::servo::Servo) is made
@@ -42,3 +42,4 @@ pub mod robot;
 pub mod sim;
 pub mod study;
 pub mod task;
+pub mod words;

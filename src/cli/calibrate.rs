@@ -1,12 +1,12 @@
 //! `palpate calibrate`.
 
 use super::terminal::{Ending, print};
-use crate::files;
 use crate::sim::finger::calibration::{Free, Model, Residual, fit, residual};
 use crate::sim::finger::effects::Effects;
 use crate::sim::finger::effects::fluid::FluidEffect;
 use crate::sim::finger::plate::{Attitude, Recordings};
-use anyhow::Context;
+use crate::{files, words};
+use anyhow::{Context, anyhow};
 use std::path::PathBuf;
 
 /// Fit the finger's constants to recordings of it on a flat plate.
@@ -27,8 +27,10 @@ pub fn run(args: &Args) -> anyhow::Result<Ending> {
     let name = args.recordings.display();
     let text = files::text(&args.recordings, files::TEXT_MAX)
         .with_context(|| format!("cannot read {name}"))?;
-    let recordings: Recordings =
-        serde_json::from_str(&text).with_context(|| format!("{name} is not a recording"))?;
+    let recordings: Recordings = serde_json::from_str(&text).map_err(|error| {
+        let (line, what) = (error.line(), words::json(&error));
+        anyhow!("{name}:{line}: not a recording: {what}")
+    })?;
     let free = if args.attitude_only { Free::Attitude } else { Free::Constants };
     for recording in &recordings.sensors {
         let start = Model {

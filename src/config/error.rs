@@ -1,6 +1,6 @@
 //! What can be wrong with a configuration, and where.
 
-use super::words::brief;
+use crate::words::brief;
 use std::fmt;
 use std::path::PathBuf;
 use thiserror::Error;

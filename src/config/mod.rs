@@ -2,12 +2,11 @@
 
 mod error;
 mod rules;
-pub mod words;
 
 pub use error::{ConfigError, Origin};
 pub use rules::{Checked, Rules};
 
-use crate::files;
+use crate::{files, words};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::element::Element;
+use crate::words;
 
 /// A file that gave no mesh: which file, and what is wrong with it.
 #[derive(Debug, Error)]
@@ -159,7 +160,7 @@ pub enum PlyFault {
         count: usize,
     },
     /// An element lacks what it is read for.
-    #[error("PLY: element \"{element}\" has no {needed}")]
+    #[error("PLY: element \"{element}\" must have {needed}")]
     Lacks {
         /// The element.
         element: String,
@@ -182,7 +183,7 @@ pub enum PlyFault {
 #[non_exhaustive]
 pub enum GltfFault {
     /// The JSON cannot be parsed.
-    #[error("JSON: {0}")]
+    #[error("JSON: line {}, column {}: {}", .0.line(), .0.column(), words::json(.0))]
     Json(#[from] gltf::json::Error),
     /// The binary container is broken.
     #[error("binary container: {0}")]

@@ -72,7 +72,7 @@ fn streams_that_cannot_be_written_stop_no_work() {
     let run = |out: &str, stderr: Stdio| {
         let mut command = command(folder.path(), &["run", "small.toml", "--out", out]);
         // Notes of progress go to standard error, one for each tenth of the trials.
-        command.args(["--set", "trials=12"]).stderr(stderr).status().unwrap()
+        command.args(["--set", "trials=12"]).stdout(Stdio::null()).stderr(stderr).status().unwrap()
     };
     assert!(run("full", full()).success());
     let (reader, writer) = std::io::pipe().unwrap();

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms of `src`, lowest floor first; the rooms of a floor know nothing of each other.
 const FLOORS: [&[&str]; 10] = [
-    &["files"],
+    &["files", "words"],
     &["geometry", "config", "math"],
     &["robot", "gp"],
     &["task", "backend"],

@@ -3,6 +3,8 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use rand::{RngExt, SeedableRng};
@@ -12,51 +14,67 @@ use tempfile::TempDir;
 use crate::common::program::{command, fails, folder, said, succeeds};
 
 /// Kills of one test; `PALPATE_FUZZ` asks for more.
-const KILLS: u32 = 100;
+const KILLS: u64 = 100;
 
-fn run(folder: &Path, out: &Path, more: &[&str]) -> std::process::Output {
-    let mut command =
-        command(folder, &["run", "small.toml", "--threads", "1", "--set", "trials=4"]);
-    command.arg("--out").arg(out).args(more).output().unwrap()
+/// Runs that are killed at the same time.
+const WORKERS: u64 = 4;
+
+fn begun(folder: &Path, out: &Path, more: &[&str]) -> Command {
+    let mut command = command(folder, &["run", "small.toml", "--threads", "1"]);
+    command.args(["--set", "trials=4", "--out"]).arg(out).args(more);
+    command
+}
+
+fn run(folder: &Path, out: &Path, more: &[&str]) -> Output {
+    begun(folder, out, more).output().unwrap()
+}
+
+/// One folder whose run is killed once or twice, and resumed.
+fn kill_and_resume(folder: &Path, kill: u64, longest: Duration, whole: &[u8]) {
+    let out = folder.join(format!("killed-{kill}"));
+    let mut random = ChaCha8Rng::seed_from_u64(kill);
+    for again in 0..=kill % 2 {
+        let fresh: &[&str] = if again == 1 && kill % 4 == 3 { &["--fresh"] } else { &[] };
+        let mut command = begun(folder, &out, &[fresh, &["--no-report"]].concat());
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        sleep(longest.mul_f64(random.random()));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    let fresh: &[&str] = if kill % 10 == 9 { &["--fresh"] } else { &[] };
+    let resumed = run(folder, &out, &[fresh, &["--no-report"]].concat());
+    let left = || fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name());
+    assert!(
+        resumed.status.success(),
+        "{kill}: {} {:?}",
+        said(&resumed),
+        left().collect::<Vec<_>>()
+    );
+    assert!(fs::read(out.join("trials.jsonl")).unwrap() == whole, "{kill}");
+    fs::remove_dir_all(&out).unwrap();
 }
 
 #[test]
 fn kills_at_random_moments_of_the_first_second_all_resume() {
     let folder = folder();
+    let folder = folder.path();
     let started = Instant::now();
-    assert!(run(folder.path(), &folder.path().join("whole"), &[]).status.success());
+    assert!(run(folder, &folder.join("whole"), &["--no-report"]).status.success());
     // A run that is over sooner is killed in all of its life.
     let longest = started.elapsed().min(Duration::from_secs(1));
-    let whole = fs::read(folder.path().join("whole/trials.jsonl")).unwrap();
-    let mut random = ChaCha8Rng::seed_from_u64(13);
-    let kills =
-        std::env::var("PALPATE_FUZZ").map_or(KILLS, |count| count.parse::<u32>().unwrap() / 100);
-    for kill in 0..kills.max(KILLS) {
-        let out = folder.path().join(format!("killed-{kill}"));
-        let fresh: &[&str] = if kill % 4 == 3 { &["--fresh"] } else { &[] };
-        // Some are killed a second time, while they begin anew or resume.
-        for arguments in [&[][..], fresh].iter().take(1 + kill as usize % 2) {
-            let mut child = command(folder.path(), &["run", "small.toml", "--set", "trials=4"]);
-            child.arg("--out").arg(&out).args(*arguments);
-            let mut child = child
-                .stdout(std::process::Stdio::null())
-                .stderr(std::process::Stdio::null())
-                .spawn()
-                .unwrap();
-            std::thread::sleep(longest.mul_f64(random.random()));
-            child.kill().unwrap();
-            child.wait().unwrap();
+    let whole = fs::read(folder.join("whole/trials.jsonl")).unwrap();
+    let asked =
+        std::env::var("PALPATE_FUZZ").map_or(0, |count| count.parse::<u64>().unwrap() / 100);
+    let kills = asked.max(KILLS);
+    std::thread::scope(|scope| {
+        for worker in 0..WORKERS {
+            let kills = (worker..kills).step_by(WORKERS as usize);
+            let whole = &whole;
+            scope.spawn(move || {
+                kills.for_each(|kill| kill_and_resume(folder, kill, longest, whole))
+            });
         }
-        let more: &[&str] =
-            if kill % 10 == 9 { &["--fresh", "--no-report"] } else { &["--no-report"] };
-        let resumed = run(folder.path(), &out, more);
-        let left = || {
-            fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>()
-        };
-        assert!(resumed.status.success(), "kill {kill}: {} {:?}", said(&resumed), left());
-        assert!(fs::read(out.join("trials.jsonl")).unwrap() == whole, "kill {kill}");
-        fs::remove_dir_all(&out).unwrap();
-    }
+    });
 }
 
 /// A folder as a crash leaves it: files and how many of their bytes.

@@ -54,7 +54,7 @@ fn values_of_a_wrong_type_are_told_what_is_allowed() {
         ("scene.object.unit={}", &["`scene.object.unit`", "allowed is m, cm, mm, um, in"]),
         ("scene.zone=3", &["`scene.zone` = 3", "allowed is a table"]),
         ("scene.object.mesh=3", &["`scene.object.mesh` = 3", "allowed is text in quotes"]),
-        ("gp.noise=[0,1e308]", &["`gp.noise[1]` = 1e308"]),
+        ("gp.noise=[1,1e308]", &["`gp.noise[1]` = 1e308"]),
         ("scene.zone.x_m=[-1e308,1e308]", &["-1e308"]),
     ];
     let folder = folder();

@@ -1,10 +1,9 @@
 //! The lines of `trials.jsonl`.
 
 use super::error::{StoreError, io_error};
-use crate::config::words;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::row::{TouchRow, TrialRow};
-use crate::files;
+use crate::{files, words};
 use std::collections::HashSet;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
@@ -32,7 +31,8 @@ pub(super) fn read(
     let lines = bytes.split_inclusive(|&byte| byte == b'\n').filter(|line| line.ends_with(b"\n"));
     for (i, line) in lines.enumerate() {
         let bad = |message| StoreError::BadRow { path: path.into(), line: i + 1, message };
-        let row: TrialRow = serde_json::from_slice(line).map_err(|error| bad(told(&error)))?;
+        let row: TrialRow =
+            serde_json::from_slice(line).map_err(|error| bad(in_its_line(&error)))?;
         belongs(&row, experiment).map_err(bad)?;
         if !seen.insert((row.trial, row.planner.clone())) {
             return Err(bad(format!("trial {} of {} stands there twice", row.trial, row.planner)));
@@ -43,13 +43,9 @@ pub(super) fn read(
     Ok((rows, good as u64))
 }
 
-/// What the parser of one line says, without that this is line 1.
-fn told(error: &serde_json::Error) -> String {
-    let text = error.to_string();
-    let what = text.split(" at line ").next().unwrap_or_default();
-    let what =
-        words::allowed(what).map_or_else(|| what.into(), |allowed| format!("allowed is {allowed}"));
-    format!("column {}: {what}", error.column())
+/// What is wrong with a line: the parser knows no other.
+fn in_its_line(error: &serde_json::Error) -> String {
+    format!("column {}: {}", error.column(), words::json(error))
 }
 
 /// Whether a row can be one of the experiment's, whichever trials and planners it lists; if not,

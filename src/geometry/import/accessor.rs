@@ -12,7 +12,7 @@ use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
-use super::{BYTES_MAX, Buffers, Source};
+use super::source::{BYTES_MAX, Buffers, Source};
 use crate::files;
 use crate::geometry::error::{BufferFault, GltfFault};
 

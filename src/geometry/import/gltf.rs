@@ -11,8 +11,8 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Mesh, Root};
 use nalgebra::{Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
 
-use super::Source;
 use super::accessor::{Document, find};
+use super::source::Source;
 use crate::files::unmarked;
 use crate::geometry::error::{GltfFault, MeshFault};
 use crate::geometry::raw::RawMesh;

@@ -14,25 +14,12 @@ mod accessor;
 mod gltf;
 mod obj;
 mod ply;
+mod source;
 mod stl;
 
-/// Where the buffers of a glTF document may lie.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Buffers {
-    /// In the folder of the document or below it, so that a mesh from a stranger opens no other
-    /// file.
-    #[default]
-    Beside,
-    /// Anywhere.
-    Anywhere,
-}
+pub use source::Buffers;
 
-/// A file that is read.
-struct Source<'a> {
-    path: &'a Path,
-    bytes: &'a [u8],
-    buffers: Buffers,
-}
+use source::{BYTES_MAX, Source};
 
 type Reader = fn(&Source) -> Result<RawMesh, MeshFault>;
 
@@ -44,10 +31,6 @@ const FORMATS: &[(&str, Reader)] = &[
     ("stl", stl::read),
     ("ply", ply::read),
 ];
-
-/// Most bytes of a mesh file, and of all buffers it refers to; chosen: the most triangles that are
-/// accepted take 1.3 GB as the longest of texts, an STL.
-const BYTES_MAX: u64 = 2 << 30;
 
 /// Reads a mesh file, scales it by `metres_per_unit` and repairs it. Buffers that a glTF document
 /// refers to must lie [beside](Buffers::Beside) it.
@@ -94,9 +77,4 @@ fn read_and_repair(
     let mut raw = read(&Source { path, bytes: &bytes, buffers })?;
     raw.scale(metres_per_unit);
     repair(raw)
-}
-
-/// A line as a message shows it: long ones cut.
-fn cut(line: &str) -> String {
-    line.trim().chars().take(60).collect()
 }

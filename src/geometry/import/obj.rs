@@ -4,7 +4,7 @@
 
 use nalgebra::Point3;
 
-use super::{Source, cut};
+use super::source::{Source, cut};
 use crate::files::unmarked;
 use crate::geometry::error::MeshFault;
 use crate::geometry::raw::RawMesh;

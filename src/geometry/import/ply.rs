@@ -6,7 +6,7 @@ use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::PropertyAccessResult::{Ignored, Set, UnsupportedType};
 use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
 
-use super::{Source, cut};
+use super::source::{Source, cut};
 use crate::files::unmarked;
 use crate::geometry::error::{MeshFault, PlyFault};
 use crate::geometry::raw::RawMesh;
@@ -80,8 +80,11 @@ fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> MeshFault {
             MeshFault::Line { line, expected: "PLY as its header declares it", found }
         }
         None => {
+            // Behind "Line 7: ": what is no text has no lines.
             let words = error.to_string();
-            PlyFault::Binary(words.lines().next().unwrap_or_default().into()).into()
+            let message = words.split_once(": ").filter(|_| error.line().is_some());
+            let message = message.map_or(words.as_str(), |(_, message)| message);
+            PlyFault::Binary(message.lines().next().unwrap_or_default().into()).into()
         }
     }
 }

@@ -5,7 +5,7 @@ use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use nalgebra::Point3;
 use stl_io::{Triangle, create_stl_reader};
 
-use super::{Source, cut};
+use super::source::{Source, cut};
 use crate::files::unmarked;
 use crate::geometry::error::MeshFault;
 use crate::geometry::raw::RawMesh;
@@ -37,7 +37,8 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
         let triangles = create_stl_reader(&mut lines).and_then(Iterator::collect);
         let triangles = triangles.map_err(|_| {
             let read = &solid[..start + lines.at];
-            let found = read.lines().last().unwrap_or_default();
+            let found = read.lines().last().filter(|line| !line.is_empty());
+            let found = found.unwrap_or("the end of the file");
             let line = lines_before + read.lines().count();
             MeshFault::Line { line, expected: STATEMENTS, found: cut(found) }
         })?;

@@ -1,4 +1,4 @@
-//! What messages say of values, in the words of those who write settings.
+//! How messages put values and what parsers say, in the words of those who write settings.
 
 /// Most characters of a value that a message repeats; chosen.
 const SHOWN_MAX: usize = 60;
@@ -42,4 +42,17 @@ pub fn allowed(message: &str) -> Option<String> {
             format!("a list of {count} values")
         }
     })
+}
+
+/// What is wrong with a JSON text, without its place.
+pub fn json(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    let what = text.split(" at line ").next().unwrap_or_default();
+    match (allowed(what), what.rsplit_once("expected ")) {
+        (Some(allowed), _) => format!("allowed is {allowed}"),
+        (None, Some((before, expected))) if before.starts_with("invalid ") => {
+            format!("allowed is {expected}")
+        }
+        _ => what.into(),
+    }
 }

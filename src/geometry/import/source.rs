@@ -1,0 +1,30 @@
+//! What every importer is given: the bytes of a file, and where else it may look.
+
+use std::path::Path;
+
+/// Where the buffers of a glTF document may lie.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Buffers {
+    /// In the folder of the document or below it, so that a mesh from a stranger opens no other
+    /// file.
+    #[default]
+    Beside,
+    /// Anywhere.
+    Anywhere,
+}
+
+/// A file that is read.
+pub(super) struct Source<'a> {
+    pub path: &'a Path,
+    pub bytes: &'a [u8],
+    pub buffers: Buffers,
+}
+
+/// Most bytes of a mesh file, and of all buffers it refers to; chosen: the most triangles that are
+/// accepted take 1.3 GB as the longest of texts, an STL.
+pub(super) const BYTES_MAX: u64 = 2 << 30;
+
+/// A line as a message shows it: long ones cut.
+pub(super) fn cut(line: &str) -> String {
+    line.trim().chars().take(60).collect()
+}
