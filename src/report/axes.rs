@@ -133,9 +133,12 @@ impl Axis {
         decades
             .flat_map(|power| digits.iter().map(move |digit| (digit, power)))
             .map(|(digit, power)| {
-                let decimals = (-power).max(0) as usize;
                 let value = digit * 10f64.powi(power);
-                (value, format!("{value:.decimals$}"))
+                let label = match power {
+                    -3.. => format!("{value:.decimals$}", decimals = (-power).max(0) as usize),
+                    _ => format!("{digit}e−{}", -power),
+                };
+                (value, label)
             })
             .filter(|(value, _)| (self.low..=self.high).contains(value))
             .collect()
@@ -213,16 +216,15 @@ impl Panel {
         canvas.rect(self.area, &style::stroke(FAINT_INK, 1.0));
     }
 
-    /// What stands above and beside the panel, and its letter; empty words are left out.
+    /// What stands above and beside the panel; empty words are left out.
     pub fn label(&self, canvas: &mut Canvas, title: &str, x: &str, y: &str) {
-        canvas.letter([self.area.left, self.area.top - 9.0]);
-        self.words(canvas, title, x, y);
+        canvas.title([self.area.centre()[0], self.area.top - 9.0], title);
+        self.name_axes(canvas, x, y);
     }
 
-    /// The same without a letter.
-    pub fn words(&self, canvas: &mut Canvas, title: &str, x: &str, y: &str) {
+    /// What stands beside the panel.
+    pub fn name_axes(&self, canvas: &mut Canvas, x: &str, y: &str) {
         let [centre_x, centre_y] = self.area.centre();
-        canvas.text([centre_x, self.area.top - 9.0], title, TEXT_PX, Anchor::Middle);
         canvas.text([centre_x, self.area.bottom() + 35.0], x, TEXT_PX, Anchor::Middle);
         canvas.upward_text([self.area.left - 46.0, centre_y], y, TEXT_PX, INK);
     }

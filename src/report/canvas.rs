@@ -56,15 +56,15 @@ pub struct Canvas {
     width: f64,
     height: f64,
     body: String,
-    /// Where the panels have their letters.
-    letters: Vec<PointPx>,
+    /// Where the panels have their titles.
+    titles: Vec<(PointPx, String)>,
 }
 
 impl Canvas {
     /// An empty sheet of whole pixels.
     pub fn new(width: f64, height: f64) -> Self {
         let [width, height] = [width, height].map(f64::ceil);
-        Self { width, height, body: String::new(), letters: Vec::new() }
+        Self { width, height, body: String::new(), titles: Vec::new() }
     }
 
     /// An open line.
@@ -176,18 +176,29 @@ impl Canvas {
         ));
     }
 
-    /// The letter of a panel, the next one of the alphabet. A panel alone needs none, so they are
-    /// written when the drawing is finished.
-    pub fn letter(&mut self, at: PointPx) {
-        self.letters.push(at);
+    /// The title of a panel, in the middle, behind its letter, the next one of the alphabet. A panel
+    /// alone needs no letter, so titles are written when the drawing is finished.
+    pub fn title(&mut self, at: PointPx, words: &str) {
+        self.titles.push((at, words.into()));
     }
 
-    fn write_letters(&mut self) {
-        let letters = std::mem::take(&mut self.letters);
-        for (i, at) in letters.iter().enumerate().filter(|_| letters.len() > 1) {
-            let attributes =
-                format!(r#"x="{}" y="{}" font-weight="bold""#, number(at[0]), number(at[1]));
-            self.words(&letter(i), TEXT_PX, Anchor::Start, INK, &attributes);
+    fn write_titles(&mut self) {
+        let titles = std::mem::take(&mut self.titles);
+        let is_alone = titles.len() == 1;
+        for (i, ([x, y], words)) in titles.iter().enumerate() {
+            if is_alone && words.is_empty() {
+                return;
+            }
+            let letter = match is_alone {
+                true => String::new(),
+                false => format!("<tspan font-weight=\"bold\">{}</tspan>", letter(i)),
+            };
+            // Spaces that no reader of the SVG takes for one.
+            let gap = if is_alone || words.is_empty() { "" } else { "\u{a0}\u{a0}" };
+            let (x, y, words) = (number(*x), number(*y), escape(words));
+            self.push(&format!(
+                r#"<text x="{x}" y="{y}" font-size="{TEXT_PX}" text-anchor="middle" fill="{INK}">{letter}{gap}{words}</text>"#
+            ));
         }
     }
 
@@ -217,7 +228,7 @@ impl Canvas {
 
     /// The whole drawing.
     pub fn finish(mut self) -> String {
-        self.write_letters();
+        self.write_titles();
         let [width, height] = [self.width, self.height].map(number);
         let mut svg = String::new();
         let _ = write!(

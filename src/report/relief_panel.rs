@@ -5,7 +5,7 @@ use super::axes::Length;
 use super::canvas::{Anchor, Area, Canvas, PointPx};
 use super::relief::{Space, View};
 use super::style;
-use super::style::{FAINT_INK, SMALL_PX, TEXT_PX};
+use super::style::{FAINT_INK, SMALL_PX};
 
 /// Room for the title.
 const TITLE_PX: f64 = 42.0;
@@ -37,8 +37,7 @@ impl ReliefPanel {
     pub fn frame(&self, canvas: &mut Canvas, title: &str, score: &str) {
         let middle = self.area.centre()[0];
         let top = self.area.top;
-        canvas.letter([self.area.left + 4.0, top + 14.0]);
-        canvas.text([middle, top + 14.0], title, TEXT_PX, Anchor::Middle);
+        canvas.title([middle, top + 14.0], title);
         canvas.coloured_text([middle, top + 31.0], score, SMALL_PX, Anchor::Middle, FAINT_INK);
         let Space { x_m: [x0, x1], z_m: [z0, z1], height_m: [back, front] } = self.space;
         let corner = |x, height, z| self.view.at([x, height, z]);

@@ -109,6 +109,9 @@ addEventListener("load", () => setTimeout(() => {
     say(name, "figure words", contrast(style(text).fill, ground(text.closest("figure"))), text.textContent);
     say(name, "figure size", size, text.textContent);
   }
+  for (const sheet of document.querySelectorAll("figure svg > rect:first-child")) {
+    say(name, "sheet", style(sheet).fill);
+  }
   for (const line of document.querySelectorAll("figure svg [stroke-width='2']:not(.relief *)")) {
     say(name, "curves", contrast(style(line).stroke, ground(line.closest("figure"))), line.getAttribute("stroke"));
   }
@@ -248,6 +251,9 @@ fn the_page_fits_every_width_on_light_and_dark_paper() {
                 for line in said(&format!("{what} cue")) {
                     assert_eq!(line[2], "local, local, scroll, scroll", "{place}: {what}");
                 }
+            }
+            for line in said("sheet") {
+                assert_eq!(line[2], "none", "{place}: a sheet covers the cue");
             }
             for line in said("head moved") {
                 assert!(number(line).abs() < 1.0, "{place}: {line:?}");

@@ -141,6 +141,7 @@ fn ticks_are_round() {
     assert_eq!(labels(Axis::linear(-0.1, 0.32, 4.0)), ["0.0", "0.2"]);
     assert_eq!(labels(Axis::linear(-50.0, 50.0, 5.0)), ["−40", "−20", "0", "20", "40"]);
     assert_eq!(labels(Axis::log([0.03, 40.0]).unwrap()), ["0.1", "1", "10"]);
+    assert_eq!(labels(Axis::log([1e-5, 0.01]).unwrap()), ["1e−5", "1e−4", "0.001", "0.01"]);
     assert_eq!(labels(Axis::log([2.0, 12.0]).unwrap()), ["2", "3", "5", "7", "10"]);
     assert!(Axis::log([0.0, f64::NAN]).is_none());
     // No range, or hardly one, must not make endless labels.

@@ -11,7 +11,7 @@ use crate::report::legend::{Legend, Swatch};
 use crate::report::replay;
 use crate::report::replay::Replay;
 use crate::report::style;
-use crate::report::style::{FAINT_INK, INITIAL, INK, LATER, SMALL_PX, TEXT_PX, TRUTH};
+use crate::report::style::{FAINT_INK, INITIAL, INK, LATER, SMALL_PX, TRUTH};
 use crate::task::Zone;
 
 pub(super) const FIGURE: Figure = Figure { name: "curves", caption, draw };
@@ -72,12 +72,10 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             let x_label = if is_last_row { format!("x ({})", unit.symbol) } else { String::new() };
             let y_label = format!("{planner}: height ({})", unit.symbol);
             let middle = area.left + 0.5 * PANEL.0;
-            canvas.letter([area.left, area.top - 24.0]);
-            let words = format!("{count} touches");
-            canvas.text([middle, area.top - 24.0], &words, TEXT_PX, Anchor::Middle);
+            canvas.title([middle, area.top - 24.0], &format!("{count} touches"));
             let above = [middle, area.top - 8.0];
             canvas.coloured_text(above, &score, SMALL_PX, Anchor::Middle, FAINT_INK);
-            panel.words(&mut canvas, "", &x_label, if column == 0 { &y_label } else { "" });
+            panel.name_axes(&mut canvas, &x_label, if column == 0 { &y_label } else { "" });
             if let Some(replay) = replay {
                 let colour = style::planner(&run.experiment.planners, planner);
                 draw_belief(&mut canvas, &panel, run, &replay, colour);
