@@ -31,6 +31,8 @@ mod hard;
 mod import;
 #[cfg(feature = "nlopt")]
 mod information;
+#[cfg(feature = "mujoco")]
+mod installed;
 mod memory;
 mod meshes;
 mod models;
