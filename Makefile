@@ -4,13 +4,16 @@
 DEPS := .deps
 MUJOCO := 3.17.0
 LIBRARY := $(DEPS)/lib/libmujoco.so
+MUJOCO_LICENCES := $(DEPS)/lib/licences
 CMAKE := $(DEPS)/bin/cmake
 # Which file of the package does not depend on the Python that fetches it.
 PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementation cp --abi cp312
 FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
 PALPATE := target/release/palpate
+VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
+DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: demo paper paper-dynamic paper-planners test page-test fuzz reference lint bench contacts growth bench-peers setup tools clean
+.PHONY: demo paper paper-dynamic paper-planners test page-test fuzz reference lint bench contacts growth bench-peers dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -89,6 +92,17 @@ $(DEPS)/peers/bin/python: benches/peers.txt
 	$(DEPS)/peers/bin/python -m pip install --quiet --only-binary=:all: -r benches/peers.txt
 	touch $@
 
+# An archive that runs where it is unpacked: program, library, what ships with them, licences.
+dist: setup $(MUJOCO_LICENCES)
+	cargo build --release --locked
+	rm -rf target/dist && mkdir -p target/dist/$(DIST)/licences
+	cp $(PALPATE) $(DEPS)/lib/libmujoco.so.$(MUJOCO) README.md CHANGELOG.md CITATION.cff target/dist/$(DIST)
+	cp -r docs models scenes experiments target/dist/$(DIST)
+	cp LICENSE-* target/dist/$(DIST)/licences
+	cp -r $(MUJOCO_LICENCES) target/dist/$(DIST)/licences/mujoco
+	python3 .cargo/licences.py > target/dist/$(DIST)/licences/packages.txt
+	tar -C target/dist -czf target/dist/$(DIST).tar.gz $(DIST)
+
 setup: tools $(LIBRARY) $(CMAKE)
 
 tools:
@@ -96,13 +110,14 @@ tools:
 	@command -v cc >/dev/null || { echo "a C compiler is missing: install gcc (Debian: apt-get install gcc)" >&2; exit 1; }
 	@command -v python3 >/dev/null || { echo "python3 is missing (Debian: apt-get install python3 python3-pip)" >&2; exit 1; }
 
-# The physics engine's shared library, out of its Python package.
-$(LIBRARY): .cargo/mujoco.txt | tools
+# The physics engine's shared library with its licences, out of its Python package.
+$(LIBRARY) $(MUJOCO_LICENCES) &: .cargo/mujoco.txt | tools
 	@python3 -m pip --version >/dev/null || { echo "pip is missing (Debian: apt-get install python3-pip)" >&2; exit 1; }
-	rm -rf $(DEPS)/mujoco && mkdir -p $(DEPS)/mujoco $(DEPS)/lib
+	rm -rf $(DEPS)/mujoco && mkdir -p $(DEPS)/mujoco $(MUJOCO_LICENCES)
 	$(FETCH) $(PLATFORM) -r .cargo/mujoco.txt -d $(DEPS)/mujoco
 	cd $(DEPS)/mujoco && python3 -m zipfile -e mujoco-*.whl .
 	cp $(DEPS)/mujoco/mujoco/libmujoco.so.$(MUJOCO) $(DEPS)/lib/
+	cp $(DEPS)/mujoco/mujoco-*.dist-info/licenses/* $(MUJOCO_LICENCES)
 	rm -rf $(DEPS)/mujoco
 	ln -sf libmujoco.so.$(MUJOCO) $@
 

@@ -18,8 +18,13 @@ fn main() {
     if env::var_os("CARGO_FEATURE_MUJOCO").is_none() {
         return;
     }
+    // An installed program has the library beside it, or in the lib beside its bin.
+    for beside in ["", "/../lib"] {
+        println!("cargo::rustc-link-arg-bin=palpate=-Wl,-rpath,$ORIGIN{beside}");
+    }
     // Relative first, so that a folder that was moved whole still runs: binaries lie in
-    // target/PROFILE, tests and examples one level deeper.
+    // target/PROFILE, tests and examples one level deeper. The absolute one is where `cargo install`
+    // leaves the library.
     for up in ["../..", "../../.."] {
         println!("cargo::rustc-link-arg=-Wl,-rpath,$ORIGIN/{up}/.deps/lib");
     }

@@ -39,6 +39,8 @@ mod hard;
 mod import;
 #[cfg(feature = "nlopt")]
 mod information;
+#[cfg(feature = "mujoco")]
+mod installed;
 mod memory;
 mod meshes;
 mod messages;

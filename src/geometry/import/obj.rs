@@ -34,8 +34,8 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
 /// are still known. tobj would overflow on the other indices of a face if they are out of range,
 /// and names no line in its errors.
 fn geometry_only(text: &str) -> Result<String, MeshFault> {
-    let keyword = |line: &str| line.split_whitespace().next().map(str::to_owned);
-    let vertices = text.lines().filter(|line| keyword(line).as_deref() == Some("v")).count();
+    let is_vertex = |line: &&str| line.split_whitespace().next() == Some("v");
+    let vertices = text.lines().filter(is_vertex).count();
     let mut kept = String::with_capacity(text.len());
     let mut seen = 0;
     for (number, line) in text.lines().enumerate() {
