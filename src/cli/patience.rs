@@ -4,7 +4,7 @@ use super::terminal::{Talk, tell};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// How long a step may take before its name is shown; chosen, as long as one waits without wondering.
+/// How long a step may take before its name is shown; chosen.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Does `work`, which tells the name of each of its steps as it begins, and shows on standard error

@@ -1,5 +1,5 @@
-//! From files to what runs: it is refused what cannot be, and said on standard error what may not be
-//! meant.
+//! From files to what runs: what cannot be is refused, and what may not be meant is said on
+//! standard error.
 
 use super::patience::with_patience;
 use super::terminal::Talk;

@@ -131,8 +131,8 @@ fn tenth_mm(length_m: f64) -> f64 {
 /// Rays along each side of an object's silhouette; chosen.
 const RAYS: usize = 61;
 
-/// Share of a zone that has a surface; chosen, so that a rounded corner costs no row of places and no
-/// touch is spent on a rim.
+/// Share of a zone that has a surface; chosen, so that a rounded corner costs no row of places and
+/// no touch is spent on a rim.
 const FILLED: f64 = 0.98;
 
 /// Room behind the farthest surface of a zone; chosen.

@@ -87,8 +87,8 @@ impl<'a> Fingers<'a> {
         })
     }
 
-    /// For each a y in the zone's frame below which its tip does not come, from the surface at every
-    /// target: no hull lets it through.
+    /// For each a y in the zone's frame below which its tip does not come, from the surface at
+    /// every target: no hull lets it through.
     fn lowest_y_m(&self) -> Vec<f64> {
         let surface_y_m: Vec<Option<f64>> =
             (0..self.tips_y_m.len()).into_par_iter().map(|at| self.surface_y_m(at)).collect();

@@ -306,8 +306,8 @@ impl Scene {
         })
     }
 
-    /// The effects, or those of a BioTac (skin, fluid and electrodes, with their defaults) where the
-    /// body must feel and the scene names none.
+    /// The effects, or those of a BioTac (skin, fluid and electrodes, with their defaults) where
+    /// the body must feel and the scene names none.
     pub fn felt_effects(&self) -> Cow<'_, Effects> {
         match self.body == Body::Kinematic && self.effects == Effects::default() {
             true => Cow::Owned(Effects::biotac()),
