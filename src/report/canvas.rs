@@ -176,8 +176,8 @@ impl Canvas {
         ));
     }
 
-    /// The title of a panel, in the middle, behind its letter, the next one of the alphabet. A panel
-    /// alone needs no letter, so titles are written when the drawing is finished.
+    /// The title of a panel, in the middle, behind its letter, the next one of the alphabet. A
+    /// panel alone needs no letter, so titles are written when the drawing is finished.
     pub fn title(&mut self, at: PointPx, words: &str) {
         self.titles.push((at, words.into()));
     }
