@@ -10,6 +10,9 @@ use super::style::{FAINT_INK, SMALL_PX};
 /// Room for the title.
 const TITLE_PX: f64 = 42.0;
 
+/// The shortest side along which its name fits between the numbers at its ends.
+const UPWARD_MIN_PX: f64 = 80.0;
+
 /// A panel.
 pub struct ReliefPanel {
     /// How its space lies on it.
@@ -60,7 +63,13 @@ impl ReliefPanel {
             label(canvas, corner(x1, back, z), &number(z), [-5.0, 4.0], Anchor::End);
         }
         let words = format!("z ({})", self.unit.symbol);
-        let middle = corner(x1, back, 0.5 * (z0 + z1));
-        canvas.upward_text([middle[0] - 8.0, middle[1]], &words, SMALL_PX, FAINT_INK);
+        let [[_, bottom], top] = [z0, z1].map(|z| corner(x1, back, z));
+        match bottom - top[1] > UPWARD_MIN_PX {
+            true => {
+                let middle = [top[0] - 8.0, 0.5 * (bottom + top[1])];
+                canvas.upward_text(middle, &words, SMALL_PX, FAINT_INK);
+            }
+            false => label(canvas, top, &words, [-5.0, -12.0], Anchor::End),
+        }
     }
 }

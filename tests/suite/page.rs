@@ -202,8 +202,8 @@ const SHAPE_CONTRAST: f64 = 3.0;
 /// Smallest words of a figure in pixels; chosen as what can be read without a glass.
 const FIGURE_WORDS_PX: f64 = 9.0;
 
-/// At every width, on light and on dark paper: the page does not scroll sideways, tables and figures
-/// do in their boxes, with a cue and the head of the line in place; everything can be read.
+/// At every width, on light and on dark paper: the page does not scroll sideways, tables and
+/// figures do in their boxes, with a cue and the head of the line in place; everything can be read.
 #[test]
 fn the_page_fits_every_width_on_light_and_dark_paper() {
     let Some(browser) = browser_or_note() else { return };

@@ -43,6 +43,7 @@ const FACES: usize = 40;
 const MARGIN: (f64, f64) = (24.0, 44.0);
 const PANEL: (f64, f64) = (252.0, 316.0);
 const FOOT_PX: f64 = 62.0;
+const BAR_LEFT_MIN_PX: f64 = 215.0;
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let (planners, counts) = (run.experiment.drawn_planners(), run.experiment.drawn_touch_counts());
@@ -192,7 +193,9 @@ fn entries(run: &Run) -> Vec<(Swatch, &'static str)> {
 fn draw_colour_bar(canvas: &mut Canvas, run: &Run, space: Space, [middle, top]: PointPx) {
     let unit = Length::of(&run.experiment.scene.zone);
     let [low, high] = space.height_m.map(|height| height * unit.per_m);
-    let area = Area { left: middle - 60.0, top, width: 320.0, height: 13.0 };
+    // Its words stand on the left, in whatever font a browser has.
+    let left = (middle - 60.0).max(BAR_LEFT_MIN_PX);
+    let area = Area { left, top, width: 320.0, height: 13.0 };
     let words = format!("height above the datum ({})", unit.symbol);
     colour_bar(canvas, area, &Axis::linear(low, high, 6.0), &words, |t| style::height(t, 1.0));
 }
