@@ -15,7 +15,7 @@ pub(super) const SCENES: &str = "scenes";
 /// If there is none, with the name most like it.
 pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
     let is_plain = name.extension().is_none() && name.components().count() == 1;
-    if name.exists() && !(is_plain && name.is_dir()) || !is_plain {
+    if !is_plain || name.exists() && !name.is_dir() {
         return Ok(name.into());
     }
     let file = name.with_extension("toml");

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, bail};
 use std::fs::{self, File};
-use std::io::{ErrorKind, Read};
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// Whether a file that Palpate did not write may be replaced.
@@ -13,11 +13,11 @@ pub(super) struct Force {
     force: bool,
 }
 
-/// What every file that Palpate writes says in its first bytes.
+/// What every file that Palpate writes says in its first bytes or its last.
 const MARK: &[u8] = b"palpate";
 
 /// In how many; chosen, longer than any header.
-const HEAD: u64 = 1024;
+const END: u64 = 1024;
 
 impl Force {
     /// Makes sure that `path` may be written: it is not there, or Palpate wrote it, or it is a file
@@ -98,12 +98,21 @@ fn found(path: &Path) -> anyhow::Result<Found> {
     if !kind.is_file() {
         bail!("{name} is a folder, a device or a pipe; allowed is the name of a file");
     }
-    let mut head = Vec::new();
-    let file = File::open(path).with_context(|| name.to_string())?;
-    file.take(HEAD).read_to_end(&mut head).with_context(|| name.to_string())?;
-    head.make_ascii_lowercase();
-    match head.windows(MARK.len()).any(|part| part == MARK) {
-        true => Ok(Found::Ours),
-        false => Ok(Found::Other),
+    let is_ours = is_marked(path).with_context(|| name.to_string())?;
+    Ok(if is_ours { Found::Ours } else { Found::Other })
+}
+
+fn is_marked(path: &Path) -> io::Result<bool> {
+    let mut file = File::open(path)?;
+    let last = file.metadata()?.len().saturating_sub(END);
+    for start in [0, last] {
+        file.seek(SeekFrom::Start(start))?;
+        let mut bytes = Vec::new();
+        Read::by_ref(&mut file).take(END).read_to_end(&mut bytes)?;
+        bytes.make_ascii_lowercase();
+        if bytes.windows(MARK.len()).any(|part| part == MARK) {
+            return Ok(true);
+        }
     }
+    Ok(false)
 }

@@ -1,7 +1,7 @@
 //! An SVG as PDF, with its lines as lines and its words as words, in the font that the PNG has.
 
 use super::tree;
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use krilla::Document;
 use krilla::geom::Size;
 use krilla::page::PageSettings;
@@ -21,5 +21,11 @@ pub fn render(svg: &str) -> anyhow::Result<Vec<u8>> {
     surface.draw_svg(&tree, size, SvgSettings::default()).context("it cannot be drawn")?;
     surface.finish();
     page.finish();
-    document.finish().map_err(|error| anyhow::anyhow!("it cannot be written: {error:?}"))
+    let finished = document.finish();
+    let mut bytes = finished.map_err(|error| anyhow!("it cannot be written: {error:?}"))?;
+    bytes.extend(SIGNED);
+    Ok(bytes)
 }
+
+/// A comment behind the end of the document, which readers pass over.
+const SIGNED: &[u8] = b"\n% drawn by Palpate\n";
