@@ -182,7 +182,7 @@ fn browser_or_note() -> Option<PathBuf> {
     if browser.is_none() {
         assert!(std::env::var_os("PALPATE_PAGE_TEST").is_none(), "no Chromium in PATH");
         // Not by a macro: its output would be kept from whoever runs the tests.
-        eprintln!("tests/page.rs: SKIPPED, no Chromium in PATH");
+        let _ = writeln!(io::stderr(), "tests/page.rs: SKIPPED, no Chromium in PATH");
     }
     browser
 }
