@@ -27,10 +27,8 @@ fn experiments_and_scenes_are_found_by_name() {
     fails(folder.path(), &["run", "smal"], &["smal: no such file", "did you mean `small`?"]);
     let text = succeeds(folder.path(), &["list", "experiments"]);
     assert!(text.contains("small"), "{text}");
-    if cfg!(feature = "nlopt") {
-        succeeds(folder.path(), &["run", "small", "--no-report"]);
-        assert!(folder.path().join("runs/small/trials.jsonl").is_file());
-    }
+    succeeds(folder.path(), &["run", "small", "--no-report"]);
+    assert!(folder.path().join("runs/small/trials.jsonl").is_file());
 }
 
 #[test]
@@ -42,7 +40,6 @@ fn shells_are_told_how_to_complete() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn a_summary_is_told_to_programs() {
     let folder = folder();
     let text = succeeds(folder.path(), &["run", "small.toml", "--no-report", "--json"]);
@@ -62,7 +59,6 @@ fn a_summary_is_told_to_programs() {
 
 /// Progress is for what takes long, and for who wants it.
 #[test]
-#[cfg(feature = "nlopt")]
 fn short_work_says_nothing_beside_its_result() {
     let folder = folder();
     let output = palpate(folder.path(), &["run", "small.toml", "--no-report"]);
@@ -115,7 +111,6 @@ fn files_of_others_are_replaced_by_force_only() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn an_exported_belief_replaces_its_own_files_only() {
     let folder = folder();
     succeeds(folder.path(), &["run", "small.toml", "--no-report"]);

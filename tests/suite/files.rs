@@ -65,7 +65,6 @@ fn what_may_never_end_is_refused_by_every_reader() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn streams_that_cannot_be_written_stop_no_work() {
     let full = || Stdio::from(fs::File::options().write(true).open("/dev/full").unwrap());
     let folder = folder();
@@ -92,7 +91,6 @@ fn streams_that_cannot_be_written_stop_no_work() {
 }
 
 /// The program with files of at most `blocks` of 512 bytes, as if the disk were full beyond.
-#[cfg(feature = "nlopt")]
 fn on_a_small_disk(folder: &Path, blocks: u32, arguments: &str) -> std::process::Output {
     let program = env!("CARGO_BIN_EXE_palpate");
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec {program} {arguments}");
@@ -102,7 +100,6 @@ fn on_a_small_disk(folder: &Path, blocks: u32, arguments: &str) -> std::process:
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn a_full_disk_is_named_with_its_file_and_the_run_resumes() {
     let folder = folder();
     let whole = succeeds(folder.path(), &["run", "small.toml", "--out", "whole"]);

@@ -102,7 +102,6 @@ fn ply_binary(is_little: bool) -> Vec<u8> {
 }
 
 /// A file of every format and encoding, to be altered.
-#[cfg(feature = "nlopt")]
 pub fn samples() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("mesh.obj", obj()),
@@ -215,7 +214,6 @@ fn broken_and_hostile_files_are_refused_at_their_place() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn what_scan_and_export_write_is_read_back() {
     let folder = folder();
     succeeds(folder.path(), &["scan", "scene.toml", "--grid", "4x5", "--out", "scan"]);

@@ -7,6 +7,7 @@ mod approach;
 mod arm;
 mod backend;
 mod broken;
+#[cfg(feature = "nlopt")]
 mod commands;
 mod control;
 #[cfg(feature = "mujoco")]
@@ -18,6 +19,7 @@ mod examples;
 mod experiments;
 mod fidelity;
 mod figures;
+#[cfg(feature = "nlopt")]
 mod files;
 mod finger;
 mod finger_parts;
@@ -29,6 +31,7 @@ mod flex;
 mod floors;
 #[cfg(feature = "nlopt")]
 mod folders;
+#[cfg(feature = "nlopt")]
 mod formats;
 #[cfg(feature = "nlopt")]
 mod fuzz;
@@ -46,6 +49,7 @@ mod meshes;
 mod messages;
 mod models;
 mod newcomer;
+#[cfg(feature = "nlopt")]
 mod notices;
 mod page;
 #[cfg(feature = "nlopt")]

@@ -53,7 +53,6 @@ fn a_scene_that_means_what_it_says_is_told_nothing() {
 
 /// Fingers of three sizes on the container: the error does not grow with what differs from 7 mm.
 #[test]
-#[cfg(feature = "nlopt")]
 fn a_soft_finger_of_another_radius_has_no_bias_of_the_difference() {
     for radius in ["0.006", "0.007", "0.008"] {
         let folder = folder("container_finger.toml", &[]);
@@ -67,7 +66,6 @@ fn a_soft_finger_of_another_radius_has_no_bias_of_the_difference() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn a_datum_that_is_left_out_is_the_middle_of_the_surface() {
     let folder = folder("container.toml", &[("datum_y_m = -0.65\n", "")]);
     let output = run(&folder, &[]);
@@ -80,7 +78,6 @@ fn a_datum_that_is_left_out_is_the_middle_of_the_surface() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn a_datum_far_from_the_surface_and_an_r_that_says_nothing_are_told() {
     let folder = folder("container.toml", &[("datum_y_m = -0.65", "datum_y_m = 0")]);
     let output = run(&folder, &["--set", "touches=8"]);
@@ -110,7 +107,6 @@ fn a_forgotten_unit_is_told_with_the_one_that_fits() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn few_places_and_few_contacts_are_told_before_and_after() {
     let folder = folder("container.toml", &[("x_m = [-0.05, 0.05]", "x_m = [-0.05, 0.5]")]);
     let output = palpate(folder.path(), &["run", "it.toml"]);
@@ -125,7 +121,6 @@ fn few_places_and_few_contacts_are_told_before_and_after() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn a_run_whose_every_trial_failed_says_why_and_keeps_headers() {
     let folder = folder("container_finger.toml", &[]);
     let sets = ["--set", "scene.effects.timing.control_delay_s=0.9", "--set", "touches=4"];
@@ -157,7 +152,6 @@ fn what_an_arm_does_not_reach_is_refused_before_it_is_sent() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn the_last_touch_stands_in_the_table() {
     let folder = folder("container.toml", &[]);
     let sets = ["--set", "report.touch_counts=[4]", "--set", "touches=9"];
