@@ -44,6 +44,13 @@ pub fn allowed(message: &str) -> Option<String> {
     })
 }
 
+/// The name most like `word`, if it takes few enough slips of the hand to turn one into the other.
+pub fn nearest(word: &str, names: &[String]) -> Option<String> {
+    let slips = |name: &String| strsim::damerau_levenshtein(word, name);
+    let most = (word.chars().count() / 2).min(2);
+    names.iter().min_by_key(|name| slips(name)).filter(|name| slips(name) <= most).cloned()
+}
+
 /// What is wrong with a JSON text, without its place.
 pub fn json(error: &serde_json::Error) -> String {
     let text = error.to_string();

@@ -1,8 +1,4 @@
-//! Tables on the terminal and in CSV and figure files beside them.
-
-use anyhow::Context;
-use serde::Serialize;
-use std::path::Path;
+//! Tables on the terminal.
 
 /// Cells in aligned columns: the first to the left, the others to the right.
 pub(super) fn aligned<const N: usize>(lines: &[[String; N]]) -> String {
@@ -36,12 +32,4 @@ pub(super) fn duration(s: f64) -> String {
         s if s < 1.0 => format!("{:.2} ms", 1e3 * s),
         s => format!("{s:.2} s"),
     }
-}
-
-/// Writes lines as CSV.
-pub(super) fn write_csv<T: Serialize>(path: &Path, lines: &[T]) -> anyhow::Result<()> {
-    let place = || path.display().to_string();
-    let mut writer = csv::Writer::from_path(path).with_context(place)?;
-    lines.iter().try_for_each(|line| writer.serialize(line)).with_context(place)?;
-    writer.flush().with_context(place)
 }

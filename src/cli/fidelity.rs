@@ -1,11 +1,12 @@
 //! `palpate fidelity`.
 
-use super::columns::{aligned, cell, duration, write_csv};
+use super::columns::{aligned, cell, duration};
 use super::find::{SCENES, find};
-use super::output::Force;
+use super::output::{Force, make_folder};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::store::write_whole;
+use crate::report::tables::write_csv;
 use crate::report::{files, pareto};
 use crate::sim::Scene;
 use crate::study::fidelity::comparison;
@@ -59,6 +60,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let name = args.scene.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("runs/fidelity-{name}")));
     args.force.claim_folder(&out, "fidelity.csv")?;
+    make_folder(&out)?;
     let count = usize::from(args.touches);
     let stop = stop_on_interrupt("touches")?;
     let bar = progress_bar(talk, "fidelity", "touches", comparison::pieces(count) as u64, 0);

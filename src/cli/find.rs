@@ -1,5 +1,6 @@
 //! Experiments and scenes by name: `bird` for `experiments/bird.toml`.
 
+use crate::words;
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 
@@ -24,8 +25,7 @@ pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
         return Ok(found);
     }
     let word = name.to_string_lossy();
-    let slips = |known: &String| strsim::damerau_levenshtein(known, &word);
-    let known = names(folder).into_iter().filter(|known| slips(known) <= 2).min_by_key(slips);
+    let known = words::nearest(&word, &names(folder));
     let meant = known.map_or(String::new(), |known| format!(", did you mean `{known}`?"));
     bail!("{word}: no such file, and no {folder}/{}{meant}", file.display())
 }

@@ -47,13 +47,8 @@ const KINDS: &[(Kind, &str, Lister)] = &[
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let wanted = KINDS.iter().filter(|(kind, ..)| args.kind.is_none_or(|wanted| wanted == *kind));
-    let sections: Vec<String> = wanted
-        .map(|(_, title, lines)| {
-            let lines = lines();
-            let indented = lines.into_iter().map(|[name, about]| [format!("  {name}"), about]);
-            format!("{title}\n{}", left(&indented.collect::<Vec<_>>()))
-        })
-        .collect();
+    let sections: Vec<String> =
+        wanted.map(|(_, title, lines)| format!("{title}\n{}", indented(&lines()))).collect();
     print(sections.join("\n").trim_end())?;
     Ok(Ending::Done)
 }
@@ -78,7 +73,8 @@ fn scenes() -> Vec<[String; 2]> {
     names(SCENES).iter().map(about).collect()
 }
 
-fn planners() -> Vec<[String; 2]> {
+/// Every planner with what it does.
+pub(super) fn planners() -> Vec<[String; 2]> {
     PLANNERS.iter().map(|planner| [planner.name, planner.about].map(String::from)).collect()
 }
 
@@ -97,8 +93,8 @@ fn effects() -> Vec<[String; 2]> {
         .collect()
 }
 
-/// Cells in aligned columns, all to the left.
-fn left(lines: &[[String; 2]]) -> String {
+/// Lines set off to the right, what each name is in a column of its own.
+pub(super) fn indented(lines: &[[String; 2]]) -> String {
     let width = lines.iter().map(|[name, _]| name.chars().count()).max().unwrap_or(0);
-    lines.iter().map(|[name, about]| format!("{name:<width$}  {about}\n")).collect()
+    lines.iter().map(|[name, about]| format!("  {name:<width$}  {about}\n")).collect()
 }

@@ -22,7 +22,6 @@ mod stress;
 mod terminal;
 mod watch;
 
-use crate::explore::planner::PLANNERS;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 use terminal::{Ending, Talk, print};
@@ -88,11 +87,8 @@ enum Command {
 /// Runs the program on the process's arguments.
 pub fn main() -> ExitCode {
     let command = Cli::command().mut_subcommand("run", |run| {
-        let planners: Vec<String> = PLANNERS
-            .iter()
-            .map(|planner| format!("  {:<9} {}", planner.name, planner.about))
-            .collect();
-        run.after_help(format!("{}\n\nPlanners:\n{}", run::EXAMPLES, planners.join("\n")))
+        let planners = list::indented(&list::planners());
+        run.after_help(format!("{}\n\nPlanners:\n{}", run::EXAMPLES, planners.trim_end()))
     });
     let cli = Cli::from_arg_matches(&command.get_matches()).unwrap_or_else(|error| error.exit());
     let outcome = match cli.command {

@@ -1,7 +1,8 @@
 //! `palpate new`.
 
-use super::output::Force;
+use super::output::{Force, make_folder};
 use super::terminal::{Ending, print};
+use crate::experiment::experiment::is_plain;
 use crate::experiment::store::write_whole;
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::import::{Buffers, import_with};
@@ -57,7 +58,7 @@ impl Args {
     }
 
     fn read(&self, metres_per_unit: f64) -> anyhow::Result<Mesh> {
-        let buffers = if self.outside_buffers { Buffers::Anywhere } else { Buffers::Beside };
+        let buffers = Buffers::outside(self.outside_buffers);
         Ok(import_with(&self.mesh, metres_per_unit, buffers)?.0)
     }
 
@@ -78,29 +79,75 @@ enum FingerKind {
     Arm,
 }
 
+/// What a finger makes of the files.
+struct Kit {
+    body: &'static str,
+    /// Tables of the scene beside object and zone.
+    scene: String,
+    /// Table of the belief, if it needs one.
+    gp: &'static str,
+    /// About the time that the experiment takes.
+    takes: &'static str,
+}
+
+impl FingerKind {
+    fn kit(self) -> Kit {
+        match self {
+            Self::Rigid => {
+                Kit { body: "cast", scene: String::new(), gp: "", takes: "a few seconds" }
+            }
+            Self::Soft => Kit {
+                body: "kinematic",
+                scene: biotac(""),
+                gp: LOCATED,
+                takes: "about ten seconds",
+            },
+            Self::Arm => Kit {
+                body: "dynamic",
+                scene: format!("{ARM}{}", biotac(SLOWER)),
+                gp: LOCATED,
+                takes: "about a minute",
+            },
+        }
+    }
+}
+
+/// Tables of a soft finger that is moved as `motion` says.
+fn biotac(motion: &str) -> String {
+    format!(
+        "\n# A BioTac: its skin, the fluid under it and 19 electrodes, which say where it touches.\n\
+         [touch]\n{motion}press_m = 0.0004\n\n\
+         [effects.skin]\n[effects.fluid]\n[effects.electrodes]\n"
+    )
+}
+
+const ARM: &str = "\n[arm]                       # a Mitsubishi PA-10; its base is the origin\n";
+
+const SLOWER: &str = "approach_m_s = 0.015        # slower than a stage: the servos need 0.04 s to stop the finger\n";
+
+/// What contacts that electrodes locate are off the surface, RMS (docs/finger.md).
+const LOCATED: &str = "\n[gp]\nnoise_sd_m = 0.0003         # of contacts that electrodes locate\n";
+
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let name = name(&args.mesh)?;
     let [experiment, scene] = ["", "-scene"].map(|what| args.beside(format!("{name}{what}.toml")));
     args.force.claim_new(&experiment)?;
     args.force.claim_new(&scene)?;
     let guess = Guess::of(args)?;
-    std::fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
-    write_whole(&scene, &guess.scene(args)?)?;
+    make_folder(&args.out)?;
+    let kit = args.finger.kit();
+    write_whole(&scene, &guess.scene(args, &kit)?)?;
     let scene_name = format!("{name}-scene.toml");
-    write_whole(&experiment, &experiment_text(&name, &scene_name, args))?;
+    write_whole(&experiment, &experiment_text(&name, &scene_name, kit.gp))?;
     print(&format!(
         "{}\nwrote {} and {}\n\nnext\n  palpate show {} --png {name}.png    to see the zone on it\n  \
-         palpate run {}{}",
+         palpate run {}    {}",
         guess.words(args),
         scene.display(),
         experiment.display(),
         scene.display(),
         experiment.display(),
-        match args.finger {
-            FingerKind::Rigid => "    a few seconds",
-            FingerKind::Soft => "    about ten seconds",
-            FingerKind::Arm => "    about a minute",
-        }
+        kit.takes
     ))?;
     Ok(Ending::Done)
 }
@@ -108,7 +155,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
 /// The mesh's name as that of an experiment.
 fn name(mesh: &Path) -> anyhow::Result<String> {
     let stem = mesh.file_stem().unwrap_or_default().to_string_lossy();
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     let name: String = stem.chars().map(|c| if is_plain(c) { c } else { '-' }).take(80).collect();
     let name = name.trim_matches(['-', '.']);
     ensure!(!name.is_empty(), "{}: a name with a letter or digit is needed", mesh.display());
@@ -131,17 +177,15 @@ impl Guess {
         let extension = args.mesh.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let is_gltf = ["gltf", "glb"].contains(&extension.as_str());
         let up = args.up.unwrap_or(if is_gltf || extension == "obj" { Up::Y } else { Up::Z });
-        // In the middle of all units, so that the largest and the smallest can be read.
-        let mut mesh = args.read(Unit::Mm.metres())?;
+        // Read in the middle of all units, so that the largest and the smallest can be.
+        let mesh = args.read(Unit::Mm.metres())?;
         let extent = |mesh: &Mesh| {
             let (low, high) = mesh.bounds();
             high - low
         };
         let unit = args.unit.or(is_gltf.then_some(Unit::M));
         let (unit, scale) = placement::size(extent(&mesh).max() / Unit::Mm.metres(), unit);
-        if (unit, scale) != (Unit::Mm, 1.0) {
-            mesh = args.read(unit.metres() * scale)?;
-        }
+        let mesh = mesh.scaled(unit.metres() * scale / Unit::Mm.metres());
         let size_mm = (extent(&mesh) * 1e3).into();
         let facing = if is_gltf { Facing::of_gltf(up) } else { Facing::of(up) };
         let rotation_deg = placement::rotation_deg(facing, args.side);
@@ -155,7 +199,7 @@ impl Guess {
     }
 
     /// The scene as a file for people.
-    fn scene(&self, args: &Args) -> anyhow::Result<String> {
+    fn scene(&self, args: &Args, Kit { body, scene, .. }: &Kit) -> anyhow::Result<String> {
         let Self { unit, scale, position_m, rotation_deg, found, .. } = self;
         let Found { zone, filled } = found;
         let mesh = match args.mesh.is_relative() && args.is_here() {
@@ -163,16 +207,8 @@ impl Guess {
             false => std::path::absolute(&args.mesh)?,
         };
         let mesh = toml::Value::from(mesh.to_string_lossy().into_owned());
-        let (body, tables) = match args.finger {
-            FingerKind::Rigid => ("cast", ""),
-            FingerKind::Soft => ("kinematic", SOFT),
-            FingerKind::Arm => ("dynamic", ARM),
-        };
         let [x_m, z_m] = [zone.x_m, zone.z_m.unwrap_or_default()];
-        let outside = match args.outside_buffers {
-            true => "outside_buffers = true\n",
-            false => "",
-        };
+        let outside = if args.outside_buffers { "outside_buffers = true\n" } else { "" };
         let datum_y_m = zone.datum_y_m();
         let depth_m = zone.depth_m.unwrap_or_default();
         Ok(format!(
@@ -188,7 +224,7 @@ impl Guess {
              x_m = {x_m:?}\n\
              z_m = {z_m:?}\n\
              datum_y_m = {datum_y_m:?}          # heights are measured from here: the middle of the surface\n\
-             depth_m = {depth_m:?}    # nearest and farthest -y at which there may be something\n{tables}",
+             depth_m = {depth_m:?}    # nearest and farthest -y at which there may be something\n{scene}",
             args.mesh.file_name().unwrap_or_default().to_string_lossy(),
             100.0 * filled,
         ))
@@ -201,7 +237,6 @@ impl Guess {
             1.0 => String::new(),
             scale => format!(", scaled by {scale} to a size that a finger can explore"),
         };
-        let named = |value: &dyn ValueName| value.name();
         let [width, height] = [found.zone.x_m, found.zone.z_m.unwrap_or_default()]
             .map(|[low, high]| 1e3 * (high - low));
         let [near, far] = found.zone.depth_m.unwrap_or_default();
@@ -218,49 +253,11 @@ impl Guess {
 }
 
 /// As the command line names it.
-trait ValueName {
-    fn name(&self) -> String;
+fn named(value: &impl ValueEnum) -> String {
+    value.to_possible_value().map_or(String::new(), |value| value.get_name().into())
 }
 
-impl<T: ValueEnum> ValueName for T {
-    fn name(&self) -> String {
-        self.to_possible_value().map_or(String::new(), |value| value.get_name().into())
-    }
-}
-
-/// Tables of a soft finger.
-const SOFT: &str = "
-# A BioTac: its skin, the fluid under it and 19 electrodes, which say where it touches.
-[touch]
-press_m = 0.0004
-
-[effects.skin]
-[effects.fluid]
-[effects.electrodes]
-";
-
-/// Tables of an arm with a soft finger.
-const ARM: &str = "
-[arm]                       # a Mitsubishi PA-10; its base is the origin
-
-# A BioTac: its skin, the fluid under it and 19 electrodes, which say where it touches.
-[touch]
-approach_m_s = 0.015        # slower than a stage: the servos need 0.04 s to stop the finger
-press_m = 0.0004
-
-[effects.skin]
-[effects.fluid]
-[effects.electrodes]
-";
-
-fn experiment_text(name: &str, scene: &str, args: &Args) -> String {
-    // What contacts that electrodes locate are off the surface, RMS (docs/finger.md).
-    let noise = match args.finger {
-        FingerKind::Rigid => "",
-        FingerKind::Soft | FingerKind::Arm => {
-            "\n[gp]\nnoise_sd_m = 0.0003         # of contacts that electrodes locate\n"
-        }
-    };
+fn experiment_text(name: &str, scene: &str, gp: &str) -> String {
     format!(
         "name = \"{name}\"\n\
          question = \"Which planner explores {name} best?\"\n\
@@ -270,6 +267,6 @@ fn experiment_text(name: &str, scene: &str, args: &Args) -> String {
          seed = 1\n\
          initial_touches = 5         # random ones that all planners share\n\
          touches = 40                # of a trial in all\n\
-         grid = 41                   # test places along each side of the zone\n{noise}"
+         grid = 41                   # test places along each side of the zone\n{gp}"
     )
 }

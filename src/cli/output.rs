@@ -60,20 +60,21 @@ impl Force {
         Ok(())
     }
 
-    /// Makes sure that `path` may be filled with results of which `own` is one, and makes it: it is
-    /// not there, empty, or has that file, or `--force` is given.
+    /// Makes sure that `path` may become a folder of results of which `own` is one: it is not
+    /// there, empty, or has that file, or `--force` is given.
     ///
     /// # Errors
-    /// If it may not, or cannot be made.
+    /// If it may not.
     pub(super) fn claim_folder(self, path: &Path, own: &str) -> anyhow::Result<()> {
-        let name = || path.display().to_string();
-        fs::create_dir_all(path).with_context(name)?;
-        let is_empty = fs::read_dir(path).with_context(name)?.next().is_none();
+        let is_empty = match fs::read_dir(path) {
+            Err(error) if error.kind() == ErrorKind::NotFound => true,
+            entries => entries.with_context(|| path.display().to_string())?.next().is_none(),
+        };
         if !is_empty && !path.join(own).is_file() && !self.force {
             bail!(
                 "{} holds other things and no {own}: name a new folder, or write beside them with \
                  --force",
-                name()
+                path.display()
             );
         }
         Ok(())
@@ -115,4 +116,9 @@ fn is_marked(path: &Path) -> io::Result<bool> {
         }
     }
     Ok(false)
+}
+
+/// Makes a folder, and those around it.
+pub(super) fn make_folder(path: &Path) -> anyhow::Result<()> {
+    fs::create_dir_all(path).with_context(|| path.display().to_string())
 }

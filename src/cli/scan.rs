@@ -1,7 +1,7 @@
 //! `palpate scan`.
 
 use super::find::{SCENES, find};
-use super::output::Force;
+use super::output::{Force, make_folder};
 use super::prepare::{environment, simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
@@ -86,6 +86,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         points: points.collect(),
         ..Points::default()
     };
+    make_folder(&folder)?;
     write_whole(&folder.join("cloud.ply"), &cloud.ply())?;
     write_whole(&folder.join("cloud.csv"), &csv(&touches))?;
     if let Some(svg) = drawing::picture(&environment, mesh, &cloud.points) {

@@ -92,10 +92,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         Some("toml") if is_scene => scene(args, talk)?,
         Some("toml") => store::resolved(&Experiment::load(&args.path, &args.set)?),
         _ => {
-            let buffers = match args.outside_buffers {
-                true => Buffers::Anywhere,
-                false => Buffers::Beside,
-            };
+            let buffers = Buffers::outside(args.outside_buffers);
             let metres = args.unit.unwrap_or_default().metres();
             let path = args.path.display();
             let (_, report) = with_patience(talk, |tell| {
@@ -139,12 +136,10 @@ fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
     notice::of_truth(environment.task().zone(), &truth).iter().for_each(|notice| talk.note(notice));
     text +=
         &format!("\nsurface in the zone: {} of {} test places", truth.count(), truth.places.len());
-    let heights = || truth.heights_m.iter().flatten().copied();
-    if let (Some(low), Some(high)) = (heights().reduce(f64::min), heights().reduce(f64::max)) {
+    if let Some([low, high]) = truth.span_m() {
         text += &format!(", heights {:.2} to {:.2} mm above the datum", low * 1e3, high * 1e3);
     }
-    let reachable = truth.is_reachable.iter().filter(|&&is_reachable| is_reachable).count();
-    text += &format!("; the finger can touch {reachable} of them\n");
+    text += &format!("; the finger can touch {} of them\n", truth.reachable_count());
     if let Shape::Mesh { report, .. } = environment.shape() {
         text += &format!("{report}\n");
     }

@@ -1,15 +1,17 @@
 //! `palpate stress`.
 
-use super::columns::{aligned, write_csv};
-use super::output::Force;
+use super::columns::aligned;
+use super::output::{Force, make_folder};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
 use crate::report::files;
 use crate::report::severity;
 use crate::report::severity::{CaseVerdicts, short};
+use crate::report::tables::write_csv;
 use crate::study::stress::{Case, Outcome, Verdict, cases};
 use anyhow::bail;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -44,7 +46,7 @@ pub(super) struct Args {
 }
 
 /// A line of `stress.csv`.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct CaseRecord<'a> {
     case: &'a str,
     severity: f64,
@@ -75,6 +77,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         print(&margins())?;
         return Ok(Ending::Done);
     }
+    args.force.claim_folder(&args.out, "stress.csv")?;
     let stop = stop_on_interrupt("runs")?;
     let jobs: Vec<(usize, usize, f64)> = (chosen.iter().enumerate())
         .flat_map(|(i, case)| {
@@ -138,7 +141,7 @@ fn margins() -> String {
 }
 
 fn report(ran: &[CaseVerdicts], args: &Args) -> anyhow::Result<()> {
-    args.force.claim_folder(&args.out, "stress.csv")?;
+    make_folder(&args.out)?;
     let mut lines = Vec::new();
     for (case, verdicts) in ran {
         lines.extend(verdicts.iter().map(|verdict| line(case, verdict)));

@@ -147,7 +147,7 @@ impl Loader {
             let unknown = names.next().unwrap_or_default();
             let allowed: Vec<String> = names.collect();
             let key = join(path.rsplit_once('.').map_or(".", |(parent, _)| parent), &unknown);
-            let nearest = nearest(key.rsplit('.').next().unwrap_or(&key), &allowed);
+            let nearest = words::nearest(key.rsplit('.').next().unwrap_or(&key), &allowed);
             return ConfigError::UnknownKey { origin: self.origin(&key), key, nearest, allowed };
         }
         if let (true, Some(missing)) = (message.starts_with("missing field"), names.next()) {
@@ -271,13 +271,6 @@ fn parse(path: &Path) -> Result<(Table, toml_edit::Document<String>), ConfigErro
         message: error.message().into(),
     })?;
     Ok((table, document))
-}
-
-/// The name most like `key`, if it takes few enough slips of the hand to turn one into the other.
-fn nearest(key: &str, names: &[String]) -> Option<String> {
-    let slips = |name: &String| strsim::damerau_levenshtein(key, name);
-    let most = (key.chars().count() / 2).min(2);
-    names.iter().min_by_key(|name| slips(name)).filter(|name| slips(name) <= most).cloned()
 }
 
 /// Removes `.` and `folder/..` without asking the file system.

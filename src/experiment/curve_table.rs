@@ -34,10 +34,15 @@ pub fn columns(experiment: &Experiment) -> Vec<String> {
     MEASURES.iter().flat_map(of_measure).collect()
 }
 
-/// A record for each planner and touch count.
-pub fn curve_table(experiment: &Experiment, rows: &[TrialRow]) -> Vec<CurveRecord> {
+/// A record for each planner and each of its touch counts that `is_wanted`.
+pub fn curve_table(
+    experiment: &Experiment,
+    rows: &[TrialRow],
+    is_wanted: impl Fn(u32) -> bool,
+) -> Vec<CurveRecord> {
     let points: Vec<CurvePoint> = (experiment.planners.iter())
         .flat_map(|planner| summary::curve(experiment, rows, planner))
+        .filter(|point| is_wanted(point.touches))
         .collect();
     points.par_iter().map(|point| record(experiment, rows, point)).collect()
 }

@@ -173,13 +173,17 @@ impl Experiment {
     }
 }
 
+/// Whether a character may stand in the name of an experiment, which names a folder.
+pub fn is_plain(c: char) -> bool {
+    c.is_ascii_alphanumeric() || "-_.".contains(c)
+}
+
 impl Checked for Experiment {
     fn check(&self, rules: &mut Rules) {
-        let simple = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
         let named = !self.name.is_empty()
             && !self.name.starts_with(['.', '-'])
             && self.name.len() <= 100
-            && self.name.chars().all(simple);
+            && self.name.chars().all(is_plain);
         rules.require("name", format!("\"{}\"", self.name), named, || {
             "1 to 100 letters, digits, - _ . that do not begin with - or . (it names a folder)"
                 .into()

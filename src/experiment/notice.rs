@@ -71,7 +71,7 @@ pub fn of_truth(zone: &Zone, truth: &Truth) -> Vec<Notice> {
     let few = |part: usize, of: usize| (part as f64) < FEW * of as f64;
     let places = few(count, truth.places.len())
         .then_some(Notice::FewPlaces { with: count, of: truth.places.len() });
-    let reachable = truth.is_reachable.iter().filter(|&&is_reachable| is_reachable).count();
+    let reachable = truth.reachable_count();
     let reached = few(reachable, count).then_some(Notice::FewReachable { reachable, of: count });
     places.into_iter().chain(reached).chain(far_datum(zone, truth)).collect()
 }
@@ -86,10 +86,9 @@ pub fn of_run(run: &Run) -> Vec<Notice> {
 }
 
 fn far_datum(zone: &Zone, truth: &Truth) -> Option<Notice> {
-    let heights_m = || truth.heights_m.iter().flatten().copied();
-    let (low_m, high_m) = (heights_m().reduce(f64::min)?, heights_m().reduce(f64::max)?);
+    let [low_m, high_m] = truth.span_m()?;
     let away_m = low_m.max(-high_m);
-    let zone_m = zone.extents_m().into_iter().fold(0.0, f64::max);
+    let zone_m = zone.widest_m();
     let datum_y_m = zone.datum_y_m();
     let surface_y_m = [datum_y_m + low_m, datum_y_m + high_m];
     (away_m > zone_m).then_some(Notice::FarDatum { datum_y_m, surface_y_m, away_m, zone_m })
@@ -149,9 +148,11 @@ impl fmt::Display for Notice {
             ),
             Self::BlindR { planners, r, centred_r } => write!(
                 f,
-                "R (Eq. 5) of {} is above {r:.4} while centred R is as low as {centred_r:.2}: here \
+                "R (Eq. 5) of {} is {:.4} at least while centred R is as low as {centred_r:.2}: here \
                  R cannot tell a belief from a constant height; judge by centred R and RMSE",
-                planners.join(", ")
+                planners.join(", "),
+                // Rounded down: what is not 1 is not told as 1.
+                (r * 1e4).floor() * 1e-4
             ),
         }
     }

@@ -23,7 +23,7 @@ const STEPS: f64 = 80.0;
 /// A grid of about square cells: targets along x and along z.
 pub fn default_grid(zone: &Zone) -> [usize; 2] {
     let extents_m = zone.extents_m();
-    let cell_m = extents_m.iter().copied().fold(0.0, f64::max) / STEPS;
+    let cell_m = zone.widest_m() / STEPS;
     let along = |side: usize| extents_m.get(side).map_or(1, |m| (m / cell_m).round() as usize + 1);
     [along(0), along(1)]
 }

@@ -51,6 +51,17 @@ impl Truth {
         self.heights_m.iter().flatten().count()
     }
 
+    /// How many of these the finger can touch.
+    pub fn reachable_count(&self) -> usize {
+        self.is_reachable.iter().filter(|&&is_reachable| is_reachable).count()
+    }
+
+    /// The lowest and the highest surface, above the datum; none if there is no surface.
+    pub fn span_m(&self) -> Option<[f64; 2]> {
+        let heights_m = || self.heights_m.iter().flatten().copied();
+        Some([heights_m().reduce(f64::min)?, heights_m().reduce(f64::max)?])
+    }
+
     /// Compares a belief with the truth wherever there is a surface.
     pub fn compare(&self, belief: &Posterior) -> Metrics {
         let mut sums = Sums::default();

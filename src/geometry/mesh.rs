@@ -71,6 +71,12 @@ impl Mesh {
             / 6.0
     }
 
+    /// The mesh enlarged by a positive, finite `factor` about its origin.
+    pub fn scaled(&self, factor: f64) -> Self {
+        let vertices = self.vertices.iter().map(|vertex| vertex * factor).collect();
+        Self::from_sound_parts(vertices, self.triangles.clone())
+    }
+
     /// The mesh moved by the finite pose `x_wm`: a vertex p in M becomes `x_wm` p in W.
     pub fn transformed(&self, x_wm: &Isometry3<f64>) -> Self {
         let vertices = self.vertices.iter().map(|vertex| x_wm * vertex).collect();

@@ -126,18 +126,17 @@ impl Environment {
         }
         let extent = extent(&scene.zone, &shape);
         let depth_m = *scene.zone.depth_m.get_or_insert([-extent.high.y, -extent.low.y]);
-        let middle_y_m = match &shape {
-            Shape::Function(_) => 0.0,
-            Shape::Mesh { bvh, .. } => {
-                let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
-                let size = SizeMismatch::between(&scene.zone, unit, (&extent.low, &extent.high));
-                check_overlap(&scene.zone, depth_m, &extent, size)?;
-                check_front(&scene.zone, bvh, depth_m[0], -extent.high.y)?;
-                notices.extend(size.map(Notice::Size));
-                middle_y_m(&scene.zone, bvh, depth_m)
+        if let Shape::Mesh { bvh, .. } = &shape {
+            let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
+            let size = SizeMismatch::between(&scene.zone, unit, (&extent.low, &extent.high));
+            check_overlap(&scene.zone, depth_m, &extent, size)?;
+            check_front(&scene.zone, bvh, depth_m[0], -extent.high.y)?;
+            notices.extend(size.map(Notice::Size));
+            if scene.zone.datum_y_m.is_none() {
+                scene.zone.datum_y_m = Some(middle_y_m(&scene.zone, bvh, depth_m));
             }
-        };
-        scene.zone.datum_y_m.get_or_insert(middle_y_m);
+        }
+        scene.zone.datum_y_m.get_or_insert(0.0);
         let task = Task::new(scene.zone.clone(), scene.touch.clone(), &scene.finger)?;
         let fingertip =
             (scene.effects.is_soft()).then(|| Fingertip::new(&scene.finger, &scene.effects));

@@ -60,7 +60,7 @@ impl SizeMismatch {
         (low, high): (&Point3<f64>, &Point3<f64>),
     ) -> Option<Self> {
         let object_m = (high.x - low.x).max(high.z - low.z);
-        let zone_m = zone.extents_m().into_iter().fold(0.0, f64::max);
+        let zone_m = zone.widest_m();
         let off = |size_m: f64| (size_m / zone_m).ln().abs();
         if off(object_m) < MISMATCH.ln() {
             return None;

@@ -182,8 +182,8 @@ pub fn zone(bvh: &MeshBvh) -> Option<Found> {
     Some(Found { zone, filled: met().count() as f64 / inside().count() as f64 })
 }
 
-/// First and last column, first and last row (the last ones beyond) of the largest rectangle of
-/// which nine tenths have a surface, by its area; none if nothing has.
+/// First and last column, first and last row (the last ones beyond) of the largest rectangle, by
+/// its area, that is filled; none if nothing is.
 fn largest(met: &[Option<f64>], [width, height]: [f64; 2]) -> Option<([usize; 2], [usize; 2])> {
     // sums[j][i]: cells with a surface before column i and row j.
     let mut sums = vec![0i64; (RAYS + 1) * (RAYS + 1)];

@@ -167,10 +167,7 @@ impl fmt::Display for Unit {
 impl Object {
     /// Where buffers of its mesh may lie.
     pub fn buffers(&self) -> Buffers {
-        match self.outside_buffers {
-            true => Buffers::Anywhere,
-            false => Buffers::Beside,
-        }
+        Buffers::outside(self.outside_buffers)
     }
 
     /// Pose of the mesh's frame in `W`.

@@ -95,6 +95,11 @@ impl Zone {
         self.sides().map(|[low, high]| high - low).collect()
     }
 
+    /// Its widest side.
+    pub fn widest_m(&self) -> f64 {
+        self.extents_m().into_iter().fold(0.0, f64::max)
+    }
+
     /// Whether `place` has as many coordinates as the zone and lies in it, edges included.
     pub fn contains(&self, place: &[f64]) -> bool {
         place.len() == self.dimension()

@@ -13,6 +13,13 @@ pub enum Buffers {
     Anywhere,
 }
 
+impl Buffers {
+    /// Anywhere if `outside` is allowed.
+    pub fn outside(outside: bool) -> Self {
+        if outside { Self::Anywhere } else { Self::Beside }
+    }
+}
+
 /// A file that is read.
 pub(super) struct Source<'a> {
     pub path: &'a Path,

@@ -106,9 +106,8 @@ pub fn text(run: &Run) -> String {
 pub fn json(run: &Run) -> Value {
     let counts = run.experiment.tabled_touch_counts();
     let columns = columns(&run.experiment);
-    let lines = curve_table(&run.experiment, &run.rows);
-    let lines = lines.into_iter().filter(|record| counts.contains(&record.point.touches));
-    let lines = lines.map(|CurveRecord { point, values }| {
+    let lines = curve_table(&run.experiment, &run.rows, |count| counts.contains(&count));
+    let lines = lines.into_iter().map(|CurveRecord { point, values }| {
         let values: Map<String, Value> =
             columns.iter().cloned().zip(values.into_iter().map(Value::from)).collect();
         json!({
@@ -150,7 +149,7 @@ pub fn write(run: &Run, folder: &Path) -> anyhow::Result<()> {
         csv::WriterBuilder::new().has_headers(false).from_path(&path).with_context(place)?;
     let header = ["planner", "touches", "trials"].map(String::from).into_iter();
     writer.write_record(header.chain(columns(&run.experiment))).with_context(place)?;
-    for CurveRecord { point, values } in curve_table(&run.experiment, &run.rows) {
+    for CurveRecord { point, values } in curve_table(&run.experiment, &run.rows, |_| true) {
         let record = (&point.planner, point.touches, point.trials, values);
         writer.serialize(record).with_context(place)?;
     }

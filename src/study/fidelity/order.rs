@@ -8,6 +8,7 @@ use crate::robot::finger::TipMotion;
 use crate::sim::environment::Shape;
 use crate::sim::scene::Body;
 use crate::sim::{Environment, Scene};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -60,7 +61,7 @@ impl Order {
 }
 
 /// A line of `orders.csv`: one resolution of an [`Order`].
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct OrderRecord {
     resolution_in: &'static str,
     resolution: f64,

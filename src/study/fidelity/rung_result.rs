@@ -10,6 +10,7 @@ use crate::sim::collision::Collision;
 use crate::sim::environment::Shape;
 use crate::sim::scene::Body;
 use nalgebra::Point3;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Errors and price of one rung.
@@ -96,7 +97,7 @@ pub fn off_surface_m(environment: &Environment, contact: &Contact) -> Option<f64
 }
 
 /// A line of `fidelity.csv`.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 pub struct RungRecord {
     rung: String,
     body: &'static str,
