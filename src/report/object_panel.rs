@@ -10,6 +10,9 @@ use crate::geometry::mesh::Mesh;
 use crate::sim::Environment;
 use crate::task::Zone;
 
+/// Room for the numbers on the left.
+const LEFT_PX: f64 = 20.0;
+
 /// Places along each side of the zone's rim; more would not show.
 const PLACES: usize = 90;
 
@@ -33,6 +36,8 @@ pub fn draw(
         z_m: around(low.z, high.z),
         height_m: [low.y, high.y].map(|y_m| y_m - zone.datum_y_m()),
     };
+    // An object stands anywhere: the numbers on its left are longer than a zone's.
+    let area = Area { left: area.left + LEFT_PX, width: area.width - LEFT_PX, ..area };
     let panel = ReliefPanel::new(unit, area, space);
     panel.frame(canvas, "the object, and the zone on it", "");
     Relief::of_mesh(&panel.view, mesh, zone.datum_y_m(), axis).draw(canvas);
