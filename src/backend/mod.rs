@@ -12,6 +12,7 @@ pub mod fault_injector;
 pub mod limits;
 mod reading;
 pub mod recorder;
+pub mod ros;
 pub mod trace;
 pub mod watched;
 

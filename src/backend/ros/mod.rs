@@ -1,0 +1,3 @@
+//! A body behind a laboratory's topics, and the side that serves them.
+
+pub mod message;
