@@ -1,5 +1,6 @@
 //! Why a body or a touch could not go on.
 
+use super::ros::fault::LinkFault;
 use crate::robot::arm::ArmError;
 use thiserror::Error;
 
@@ -99,6 +100,14 @@ pub enum Fault {
     Lost {
         /// When it last answered.
         time_s: f64,
+    },
+    /// The arm behind topics cannot be driven on.
+    #[error("at {time_s:.3} s {cause}")]
+    Link {
+        /// When.
+        time_s: f64,
+        /// Why.
+        cause: LinkFault,
     },
     /// There is no memory for the body's state.
     #[error("no memory for the state of the body")]

@@ -1,0 +1,318 @@
+//! An arm behind topics, as a [`Backend`]: commands out at a fixed rate, the newest of what is heard
+//! in.
+
+use super::clock;
+use super::fault::LinkFault;
+use super::joints::JointNames;
+use super::link::Link;
+use super::mailbox::{Heard, Mailboxes, Postman};
+use super::service::Service;
+use super::settings::BackendSettings;
+use super::topics::Topic;
+use super::transport::Connect;
+use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
+use crate::robot::arm::Chain;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// An arm that is connected; several bodies may use it, one after another.
+pub struct Lab {
+    settings: BackendSettings,
+    chain: Chain,
+    names: JointNames,
+    link: Link,
+    boxes: Mailboxes,
+    overruns: AtomicU64,
+}
+
+/// How often is looked whether something has come; chosen, well below a control tick.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// How long an answer is waited for; chosen.
+const ANSWER_S: f64 = 0.5;
+
+/// Topics that an arm must be heard on.
+const HEARD: [Topic; 4] = [Topic::Joints, Topic::Wrench, Topic::Tactile, Topic::Status];
+
+impl Lab {
+    /// Connects to the arm of `chain` and waits until every topic is heard.
+    ///
+    /// # Errors
+    /// If the transport cannot be opened, a topic stays silent, or somebody else commands the arm.
+    pub fn connect(
+        settings: &BackendSettings,
+        chain: &Chain,
+        connect: Connect,
+    ) -> Result<Arc<Self>, LinkFault> {
+        let manufacturer = || chain.joints.iter().map(|joint| joint.name.to_owned()).collect();
+        let names = match settings.joints.as_slice() {
+            [] => manufacturer(),
+            named => named.to_vec(),
+        };
+        let names = JointNames::new(names);
+        let boxes = Mailboxes::default();
+        boxes.heard().since = Some(Instant::now());
+        let postman = Postman::new(boxes.clone(), names.clone(), settings.clone());
+        let period = Duration::from_secs_f64(1.0 / settings.rate_hz);
+        let link = Link::open(connect, period, Box::new(postman))?;
+        let (settings, chain) = (settings.clone(), chain.clone());
+        let overruns = AtomicU64::new(0);
+        let lab = Arc::new(Self { settings, chain, names, link, boxes, overruns });
+        lab.wait_for_topics()?;
+        lab.check_publishers()?;
+        Ok(lab)
+    }
+
+    /// A body on this arm; there should be one at a time.
+    pub fn body(self: &Arc<Self>) -> LabArm {
+        let capabilities = Capabilities {
+            resettable: false,
+            real_time: true,
+            ..Capabilities::of(&self.chain, 1.0 / self.settings.rate_hz)
+        };
+        let joints = self.chain.joints.len();
+        LabArm {
+            lab: Arc::clone(self),
+            capabilities,
+            reading: Reading::default(),
+            since: Instant::now(),
+            next: Instant::now(),
+            still: Command { qdot: vec![0.0; joints] },
+            fault: None,
+        }
+    }
+
+    /// Calls a service and waits for its answer.
+    ///
+    /// # Errors
+    /// If it does not answer in time, or refuses.
+    pub fn call(&self, service: &Service) -> Result<(), LinkFault> {
+        self.boxes.heard().answers.retain(|(other, _)| other != service);
+        self.link.call(service.clone());
+        let begun = Instant::now();
+        let words = loop {
+            let mut heard = self.boxes.heard();
+            let found = heard.answers.iter().position(|(other, _)| other == service);
+            if let Some((_, answer)) = found.map(|i| heard.answers.swap_remove(i)) {
+                match answer.is_done {
+                    true => return Ok(()),
+                    false => break answer.words,
+                }
+            }
+            drop(heard);
+            if begun.elapsed().as_secs_f64() > ANSWER_S {
+                break format!("no answer in {ANSWER_S} s");
+            }
+            sleep(LOOK);
+        };
+        Err(LinkFault::Service { name: service.name(), words })
+    }
+
+    /// Control ticks that came more than a period late.
+    pub fn overruns(&self) -> u64 {
+        self.overruns.load(Ordering::Relaxed)
+    }
+
+    fn wait_for_topics(&self) -> Result<(), LinkFault> {
+        let begun = Instant::now();
+        loop {
+            let missing = {
+                let heard = self.boxes.heard();
+                if let Some(refused) = &heard.refused {
+                    return Err(refused.clone());
+                }
+                HEARD.into_iter().filter(|&topic| heard.at[topic as usize].is_none()).collect()
+            };
+            let missing: Vec<Topic> = missing;
+            if missing.is_empty() {
+                return Ok(());
+            }
+            let patience_s = self.settings.patience_s;
+            if begun.elapsed().as_secs_f64() > patience_s {
+                let words = |topic| {
+                    let line = self.settings.topics.line(topic);
+                    format!("{} ({})", line.name, line.type_name)
+                };
+                let missing = missing.into_iter().map(words).collect();
+                return Err(LinkFault::NotThere { missing, patience_s });
+            }
+            sleep(LOOK);
+        }
+    }
+
+    fn check_publishers(&self) -> Result<(), LinkFault> {
+        let count = self.link.publisher_count(Topic::Command);
+        let topic = self.settings.topics.command.name.clone();
+        if count > 1 { Err(LinkFault::Publishers { topic, count }) } else { Ok(()) }
+    }
+
+    /// Sends velocities.
+    fn command(&self, qdot: &[f64]) {
+        let command = &self.settings.topics.command;
+        let packet = self.names.command(clock::now_s(), command.age_s, qdot, command.is_bare());
+        self.boxes.heard().commanded = Some(Instant::now());
+        self.link.send(packet);
+    }
+
+    /// Whether everything that was heard is of an age and kind that may be acted on.
+    fn check(&self, heard: &Heard) -> Result<(), LinkFault> {
+        if let Some(refused) = &heard.refused {
+            return Err(refused.clone());
+        }
+        if let Some(words) = heard.status.as_ref().and_then(|status| status.refusal()) {
+            return Err(LinkFault::Arm { words });
+        }
+        for topic in HEARD {
+            let line = self.settings.topics.line(topic);
+            let age_s = heard.at[topic as usize].map_or(f64::MAX, |at| at.elapsed().as_secs_f64());
+            if age_s > line.age_s {
+                let (topic, late_s) = (line.name.into(), heard.late_s[topic as usize]);
+                return Err(LinkFault::Silent { topic, age_s, late_s });
+            }
+        }
+        match self.link.broken() {
+            Some(broken) => Err(broken.into()),
+            None => self.check_publishers(),
+        }
+    }
+}
+
+impl Drop for Lab {
+    /// Nobody commands any more, and the arm's side is told, so that it is no alarm.
+    fn drop(&mut self) {
+        let was_engaged = std::mem::take(&mut self.boxes.heard().is_engaged);
+        if was_engaged {
+            let _ = self.call(&Service::Hold);
+        }
+    }
+}
+
+/// The body.
+pub struct LabArm {
+    lab: Arc<Lab>,
+    capabilities: Capabilities,
+    reading: Reading,
+    since: Instant,
+    /// When the next tick begins.
+    next: Instant,
+    still: Command,
+    fault: Option<Fault>,
+}
+
+impl LabArm {
+    fn time_s(&self) -> f64 {
+        self.since.elapsed().as_secs_f64()
+    }
+
+    fn fault(&mut self, cause: LinkFault) -> Fault {
+        let fault = Fault::Link { time_s: self.time_s(), cause };
+        // An arm that was stopped by hand hears nothing more until somebody starts anew.
+        if matches!(&fault, Fault::Link { cause: LinkFault::Arm { .. }, .. }) {
+            self.lab.boxes.heard().is_engaged = false;
+        }
+        self.fault = Some(fault.clone());
+        fault
+    }
+
+    /// Waits for the next tick's time; who is late does not catch up.
+    fn wait(&mut self) {
+        let period = Duration::from_secs_f64(self.capabilities.period_s);
+        let now = Instant::now();
+        self.next += period;
+        if self.next + period < now {
+            self.lab.overruns.fetch_add(1, Ordering::Relaxed);
+            self.next = now + period;
+        }
+        sleep(self.next.saturating_duration_since(Instant::now()));
+    }
+
+    /// Takes over what was heard.
+    fn read(&mut self) -> Result<(), LinkFault> {
+        let boxes = self.lab.boxes.clone();
+        let mut heard = boxes.heard();
+        self.lab.check(&heard)?;
+        let time_s = self.time_s();
+        let dt_s = time_s - self.reading.time_s;
+        if self.reading.q.len() == heard.q.len() {
+            let joints = self.lab.chain.joints.iter().zip(self.reading.q.iter().zip(&heard.q));
+            for (joint, (&from, &to)) in joints {
+                if (to - from).abs() > JUMP_RAD + joint.qdot_limit * dt_s {
+                    let joint = joint.name.to_owned();
+                    return Err(LinkFault::Jump { joint, from, to, dt_s });
+                }
+            }
+        }
+        let Reading { q, qdot, wrench, frames, .. } = &mut self.reading;
+        q.clone_from(&heard.q);
+        qdot.clone_from(&heard.qdot);
+        *wrench = heard.wrench.map(|wrench| wrench.moved(&self.lab.chain.tool.inverse()));
+        frames.clear();
+        frames.extend(heard.frames.drain(..));
+        self.reading.time_s = time_s;
+        Ok(())
+    }
+}
+
+/// A joint's position may be off by this much for other reasons than motion; chosen: a tick at half
+/// of the fastest joint's speed.
+const JUMP_RAD: f64 = 0.02;
+
+/// How long the arm is told to stand still before it is moved; chosen.
+const HANDSHAKE_S: f64 = 0.1;
+
+impl Backend for LabArm {
+    fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    /// Brings nothing anywhere: the arm stays where it stands, and is told to listen.
+    fn reset(&mut self, _seed: u64) -> Result<&Reading, Fault> {
+        if let Some(fault) = &self.fault {
+            return Err(fault.clone());
+        }
+        let lab = Arc::clone(&self.lab);
+        (self.since, self.reading) = (Instant::now(), Reading::default());
+        {
+            let mut heard = lab.boxes.heard();
+            heard.since = Some(self.since);
+            heard.frames.clear();
+            heard.is_engaged = true;
+        }
+        if let Err(fault) = lab.call(&Service::Unhold) {
+            return Err(self.fault(fault));
+        }
+        // Brakes open after the first commands to stand still.
+        let begun = Instant::now();
+        loop {
+            sleep(LOOK);
+            let is_on = lab.boxes.heard().status.as_ref().is_some_and(|status| status.servo_on);
+            let waited_s = begun.elapsed().as_secs_f64();
+            let is_done = is_on && waited_s > HANDSHAKE_S;
+            if is_done || waited_s > lab.settings.patience_s {
+                break;
+            }
+        }
+        self.next = Instant::now();
+        self.reading.applied.clone_from(&self.still);
+        match self.read() {
+            Ok(()) => Ok(&self.reading),
+            Err(cause) => Err(self.fault(cause)),
+        }
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        if let Some(fault) = &self.fault {
+            return Err(fault.clone());
+        }
+        self.capabilities.accept(command)?;
+        self.lab.command(&command.qdot);
+        self.wait();
+        self.reading.applied.clone_from(command);
+        match self.read() {
+            Ok(()) => Ok(&self.reading),
+            Err(cause) => Err(self.fault(cause)),
+        }
+    }
+}

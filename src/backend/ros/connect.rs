@@ -1,0 +1,39 @@
+//! From settings to a transport: what of them this build has.
+
+use super::service::Service;
+use super::settings::{BackendKind, BackendSettings};
+use super::topics::Side;
+use super::transport::{Connect, Transport, TransportError};
+
+/// What opens the transport that `settings` name, in the thread that is going to own it.
+///
+/// # Errors
+/// If this build lacks it.
+pub fn connect(
+    settings: &BackendSettings,
+    side: Side,
+    services: Vec<Service>,
+) -> Result<Connect, TransportError> {
+    let settings = settings.clone();
+    match settings.kind {
+        BackendKind::Ros2 => ros2(settings, side, services),
+        kind => Err(TransportError::NotBuilt { kind: kind.name() }),
+    }
+}
+
+#[cfg(feature = "ros2")]
+fn ros2(
+    settings: BackendSettings,
+    side: Side,
+    services: Vec<Service>,
+) -> Result<Connect, TransportError> {
+    Ok(Box::new(move || {
+        let end = super::ros2::Ros2::open(&settings, side, services)?;
+        Ok(Box::new(end) as Box<dyn Transport>)
+    }))
+}
+
+#[cfg(not(feature = "ros2"))]
+fn ros2(_: BackendSettings, _: Side, _: Vec<Service>) -> Result<Connect, TransportError> {
+    Err(TransportError::NotBuilt { kind: "ros2" })
+}

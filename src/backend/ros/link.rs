@@ -1,0 +1,173 @@
+//! A thread of its own for one side's topics: what arrives is handed on at once, what is to be sent
+//! never makes a control loop wait.
+
+use super::packet::Packet;
+use super::service::{Answer, Service};
+use super::topics::Topic;
+use super::transport::{Connect, Delivery, TransportError, Waker};
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::channel;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// How often publishers are counted; chosen, discovery takes longer.
+const COUNTED_S: f64 = 0.1;
+
+/// What is to be done by the thread.
+enum Errand {
+    Send(Packet),
+    Call(Service),
+    Answer(Service, u64, Answer),
+}
+
+/// Most errands that wait; older ones are of no use.
+const ERRANDS_MAX: usize = 256;
+
+#[derive(Default)]
+struct Shared {
+    errands: Mutex<VecDeque<Errand>>,
+    is_closed: AtomicBool,
+    /// Known publishers by topic.
+    publishers: [AtomicUsize; Topic::ALL.len()],
+    broken: Mutex<Option<TransportError>>,
+}
+
+/// What a side does with what arrives, in the link's thread.
+pub trait Sink: Send {
+    /// Takes what has arrived.
+    fn take(&mut self, delivery: Delivery);
+
+    /// Called about every `period`: what is to be sent then.
+    fn tick(&mut self, send: &mut dyn FnMut(Packet));
+}
+
+/// One side's end with its thread.
+pub struct Link {
+    shared: Arc<Shared>,
+    waker: Waker,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Link {
+    /// Opens a transport in a thread of its own, which ticks every `period`.
+    ///
+    /// # Errors
+    /// If it cannot be opened.
+    pub fn open(
+        connect: Connect,
+        period: Duration,
+        sink: Box<dyn Sink>,
+    ) -> Result<Self, TransportError> {
+        let shared = Arc::new(Shared::default());
+        let (opened, is_open) = channel();
+        let inside = Arc::clone(&shared);
+        let thread = std::thread::spawn(move || match connect() {
+            Ok(transport) => {
+                let _ = opened.send(Ok(transport.waker()));
+                serve(transport, &inside, period, sink);
+            }
+            Err(error) => {
+                let _ = opened.send(Err(error));
+            }
+        });
+        let gone =
+            || TransportError::Open { what: "the transport".into(), words: "it ended".into() };
+        let waker = is_open.recv().map_err(|_| gone())??;
+        Ok(Self { shared, waker, thread: Some(thread) })
+    }
+
+    /// Sends a packet soon.
+    pub fn send(&self, packet: Packet) {
+        self.errand(Errand::Send(packet));
+    }
+
+    /// Calls a service of the other side; the answer comes to the sink.
+    pub fn call(&self, service: Service) {
+        self.errand(Errand::Call(service));
+    }
+
+    /// Answers a call.
+    pub fn answer(&self, service: Service, call: u64, answer: Answer) {
+        self.errand(Errand::Answer(service, call, answer));
+    }
+
+    /// How many publishers of a topic are known, this side's own among them.
+    pub fn publisher_count(&self, topic: Topic) -> usize {
+        self.shared.publishers[topic as usize].load(Ordering::Relaxed)
+    }
+
+    /// Why nothing is sent any more, if that is so.
+    pub fn broken(&self) -> Option<TransportError> {
+        lock(&self.shared.broken).clone()
+    }
+
+    fn errand(&self, errand: Errand) {
+        let mut errands = lock(&self.shared.errands);
+        if errands.len() == ERRANDS_MAX {
+            errands.pop_front();
+        }
+        errands.push_back(errand);
+        drop(errands);
+        (self.waker)();
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        self.shared.is_closed.store(true, Ordering::Relaxed);
+        (self.waker)();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The thread.
+fn serve(
+    mut transport: Box<dyn super::transport::Transport>,
+    shared: &Shared,
+    period: Duration,
+    mut sink: Box<dyn Sink>,
+) {
+    let mut next = Instant::now() + period;
+    let mut counted = Instant::now() - Duration::from_secs(1);
+    while !shared.is_closed.load(Ordering::Relaxed) {
+        let wait = next.saturating_duration_since(Instant::now());
+        transport.receive(wait, &mut |delivery| sink.take(delivery));
+        let mut result = Ok(());
+        loop {
+            let Some(errand) = lock(&shared.errands).pop_front() else { break };
+            result = result.and(match errand {
+                Errand::Send(packet) => transport.send(&packet),
+                Errand::Call(service) => transport.call(&service),
+                Errand::Answer(service, call, answer) => transport.answer(&service, call, &answer),
+            });
+        }
+        let now = Instant::now();
+        if now >= next {
+            sink.tick(&mut |packet| result = result.clone().and(transport.send(&packet)));
+            // Who was held up does not catch up.
+            next = (next + period).max(now);
+        }
+        if counted.elapsed().as_secs_f64() > COUNTED_S {
+            counted = now;
+            for topic in Topic::ALL {
+                let count = transport.publisher_count(topic);
+                shared.publishers[topic as usize].store(count, Ordering::Relaxed);
+            }
+        }
+        *lock(&shared.broken) = result.err();
+    }
+    // What a side says last is still sent.
+    for errand in lock(&shared.errands).drain(..) {
+        if let Errand::Send(packet) = errand {
+            let _ = transport.send(&packet);
+        }
+    }
+}

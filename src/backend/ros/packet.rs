@@ -1,0 +1,42 @@
+//! A message of any topic of the table.
+
+use super::message::{
+    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, Header, JointState, JointTrajectory,
+    WrenchStamped,
+};
+use super::topics::Topic;
+
+/// A message of any topic of the table, in the layout of ROS 2.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Packet {
+    /// The arm's joints.
+    Joints(JointState),
+    /// Force and torque.
+    Wrench(WrenchStamped),
+    /// A tactile frame of the BioTac's own driver.
+    Hand(BioTacHand),
+    /// The same of a Shadow hand.
+    Fingers(BiotacAll),
+    /// The arm's state.
+    Status(DiagnosticArray),
+    /// Joint velocities with names and validity.
+    Command(JointTrajectory),
+    /// Joint velocities as `ros_control` takes them.
+    Velocities(Float64MultiArray),
+    /// A sign of life.
+    Heartbeat(Header),
+}
+
+impl Packet {
+    /// Over which topic it goes.
+    pub fn topic(&self) -> Topic {
+        match self {
+            Self::Joints(_) => Topic::Joints,
+            Self::Wrench(_) => Topic::Wrench,
+            Self::Hand(_) | Self::Fingers(_) => Topic::Tactile,
+            Self::Status(_) => Topic::Status,
+            Self::Command(_) | Self::Velocities(_) => Topic::Command,
+            Self::Heartbeat(_) => Topic::Heartbeat,
+        }
+    }
+}

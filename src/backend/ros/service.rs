@@ -1,0 +1,45 @@
+//! What an arm's computer does when it is called: services without arguments (`std_srvs/Trigger`).
+
+/// A service of the arm's side.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Service {
+    /// Stops and stays, whatever is commanded.
+    Hold,
+    /// Listens to commands again.
+    Unhold,
+    /// Stops at once and brakes: as the emergency stop.
+    Stop,
+    /// Forgets faults; the operator's.
+    ClearFault,
+    /// Takes what the force/torque sensor says now as its zero.
+    Bias,
+    /// Of a twin only: begins or ends a failure, by its name.
+    Twin(&'static str),
+}
+
+impl Service {
+    /// Those that every arm has.
+    pub const COMMON: [Self; 5] =
+        [Self::Hold, Self::Unhold, Self::Stop, Self::ClearFault, Self::Bias];
+
+    /// As it is called.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Hold => "/pa10/hold".into(),
+            Self::Unhold => "/pa10/unhold".into(),
+            Self::Stop => "/pa10/stop".into(),
+            Self::ClearFault => "/pa10/clear_fault".into(),
+            Self::Bias => "/ft_sensor/bias".into(),
+            Self::Twin(name) => format!("/twin/{name}"),
+        }
+    }
+}
+
+/// What a service answers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// Whether it was done.
+    pub is_done: bool,
+    /// What was, or why not.
+    pub words: String,
+}

@@ -1,0 +1,248 @@
+//! The table of topics: what each is called, what is sent over it, how often, and how old it may be.
+
+use super::message::{
+    BioTacHand, BiotacAll, Described, DiagnosticArray, Float64MultiArray, Header, JointState,
+    JointTrajectory, WrenchStamped,
+};
+use crate::config::{Checked, Rules};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What is sent between an arm and who explores with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Topic {
+    /// The arm's joints.
+    Joints,
+    /// The force/torque sensor.
+    Wrench,
+    /// The fingertip.
+    Tactile,
+    /// The arm's own state.
+    Status,
+    /// Joint velocities, to the arm.
+    Command,
+    /// That who commands is alive, to the arm.
+    Heartbeat,
+}
+
+/// Which end of the topics.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Who commands and reads.
+    Explorer,
+    /// Who is commanded and read: an arm's computer, or its twin.
+    Arm,
+}
+
+/// A line of the table, if nobody says otherwise; the first type is taken.
+struct Usual {
+    name: &'static str,
+    types: &'static [&'static str],
+    rate_hz: f64,
+    age_s: f64,
+}
+
+impl Topic {
+    /// All of them, in the order of the table.
+    pub const ALL: [Self; 6] =
+        [Self::Joints, Self::Wrench, Self::Tactile, Self::Status, Self::Command, Self::Heartbeat];
+
+    /// Who publishes it.
+    pub fn publisher(self) -> Side {
+        match self {
+            Self::Joints | Self::Wrench | Self::Tactile | Self::Status => Side::Arm,
+            Self::Command | Self::Heartbeat => Side::Explorer,
+        }
+    }
+
+    /// Its key in `[backend.topics]`.
+    pub fn key(self) -> &'static str {
+        ["joints", "wrench", "tactile", "status", "command", "heartbeat"][self as usize]
+    }
+}
+
+/// Names, types and rates of what drivers of the time send (`pa10_hardware_interface`,
+/// `kth-ros-pkg/biotac_driver`, `netft_rdt_driver`), ages chosen: some frames of each may be lost.
+const USUAL: [Usual; 6] = [
+    Usual {
+        name: "/joint_states",
+        types: &[JointState::<Header>::DEFINITION.name],
+        rate_hz: 250.0,
+        age_s: 0.05,
+    },
+    Usual {
+        name: "/ft_sensor/wrench",
+        types: &[WrenchStamped::<Header>::DEFINITION.name],
+        rate_hz: 500.0,
+        age_s: 0.1,
+    },
+    Usual {
+        name: "/biotac_pub",
+        types: &[BioTacHand::<Header>::DEFINITION.name, BiotacAll::<Header>::DEFINITION.name],
+        rate_hz: 100.0,
+        age_s: 0.1,
+    },
+    Usual {
+        name: "/pa10/status",
+        types: &[DiagnosticArray::<Header>::DEFINITION.name],
+        rate_hz: 50.0,
+        age_s: 0.2,
+    },
+    Usual {
+        name: "/pa10/joint_velocity_cmd",
+        types: &[JointTrajectory::<Header>::DEFINITION.name, Float64MultiArray::DEFINITION.name],
+        rate_hz: 250.0,
+        age_s: 0.02,
+    },
+    Usual {
+        name: "/palpate/heartbeat",
+        types: &[Header::DEFINITION.name],
+        rate_hz: 50.0,
+        age_s: 0.1,
+    },
+];
+
+/// A line of the table as a table of settings of its own, with its own defaults.
+macro_rules! line {
+    ($name:ident, $topic:expr) => {
+        /// A line of the table of topics.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $name {
+            /// Its name, beginning with a slash.
+            pub name: String,
+            /// Its message type, as in `sensor_msgs/msg/JointState`.
+            #[serde(rename = "type")]
+            pub type_name: String,
+            /// How often it is sent.
+            pub rate_hz: f64,
+            /// Age beyond which what was last received counts as lost; of a command: how long it is
+            /// valid.
+            pub age_s: f64,
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                let Usual { name, types, rate_hz, age_s } = &USUAL[$topic as usize];
+                let type_name = types[0].into();
+                Self { name: (*name).into(), type_name, rate_hz: *rate_hz, age_s: *age_s }
+            }
+        }
+
+        impl $name {
+            fn line(&self) -> Line<'_> {
+                let Self { name, type_name, rate_hz, age_s } = self;
+                Line { name, type_name, rate_hz: *rate_hz, age_s: *age_s }
+            }
+        }
+
+        impl Checked for $name {
+            fn check(&self, rules: &mut Rules) {
+                self.line().check(rules, USUAL[$topic as usize].types);
+            }
+        }
+    };
+}
+
+line!(JointsTopic, Topic::Joints);
+line!(WrenchTopic, Topic::Wrench);
+line!(TactileTopic, Topic::Tactile);
+line!(StatusTopic, Topic::Status);
+line!(CommandTopic, Topic::Command);
+line!(HeartbeatTopic, Topic::Heartbeat);
+
+impl CommandTopic {
+    /// Whether commands go without names and stamp.
+    pub fn is_bare(&self) -> bool {
+        self.type_name == Float64MultiArray::DEFINITION.name
+    }
+}
+
+impl TactileTopic {
+    /// Whether the fingers are those of a Shadow hand.
+    pub fn is_shadow(&self) -> bool {
+        self.type_name == BiotacAll::<Header>::DEFINITION.name
+    }
+}
+
+/// Table `[backend.topics]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Topics {
+    /// The arm's joints, from it.
+    pub joints: JointsTopic,
+    /// The force/torque sensor, in its own frame, its bias not taken off.
+    pub wrench: WrenchTopic,
+    /// The fingertip.
+    pub tactile: TactileTopic,
+    /// The arm's own state: servos, brakes, emergency stop, dead-man switch, alarm.
+    pub status: StatusTopic,
+    /// Joint velocities, to the arm.
+    pub command: CommandTopic,
+    /// That the explorer is alive, to the arm.
+    pub heartbeat: HeartbeatTopic,
+}
+
+/// A line of the table, whichever it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its message type.
+    pub type_name: &'a str,
+    /// How often it is sent.
+    pub rate_hz: f64,
+    /// Age beyond which it counts as lost.
+    pub age_s: f64,
+}
+
+impl Line<'_> {
+    fn check(&self, rules: &mut Rules, types: &[&str]) {
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "_/".contains(c);
+        let named = self.name.starts_with('/')
+            && self.name.len() > 1
+            && !self.name.ends_with('/')
+            && self.name.chars().all(is_plain);
+        rules.require("name", format!("\"{}\"", self.name), named, || {
+            "a slash, then letters, digits, _ and slashes".into()
+        });
+        rules.one_of("type", self.type_name, types);
+        rules.number("rate_hz", self.rate_hz, 1.0..=10_000.0);
+        rules.number("age_s", self.age_s, 1e-3..=10.0);
+    }
+}
+
+impl Topics {
+    /// The line of a topic.
+    pub fn line(&self, topic: Topic) -> Line<'_> {
+        match topic {
+            Topic::Joints => self.joints.line(),
+            Topic::Wrench => self.wrench.line(),
+            Topic::Tactile => self.tactile.line(),
+            Topic::Status => self.status.line(),
+            Topic::Command => self.command.line(),
+            Topic::Heartbeat => self.heartbeat.line(),
+        }
+    }
+}
+
+impl Checked for Topics {
+    fn check(&self, rules: &mut Rules) {
+        rules.table("joints", &self.joints);
+        rules.table("wrench", &self.wrench);
+        rules.table("tactile", &self.tactile);
+        rules.table("status", &self.status);
+        rules.table("command", &self.command);
+        rules.table("heartbeat", &self.heartbeat);
+        let names = Topic::ALL.map(|topic| self.line(topic).name);
+        for (i, topic) in Topic::ALL.iter().enumerate() {
+            let first = !names[..i].contains(&names[i]);
+            rules.require(
+                &format!("{}.name", topic.key()),
+                format!("\"{}\"", names[i]),
+                first,
+                || "a name of its own".into(),
+            );
+        }
+    }
+}
