@@ -10,6 +10,7 @@
 //! | 8 | [`report`] | tables, figures, the page: drawn from rows and studies |
 //! | 7 | [`study`] | fidelity, effects, hard cases: questions asked of many touches |
 //! | 6 | [`experiment`] | experiment, trial, runner, store, measures, statistics, truth |
+//! | 6 | [`twin`] | a simulated arm behind a laboratory's topics |
 //! | 5 | [`sim`] | what only a simulator knows: object, effects, physics of the finger, bodies |
 //! | 4 | [`explore`] | what the robot does: belief, planner, probe, control |
 //! | 3 | [`task`], [`backend`] | what the robot is told; what is commanded and read |
@@ -42,4 +43,5 @@ pub mod robot;
 pub mod sim;
 pub mod study;
 pub mod task;
+pub mod twin;
 pub mod words;

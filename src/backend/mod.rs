@@ -10,6 +10,7 @@ pub mod delay;
 mod fault;
 pub mod fault_injector;
 pub mod limits;
+pub mod pace;
 mod reading;
 pub mod recorder;
 pub mod ros;

@@ -20,6 +20,7 @@ mod scan;
 mod show;
 mod stress;
 mod terminal;
+mod twin;
 mod watch;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -45,6 +46,7 @@ Examples:
   palpate show my-part.obj --unit mm        check a mesh before exploring it
   palpate scan scenes/bird.toml             touch the whole zone, write a point cloud
   palpate watch scenes/bird_pa10.toml       watch a trial in a window
+  palpate twin experiments/container_pa10.toml   a stand-in for the real arm, over ROS 2
   palpate export runs/bird --planner active --out bird.ply
   palpate fidelity scenes/bird_finger.toml --tolerance 0.2mm
   palpate stress                            hard cases until they break
@@ -66,6 +68,8 @@ enum Command {
     Scan(scan::Args),
     /// Watch a trial in a window while it runs.
     Watch(watch::Args),
+    /// Serve a simulated arm over a laboratory's topics in real time.
+    Twin(twin::Args),
     /// Write a belief of a run as a mesh.
     Export(export::Args),
     /// Show what accuracy costs: errors and time over a ladder of scenes.
@@ -98,6 +102,7 @@ pub fn main() -> ExitCode {
         Command::Show(args) => show::run(&args, cli.talk),
         Command::Scan(args) => scan::run(&args, cli.talk),
         Command::Watch(args) => watch::run(&args, cli.talk),
+        Command::Twin(args) => twin::run(&args, cli.talk),
         Command::Export(args) => export::run(&args),
         Command::Fidelity(args) => fidelity::run(&args, cli.talk),
         Command::Effects(args) => effects::run(&args, cli.talk),

@@ -51,7 +51,9 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let experiment = Experiment::load(&find(&args.experiment, EXPERIMENTS)?, &args.set)?;
     bound_threads(args.threads)?;
-    let simulation = simulation(experiment, talk)?;
+    let mut simulation = simulation(experiment, talk)?;
+    simulation.connect()?;
+    let simulation = simulation;
     let experiment = simulation.experiment();
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&experiment.name));
     let manifest = manifest(experiment);

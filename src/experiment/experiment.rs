@@ -6,6 +6,7 @@
 
 use super::report_settings::{ReportSettings, TOUCHES_MAX};
 use super::row::TrialRow;
+use crate::backend::ros::settings::BackendSettings;
 use crate::config::{Checked, ConfigError, Loader, Rules};
 use crate::explore::belief::GpSettings;
 use crate::explore::planner;
@@ -46,9 +47,20 @@ pub struct Experiment {
     /// What the report shows.
     #[serde(default)]
     pub report: ReportSettings,
+    /// Which body carries out the touches: the scene's own, or an arm; or the path of a file that
+    /// says it.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub backend: BackendSettings,
     /// The scene, or in a file the path of one, relative to that file.
     pub scene: Scene,
 }
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// Tables that may stand in a file of their own.
+const INCLUDED: [&str; 2] = ["scene", "backend"];
 
 /// Planners that the others are held against, if nobody says which: the paper's two.
 const BASELINES: [&str; 2] = ["random", "active"];
@@ -72,6 +84,7 @@ impl Experiment {
             gp: GpSettings::default(),
             planning: PlanningSettings::default(),
             report: ReportSettings::default(),
+            backend: BackendSettings::default(),
             scene: scene.clone(),
         }
     }
@@ -90,10 +103,13 @@ impl Experiment {
             ));
         }
         // `--set scene=FILE` chooses the file; the other assignments then edit what it holds.
-        let (scene, others): (Vec<_>, Vec<_>) =
-            sets.iter().partition(|set| set.split('=').next().map(str::trim) == Some("scene"));
-        scene.iter().try_for_each(|set| loader.set(set))?;
-        loader.include("scene")?;
+        let is_file = |set: &&String| {
+            let key = set.split('=').next().map(str::trim);
+            key.is_some_and(|key| INCLUDED.contains(&key))
+        };
+        let (files, others): (Vec<_>, Vec<_>) = sets.iter().partition(is_file);
+        files.iter().try_for_each(|set| loader.set(set))?;
+        INCLUDED.iter().try_for_each(|key| loader.include(key))?;
         others.iter().try_for_each(|set| loader.set(set))?;
         loader.resolve_path("scene.object.mesh");
         loader.finish()
@@ -205,6 +221,7 @@ impl Checked for Experiment {
         rules.table("gp", &self.gp);
         rules.table("planning", &self.planning);
         rules.table("report", &self.report);
+        rules.table("backend", &self.backend);
         let last = f64::from(self.trials.max(1) - 1);
         rules.number("report.trial", self.report.trial.into(), 0.0..=last);
         rules.table("scene", &self.scene);

@@ -47,7 +47,8 @@ pub fn run(
     progress: &(dyn Fn(&TrialRow) + Sync),
 ) -> Result<usize, RunError> {
     let jobs = jobs(simulation.experiment(), done);
-    let pool = pool(threads)?;
+    // There is one arm, and every touch of it takes its time.
+    let pool = pool(if simulation.is_real() { 1 } else { threads })?;
     let finished = Mutex::new((folder, 0));
     // Handed out one by one, so that rows finish about in order and an interrupted run has
     // whole pairs.

@@ -6,6 +6,12 @@ use super::row::TrialRow;
 use super::trial;
 use super::truth::Truth;
 use crate::backend::Fault;
+use crate::backend::ros::arm::Lab;
+use crate::backend::ros::connect::connect;
+use crate::backend::ros::fault::LinkFault;
+use crate::backend::ros::service::Service;
+use crate::backend::ros::settings::BackendKind;
+use crate::backend::ros::topics::Side;
 use crate::explore::planner;
 use crate::explore::probe::Probe;
 use crate::math::{optimize, seed};
@@ -23,6 +29,8 @@ pub struct Simulation {
     experiment: Experiment,
     simulator: Simulator,
     truth: Truth,
+    /// The arm that touches in place of the simulated body, once it is connected.
+    lab: Option<Arc<Lab>>,
 }
 
 /// An experiment that cannot be simulated.
@@ -99,7 +107,7 @@ impl Simulation {
             return Err(SimulationError::NoSurface);
         }
         experiment.scene = environment.scene().clone();
-        Ok(Self { experiment, simulator: Simulator::new(environment)?, truth })
+        Ok(Self { experiment, simulator: Simulator::new(environment)?, truth, lab: None })
     }
 
     /// What is run, with everything that it left to its object written out.
@@ -139,12 +147,37 @@ impl Simulation {
         seed::stream(self.experiment.seed, trial.into(), "body").random()
     }
 
+    /// Whether the experiment wants an arm that is not simulated here.
+    pub fn is_real(&self) -> bool {
+        self.experiment.backend.kind != BackendKind::Simulated
+    }
+
+    /// Connects to the arm that the experiment wants, and none if it wants a simulated one.
+    ///
+    /// # Errors
+    /// If it cannot be reached, or is not in a state to be driven.
+    pub fn connect(&mut self) -> Result<Option<Arc<Lab>>, LinkFault> {
+        if self.is_real() {
+            let lacks = || LinkFault::Arm { words: "the scene has no object to touch".into() };
+            let chain = self.environment().chain().ok_or_else(lacks)?;
+            let settings = &self.experiment.backend;
+            let open = connect(settings, Side::Explorer, Service::COMMON.into())?;
+            self.lab = Some(Lab::connect(settings, &chain, open)?);
+        }
+        Ok(self.lab.clone())
+    }
+
     /// What touches in a trial.
     ///
     /// # Errors
-    /// If the body cannot be brought to its start.
+    /// If the body cannot be brought to its start, or no arm is connected.
     pub fn probe(&self, trial: u32) -> Result<Box<dyn Probe>, Fault> {
-        self.simulator.probe(self.body_seed(trial))
+        let seed = self.body_seed(trial);
+        match &self.lab {
+            Some(lab) => Ok(Box::new(self.simulator.servo(Box::new(lab.body()), seed)?)),
+            None if self.is_real() => Err(Fault::Lacks { part: "a connection to the arm" }),
+            None => self.simulator.probe(seed),
+        }
     }
 
     /// Runs one trial of `planner` from start to end; what goes wrong stands in its row.

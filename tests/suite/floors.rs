@@ -13,7 +13,7 @@ const FLOORS: [&[&str]; 10] = [
     &["task", "backend"],
     &["explore"],
     &["sim"],
-    &["experiment"],
+    &["experiment", "twin"],
     &["study"],
     &["report"],
     &["cli"],

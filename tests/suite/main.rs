@@ -5,6 +5,7 @@ mod common;
 mod allocation;
 mod approach;
 mod arm;
+mod arm_pc;
 mod backend;
 mod broken;
 #[cfg(feature = "nlopt")]
@@ -48,6 +49,7 @@ mod memory;
 mod meshes;
 mod messages;
 mod models;
+mod net_ft;
 mod newcomer;
 #[cfg(feature = "nlopt")]
 mod notices;
@@ -66,3 +68,4 @@ mod scenes;
 mod servo;
 mod slopes;
 mod stress;
+mod twin;

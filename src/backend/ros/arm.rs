@@ -6,14 +6,15 @@ use super::fault::LinkFault;
 use super::joints::JointNames;
 use super::link::Link;
 use super::mailbox::{Heard, Mailboxes, Postman};
+use super::net_ft::{NetFt, NetFtSettings, Record};
 use super::service::Service;
 use super::settings::BackendSettings;
 use super::topics::Topic;
-use super::transport::Connect;
+use super::transport::{Connect, TransportError};
+use crate::backend::pace::Pace;
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use crate::robot::arm::Chain;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -24,7 +25,10 @@ pub struct Lab {
     names: JointNames,
     link: Link,
     boxes: Mailboxes,
-    overruns: AtomicU64,
+    /// The first fault; it stays until the operator clears it.
+    latched: Mutex<Option<LinkFault>>,
+    /// Fills the mailbox of forces, while it is there.
+    _net_ft: Option<NetFt>,
 }
 
 /// How often is looked whether something has come; chosen, well below a control tick.
@@ -46,20 +50,23 @@ impl Lab {
         chain: &Chain,
         connect: Connect,
     ) -> Result<Arc<Self>, LinkFault> {
-        let manufacturer = || chain.joints.iter().map(|joint| joint.name.to_owned()).collect();
-        let names = match settings.joints.as_slice() {
-            [] => manufacturer(),
-            named => named.to_vec(),
-        };
-        let names = JointNames::new(names);
+        let names = settings.joint_names(chain);
         let boxes = Mailboxes::default();
         boxes.heard().since = Some(Instant::now());
         let postman = Postman::new(boxes.clone(), names.clone(), settings.clone());
         let period = Duration::from_secs_f64(1.0 / settings.rate_hz);
         let link = Link::open(connect, period, Box::new(postman))?;
         let (settings, chain) = (settings.clone(), chain.clone());
-        let overruns = AtomicU64::new(0);
-        let lab = Arc::new(Self { settings, chain, names, link, boxes, overruns });
+        let net_ft = settings.net_ft.as_ref().map(|sensor| listen(sensor, &boxes)).transpose()?;
+        let lab = Arc::new(Self {
+            settings,
+            chain,
+            names,
+            link,
+            boxes,
+            latched: Mutex::default(),
+            _net_ft: net_ft,
+        });
         lab.wait_for_topics()?;
         lab.check_publishers()?;
         Ok(lab)
@@ -78,9 +85,8 @@ impl Lab {
             capabilities,
             reading: Reading::default(),
             since: Instant::now(),
-            next: Instant::now(),
+            pace: Pace::new(1.0 / self.settings.rate_hz),
             still: Command { qdot: vec![0.0; joints] },
-            fault: None,
         }
     }
 
@@ -110,9 +116,19 @@ impl Lab {
         Err(LinkFault::Service { name: service.name(), words })
     }
 
-    /// Control ticks that came more than a period late.
-    pub fn overruns(&self) -> u64 {
-        self.overruns.load(Ordering::Relaxed)
+    /// Forgets faults, here and on the arm's side: the operator's to ask for.
+    ///
+    /// # Errors
+    /// If the arm's side does not.
+    pub fn clear_fault(&self) -> Result<(), LinkFault> {
+        self.call(&Service::ClearFault)?;
+        self.boxes.heard().refused = None;
+        *self.latch() = None;
+        Ok(())
+    }
+
+    fn latch(&self) -> MutexGuard<'_, Option<LinkFault>> {
+        self.latched.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn wait_for_topics(&self) -> Result<(), LinkFault> {
@@ -179,6 +195,25 @@ impl Lab {
     }
 }
 
+/// Puts what the sensor sends into its mailbox; a record with an error is a refusal.
+fn listen(settings: &NetFtSettings, boxes: &Mailboxes) -> Result<NetFt, LinkFault> {
+    let (boxes, address) = (boxes.clone(), settings.address.clone());
+    let take = move |record: Record| {
+        let mut heard = boxes.heard();
+        heard.at[Topic::Wrench as usize] = Some(Instant::now());
+        heard.wrench = Some(record.wrench);
+        if record.status != 0 {
+            let words = format!("status {:#010x}", record.status);
+            let fault = LinkFault::Message { topic: address.clone(), words };
+            heard.refused.get_or_insert(fault);
+        }
+    };
+    NetFt::open(settings, take).map_err(|error| {
+        let (what, words) = (settings.address.clone(), error.to_string());
+        LinkFault::Transport(TransportError::Open { what, words })
+    })
+}
+
 impl Drop for Lab {
     /// Nobody commands any more, and the arm's side is told, so that it is no alarm.
     fn drop(&mut self) {
@@ -195,10 +230,8 @@ pub struct LabArm {
     capabilities: Capabilities,
     reading: Reading,
     since: Instant,
-    /// When the next tick begins.
-    next: Instant,
+    pace: Pace,
     still: Command,
-    fault: Option<Fault>,
 }
 
 impl LabArm {
@@ -206,26 +239,22 @@ impl LabArm {
         self.since.elapsed().as_secs_f64()
     }
 
-    fn fault(&mut self, cause: LinkFault) -> Fault {
-        let fault = Fault::Link { time_s: self.time_s(), cause };
+    /// Latches a fault.
+    fn fault(&self, cause: LinkFault) -> Fault {
         // An arm that was stopped by hand hears nothing more until somebody starts anew.
-        if matches!(&fault, Fault::Link { cause: LinkFault::Arm { .. }, .. }) {
+        if matches!(cause, LinkFault::Arm { .. }) {
             self.lab.boxes.heard().is_engaged = false;
         }
-        self.fault = Some(fault.clone());
-        fault
+        let cause = self.lab.latch().get_or_insert(cause).clone();
+        Fault::Link { time_s: self.time_s(), cause }
     }
 
-    /// Waits for the next tick's time; who is late does not catch up.
-    fn wait(&mut self) {
-        let period = Duration::from_secs_f64(self.capabilities.period_s);
-        let now = Instant::now();
-        self.next += period;
-        if self.next + period < now {
-            self.lab.overruns.fetch_add(1, Ordering::Relaxed);
-            self.next = now + period;
+    /// The fault that is latched, if one is.
+    fn latched(&self) -> Result<(), Fault> {
+        match self.lab.latch().clone() {
+            Some(cause) => Err(Fault::Link { time_s: self.time_s(), cause }),
+            None => Ok(()),
         }
-        sleep(self.next.saturating_duration_since(Instant::now()));
     }
 
     /// Takes over what was heard.
@@ -269,9 +298,7 @@ impl Backend for LabArm {
 
     /// Brings nothing anywhere: the arm stays where it stands, and is told to listen.
     fn reset(&mut self, _seed: u64) -> Result<&Reading, Fault> {
-        if let Some(fault) = &self.fault {
-            return Err(fault.clone());
-        }
+        self.latched()?;
         let lab = Arc::clone(&self.lab);
         (self.since, self.reading) = (Instant::now(), Reading::default());
         {
@@ -294,7 +321,7 @@ impl Backend for LabArm {
                 break;
             }
         }
-        self.next = Instant::now();
+        self.pace.restart();
         self.reading.applied.clone_from(&self.still);
         match self.read() {
             Ok(()) => Ok(&self.reading),
@@ -303,12 +330,10 @@ impl Backend for LabArm {
     }
 
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
-        if let Some(fault) = &self.fault {
-            return Err(fault.clone());
-        }
+        self.latched()?;
         self.capabilities.accept(command)?;
         self.lab.command(&command.qdot);
-        self.wait();
+        self.pace.wait(1);
         self.reading.applied.clone_from(command);
         match self.read() {
             Ok(()) => Ok(&self.reading),

@@ -3,7 +3,7 @@
 use super::service::Service;
 use super::settings::{BackendKind, BackendSettings};
 use super::topics::Side;
-use super::transport::{Connect, Transport, TransportError};
+use super::transport::{Connect, TransportError};
 
 /// What opens the transport that `settings` name, in the thread that is going to own it.
 ///
@@ -17,8 +17,26 @@ pub fn connect(
     let settings = settings.clone();
     match settings.kind {
         BackendKind::Ros2 => ros2(settings, side, services),
-        kind => Err(TransportError::NotBuilt { kind: kind.name() }),
+        BackendKind::Ros1 => ros1(settings, side, services),
+        BackendKind::Simulated => Err(TransportError::Simulated),
     }
+}
+
+#[cfg(feature = "ros1")]
+fn ros1(
+    settings: BackendSettings,
+    side: Side,
+    services: Vec<Service>,
+) -> Result<Connect, TransportError> {
+    Ok(Box::new(move || {
+        let end = super::ros1::Ros1::open(&settings, side, services)?;
+        Ok(Box::new(end) as Box<dyn super::transport::Transport>)
+    }))
+}
+
+#[cfg(not(feature = "ros1"))]
+fn ros1(_: BackendSettings, _: Side, _: Vec<Service>) -> Result<Connect, TransportError> {
+    Err(TransportError::NotBuilt { kind: "ros1" })
 }
 
 #[cfg(feature = "ros2")]
@@ -29,7 +47,7 @@ fn ros2(
 ) -> Result<Connect, TransportError> {
     Ok(Box::new(move || {
         let end = super::ros2::Ros2::open(&settings, side, services)?;
-        Ok(Box::new(end) as Box<dyn Transport>)
+        Ok(Box::new(end) as Box<dyn super::transport::Transport>)
     }))
 }
 

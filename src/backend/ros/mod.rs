@@ -10,9 +10,13 @@ pub mod fault;
 pub mod joints;
 pub mod link;
 pub mod mailbox;
+pub mod master;
 pub mod memory;
 pub mod message;
+pub mod net_ft;
 pub mod packet;
+#[cfg(feature = "ros1")]
+mod ros1;
 #[cfg(feature = "ros2")]
 mod ros2;
 pub mod service;

@@ -1,7 +1,10 @@
 //! What an arm's computer does when it is called: services without arguments (`std_srvs/Trigger`).
 
+use serde::Serialize;
+
 /// A service of the arm's side.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Service {
     /// Stops and stays, whatever is commanded.
     Hold,

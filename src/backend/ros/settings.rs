@@ -1,7 +1,10 @@
 //! Which body carries out the touches of an experiment: table `[backend]`.
 
+use super::joints::JointNames;
+use super::net_ft::NetFtSettings;
 use super::topics::Topics;
 use crate::config::{Checked, Rules};
+use crate::robot::arm::Chain;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +40,8 @@ pub struct BackendSettings {
     pub kind: BackendKind,
     /// Domain of ROS 2, `ROS_DOMAIN_ID` of the lab.
     pub domain: u16,
+    /// Where the master of ROS 1 is.
+    pub master: String,
     /// Names of the joints in the lab's messages, from the base on; left out, the manufacturer's.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<String>,
@@ -48,6 +53,9 @@ pub struct BackendSettings {
     pub patience_s: f64,
     /// How far stamps may be ahead of this machine's clock.
     pub clock_ahead_s: f64,
+    /// A force/torque sensor that is read over UDP in place of its topic.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub net_ft: Option<NetFtSettings>,
     /// The table of topics.
     pub topics: Topics,
 }
@@ -61,19 +69,35 @@ impl Default for BackendSettings {
         Self {
             kind: BackendKind::Simulated,
             domain: 0,
+            master: "http://127.0.0.1:11311".into(),
             joints: Vec::new(),
             finger: 0,
             rate_hz: 250.0,
             patience_s: 5.0,
             clock_ahead_s: 0.005,
+            net_ft: None,
             topics: Topics::default(),
         }
+    }
+}
+
+impl BackendSettings {
+    /// The joints of `chain` as the lab names them.
+    pub fn joint_names(&self, chain: &Chain) -> JointNames {
+        JointNames::new(match self.joints.as_slice() {
+            [] => chain.joints.iter().map(|joint| joint.name.to_owned()).collect(),
+            named => named.to_vec(),
+        })
     }
 }
 
 impl Checked for BackendSettings {
     fn check(&self, rules: &mut Rules) {
         rules.number("domain", self.domain.into(), 0.0..=232.0);
+        let is_address = self.master.starts_with("http://") && self.master.len() > 7;
+        rules.require("master", format!("\"{}\"", self.master), is_address, || {
+            "an address, as in \"http://127.0.0.1:11311\"".into()
+        });
         rules.number("rate_hz", self.rate_hz, 50.0..=RATE_MAX_HZ);
         rules.number("patience_s", self.patience_s, 0.1..=600.0);
         rules.number("clock_ahead_s", self.clock_ahead_s, 0.0..=10.0);
@@ -82,6 +106,9 @@ impl Checked for BackendSettings {
             rules.require(&format!("joints[{i}]"), format!("\"{name}\""), is_new, || {
                 "a name of its own".into()
             });
+        }
+        if let Some(net_ft) = &self.net_ft {
+            rules.table("net_ft", net_ft);
         }
         rules.table("topics", &self.topics);
     }

@@ -1,9 +1,10 @@
 //! What an arm's own computer says of it.
 
 use super::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, Level};
+use serde::Serialize;
 
 /// The arm's state.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ArmStatus {
     /// The servos hold the joints.
     pub servo_on: bool,

@@ -53,6 +53,9 @@ pub enum TransportError {
         /// As `[backend]` names it.
         kind: &'static str,
     },
+    /// There is nothing to connect to.
+    #[error("kind = \"simulated\" has no arm to connect to; allowed are \"ros2\", \"ros1\"")]
+    Simulated,
     /// It cannot be set up.
     #[error("cannot open {what}: {words}")]
     Open {

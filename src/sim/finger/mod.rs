@@ -17,7 +17,7 @@ pub mod effects;
 pub mod fingertip;
 pub mod lattice;
 pub mod load;
-mod noise;
+pub(crate) mod noise;
 pub mod plate;
 pub mod profile;
 pub mod samples;

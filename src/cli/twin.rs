@@ -1,0 +1,125 @@
+//! `palpate twin`.
+
+use super::find::{SCENES, find};
+use super::prepare::simulation;
+use super::progress::stop_on_interrupt;
+use super::show::is_experiment;
+use super::terminal::{Ending, Talk, print};
+use crate::backend::ros::connect::connect;
+use crate::backend::ros::settings::BackendKind;
+use crate::backend::ros::topics::Side;
+use crate::experiment::Experiment;
+use crate::sim::Scene;
+use crate::sim::finger::effects::wrench::WrenchEffect;
+use crate::twin::failure::{FAILURES, by_name};
+use crate::twin::serve::{Injection, Twin, services};
+use anyhow::{Context, bail};
+use serde_json::json;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate twin experiments/container_pa10.toml
+  palpate twin scenes/container_pa10.toml --domain 7 --seed 3
+  palpate twin scenes/bird_pa10.toml --inject force_spike@12 --inject estop@20+2
+
+In another terminal: palpate run container_pa10 --set backend.kind='\"ros2\"'
+
+Serves the simulated arm over the topics of the experiment's [backend] in real time, with what an arm's own \
+computer does: a command that is late, garbled or of a second publisher stops the arm. Events are printed as \
+JSON lines. Ctrl-C ends it. A failure is begun by --inject, or by the service /twin/NAME.")]
+pub(super) struct Args {
+    /// A scene or an experiment (.toml) with a body that moves and a soft finger.
+    path: PathBuf,
+    /// Transport [default: the experiment's, or ros2].
+    #[arg(long, value_name = "ros2|ros1", value_parser = kind)]
+    kind: Option<BackendKind>,
+    /// Domain of ROS 2 [default: the experiment's, or 0].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
+    domain: Option<u16>,
+    /// Begin a failure some seconds after the first movement, and end it: NAME@SECONDS[+SECONDS].
+    #[arg(long, value_name = "NAME@AT[+FOR]", value_parser = injection)]
+    inject: Vec<Injection>,
+    /// Randomness of the sensors.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    seed: u64,
+    /// Change one setting; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+fn kind(text: &str) -> Result<BackendKind, String> {
+    let kinds = [BackendKind::Ros2, BackendKind::Ros1];
+    kinds.into_iter().find(|kind| kind.name() == text).ok_or("allowed are ros2, ros1".into())
+}
+
+fn injection(text: &str) -> Result<Injection, String> {
+    let names = || FAILURES.iter().map(|failure| failure.name).collect::<Vec<_>>().join(", ");
+    let form = "allowed is NAME@SECONDS or NAME@SECONDS+SECONDS, as in force_spike@12+0.1";
+    let (name, times) = text.split_once('@').ok_or(form)?;
+    let failure = by_name(name).ok_or_else(|| format!("allowed names are {}", names()))?;
+    let seconds = |text: &str| {
+        let seconds = text.parse::<f64>().ok();
+        seconds.filter(|seconds| (0.0..=1e6).contains(seconds)).ok_or(form)
+    };
+    let (at, span) = times.split_once('+').map_or((times, None), |(at, span)| (at, Some(span)));
+    Ok(Injection { failure, at_s: seconds(at)?, for_s: span.map(seconds).transpose()? })
+}
+
+pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+    let mut experiment = experiment(args)?;
+    let scene = &mut experiment.scene;
+    if scene.effects.wrench.is_none() {
+        scene.effects.wrench = Some(WrenchEffect::default());
+        talk.note("the scene has no [effects.wrench]; the twin has the default one");
+    }
+    let settings = experiment.backend.clone();
+    let simulation = simulation(experiment, talk)?;
+    let simulator = simulation.simulator();
+    let (Some(body), Some(robot)) = (simulator.body()?, simulation.environment().robot()) else {
+        bail!(
+            "{}: body = \"{}\" does not move; a twin needs \"kinematic\" or \"dynamic\"",
+            args.path.display(),
+            simulation.experiment().scene.body.name()
+        );
+    };
+    let effects = &simulation.experiment().scene.effects;
+    if effects.fluid.is_none() || effects.electrodes.is_none() {
+        bail!(
+            "{}: a twin sends tactile frames; it needs [effects.skin], [effects.fluid] and \
+             [effects.electrodes]",
+            args.path.display()
+        );
+    }
+    let stop = stop_on_interrupt("ticks")?;
+    let open = connect(&settings, Side::Arm, services())?;
+    let injections = args.inject.clone();
+    let mut twin = Twin::new(body, &robot.chain, &settings, open, injections, args.seed)
+        .context("cannot serve")?;
+    let mut written = Ok(());
+    twin.run(&stop, &mut |time_unix_s, event| {
+        let line = json!({ "time_unix_s": time_unix_s, "event": event });
+        written = std::mem::replace(&mut written, Ok(())).and(print(&line.to_string()));
+    })?;
+    written?;
+    let counts = json!({ "overruns": twin.overruns(), "refused": twin.refused() });
+    print(&json!({ "ended": counts }).to_string())?;
+    Ok(Ending::Done)
+}
+
+/// Touches of the experiment that a scene alone makes; a twin makes none by itself.
+const TOUCHES: u32 = 1;
+
+fn experiment(args: &Args) -> anyhow::Result<Experiment> {
+    let path = find(&args.path, SCENES)?;
+    let mut experiment = match is_experiment(&path) {
+        true => Experiment::load(&path, &args.set)?,
+        false => Experiment::on(&Scene::load(&path, &args.set)?, &["active"], 1, TOUCHES),
+    };
+    let backend = &mut experiment.backend;
+    backend.domain = args.domain.unwrap_or(backend.domain);
+    let usual = || Some(backend.kind).filter(|kind| *kind != BackendKind::Simulated);
+    backend.kind = args.kind.or_else(usual).unwrap_or(BackendKind::Ros2);
+    Ok(experiment)
+}

@@ -1,0 +1,171 @@
+//! The layer between network and servos: what it takes, and how it stops.
+
+use palpate::backend::ros::joints::JointNames;
+use palpate::backend::ros::message::{JointTrajectory, JointTrajectoryPoint};
+use palpate::backend::ros::packet::Packet;
+use palpate::twin::arm_pc::ArmPc;
+use proptest::prelude::*;
+
+const PERIOD_S: f64 = 0.002;
+const VALID_S: f64 = 0.02;
+
+fn names() -> JointNames {
+    JointNames::new(["S1", "S2", "S3"].map(String::from).to_vec())
+}
+
+/// An arm's computer that has been told to stand still and then to move, 4 ms apart, until 0.1 s.
+fn moving() -> ArmPc {
+    let mut pc = ArmPc::new(names());
+    pc.take(&names().command(0.0, VALID_S, &[0.0; 3], false), 1, 0.0, 0.0);
+    for i in 1..=25 {
+        let now_s = f64::from(i) * 0.004;
+        pc.take(&names().command(now_s, VALID_S, &[0.1, -0.2, 0.3], false), 1, now_s, now_s);
+        pc.advance(now_s);
+    }
+    assert_eq!(pc.advance(0.1), [0.1, -0.2, 0.3]);
+    pc
+}
+
+/// The largest speed that is still commanded at each of the ticks from 0.1 s on.
+fn speeds(pc: &mut ArmPc, ticks: u32) -> Vec<f64> {
+    let at = |tick| 0.1 + f64::from(tick) * PERIOD_S;
+    let fastest = |qdot: &[f64]| qdot.iter().fold(0.0, |most: f64, qdot| most.max(qdot.abs()));
+    (1..=ticks).map(|tick| fastest(pc.advance(at(tick)))).collect()
+}
+
+#[test]
+fn it_moves_after_a_command_to_stand_still_only() {
+    let mut pc = ArmPc::new(names());
+    pc.take(&names().command(1.0, VALID_S, &[0.1; 3], false), 1, 1.0, 1.0);
+    assert_eq!(pc.advance(1.0), [0.0; 3]);
+    assert!(!pc.status().servo_on && pc.status().brake);
+    moving();
+}
+
+/// At most 30 ms of silence and 60 ms of ramp; and never faster on the way.
+#[test]
+fn when_commands_cease_it_stops_and_brakes_and_tells() {
+    let mut pc = moving();
+    let speeds = speeds(&mut pc, 50);
+    assert!(speeds.windows(2).all(|pair| pair[1] <= pair[0]), "{speeds:?}");
+    let stopped = speeds.iter().position(|&speed| speed == 0.0).unwrap();
+    let stopped_s = f64::from(stopped as u32 + 1) * PERIOD_S;
+    assert!((0.085..=0.095).contains(&stopped_s), "{stopped_s}");
+    assert!(pc.status().brake && !pc.status().servo_on);
+    assert_eq!(pc.status().refusal(), Some("alarm: commands ceased".into()));
+}
+
+/// What was queued while the sender stood still is old when it comes, and moves nothing.
+#[test]
+fn old_commands_move_nothing_neither_before_nor_after_a_stop() {
+    let mut pc = moving();
+    speeds(&mut pc, 60);
+    pc.clear();
+    for i in 0..200 {
+        let sent_s = 0.1 + f64::from(i) * 0.004;
+        pc.take(&names().command(sent_s, VALID_S, &[0.3; 3], false), 1, 1.0, 1.0);
+        assert_eq!(pc.advance(1.0 + f64::from(i) * 1e-4), [0.0; 3]);
+    }
+    assert_eq!(pc.refused(), 200 - 5, "those of the last 20 ms are timely, but not to stand still");
+}
+
+#[test]
+fn an_alarm_stays_until_it_is_cleared_and_it_begins_again_from_rest() {
+    let mut pc = moving();
+    speeds(&mut pc, 60);
+    let still = |now_s| names().command(now_s, VALID_S, &[0.0; 3], false);
+    pc.take(&still(0.3), 1, 0.3, 0.3);
+    assert!(!pc.status().servo_on);
+    pc.clear();
+    pc.take(&still(0.4), 1, 0.4, 0.4);
+    assert!(pc.status().servo_on);
+    pc.take(&names().command(0.404, VALID_S, &[0.1; 3], false), 1, 0.404, 0.404);
+    assert_eq!(pc.advance(0.404), [0.1; 3]);
+}
+
+#[test]
+fn a_second_publisher_stops_it() {
+    let mut pc = moving();
+    pc.take(&names().command(0.102, VALID_S, &[0.1; 3], false), 2, 0.102, 0.102);
+    assert_eq!(pc.status().refusal(), Some("alarm: two publishers command".into()));
+    assert_eq!(speeds(&mut pc, 50).last(), Some(&0.0));
+}
+
+#[test]
+fn emergency_stop_and_dead_man_switch_stop_at_once_and_hold_softly() {
+    let mut pc = moving();
+    pc.set_estop(true);
+    assert_eq!(pc.advance(0.102), [0.0; 3]);
+    assert_eq!(pc.status().refusal(), Some("emergency stop".into()));
+    let mut pc = moving();
+    pc.set_deadman(false);
+    assert_eq!(pc.advance(0.102), [0.0; 3]);
+    let mut pc = moving();
+    pc.set_hold(true, 0.1);
+    let speeds = speeds(&mut pc, 40);
+    assert!(
+        speeds[0] > 0.0 && speeds[39] == 0.0 && pc.status().refusal() == Some("servos off".into())
+    );
+}
+
+fn command(joint_names: &[&str], velocities: &[f64]) -> Packet {
+    let point = JointTrajectoryPoint {
+        velocities: velocities.into(),
+        time_from_start: palpate::backend::ros::message::Duration::from_s(VALID_S),
+        ..JointTrajectoryPoint::default()
+    };
+    Packet::Command(JointTrajectory {
+        header: palpate::backend::ros::message::Header::new(0.102, ""),
+        joint_names: joint_names.iter().map(|name| (*name).into()).collect(),
+        points: vec![point],
+    })
+}
+
+#[test]
+fn what_is_no_command_of_this_arm_stops_it() {
+    let cases = [
+        (command(&["S1", "S2"], &[0.0; 2]), "no joint \"S3\""),
+        (command(&["S1", "S2", "S2"], &[0.0; 3]), "no joint \"S3\""),
+        (command(&["S1", "S2", "S3", "S3"], &[0.0; 4]), "named twice"),
+        (command(&["S1", "S2", "E1"], &[0.0; 3]), "is no joint"),
+        (command(&["S1", "S2", "S3"], &[0.0; 2]), "2 velocities for 3 joints"),
+        (command(&["S1", "S2", "S3"], &[0.0, f64::NAN, 0.0]), "velocities of \"S2\" is NaN"),
+        (Packet::Command(JointTrajectory::default()), "0 points"),
+    ];
+    for (packet, says) in cases {
+        let mut pc = moving();
+        pc.take(&packet, 1, 0.102, 0.102);
+        let refusal = pc.status().refusal().unwrap();
+        assert!(refusal.contains(says), "{refusal}: {says}");
+        assert_eq!(speeds(&mut pc, 50).last(), Some(&0.0));
+    }
+}
+
+/// Names decide, not their order.
+#[test]
+fn swapped_names_move_the_joints_that_they_name() {
+    let mut pc = moving();
+    pc.take(&command(&["S3", "S1", "S2"], &[0.3, 0.1, 0.2]), 1, 0.102, 0.102);
+    assert_eq!(pc.advance(0.102), [0.1, 0.2, 0.3]);
+}
+
+proptest! {
+    /// Whatever comes whenever: it never goes faster than the fastest command, and a tick after
+    /// 95 ms without a timely one it stands.
+    #[test]
+    fn it_stands_after_every_silence(
+        sent in prop::collection::vec((0.0..0.05f64, -0.03..0.03f64, -1.0..1.0f64), 1..60),
+    ) {
+        let mut pc = ArmPc::new(names());
+        let (mut now_s, mut fastest) = (1.0, 0.0f64);
+        for (after_s, age_s, qdot) in sent {
+            now_s += after_s;
+            fastest = fastest.max(qdot.abs());
+            let stamp_s = now_s - age_s;
+            pc.take(&names().command(stamp_s, VALID_S, &[qdot, 0.0, 0.0], false), 1, now_s, now_s);
+            prop_assert!(pc.advance(now_s)[0].abs() <= fastest);
+        }
+        pc.advance(now_s + 0.031);
+        prop_assert_eq!(pc.advance(now_s + 0.095), [0.0; 3]);
+    }
+}
