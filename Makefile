@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: demo paper paper-dynamic paper-planners test page-test fuzz reference lint bench contacts growth bench-peers dist setup tools clean
+.PHONY: demo paper paper-dynamic paper-planners test page-test test-mcap fuzz reference lint bench contacts growth bench-peers dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -48,6 +48,21 @@ test: setup
 # The report page in a browser; fails where there is no Chromium.
 page-test: setup
 	PALPATE_PAGE_TEST=1 cargo test --locked --test suite page
+
+# A recording in a reader that is not ours; skipped where Python's packages cannot be fetched.
+READER := $(DEPS)/mcap/bin/python
+RECORDED := target/test-mcap
+
+test-mcap: setup
+	cargo build --release --locked
+	$(PALPATE) run container_finger --set trials=1 --set touches=7 --set planners='["active"]' --record --fresh --no-report --out $(RECORDED)
+	@if $(MAKE) --no-print-directory $(READER); then $(READER) tests/mcap_reads.py $(RECORDED)/recordings/active-0000.mcap; \
+	else echo "test-mcap: skipped, the packages of tests/mcap.txt cannot be fetched"; fi
+
+$(READER): tests/mcap.txt
+	python3 -m venv $(DEPS)/mcap
+	$(READER) -m pip install --quiet --only-binary=:all: -r tests/mcap.txt
+	touch $@
 
 # Valid files and settings, altered at random: no panic, no hang, no silence. Takes about an hour.
 FUZZ := 100000

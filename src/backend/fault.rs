@@ -89,6 +89,41 @@ pub enum Fault {
         /// What the system says.
         message: String,
     },
+    /// A recording is played to who commands something else than was commanded then.
+    #[error(
+        "tick {tick} after {time_s:.3} s: joint {} is told {now:?}, in the recording {recorded:?}",
+        joint + 1
+    )]
+    Differs {
+        /// Ticks since the reset.
+        tick: u64,
+        /// Of the reading that the command was made of.
+        time_s: f64,
+        /// Which joint, the first is 0.
+        joint: usize,
+        /// What it was told then.
+        recorded: f64,
+        /// What it is told now.
+        now: f64,
+    },
+    /// A recording is played beyond its end.
+    #[error("the recording ends at {time_s:.3} s")]
+    RecordingEnds {
+        /// Of its last reading.
+        time_s: f64,
+    },
+    /// A recording is played of a body that was not reset with that seed.
+    #[error("the recording has no reset with seed {seed}")]
+    NeverReset {
+        /// The seed.
+        seed: u64,
+    },
+    /// The fault that was recorded, played again.
+    #[error("{message}")]
+    Recorded {
+        /// What it was.
+        message: String,
+    },
     /// Whoever watched it had it stopped.
     #[error("stopped at {time_s:.3} s")]
     Stopped {

@@ -1,7 +1,7 @@
 //! Bodies that are commanded and read: simulated, recorded or real.
 //!
-//! [`Backend`] is the trait of a body, one control tick at a time. `delay`, `limits`, `recorder`,
-//! `trace`, `watched` and `fault_injector` are bodies around other bodies.
+//! [`Backend`] is the trait of a body, one control tick at a time. `delay`, `limits`, `trace`,
+//! `watched`, `fault_injector` and the recorder of `recording` are bodies around other bodies.
 
 #[allow(clippy::module_inception)]
 mod backend;
@@ -12,7 +12,7 @@ pub mod fault_injector;
 pub mod limits;
 pub mod pace;
 mod reading;
-pub mod recorder;
+pub mod recording;
 pub mod ros;
 pub mod trace;
 pub mod watched;

@@ -14,6 +14,7 @@ mod patience;
 mod prepare;
 mod progress;
 mod reference;
+mod replay;
 mod report;
 mod run;
 mod scan;
@@ -60,6 +61,8 @@ enum Command {
     New(new::Args),
     /// Run an experiment: planners × trials, then its report.
     Run(run::Args),
+    /// Run a recorded trial again on what was read then, and compare.
+    Replay(replay::Args),
     /// Draw a run's figures and page again from its rows.
     Report(report::Args),
     /// Say what a mesh, scene, experiment or run folder holds.
@@ -98,6 +101,7 @@ pub fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::New(args) => new::run(&args),
         Command::Run(args) => run::run(&args, cli.talk),
+        Command::Replay(args) => replay::run(&args, cli.talk),
         Command::Report(args) => report::run(&args),
         Command::Show(args) => show::run(&args, cli.talk),
         Command::Scan(args) => scan::run(&args, cli.talk),

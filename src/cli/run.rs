@@ -7,9 +7,9 @@ use super::terminal::{Ending, Talk, error, print};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::runner;
-use crate::experiment::store::{Manifest, Run, RunFolder};
+use crate::experiment::store::{Manifest, RECORDINGS, Run, RunFolder};
 use crate::report;
-use anyhow::Context;
+use anyhow::{Context, bail};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -40,6 +40,9 @@ pub(super) struct Args {
     /// Throw away what an earlier run left in the folder.
     #[arg(long)]
     fresh: bool,
+    /// Record every tick of every trial in recordings/PLANNER-TRIAL.mcap of the run's folder.
+    #[arg(long)]
+    record: bool,
     /// Write rows and summary only, no figures.
     #[arg(long)]
     no_report: bool,
@@ -55,19 +58,31 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     simulation.connect()?;
     let simulation = simulation;
     let experiment = simulation.experiment();
+    if args.record && !experiment.scene.body.moves() {
+        let body = experiment.scene.body.name();
+        bail!(
+            "--record: body = \"{body}\" touches without moving, so that there is nothing to record; \
+             allowed are \"kinematic\" and \"dynamic\""
+        );
+    }
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&experiment.name));
     let manifest = manifest(experiment);
     let (mut folder, done) =
         RunFolder::open(&path, experiment, simulation.truth(), &manifest, args.fresh)?;
+    let recorded = args.record.then_some(path.as_path());
+    if recorded.is_some() {
+        let folder = path.join(RECORDINGS);
+        std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    }
     let stop = stop_on_interrupt("trials")?;
 
     let total = u64::from(experiment.trials) * experiment.planners.len() as u64;
     let bar = progress_bar(talk, &experiment.name, "trials", total, done.len() as u64);
     let begun = Instant::now();
-    let count =
-        runner::run(&simulation, (&mut folder, &done), args.threads.into(), &stop, &|_| {
-            step(talk, &bar)
-        })?;
+    let threads = args.threads.into();
+    let count = runner::run(&simulation, (&mut folder, &done), threads, &stop, recorded, &|_| {
+        step(talk, &bar)
+    })?;
     bar.finish_and_clear();
     folder.sort(experiment)?;
 

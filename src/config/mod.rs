@@ -40,7 +40,15 @@ impl Loader {
     /// # Errors
     /// If it cannot be read or is not TOML.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let (table, document) = parse(path)?;
+        Self::of(path, text(path)?)
+    }
+
+    /// Takes `text`, which stands in `path`.
+    ///
+    /// # Errors
+    /// If it is not TOML.
+    pub fn of(path: &Path, text: String) -> Result<Self, ConfigError> {
+        let (table, document) = parse(path, text)?;
         let source = Source { path: path.into(), prefix: String::new(), document };
         Ok(Self { table, sources: vec![source], sets: Vec::new() })
     }
@@ -63,15 +71,16 @@ impl Loader {
     pub fn include(&mut self, key: &str) -> Result<(), ConfigError> {
         let Some(Value::String(name)) = self.table.get(key) else { return Ok(()) };
         let path = self.beside(key, Path::new(name));
-        let (table, document) = parse(&path).map_err(|error| match error {
-            ConfigError::Unreadable { path, cause } => ConfigError::NotAllowed {
-                origin: self.origin(key),
-                key: key.into(),
-                value: format!("\"{name}\""),
-                allowed: format!("a readable file ({}: {cause})", path.display()),
-            },
-            other => other,
-        })?;
+        let (table, document) =
+            text(&path).and_then(|text| parse(&path, text)).map_err(|error| match error {
+                ConfigError::Unreadable { path, cause } => ConfigError::NotAllowed {
+                    origin: self.origin(key),
+                    key: key.into(),
+                    value: format!("\"{name}\""),
+                    allowed: format!("a readable file ({}: {cause})", path.display()),
+                },
+                other => other,
+            })?;
         self.table.insert(key.into(), Value::Table(table));
         // From here on, what stands under the key comes from the file.
         self.sets.retain(|(set, _)| set != key);
@@ -255,9 +264,12 @@ fn line_of(document: &toml_edit::Document<String>, key: &str) -> Option<usize> {
     Some(before.matches('\n').count() + 1)
 }
 
-fn parse(path: &Path) -> Result<(Table, toml_edit::Document<String>), ConfigError> {
+fn text(path: &Path) -> Result<String, ConfigError> {
     let unreadable = |cause| ConfigError::Unreadable { path: path.into(), cause };
-    let text = files::text(path, files::TEXT_MAX).map_err(unreadable)?;
+    files::text(path, files::TEXT_MAX).map_err(unreadable)
+}
+
+fn parse(path: &Path, text: String) -> Result<(Table, toml_edit::Document<String>), ConfigError> {
     let document = toml_edit::Document::parse(text.clone()).map_err(|error| {
         let line = error
             .span()

@@ -94,7 +94,18 @@ impl Experiment {
     /// # Errors
     /// The first thing that is wrong, with its place.
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, ConfigError> {
-        let mut loader = Loader::read(path)?;
+        Self::finish(Loader::read(path)?, sets)
+    }
+
+    /// As [`load`](Self::load), of an experiment's text that stands in the file `path`.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn parse(path: &Path, text: String, sets: &[String]) -> Result<Self, ConfigError> {
+        Self::finish(Loader::of(path, text)?, sets)
+    }
+
+    fn finish(mut loader: Loader, sets: &[String]) -> Result<Self, ConfigError> {
         if !loader.has("scene") && !loader.has("planners") && loader.has("zone") {
             return Err(loader.other(
                 "a scene",

@@ -21,6 +21,7 @@
 //! ```
 
 pub mod analysis;
+mod belief_shape;
 pub mod comparison;
 pub mod curve_table;
 pub mod equal_error;
@@ -29,6 +30,8 @@ pub mod experiment;
 pub mod measure;
 pub mod metrics;
 pub mod notice;
+pub mod recorded_trial;
+pub mod replay;
 pub mod report_settings;
 pub mod row;
 pub mod runner;
@@ -39,6 +42,7 @@ pub mod store;
 pub mod summary;
 pub mod trial;
 pub mod truth;
+pub mod witness;
 
 pub use experiment::Experiment;
 pub use simulation::Simulation;

@@ -1,6 +1,7 @@
 //! One line of `trials.jsonl`: everything a trial did.
 
 use super::metrics::Metrics;
+use crate::backend::Fault;
 use crate::explore::planner::Stall;
 use crate::gp::fit::Fit;
 use schemars::JsonSchema;
@@ -59,6 +60,16 @@ pub struct TouchRow {
 }
 
 impl TrialRow {
+    /// Of a trial that had to be given up before its first touch.
+    pub fn unstarted(trial: u32, planner: &str, fault: &Fault) -> Self {
+        Self {
+            trial,
+            planner: planner.into(),
+            failure: Some(format!("before the first touch: {fault}")),
+            touches: Vec::new(),
+        }
+    }
+
     /// Lateral travel of the finger over its first `touches` targets, in straight lines; none of a
     /// trial with fewer.
     pub fn path_m(&self, touches: u32) -> Option<f64> {

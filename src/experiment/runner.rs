@@ -1,6 +1,7 @@
 //! Trials × planners on all cores.
 
 use super::experiment::Experiment;
+use super::recorded_trial::{self, recording_path};
 use super::row::TrialRow;
 use super::simulation::Simulation;
 use super::store::{RunFolder, StoreError};
@@ -8,6 +9,7 @@ use crate::explore::planner;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
@@ -34,6 +36,8 @@ type Job = (u32, &'static planner::Entry);
 /// Runs what `done` lacks and adds each row to `folder` as it finishes; returns how many trials
 /// it ran.
 ///
+/// A trial is recorded if `recorded` says in which run's folder.
+///
 /// `progress` is called after each trial, from any thread. When `stop` becomes true, running
 /// trials are finished and no others begun. `threads` 0 means all cores.
 ///
@@ -44,6 +48,7 @@ pub fn run(
     (folder, done): (&mut RunFolder, &[TrialRow]),
     threads: usize,
     stop: &AtomicBool,
+    recorded: Option<&Path>,
     progress: &(dyn Fn(&TrialRow) + Sync),
 ) -> Result<usize, RunError> {
     let jobs = jobs(simulation.experiment(), done);
@@ -57,7 +62,7 @@ pub fn run(
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let row = run_caught(simulation, planner, trial);
+            let row = run_caught(simulation, planner, trial, recorded);
             let mut finished = finished.lock().unwrap_or_else(PoisonError::into_inner);
             finished.0.append(&row)?;
             finished.1 += 1;
@@ -83,8 +88,19 @@ pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, RunError> {
 
 /// Runs one trial; a planner's or probe's panic becomes the trial's failure, so that one fault
 /// in somebody's code does not lose the others' work.
-fn run_caught(simulation: &Simulation, planner: &'static planner::Entry, trial: u32) -> TrialRow {
-    let run = || simulation.trial(planner, trial);
+fn run_caught(
+    simulation: &Simulation,
+    planner: &'static planner::Entry,
+    trial: u32,
+    recorded: Option<&Path>,
+) -> TrialRow {
+    let run = || match recorded {
+        None => simulation.trial(planner, trial),
+        Some(folder) => {
+            let path = recording_path(folder, planner, trial);
+            recorded_trial::run(simulation, planner, trial, &path)
+        }
+    };
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");

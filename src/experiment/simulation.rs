@@ -5,6 +5,7 @@ use super::notice;
 use super::row::TrialRow;
 use super::trial;
 use super::truth::Truth;
+use super::witness::Witness;
 use crate::backend::Fault;
 use crate::backend::ros::arm::Lab;
 use crate::backend::ros::connect::connect;
@@ -184,12 +185,7 @@ impl Simulation {
     pub fn trial(&self, planner: &planner::Entry, trial: u32) -> TrialRow {
         match self.probe(trial) {
             Ok(mut probe) => self.trial_with(&mut *probe, planner, trial),
-            Err(fault) => TrialRow {
-                trial,
-                planner: planner.name.into(),
-                failure: Some(format!("before the first touch: {fault}")),
-                touches: Vec::new(),
-            },
+            Err(fault) => TrialRow::unstarted(trial, planner.name, &fault),
         }
     }
 
@@ -200,6 +196,17 @@ impl Simulation {
         planner: &planner::Entry,
         trial: u32,
     ) -> TrialRow {
-        trial::run(&self.experiment, self.task(), &self.truth, probe, planner, trial)
+        self.trial_before(probe, planner, trial, &mut ())
+    }
+
+    /// As [`trial_with`](Self::trial_with), with `witness` told of every touch.
+    pub fn trial_before(
+        &self,
+        probe: &mut dyn Probe,
+        planner: &planner::Entry,
+        trial: u32,
+        witness: &mut dyn Witness,
+    ) -> TrialRow {
+        trial::run(&self.experiment, self.task(), &self.truth, probe, planner, trial, witness)
     }
 }

@@ -3,6 +3,7 @@
 use super::experiment::Experiment;
 use super::row::{TouchRow, TrialRow};
 use super::truth::Truth;
+use super::witness::{Touched, Witness};
 use crate::explore::belief::Belief;
 use crate::explore::planner;
 use crate::explore::planner::{Plan, uniform};
@@ -10,7 +11,7 @@ use crate::explore::probe::{Probe, Touch};
 use crate::math::seed;
 use crate::task::Task;
 
-/// Runs one trial of `planner` from start to end with the touches of `probe`.
+/// Runs one trial of `planner` from start to end with the touches of `probe`, before `witness`.
 ///
 /// Its row depends on the experiment, the trial's number, the planner and the probe only.
 pub fn run(
@@ -20,6 +21,7 @@ pub fn run(
     probe: &mut dyn Probe,
     planner: &planner::Entry,
     trial: u32,
+    witness: &mut dyn Witness,
 ) -> TrialRow {
     let mut row =
         TrialRow { trial, planner: planner.name.into(), failure: None, touches: Vec::new() };
@@ -76,6 +78,10 @@ pub fn run(
                 }
                 Err(error) => row.failure = Some(format!("fit after touch {count}: {error}")),
             }
+        }
+        let touched = Touched { count, touch: &touch, row: &touch_row, belief: &belief };
+        if let Err(fault) = witness.touched(&touched) {
+            row.failure.get_or_insert_with(|| format!("touch {count}: {fault}"));
         }
         row.touches.push(touch_row);
         if row.failure.is_some() {

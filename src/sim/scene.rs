@@ -82,6 +82,11 @@ impl Body {
             Self::Dynamic => "dynamic",
         }
     }
+
+    /// Whether it moves a finger in time.
+    pub fn moves(self) -> bool {
+        matches!(self, Self::Kinematic | Self::Dynamic)
+    }
 }
 
 /// A mesh and where it stands.

@@ -3,13 +3,13 @@
 use crate::common::shipped;
 use palpate::backend::delay::Delayed;
 use palpate::backend::limits::Limited;
-use palpate::backend::recorder::Recorder;
+use palpate::backend::recording::{About, Recorder, Recording, wall_clock};
 use palpate::backend::watched::Watched;
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::robot::arm::Chain;
 use palpate::sim::Environment;
 use palpate::sim::simulator::Simulator;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 #[cfg(feature = "mujoco")]
 const KINDS: [&str; 2] = ["kinematic", "dynamic"];
@@ -29,10 +29,23 @@ type Wrap = fn(Box<dyn Backend>, &Chain) -> Box<dyn Backend>;
 const WRAPS: [(&str, Wrap); 5] = [
     ("bare", |body, _| body),
     ("limited", |body, chain| Box::new(Limited::new(body, chain.clone()).unwrap())),
-    ("recorded", |body, _| Box::new(Recorder::new(body, std::io::sink()))),
+    ("recorded", |body, _| recorded(body)),
     ("delayed", |body, _| Box::new(Delayed::new(body, 0.03))),
     ("watched", |body, _| Box::new(Watched::new(body, 100.0).0)),
 ];
+
+fn recorded(body: Box<dyn Backend>) -> Box<dyn Backend> {
+    let about = About {
+        version: String::new(),
+        experiment: String::new(),
+        planner: String::new(),
+        trial: 0,
+        seed: 0,
+        capabilities: body.capabilities().clone(),
+    };
+    let recording = Recording::new(Box::new(std::io::sink()), &about, wall_clock).unwrap();
+    Box::new(Recorder::new(body, recording))
+}
 
 /// Shows `check` every body, each in every wrapper.
 fn each(check: impl Fn(&str, &mut dyn Backend, &Chain)) {
@@ -235,62 +248,6 @@ fn a_delayed_body_does_later_what_the_bare_one_does() {
         let apart = bare.q.iter().zip(&delayed.q).map(|(a, b)| (a - b).abs());
         assert!(apart.fold(0.0, f64::max) < 1e-12);
     }
-}
-
-/// A file in memory that can be looked into.
-#[derive(Clone, Default)]
-struct Paper(Arc<Mutex<Vec<u8>>>);
-
-impl std::io::Write for Paper {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.lock().unwrap().write(bytes)
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
-}
-
-#[test]
-fn a_recording_reads_back_as_what_was_read() {
-    let simulator = Simulator::new(environment(&[EVERYTHING])).unwrap();
-    let paper = Paper::default();
-    let mut recorder = Recorder::new(simulator.body().unwrap().unwrap(), paper.clone());
-    let readings = run(&mut recorder, 5, 30);
-    assert!(recorder.step(&Command { qdot: vec![f64::NAN; 3] }).is_err());
-    let text = String::from_utf8(paper.0.lock().unwrap().clone()).unwrap();
-    let lines: Vec<serde_json::Value> =
-        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    assert_eq!(lines.len(), readings.len() + 1);
-    assert_eq!(lines[0]["reset"], 5);
-    let joints: Capabilities = serde_json::from_value(lines[0]["capabilities"].clone()).unwrap();
-    assert_eq!(&joints, recorder.capabilities());
-    for (line, reading) in lines.iter().zip(&readings) {
-        let read: Reading = serde_json::from_value(line["reading"].clone()).unwrap();
-        assert_eq!(&read, reading);
-    }
-    assert!(lines.last().unwrap()["fault"].as_str().unwrap().contains("refused"));
-}
-
-#[test]
-fn a_recording_that_cannot_be_written_is_a_fault() {
-    let simulator = Simulator::new(environment(&[])).unwrap();
-    let mut full = [0u8; 2000];
-    let body = simulator.body().unwrap().unwrap();
-    struct Short<'a>(&'a mut [u8]);
-    impl std::io::Write for Short<'_> {
-        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-            std::io::Write::write(&mut self.0, bytes)
-        }
-        fn flush(&mut self) -> std::io::Result<()> {
-            Ok(())
-        }
-    }
-    let mut recorder = Recorder::new(body, Short(&mut full));
-    recorder.reset(1).unwrap();
-    let still = Command { qdot: vec![0.0; 3] };
-    let fault = (0..100).find_map(|_| recorder.step(&still).err()).unwrap();
-    assert!(matches!(fault, Fault::Unrecorded { .. }), "{fault}");
 }
 
 /// Watching changes no reading and shows the last; the body is never ahead of the clock by more

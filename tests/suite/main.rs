@@ -58,6 +58,8 @@ mod page;
 mod planners;
 mod probes;
 mod reach;
+#[cfg(feature = "nlopt")]
+mod recording;
 mod reference;
 mod report;
 #[cfg(feature = "nlopt")]

@@ -21,7 +21,7 @@ mod surface;
 pub use error::StoreError;
 pub use file::write_whole;
 pub use manifest::{MANIFEST, Manifest};
-pub use resolved::{RESOLVED, resolved};
+pub use resolved::{RESOLVED, resolved, resolved_beside};
 
 use self::error::io_error;
 use self::file::{partial, remove};
@@ -34,6 +34,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 const TRIALS: &str = "trials.jsonl";
+/// Folder of a run's recordings.
+pub const RECORDINGS: &str = "recordings";
 /// Folder of a run's figures.
 pub const FIGURES: &str = "figures";
 
@@ -197,6 +199,12 @@ fn require_run(path: &Path) -> Result<(), StoreError> {
 /// Removes what an earlier run wrote but its mark. Figures are drawn again; others' files beside
 /// them are not ours to remove.
 fn clear(path: &Path) -> Result<(), StoreError> {
+    for recording in fs::read_dir(path.join(RECORDINGS)).into_iter().flatten().flatten() {
+        let recording = recording.path();
+        if recording.extension().is_some_and(|extension| extension == "mcap") {
+            remove(&recording)?;
+        }
+    }
     ["report.html", "summary.csv", "comparison.csv", "equal_error.csv", MANIFEST, SURFACE]
         .iter()
         .try_for_each(|name| remove(&path.join(name)))

@@ -51,6 +51,11 @@ pub(super) fn only_shown(set: &str) -> Result<(), StoreError> {
     }
 }
 
+/// As [`resolved`], with the mesh's path relative to the folder of the file `path`.
+pub fn resolved_beside(experiment: &Experiment, path: &Path) -> String {
+    saved(experiment, path.parent().unwrap_or(Path::new("")))
+}
+
 /// As [`resolved`], with the mesh's path relative to the run's folder, so that both may move.
 fn saved(experiment: &Experiment, folder: &Path) -> String {
     let mut experiment = experiment.clone();

@@ -1,0 +1,184 @@
+//! A recorded trial run again by today's code, on what was read then.
+
+use super::experiment::Experiment;
+use super::simulation::Simulation;
+use super::witness::{Touched, Witness};
+use crate::backend::Fault;
+use crate::backend::recording::{Player, Recorded};
+use crate::config::ConfigError;
+use crate::explore::planner;
+use crate::explore::probe::servo::Servo;
+use crate::explore::probe::{Probe, Swept, Touch};
+use crate::task::Approach;
+use serde::Serialize;
+use std::path::Path;
+use thiserror::Error;
+
+/// What came of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Replay {
+    /// Touches that are the same, decision and belief, byte for byte.
+    pub touches: u32,
+    /// Whether the recording ends before the trial that it is of.
+    pub is_cut: bool,
+    /// What is the first to differ; none if nothing does.
+    pub difference: Option<Difference>,
+}
+
+/// Where today's code is the first time not what it was.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "what")]
+pub enum Difference {
+    /// It commands something else.
+    Command {
+        /// In which touch, counted from 1.
+        touch: u32,
+        /// Ticks since the reset.
+        tick: u64,
+        /// Of the reading that the command was made of.
+        time_s: f64,
+        /// The joint's name.
+        joint: String,
+        /// What it was told, rad/s or m/s.
+        recorded: Option<f64>,
+        /// What it is told.
+        now: Option<f64>,
+    },
+    /// It makes something else of the same touch.
+    Row {
+        /// Which, counted from 1.
+        touch: u32,
+        /// JSON of the touch and the belief after it.
+        recorded: String,
+        /// The same of now.
+        now: String,
+    },
+    /// It ends otherwise.
+    End {
+        /// Touches of then.
+        recorded_touches: u32,
+        /// Why it ended before its last touch, if it did.
+        recorded: Option<String>,
+        /// Touches of now.
+        now_touches: u32,
+        /// Why it ends before its last touch, if it does.
+        now: Option<String>,
+    },
+}
+
+/// Why a recording cannot be replayed.
+#[derive(Debug, Error)]
+pub enum ReplayError {
+    /// Its planner is unknown.
+    #[error("it is of the planner \"{name}\", which this version does not have")]
+    Planner {
+        /// The planner.
+        name: String,
+    },
+    /// The robot cannot be brought to the recording's start.
+    #[error(transparent)]
+    Start(#[from] Fault),
+}
+
+/// The experiment of a recording that lies at `path`, after `--set` assignments.
+///
+/// # Errors
+/// If it is none of this version's.
+pub fn experiment(
+    recorded: &Recorded,
+    path: &Path,
+    sets: &[String],
+) -> Result<Experiment, ConfigError> {
+    Experiment::parse(path, recorded.about.experiment.clone(), sets)
+}
+
+/// Runs the trial of `recorded` again in `simulation`, which is made of its
+/// [`experiment`](experiment()).
+///
+/// # Errors
+/// If it cannot be begun.
+pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, ReplayError> {
+    let about = &recorded.about;
+    let unknown = || ReplayError::Planner { name: about.planner.clone() };
+    let planner = planner::by_name(&about.planner).ok_or_else(unknown)?;
+    let player = Box::new(Player::new(recorded.clone()));
+    let servo = simulation.simulator().servo(player, simulation.body_seed(about.trial))?;
+    let mut probe = Kept { servo, fault: None };
+    let mut reader = Reader { recorded, same: 0, difference: None };
+    let row = simulation.trial_before(&mut probe, planner, about.trial, &mut reader);
+    let (touches, now) = (reader.same, row.failure);
+    let is_cut = recorded.ending.is_none();
+    let difference = match (reader.difference, probe.fault) {
+        (Some(difference), _) => Some(difference),
+        (_, Some(Fault::Differs { tick, time_s, joint, recorded: then, now })) => {
+            let number = |value: f64| Some(value).filter(|value| value.is_finite());
+            Some(Difference::Command {
+                touch: touches + 1,
+                tick,
+                time_s,
+                joint: about.capabilities.joints.get(joint).cloned().unwrap_or_default(),
+                recorded: number(then),
+                now: number(now),
+            })
+        }
+        (_, Some(Fault::RecordingEnds { .. })) if is_cut => None,
+        _ => {
+            let recorded_touches = recorded.touches.len() as u32;
+            let then = recorded.ending.as_ref().and_then(|ending| ending.failure.clone());
+            let is_same = recorded_touches == touches && (is_cut || then == now);
+            let end =
+                Difference::End { recorded_touches, recorded: then, now_touches: touches, now };
+            (!is_same).then_some(end)
+        }
+    };
+    Ok(Replay { touches, is_cut, difference })
+}
+
+/// A servo whose fault is kept as it is.
+struct Kept {
+    servo: Servo,
+    fault: Option<Fault>,
+}
+
+impl Probe for Kept {
+    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+        let touch = self.servo.touch(approach);
+        self.fault = touch.as_ref().err().cloned();
+        touch
+    }
+
+    fn swept(&self) -> Option<Swept> {
+        self.servo.swept()
+    }
+
+    fn time_s(&self) -> Option<f64> {
+        self.servo.time_s()
+    }
+}
+
+/// Compares every touch with the recorded one.
+struct Reader<'a> {
+    recorded: &'a Recorded,
+    same: u32,
+    difference: Option<Difference>,
+}
+
+impl Witness for Reader<'_> {
+    fn touched(&mut self, touched: &Touched) -> Result<(), Fault> {
+        let Some(then) = self.recorded.touches.get(self.same as usize) else {
+            // It was cut between a touch's last tick and what was made of it, or it ended there.
+            return Ok(());
+        };
+        let now = serde_json::to_string(touched.row).unwrap_or_default();
+        if now == then.row {
+            self.same += 1;
+            return Ok(());
+        }
+        self.difference = Some(Difference::Row {
+            touch: touched.count,
+            recorded: then.row.clone().into_owned(),
+            now,
+        });
+        Err(Fault::Stopped { time_s: touched.row.time_s.unwrap_or_default() })
+    }
+}
