@@ -70,6 +70,7 @@ FUZZ := 100000
 fuzz: setup
 	PALPATE_FUZZ=$(FUZZ) cargo test --locked --test suite fuzz::
 	PALPATE_FUZZ=$(FUZZ) cargo test --locked --test suite folders::kills
+	PALPATE_FUZZ=$(FUZZ) cargo test --locked --test suite recording::
 
 # docs/reference.md, from the code; a test holds it to what the code says.
 reference: setup

@@ -175,8 +175,13 @@ fn any_reading() -> impl Strategy<Value = Reading> {
     )
 }
 
+/// Cases of each law; `PALPATE_FUZZ` asks for more.
+fn cases() -> u32 {
+    std::env::var("PALPATE_FUZZ").map_or(64, |count| count.parse().expect("a number of cases"))
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig::with_cases(cases()))]
 
     /// Whatever a body reads and is told is played to the bit, and its fault in its words.
     #[test]

@@ -17,6 +17,7 @@ mod marker;
 mod player;
 mod recorded;
 mod recorder;
+#[allow(clippy::module_inception)]
 mod recording;
 mod tick;
 mod topic;
