@@ -1,5 +1,6 @@
 //! Why a body or a touch could not go on.
 
+use super::interlock::Trip;
 use super::ros::fault::LinkFault;
 use crate::robot::arm::ArmError;
 use thiserror::Error;
@@ -129,6 +130,14 @@ pub enum Fault {
     Stopped {
         /// When.
         time_s: f64,
+    },
+    /// An interlock stopped the body; it moves no more until it is cleared.
+    #[error("stopped at {time_s:.3} s: {trip}")]
+    Interlock {
+        /// When.
+        time_s: f64,
+        /// By which, and why.
+        trip: Trip,
     },
     /// The body stopped answering.
     #[error("no answer since {time_s:.3} s")]

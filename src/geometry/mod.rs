@@ -39,6 +39,7 @@
 
 mod bounds;
 pub mod bvh;
+pub mod distance;
 pub mod element;
 pub mod error;
 pub mod implicit;

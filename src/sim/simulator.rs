@@ -8,8 +8,10 @@ use super::notice::Notice;
 use super::probe::{Cast, FunctionProbe};
 use super::simulated_finger::Shell;
 use crate::backend::delay::Delayed;
+use crate::backend::interlock::InterlockSettings;
 use crate::backend::{Backend, Fault};
 use crate::explore::probe::Probe;
+use crate::explore::probe::interlocks::interlocked;
 use crate::explore::probe::servo::{OutOfReach, Servo, check_reach};
 use crate::sim::Environment;
 use crate::sim::scene::Body;
@@ -115,13 +117,29 @@ impl Simulator {
         })
     }
 
-    /// What drives `body`, one of the scene's own or around one, through touches.
+    /// What drives `body`, one of the scene's own or around one, through touches, with the usual
+    /// interlocks around it.
     ///
     /// # Errors
     /// If it cannot be brought to its start.
     pub fn servo(&self, body: Box<dyn Backend>, seed: u64) -> Result<Servo, Fault> {
+        self.servo_within(body, seed, &InterlockSettings::default())
+    }
+
+    /// As [`servo`](Self::servo), within limits of one's own.
+    ///
+    /// # Errors
+    /// As [`servo`](Self::servo).
+    pub fn servo_within(
+        &self,
+        body: Box<dyn Backend>,
+        seed: u64,
+        limits: &InterlockSettings,
+    ) -> Result<Servo, Fault> {
         let robot = self.environment.robot().ok_or(Fault::Lacks { part: "an object" })?;
-        Servo::new(robot, self.environment.task().touch().clone(), body, seed)
+        let task = self.environment.task();
+        let body = interlocked(body, &robot, task, None, limits)?;
+        Servo::new(robot, task.touch().clone(), Box::new(body), seed)
     }
 
     /// The simulated body that the scene asks for, at its start; none where a touch is no motion.

@@ -1,5 +1,6 @@
 //! One touch: go the way of an approach, get a contact or a miss.
 
+pub mod interlocks;
 pub mod servo;
 mod swept;
 

@@ -113,6 +113,39 @@ impl Chain {
         moved.fold(self.base, |x, (joint, &q)| x * joint.motion(q)) * self.flange * self.tool
     }
 
+    /// Poses in `W` of the base and then of each joint's moved frame; beyond the chain's joints that
+    /// of the last.
+    pub fn frames(&self, q: &Joints) -> [Isometry3<f64>; MAX_JOINTS + 1] {
+        let mut frames = [self.base; MAX_JOINTS + 1];
+        let mut x = self.base;
+        for (k, frame) in frames.iter_mut().enumerate().skip(1) {
+            if let (Some(joint), Some(&q)) = (self.joints.get(k - 1), q.get(k - 1)) {
+                x *= joint.motion(q);
+            }
+            *frame = x;
+        }
+        frames
+    }
+
+    /// For each joint, the farthest that any point moved by it within `beyond_m` of `T` can lie from
+    /// its axis, in m: what such a point moves by per rad, at most. 1 where the joint slides.
+    pub fn reaches_m(&self, beyond_m: f64) -> Joints {
+        let end_m = self.flange.translation.vector.norm() + self.tool.translation.vector.norm();
+        let mut reaches = Joints::zeros();
+        let mut rest_m = end_m + beyond_m;
+        let joints = self.joints.iter().enumerate().take(MAX_JOINTS).rev();
+        for (i, joint) in joints {
+            let [low, high] = joint.q_limits;
+            (reaches[i], rest_m) = match joint.kind {
+                Kind::Revolute => (rest_m, rest_m + joint.origin_m.norm()),
+                Kind::Prismatic => {
+                    (1.0, rest_m + joint.origin_m.norm() + low.abs().max(high.abs()))
+                }
+            };
+        }
+        reaches
+    }
+
     /// [`forward`](Self::forward) with the geometric Jacobian: column i is
     /// `[a × (p_T − p_i); a]` where joint i turns and `[a; 0]` where it slides, with its axis a
     /// and origin p_i in `W` (Siciliano et al. 2009, Robotics, Eq. 3.30).

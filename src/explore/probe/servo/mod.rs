@@ -15,9 +15,9 @@ use crate::task::touch::TouchSettings;
 use contact_monitor::{ApproachEnd, ContactMonitor};
 use nalgebra::Isometry3;
 use trajectory::StraightPath;
-use way::{standoff, turning_point};
 
 pub use way::{OutOfReach, check_reach};
+pub(super) use way::{standoff, turning_point};
 
 /// A movement has arrived when the tip is this near to its end; chosen: below what a touch
 /// resolves.

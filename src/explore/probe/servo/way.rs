@@ -11,7 +11,11 @@ use thiserror::Error;
 const BEYOND_M: f64 = 0.01;
 
 /// The tip in front of all that may be touched.
-pub(super) fn standoff(robot: &Robot, standoff_m: f64, approach: &Approach) -> Isometry3<f64> {
+pub(in crate::explore::probe) fn standoff(
+    robot: &Robot,
+    standoff_m: f64,
+    approach: &Approach,
+) -> Isometry3<f64> {
     let back_w = -approach.direction_w().into_inner();
     let bulge_w = back_w * robot.finger.bulge_m();
     let p_wt = approach.p_near_w + bulge_w + back_w * standoff_m;
@@ -19,7 +23,10 @@ pub(super) fn standoff(robot: &Robot, standoff_m: f64, approach: &Approach) -> I
 }
 
 /// The tip behind all that may be touched.
-pub(super) fn turning_point(robot: &Robot, approach: &Approach) -> Isometry3<f64> {
+pub(in crate::explore::probe) fn turning_point(
+    robot: &Robot,
+    approach: &Approach,
+) -> Isometry3<f64> {
     let ahead_w = approach.direction_w().into_inner();
     let hull_w = ahead_w * robot.finger.radius_m;
     let p_wt = approach.p_far_w + hull_w + ahead_w * BEYOND_M;

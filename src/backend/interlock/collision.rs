@@ -1,0 +1,141 @@
+//! What of the robot may not come near to what.
+
+use super::ahead::Ahead;
+use super::interlock::{Entry, Interlock, Now};
+use super::settings::InterlockSettings;
+use super::site::Site;
+use super::trip::Trip;
+use crate::geometry::distance::{HalfSpace, OrientedBox};
+use crate::geometry::sweep::Capsule;
+use crate::robot::arm::Joints;
+use crate::robot::capsules::{CARRIED, LinkCapsule, capsules};
+use nalgebra::{Point3, Vector3};
+
+/// Stops the body before links come near to each other, to the table or to the object.
+pub const ENTRY: Entry = Entry {
+    name: NAME,
+    make: |site, settings, _| {
+        let guard = Guard::new(site, settings);
+        (!guard.pairs.is_empty()).then(|| Box::new(guard) as _)
+    },
+};
+
+const NAME: &str = "clearance";
+
+/// The first link that a table can be in the way of: those before it turn about the foot.
+const FIRST_LOW: usize = 2;
+
+/// The first link that can reach out to an object.
+const FIRST_FAR: usize = 3;
+
+/// Looks at the capsules of the links where the body cannot help going.
+struct Guard {
+    links: Vec<LinkCapsule>,
+    pairs: Vec<Pair>,
+    clearance_m: f64,
+    reaction_s: f64,
+    /// The links in `W` at the posture looked at last.
+    placed: Vec<Capsule>,
+    /// A posture, and the clearance there: until some point can have moved by that much, nobody
+    /// needs to look again.
+    looked: Option<(Joints, f64)>,
+}
+
+/// What must not meet: a link, and what.
+struct Pair {
+    link: usize,
+    other: Other,
+}
+
+enum Other {
+    Link(usize),
+    Table(HalfSpace),
+    Object(OrientedBox),
+}
+
+impl Guard {
+    fn new(site: &Site, settings: &InterlockSettings) -> Self {
+        let links = capsules(&site.robot);
+        let mut pairs = Vec::new();
+        for (i, link) in links.iter().enumerate() {
+            let beside = links.iter().enumerate().skip(i + 1);
+            let met = beside.filter(|(_, other)| link.may_meet(other));
+            pairs.extend(met.map(|(k, _)| Pair { link: i, other: Other::Link(k) }));
+            if let Some(z_m) = settings.lowest_m.filter(|_| link.link >= FIRST_LOW) {
+                let (p_w, outward_w) = (Point3::new(0.0, 0.0, z_m), Vector3::z_axis());
+                pairs.push(Pair { link: i, other: Other::Table(HalfSpace { p_w, outward_w }) });
+            }
+            let is_arm = link.link >= FIRST_FAR && !CARRIED.contains(&link.name);
+            if let Some(object) = site.object.filter(|_| is_arm) {
+                pairs.push(Pair { link: i, other: Other::Object(object) });
+            }
+        }
+        Self {
+            placed: Vec::with_capacity(links.len()),
+            links,
+            pairs,
+            clearance_m: settings.clearance_m,
+            reaction_s: settings.reaction_s,
+            looked: None,
+        }
+    }
+
+    /// The smallest distance at `q`, and the pair that has it.
+    fn nearest(&mut self, now: &Now, q: &Joints) -> (f64, usize) {
+        let frames = now.chain.frames(q);
+        self.placed.clear();
+        self.placed.extend(self.links.iter().map(|link| link.at(&frames[link.link])));
+        let mut nearest = (f64::INFINITY, 0);
+        for (i, pair) in self.pairs.iter().enumerate() {
+            let link = &self.placed[pair.link];
+            let distance_m = match &pair.other {
+                Other::Link(other) => link.to_capsule_m(&self.placed[*other]),
+                Other::Table(space) => link.to_half_space_m(space),
+                Other::Object(object) => link.to_box_m(object),
+            };
+            // Also if it is not a number.
+            if !(distance_m >= nearest.0) {
+                nearest = (distance_m, i);
+            }
+        }
+        nearest
+    }
+
+    fn name(&self, pair: usize) -> String {
+        let Pair { link, other } = &self.pairs[pair];
+        let other = match other {
+            Other::Link(other) => self.links[*other].name,
+            Other::Table(_) => "the table",
+            Other::Object(_) => "the object",
+        };
+        format!("{} and {other}", self.links[*link].name)
+    }
+}
+
+impl Interlock for Guard {
+    fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
+        let ahead = Ahead::of(now, qdot, self.reaction_s);
+        let limit = self.clearance_m;
+        if let Some((q, distance_m)) = &self.looked
+            && distance_m - ahead.farthest_m(q) > limit
+        {
+            return Ok(());
+        }
+        let here_m = self.nearest(now, &now.q).0;
+        self.looked = Some((now.q, here_m));
+        let mut pair = 0;
+        let below = ahead.below(limit, |q| {
+            let (distance_m, of) = self.nearest(now, q);
+            pair = of;
+            distance_m
+        });
+        below.map_or(Ok(()), |found| {
+            let part = self.name(pair);
+            Err(Trip { interlock: NAME, part, found, limit, unit: "m" })
+        })
+    }
+
+    fn reset(&mut self) {
+        self.looked = None;
+    }
+}

@@ -1,0 +1,48 @@
+//! Joints that do not do what they are told.
+
+use super::interlock::{Entry, Interlock, Now};
+use super::trip::Trip;
+use crate::backend::Reading;
+use crate::robot::arm::chain::MAX_JOINTS;
+
+/// Stops a body one of whose joints moves otherwise than was applied for some time.
+pub const ENTRY: Entry = Entry {
+    name: NAME,
+    make: |_, settings, _| {
+        let (share, limit_s) = (settings.follow_share, settings.follow_s);
+        Some(Box::new(Following { share, limit_s, since_s: [None; MAX_JOINTS] }))
+    },
+};
+
+const NAME: &str = "error of speed";
+
+struct Following {
+    /// Of the joint's speed limit.
+    share: f64,
+    limit_s: f64,
+    /// Since when each joint has been off.
+    since_s: [Option<f64>; MAX_JOINTS],
+}
+
+impl Interlock for Following {
+    fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
+        let speeds = reading.applied.qdot.iter().zip(now.qdot.iter());
+        let joints = now.chain.joints.iter().zip(speeds).zip(&mut self.since_s);
+        for ((joint, (&applied, &read)), since_s) in joints {
+            let (found, limit) = ((read - applied).abs(), self.share * joint.qdot_limit);
+            if found <= limit {
+                *since_s = None;
+                continue;
+            }
+            if now.time_s - *since_s.get_or_insert(now.time_s) > self.limit_s {
+                let (part, unit) = (joint.name.into(), "rad/s or m/s");
+                return Err(Trip { interlock: NAME, part, found, limit, unit });
+            }
+        }
+        Ok(())
+    }
+
+    fn reset(&mut self) {
+        self.since_s = [None; MAX_JOINTS];
+    }
+}

@@ -1,0 +1,33 @@
+//! Interlocks: reasons to stop a body that hold whatever it is told.
+//!
+//! An [`Interlock`] is a file here and a line in [`INTERLOCKS`]; [`Interlocked`] is a body around
+//! another that asks each of them in every tick. Before a body is moved, [`check_start`] asks it
+//! to stand still and looks at its sensors.
+
+mod ahead;
+mod collision;
+mod depth;
+mod electrodes;
+mod following;
+mod force;
+mod gates;
+#[allow(clippy::module_inception)]
+mod interlock;
+mod interlocked;
+mod joints;
+mod settings;
+mod silence;
+mod site;
+mod table;
+mod tip_speed;
+mod trip;
+mod way_back;
+mod workspace;
+
+pub use gates::{Baseline, Expected, GateError, GateSettings, check_start};
+pub use interlock::{Entry, Interlock, Now};
+pub use interlocked::{Interlocked, Operator};
+pub use settings::InterlockSettings;
+pub use site::Site;
+pub use table::INTERLOCKS;
+pub use trip::Trip;

@@ -1,0 +1,58 @@
+//! Sensors that no longer say anything new.
+
+use super::interlock::{Entry, Interlock, Now};
+use super::trip::Trip;
+use crate::backend::{Reading, Wrench};
+
+/// Stops a body whose joints, force/torque sensor or tactile sensor fall silent.
+pub const ENTRY: Entry = Entry {
+    name: "silence",
+    make: |_, settings, capabilities| {
+        let limits_s =
+            [settings.joint_silence_s, settings.wrench_silence_s, settings.frame_silence_s];
+        let repeats = capabilities.real_time;
+        Some(Box::new(Silence { limits_s, repeats, heard: [None; 3], time_s: 0.0, wrench: None }))
+    },
+};
+
+const NAMES: [&str; 3] = ["silence of the joints", "silence of the force", "silence of the skin"];
+
+struct Silence {
+    limits_s: [f64; 3],
+    /// Whether a wrench that is the same to the last bit counts as none: a simulated one may be
+    /// free of noise.
+    repeats: bool,
+    /// The tick at which each was heard last; none before it first is.
+    heard: [Option<u64>; 3],
+    time_s: f64,
+    wrench: Option<Wrench>,
+}
+
+impl Interlock for Silence {
+    fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
+        let is_new = reading.wrench != self.wrench || !self.repeats;
+        let news = [
+            reading.time_s > self.time_s || self.heard[0].is_none(),
+            reading.wrench.is_some() && is_new,
+            !reading.frames.is_empty(),
+        ];
+        (self.time_s, self.wrench) = (reading.time_s, reading.wrench);
+        for (i, (heard, is_news)) in self.heard.iter_mut().zip(news).enumerate() {
+            if is_news {
+                *heard = Some(now.tick);
+            }
+            let Some(heard) = heard else { continue };
+            // By ticks: the body's own time may be what stands still.
+            let (found, limit) = ((now.tick - *heard) as f64 * now.period_s, self.limits_s[i]);
+            if found > limit {
+                let (interlock, part) = (NAMES[i], String::new());
+                return Err(Trip { interlock, part, found, limit, unit: "s" });
+            }
+        }
+        Ok(())
+    }
+
+    fn reset(&mut self) {
+        (self.heard, self.time_s, self.wrench) = ([None; 3], 0.0, None);
+    }
+}

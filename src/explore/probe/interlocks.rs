@@ -1,0 +1,50 @@
+//! Puts the interlocks around a body: of the robot and the task they make what interlocks know.
+
+use super::servo::{standoff, turning_point};
+use crate::backend::interlock::{InterlockSettings, Interlocked, Site};
+use crate::backend::{Backend, Fault};
+use crate::geometry::distance::{HalfSpace, OrientedBox};
+use crate::robot::Robot;
+use crate::task::Task;
+use nalgebra::Point3;
+
+/// `body`, which moves `robot`, stopped where it has no business in `task` or something is wrong;
+/// `object` is what the arm's links must keep away from, if that is known.
+///
+/// # Errors
+/// [`Fault::Joints`] if the body is another arm.
+pub fn interlocked(
+    body: Box<dyn Backend>,
+    robot: &Robot,
+    task: &Task,
+    object: Option<OrientedBox>,
+    settings: &InterlockSettings,
+) -> Result<Interlocked, Fault> {
+    Interlocked::new(body, &site(robot, task, object), settings)
+}
+
+/// What the interlocks are told.
+fn site(robot: &Robot, task: &Task, object: Option<OrientedBox>) -> Site {
+    let touch = task.touch();
+    let home: Point3<f64> = robot.chain.forward(&robot.chain.home).translation.vector.into();
+    let (mut low, mut high) = (home, home);
+    let mut farthest = None;
+    // Ways are parallel and the zone is a rectangle: its corners span them all.
+    for place in task.zone().grid(2) {
+        let approach = task.approach(&place);
+        let ends = [standoff(robot, touch.standoff_m, &approach), turning_point(robot, &approach)]
+            .map(|x_wt| Point3::from(x_wt.translation.vector));
+        for p_w in &ends {
+            (low, high) = (low.inf(p_w), high.sup(p_w));
+        }
+        farthest = Some(HalfSpace { p_w: ends[1], outward_w: approach.direction_w() });
+    }
+    Site {
+        robot: robot.clone(),
+        tip_w: Some([low, high]),
+        farthest,
+        object,
+        touch_force_n: touch.force_limit_n,
+        travel_m_s: touch.travel_m_s.max(touch.approach_m_s),
+    }
+}
