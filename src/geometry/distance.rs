@@ -2,7 +2,7 @@
 
 use super::primitives::nearest_on_segment;
 use super::sweep::Capsule;
-use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitVector3, Vector3};
 
 /// A box that may be turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,6 +11,14 @@ pub struct OrientedBox {
     pub x_wb: Isometry3<f64>,
     /// Half of its sides, in metres.
     pub half_m: Vector3<f64>,
+}
+
+impl OrientedBox {
+    /// Along the axes of `W`, with these smallest and largest coordinates.
+    pub fn between((low, high): (Point3<f64>, Point3<f64>)) -> Self {
+        let middle = Translation3::from(nalgebra::center(&low, &high).coords);
+        Self { x_wb: middle.into(), half_m: (high - low) / 2.0 }
+    }
 }
 
 /// All points behind a plane.

@@ -248,9 +248,10 @@ impl Checked for Scene {
         }
         if let Some(collision) = self.solver.collision {
             let value = format!("\"{}\"", collision.name());
-            rules.require("solver.collision", value, self.collides(), || {
-                "no collision: only a finger without skin of body = \"dynamic\" collides in \
-                 MuJoCo; any other meets the exact mesh"
+            let met = self.collides() || self.effects.collision.is_some();
+            rules.require("solver.collision", value, met, || {
+                "no collision: only a finger without skin of body = \"dynamic\", or a scene with \
+                 [effects.collision], collides in MuJoCo; any other meets the exact mesh"
                     .into()
             });
         }
@@ -263,6 +264,10 @@ impl Checked for Scene {
         let stepped = self.body == Body::Dynamic || self.effects.flex.is_none();
         rules.require("effects.flex", "(given)", stepped, || {
             "no flex: only body = \"dynamic\" is stepped by MuJoCo".into()
+        });
+        let bumps = self.body == Body::Dynamic || self.effects.collision.is_none();
+        rules.require("effects.collision", "(given)", bumps, || {
+            "no collision: only links of body = \"dynamic\" are kept apart by MuJoCo".into()
         });
         if let (Some(wrench), None) = (&self.effects.wrench, &self.effects.fluid) {
             let least_n = SDS_OF_CONTACT * wrench.noise_max_n();

@@ -13,6 +13,7 @@ use crate::backend::{Backend, Fault};
 use crate::explore::probe::Probe;
 use crate::explore::probe::interlocks::interlocked;
 use crate::explore::probe::servo::{OutOfReach, Servo, check_reach};
+use crate::geometry::distance::OrientedBox;
 use crate::sim::Environment;
 use crate::sim::scene::Body;
 use std::sync::Arc;
@@ -118,7 +119,7 @@ impl Simulator {
     }
 
     /// What drives `body`, one of the scene's own or around one, through touches, with the usual
-    /// interlocks around it.
+    /// interlocks around it. They know of table and object where the scene lets those collide.
     ///
     /// # Errors
     /// If it cannot be brought to its start.
@@ -138,7 +139,13 @@ impl Simulator {
     ) -> Result<Servo, Fault> {
         let robot = self.environment.robot().ok_or(Fault::Lacks { part: "an object" })?;
         let task = self.environment.task();
-        let body = interlocked(body, &robot, task, None, limits)?;
+        let mut limits = limits.clone();
+        let mut object = None;
+        if let Some(collision) = &self.environment.scene().effects.collision {
+            limits.lowest_m.get_or_insert(collision.table_m);
+            object = self.environment.mesh().map(|mesh| OrientedBox::between(mesh.bounds()));
+        }
+        let body = interlocked(body, &robot, task, object, &limits)?;
         Servo::new(robot, task.touch().clone(), Box::new(body), seed)
     }
 

@@ -26,8 +26,8 @@ pub struct SolverSettings {
     pub step_s: f64,
     /// How a step is made.
     pub integrator: Integrator,
-    /// As what MuJoCo lets a finger without skin meet the object; left out, the default of
-    /// [`Collision`]. Any other finger has none.
+    /// As what MuJoCo lets a finger without skin, or the links of `[effects.collision]`, meet the
+    /// object; left out, the default of [`Collision`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub collision: Option<Collision>,
     /// How `collision = "sdf"` looks for contact; left out, the default of [`Sdf`].

@@ -8,9 +8,12 @@ mod arm;
 mod arm_pc;
 mod backend;
 mod broken;
+#[cfg(feature = "mujoco")]
+mod collisions;
 #[cfg(feature = "nlopt")]
 mod commands;
 mod control;
+mod distances;
 #[cfg(feature = "mujoco")]
 mod dynamic;
 mod effects;
@@ -36,6 +39,7 @@ mod folders;
 mod formats;
 #[cfg(feature = "nlopt")]
 mod fuzz;
+mod gates;
 mod geometry;
 mod gp;
 #[cfg(feature = "nlopt")]
@@ -45,6 +49,7 @@ mod import;
 mod information;
 #[cfg(feature = "mujoco")]
 mod installed;
+mod interlocks;
 mod memory;
 mod meshes;
 mod messages;

@@ -90,7 +90,8 @@ fn a_target_that_is_not_a_number_or_out_of_reach_ends_as_a_fault() {
     let near = environment("container_finger.toml", &[]);
     assert!(matches!(touch(&near, 1, &[f64::NAN, 0.5]), Err(Fault::Refused { .. })));
     let arm = environment("container_finger.toml", &["arm.links=\"C\"", "zone.x_m=[-0.05, 3]"]);
-    let Err(Fault::OutOfReach { distance_m, .. }) = touch(&arm, 1, &[2.9, 0.5]) else { panic!() };
+    let far = touch(&arm, 1, &[2.9, 0.5]);
+    let Err(Fault::OutOfReach { distance_m, .. }) = far else { panic!("{far:?}") };
     // Nearly as far as the target is from the base, less the arm's length.
     assert!((1.5..2.5).contains(&distance_m), "{distance_m}");
 }
@@ -151,7 +152,7 @@ fn a_sensor_that_falls_silent_and_joints_that_do_not_move_are_faults_with_their_
         }
     });
     assert!(matches!(silent, Err(Fault::Lost { time_s }) if time_s > 0.0), "{silent:?}");
-    let (stuck, _) = broken(&environment, |_, reading| reading.q[0] = 0.3);
+    let (stuck, _) = broken(&environment, |_, reading| reading.q[0] = 0.03);
     assert!(matches!(stuck, Err(Fault::Late { .. })), "{stuck:?}");
     let (nan, _) = broken(&environment, |tick, reading| {
         if tick > 20 {

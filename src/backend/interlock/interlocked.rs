@@ -159,8 +159,8 @@ impl Interlocked {
         self.latch(fault)
     }
 
-    /// Brings the joints to rest together, in a straight line. Whether nothing but too much force was
-    /// found wrong meanwhile.
+    /// Brings the joints to rest together, in a straight line. Whether nothing but too much force
+    /// was found wrong meanwhile.
     fn brake(&mut self) -> bool {
         let mut is_sound = true;
         let ticks = (stopping_s(&self.now, &self.now.sent) / self.now.period_s).ceil() as usize + 1;

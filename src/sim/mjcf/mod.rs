@@ -7,6 +7,7 @@ mod robot;
 mod scenery;
 mod sdf;
 mod shell;
+mod surroundings;
 mod text;
 
 pub use shell::flex;
@@ -27,7 +28,7 @@ pub enum Mode {
     Picture,
     /// To step: what moves and nothing else. Shapes would cost time at every step, and contact is
     /// the skin's matter, not MuJoCo's; only a finger without a skin meets the object, as the
-    /// scene's [`Collision`].
+    /// scene's [`Collision`], and links whatever is in their way if the scene asks for that.
     Dynamic {
         /// Time step; the servos' gains are chosen for 2 ms and less.
         step_s: f64,
@@ -43,8 +44,10 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     let chain = environment.chain()?;
     let shown = mode == Mode::Picture;
     let collides = !shown && environment.scene().collides();
+    let bumps = !shown && environment.scene().effects.collision.is_some();
     let scenery = match shown {
         true => scenery::scenery(mesh, environment.task().zone(), &chain),
+        false if bumps => obstacle(environment)? + &surroundings::surroundings(environment.scene()),
         false if collides => obstacle(environment)?,
         false => String::new(),
     };
@@ -67,7 +70,7 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
   <keyframe><key name="home" qpos="{home}"/></keyframe>
 {scenery}</mujoco>
 "#,
-        robot = robot::robot(environment.scene(), &chain, collides),
+        robot = robot::robot(environment.scene(), &chain, collides, bumps),
         discard = !shown,
         integrator = keyword(environment.scene().solver.integrator),
         home = list(chain.home.iter().take(chain.joints.len())),

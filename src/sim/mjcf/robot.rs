@@ -1,6 +1,6 @@
 //! The arm or the stage with the finger on it.
 
-use super::text::{CONTACT, pose};
+use super::text::{CONTACT, LINK, TABLE, pose};
 use crate::robot::arm::settings::TOOL_KG;
 use crate::robot::arm::{Chain, Links};
 use crate::robot::finger::Finger;
@@ -10,9 +10,12 @@ const C: &str = include_str!("../../../models/pa10/c.xml");
 const A: &str = include_str!("../../../models/pa10/a.xml");
 const STAGE: &str = include_str!("../../../models/stage.xml");
 
+/// How the models say that their shapes meet nothing.
+const PASSING: &str = r#"contype="0" conaffinity="0""#;
+
 /// The robot's model without its outermost tags, with its base and its tool put in; the finger's
-/// hull is met by the object if it `collides`.
-pub(super) fn robot(scene: &Scene, chain: &Chain, collides: bool) -> String {
+/// hull is met by the object if it `collides`, and the links by all there is if the robot `bumps`.
+pub(super) fn robot(scene: &Scene, chain: &Chain, collides: bool, bumps: bool) -> String {
     let model = match scene.arm.as_ref().map(|arm| arm.links) {
         Some(Links::C) => C,
         Some(Links::A) => A,
@@ -21,9 +24,16 @@ pub(super) fn robot(scene: &Scene, chain: &Chain, collides: bool) -> String {
     let after_open = model.split_once("<mujoco").and_then(|(_, rest)| rest.split_once('>'));
     let inner = after_open.and_then(|(_, rest)| rest.split_once("</mujoco>"));
     let tool_kg = scene.arm.as_ref().map_or(TOOL_KG, |arm| arm.tool_kg);
-    let contact = if collides { CONTACT } else { "" };
+    let contact = match (collides, bumps) {
+        (true, false) => CONTACT,
+        (true, true) => LINK,
+        (false, true) => TABLE,
+        (false, false) => "",
+    };
+    let links = if bumps { LINK } else { PASSING };
     inner
         .map_or("", |(inner, _)| inner)
+        .replace(PASSING, links)
         .replace("<body name=\"base\"", &format!("<body name=\"base\" {}", pose(&chain.base)))
         .replace("<!-- tool -->", &tool(&scene.finger, tool_kg, chain, contact))
 }

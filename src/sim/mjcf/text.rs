@@ -8,6 +8,14 @@ use std::fmt::Display;
 pub(super) const CONTACT: &str =
     r#"contype="1" conaffinity="1" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
 
+/// The same of the arm's links where they collide: with each other, the table and the object.
+pub(super) const LINK: &str =
+    r#"contype="2" conaffinity="3" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
+
+/// The same of the table, and of a finger whose skin meets the object: with links.
+pub(super) const TABLE: &str =
+    r#"contype="2" conaffinity="2" condim="1" solref=".01 1" solimp=".95 .99 .0001""#;
+
 /// Numbers with spaces between them.
 pub(super) fn list<T: Display>(numbers: impl IntoIterator<Item = T>) -> String {
     let texts: Vec<String> = numbers.into_iter().map(|number| number.to_string()).collect();

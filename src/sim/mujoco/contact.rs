@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;
 
 /// The contacts as one, in `T`: centre weighted by force, sum of the forces and its direction; none
-/// without force. All of them are the object's on the finger: nothing else collides.
+/// without force. Those of links with whatever else are left out.
 ///
 /// To be asked while `data` holds the forces of the last step; `finger` is the finger's body.
 pub(super) fn contact(
@@ -20,8 +20,12 @@ pub(super) fn contact(
         let force_n = data.try_contact_force(i).map_or(0.0, |[normal, ..]| normal);
         // From the first geom to the second, which come in the order of their kinds.
         let [x, y, z, ..] = contact.frame;
-        let second = data.model().geom_bodyid().get(contact.geom[1] as usize);
-        let outward = if second == Some(&(finger as i32)) { 1.0 } else { -1.0 };
+        let of = |geom: i32| data.model().geom_bodyid().get(geom as usize);
+        let outward = match contact.geom.map(|geom| of(geom) == Some(&(finger as i32))) {
+            [_, true] => 1.0,
+            [true, false] => -1.0,
+            [false, false] => continue,
+        };
         moment += Vector3::from(contact.pos) * force_n;
         weight_n += force_n;
         sum_n += outward * force_n * Vector3::new(x, y, z);

@@ -1,6 +1,7 @@
 //! What several tests need.
 
 pub mod counting;
+pub mod fake;
 #[cfg(feature = "mujoco")]
 #[allow(dead_code)] // The bench of finite elements uses the rest.
 pub mod presses;

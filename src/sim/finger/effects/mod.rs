@@ -4,6 +4,7 @@
 //! rules in the scene's file, presence in [`Effects`], memory during a trial, hook on the load,
 //! switch and row in a study of effects follow from that line.
 
+pub mod collision;
 pub mod effect;
 pub mod electrodes;
 pub mod flex;
@@ -44,6 +45,8 @@ table::effects! {
     registration: registration::RegistrationEffect,
     /// Skew and latency of the tactile frames, delay of commands.
     timing: timing::TimingEffect,
+    /// Links, tool, object and table collide.
+    collision: collision::CollisionEffect,
 }
 
 impl Effects {

@@ -1,0 +1,141 @@
+//! A body of numbers alone, which does what it is told and reads what a test wants.
+
+use palpate::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
+use palpate::robot::arm::Chain;
+use palpate::robot::finger::Frame;
+use palpate::robot::finger::frame::ELECTRODES;
+use std::sync::{Arc, Mutex};
+
+/// What a fake body lives in.
+#[derive(Default)]
+pub struct World {
+    pub real_time: bool,
+    /// From which tick on readings go through what.
+    pub breaks: Option<(u64, fn(u64, &mut Reading))>,
+    /// Force along y on a stage's tip at y.
+    pub wall: Option<Box<dyn Fn(f64) -> f64 + Send>>,
+    /// The tick at which it says that it was stopped.
+    pub dies_at: Option<u64>,
+}
+
+impl World {
+    pub fn real() -> Self {
+        Self { real_time: true, ..Self::default() }
+    }
+
+    pub fn simulated() -> Self {
+        Self::default()
+    }
+}
+
+/// What a fake body was told and where it was, from its first reset on.
+#[derive(Clone, Default)]
+pub struct Fake(Arc<Mutex<Log>>);
+
+#[derive(Default)]
+struct Log {
+    commands: Vec<Vec<f64>>,
+    places: Vec<Vec<f64>>,
+    is_mended: bool,
+}
+
+impl Fake {
+    pub fn commands(&self) -> Vec<Vec<f64>> {
+        self.0.lock().unwrap().commands.clone()
+    }
+
+    /// One more than commands: the start comes first.
+    pub fn places(&self) -> Vec<Vec<f64>> {
+        self.0.lock().unwrap().places.clone()
+    }
+
+    pub fn last(&self) -> Vec<f64> {
+        self.0.lock().unwrap().places.last().unwrap().clone()
+    }
+
+    /// From now on nothing is broken.
+    pub fn mend(&self) {
+        self.0.lock().unwrap().is_mended = true;
+    }
+}
+
+pub struct FakeBody {
+    chain: Chain,
+    capabilities: Capabilities,
+    world: World,
+    log: Fake,
+    tick: u64,
+    reading: Reading,
+}
+
+/// A body with ticks of 2 ms.
+pub fn body_of(chain: &Chain, world: World) -> (FakeBody, Fake) {
+    let log = Fake::default();
+    let mut capabilities = Capabilities::of(chain, 0.002);
+    capabilities.real_time = world.real_time;
+    let (chain, reading) = (chain.clone(), Reading::default());
+    (FakeBody { chain, capabilities, world, log: log.clone(), tick: 0, reading }, log)
+}
+
+impl FakeBody {
+    fn report(&mut self) {
+        let Self { reading, tick, .. } = self;
+        reading.time_s = *tick as f64 * self.capabilities.period_s;
+        // Something that is never twice the same, as noise is.
+        let noise = |i: u64| ((*tick * 31 + i * 17) as f64 * 0.7).sin();
+        let mut wrench = Wrench::default();
+        wrench.force_n.x = 0.02 * noise(1);
+        if let Some(wall) = &self.world.wall {
+            wrench.force_n.y = wall(reading.q[1]);
+        }
+        reading.wrench = Some(wrench);
+        reading.frames.clear();
+        if tick.is_multiple_of(5) {
+            let counts = std::array::from_fn(|i| (3000.0 + 5.0 * noise(i as u64)).round());
+            let counts: [f64; ELECTRODES] = counts;
+            let (time_s, electrode_counts) = (reading.time_s, Some(counts));
+            reading.frames.push(Frame { time_s, electrode_counts, ..Frame::default() });
+        }
+        let is_mended = self.log.0.lock().unwrap().is_mended;
+        if let Some((from, breaks)) = self.world.breaks.filter(|_| !is_mended)
+            && *tick >= from
+        {
+            breaks(*tick, reading);
+        }
+    }
+}
+
+impl Backend for FakeBody {
+    fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    fn reset(&mut self, _: u64) -> Result<&Reading, Fault> {
+        let joints = self.chain.joints.len();
+        self.tick = 0;
+        self.reading.q = self.chain.start().to_vec();
+        self.reading.qdot = vec![0.0; joints];
+        self.reading.applied.qdot = vec![0.0; joints];
+        self.report();
+        self.log.0.lock().unwrap().places.push(self.chain.start().to_vec());
+        Ok(&self.reading)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        self.tick += 1;
+        let mut log = self.log.0.lock().unwrap();
+        log.commands.push(command.qdot.clone());
+        if self.world.dies_at.is_some_and(|tick| self.tick >= tick) {
+            return Err(Fault::Stopped { time_s: self.reading.time_s });
+        }
+        let mut place = log.places.last().unwrap().clone();
+        place.iter_mut().zip(&command.qdot).for_each(|(q, qdot)| *q += qdot * 0.002);
+        log.places.push(place.clone());
+        drop(log);
+        self.reading.q = place;
+        self.reading.qdot.clone_from(&command.qdot);
+        self.reading.applied.qdot.clone_from(&command.qdot);
+        self.report();
+        Ok(&self.reading)
+    }
+}

@@ -1,0 +1,84 @@
+//! What must hold before a body is moved.
+
+use crate::common::fake::{World, body_of};
+use crate::common::shipped;
+use palpate::backend::Reading;
+use palpate::backend::interlock::{Expected, GateError, GateSettings, check_start};
+use palpate::robot::arm::ArmSettings;
+use palpate::sim::simulator::Simulator;
+
+fn checked(breaks: fn(u64, &mut Reading)) -> Result<(), GateError> {
+    let chain = ArmSettings::default().chain();
+    let world = World { breaks: Some((0, breaks)), ..World::real() };
+    let (mut body, _) = body_of(&chain, world);
+    let expected = Expected { q: Some(chain.start()), sends_frames: true };
+    check_start(&mut body, &chain, expected, &GateSettings::default(), 1).map(drop)
+}
+
+#[test]
+fn a_body_in_order_passes_and_gives_its_baseline() {
+    assert_eq!(checked(|_, _| {}), Ok(()));
+    let environment = shipped::environment("container_finger.toml", &["effects.wrench={}"]);
+    let mut body = Simulator::new(environment.clone()).unwrap().body().unwrap().unwrap();
+    let chain = environment.chain().unwrap();
+    let expected = Expected { q: Some(chain.start()), sends_frames: true };
+    let settings = GateSettings::default();
+    let baseline = check_start(body.as_mut(), &chain, expected, &settings, 1).unwrap();
+    assert_eq!(baseline.q, chain.start());
+    assert!(baseline.frames >= 199 && baseline.electrode_counts.is_some());
+    // A bias, and noise that its mean over 200 readings takes away.
+    let bias = baseline.wrench.unwrap().force_n;
+    assert!(bias.norm() > 0.01);
+    let once = body.reset(1).unwrap().wrench.unwrap().force_n;
+    assert!((bias - once).norm() < 0.3, "{bias} {once}");
+}
+
+#[test]
+fn what_is_not_in_order_is_said_with_its_numbers() {
+    let cases: [(fn(u64, &mut Reading), fn(&GateError) -> bool); 8] = [
+        (
+            |_, reading| reading.q[1] = 1.7,
+            |error| matches!(error, GateError::Outside { joint: "S2", q: 1.7, .. }),
+        ),
+        (
+            |_, reading| reading.q[3] += 0.1,
+            |error| matches!(error, GateError::Away { joint: "E1", .. }),
+        ),
+        (
+            |tick, reading| reading.q[0] += 1e-5 * tick as f64,
+            |error| matches!(error, GateError::Moves { joint: "S1", moved, .. } if *moved > 0.002),
+        ),
+        (
+            |tick, reading| reading.wrench.as_mut().unwrap().force_n.z = 1e-3 * tick as f64,
+            |error| matches!(error, GateError::Drifts { drift_n, .. } if (drift_n - 0.75).abs() < 0.01),
+        ),
+        (|_, reading| reading.frames.clear(), |error| matches!(error, GateError::NoFrames { .. })),
+        (
+            |_, reading| counts(reading, |counts| counts[4] = 2000.0),
+            |error| matches!(error, GateError::Electrode { electrode: 5, .. }),
+        ),
+        (
+            |_, reading| counts(reading, |counts| counts[0] = 4095.0),
+            |error| matches!(error, GateError::Electrode { electrode: 1, .. }),
+        ),
+        (
+            |tick, reading| {
+                let sign = if (tick / 5).is_multiple_of(2) { 1.0 } else { -1.0 };
+                for frame in &mut reading.frames {
+                    frame.electrode_counts.as_mut().unwrap()[7] += 40.0 * sign;
+                }
+            },
+            |error| matches!(error, GateError::Electrode { electrode: 8, .. }),
+        ),
+    ];
+    for (i, (breaks, is_right)) in cases.into_iter().enumerate() {
+        let error = checked(breaks).unwrap_err();
+        assert!(is_right(&error), "{i}: {error}");
+    }
+    let nan = checked(|_, reading| reading.q[2] = f64::NAN).unwrap_err();
+    assert!(matches!(nan, GateError::Fault(_)));
+}
+
+fn counts(reading: &mut Reading, change: fn(&mut [f64; 19])) {
+    reading.frames.iter_mut().for_each(|frame| change(frame.electrode_counts.as_mut().unwrap()));
+}

@@ -1,0 +1,310 @@
+//! Interlocks: each trips on its cause and on nothing that is in order, and stays tripped.
+
+use crate::common::fake::{Fake, World, body_of};
+use crate::common::shipped;
+use nalgebra::{Point3, Vector3};
+use palpate::backend::interlock::{INTERLOCKS, InterlockSettings, Interlocked, Site};
+use palpate::backend::{Backend, Command, Fault, Reading, Wrench};
+use palpate::explore::probe::interlocks::interlocked;
+use palpate::robot::arm::stage::stage;
+use palpate::robot::arm::{ArmSettings, Chain};
+use palpate::robot::{Finger, Robot};
+use palpate::sim::simulator::Simulator;
+use proptest::prelude::*;
+use std::sync::Arc;
+
+fn site(chain: Chain) -> Site {
+    let robot = Robot { chain, finger: Finger::default(), is_soft: true };
+    let (touch_force_n, travel_m_s) = (15.0, 0.1);
+    Site { robot, tip_w: None, farthest: None, object: None, touch_force_n, travel_m_s }
+}
+
+fn arm() -> Site {
+    site(ArmSettings::default().chain())
+}
+
+fn interlocks(site: &Site, settings: &InterlockSettings, world: World) -> (Interlocked, Fake) {
+    let (body, fake) = body_of(&site.robot.chain, world);
+    let mut body = Interlocked::new(Box::new(body), site, settings).unwrap();
+    body.reset(1).unwrap();
+    (body, fake)
+}
+
+fn command(joints: usize, tick: u32) -> Command {
+    Command { qdot: vec![0.02 * (f64::from(tick) * 0.01).sin(); joints] }
+}
+
+/// What a body that is otherwise in order reads wrong from tick 100 on.
+type Breaks = fn(u64, &mut Reading);
+
+/// Cause, interlock, whether it waits.
+const CAUSES: [(&str, Breaks); 13] = [
+    ("force", |tick, reading| force(reading, (0.5 * (tick - 100) as f64).min(40.0))),
+    ("force rate", |_, reading| force(reading, 24.0)),
+    ("torque", |_, reading| reading.wrench.as_mut().unwrap().torque_nm.x += 2.0),
+    ("silence of the joints", |_, reading| reading.time_s = 0.2),
+    ("silence of the force", |_, reading| reading.wrench = None),
+    ("silence of the force", |_, reading| reading.wrench = Some(Wrench::default())),
+    ("silence of the skin", |_, reading| reading.frames.clear()),
+    ("value of E3", |_, reading| electrode(reading, 2, 4095.0)),
+    ("value of E4", |_, reading| electrode(reading, 3, 0.0)),
+    ("standstill of E19", |_, reading| electrode(reading, 18, 2000.0)),
+    ("error of speed of S1", |_, reading| reading.qdot[0] = 0.4),
+    ("joint position of S2", |_, reading| reading.q[1] = 2.0),
+    ("tip speed", |_, reading| reading.qdot[0] = 2.0),
+];
+
+fn force(reading: &mut Reading, more_n: f64) {
+    reading.wrench.as_mut().unwrap().force_n.y += more_n;
+}
+
+fn electrode(reading: &mut Reading, i: usize, counts: f64) {
+    for frame in &mut reading.frames {
+        frame.electrode_counts.as_mut().unwrap()[i] = counts;
+    }
+}
+
+#[test]
+fn each_trips_on_its_cause_soon_and_stays_tripped_until_an_operator_clears_it() {
+    for (named, breaks) in CAUSES {
+        let site = arm();
+        let world = World { breaks: Some((100, breaks)), ..World::real() };
+        let (mut body, fake) = interlocks(&site, &InterlockSettings::default(), world);
+        for tick in 0..99 {
+            body.step(&command(7, tick)).unwrap_or_else(|fault| panic!("{named}: {fault}"));
+        }
+        let stepped = (99..300).find_map(|tick| Some((tick, body.step(&command(7, tick)).err()?)));
+        let (tick, fault) = stepped.unwrap_or_else(|| panic!("{named} does not trip"));
+        let Fault::Interlock { trip, .. } = &fault else { panic!("{named}: {fault}") };
+        let said = trip.to_string();
+        assert!(said.starts_with(&format!("{named} is ")), "{named}: {said}");
+        assert!(trip.found > trip.limit || trip.unit == "counts", "{said}");
+        // The longest that any of them waits is 0.2 s, 100 ticks; a spike needs two readings.
+        assert!(tick <= 205, "{named}: {tick}");
+        let commands = fake.commands();
+        assert!(commands.last().unwrap().iter().all(|qdot| *qdot == 0.0), "{named}");
+        let told = commands.len();
+        assert_eq!(body.step(&command(7, 0)).unwrap_err(), fault);
+        assert_eq!(body.reset(2).unwrap_err(), fault);
+        assert_eq!(fake.commands().len(), told, "{named}: it moved after it was stopped");
+        body.operator().clear();
+        fake.mend();
+        body.reset(2).unwrap();
+        body.step(&command(7, 0)).unwrap();
+    }
+}
+
+/// One reading alone is no force.
+#[test]
+fn a_single_spike_of_force_is_none() {
+    let world = World {
+        breaks: Some((100, |tick, reading| {
+            // Between two readings from which a rise is measured.
+            if tick % 50 == 2 {
+                force(reading, 100.0);
+            }
+        })),
+        ..World::real()
+    };
+    let (mut body, _) = interlocks(&arm(), &InterlockSettings::default(), world);
+    (0..300).for_each(|tick| drop(body.step(&command(7, tick)).unwrap()));
+}
+
+#[test]
+fn a_simulated_body_is_cleared_by_its_reset() {
+    let world =
+        World { breaks: Some((10, |_, reading| force(reading, 24.0))), ..World::simulated() };
+    let (mut body, fake) = interlocks(&arm(), &InterlockSettings::default(), world);
+    assert!((0..50).any(|tick| body.step(&command(7, tick)).is_err()));
+    fake.mend();
+    body.reset(1).unwrap();
+    assert!(body.step(&command(7, 0)).is_ok());
+}
+
+/// A wall of 20 N/mm across y; the tip goes against it at 20 mm/s.
+fn pressed(
+    wall: impl Fn(f64) -> f64 + Send + 'static,
+    settings: &InterlockSettings,
+) -> (Fault, Fake) {
+    let site = site(stage(Point3::origin(), Finger::default().r_at()));
+    let world = World { wall: Some(Box::new(wall)), ..World::real() };
+    let (mut body, fake) = interlocks(&site, settings, world);
+    let ahead = Command { qdot: vec![0.0, -0.02, 0.0] };
+    let fault = (0..2000).find_map(|_| body.step(&ahead).err()).unwrap();
+    (fault, fake)
+}
+
+const N_M: f64 = 20_000.0;
+const FRONT_M: f64 = -0.02;
+
+#[test]
+fn too_much_force_is_left_by_the_way_it_came_and_no_farther_than_said() {
+    let settings = InterlockSettings::default();
+    let (fault, fake) = pressed(|y| N_M * (FRONT_M - y).max(0.0), &settings);
+    let Fault::Interlock { trip, .. } = &fault else { panic!("{fault}") };
+    assert_eq!((trip.interlock, trip.limit), ("force", 25.0));
+    let (deepest, last) = (fake.places().iter().map(|q| q[1]).fold(0.0, f64::min), fake.last()[1]);
+    let back_m = last - deepest;
+    assert!((0.010..0.012).contains(&back_m), "{back_m}");
+    let speeds = fake.commands().iter().map(|qdot| qdot[1]).fold(0.0, f64::max);
+    assert!(speeds <= 0.02 + 1e-9, "{speeds}");
+    assert!(fake.commands().last().unwrap().iter().all(|qdot| *qdot == 0.0));
+
+    let (_, fake) = pressed(
+        |y| N_M * (FRONT_M - y).max(0.0),
+        &InterlockSettings { retract_m: 0.0, ..settings.clone() },
+    );
+    let deepest = fake.places().iter().map(|q| q[1]).fold(0.0, f64::min);
+    assert_eq!(fake.last()[1], deepest);
+}
+
+/// Pulled back, a hook would hold.
+#[test]
+fn going_back_ends_where_the_force_rises() {
+    let caught = std::sync::Mutex::new(0.0f64);
+    let hook = move |y: f64| {
+        let mut deepest = caught.lock().unwrap();
+        *deepest = deepest.min(y);
+        let pulled_m = (y - *deepest - 0.003).max(0.0);
+        N_M * (FRONT_M - y).max(0.0).max(if *deepest < FRONT_M { pulled_m + 0.002 } else { 0.0 })
+    };
+    let (fault, fake) = pressed(hook, &InterlockSettings::default());
+    assert!(matches!(fault, Fault::Interlock { .. }));
+    let (deepest, last) = (fake.places().iter().map(|q| q[1]).fold(0.0, f64::min), fake.last()[1]);
+    // 2 N at 20 N/mm are 0.1 mm; to stop from 20 mm/s takes 0.2 mm.
+    assert!((0.003..0.0042).contains(&(last - deepest)), "{}", last - deepest);
+}
+
+#[test]
+fn it_goes_back_from_nothing_but_force() {
+    for (named, breaks) in CAUSES.into_iter().filter(|(named, _)| *named != "force") {
+        let world = World { breaks: Some((100, breaks)), ..World::real() };
+        let (mut body, fake) = interlocks(&arm(), &InterlockSettings::default(), world);
+        let ahead = Command { qdot: vec![0.01; 7] };
+        assert!((0..300).any(|_| body.step(&ahead).is_err()), "{named}");
+        let back = fake.commands().iter().flatten().fold(0.0, |least: f64, &qdot| least.min(qdot));
+        assert_eq!(back, 0.0, "{named}");
+    }
+    // Nor from force, if the skin is silent too.
+    let both: Breaks = |tick, reading| {
+        reading.frames.clear();
+        force(reading, (0.24 * (tick - 100) as f64).min(26.0));
+    };
+    let world = World { breaks: Some((100, both)), ..World::real() };
+    let settings = InterlockSettings { frame_silence_s: 0.23, ..InterlockSettings::default() };
+    let (mut body, fake) = interlocks(&arm(), &settings, world);
+    let ahead = Command { qdot: vec![0.05; 7] };
+    let fault = (0..400).find_map(|_| body.step(&ahead).err()).unwrap();
+    assert!(fault.to_string().contains("force is"), "{fault}");
+    assert!(fake.commands().iter().flatten().all(|qdot| *qdot >= 0.0));
+}
+
+#[test]
+fn a_body_that_faults_is_told_to_stand_still_at_once() {
+    let world = World { dies_at: Some(50), ..World::real() };
+    let (mut body, fake) = interlocks(&arm(), &InterlockSettings::default(), world);
+    let fault = (0..100).find_map(|_| body.step(&Command { qdot: vec![0.05; 7] }).err()).unwrap();
+    assert!(matches!(fault, Fault::Stopped { .. }));
+    assert_eq!(fake.commands().last().unwrap(), &vec![0.0; 7]);
+    assert_eq!(body.step(&command(7, 0)).unwrap_err(), fault);
+}
+
+#[test]
+fn the_table_has_every_interlock_once() {
+    let mut names: Vec<&str> = INTERLOCKS.iter().map(|entry| entry.name).collect();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), INTERLOCKS.len());
+    let docs = include_str!("../../docs/interlocks.md");
+    for name in names {
+        assert!(docs.contains(&format!("| {name} |")), "{name}");
+    }
+}
+
+#[test]
+fn no_touch_of_a_shipped_scene_comes_near_one() {
+    let names =
+        ["container_finger.toml", "bird_finger.toml", "container_pa10.toml", "bird_pa10.toml"];
+    for name in names.into_iter().filter(|name| cfg!(feature = "mujoco") || !name.contains("pa10"))
+    {
+        for sets in [&[][..], &["effects.wrench={}", "effects.timing={}"]] {
+            let environment = shipped::environment(name, sets);
+            let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
+            let mut probe = simulator.probe(1).unwrap();
+            for place in environment.scene().zone.grid(2).into_iter().step_by(3) {
+                let touch = probe.touch(&environment.task().approach(&place));
+                assert!(touch.is_ok(), "{name} {sets:?} {place:?}: {touch:?}");
+            }
+        }
+    }
+}
+
+/// Where the finger is not stopped by what it is to feel, the interlock stops it: the depth of the
+/// zone, the box around the ways.
+#[test]
+fn a_finger_that_feels_nothing_is_stopped_behind_the_zone() {
+    let environment = shipped::environment("container_finger.toml", &[]);
+    let (robot, task) = (environment.robot().unwrap(), environment.task());
+    let [_, far_m] = task.depth_m();
+    for (way, named) in [([0.0, -0.05, 0.0], "depth"), ([0.05, 0.0, 0.0], "workspace")] {
+        let (body, fake) = body_of(&robot.chain, World::simulated());
+        let settings = InterlockSettings::default();
+        let mut body = interlocked(Box::new(body), &robot, task, None, &settings).unwrap();
+        body.reset(1).unwrap();
+        let ahead = Command { qdot: way.to_vec() };
+        let fault = (0..5000).find_map(|_| body.step(&ahead).err()).unwrap();
+        assert!(fault.to_string().contains(named), "{fault}");
+        let y_m = fake.last()[1];
+        let deepest_m = far_m + robot.finger.radius_m + 0.01 + settings.depth_margin_m;
+        assert!(-y_m <= deepest_m + 1e-9, "{y_m}");
+        assert!(named != "depth" || -y_m > deepest_m - 0.005, "{y_m} {deepest_m} {fault}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    /// Whatever is commanded, up to ten times what a joint can do.
+    #[test]
+    fn whatever_is_commanded_limits_hold_and_the_tip_stays_in_its_box(
+        wild in prop::collection::vec(prop::array::uniform7(-1.0f64..1.0), 1..12),
+        gentle in 0.02f64..1.0,
+    ) {
+        let mut site = arm();
+        let chain = site.robot.chain.clone();
+        let home: Point3<f64> = chain.forward(&chain.home).translation.vector.into();
+        let room = Vector3::repeat(0.15);
+        site.tip_w = Some([home, home]);
+        let settings = InterlockSettings {
+            tip_margin_m: room.x,
+            lowest_m: Some(0.3),
+            tip_speed_m_s: Some(2.0),
+            ..InterlockSettings::default()
+        };
+        let (mut body, fake) = interlocks(&site, &settings, World::simulated());
+        'run: for qdot in &wild {
+            let wanted = |i: usize| 10.0 * gentle * qdot[i] * chain.joints[i].qdot_limit;
+            let command = Command { qdot: (0..7).map(wanted).collect() };
+            for _ in 0..150 {
+                if body.step(&command).is_err() {
+                    break 'run;
+                }
+            }
+        }
+        let period_s = body.capabilities().period_s;
+        let mut before = vec![0.0; 7];
+        for (qdot, q) in fake.commands().iter().zip(fake.places().iter().skip(1)) {
+            for (i, joint) in chain.joints.iter().enumerate() {
+                let [low, high] = joint.q_limits;
+                prop_assert!((low - 1e-6..=high + 1e-6).contains(&q[i]), "{} {}", joint.name, q[i]);
+                prop_assert!(qdot[i].abs() <= joint.qdot_limit * (1.0 + 1e-6));
+                let step = joint.qddot_limit * period_s * (1.0 + 1e-6);
+                prop_assert!((qdot[i] - before[i]).abs() <= step, "{}", joint.name);
+            }
+            let tip = chain.forward(&chain.joints_from(q).unwrap()).translation.vector - home.coords;
+            // The grain of looking ahead.
+            prop_assert!(tip.amax() <= room.x + 1e-3, "{tip}");
+            before.clone_from(qdot);
+        }
+    }
+}
