@@ -44,13 +44,11 @@ impl<'a> Ahead<'a> {
             if !(found_m >= least_m) {
                 return Some(found_m);
             }
-            if length_m <= 0.0 {
+            if length_m <= 0.0 || part >= 1.0 {
                 return None;
             }
-            part += (found_m - least_m + GRAIN_M) / length_m;
-            if part >= 1.0 {
-                return None;
-            }
+            // The end is looked at itself.
+            part = (part + (found_m - least_m + GRAIN_M) / length_m).min(1.0);
         }
         Some(found_m)
     }

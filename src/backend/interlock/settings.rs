@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct InterlockSettings {
-    /// Fastest that the fingertip may be. Left out, a real body's 0.25 m/s (EN ISO 10218-1, reduced
-    /// speed); a simulated one's is what its controller may ask for.
+    /// Fastest that the fingertip may be. Left out, 0.25 m/s for a real body (EN ISO 10218-1,
+    /// reduced speed), for a simulated one what its controller may ask for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_speed_m_s: Option<f64>,
     /// How far the tip may be from the box around its home and the ways of all its touches.
@@ -19,8 +19,8 @@ pub struct InterlockSettings {
     /// there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workspace_m: Option<[[f64; 2]; 3]>,
-    /// Height in `W` of the table or floor that nothing of the robot but its foot may come near. Left
-    /// out, there is none; a real robot must be told.
+    /// Height in `W` of the table or floor that nothing of the robot but its foot may come near.
+    /// Left out, there is none; a real robot must be told.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lowest_m: Option<f64>,
     /// How far the tip may go beyond where a touch turns back.
@@ -69,7 +69,7 @@ impl Default for InterlockSettings {
     fn default() -> Self {
         Self {
             tip_speed_m_s: None,
-            tip_margin_m: 0.1,
+            tip_margin_m: 0.2,
             workspace_m: None,
             lowest_m: None,
             depth_margin_m: 0.01,
