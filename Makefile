@@ -85,6 +85,7 @@ lint: setup
 
 bench: setup
 	cargo bench --locked --bench kernels
+	cargo bench --locked --bench interlocks
 	cargo bench --locked --bench plant
 	cargo bench --locked --bench dynamic
 	cargo bench --locked --bench contact

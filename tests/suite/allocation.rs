@@ -22,6 +22,32 @@ fn the_controller_allocates_nothing() {
 }
 
 #[test]
+fn interlocks_allocate_nothing() {
+    use crate::common::shipped;
+    use palpate::backend::interlock::InterlockSettings;
+    use palpate::backend::{Backend, Command};
+    use palpate::explore::probe::interlocks::interlocked;
+    use palpate::sim::simulator::Simulator;
+    let sets = ["arm.links=\"C\"", "effects={skin={samples=100}, wrench={}}"];
+    let environment = shipped::environment("container_finger.toml", &sets);
+    let body = Simulator::new(environment.clone()).unwrap().body().unwrap().unwrap();
+    let (robot, task) = (environment.robot().unwrap(), environment.task());
+    // So near to the table that the guard looks at every tick.
+    let settings = InterlockSettings { lowest_m: Some(0.25), ..InterlockSettings::default() };
+    let mut body = interlocked(body, &robot, task, None, &settings).unwrap();
+    let mut command = Command { qdot: vec![0.05; 7] };
+    body.reset(1).unwrap();
+    let count = allocations(|| {
+        for tick in 0..200 {
+            command.qdot[0] = 0.1 * (f64::from(tick) * 0.1).sin();
+            command.qdot[1] = -0.02;
+            body.step(&command).unwrap();
+        }
+    });
+    assert_eq!(count, 0);
+}
+
+#[test]
 #[cfg(feature = "mujoco")]
 fn the_plant_allocates_nothing() {
     use palpate::backend::Wrench;

@@ -85,12 +85,35 @@ fn past_the_object_is_a_miss_and_too_much_force_is_broken_off() {
     );
 }
 
+/// A servo with nothing between it and the body.
+fn bare(environment: &Arc<Environment>, seed: u64) -> Servo {
+    let body = Simulator::new(Arc::clone(environment)).unwrap().body().unwrap().unwrap();
+    let touch = environment.task().touch().clone();
+    Servo::new(environment.robot().unwrap(), touch, body, seed).unwrap()
+}
+
+#[test]
+fn interlocks_leave_every_touch_as_it_is_to_the_bit() {
+    for sets in [&[][..], &["arm.links=\"A\"", "effects.wrench={}"]] {
+        let environment = environment("bird_finger.toml", sets);
+        let (mut bare, mut probe) = (bare(&environment, 5), simulator(&environment, 5));
+        for target in environment.scene().zone.grid(2) {
+            let approach = environment.task().approach(&target);
+            assert_eq!(bare.touch(&approach).unwrap(), probe.touch(&approach).unwrap());
+            assert_eq!(bare.time_s(), probe.time_s());
+        }
+    }
+}
+
 #[test]
 fn a_target_that_is_not_a_number_or_out_of_reach_ends_as_a_fault() {
     let near = environment("container_finger.toml", &[]);
     assert!(matches!(touch(&near, 1, &[f64::NAN, 0.5]), Err(Fault::Refused { .. })));
     let arm = environment("container_finger.toml", &["arm.links=\"C\"", "zone.x_m=[-0.05, 3]"]);
-    let far = touch(&arm, 1, &[2.9, 0.5]);
+    // It strays on the way, and is not let.
+    let strayed = touch(&arm, 1, &[2.9, 0.5]);
+    assert!(matches!(strayed, Err(Fault::Interlock { .. })), "{strayed:?}");
+    let far = bare(&arm, 1).touch(&arm.task().approach(&[2.9, 0.5]));
     let Err(Fault::OutOfReach { distance_m, .. }) = far else { panic!("{far:?}") };
     // Nearly as far as the target is from the base, less the arm's length.
     assert!((1.5..2.5).contains(&distance_m), "{distance_m}");
