@@ -33,7 +33,7 @@ fn run_faulty(
     path: &Path,
 ) -> Result<TrialRow, Fault> {
     let simulator = simulation.simulator();
-    let body = simulator.body()?.ok_or(Fault::Lacks { part: "a body that moves" })?;
+    let body = simulation.body()?.ok_or(Fault::Lacks { part: "a body that moves" })?;
     let seed = simulation.body_seed(trial);
     let about = About {
         version: env!("CARGO_PKG_VERSION").into(),

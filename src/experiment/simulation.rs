@@ -6,13 +6,13 @@ use super::row::TrialRow;
 use super::trial;
 use super::truth::Truth;
 use super::witness::Witness;
-use crate::backend::Fault;
 use crate::backend::ros::arm::Lab;
 use crate::backend::ros::connect::connect;
 use crate::backend::ros::fault::LinkFault;
 use crate::backend::ros::service::Service;
 use crate::backend::ros::settings::BackendKind;
 use crate::backend::ros::topics::Side;
+use crate::backend::{Backend, Fault};
 use crate::explore::planner;
 use crate::explore::probe::Probe;
 use crate::math::{optimize, seed};
@@ -168,15 +168,27 @@ impl Simulation {
         Ok(self.lab.clone())
     }
 
+    /// What is moved in a trial: the arm that is connected, or the simulated body; none where a touch
+    /// is no motion.
+    ///
+    /// # Errors
+    /// If no arm is connected, or there is no memory for the body's state.
+    pub fn body(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
+        match &self.lab {
+            Some(lab) => Ok(Some(Box::new(lab.body()))),
+            None if self.is_real() => Err(Fault::Lacks { part: "a connection to the arm" }),
+            None => self.simulator.body(),
+        }
+    }
+
     /// What touches in a trial.
     ///
     /// # Errors
     /// If the body cannot be brought to its start, or no arm is connected.
     pub fn probe(&self, trial: u32) -> Result<Box<dyn Probe>, Fault> {
         let seed = self.body_seed(trial);
-        match &self.lab {
-            Some(lab) => Ok(Box::new(self.simulator.servo(Box::new(lab.body()), seed)?)),
-            None if self.is_real() => Err(Fault::Lacks { part: "a connection to the arm" }),
+        match self.body()? {
+            Some(body) => Ok(Box::new(self.simulator.servo(body, seed)?)),
             None => self.simulator.probe(seed),
         }
     }
