@@ -125,6 +125,17 @@ pub enum Fault {
         /// What it was.
         message: String,
     },
+    /// A trial that goes on would have made another touch than was made.
+    #[error(
+        "touch {touch} was made at {target:?}, and would be made elsewhere now: the program or the experiment \
+         is not what it was; --fresh begins anew"
+    )]
+    PlannedOtherwise {
+        /// Which, counted from 1.
+        touch: u32,
+        /// Where it was made.
+        target: Vec<f64>,
+    },
     /// Whoever watched it had it stopped.
     #[error("stopped at {time_s:.3} s")]
     Stopped {

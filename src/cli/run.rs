@@ -6,11 +6,14 @@ use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, error, print};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::experiment::Experiment;
+use crate::experiment::lab_runner::{self, Halt, Outcome};
+use crate::experiment::row::TrialRow;
 use crate::experiment::runner;
-use crate::experiment::store::{Manifest, RECORDINGS, Run, RunFolder};
+use crate::experiment::store::{JOURNAL, Manifest, RECORDINGS, Run, RunFolder};
 use crate::report;
 use anyhow::{Context, bail};
 use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 pub(super) const EXAMPLES: &str = "\
@@ -43,6 +46,9 @@ pub(super) struct Args {
     /// Record every tick of every trial in recordings/PLANNER-TRIAL.mcap of the run's folder.
     #[arg(long)]
     record: bool,
+    /// Clear what the side of a real arm has latched, before it is moved: the operator's to say.
+    #[arg(long)]
+    clear_fault: bool,
     /// Write rows and summary only, no figures.
     #[arg(long)]
     no_report: bool,
@@ -55,10 +61,15 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let experiment = Experiment::load(&find(&args.experiment, EXPERIMENTS)?, &args.set)?;
     bound_threads(args.threads)?;
     let mut simulation = simulation(experiment, talk)?;
-    simulation.connect()?;
+    if let Some(lab) = simulation.connect()? {
+        if args.clear_fault {
+            lab.clear_fault()?;
+        }
+        simulation.check_start()?;
+    }
     let simulation = simulation;
     let experiment = simulation.experiment();
-    if args.record && !experiment.scene.body.moves() {
+    if args.record && !experiment.scene.body.moves() && !simulation.is_real() {
         let body = experiment.scene.body.name();
         bail!(
             "--record: body = \"{body}\" touches without moving, so that there is nothing to record; \
@@ -80,9 +91,16 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let bar = progress_bar(talk, &experiment.name, "trials", total, done.len() as u64);
     let begun = Instant::now();
     let threads = args.threads.into();
-    let count = runner::run(&simulation, (&mut folder, &done), threads, &stop, recorded, &|_| {
-        step(talk, &bar)
-    })?;
+    let tick = |_: &TrialRow| step(talk, &bar);
+    let rows = (&mut folder, done.as_slice());
+    let outcome = match simulation.is_real() {
+        true => lab_runner::run(&simulation, rows, &stop, recorded, &tick)?,
+        false => Outcome {
+            finished: runner::run(&simulation, rows, threads, &stop, recorded, &tick)?,
+            halt: None,
+        },
+    };
+    let count = outcome.finished;
     bar.finish_and_clear();
     folder.sort(experiment)?;
 
@@ -111,6 +129,17 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     match args.json {
         true => print(&format!("{:#}", report::tables::summary::json(&run)))?,
         false => print(&text)?,
+    }
+    if let Some(Halt { planner, trial, touches, reason }) = outcome.halt {
+        let kept = format!(
+            "{planner}, trial {trial}: {reason}\n{touches} touches of it are kept in {}; mend what is \
+             wrong, and the same command goes on (--clear-fault clears what the arm's side has latched)",
+            path.join(JOURNAL).display()
+        );
+        if !stop.load(Ordering::Relaxed) {
+            bail!(kept);
+        }
+        talk.note(kept);
     }
     Ok(match tell_failures(&run, talk) {
         _ if !finished => Ending::Interrupted,

@@ -69,7 +69,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let window =
         Window::open(simulation.environment(), &format!("Palpate: {}", args.path.display()))?;
     let (body, sight) = Watched::new(body, args.speed);
-    let servo = simulation.simulator().servo(Box::new(body), simulation.body_seed(args.trial))?;
+    let servo = simulation.servo(Box::new(body), simulation.body_seed(args.trial))?;
     let mut probe = Told { servo, sight: sight.clone(), count: 0 };
     let number = args.trial;
     // The window has to be drawn by the main thread.

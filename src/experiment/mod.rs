@@ -27,12 +27,14 @@ pub mod curve_table;
 pub mod equal_error;
 #[allow(clippy::module_inception)]
 pub mod experiment;
+pub mod lab_runner;
 pub mod measure;
 pub mod metrics;
 pub mod notice;
 pub mod recorded_trial;
 pub mod replay;
 pub mod report_settings;
+pub mod resumed;
 pub mod row;
 pub mod runner;
 pub mod scan;

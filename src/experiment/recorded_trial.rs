@@ -1,7 +1,8 @@
 //! A trial that is recorded while it runs.
 
 use super::belief_shape::shapes;
-use super::row::TrialRow;
+use super::resumed::Resumed;
+use super::row::{TouchRow, TrialRow};
 use super::simulation::Simulation;
 use super::store::{RECORDINGS, resolved_beside};
 use super::witness::{Touched, Witness};
@@ -20,7 +21,19 @@ pub fn recording_path(run: &Path, planner: &planner::Entry, trial: u32) -> PathB
 /// As [`Simulation::trial`], recorded in the file `path`, which is replaced if it is there. What
 /// cannot be recorded fails the trial.
 pub fn run(simulation: &Simulation, planner: &planner::Entry, trial: u32, path: &Path) -> TrialRow {
-    run_faulty(simulation, planner, trial, path)
+    go_on(simulation, planner, trial, path, &[], &mut ())
+}
+
+/// As [`run`], after the touches `made`, which are not recorded, with `witness` told of every touch.
+pub fn go_on(
+    simulation: &Simulation,
+    planner: &planner::Entry,
+    trial: u32,
+    path: &Path,
+    made: &[TouchRow],
+    witness: &mut dyn Witness,
+) -> TrialRow {
+    run_faulty(simulation, planner, trial, path, made, witness)
         .unwrap_or_else(|fault| TrialRow::unstarted(trial, planner.name, &fault))
 }
 
@@ -31,8 +44,9 @@ fn run_faulty(
     planner: &planner::Entry,
     trial: u32,
     path: &Path,
+    made: &[TouchRow],
+    witness: &mut dyn Witness,
 ) -> Result<TrialRow, Fault> {
-    let simulator = simulation.simulator();
     let body = simulation.body()?.ok_or(Fault::Lacks { part: "a body that moves" })?;
     let seed = simulation.body_seed(trial);
     let about = About {
@@ -45,9 +59,13 @@ fn run_faulty(
     };
     let recording = Recording::create(path, &about)?;
     let recorder = Recorder::new(body, recording.clone());
-    let mut servo = simulator.servo(Box::new(recorder), seed)?;
-    let mut scribe = Scribe { recording: recording.clone(), zone: simulation.task().zone() };
-    let mut row = simulation.trial_before(&mut servo, planner, trial, &mut scribe);
+    let mut servo = simulation.servo(Box::new(recorder), seed)?;
+    let zone = simulation.task().zone();
+    let mut scribe =
+        Scribe { recording: recording.clone(), zone, made: made.len() as u32, witness };
+    let finger = simulation.environment().scene().finger.clone();
+    let mut probe = Resumed::new(made.to_vec(), finger, &mut servo);
+    let mut row = simulation.trial_before(&mut probe, planner, trial, &mut scribe);
     let ending = Ending { failure: row.failure.clone() };
     if let Err(fault) = recording.end(servo.time_s().unwrap_or_default(), &ending) {
         row.failure.get_or_insert_with(|| format!("after the last touch: {fault}"));
@@ -59,10 +77,17 @@ fn run_faulty(
 struct Scribe<'a> {
     recording: Recording,
     zone: &'a Zone,
+    /// Touches that were made before.
+    made: u32,
+    witness: &'a mut dyn Witness,
 }
 
 impl Witness for Scribe<'_> {
     fn touched(&mut self, touched: &Touched) -> Result<(), Fault> {
+        self.witness.touched(touched)?;
+        if touched.count <= self.made {
+            return Ok(());
+        }
         let time_s = touched.row.time_s.unwrap_or_default();
         let unrecorded =
             |error: serde_json::Error| Fault::Unrecorded { time_s, message: error.to_string() };

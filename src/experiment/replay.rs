@@ -102,7 +102,7 @@ pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, Re
     let unknown = || ReplayError::Planner { name: about.planner.clone() };
     let planner = planner::by_name(&about.planner).ok_or_else(unknown)?;
     let player = Box::new(Player::new(recorded.clone()));
-    let servo = simulation.simulator().servo(player, simulation.body_seed(about.trial))?;
+    let servo = simulation.servo(player, simulation.body_seed(about.trial))?;
     let mut probe = Kept { servo, fault: None };
     let mut reader = Reader { recorded, same: 0, difference: None };
     let row = simulation.trial_before(&mut probe, planner, about.trial, &mut reader);

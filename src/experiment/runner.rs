@@ -31,7 +31,7 @@ pub enum RunError {
 }
 
 /// One piece of work.
-type Job = (u32, &'static planner::Entry);
+pub type Job = (u32, &'static planner::Entry);
 
 /// Runs what `done` lacks and adds each row to `folder` as it finishes; returns how many trials
 /// it ran.
@@ -52,8 +52,7 @@ pub fn run(
     progress: &(dyn Fn(&TrialRow) + Sync),
 ) -> Result<usize, RunError> {
     let jobs = jobs(simulation.experiment(), done);
-    // There is one arm, and every touch of it takes its time.
-    let pool = pool(if simulation.is_real() { 1 } else { threads })?;
+    let pool = pool(threads)?;
     let finished = Mutex::new((folder, 0));
     // Handed out one by one, so that rows finish about in order and an interrupted run has
     // whole pairs.
@@ -110,7 +109,7 @@ fn run_caught(
 }
 
 /// Every trial of every planner that `done` lacks, trial by trial.
-fn jobs(experiment: &Experiment, done: &[TrialRow]) -> Vec<Job> {
+pub fn jobs(experiment: &Experiment, done: &[TrialRow]) -> Vec<Job> {
     let done: HashSet<_> = done.iter().map(|row| (row.trial, row.planner.as_str())).collect();
     let planners: Vec<_> =
         experiment.planners.iter().filter_map(|name| planner::by_name(name)).collect();

@@ -6,6 +6,7 @@ use super::row::TrialRow;
 use super::trial;
 use super::truth::Truth;
 use super::witness::Witness;
+use crate::backend::interlock::gates::{Expected, GateError, check_start};
 use crate::backend::ros::arm::Lab;
 use crate::backend::ros::connect::connect;
 use crate::backend::ros::fault::LinkFault;
@@ -15,6 +16,7 @@ use crate::backend::ros::topics::Side;
 use crate::backend::{Backend, Fault};
 use crate::explore::planner;
 use crate::explore::probe::Probe;
+use crate::explore::probe::servo::Servo;
 use crate::math::{optimize, seed};
 use crate::sim::Environment;
 use crate::sim::environment::EnvironmentError;
@@ -181,6 +183,27 @@ impl Simulation {
         }
     }
 
+    /// Holds the connected arm still, and looks whether joints and sensors are as they must be.
+    ///
+    /// # Errors
+    /// The first thing that is not.
+    pub fn check_start(&self) -> Result<(), GateError> {
+        let (Some(mut body), Some(chain)) = (self.body()?, self.environment().chain()) else {
+            return Ok(());
+        };
+        let expected = Expected { q: None, sends_frames: true };
+        let gates = &self.experiment.backend.gates;
+        check_start(&mut *body, &chain, expected, gates, 0).map(|_| ())
+    }
+
+    /// What drives `body` through touches, within the experiment's interlocks.
+    ///
+    /// # Errors
+    /// If it cannot be brought to its start.
+    pub fn servo(&self, body: Box<dyn Backend>, seed: u64) -> Result<Servo, Fault> {
+        self.simulator.servo_within(body, seed, &self.experiment.backend.interlocks)
+    }
+
     /// What touches in a trial.
     ///
     /// # Errors
@@ -188,7 +211,7 @@ impl Simulation {
     pub fn probe(&self, trial: u32) -> Result<Box<dyn Probe>, Fault> {
         let seed = self.body_seed(trial);
         match self.body()? {
-            Some(body) => Ok(Box::new(self.simulator.servo(body, seed)?)),
+            Some(body) => Ok(Box::new(self.servo(body, seed)?)),
             None => self.simulator.probe(seed),
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::common::shipped::{contact, environment};
 use palpate::backend::{Backend, Capabilities, Command, Fault, Quantity, Reading};
+use palpate::explore::probe::servo::Servo;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::sim::Environment;
 use palpate::sim::environment::Shape;

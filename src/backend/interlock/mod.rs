@@ -10,7 +10,7 @@ mod depth;
 mod electrodes;
 mod following;
 mod force;
-mod gates;
+pub mod gates;
 #[allow(clippy::module_inception)]
 mod interlock;
 mod interlocked;

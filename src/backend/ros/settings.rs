@@ -3,6 +3,8 @@
 use super::joints::JointNames;
 use super::net_ft::NetFtSettings;
 use super::topics::Topics;
+use crate::backend::interlock::InterlockSettings;
+use crate::backend::interlock::gates::GateSettings;
 use crate::config::{Checked, Rules};
 use crate::robot::arm::Chain;
 use schemars::JsonSchema;
@@ -56,8 +58,18 @@ pub struct BackendSettings {
     /// A force/torque sensor that is read over UDP in place of its topic.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub net_ft: Option<NetFtSettings>,
+    /// Where the body is stopped, whatever it is told; of a simulated one too.
+    #[serde(skip_serializing_if = "is_default")]
+    pub interlocks: InterlockSettings,
+    /// What an arm and its sensors must be like before it is moved.
+    #[serde(skip_serializing_if = "is_default")]
+    pub gates: GateSettings,
     /// The table of topics.
     pub topics: Topics,
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// Most ticks in a second: the cycle of the PA-10's servo driver, 2 ms (`hydro`, Orca robotics).
@@ -76,6 +88,8 @@ impl Default for BackendSettings {
             patience_s: 5.0,
             clock_ahead_s: 0.005,
             net_ft: None,
+            gates: GateSettings::default(),
+            interlocks: InterlockSettings::default(),
             topics: Topics::default(),
         }
     }
@@ -110,6 +124,8 @@ impl Checked for BackendSettings {
         if let Some(net_ft) = &self.net_ft {
             rules.table("net_ft", net_ft);
         }
+        rules.table("interlocks", &self.interlocks);
+        rules.table("gates", &self.gates);
         rules.table("topics", &self.topics);
     }
 }

@@ -13,6 +13,7 @@
 
 mod error;
 mod file;
+mod journal;
 mod manifest;
 mod resolved;
 mod rows;
@@ -20,6 +21,7 @@ mod surface;
 
 pub use error::StoreError;
 pub use file::write_whole;
+pub use journal::{Entry, JOURNAL, Journal};
 pub use manifest::{MANIFEST, Manifest};
 pub use resolved::{RESOLVED, resolved, resolved_beside};
 
@@ -122,6 +124,14 @@ impl RunFolder {
         self.trials.write_all(&line).map_err(io_error(&file))
     }
 
+    /// The touches and faults of a real arm.
+    ///
+    /// # Errors
+    /// If they cannot be read or written.
+    pub fn journal(&self) -> Result<Journal, StoreError> {
+        Journal::open(&self.path)
+    }
+
     /// Puts the rows in order of trial and planner: the same bytes whoever finished first, and
     /// however often trials and planners were added.
     ///
@@ -205,7 +215,7 @@ fn clear(path: &Path) -> Result<(), StoreError> {
             remove(&recording)?;
         }
     }
-    ["report.html", "summary.csv", "comparison.csv", "equal_error.csv", MANIFEST, SURFACE]
+    ["report.html", "summary.csv", "comparison.csv", "equal_error.csv", MANIFEST, SURFACE, JOURNAL]
         .iter()
         .try_for_each(|name| remove(&path.join(name)))
 }

@@ -23,6 +23,10 @@ pub(super) use way::{standoff, turning_point};
 /// resolves.
 const ARRIVED_M: f64 = 5e-5;
 
+/// A finger that is no farther beyond the stand-off goes there at once; chosen: less than any object
+/// is high.
+const BEYOND_M: f64 = 5e-3;
+
 /// Drives any [`Backend`] through touches. The same code drives simulators, recordings and the
 /// real arm: it knows the robot, how to touch, and what it is told of each touch.
 pub struct Servo {
@@ -125,6 +129,19 @@ impl Servo {
         }
     }
 
+    /// Goes straight back to the level of the stand-off `above` where the finger is beyond it: after a
+    /// touch that was broken off there may be something beside it.
+    fn withdraw(&mut self, approach: &Approach, above: &Isometry3<f64>) -> Result<(), Fault> {
+        let here = self.x_wt();
+        let from_w = here.translation.vector;
+        let back_w = approach.level_with(&from_w, &above.translation.vector);
+        if (back_w - from_w).dot(&approach.direction_w()) > -BEYOND_M {
+            return Ok(());
+        }
+        let back = Isometry3::from_parts(back_w.into(), here.rotation);
+        self.go("the way back", back, self.settings.approach_m_s, false).map(|_| ())
+    }
+
     /// Why a movement to `to` has not ended in its time.
     fn overdue(&self, phase: &'static str, to: &Isometry3<f64>) -> Fault {
         let State { time_s, q } = &self.state;
@@ -192,6 +209,7 @@ impl Probe for Servo {
         refuse_unless_finite(approach)?;
         let TouchSettings { travel_m_s, approach_m_s, frames, .. } = self.settings;
         let above = standoff(&self.robot, self.settings.standoff_m, approach);
+        self.withdraw(approach, &above)?;
         self.go("the stand-off", above, travel_m_s, false)?;
         self.rest(above, frames)?;
         self.monitor.tare();

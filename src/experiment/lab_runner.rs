@@ -1,0 +1,155 @@
+//! Trials of a real arm: one after another, every touch kept, and none after a fault.
+
+use super::recorded_trial::{self, recording_path};
+use super::resumed::Resumed;
+use super::row::{TouchRow, TrialRow};
+use super::runner::jobs;
+use super::simulation::Simulation;
+use super::store::{Entry, Journal, RunFolder, StoreError};
+use super::witness::{Touched, Witness};
+use crate::backend::Fault;
+use crate::backend::ros::clock;
+use crate::explore::planner;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What came of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outcome {
+    /// Trials that were finished.
+    pub finished: usize,
+    /// Where and why it went no further.
+    pub halt: Option<Halt>,
+}
+
+/// Where a real arm stopped.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Halt {
+    /// Of which planner.
+    pub planner: &'static str,
+    /// In which trial.
+    pub trial: u32,
+    /// Touches of the trial that are done and kept.
+    pub touches: usize,
+    /// Why.
+    pub reason: String,
+}
+
+/// Runs what `done` lacks, one trial after another, until one fails or `stop` becomes true between
+/// two touches.
+///
+/// # Errors
+/// If a row or touch cannot be stored.
+pub fn run(
+    simulation: &Simulation,
+    (folder, done): (&mut RunFolder, &[TrialRow]),
+    stop: &AtomicBool,
+    recorded: Option<&Path>,
+    progress: &(dyn Fn(&TrialRow) + Sync),
+) -> Result<Outcome, StoreError> {
+    let mut journal = folder.journal()?;
+    let mut outcome = Outcome::default();
+    for (trial, planner) in jobs(simulation.experiment(), done) {
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let made = journal.touches(trial, planner.name);
+        let mut keeper =
+            Keeper { journal: &mut journal, made: &made, stop, trial, planner, error: None };
+        let row = match recorded {
+            Some(run) => {
+                let path = part_path(run, planner, trial);
+                recorded_trial::go_on(simulation, planner, trial, &path, &made, &mut keeper)
+            }
+            None => go_on(simulation, planner, trial, &made, &mut keeper),
+        };
+        if let Some(error) = keeper.error {
+            return Err(error);
+        }
+        let Some(reason) = row.failure else {
+            folder.append(&row)?;
+            outcome.finished += 1;
+            progress(&row);
+            continue;
+        };
+        journal.add(&Entry {
+            time_unix_s: clock::now_s(),
+            trial,
+            planner: planner.name.into(),
+            touch: None,
+            fault: Some(reason.clone()),
+        })?;
+        let touches = journal.touches(trial, planner.name).len();
+        outcome.halt = Some(Halt { planner: planner.name, trial, touches, reason });
+        break;
+    }
+    Ok(outcome)
+}
+
+/// The file of a trial's recording; of a trial that goes on, one beside those of its parts before.
+fn part_path(run: &Path, planner: &planner::Entry, trial: u32) -> PathBuf {
+    let whole = recording_path(run, planner, trial);
+    let mut path = whole.clone();
+    let mut part = 1;
+    while path.exists() {
+        part += 1;
+        path = whole.with_file_name(format!("{}-{trial:04}-part-{part}.mcap", planner.name));
+    }
+    path
+}
+
+/// Runs a trial from where its touches end.
+fn go_on(
+    simulation: &Simulation,
+    planner: &planner::Entry,
+    trial: u32,
+    made: &[TouchRow],
+    keeper: &mut Keeper,
+) -> TrialRow {
+    let mut probe = match simulation.probe(trial) {
+        Ok(probe) => probe,
+        Err(fault) => return TrialRow::unstarted(trial, planner.name, &fault),
+    };
+    let finger = simulation.environment().scene().finger.clone();
+    let mut probe = Resumed::new(made.to_vec(), finger, &mut *probe);
+    simulation.trial_before(&mut probe, planner, trial, keeper)
+}
+
+/// Keeps every touch, and ends the trial after one if it is asked to.
+struct Keeper<'a> {
+    journal: &'a mut Journal,
+    made: &'a [TouchRow],
+    stop: &'a AtomicBool,
+    trial: u32,
+    planner: &'static planner::Entry,
+    error: Option<StoreError>,
+}
+
+impl Witness for Keeper<'_> {
+    fn touched(&mut self, touched: &Touched) -> Result<(), Fault> {
+        let time_s = touched.row.time_s.unwrap_or_default();
+        if let Some(made) = self.made.get(touched.count as usize - 1) {
+            let is_same = made.target == touched.row.target;
+            return is_same.then_some(()).ok_or(Fault::PlannedOtherwise {
+                touch: touched.count,
+                target: made.target.clone(),
+            });
+        }
+        let entry = Entry {
+            time_unix_s: clock::now_s(),
+            trial: self.trial,
+            planner: self.planner.name.into(),
+            touch: Some(touched.row.clone()),
+            fault: None,
+        };
+        if let Err(error) = self.journal.add(&entry) {
+            let message = error.to_string();
+            self.error = Some(error);
+            return Err(Fault::Unrecorded { time_s, message });
+        }
+        match self.stop.load(Ordering::Relaxed) {
+            true => Err(Fault::Stopped { time_s }),
+            false => Ok(()),
+        }
+    }
+}
