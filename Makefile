@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: demo paper paper-dynamic paper-planners test page-test test-mcap fuzz reference lint bench contacts growth bench-peers dist setup tools clean
+.PHONY: demo paper paper-dynamic paper-planners test test-ros2 page-test test-mcap fuzz reference lint bench contacts growth bench-peers dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -41,9 +41,27 @@ paper-planners: setup
 	cargo build --release --locked
 	for experiment in $(PLANNERS); do $(PALPATE) run $$experiment || exit; done
 
+# With ROS 2, so that an arm behind topics is tested where there is none.
 test: setup
-	cargo test --locked
-	for example in $(EXAMPLES); do cargo run --quiet --locked --example $$example || exit; done
+	cargo test --locked --features ros2
+	for example in $(EXAMPLES); do cargo run --quiet --locked --features ros2 --example $$example || exit; done
+	$(MAKE) test-ros2
+
+# An explorer and a twin of the arm over ROS 2, and a peer of another implementation, in a network
+# namespace of their own: nothing leaves it.
+NAMESPACE := unshare --map-root-user --net bash tests/ros2/namespace.sh
+test-ros2: setup $(DEPS)/ros2/bin/python
+	@if $(NAMESPACE) true 2>/dev/null; then \
+		PALPATE_PEER=$(abspath $(DEPS)/ros2/bin/python) $(NAMESPACE) \
+			cargo test --locked --features ros2 --test suite -- --ignored --test-threads 1 ros2:: ; \
+	else \
+		echo "test-ros2 is skipped: this machine allows no network namespace (unshare --map-root-user --net)"; \
+	fi
+
+$(DEPS)/ros2/bin/python: tests/ros2/peer.txt
+	python3 -m venv $(DEPS)/ros2
+	$(DEPS)/ros2/bin/python -m pip install --quiet --only-binary=:all: -r tests/ros2/peer.txt
+	touch $@
 
 # The report page in a browser; fails where there is no Chromium.
 page-test: setup
@@ -78,10 +96,9 @@ reference: setup
 
 lint: setup
 	cargo fmt --check
-	cargo clippy --locked --all-targets -- -D warnings
-	cargo clippy --locked --all-targets --no-default-features -- -D warnings
-	cargo clippy --locked --lib --bins --features render,viewer -- -D warnings
-	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
+	cargo clippy --locked --all-targets --features ros2,render,viewer -- -D warnings
+	cargo clippy --locked --lib --bins --no-default-features -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --features ros2,render,viewer
 
 bench: setup
 	cargo bench --locked --bench kernels

@@ -14,11 +14,12 @@ const TICKS: u32 = 20_000;
 
 fn main() -> anyhow::Result<()> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
-    let sets = ["arm.links=\"C\"".into(), "effects={skin={samples=100}, wrench={}}".into()];
+    let sets =
+        ["arm.links=\"C\"".into(), "effects={skin={samples=100}, fluid={}, wrench={}}".into()];
     let environment = Arc::new(Environment::build(Scene::load(&path, &sets)?)?);
     let simulator = Simulator::new(Arc::clone(&environment))?;
     let (Some(robot), task) = (environment.robot(), environment.task()) else { return Ok(()) };
-    for (name, lowest_m) in [("none", None), ("far", Some(-1.0)), ("near a table", Some(0.25))] {
+    for (name, lowest_m) in [("none", None), ("far", Some(-1.0)), ("near a table", Some(0.22))] {
         let Some(bare) = simulator.body()? else { return Ok(()) };
         let settings = InterlockSettings { lowest_m, ..InterlockSettings::default() };
         let mut body: Box<dyn Backend> = match name {

@@ -24,7 +24,8 @@ pub fn run(simulation: &Simulation, planner: &planner::Entry, trial: u32, path: 
     go_on(simulation, planner, trial, path, &[], &mut ())
 }
 
-/// As [`run`], after the touches `made`, which are not recorded, with `witness` told of every touch.
+/// As [`run`], after the touches `made`, which are not recorded, with `witness` told of every
+/// touch.
 pub fn go_on(
     simulation: &Simulation,
     planner: &planner::Entry,

@@ -170,8 +170,8 @@ impl Simulation {
         Ok(self.lab.clone())
     }
 
-    /// What is moved in a trial: the arm that is connected, or the simulated body; none where a touch
-    /// is no motion.
+    /// What is moved in a trial: the arm that is connected, or the simulated body; none where a
+    /// touch is no motion.
     ///
     /// # Errors
     /// If no arm is connected, or there is no memory for the body's state.

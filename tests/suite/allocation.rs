@@ -28,19 +28,18 @@ fn interlocks_allocate_nothing() {
     use palpate::backend::{Backend, Command};
     use palpate::explore::probe::interlocks::interlocked;
     use palpate::sim::simulator::Simulator;
-    let sets = ["arm.links=\"C\"", "effects={skin={samples=100}, wrench={}}"];
+    let sets = ["arm.links=\"C\"", "effects={skin={samples=100}, fluid={}, wrench={}}"];
     let environment = shipped::environment("container_finger.toml", &sets);
     let body = Simulator::new(environment.clone()).unwrap().body().unwrap().unwrap();
     let (robot, task) = (environment.robot().unwrap(), environment.task());
     // So near to the table that the guard looks at every tick.
-    let settings = InterlockSettings { lowest_m: Some(0.25), ..InterlockSettings::default() };
+    let settings = InterlockSettings { lowest_m: Some(0.22), ..InterlockSettings::default() };
     let mut body = interlocked(body, &robot, task, None, &settings).unwrap();
-    let mut command = Command { qdot: vec![0.05; 7] };
+    let mut command = Command { qdot: vec![0.0; 7] };
     body.reset(1).unwrap();
     let count = allocations(|| {
         for tick in 0..200 {
-            command.qdot[0] = 0.1 * (f64::from(tick) * 0.1).sin();
-            command.qdot[1] = -0.02;
+            command.qdot.fill(0.1 * (f64::from(tick) * 0.1).sin());
             body.step(&command).unwrap();
         }
     });

@@ -71,6 +71,8 @@ mod report;
 mod reproducible;
 #[cfg(feature = "mujoco")]
 mod rigid;
+#[cfg(all(feature = "ros2", feature = "mujoco", feature = "nlopt"))]
+mod ros2;
 mod scenes;
 mod servo;
 mod slopes;

@@ -95,7 +95,7 @@ fn bare(environment: &Arc<Environment>, seed: u64) -> Servo {
 
 #[test]
 fn interlocks_leave_every_touch_as_it_is_to_the_bit() {
-    for sets in [&[][..], &["arm.links=\"A\"", "effects.wrench={}"]] {
+    for sets in [&[][..], &["arm.links=\"C\"", "effects.wrench={}"]] {
         let environment = environment("bird_finger.toml", sets);
         let (mut bare, mut probe) = (bare(&environment, 5), simulator(&environment, 5));
         for target in environment.scene().zone.grid(2) {

@@ -22,10 +22,8 @@ pub const ENTRY: Entry = Entry {
 
 const NAME: &str = "clearance";
 
-/// The first link that a table can be in the way of: those before it turn about the foot.
-const FIRST_LOW: usize = 2;
-
-/// The first link that can reach out to an object.
+/// The first link that can come down to a table or reach out to an object: those before it stand
+/// on the foot.
 const FIRST_FAR: usize = 3;
 
 /// Looks at the capsules of the links where the body cannot help going.
@@ -61,7 +59,7 @@ impl Guard {
             let beside = links.iter().enumerate().skip(i + 1);
             let met = beside.filter(|(_, other)| link.may_meet(other));
             pairs.extend(met.map(|(k, _)| Pair { link: i, other: Other::Link(k) }));
-            if let Some(z_m) = settings.lowest_m.filter(|_| link.link >= FIRST_LOW) {
+            if let Some(z_m) = settings.lowest_m.filter(|_| link.link >= FIRST_FAR) {
                 let (p_w, outward_w) = (Point3::new(0.0, 0.0, z_m), Vector3::z_axis());
                 pairs.push(Pair { link: i, other: Other::Table(HalfSpace { p_w, outward_w }) });
             }
@@ -121,11 +119,11 @@ impl Interlock for Guard {
         {
             return Ok(());
         }
-        let here_m = self.nearest(now, &now.q).0;
-        self.looked = Some((now.q, here_m));
+        self.looked = None;
         let mut pair = 0;
         let below = ahead.below(limit, |q| {
             let (distance_m, of) = self.nearest(now, q);
+            self.looked.get_or_insert((*q, distance_m));
             pair = of;
             distance_m
         });

@@ -15,8 +15,8 @@ pub struct InterlockSettings {
     pub tip_speed_m_s: Option<f64>,
     /// How far the tip may be from the box around its home and the ways of all its touches.
     pub tip_margin_m: f64,
-    /// A box in `W`, [smallest, largest] x, y and z, that neither tip nor elbow may leave. Left out,
-    /// there is none.
+    /// A box in `W`, [smallest, largest] of x, y and z, that neither tip nor elbow may leave. Left
+    /// out, there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workspace_m: Option<[[f64; 2]; 3]>,
     /// Height in `W` of the table or floor that nothing of the robot but its foot may come near.
@@ -29,12 +29,12 @@ pub struct InterlockSettings {
     pub clearance_m: f64,
     /// From a command until the body heeds it, as the interlocks that look ahead take it.
     pub reaction_s: f64,
-    /// Force, beyond that at the start, that is a fault. Left out, 10 N above `touch.force_limit_n`,
-    /// at which a touch retreats by itself: 25 N with the default.
+    /// Force, beyond that at the start, that is a fault. Left out, 10 N above
+    /// `touch.force_limit_n`, at which a touch retreats by itself: 25 N with the default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_limit_n: Option<f64>,
-    /// The same of the torque about the fingertip. Left out, that force at the lever of the finger's
-    /// length.
+    /// The same of the torque about the fingertip. Left out, that force at the lever of the
+    /// finger's length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_limit_nm: Option<f64>,
     /// Rise of the force that is a fault: 0.1 m/s, the speed of travel, against 20 N/mm.

@@ -1,5 +1,5 @@
-//! An arm behind topics, as a [`Backend`]: commands out at a fixed rate, the newest of what is heard
-//! in.
+//! An arm behind topics, as a [`Backend`]: commands out at a fixed rate, the newest of what is
+//! heard in.
 
 use super::clock;
 use super::fault::LinkFault;

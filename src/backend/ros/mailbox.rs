@@ -1,5 +1,5 @@
-//! What was heard last of each topic, stamped on receipt by the monotonic clock, and what the arm is
-//! told while nobody else speaks.
+//! What was heard last of each topic, stamped on receipt by the monotonic clock, and what the arm
+//! is told while nobody else speaks.
 
 use super::clock;
 use super::fault::LinkFault;

@@ -5,8 +5,8 @@ use super::packet::Packet;
 use crate::robot::finger::Frame;
 use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS, VIBRATIONS};
 
-/// Reads the frame of a finger out of a packet of the tactile topic; it gets the time `time_s`. None
-/// if the hand has no such finger, or one of another model.
+/// Reads the frame of a finger out of a packet of the tactile topic; it gets the time `time_s`.
+/// None if the hand has no such finger, or one of another model.
 pub fn frame(packet: &Packet, finger: usize, time_s: f64) -> Option<Frame> {
     match packet {
         Packet::Hand(hand) => {

@@ -1,4 +1,5 @@
-//! The table of topics: what each is called, what is sent over it, how often, and how old it may be.
+//! The table of topics: what each is called, what is sent over it, how often, and how old it may
+//! be.
 
 use super::message::{
     BioTacHand, BiotacAll, Described, DiagnosticArray, Float64MultiArray, Header, JointState,

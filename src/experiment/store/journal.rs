@@ -1,5 +1,5 @@
-//! `touches.jsonl`: what a real arm has done, touch by touch, so that none is lost with the trial that
-//! it belongs to.
+//! `touches.jsonl`: what a real arm has done, touch by touch, so that none is lost with the trial
+//! that it belongs to.
 
 use super::error::{StoreError, io_error};
 use crate::experiment::row::TouchRow;

@@ -150,18 +150,20 @@ impl Chain {
     /// `[a × (p_T − p_i); a]` where joint i turns and `[a; 0]` where it slides, with its axis a
     /// and origin p_i in `W` (Siciliano et al. 2009, Robotics, Eq. 3.30).
     pub fn jacobian(&self, q: &Joints) -> (Isometry3<f64>, Jacobian) {
-        let x_wt = self.forward(q);
-        let mut jacobian = Jacobian::zeros();
         let mut x = self.base;
-        for ((joint, &q), mut column) in
-            self.joints.iter().zip(q.iter()).zip(jacobian.column_iter_mut())
-        {
-            let axis = x.rotation * joint.axis.into_inner();
+        let mut axes = [(Vector3::zeros(), Vector3::zeros()); MAX_JOINTS];
+        for ((joint, &q), (axis, origin)) in self.joints.iter().zip(q.iter()).zip(&mut axes) {
+            *axis = x.rotation * joint.axis.into_inner();
             x *= joint.motion(q);
+            *origin = x.translation.vector;
+        }
+        let x_wt = x * self.flange * self.tool;
+        let mut jacobian = Jacobian::zeros();
+        for ((joint, (axis, origin)), mut column) in
+            self.joints.iter().zip(axes).zip(jacobian.column_iter_mut())
+        {
             let (linear, angular) = match joint.kind {
-                Kind::Revolute => {
-                    (axis.cross(&(x_wt.translation.vector - x.translation.vector)), axis)
-                }
+                Kind::Revolute => (axis.cross(&(x_wt.translation.vector - origin)), axis),
                 Kind::Prismatic => (axis, Vector3::zeros()),
             };
             column.fixed_rows_mut::<3>(0).copy_from(&linear);

@@ -23,8 +23,8 @@ pub(super) use way::{standoff, turning_point};
 /// resolves.
 const ARRIVED_M: f64 = 5e-5;
 
-/// A finger that is no farther beyond the stand-off goes there at once; chosen: less than any object
-/// is high.
+/// A finger that is no farther beyond the stand-off goes there at once; chosen: less than any
+/// object is high.
 const BEYOND_M: f64 = 5e-3;
 
 /// Drives any [`Backend`] through touches. The same code drives simulators, recordings and the
@@ -129,8 +129,8 @@ impl Servo {
         }
     }
 
-    /// Goes straight back to the level of the stand-off `above` where the finger is beyond it: after a
-    /// touch that was broken off there may be something beside it.
+    /// Goes straight back to the level of the stand-off `above` where the finger is beyond it:
+    /// after a touch that was broken off there may be something beside it.
     fn withdraw(&mut self, approach: &Approach, above: &Isometry3<f64>) -> Result<(), Fault> {
         let here = self.x_wt();
         let from_w = here.translation.vector;
