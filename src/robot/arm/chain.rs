@@ -113,8 +113,8 @@ impl Chain {
         moved.fold(self.base, |x, (joint, &q)| x * joint.motion(q)) * self.flange * self.tool
     }
 
-    /// Poses in `W` of the base and then of each joint's moved frame; beyond the chain's joints that
-    /// of the last.
+    /// Poses in `W` of the base and then of each joint's moved frame; beyond the chain's joints
+    /// that of the last.
     pub fn frames(&self, q: &Joints) -> [Isometry3<f64>; MAX_JOINTS + 1] {
         let mut frames = [self.base; MAX_JOINTS + 1];
         let mut x = self.base;
@@ -127,8 +127,8 @@ impl Chain {
         frames
     }
 
-    /// For each joint, the farthest that any point moved by it within `beyond_m` of `T` can lie from
-    /// its axis, in m: what such a point moves by per rad, at most. 1 where the joint slides.
+    /// For each joint, the farthest that any point moved by it within `beyond_m` of `T` can lie
+    /// from its axis, in m: what such a point moves by per rad, at most. 1 where the joint slides.
     pub fn reaches_m(&self, beyond_m: f64) -> Joints {
         let end_m = self.flange.translation.vector.norm() + self.tool.translation.vector.norm();
         let mut reaches = Joints::zeros();
