@@ -1,5 +1,6 @@
 //! The command line.
 
+mod align;
 mod calibrate;
 mod columns;
 mod completions;
@@ -14,6 +15,7 @@ mod patience;
 mod prepare;
 mod progress;
 mod reference;
+mod register;
 mod replay;
 mod report;
 mod run;
@@ -85,6 +87,10 @@ enum Command {
     List(list::Args),
     /// Print a script with which a shell completes commands.
     Completions(completions::Args),
+    /// Find by touch where the finger stands on its mount, and a ball or plate in the world.
+    Register(register::Args),
+    /// Lay a cloud of contacts onto a mesh: where the object stands.
+    Align(align::Args),
     /// Print every command, setting and column as Markdown.
     Reference(reference::Args),
     /// Fit the finger's constants to recordings of it on a flat plate.
@@ -111,6 +117,8 @@ pub fn main() -> ExitCode {
         Command::Fidelity(args) => fidelity::run(&args, cli.talk),
         Command::Effects(args) => effects::run(&args, cli.talk),
         Command::Stress(args) => stress::run(&args, cli.talk),
+        Command::Register(args) => register::run(&args, cli.talk),
+        Command::Align(args) => align::run(&args, cli.talk),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::List(args) => list::run(&args),
         Command::Completions(args) => completions::run(&args, Cli::command()),

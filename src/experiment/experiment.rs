@@ -6,6 +6,7 @@
 
 use super::report_settings::{ReportSettings, TOUCHES_MAX};
 use super::row::TrialRow;
+use super::scan_truth::ScanTruth;
 use crate::backend::ros::settings::BackendSettings;
 use crate::config::{Checked, ConfigError, Loader, Rules};
 use crate::explore::belief::GpSettings;
@@ -36,6 +37,13 @@ pub struct Experiment {
     pub initial_touches: u32,
     /// Touches of a trial in all.
     pub touches: u32,
+    /// Touches after these at places of a low-discrepancy sequence. The belief predicts them and
+    /// learns nothing of them: what can be measured where nobody knows the truth.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub verification_touches: u32,
+    /// Touches after those at targets of earlier ones: how well a touch repeats.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub repeat_touches: u32,
     /// Test places along each side of the zone, on which the metrics are taken.
     pub grid: u32,
     /// How the belief is fitted.
@@ -51,6 +59,9 @@ pub struct Experiment {
     /// says it.
     #[serde(default, skip_serializing_if = "is_default")]
     pub backend: BackendSettings,
+    /// What beliefs are held against, if not the object's own surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<ScanTruth>,
     /// The scene, or in a file the path of one, relative to that file.
     pub scene: Scene,
 }
@@ -80,11 +91,14 @@ impl Experiment {
             seed: 0,
             initial_touches: 5.min(touches),
             touches,
+            verification_touches: 0,
+            repeat_touches: 0,
             grid: GRID,
             gp: GpSettings::default(),
             planning: PlanningSettings::default(),
             report: ReportSettings::default(),
             backend: BackendSettings::default(),
+            truth: None,
             scene: scene.clone(),
         }
     }
@@ -123,6 +137,7 @@ impl Experiment {
         INCLUDED.iter().try_for_each(|key| loader.include(key))?;
         others.iter().try_for_each(|set| loader.set(set))?;
         loader.resolve_path("scene.object.mesh");
+        loader.resolve_path("truth.scan");
         loader.finish()
     }
 
@@ -200,6 +215,10 @@ impl Experiment {
     }
 }
 
+fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
 /// Whether a character may stand in the name of an experiment, which names a folder.
 pub fn is_plain(c: char) -> bool {
     c.is_ascii_alphanumeric() || "-_.".contains(c)
@@ -225,6 +244,8 @@ impl Checked for Experiment {
         rules.number("trials", self.trials.into(), 1.0..=1e6);
         rules.number("touches", self.touches.into(), 1.0..=TOUCHES_MAX);
         rules.number("initial_touches", self.initial_touches.into(), 1.0..=self.touches.into());
+        rules.number("verification_touches", self.verification_touches.into(), 0.0..=TOUCHES_MAX);
+        rules.number("repeat_touches", self.repeat_touches.into(), 0.0..=TOUCHES_MAX);
         rules.number("grid", self.grid.into(), 2.0..=2001.0);
         rules.require("seed", self.seed, self.seed <= i64::MAX as u64, || {
             format!("0 to {}", i64::MAX)
@@ -233,6 +254,9 @@ impl Checked for Experiment {
         rules.table("planning", &self.planning);
         rules.table("report", &self.report);
         rules.table("backend", &self.backend);
+        if let Some(truth) = &self.truth {
+            rules.table("truth", truth);
+        }
         let last = f64::from(self.trials.max(1) - 1);
         rules.number("report.trial", self.report.trial.into(), 0.0..=last);
         rules.table("scene", &self.scene);

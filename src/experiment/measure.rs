@@ -6,6 +6,7 @@
 
 use super::metrics::Metrics;
 use super::row::{TouchRow, TrialRow};
+use super::verification;
 use std::fmt;
 
 /// A number of a trial after some touches, in SI units.
@@ -134,6 +135,27 @@ pub const COVERAGE: Measure =
     fact("coverage", "share in the 95 % band", PLAIN, |row, n| metrics(row, n)?.coverage)
         .drawn(Scale::UpToOne);
 
+/// Root mean square error at touches that the last belief predicted and did not learn from.
+pub const VERIFICATION_RMSE: Measure =
+    less("verification_rmse_m", "RMSE at verification touches", MM, |row, n| {
+        verification::errors(row, n)?.rmse()
+    })
+    .told(Aggregate::Both)
+    .drawn(Scale::Undrawn);
+/// Share of these inside the 95 % band.
+pub const VERIFICATION_COVERAGE: Measure =
+    fact("verification_coverage", "verification touches in the 95 % band", PLAIN, |row, n| {
+        verification::calibration(row, n)?.told().0
+    })
+    .drawn(Scale::Undrawn);
+/// Root mean square difference of a touch from the one it repeats.
+pub const REPEATABILITY: Measure =
+    less("repeatability_m", "difference of repeated touches", MM, |row, n| {
+        verification::differences(row, n)?.rmse()
+    })
+    .told(Aggregate::Both)
+    .drawn(Scale::Undrawn);
+
 /// Every measure, in the order of columns and panels; one line to add one.
 pub static MEASURES: &[Measure] = &[
     R,
@@ -161,6 +183,17 @@ pub static MEASURES: &[Measure] = &[
     less("path_m", "lateral travel", METRES, TrialRow::path_m),
     less("time_s", "time of the body", SECONDS, |row, n| touch(row, n)?.time_s)
         .drawn(Scale::Undrawn),
+    VERIFICATION_RMSE,
+    less("verification_nlpd", "NLPD at verification touches", PLAIN, |row, n| {
+        verification::calibration(row, n)?.told().1
+    })
+    .drawn(Scale::Undrawn),
+    VERIFICATION_COVERAGE,
+    less("verification_missed", "verification touches without contact", PLAIN, |row, n| {
+        verification::missed(row, n)
+    })
+    .drawn(Scale::Undrawn),
+    REPEATABILITY,
     length_scale("length_scale_x_m", "length scale along x", |row, n| length_along(row, n, 0)),
     length_scale("length_scale_z_m", "length scale along z", |row, n| length_along(row, n, 1)),
 ];

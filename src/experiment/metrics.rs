@@ -48,7 +48,7 @@ impl Errors {
         self.squares += error * error;
     }
 
-    fn rmse(&self) -> Option<f64> {
+    pub(super) fn rmse(&self) -> Option<f64> {
         (self.count > 0.0).then(|| (self.squares / self.count).sqrt())
     }
 }
@@ -68,6 +68,11 @@ impl Calibration {
         self.count += 1.0;
         self.inside += f64::from(u8::from(error.abs() <= BAND_95 * variance.sqrt()));
         self.nlpd += 0.5 * (std::f64::consts::TAU * variance).ln() + 0.5 * error * error / variance;
+    }
+
+    /// Share inside the 95 % band, and mean negative log density.
+    pub(super) fn told(&self) -> (Option<f64>, Option<f64>) {
+        (self.mean(self.inside), self.mean(self.nlpd))
     }
 
     /// To four decimals: the rows keep one after every touch.
@@ -121,6 +126,7 @@ impl Sums {
             if spread > 1e3 * f64::EPSILON * f64::EPSILON * square { spread } else { 0.0 }
         };
         let spreads = spread(self.spread_f, self.ff) * spread(self.spread_g, self.gg);
+        let (coverage, nlpd) = calibration.told();
         Metrics {
             r: ratio(self.fg, (self.ff * self.gg).sqrt()),
             centred_r: ratio(self.covariance, spreads.sqrt()),
@@ -129,8 +135,8 @@ impl Sums {
             edge_rmse_m: edge.rmse(),
             reachable_rmse_m: reachable.rmse(),
             unreachable_rmse_m: unreachable.rmse(),
-            coverage: calibration.mean(calibration.inside),
-            nlpd: calibration.mean(calibration.nlpd),
+            coverage,
+            nlpd,
         }
     }
 }

@@ -22,6 +22,7 @@
 
 pub mod analysis;
 mod belief_shape;
+pub mod cloud;
 pub mod comparison;
 pub mod curve_table;
 pub mod equal_error;
@@ -38,12 +39,14 @@ pub mod resumed;
 pub mod row;
 pub mod runner;
 pub mod scan;
+pub mod scan_truth;
 pub mod simulation;
 pub mod statistics;
 pub mod store;
 pub mod summary;
 pub mod trial;
 pub mod truth;
+pub mod verification;
 pub mod witness;
 
 pub use experiment::Experiment;

@@ -3,6 +3,7 @@
 use super::experiment::Experiment;
 use super::measure::{CENTRED_R, Measure, R};
 use super::row::{TrialRow, of_planner};
+use super::scan_truth::LeftOut;
 use super::store::Run;
 use super::summary;
 use super::truth::Truth;
@@ -20,6 +21,10 @@ pub enum Notice {
         /// All test places.
         of: usize,
     },
+    /// Nobody knows the surface.
+    NoTruth,
+    /// The truth is a scan, which has errors of its own.
+    FromScan(LeftOut),
     /// The finger can touch a small part of the surface only.
     FewReachable {
         /// Test places where it can.
@@ -68,6 +73,9 @@ const LOW_CENTRED_R: f64 = 0.9;
 /// What `truth` says of an experiment in `zone` before it is run.
 pub fn of_truth(zone: &Zone, truth: &Truth) -> Vec<Notice> {
     let count = truth.count();
+    if count == 0 {
+        return vec![Notice::NoTruth];
+    }
     let few = |part: usize, of: usize| (part as f64) < FEW * of as f64;
     let places = few(count, truth.places.len())
         .then_some(Notice::FewPlaces { with: count, of: truth.places.len() });
@@ -128,6 +136,23 @@ impl fmt::Display for Notice {
                  others: the object fills a small part of the zone (scene.zone, object.unit, \
                  object.position_m)"
             ),
+            Self::NoTruth => write!(
+                f,
+                "nobody knows this surface: only the measures that need no truth are told \
+                 (verification_touches, repeat_touches)"
+            ),
+            Self::FromScan(LeftOut { contacts, rmse_m }) => {
+                write!(f, "the truth is a scan of {contacts} contacts")?;
+                match rmse_m {
+                    Some(rmse_m) => write!(
+                        f,
+                        ": where one is left out, the others are {:.2} mm (RMS) off it, and no \
+                         error below that means anything",
+                        1e3 * rmse_m
+                    ),
+                    None => write!(f, ", too few to say how far it is off"),
+                }
+            }
             Self::FewReachable { reachable, of } => write!(
                 f,
                 "the finger can touch only {reachable} of {of} test places with a surface: it is \

@@ -1,6 +1,7 @@
 //! One line of `trials.jsonl`: everything a trial did.
 
 use super::metrics::Metrics;
+use super::verification::VerificationRow;
 use crate::backend::Fault;
 use crate::explore::planner::Stall;
 use crate::gp::fit::Fit;
@@ -19,6 +20,9 @@ pub struct TrialRow {
     pub failure: Option<String>,
     /// Its touches in order.
     pub touches: Vec<TouchRow>,
+    /// Touches after the last, of which the belief learned nothing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub verification: Vec<VerificationRow>,
 }
 
 /// One touch and the belief after it.
@@ -67,6 +71,7 @@ impl TrialRow {
             planner: planner.into(),
             failure: Some(format!("before the first touch: {fault}")),
             touches: Vec::new(),
+            verification: Vec::new(),
         }
     }
 

@@ -104,7 +104,13 @@ fn run_caught(
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
         let failure = Some(format!("panicked: {words}"));
-        TrialRow { trial, planner: planner.name.into(), failure, touches: Vec::new() }
+        TrialRow {
+            trial,
+            planner: planner.name.into(),
+            failure,
+            touches: Vec::new(),
+            verification: Vec::new(),
+        }
     })
 }
 

@@ -1,8 +1,11 @@
 //! From an experiment to its trials: the one way that everything goes which runs a simulation.
 
+use super::cloud::CloudError;
 use super::experiment::Experiment;
 use super::notice;
+use super::notice::Notice;
 use super::row::TrialRow;
+use super::scan_truth::LeftOut;
 use super::trial;
 use super::truth::Truth;
 use super::witness::Witness;
@@ -34,6 +37,8 @@ pub struct Simulation {
     truth: Truth,
     /// The arm that touches in place of the simulated body, once it is connected.
     lab: Option<Arc<Lab>>,
+    /// How far the truth may itself be off, if it was scanned.
+    left_out: Option<LeftOut>,
 }
 
 /// An experiment that cannot be simulated.
@@ -51,6 +56,9 @@ pub enum SimulationError {
         /// The missing feature.
         feature: &'static str,
     },
+    /// The scan that is its truth cannot be read.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
     /// No surface at any test place.
     #[error("no place of the zone has a surface along the approach: nothing to explore")]
     NoSurface,
@@ -76,9 +84,10 @@ impl Simulation {
     ) -> Result<Self, SimulationError> {
         let environment = Environment::build_telling(experiment.scene.clone(), tell)?;
         tell("looking where the finger can touch the surface");
-        let truth = Truth::sample(&environment, experiment.grid as usize);
+        let (truth, left_out) = sampled(&experiment, &environment)?;
         tell("compiling the model");
-        Self::against(experiment, Arc::new(environment), truth)
+        let simulation = Self::against(experiment, Arc::new(environment), truth)?;
+        Ok(Self { left_out, ..simulation })
     }
 
     /// As [`new`](Self::new), in an environment that is there already; its scene takes the place of
@@ -90,14 +99,15 @@ impl Simulation {
         experiment: Experiment,
         environment: Arc<Environment>,
     ) -> Result<Self, SimulationError> {
-        let truth = Truth::sample(&environment, experiment.grid as usize);
-        Self::against(experiment, environment, truth)
+        let (truth, left_out) = sampled(&experiment, &environment)?;
+        Ok(Self { left_out, ..Self::against(experiment, environment, truth)? })
     }
 
-    /// As [`within`](Self::within), held against a `truth` that was sampled before.
+    /// As [`within`](Self::within), held against a `truth` that was sampled before; an unknown one
+    /// leaves the measures that need none.
     ///
     /// # Errors
-    /// If it cannot be simulated, or the truth has no surface.
+    /// If it cannot be simulated.
     pub fn against(
         mut experiment: Experiment,
         environment: Arc<Environment>,
@@ -106,11 +116,14 @@ impl Simulation {
         if !optimize::BUILT {
             return Err(SimulationError::NotBuilt { feature: "nlopt" });
         }
-        if truth.count() == 0 {
-            return Err(SimulationError::NoSurface);
-        }
         experiment.scene = environment.scene().clone();
-        Ok(Self { experiment, simulator: Simulator::new(environment)?, truth, lab: None })
+        Ok(Self {
+            experiment,
+            simulator: Simulator::new(environment)?,
+            truth,
+            lab: None,
+            left_out: None,
+        })
     }
 
     /// What is run, with everything that it left to its object written out.
@@ -132,7 +145,9 @@ impl Simulation {
     pub fn notices(&self) -> Vec<String> {
         let scene = self.simulator.notices().into_iter().map(|notice| notice.to_string());
         let truth = notice::of_truth(self.task().zone(), &self.truth).into_iter();
-        scene.chain(truth.map(|notice| notice.to_string())).collect()
+        let left_out = self.left_out.map(Notice::FromScan).into_iter();
+        let told = truth.chain(left_out).map(|notice| notice.to_string());
+        scene.chain(told).collect()
     }
 
     /// The truth on the test grid.
@@ -243,5 +258,24 @@ impl Simulation {
         witness: &mut dyn Witness,
     ) -> TrialRow {
         trial::run(&self.experiment, self.task(), &self.truth, probe, planner, trial, witness)
+    }
+}
+
+/// The truth that an experiment asks for, and how far it may be off, if it was scanned.
+fn sampled(
+    experiment: &Experiment,
+    environment: &Environment,
+) -> Result<(Truth, Option<LeftOut>), SimulationError> {
+    let per_side = experiment.grid as usize;
+    let (truth, left_out) = match &experiment.truth {
+        Some(scan) => {
+            let (truth, left_out) = scan.sample(&environment.scene().zone, per_side)?;
+            (truth, Some(left_out))
+        }
+        None => (Truth::sample(environment, per_side), None),
+    };
+    match truth.is_known() {
+        true => Ok((truth, left_out)),
+        false => Err(SimulationError::NoSurface),
     }
 }

@@ -91,7 +91,7 @@ pub(super) fn fitted<'a>(
     touches: u32,
 ) -> Vec<&'a TrialRow> {
     let is_fitted = |row: &&TrialRow| {
-        row.touches.get(touches as usize - 1).is_some_and(|touch| touch.metrics.is_some())
+        row.touches.get(touches as usize - 1).is_some_and(|touch| touch.fit.is_some())
     };
     of_planner(rows, planner).filter(is_fitted).collect()
 }

@@ -3,6 +3,7 @@
 use super::experiment::Experiment;
 use super::row::{TouchRow, TrialRow};
 use super::truth::Truth;
+use super::verification::verify;
 use super::witness::{Touched, Witness};
 use crate::explore::belief::Belief;
 use crate::explore::planner;
@@ -23,8 +24,13 @@ pub fn run(
     trial: u32,
     witness: &mut dyn Witness,
 ) -> TrialRow {
-    let mut row =
-        TrialRow { trial, planner: planner.name.into(), failure: None, touches: Vec::new() };
+    let mut row = TrialRow {
+        trial,
+        planner: planner.name.into(),
+        failure: None,
+        touches: Vec::new(),
+        verification: Vec::new(),
+    };
     let stream = |purpose| seed::stream(experiment.seed, trial.into(), purpose);
     let zone = task.zone();
     let mut start = stream("initial touches");
@@ -72,7 +78,7 @@ pub fn run(
         if count >= experiment.initial_touches {
             match belief.refit() {
                 Ok((fit, surface)) => {
-                    touch_row.metrics = Some(truth.compare(surface));
+                    touch_row.metrics = truth.compare(surface);
                     touch_row.fit = Some(fit.clone());
                     touch_row.jitter = belief.jitter();
                 }
@@ -87,6 +93,10 @@ pub fn run(
         if row.failure.is_some() {
             break;
         }
+    }
+    if row.failure.is_none() {
+        let made = (row.touches.as_slice(), trial);
+        (row.verification, row.failure) = verify(experiment, task, &belief, probe, made);
     }
     row
 }

@@ -35,6 +35,18 @@ impl Truth {
         Self::new(&environment.scene().zone, places, heights_m, is_reachable)
     }
 
+    /// Of an object that nobody has measured: no height at any place.
+    pub fn unknown(zone: &Zone, per_side: usize) -> Self {
+        let places = zone.grid(per_side);
+        let count = places.len();
+        Self::new(zone, places, vec![None; count], vec![false; count])
+    }
+
+    /// Whether any height is known.
+    pub fn is_known(&self) -> bool {
+        self.heights_m.iter().any(Option::is_some)
+    }
+
     /// From recorded heights and reachabilities.
     pub fn new(
         zone: &Zone,
@@ -62,8 +74,11 @@ impl Truth {
         Some([heights_m().reduce(f64::min)?, heights_m().reduce(f64::max)?])
     }
 
-    /// Compares a belief with the truth wherever there is a surface.
-    pub fn compare(&self, belief: &Posterior) -> Metrics {
+    /// Compares a belief with the truth wherever there is a surface; none if nobody knows of any.
+    pub fn compare(&self, belief: &Posterior) -> Option<Metrics> {
+        if self.count() == 0 {
+            return None;
+        }
         let mut sums = Sums::default();
         let [mut edge, mut reachable, mut unreachable] = [Errors::default(); 3];
         let mut calibration = Calibration::default();
@@ -82,6 +97,6 @@ impl Truth {
                 calibration.add(truth - mean, belief.variance(place, &mut scratch) + noise2);
             }
         }
-        sums.metrics([edge, reachable, unreachable], calibration)
+        Some(sums.metrics([edge, reachable, unreachable], calibration))
     }
 }

@@ -37,3 +37,4 @@ pub mod control;
 mod free_space;
 pub mod planner;
 pub mod probe;
+pub mod registration;

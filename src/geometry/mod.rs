@@ -49,6 +49,7 @@ pub mod primitives;
 pub mod raw;
 pub mod repair;
 pub mod report;
+pub mod solids;
 pub mod surfaces;
 pub mod sweep;
 mod topology;

@@ -11,3 +11,9 @@ pub fn pose(position_m: [f64; 3], rotation_deg: [f64; 3]) -> Isometry3<f64> {
         UnitQuaternion::from_euler_angles(roll, pitch, yaw),
     )
 }
+
+/// What files give of a pose: the inverse of [`pose`].
+pub fn parts(pose: &Isometry3<f64>) -> ([f64; 3], [f64; 3]) {
+    let (roll, pitch, yaw) = pose.rotation.euler_angles();
+    (pose.translation.vector.into(), [roll, pitch, yaw].map(f64::to_degrees))
+}

@@ -1,7 +1,10 @@
 //! What a run found, in words and numbers taken from its rows.
 
 use super::number::{digits, with_error};
-use crate::experiment::measure::{CENTRED_R, COVERAGE, EDGE_RMSE, Measure, R, RMSE};
+use crate::experiment::measure::{
+    CENTRED_R, COVERAGE, EDGE_RMSE, Measure, R, REPEATABILITY, RMSE, VERIFICATION_COVERAGE,
+    VERIFICATION_RMSE,
+};
 use crate::experiment::metrics::constant_r;
 use crate::experiment::notice;
 use crate::experiment::store::Run;
@@ -34,6 +37,10 @@ pub fn sentences(run: &Run) -> Vec<String> {
             .push("No trial got as far as its first fit, so there is nothing to say yet.".into());
         return sentences;
     }
+    sentences.extend(verified(run, &curves));
+    if !run.truth.is_known() {
+        return sentences;
+    }
     sentences.extend(scores(run, &curves));
     let constant = constant_r(run.truth.heights_m.iter().flatten())
         .map_or(String::new(), |score| format!(" (a constant height scores {score:.3})"));
@@ -43,6 +50,30 @@ pub fn sentences(run: &Run) -> Vec<String> {
     sentences.extend(against_baseline(run, &curves));
     sentences.push(honesty(&curves));
     sentences
+}
+
+/// How the last beliefs stand verification and repeated touches, where there were any.
+fn verified(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<String> {
+    let told = curves.iter().filter_map(|(name, points)| {
+        let point = points.last().filter(|point| point.touches == run.experiment.touches)?;
+        let rmse = median(point, &VERIFICATION_RMSE).map(|rmse| {
+            let share = point.of(&VERIFICATION_COVERAGE).map_or(String::new(), |share| {
+                format!(", {:.0} % in the 95 % band", 100.0 * share.mean)
+            });
+            format!("median RMSE {rmse} mm{share}")
+        });
+        let again = median(point, &REPEATABILITY);
+        let again = again.map(|again| format!("repeated touches differ by {again} mm"));
+        let parts: Vec<String> = rmse.into_iter().chain(again).collect();
+        (!parts.is_empty()).then(|| format!("{name} {}", parts.join("; ")))
+    });
+    let told: Vec<String> = told.collect();
+    (!told.is_empty()).then(|| {
+        format!(
+            "At verification touches, which the last belief predicted and did not learn from: {}.",
+            told.join(" · ")
+        )
+    })
 }
 
 /// Scores at the last drawn touch count that any planner reached.

@@ -5,6 +5,7 @@ pub mod environment;
 pub mod finger;
 pub mod function;
 pub mod kinematic;
+pub mod known_body;
 pub mod mjcf;
 #[cfg(feature = "mujoco")]
 pub mod mujoco;

@@ -169,8 +169,9 @@ impl Drawn {
         if let (Some(effect), Some(object)) = (&effects.registration, &scene.object) {
             let error = Registration::new(effect, &mut stream("registration"));
             let x_wo = object.x_wo();
+            let correction = scene.arm.as_ref().and_then(|arm| arm.correction());
             drawn.misplaced = Some(Misplaced {
-                finger: error.finger,
+                finger: effect.fixed(correction).map_or(error.finger, |fixed| fixed * error.finger),
                 object: x_wo * error.object.inverse() * x_wo.inverse(),
             });
         }

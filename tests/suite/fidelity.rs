@@ -1,9 +1,9 @@
 //! What the ladder of fidelities promises.
 
 use crate::common::shipped;
+use palpate::robot::finger::profile::Profile;
 use palpate::sim::collision::Collision;
 use palpate::sim::finger::Effects;
-use palpate::sim::finger::profile::Profile;
 use palpate::sim::probe::rest;
 use palpate::sim::{Environment, Scene};
 use palpate::study::fidelity::ladder::{DIAGONAL, RUNGS, is_diagonal};

@@ -11,11 +11,11 @@ use palpate::geometry::mesh::Mesh;
 use palpate::math::seed::stream;
 use palpate::robot::finger::Finger;
 use palpate::robot::finger::TipMotion;
+use palpate::robot::finger::profile::Profile;
 use palpate::sim::finger::column::Column;
 use palpate::sim::finger::effects::skin::{Skin, SkinEffect};
 use palpate::sim::finger::load::PressError;
 use palpate::sim::finger::plate::direction_t;
-use palpate::sim::finger::profile::Profile;
 use palpate::sim::finger::{Effects, Fingertip, FingertipError, FingertipState, Load};
 use proptest::prelude::*;
 

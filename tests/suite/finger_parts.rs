@@ -11,7 +11,7 @@ use palpate::math::seed::stream;
 use palpate::robot::finger::Finger;
 use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::electrode_table::{normals_t, positions_t};
-use palpate::sim::finger::profile::{CORE_M, Profile};
+use palpate::robot::finger::profile::{CORE_M, Profile};
 use palpate::sim::finger::samples::spread;
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 

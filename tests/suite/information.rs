@@ -175,7 +175,7 @@ fn a_recorded_row_holds_all_that_the_belief_was_made_of() {
         }
         let last = read.touches.last().unwrap();
         belief.condition(last.fit.clone().unwrap().hyperparameters).unwrap();
-        assert_eq!(Some(truth.compare(belief.surface().unwrap())), last.metrics);
+        assert_eq!(truth.compare(belief.surface().unwrap()), last.metrics);
     }
 }
 

@@ -57,6 +57,7 @@ mod models;
 mod net_ft;
 mod newcomer;
 #[cfg(feature = "nlopt")]
+mod no_truth;
 mod notices;
 mod page;
 #[cfg(feature = "nlopt")]
@@ -66,6 +67,7 @@ mod reach;
 #[cfg(feature = "nlopt")]
 mod recording;
 mod reference;
+mod registration;
 mod report;
 #[cfg(feature = "nlopt")]
 mod reproducible;

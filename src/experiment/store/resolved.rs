@@ -56,12 +56,17 @@ pub fn resolved_beside(experiment: &Experiment, path: &Path) -> String {
     saved(experiment, path.parent().unwrap_or(Path::new("")))
 }
 
-/// As [`resolved`], with the mesh's path relative to the run's folder, so that both may move.
+/// As [`resolved`], with the paths of mesh and scan relative to the run's folder, so that both may
+/// move.
 fn saved(experiment: &Experiment, folder: &Path) -> String {
     let mut experiment = experiment.clone();
     if let (Some(object), Ok(folder)) = (&mut experiment.scene.object, folder.canonicalize()) {
         let mesh = object.mesh.canonicalize().unwrap_or_else(|_| object.mesh.clone());
         object.mesh = relative(&mesh, &folder);
+    }
+    if let (Some(truth), Ok(folder)) = (&mut experiment.truth, folder.canonicalize()) {
+        let scan = truth.scan.canonicalize().unwrap_or_else(|_| truth.scan.clone());
+        truth.scan = relative(&scan, &folder);
     }
     resolved(&experiment)
 }

@@ -8,7 +8,7 @@ pub use swept::Swept;
 
 use crate::backend::Fault;
 use crate::task::Approach;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 /// What a touch ended with.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +40,12 @@ pub trait Probe: Send {
 
     /// The space that the last touch found free; none if it is not known.
     fn swept(&self) -> Option<Swept> {
+        None
+    }
+
+    /// Pose of the fingertip in `W`, by forward kinematics, where the last contact was read; none of
+    /// a probe that has no finger, or before a contact.
+    fn tip(&self) -> Option<Isometry3<f64>> {
         None
     }
 

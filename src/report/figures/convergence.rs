@@ -50,6 +50,9 @@ type Curve = (&'static str, Vec<CurvePoint>);
 type Reading = (f64, f64, Option<f64>, Option<[f64; 2]>);
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
+    if !run.truth.is_known() {
+        return Ok(None);
+    }
     let planners = &run.experiment.planners;
     let curves: Vec<Curve> = planners
         .iter()

@@ -93,10 +93,12 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             }
         }
     }
-    let panel = ReliefPanel::new(unit, area(0.5 * (rows - 1.0), counts.len()), space);
-    panel.frame(&mut canvas, "true object", "");
-    let heights = grid.heights(|_, height| height);
-    Relief::new(&panel.view, &grid.xs, &grid.zs, &heights, &axis).draw(&mut canvas);
+    if run.truth.is_known() {
+        let panel = ReliefPanel::new(unit, area(0.5 * (rows - 1.0), counts.len()), space);
+        panel.frame(&mut canvas, "true object", "");
+        let heights = grid.heights(|_, height| height);
+        Relief::new(&panel.view, &grid.xs, &grid.zs, &heights, &axis).draw(&mut canvas);
+    }
     draw_colour_bar(&mut canvas, run, space, [0.5 * width, height - FOOT_PX + 14.0]);
     Ok(Some(canvas.finish()))
 }

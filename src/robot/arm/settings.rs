@@ -23,6 +23,13 @@ pub struct ArmSettings {
     pub home_deg: [f64; 7],
     /// From the flange along its axis to the origin of `T`.
     pub mount_m: f64,
+    /// Where the origin of `T` really is, in the frame that `T` has at the end of the mount, as
+    /// `palpate register` finds it.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub tool_position_m: [f64; 3],
+    /// Turns of `T` about the fixed axes x, then y, then z of that frame.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub tool_rotation_deg: [f64; 3],
     /// Mass of adapter and finger, which a `dynamic` body moves.
     pub tool_kg: f64,
 }
@@ -41,22 +48,37 @@ impl Default for ArmSettings {
             base_rotation_deg: [0.0; 3],
             home_deg: [-90.0, 15.0, 0.0, 120.0, 0.0, -90.0, 0.0],
             mount_m: 0.12,
+            tool_position_m: [0.0; 3],
+            tool_rotation_deg: [0.0; 3],
             tool_kg: TOOL_KG,
         }
     }
 }
 
 impl ArmSettings {
+    /// Pose of `T` in the frame that it has at the end of the mount; none if it is that frame.
+    pub fn correction(&self) -> Option<Isometry3<f64>> {
+        let is_there = is_zero(&self.tool_position_m) && is_zero(&self.tool_rotation_deg);
+        (!is_there).then(|| pose(self.tool_position_m, self.tool_rotation_deg))
+    }
+
     /// The arm as a chain from `W` to `T`.
     pub fn chain(&self) -> Chain {
         Chain {
             base: pose(self.base_position_m, self.base_rotation_deg),
             joints: self.links.joints().into(),
             flange: Translation3::new(0.0, 0.0, self.links.flange_m()).into(),
-            tool: tool(self.mount_m),
+            tool: match self.correction() {
+                Some(correction) => tool(self.mount_m) * correction,
+                None => tool(self.mount_m),
+            },
             home: Joints::from(self.home_deg.map(f64::to_radians)),
         }
     }
+}
+
+fn is_zero(numbers: &[f64; 3]) -> bool {
+    *numbers == [0.0; 3]
 }
 
 /// Pose of `T` in the flange's frame: distal along the flange's +z, the pad towards its +x.
@@ -76,6 +98,8 @@ impl Checked for ArmSettings {
             rules.number(&format!("home_deg[{i}]"), home, low..=high);
         }
         rules.number("mount_m", self.mount_m, 0.01..=0.5);
+        rules.numbers("tool_position_m", &self.tool_position_m, -0.1..=0.1);
+        rules.numbers("tool_rotation_deg", &self.tool_rotation_deg, -45.0..=45.0);
         rules.number("tool_kg", self.tool_kg, 1e-6..=100.0);
     }
 }

@@ -5,6 +5,7 @@ pub mod contact_point;
 pub mod electrode_table;
 pub mod frame;
 pub mod motion;
+pub mod profile;
 pub mod shape;
 
 pub use contact_point::{Detection, Detector, PointOfContact, Tare};

@@ -2,8 +2,8 @@
 //! of the skin over which electrodes sense.
 
 use super::effects::flex::FlexEffect;
-use super::profile::Profile;
 use super::samples::SkinSample;
+use crate::robot::finger::profile::Profile;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -19,7 +19,6 @@ pub mod lattice;
 pub mod load;
 pub(crate) mod noise;
 pub mod plate;
-pub mod profile;
 pub mod samples;
 pub mod stiffness;
 

@@ -3,10 +3,10 @@
 use super::effects::electrodes::{Electrodes, ElectrodesEffect};
 use super::effects::skin::{Pressed, Skin, SkinEffect};
 use super::load::{Load, PressError};
-use super::profile::Profile;
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::mesh::Mesh;
 use crate::robot::finger::frame::ELECTRODES;
+use crate::robot::finger::profile::Profile;
 use crate::robot::finger::shape::Finger;
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};

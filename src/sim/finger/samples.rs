@@ -1,6 +1,6 @@
 //! Points spread evenly over the fingertip's outer skin.
 
-use super::profile::{Layers, Profile};
+use crate::robot::finger::profile::{Layers, Profile};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use std::f64::consts::TAU;
 

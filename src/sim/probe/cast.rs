@@ -7,19 +7,20 @@ use crate::geometry::sweep::Capsule;
 use crate::sim::Environment;
 use crate::sim::environment::{CLEARANCE_M, Shape};
 use crate::task::Approach;
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;
 
 /// Touches the exact mesh with the rigid hull.
 pub struct Cast {
     environment: Arc<Environment>,
     swept: Option<Swept>,
+    tip: Option<Isometry3<f64>>,
 }
 
 impl Cast {
     /// In `environment`.
     pub fn new(environment: Arc<Environment>) -> Self {
-        Self { environment, swept: None }
+        Self { environment, swept: None, tip: None }
     }
 }
 
@@ -31,6 +32,9 @@ impl Probe for Cast {
             || approach.p_far_w + approach.direction_w().scale(reach_m(&self.environment));
         let p_wt = found.as_ref().map_or_else(turned_w, |rest| rest.p_wt);
         self.swept = Some(Swept { finger: self.environment.scene().finger.clone(), p_wt });
+        self.tip = found
+            .as_ref()
+            .map(|rest| Isometry3::from_parts(rest.p_wt.coords.into(), approach.r_wt()));
         Ok(match found {
             Some(Rest { hit, .. }) => {
                 Touch::Contact(Contact { p_wc: hit.point, normal_w: hit.normal })
@@ -41,6 +45,10 @@ impl Probe for Cast {
 
     fn swept(&self) -> Option<Swept> {
         self.swept.clone()
+    }
+
+    fn tip(&self) -> Option<Isometry3<f64>> {
+        self.tip
     }
 }
 
@@ -58,7 +66,10 @@ pub fn rest(environment: &Environment, approach: &Approach) -> Option<Rest> {
     let finger = &environment.scene().finger;
     let (ahead_w, reach_m) = (approach.direction_w(), reach_m(environment));
     let start_w = approach.p_near_w - ahead_w.scale(reach_m);
-    let axis_w = approach.r_wa * finger.axis_a();
+    let axis_w = match approach.r_at == finger.r_at() {
+        true => approach.r_wa * finger.axis_a(),
+        false => approach.r_wt() * Vector3::x() * -finger.length_m,
+    };
     let hull = Capsule { p0_w: start_w, p1_w: start_w + axis_w, radius_m: finger.radius_m };
     let way_m = (approach.p_far_w - start_w).dot(&ahead_w) + reach_m;
     let hit = bvh.sweep(&hull, &ahead_w, way_m)?;

@@ -177,7 +177,7 @@ fn time_ratio(
 /// `active` against `random` in the same trials.
 fn verdict(environment: &Arc<Environment>, truth: &Truth, budget: Budget) -> Option<Paired> {
     let planners = [planner::by_name("active")?, planner::by_name("random")?];
-    if budget.trials == 0 {
+    if budget.trials == 0 || !truth.is_known() {
         return None;
     }
     let names = planners.map(|planner| planner.name);

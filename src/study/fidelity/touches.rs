@@ -171,5 +171,5 @@ pub fn surface_rmse_m(
         belief.observe(target, &touch);
     }
     let (_, surface) = belief.refit().ok()?;
-    Some(truth.compare(surface).rmse_m)
+    Some(truth.compare(surface)?.rmse_m)
 }

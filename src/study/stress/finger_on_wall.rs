@@ -6,7 +6,7 @@ use crate::geometry::bvh::MeshBvh;
 use crate::math::seed;
 use crate::robot::finger::Finger;
 use crate::robot::finger::TipMotion;
-use crate::sim::finger::profile::Profile;
+use crate::robot::finger::profile::Profile;
 use crate::sim::finger::samples::spread;
 use crate::sim::finger::{Effects, Fingertip, FingertipError, FingertipState, Load};
 use nalgebra::{Isometry3, Vector3};

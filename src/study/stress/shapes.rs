@@ -2,9 +2,10 @@
 
 use super::case::{Case, Outcome, all, case, require};
 use super::checked_touch::{CheckedTouch, touch_solid};
-use super::solids::{ball, block, both, mesh, needle, sheet, wall};
+use super::solids::{both, mesh, needle, sheet, wall};
 use super::wall::scene;
 use crate::geometry::mesh::Mesh;
+use crate::geometry::solids::{ball, block};
 use crate::sim::Scene;
 use nalgebra::Point3;
 

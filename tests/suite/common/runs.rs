@@ -66,7 +66,7 @@ pub fn run(text: &str) -> Run {
 fn row(experiment: &Experiment, trial: u32, planner: &str) -> TrialRow {
     let touches =
         (1..=experiment.touches).map(|count| touch(experiment, (trial, planner), count)).collect();
-    TrialRow { trial, planner: planner.into(), failure: None, touches }
+    TrialRow { trial, planner: planner.into(), failure: None, touches, verification: Vec::new() }
 }
 
 fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> TouchRow {

@@ -16,7 +16,7 @@ use contact_monitor::{ApproachEnd, ContactMonitor};
 use nalgebra::Isometry3;
 use trajectory::StraightPath;
 
-pub use way::{OutOfReach, check_reach};
+pub use way::{BEYOND_M, OutOfReach, check_reach};
 pub(super) use way::{standoff, turning_point};
 
 /// A movement has arrived when the tip is this near to its end; chosen: below what a touch
@@ -25,7 +25,7 @@ const ARRIVED_M: f64 = 5e-5;
 
 /// A finger that is no farther beyond the stand-off goes there at once; chosen: less than any
 /// object is high.
-const BEYOND_M: f64 = 5e-3;
+const DEEPER_M: f64 = 5e-3;
 
 /// Drives any [`Backend`] through touches. The same code drives simulators, recordings and the
 /// real arm: it knows the robot, how to touch, and what it is told of each touch.
@@ -38,6 +38,8 @@ pub struct Servo {
     command: Command,
     state: State,
     swept: Option<Swept>,
+    /// Where the last contact was read.
+    tip: Option<Isometry3<f64>>,
 }
 
 /// What is kept of the last reading.
@@ -72,6 +74,7 @@ impl Servo {
             settings,
             state,
             swept: None,
+            tip: None,
         })
     }
 
@@ -135,7 +138,7 @@ impl Servo {
         let here = self.x_wt();
         let from_w = here.translation.vector;
         let back_w = approach.level_with(&from_w, &above.translation.vector);
-        if (back_w - from_w).dot(&approach.direction_w()) > -BEYOND_M {
+        if (back_w - from_w).dot(&approach.direction_w()) > -DEEPER_M {
             return Ok(());
         }
         let back = Isometry3::from_parts(back_w.into(), here.rotation);
@@ -189,6 +192,7 @@ impl Servo {
             return Ok(None);
         }
         let x_wt = self.x_wt();
+        self.tip = Some(x_wt);
         Ok(self.monitor.contact(&self.robot.finger, self.settings.point).map(|(p_tc, normal_t)| {
             Contact { p_wc: x_wt * p_tc, normal_w: x_wt.rotation * normal_t }
         }))
@@ -235,6 +239,10 @@ impl Probe for Servo {
 
     fn swept(&self) -> Option<Swept> {
         self.swept.clone()
+    }
+
+    fn tip(&self) -> Option<Isometry3<f64>> {
+        self.tip
     }
 
     fn time_s(&self) -> Option<f64> {

@@ -8,7 +8,7 @@ use nalgebra::Isometry3;
 use thiserror::Error;
 
 /// Distance that the finger's hull goes beyond the farthest depth before it turns back; chosen.
-const BEYOND_M: f64 = 0.01;
+pub const BEYOND_M: f64 = 0.01;
 
 /// The tip in front of all that may be touched.
 pub(in crate::explore::probe) fn standoff(

@@ -2,6 +2,7 @@
 
 use super::effect::Effect;
 use crate::config::{Checked, Rules};
+use crate::math::pose::pose;
 use crate::sim::finger::noise::normal;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::Rng;
@@ -13,6 +14,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegistrationEffect {
+    /// Where the finger really is on its mount, in the words of `arm.tool_position_m`; left out,
+    /// where the arm says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub finger_position_m: Option<[f64; 3]>,
+    /// The same of its attitude, in the words of `arm.tool_rotation_deg`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub finger_rotation_deg: Option<[f64; 3]>,
     /// Standard deviation of the fingertip's place on its mount, along each axis.
     pub finger_m: f64,
     /// The same of its attitude, about each axis.
@@ -26,16 +34,44 @@ pub struct RegistrationEffect {
 impl Default for RegistrationEffect {
     /// Chosen: a finger that was measured with a calliper, an object put against a mark.
     fn default() -> Self {
-        Self { finger_m: 0.2e-3, finger_deg: 0.5, object_m: 0.5e-3, object_deg: 0.5 }
+        Self {
+            finger_position_m: None,
+            finger_rotation_deg: None,
+            finger_m: 0.2e-3,
+            finger_deg: 0.5,
+            object_m: 0.5e-3,
+            object_deg: 0.5,
+        }
     }
 }
 
 impl Checked for RegistrationEffect {
     fn check(&self, rules: &mut Rules) {
+        if let Some(position_m) = &self.finger_position_m {
+            rules.numbers("finger_position_m", position_m, -0.1..=0.1);
+        }
+        if let Some(rotation_deg) = &self.finger_rotation_deg {
+            rules.numbers("finger_rotation_deg", rotation_deg, -45.0..=45.0);
+        }
         rules.number("finger_m", self.finger_m, 0.0..=0.1);
         rules.number("finger_deg", self.finger_deg, 0.0..=45.0);
         rules.number("object_m", self.object_m, 0.0..=0.1);
         rules.number("object_deg", self.object_deg, 0.0..=45.0);
+    }
+}
+
+impl RegistrationEffect {
+    /// Pose of the finger's own `T` in that of kinematics which the arm's settings move by
+    /// `correction` from the end of the mount, before anything is drawn.
+    pub fn fixed(&self, correction: Option<Isometry3<f64>>) -> Option<Isometry3<f64>> {
+        if self.finger_position_m.is_none() && self.finger_rotation_deg.is_none() {
+            return None;
+        }
+        let really = pose(
+            self.finger_position_m.unwrap_or_default(),
+            self.finger_rotation_deg.unwrap_or_default(),
+        );
+        Some(correction.map_or(really, |correction| correction.inverse() * really))
     }
 }
 
@@ -57,15 +93,15 @@ pub struct Registration {
 impl Registration {
     /// Drawn by `rng`.
     pub fn new(effect: &RegistrationEffect, rng: &mut impl Rng) -> Self {
-        let mut pose = |place_m: f64, angle_deg: f64| {
+        let mut drawn = |place_m: f64, angle_deg: f64| {
             let mut vector = |sd| Vector3::from_fn(|_, _| sd * normal(rng));
             let place = Translation3::from(vector(place_m));
             let turn = UnitQuaternion::from_scaled_axis(vector(angle_deg.to_radians()));
             Isometry3::from_parts(place, turn)
         };
         Self {
-            finger: pose(effect.finger_m, effect.finger_deg),
-            object: pose(effect.object_m, effect.object_deg),
+            finger: drawn(effect.finger_m, effect.finger_deg),
+            object: drawn(effect.object_m, effect.object_deg),
         }
     }
 }

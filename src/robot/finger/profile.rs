@@ -3,7 +3,7 @@
 //! All figures are from the FEM mesh of NVlabs/biotac_sim unless said otherwise. Behind the
 //! origin of `T` (x ≤ 0) rays leave the axis at right angles; before it they leave the origin.
 
-use crate::robot::finger::shape::{BIOTAC_RADIUS_M, Finger};
+use super::shape::{BIOTAC_RADIUS_M, Finger};
 use nalgebra::{Point3, UnitVector3, Vector3};
 
 /// Radius of the rigid core: cylinder and hemisphere (electrode table of TAMS

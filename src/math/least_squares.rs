@@ -1,0 +1,325 @@
+//! Nonlinear least squares that says what the data do not determine, and leaves out what does not
+//! fit the rest.
+//!
+//! Gauss-Newton with halved steps. The step is found by singular values, and along a direction of
+//! parameters that the residuals say next to nothing of, nothing moves.
+
+use nalgebra::{DMatrix, DVector};
+use thiserror::Error;
+
+/// What is fitted.
+///
+/// Parameters are counted in units of what they could plausibly be off, residuals in units of
+/// their expected standard deviation. Then a singular value of the Jacobian says how much narrower
+/// the data make a direction than it was believed to be.
+pub trait Problem {
+    /// Everything that is fitted.
+    type State: Clone;
+
+    /// How many parameters a step has.
+    fn parameters(&self) -> usize;
+
+    /// `state` moved by a step.
+    fn moved(&self, state: &Self::State, step: &DVector<f64>) -> Self::State;
+
+    /// The residuals at `state`, as many each time.
+    fn residuals(&self, state: &Self::State) -> DVector<f64>;
+
+    /// Part of the greatest singular value below which one says nothing, whatever its size.
+    fn resolution(&self) -> f64 {
+        0.0
+    }
+
+    /// Of which kind residual `i` is: each kind has a scatter of its own.
+    fn kind(&self, _i: usize) -> usize {
+        0
+    }
+}
+
+/// A fit.
+#[derive(Clone, Debug)]
+pub struct Solution<S> {
+    /// The best parameters.
+    pub state: S,
+    /// Covariance in the problem's units, s²(JᵀJ)⁻¹ in the determined directions; 1, the plausible,
+    /// in the others.
+    pub covariance: DMatrix<f64>,
+    /// Unit vectors of the directions that the data do not determine.
+    pub undetermined: Vec<DVector<f64>>,
+    /// Greatest singular value over the least of those that count.
+    pub condition: f64,
+    /// Residuals at the end, all of them.
+    pub residuals: DVector<f64>,
+    /// Whether each residual was used; an outlier was not.
+    pub used: Vec<bool>,
+}
+
+/// What cannot be fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum FitError {
+    /// A residual is not a number.
+    #[error("a residual is not a number")]
+    NotFinite,
+    /// There is nothing to fit to.
+    #[error("no residuals")]
+    Empty,
+    /// Every step made it worse.
+    #[error("the fit does not settle")]
+    Unsettled,
+}
+
+/// A direction counts as determined if the data make it at least this much narrower than what was
+/// plausible; chosen.
+pub const NARROWER: f64 = 3.0;
+
+/// Part of a unit over which slopes are taken, by central differences; chosen, near the cube root
+/// of the residuals' precision.
+const DIFFERENCE: f64 = 1e-4;
+
+/// Rounds of steps, and of leaving out; chosen, several times what is usual.
+const STEPS: usize = 60;
+const ROUNDS: usize = 12;
+
+/// A step shorter than this part of a unit is the last; chosen.
+const SETTLED: f64 = 1e-7;
+
+/// A step that gains no more than this part of the cost is the last; chosen.
+const GAINED: f64 = 1e-9;
+
+/// A residual beyond this many robust standard deviations is an outlier; chosen: 1 in 2000 of a
+/// normal distribution.
+const OUTLIER: f64 = 3.5;
+
+/// Residuals up to this many count with their square, beyond it with their amount (Huber 1964).
+const HUBER: f64 = 1.345;
+
+/// Standard deviations per median absolute deviation of a normal distribution.
+const SD_PER_MAD: f64 = 1.4826;
+
+/// Scatter of a kind below this part of the expected one is taken for it; chosen.
+const LEAST_SCATTER: f64 = 0.05;
+
+/// Fits `problem` from `start`.
+///
+/// At first a residual far off counts with its amount only; then those are left out that lie
+/// beyond 3.5 robust standard deviations of their kind, until the same are.
+///
+/// # Errors
+/// If a residual is not finite, there is none, or no step helps.
+pub fn fit<P: Problem>(problem: &P, start: &P::State) -> Result<Solution<P::State>, FitError> {
+    let count = problem.residuals(start).len();
+    if count == 0 {
+        return Err(FitError::Empty);
+    }
+    let mut used = vec![true; count];
+    let mut state = settle(problem, start, huber)?;
+    for _ in 0..ROUNDS {
+        let residuals = problem.residuals(&state);
+        let scatter = scatters(problem, &residuals);
+        let now: Vec<bool> = (residuals.iter().enumerate())
+            .map(|(i, r)| r.abs() <= OUTLIER * scatter[problem.kind(i)])
+            .collect();
+        state = settle(problem, &state, |r| kept(r, &now))?;
+        if std::mem::replace(&mut used, now) == used {
+            break;
+        }
+    }
+    conclude(problem, state, used)
+}
+
+/// How well a problem's data would determine its parameters at `state`, before there are any.
+///
+/// # Errors
+/// If a residual is not finite, or there is none.
+pub fn foresee<P: Problem>(problem: &P, state: &P::State) -> Result<Solution<P::State>, FitError> {
+    let count = problem.residuals(state).len();
+    let mut foreseen = conclude(problem, state.clone(), vec![true; count])?;
+    let jacobian = jacobian(problem, state, count);
+    foreseen.covariance = Spectrum::of(&jacobian, problem.resolution())?.covariance(1.0);
+    Ok(foreseen)
+}
+
+/// ∂r/∂step at no step, by central differences.
+pub fn jacobian<P: Problem>(problem: &P, state: &P::State, count: usize) -> DMatrix<f64> {
+    let parameters = problem.parameters();
+    let mut jacobian = DMatrix::zeros(count, parameters);
+    for j in 0..parameters {
+        let mut step = DVector::zeros(parameters);
+        step[j] = DIFFERENCE;
+        let ahead = problem.residuals(&problem.moved(state, &step));
+        let behind = problem.residuals(&problem.moved(state, &-step));
+        jacobian.set_column(j, &((ahead - behind) / (2.0 * DIFFERENCE)));
+    }
+    jacobian
+}
+
+/// Steps until they are too short to matter. `weigh` gives each residual its weight and the whole
+/// its cost.
+fn settle<P: Problem>(
+    problem: &P,
+    start: &P::State,
+    weigh: impl Fn(&DVector<f64>) -> (DVector<f64>, f64),
+) -> Result<P::State, FitError> {
+    let mut state = start.clone();
+    for _ in 0..STEPS {
+        let residuals = problem.residuals(&state);
+        let (weights, cost) = weigh(&residuals);
+        if !cost.is_finite() {
+            return Err(FitError::NotFinite);
+        }
+        let roots = weights.map(f64::sqrt);
+        let mut slopes = jacobian(problem, &state, residuals.len());
+        (slopes.row_iter_mut().zip(roots.iter())).for_each(|(mut row, root)| row *= *root);
+        let mut step =
+            -Spectrum::of(&slopes, problem.resolution())?.solve(&residuals.component_mul(&roots));
+        let mut gain = 0.0;
+        while step.norm() > SETTLED && gain <= 0.0 {
+            let next = problem.moved(&state, &step);
+            gain = cost - weigh(&problem.residuals(&next)).1;
+            if gain > 0.0 {
+                state = next;
+            }
+            step *= 0.5;
+        }
+        if gain <= GAINED * cost {
+            return Ok(state);
+        }
+    }
+    Err(FitError::Unsettled)
+}
+
+/// Weights and cost in which an outlier counts with its amount; the scatter stays the expected one.
+fn huber(residuals: &DVector<f64>) -> (DVector<f64>, f64) {
+    let weights = residuals.map(|r| (HUBER / r.abs().max(HUBER)).min(1.0));
+    let costs = residuals.iter().map(|r| match r.abs() <= HUBER {
+        true => 0.5 * r * r,
+        false => HUBER * (r.abs() - 0.5 * HUBER),
+    });
+    let cost = costs.sum();
+    (weights, cost)
+}
+
+/// Weights and cost of the residuals that are used.
+fn kept(residuals: &DVector<f64>, used: &[bool]) -> (DVector<f64>, f64) {
+    let weights =
+        DVector::from_iterator(used.len(), used.iter().map(|&used| f64::from(u8::from(used))));
+    let cost = 0.5 * residuals.component_mul(&weights).norm_squared();
+    (weights, cost)
+}
+
+/// The robust standard deviation of each kind.
+fn scatters<P: Problem>(problem: &P, residuals: &DVector<f64>) -> Vec<f64> {
+    let kinds = (0..residuals.len()).map(|i| problem.kind(i)).max().map_or(0, |last| last + 1);
+    let of = |kind: usize| {
+        let all = residuals.iter().enumerate();
+        let mut sizes: Vec<f64> =
+            all.filter(|(i, _)| problem.kind(*i) == kind).map(|(_, r)| r.abs()).collect();
+        sizes.sort_unstable_by(f64::total_cmp);
+        let median = sizes.get(sizes.len() / 2).copied().unwrap_or(1.0);
+        (SD_PER_MAD * median).max(LEAST_SCATTER)
+    };
+    (0..kinds).map(of).collect()
+}
+
+/// Covariance and rank at the end.
+fn conclude<P: Problem>(
+    problem: &P,
+    state: P::State,
+    used: Vec<bool>,
+) -> Result<Solution<P::State>, FitError> {
+    let residuals = problem.residuals(&state);
+    if residuals.is_empty() {
+        return Err(FitError::Empty);
+    }
+    let mut slopes = jacobian(problem, &state, residuals.len());
+    for (mut row, used) in slopes.row_iter_mut().zip(&used) {
+        row *= f64::from(u8::from(*used));
+    }
+    let spectrum = Spectrum::of(&slopes, problem.resolution())?;
+    let squares: f64 =
+        residuals.iter().zip(&used).filter(|(_, used)| **used).map(|(r, _)| r * r).sum();
+    let count = used.iter().filter(|used| **used).count();
+    // As many data as parameters leave no scatter to see: then the expected one stands.
+    let variance = match count.checked_sub(spectrum.rank()) {
+        Some(freedom) if freedom > 0 => squares / freedom as f64,
+        _ => 1.0,
+    };
+    Ok(Solution {
+        covariance: spectrum.covariance(variance),
+        undetermined: spectrum.undetermined(),
+        condition: spectrum.condition(),
+        state,
+        residuals,
+        used,
+    })
+}
+
+/// Singular values of a Jacobian with their directions of parameters.
+struct Spectrum {
+    /// JᵀJ's eigenvalues' roots.
+    values: DVector<f64>,
+    directions: DMatrix<f64>,
+    slopes: DMatrix<f64>,
+    /// The least value that counts.
+    least: f64,
+}
+
+impl Spectrum {
+    fn of(slopes: &DMatrix<f64>, resolution: f64) -> Result<Self, FitError> {
+        if slopes.iter().any(|slope| !slope.is_finite()) {
+            return Err(FitError::NotFinite);
+        }
+        let parameters = slopes.ncols();
+        // Rows of zeros make the decomposition's directions complete where data are few.
+        let rows = slopes.nrows().max(parameters);
+        let svd = slopes
+            .clone()
+            .resize(rows, parameters, 0.0)
+            .try_svd(false, true, f64::EPSILON, 10_000)
+            .ok_or(FitError::NotFinite)?;
+        let directions = svd.v_t.ok_or(FitError::NotFinite)?.transpose();
+        let least = NARROWER.max(resolution * svd.singular_values.max());
+        Ok(Self { values: svd.singular_values, directions, slopes: slopes.clone(), least })
+    }
+
+    fn counts(&self, i: usize) -> bool {
+        self.values[i] >= self.least
+    }
+
+    fn rank(&self) -> usize {
+        (0..self.values.len()).filter(|&i| self.counts(i)).count()
+    }
+
+    /// The least step that explains `residuals`, along determined directions only.
+    fn solve(&self, residuals: &DVector<f64>) -> DVector<f64> {
+        let gradient = self.slopes.transpose() * residuals;
+        let mut step = DVector::zeros(self.directions.nrows());
+        for i in (0..self.values.len()).filter(|&i| self.counts(i)) {
+            let direction = self.directions.column(i);
+            step += direction * (direction.dot(&gradient) / self.values[i].powi(2));
+        }
+        step
+    }
+
+    fn covariance(&self, variance: f64) -> DMatrix<f64> {
+        let mut covariance = DMatrix::zeros(self.directions.nrows(), self.directions.nrows());
+        for i in 0..self.values.len() {
+            let direction = self.directions.column(i);
+            let along = if self.counts(i) { variance / self.values[i].powi(2) } else { 1.0 };
+            covariance += direction * direction.transpose() * along;
+        }
+        covariance
+    }
+
+    fn undetermined(&self) -> Vec<DVector<f64>> {
+        let lost = (0..self.values.len()).filter(|&i| !self.counts(i));
+        lost.map(|i| self.directions.column(i).into_owned()).collect()
+    }
+
+    fn condition(&self) -> f64 {
+        let counted = (0..self.values.len()).filter(|&i| self.counts(i)).map(|i| self.values[i]);
+        let least = counted.clone().fold(f64::INFINITY, f64::min);
+        let greatest = counted.fold(0.0, f64::max);
+        if greatest > 0.0 { greatest / least } else { f64::INFINITY }
+    }
+}

@@ -1,0 +1,63 @@
+//! A ball or a plate in place of a scene's object, for a robot that registers itself.
+
+use super::environment::{Environment, EnvironmentError, Shape};
+use super::scene::{Body, Object, Scene, Unit};
+use crate::explore::registration::found::x_wo;
+use crate::explore::registration::{KnownBody, design};
+use crate::geometry::bvh::MeshBvh;
+use crate::geometry::error::MeshError;
+use crate::geometry::mesh::Mesh;
+use crate::geometry::solids::{Triangles, ball, block};
+use crate::math::pose::parts;
+use crate::task::Zone;
+use nalgebra::Point3;
+
+/// Rings of a ball; chosen: its facets lie within 2 µm of a ball of 20 mm.
+const RINGS: u32 = 180;
+
+/// Half of a plate's sides, and its thickness; chosen: larger than any finger.
+const PLATE_M: [f64; 2] = [0.1, 0.02];
+
+/// `scene` with `body` instead of its object, touched as registration touches.
+///
+/// # Errors
+/// If the scene's body touches no object.
+pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, EnvironmentError> {
+    if scene.body == Body::Function {
+        return Err(EnvironmentError::Missing { part: "object" });
+    }
+    let ((points, triangles), half_m) = solid(body);
+    let x_wo = x_wo(body);
+    let (mesh, report) =
+        Mesh::new(&points, &triangles).map_err(|fault| MeshError { path: NAME.into(), fault })?;
+    let (position_m, rotation_deg) = parts(&x_wo);
+    let sides_m = [-half_m, half_m];
+    let zone = Zone { position_m, rotation_deg, ..Zone::new(sides_m, Some(sides_m)) };
+    let object = Object {
+        mesh: NAME.into(),
+        outside_buffers: false,
+        unit: Unit::M,
+        scale: 1.0,
+        position_m,
+        rotation_deg,
+        truth: None,
+    };
+    let touch = design::touch_settings(&scene.touch);
+    let scene = Scene { zone, object: Some(object), touch, ..scene.clone() };
+    let bvh = MeshBvh::new(mesh.transformed(&x_wo));
+    Environment::around(scene, Shape::Mesh { bvh, report: report.into() })
+}
+
+/// In the place of a file's name.
+const NAME: &str = "(known body)";
+
+/// Its triangles in a frame whose +y is the plate's normal, and how far it is explored to each side.
+fn solid(body: &KnownBody) -> (Triangles, f64) {
+    match *body {
+        KnownBody::Ball { radius_m, .. } => (ball(Point3::origin(), radius_m, RINGS), radius_m),
+        KnownBody::Plate { .. } => {
+            let [half_m, thick_m] = PLATE_M;
+            (block([-half_m, -thick_m, -half_m], [half_m, 0.0, half_m]), half_m)
+        }
+    }
+}
