@@ -42,8 +42,8 @@ pub enum CloudError {
     },
 }
 
-/// The points of contact in `cloud.csv` or `cloud.ply`, which a scan writes, in `W`; targets without
-/// contact are passed over.
+/// The points of contact in `cloud.csv` or `cloud.ply`, which a scan writes, in `W`; targets
+/// without contact are passed over.
 ///
 /// # Errors
 /// If it cannot be read, or is none.
