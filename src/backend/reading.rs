@@ -27,6 +27,16 @@ pub struct Reading {
 }
 
 impl Reading {
+    /// Becomes the same as `other` in the memory that it has.
+    pub fn copy(&mut self, other: &Self) {
+        let Self { time_s, q, qdot, wrench, frames, ideal, applied } = self;
+        (*time_s, *wrench, *ideal) = (other.time_s, other.wrench, other.ideal);
+        q.clone_from(&other.q);
+        qdot.clone_from(&other.qdot);
+        frames.clone_from(&other.frames);
+        applied.qdot.clone_from(&other.applied.qdot);
+    }
+
     /// Whether the numbers that a controller acts on are numbers. Tactile frames are judged one by
     /// one, by who reads them.
     ///

@@ -97,7 +97,7 @@ impl Interlocked {
         self.now.sent = *qdot;
         self.now.tick += 1;
         match self.inner.step(&self.command) {
-            Ok(reading) => self.reading.clone_from(reading),
+            Ok(reading) => self.reading.copy(reading),
             Err(fault) => {
                 // It said itself that it stops; what was commanded must not hold on.
                 if self.inner.capabilities().real_time {
@@ -224,7 +224,7 @@ impl Backend for Interlocked {
         {
             return Err(fault.clone());
         }
-        self.reading.clone_from(self.inner.reset(seed)?);
+        self.reading.copy(self.inner.reset(seed)?);
         self.interlocks.iter_mut().for_each(|one| one.reset());
         self.way_back.forget();
         (self.fault, self.rest) = (None, None);
