@@ -6,7 +6,7 @@
 
 use super::metrics::Metrics;
 use super::row::{TouchRow, TrialRow};
-use super::verification;
+use super::verified;
 use std::fmt;
 
 /// A number of a trial after some touches, in SI units.
@@ -138,20 +138,20 @@ pub const COVERAGE: Measure =
 /// Root mean square error at touches that the last belief predicted and did not learn from.
 pub const VERIFICATION_RMSE: Measure =
     less("verification_rmse_m", "RMSE at verification touches", MM, |row, n| {
-        verification::errors(row, n)?.rmse()
+        verified::errors(row, n)?.rmse()
     })
     .told(Aggregate::Both)
     .drawn(Scale::Undrawn);
 /// Share of these inside the 95 % band.
 pub const VERIFICATION_COVERAGE: Measure =
     fact("verification_coverage", "verification touches in the 95 % band", PLAIN, |row, n| {
-        verification::calibration(row, n)?.told().0
+        verified::calibration(row, n)?.told().0
     })
     .drawn(Scale::Undrawn);
 /// Root mean square difference of a touch from the one it repeats.
 pub const REPEATABILITY: Measure =
     less("repeatability_m", "difference of repeated touches", MM, |row, n| {
-        verification::differences(row, n)?.rmse()
+        verified::differences(row, n)?.rmse()
     })
     .told(Aggregate::Both)
     .drawn(Scale::Undrawn);
@@ -185,12 +185,12 @@ pub static MEASURES: &[Measure] = &[
         .drawn(Scale::Undrawn),
     VERIFICATION_RMSE,
     less("verification_nlpd", "NLPD at verification touches", PLAIN, |row, n| {
-        verification::calibration(row, n)?.told().1
+        verified::calibration(row, n)?.told().1
     })
     .drawn(Scale::Undrawn),
     VERIFICATION_COVERAGE,
     less("verification_missed", "verification touches without contact", PLAIN, |row, n| {
-        verification::missed(row, n)
+        verified::missed(row, n)
     })
     .drawn(Scale::Undrawn),
     REPEATABILITY,

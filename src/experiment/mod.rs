@@ -47,6 +47,8 @@ pub mod summary;
 pub mod trial;
 pub mod truth;
 pub mod verification;
+pub mod verification_row;
+mod verified;
 pub mod witness;
 
 pub use experiment::Experiment;

@@ -1,7 +1,7 @@
 //! One line of `trials.jsonl`: everything a trial did.
 
 use super::metrics::Metrics;
-use super::verification::VerificationRow;
+use super::verification_row::VerificationRow;
 use crate::backend::Fault;
 use crate::explore::planner::Stall;
 use crate::gp::fit::Fit;

@@ -2,8 +2,8 @@
 //! held against what the finger then meets.
 
 use super::experiment::Experiment;
-use super::metrics::{Calibration, Errors};
-use super::row::{TouchRow, TrialRow};
+use super::row::TouchRow;
+use super::verification_row::VerificationRow;
 use crate::explore::belief::Belief;
 use crate::explore::probe::{Probe, Touch};
 use crate::gp::posterior::Scratch;
@@ -12,38 +12,6 @@ use crate::task::{Task, Zone};
 use nalgebra::Point3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-/// A touch after a trial's last one, of which the belief learns nothing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct VerificationRow {
-    /// Where the finger was sent: (x) or (x, z) in the zone's frame.
-    pub target: Vec<f64>,
-    /// Which of the trial's touches it repeats, counted from 1; none of a touch at a new place.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub again: Option<u32>,
-    /// Height that the belief expected at the target, before the touch was made.
-    pub predicted_m: f64,
-    /// Standard deviation of that, of a touch: σ² + noise².
-    pub predicted_sd_m: f64,
-    /// The point of contact (x, y, z) in `W`; none for a miss or a touch broken off.
-    pub contact: Option<[f64; 3]>,
-    /// Whether the touch was broken off.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub overload: bool,
-    /// The contact's height above what the same belief expected at the contact's own place, which
-    /// differs from the target.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub error_m: Option<f64>,
-    /// Standard deviation of that.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sd_m: Option<f64>,
-    /// The contact's height above that of the touch it repeats, less what the belief says that the
-    /// surface rises from one place of contact to the other.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub difference_m: Option<f64>,
-}
 
 /// Makes the verification touches of `trial`, then those that repeat an earlier one; what was made
 /// of them, and why there are no more, if a fault ended them.
@@ -160,47 +128,4 @@ fn repeated(touches: &[TouchRow], count: u32) -> Vec<usize> {
         met_count if met_count < count => met.into_iter().cycle().take(count).collect(),
         met_count => (0..count).map(|i| met[i * met_count / count]).collect(),
     }
-}
-
-/// The rows of a trial's verification touches at new places, where `touches` are all that it made.
-fn verified(row: &TrialRow, touches: u32) -> Option<impl Iterator<Item = &VerificationRow>> {
-    Some(all(row, touches)?.filter(|touch| touch.again.is_none()))
-}
-
-/// The same of all of them.
-fn all(row: &TrialRow, touches: u32) -> Option<impl Iterator<Item = &VerificationRow>> {
-    (row.touches.len() == touches as usize).then(|| row.verification.iter())
-}
-
-/// How far they were from what was expected; none after a touch that is not the last.
-pub(super) fn errors(row: &TrialRow, touches: u32) -> Option<Errors> {
-    let mut errors = Errors::default();
-    verified(row, touches)?.filter_map(|touch| touch.error_m).for_each(|error| errors.add(error));
-    Some(errors)
-}
-
-/// How that compares with what the belief said of its own errors.
-pub(super) fn calibration(row: &TrialRow, touches: u32) -> Option<Calibration> {
-    let mut calibration = Calibration::default();
-    let told = verified(row, touches)?.filter_map(|touch| touch.error_m.zip(touch.sd_m));
-    told.for_each(|(error, sd)| calibration.add(error, sd * sd));
-    Some(calibration)
-}
-
-/// Share of them that met nothing or were broken off.
-pub(super) fn missed(row: &TrialRow, touches: u32) -> Option<f64> {
-    let (mut count, mut missed) = (0.0, 0.0);
-    for touch in verified(row, touches)? {
-        count += 1.0;
-        missed += f64::from(u8::from(touch.contact.is_none()));
-    }
-    (count > 0.0).then(|| missed / count)
-}
-
-/// How far repeated touches were from the first.
-pub(super) fn differences(row: &TrialRow, touches: u32) -> Option<Errors> {
-    let mut differences = Errors::default();
-    let repeated = all(row, touches)?.filter_map(|touch| touch.difference_m);
-    repeated.for_each(|difference| differences.add(difference));
-    Some(differences)
 }

@@ -40,8 +40,7 @@ impl<'a> Ahead<'a> {
         let mut found_m = f64::NEG_INFINITY;
         for _ in 0..LOOKS {
             found_m = clearance_m(&self.now.chain.clamp(&(self.from + self.by * part)));
-            // Also if it is not a number.
-            if !(found_m >= least_m) {
+            if found_m < least_m || found_m.is_nan() {
                 return Some(found_m);
             }
             if length_m <= 0.0 || part >= 1.0 {

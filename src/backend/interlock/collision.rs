@@ -91,8 +91,7 @@ impl Guard {
                 Other::Table(space) => link.to_half_space_m(space),
                 Other::Object(object) => link.to_box_m(object),
             };
-            // Also if it is not a number.
-            if !(distance_m >= nearest.0) {
+            if distance_m < nearest.0 || distance_m.is_nan() {
                 nearest = (distance_m, i);
             }
         }

@@ -181,7 +181,7 @@ fn check_joints(
         let [low, high] = joint.q_limits;
         let (least, most) =
             places().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| (a.min(q), b.max(q)));
-        let Some(q) = places().last() else { continue };
+        let Some(q) = places().next_back() else { continue };
         if let Some(q) = [least, most].into_iter().find(|q| !(low..=high).contains(q)) {
             return Err(GateError::Outside { joint: joint.name, q, low, high });
         }

@@ -88,7 +88,8 @@ impl RunFolder {
             .open(&file)
             .map_err(io_error(&file))?;
         lock(&trials, path)?;
-        if fresh || !rows::has_some(&trials).map_err(io_error(&file))? {
+        let has_touches = fs::metadata(path.join(JOURNAL)).is_ok_and(|journal| journal.len() > 0);
+        if fresh || !(has_touches || rows::has_some(&trials).map_err(io_error(&file))?) {
             trials.set_len(0).map_err(io_error(&file))?;
             // First of all, as the mark of a run's folder.
             resolved::write(path, experiment)?;
