@@ -125,8 +125,9 @@ fn touches(
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4))]
 
-    /// Without noise the law is inverted exactly, wherever the finger stands, and an outlier of half
-    /// a centimetre is left out.
+    /// Without noise the law is inverted, wherever the finger stands, and an outlier of half a
+    /// centimetre is left out: that of a rigid finger exactly; that of a soft one, of which give,
+    /// gain and felt side are sought too, to 0.2 mm and 0.3°, but for the roll.
     #[test]
     fn exact_touches_give_the_finger_back(
         place in prop::array::uniform3(-3e-3..3e-3),
@@ -144,10 +145,12 @@ proptest! {
         let found = conclude(&touches, &robot, &believed, touches.len()).unwrap();
         let (place_off, turn_off) = parts(&(found.found.correction.inverse() * error));
         prop_assert!(found.outliers >= 1);
-        prop_assert!(place_off.iter().all(|off| off.abs() < 2e-5), "{:?}", place_off);
-        prop_assert!(turn_off.iter().all(|off| off.abs() < 0.1), "{:?}", turn_off);
+        let (place_m, turn_deg, roll_deg) = if is_soft { (2e-4, 0.3, 3.0) } else { (2e-5, 0.1, 0.1) };
+        prop_assert!(place_off.iter().all(|off| off.abs() < place_m), "{:?}", place_off);
+        prop_assert!(turn_off[0].abs() < roll_deg, "{:?}", turn_off);
+        prop_assert!(turn_off.iter().skip(1).all(|off| off.abs() < turn_deg), "{:?}", turn_off);
         let KnownBody::Ball { centre_w, .. } = found.found.body else { panic!() };
-        prop_assert!((centre_w - Point3::new(0.0, -0.65, 0.5)).norm() < 2e-5);
+        prop_assert!((centre_w - Point3::new(0.0, -0.65, 0.5)).norm() < 2.0 * place_m);
     }
 }
 
@@ -172,8 +175,11 @@ fn what_touches_do_not_determine_is_said_and_not_invented() {
     }
     assert!(found.found.correction.translation.vector.norm() < 1e-3);
     let whole = conclude(&all, &robot, &plate, all.len()).unwrap();
-    assert_eq!(whole.undetermined, Vec::<&str>::new());
-    assert!(whole.sds.iter().zip(parameters(&plate)).all(|(sd, (_, unit))| *sd < 0.3 * unit));
+    // A finger that gives way alike everywhere cannot be told from a plate that stands farther
+    // back.
+    assert_eq!(whole.undetermined, ["give"]);
+    let of_finger = whole.sds.iter().zip(parameters(&plate)).take(6);
+    assert!(of_finger.map(|(sd, (_, unit))| sd / unit).all(|share| share < 0.3));
 }
 
 #[test]
@@ -224,8 +230,8 @@ fn a_soft_finger_on_an_arm_finds_where_it_stands() {
     assert!(turn_deg[0].abs() < 4.0 * x_sd_deg.max(0.3), "{turn_deg:?} {x_sd_deg}");
 }
 
-/// A correction of exactly the error makes the finger stand where it is believed to, and none leaves
-/// the chain as it is to the bit.
+/// A correction of exactly the error makes the finger stand where it is believed to, and none
+/// leaves the chain as it is to the bit.
 #[test]
 fn a_correction_moves_the_tool() {
     let plain = ArmSettings::default();

@@ -43,8 +43,8 @@ pub trait Probe: Send {
         None
     }
 
-    /// Pose of the fingertip in `W`, by forward kinematics, where the last contact was read; none of
-    /// a probe that has no finger, or before a contact.
+    /// Pose of the fingertip in `W`, by forward kinematics, where the last contact was read; none
+    /// of a probe that has no finger, or before a contact.
     fn tip(&self) -> Option<Isometry3<f64>> {
         None
     }
