@@ -51,7 +51,8 @@ pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Envir
 /// In the place of a file's name.
 const NAME: &str = "(known body)";
 
-/// Its triangles in a frame whose +y is the plate's normal, and how far it is explored to each side.
+/// Its triangles in a frame whose +y is the plate's normal, and how far it is explored to each
+/// side.
 fn solid(body: &KnownBody) -> (Triangles, f64) {
     match *body {
         KnownBody::Ball { radius_m, .. } => (ball(Point3::origin(), radius_m, RINGS), radius_m),

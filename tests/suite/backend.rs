@@ -196,7 +196,7 @@ fn limits_hold_acceleration_and_braking_and_leave_a_good_command_alone() {
             // Away from the object, as fast as it goes, into the limits; of an arm the joints that
             // turn it about its foot and its hand about itself.
             let last = before.len() - 1;
-            let is_asked = |i: usize| last == 2 || i % last == 0;
+            let is_asked = |i: usize| last == 2 || i.is_multiple_of(last);
             let qdot = (0..=last).map(|i| if is_asked(i) { 9.0 } else { 0.0 }).collect();
             let reading = limited.step(&Command { qdot }).unwrap();
             for ((joint, now), before) in

@@ -35,7 +35,8 @@ fn a_body_in_order_passes_and_gives_its_baseline() {
 
 #[test]
 fn what_is_not_in_order_is_said_with_its_numbers() {
-    let cases: [(fn(u64, &mut Reading), fn(&GateError) -> bool); 8] = [
+    type Case = (fn(u64, &mut Reading), fn(&GateError) -> bool);
+    let cases: [Case; 8] = [
         (
             |_, reading| reading.q[1] = 1.7,
             |error| matches!(error, GateError::Outside { joint: "S2", q: 1.7, .. }),

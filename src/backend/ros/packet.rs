@@ -14,9 +14,9 @@ pub enum Packet {
     /// Force and torque.
     Wrench(WrenchStamped),
     /// A tactile frame of the BioTac's own driver.
-    Hand(BioTacHand),
+    Hand(Box<BioTacHand>),
     /// The same of a Shadow hand.
-    Fingers(BiotacAll),
+    Fingers(Box<BiotacAll>),
     /// The arm's state.
     Status(DiagnosticArray),
     /// Joint velocities with names and validity.

@@ -216,11 +216,11 @@ impl Ros1 {
         )?;
         match self.topics.tactile.is_shadow() {
             true => self.topic(side, Topic::Tactile, fingers_in, |packet| match packet {
-                Packet::Fingers(message) => Some(fingers_out(message.clone())),
+                Packet::Fingers(message) => Some(fingers_out(*message.clone())),
                 _ => None,
             })?,
             false => self.topic(side, Topic::Tactile, hand_in, |packet| match packet {
-                Packet::Hand(message) => Some(hand_out(message.clone())),
+                Packet::Hand(message) => Some(hand_out(*message.clone())),
                 _ => None,
             })?,
         }
@@ -375,7 +375,7 @@ macro_rules! headed {
     ($in:ident, $out:ident, $type:ident, $packet:ident, { $($field:ident),* }) => {
         fn $in(message: $type<Counted>) -> Packet {
             let $type { header, $($field),* } = message;
-            Packet::$packet($type { header: header.into(), $($field),* })
+            Packet::$packet($type { header: header.into(), $($field),* }.into())
         }
 
         fn $out(message: $type) -> $type<Counted> {

@@ -126,14 +126,22 @@ impl Ros2 {
             _ => None,
         })?;
         match self.topics.tactile.is_shadow() {
-            true => self.topic(Topic::Tactile, Packet::Fingers, |packet| match packet {
-                Packet::Fingers(message) => Some(message),
-                _ => None,
-            })?,
-            false => self.topic(Topic::Tactile, Packet::Hand, |packet| match packet {
-                Packet::Hand(message) => Some(message),
-                _ => None,
-            })?,
+            true => self.topic(
+                Topic::Tactile,
+                |m| Packet::Fingers(Box::new(m)),
+                |packet| match packet {
+                    Packet::Fingers(message) => Some(message.as_ref()),
+                    _ => None,
+                },
+            )?,
+            false => self.topic(
+                Topic::Tactile,
+                |m| Packet::Hand(Box::new(m)),
+                |packet| match packet {
+                    Packet::Hand(message) => Some(message.as_ref()),
+                    _ => None,
+                },
+            )?,
         }
         match self.topics.command.is_bare() {
             true => self.topic(Topic::Command, Packet::Velocities, |packet| match packet {

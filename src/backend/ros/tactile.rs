@@ -62,10 +62,10 @@ pub fn packet(frame: &Frame, stamp_s: f64, finger: usize, is_shadow: bool) -> Pa
                 electrodes: electrodes.map(|value| value as i16).into(),
             };
         }
-        return Packet::Fingers(hand);
+        return Packet::Fingers(Box::new(hand));
     }
     let at = Time::from_s(stamp_s);
-    Packet::Hand(BioTacHand {
+    Packet::Hand(Box::new(BioTacHand {
         header,
         hand_id: String::new(),
         bt_data: vec![BioTacData {
@@ -78,5 +78,5 @@ pub fn packet(frame: &Frame, stamp_s: f64, finger: usize, is_shadow: bool) -> Pa
             electrode_data: electrodes.map(|value| value as u16),
         }],
         bt_time: BioTacTime { frame_start_time: at, frame_end_time: at, ..BioTacTime::default() },
-    })
+    }))
 }

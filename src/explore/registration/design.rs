@@ -151,9 +151,9 @@ impl Candidate {
 
 impl Design {
     /// The `count` touches of `body` that tell the most: each is the one that shrinks the
-    /// parameters' ellipsoid most, given those before it, among those that `robot` reaches. Then they
-    /// are rehearsed in the order in which they will be made, and those left out that do not follow
-    /// on from the one before.
+    /// parameters' ellipsoid most, given those before it, among those that `robot` reaches. Then
+    /// they are rehearsed in the order in which they will be made, and those left out that do not
+    /// follow on from the one before.
     ///
     /// # Errors
     /// If it reaches too few, or they would determine too little.

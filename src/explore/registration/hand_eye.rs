@@ -4,8 +4,8 @@
 //! correction, reaches into the body until the liquid under its skin tells of contact: by the same
 //! volume each time, and by what it then went on. Where the electrodes feel the body does not
 //! enter, so their errors do not either. Of a turn about the finger's own axis the outline says
-//! little, but that its tip has a corner; there the electrodes are asked too on which side they feel
-//! the body, with a gain that is fitted and as far as a finger is its own mirror image.
+//! little, but that its tip has a corner; there the electrodes are asked too on which side they
+//! feel the body, with a gain that is fitted and as far as a finger is its own mirror image.
 
 use super::known_body::KnownBody;
 use super::outline::{Meeting, Outline};
@@ -48,8 +48,8 @@ const FINGER_RAD: f64 = 0.2;
 /// The same of the skin's give and the electrodes' gain; chosen.
 const GIVE_M: f64 = 0.5e-3;
 const GAIN: f64 = 0.5;
-/// The same of what an electrode finger feels aside of a contact in its middle: its halves are never
-/// quite alike. Chosen: three times what `make contacts` finds on a sphere.
+/// The same of what an electrode finger feels aside of a contact in its middle: its halves are
+/// never quite alike. Chosen: three times what `make contacts` finds on a sphere.
 const ASIDE_M: f64 = 3e-4;
 /// And of a finger that tells the exact point.
 const ASIDE_EXACT_M: f64 = 1e-6;

@@ -16,8 +16,8 @@ pub struct Aligned {
     /// Standard deviation of its place along each axis, m, then of its turn about each axis through
     /// the mesh's middle, rad.
     pub sds: [f64; 6],
-    /// Unit vectors of what the cloud does not determine: place in units of 2 cm, then turn in units
-    /// of 0.2 rad. The mesh stays there as it was.
+    /// Unit vectors of what the cloud does not determine: place in units of 2 cm, then turn in
+    /// units of 0.2 rad. The mesh stays there as it was.
     pub undetermined: Vec<DVector<f64>>,
     /// Root mean square distance of the points used from the mesh.
     pub rms_m: f64,
@@ -68,8 +68,8 @@ pub struct Alignment {
     pub position_sd_m: [f64; 3],
     /// Standard deviations of small turns about these axes, through the mesh's middle.
     pub turn_sd_deg: [f64; 3],
-    /// Directions (x, y, z in units of 2 cm, turns about x, y, z in units of 0.2 rad) that the cloud
-    /// does not determine; there the mesh stays as it was.
+    /// Directions (x, y, z in units of 2 cm, turns about x, y, z in units of 0.2 rad) that the
+    /// cloud does not determine; there the mesh stays as it was.
     pub undetermined: Vec<Vec<f64>>,
     /// Root mean square distance of the points from the mesh.
     pub residual_rms_m: f64,

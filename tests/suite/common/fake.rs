@@ -6,12 +6,15 @@ use palpate::robot::finger::Frame;
 use palpate::robot::finger::frame::ELECTRODES;
 use std::sync::{Arc, Mutex};
 
+/// What it does to the reading of a tick.
+pub type Break = fn(u64, &mut Reading);
+
 /// What a fake body lives in.
 #[derive(Default)]
 pub struct World {
     pub real_time: bool,
     /// From which tick on readings go through what.
-    pub breaks: Option<(u64, fn(u64, &mut Reading))>,
+    pub breaks: Option<(u64, Break)>,
     /// Force along y on a stage's tip at y.
     pub wall: Option<Box<dyn Fn(f64) -> f64 + Send>>,
     /// The tick at which it says that it was stopped.
