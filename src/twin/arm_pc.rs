@@ -5,8 +5,9 @@ use crate::backend::ros::joints::JointNames;
 use crate::backend::ros::packet::Packet;
 use crate::backend::ros::status::ArmStatus;
 
-/// Silence after which the arm is stopped; chosen: one command in six is enough.
-const SILENCE_S: f64 = 0.024;
+/// The arm is stopped when the last command has not been valid for so long; chosen: a period at
+/// 250 Hz.
+const GRACE_S: f64 = 0.004;
 
 /// How long a stop takes; chosen: the servos' own lag of 0.02 s makes it soft, and the arm is at
 /// rest 0.1 s later.
@@ -21,6 +22,8 @@ const TOGETHER_S: f64 = 0.5;
 /// The state between network and servos. Times are seconds of a monotonic clock.
 pub struct ArmPc {
     names: JointNames,
+    /// Silence after which the arm is stopped.
+    silence_s: f64,
     status: ArmStatus,
     /// The last command.
     wanted: Vec<f64>,
@@ -36,12 +39,13 @@ pub struct ArmPc {
 }
 
 impl ArmPc {
-    /// At rest with closed brakes.
-    pub fn new(names: JointNames) -> Self {
+    /// At rest with closed brakes; commands are valid for `valid_s`.
+    pub fn new(names: JointNames, valid_s: f64) -> Self {
         let count = names.names().len();
         let status = ArmStatus { brake: true, deadman: true, ..ArmStatus::default() };
         Self {
             names,
+            silence_s: valid_s + GRACE_S,
             status,
             wanted: vec![0.0; count],
             incoming: Vec::new(),
@@ -152,7 +156,7 @@ impl ArmPc {
 
     /// The velocities for the next tick.
     pub fn advance(&mut self, now_s: f64) -> &[f64] {
-        let is_silent = self.commanded_s.is_some_and(|at_s| now_s - at_s > SILENCE_S);
+        let is_silent = self.commanded_s.is_some_and(|at_s| now_s - at_s > self.silence_s);
         if self.status.servo_on && self.stop.is_none() && is_silent {
             let words = match self.refusal.as_str() {
                 "" => "commands ceased".to_owned(),

@@ -15,7 +15,7 @@ fn names() -> JointNames {
 
 /// An arm's computer that has been told to stand still and then to move, 4 ms apart, until 0.1 s.
 fn moving() -> ArmPc {
-    let mut pc = ArmPc::new(names());
+    let mut pc = ArmPc::new(names(), VALID_S);
     pc.take(&names().command(0.0, VALID_S, &[0.0; 3], false), 1, 0.0, 0.0);
     for i in 1..=25 {
         let now_s = f64::from(i) * 0.004;
@@ -35,7 +35,7 @@ fn speeds(pc: &mut ArmPc, ticks: u32) -> Vec<f64> {
 
 #[test]
 fn it_moves_after_a_command_to_stand_still_only() {
-    let mut pc = ArmPc::new(names());
+    let mut pc = ArmPc::new(names(), VALID_S);
     pc.take(&names().command(1.0, VALID_S, &[0.1; 3], false), 1, 1.0, 1.0);
     assert_eq!(pc.advance(1.0), [0.0; 3]);
     assert!(!pc.status().servo_on && pc.status().brake);
@@ -156,7 +156,7 @@ proptest! {
     fn it_stands_after_every_silence(
         sent in prop::collection::vec((0.0..0.05f64, -0.03..0.03f64, -1.0..1.0f64), 1..60),
     ) {
-        let mut pc = ArmPc::new(names());
+        let mut pc = ArmPc::new(names(), VALID_S);
         let (mut now_s, mut fastest) = (1.0, 0.0f64);
         for (after_s, age_s, qdot) in sent {
             now_s += after_s;
