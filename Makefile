@@ -45,16 +45,17 @@ paper-planners: setup
 test: setup
 	cargo test --locked --features ros2
 	for example in $(EXAMPLES); do cargo run --quiet --locked --features ros2 --example $$example || exit; done
-	$(MAKE) test-ros2 TOUCHES=8
+	$(MAKE) test-ros2 TOUCHES=8 OVER_ROS2='ros2::a_peer ros2::the_container ros2::the_loop'
 
 # An explorer and a twin of the arm over ROS 2, and a peer of another implementation, in a network
 # namespace of their own: nothing leaves it.
 TOUCHES := 20
+OVER_ROS2 := ros2::
 NAMESPACE := unshare --map-root-user --net bash tests/ros2/namespace.sh
 test-ros2: setup $(DEPS)/ros2/bin/python
 	@if $(NAMESPACE) true 2>/dev/null; then \
 		PALPATE_PEER=$(abspath $(DEPS)/ros2/bin/python) PALPATE_TOUCHES=$(TOUCHES) $(NAMESPACE) \
-			cargo test --locked --features ros2 --test suite -- --ignored --test-threads 1 ros2:: ; \
+			cargo test --locked --features ros2 --test suite -- --ignored --test-threads 1 $(OVER_ROS2) ; \
 	else \
 		echo "test-ros2 is skipped: this machine allows no network namespace (unshare --map-root-user --net)"; \
 	fi
