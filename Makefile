@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: demo paper paper-dynamic paper-planners test test-ros2 page-test test-mcap fuzz reference lint lint-windows bench contacts growth bench-peers dist setup tools clean
+.PHONY: demo paper paper-dynamic paper-planners test test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts growth bench-peers dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -45,25 +45,40 @@ paper-planners: setup
 test: setup
 	cargo test --locked --features ros2
 	for example in $(EXAMPLES); do cargo run --quiet --locked --features ros2 --example $$example || exit; done
-	$(MAKE) test-ros2 TOUCHES=8 OVER_ROS2='ros2::a_peer ros2::the_container ros2::the_loop'
+	$(MAKE) test-ros2 TOUCHES=8 OVER_TOPICS='lab::a_peer lab::the_container lab::the_loop'
 
 # An explorer and a twin of the arm over ROS 2, and a peer of another implementation, in a network
 # namespace of their own: nothing leaves it.
 TOUCHES := 20
-OVER_ROS2 := ros2::
+OVER_TOPICS := lab:: lab_faults::
 NAMESPACE := unshare --map-root-user --net bash tests/ros2/namespace.sh
+NO_NAMESPACE := this machine allows no network namespace (unshare --map-root-user --net)
+LAB_TESTS = cargo test --locked --features $(1) --test suite -- --ignored --test-threads 1 $(OVER_TOPICS)
+
 test-ros2: setup $(DEPS)/ros2/bin/python
 	@if $(NAMESPACE) true 2>/dev/null; then \
 		PALPATE_PEER=$(abspath $(DEPS)/ros2/bin/python) PALPATE_TOUCHES=$(TOUCHES) $(NAMESPACE) \
-			cargo test --locked --features ros2 --test suite -- --ignored --test-threads 1 $(OVER_ROS2) ; \
-	else \
-		echo "test-ros2 is skipped: this machine allows no network namespace (unshare --map-root-user --net)"; \
-	fi
+			$(call LAB_TESTS,ros2); \
+	else echo "test-ros2 is skipped: $(NO_NAMESPACE)"; fi
 
 $(DEPS)/ros2/bin/python: tests/ros2/peer.txt
 	python3 -m venv $(DEPS)/ros2
 	$(DEPS)/ros2/bin/python -m pip install --quiet --only-binary=:all: -r tests/ros2/peer.txt
 	touch $@
+
+# The same over ROS 1, with Debian's master and rospy; `make install-ros1` fetches them.
+ROS1 := libssl-dev pkg-config python3-rosmaster python3-rospy python3-std-srvs \
+	$(foreach part,std sensor geometry trajectory diagnostic,python3-$(part)-msgs)
+
+test-ros1: setup
+	@if ! command -v rosmaster >/dev/null; then echo "test-ros1 is skipped: no rosmaster; make install-ros1"; \
+	elif $(NAMESPACE) true 2>/dev/null; then \
+		PALPATE_ROS=ros1 PALPATE_PEER=/usr/bin/python3 PALPATE_TOUCHES=$(TOUCHES) $(NAMESPACE) \
+			$(call LAB_TESTS,ros1); \
+	else echo "test-ros1 is skipped: $(NO_NAMESPACE)"; fi
+
+install-ros1:
+	apt-get install --yes --no-install-recommends $(ROS1)
 
 # The report page in a browser; fails where there is no Chromium.
 page-test: setup
@@ -99,7 +114,7 @@ reference: setup
 lint: setup
 	cargo fmt --check
 	cargo clippy --locked --all-targets --features ros2 -- -D warnings
-	cargo clippy --locked --lib --bins --no-default-features --features ros2 -- -D warnings
+	cargo clippy --locked --lib --bins --tests --no-default-features --features ros2 -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --features ros2
 
 # What draws windows and pictures, whose packages take long to check.

@@ -3,5 +3,7 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    #[cfg(feature = "ros1")]
+    palpate::backend::ros::spare_certificates();
     palpate::cli::main()
 }

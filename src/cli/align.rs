@@ -1,8 +1,8 @@
 //! `palpate align`.
 
+use super::known_body::numbers;
 use super::output::Force;
 use super::patience::with_patience;
-use super::register::numbers;
 use super::terminal::Talk;
 use super::terminal::{Ending, print};
 use crate::experiment::cloud;

@@ -2,12 +2,14 @@
 
 mod align;
 mod calibrate;
+mod check;
 mod columns;
 mod completions;
 mod effects;
 mod export;
 mod fidelity;
 mod find;
+mod known_body;
 mod list;
 mod new;
 mod output;
@@ -51,10 +53,11 @@ Examples:
   palpate watch scenes/bird_pa10.toml       watch a trial in a window
   palpate twin experiments/container_pa10.toml   a stand-in for the real arm, over ROS 2
   palpate export runs/bird --planner active --out bird.ply
+  palpate check toy --baseline experiments/baselines/toy.jsonl
   palpate fidelity scenes/bird_finger.toml --tolerance 0.2mm
   palpate stress                            hard cases until they break
 
-Exit codes: 0 done, 1 a test failed, 2 could not (the message says why), 130 interrupted; run the same command \
+Exit codes: 0 done, 1 a test failed, 2 could not (the message says why), 3 undecided, 130 interrupted; run the same command \
 again to continue.";
 
 #[derive(Subcommand)]
@@ -77,6 +80,8 @@ enum Command {
     Twin(twin::Args),
     /// Write a belief of a run as a mesh.
     Export(export::Args),
+    /// Hold planners against what they were: better, ok, worse, or undecided.
+    Check(check::Args),
     /// Show what accuracy costs: errors and time over a ladder of scenes.
     Fidelity(fidelity::Args),
     /// Show what each effect of a scene changes and costs.
@@ -116,6 +121,7 @@ pub fn main() -> ExitCode {
         Command::Export(args) => export::run(&args),
         Command::Fidelity(args) => fidelity::run(&args, cli.talk),
         Command::Effects(args) => effects::run(&args, cli.talk),
+        Command::Check(args) => check::run(&args, cli.talk),
         Command::Stress(args) => stress::run(&args, cli.talk),
         Command::Register(args) => register::run(&args, cli.talk),
         Command::Align(args) => align::run(&args, cli.talk),
@@ -127,6 +133,7 @@ pub fn main() -> ExitCode {
     match outcome {
         Ok(Ending::Done) => ExitCode::SUCCESS,
         Ok(Ending::Failed) => ExitCode::FAILURE,
+        Ok(Ending::Undecided) => ExitCode::from(3),
         Ok(Ending::Interrupted) => ExitCode::from(130),
         Err(error) => {
             terminal::error(format!("{error:#}"));

@@ -11,6 +11,8 @@ pub(super) enum Ending {
     Done,
     /// What was tested did not hold.
     Failed,
+    /// What was asked cannot be told.
+    Undecided,
     /// The person who began it stopped it.
     Interrupted,
 }

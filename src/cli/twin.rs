@@ -1,7 +1,8 @@
 //! `palpate twin`.
 
 use super::find::{SCENES, find};
-use super::prepare::simulation;
+use super::known_body::KnownBodyArgs;
+use super::prepare::{environment, simulator};
 use super::progress::stop_on_interrupt;
 use super::show::is_experiment;
 use super::terminal::{Ending, Talk, print};
@@ -9,13 +10,14 @@ use crate::backend::ros::connect::connect;
 use crate::backend::ros::settings::BackendKind;
 use crate::backend::ros::topics::Side;
 use crate::experiment::Experiment;
-use crate::sim::Scene;
 use crate::sim::finger::effects::wrench::WrenchEffect;
+use crate::sim::{Scene, known_body};
 use crate::twin::failure::{FAILURES, by_name};
 use crate::twin::serve::{Injection, Twin, services};
 use anyhow::{Context, bail};
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -23,6 +25,7 @@ Examples:
   palpate twin experiments/container_pa10.toml
   palpate twin scenes/container_pa10.toml --domain 7 --seed 3
   palpate twin scenes/bird_pa10.toml --inject force_spike@12 --inject estop@20+2
+  palpate twin scenes/container_pa10.toml --ball 0.02 --at 0.003,-0.652,0.501
 
 In another terminal: palpate run container_pa10 --set backend.kind='\"ros2\"'
 
@@ -32,6 +35,9 @@ JSON lines. Ctrl-C ends it. A failure is begun by --inject, or by the service /t
 pub(super) struct Args {
     /// A scene or an experiment (.toml) with a body that moves and a soft finger.
     path: PathBuf,
+    /// In place of the scene's object: what `register` touches.
+    #[command(flatten)]
+    body: KnownBodyArgs,
     /// Transport [default: the experiment's, or ros2].
     #[arg(long, value_name = "ros2|ros1", value_parser = kind)]
     kind: Option<BackendKind>,
@@ -75,16 +81,21 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         talk.note("the scene has no [effects.wrench]; the twin has the default one");
     }
     let settings = experiment.backend.clone();
-    let simulation = simulation(experiment, talk)?;
-    let simulator = simulation.simulator();
-    let (Some(body), Some(robot)) = (simulator.body()?, simulation.environment().robot()) else {
+    let scene = experiment.scene;
+    let environment = match args.body.body()? {
+        Some(body) => Arc::new(known_body::environment(&scene, &body)?),
+        None => environment(scene, talk)?,
+    };
+    let simulator = simulator(&environment, talk)?;
+    let scene = environment.scene();
+    let (Some(body), Some(robot)) = (simulator.body()?, environment.robot()) else {
         bail!(
             "{}: body = \"{}\" does not move; a twin needs \"kinematic\" or \"dynamic\"",
             args.path.display(),
-            simulation.experiment().scene.body.name()
+            scene.body.name()
         );
     };
-    let effects = &simulation.experiment().scene.effects;
+    let effects = &scene.effects;
     if effects.fluid.is_none() || effects.electrodes.is_none() {
         bail!(
             "{}: a twin sends tactile frames; it needs [effects.skin], [effects.fluid] and \

@@ -6,7 +6,9 @@ use super::row::TrialRow;
 use super::simulation::Simulation;
 use super::store::{RunFolder, StoreError};
 use crate::explore::planner;
-use rayon::iter::{ParallelBridge, ParallelIterator};
+use rayon::iter::{
+    IndexedParallelIterator, IntoParallelIterator, ParallelBridge, ParallelIterator,
+};
 use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -72,6 +74,29 @@ pub fn run(
     .map_err(|error: StoreError| RunError::Store(error))?;
     let (_, count) = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
     Ok(count)
+}
+
+/// Runs `jobs` and keeps their rows in memory, in the jobs' order; those begun after `stop` became
+/// true are left out.
+///
+/// # Errors
+/// If threads cannot be started.
+pub fn rows(
+    simulation: &Simulation,
+    jobs: Vec<Job>,
+    threads: usize,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(&TrialRow) + Sync),
+) -> Result<Vec<TrialRow>, RunError> {
+    let run = |(trial, planner): Job| {
+        let row = (!stop.load(Ordering::Relaxed))
+            .then(|| run_caught(simulation, planner, trial, None))?;
+        progress(&row);
+        Some(row)
+    };
+    let found: Vec<Option<TrialRow>> =
+        pool(threads)?.install(|| jobs.into_par_iter().with_max_len(1).map(run).collect());
+    Ok(found.into_iter().flatten().collect())
 }
 
 /// Threads of its own for a piece of work; 0 means all cores.

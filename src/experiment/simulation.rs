@@ -11,11 +11,8 @@ use super::truth::Truth;
 use super::witness::Witness;
 use crate::backend::interlock::gates::{Expected, GateError, check_start};
 use crate::backend::ros::arm::Lab;
-use crate::backend::ros::connect::connect;
 use crate::backend::ros::fault::LinkFault;
-use crate::backend::ros::service::Service;
 use crate::backend::ros::settings::BackendKind;
-use crate::backend::ros::topics::Side;
 use crate::backend::{Backend, Fault};
 use crate::explore::planner;
 use crate::explore::probe::Probe;
@@ -178,9 +175,7 @@ impl Simulation {
         if self.is_real() {
             let lacks = || LinkFault::Arm { words: "the scene has no object to touch".into() };
             let chain = self.environment().chain().ok_or_else(lacks)?;
-            let settings = &self.experiment.backend;
-            let open = connect(settings, Side::Explorer, Service::COMMON.into())?;
-            self.lab = Some(Lab::connect(settings, &chain, open)?);
+            self.lab = Some(Lab::join(&self.experiment.backend, &chain)?);
         }
         Ok(self.lab.clone())
     }

@@ -2,6 +2,7 @@
 
 pub mod axes;
 pub mod canvas;
+pub mod check;
 pub mod explorer;
 pub mod figures;
 pub mod files;

@@ -5,9 +5,9 @@ use crate::backend::ros::joints::JointNames;
 use crate::backend::ros::packet::Packet;
 use crate::backend::ros::status::ArmStatus;
 
-/// The arm is stopped when the last command has not been valid for so long; chosen: a period at
+/// The arm is stopped when the last command has not been valid for so long; chosen: two periods at
 /// 250 Hz.
-const GRACE_S: f64 = 0.004;
+const GRACE_S: f64 = 0.008;
 
 /// How long a stop takes; chosen: the servos' own lag of 0.02 s makes it soft, and the arm is at
 /// rest 0.1 s later.

@@ -231,7 +231,7 @@ def touch(domain, tactile):
             speed = 0.02
         else:
             break
-        point = JointTrajectoryPoint([], [0.0, speed, 0.0], [], [], Duration(0, 20_000_000))
+        point = JointTrajectoryPoint([], [0.0, speed, 0.0], [], [], Duration(0, 30_000_000))
         command.write(JointTrajectory(Header(now(), ""), ["X", "Y", "Z"], [point]))
         time.sleep(0.004)
     if felt is None or not moved:
@@ -258,7 +258,7 @@ def listen(domain, span):
                 problems.add(f"names {message.joint_names}")
             if not all(math.isfinite(value) for value in point.velocities) or point.positions:
                 problems.add("velocities that are no numbers")
-            if point.time_from_start.nanosec != 20_000_000:
+            if point.time_from_start.nanosec != 30_000_000:
                 problems.add("a validity that is not that of the table")
         beats += len([beat for beat in hearts.take(N=100) if getattr(beat, "stamp", None)])
         time.sleep(0.001)

@@ -8,6 +8,8 @@ mod arm;
 mod arm_pc;
 mod backend;
 mod broken;
+#[cfg(feature = "nlopt")]
+mod check;
 #[cfg(feature = "mujoco")]
 mod collisions;
 #[cfg(feature = "nlopt")]
@@ -50,6 +52,10 @@ mod information;
 #[cfg(feature = "mujoco")]
 mod installed;
 mod interlocks;
+#[cfg(all(feature = "mujoco", feature = "nlopt"))]
+mod lab;
+#[cfg(all(feature = "mujoco", feature = "nlopt"))]
+mod lab_faults;
 mod memory;
 mod meshes;
 mod messages;
@@ -73,8 +79,6 @@ mod report;
 mod reproducible;
 #[cfg(feature = "mujoco")]
 mod rigid;
-#[cfg(all(feature = "ros2", feature = "mujoco", feature = "nlopt"))]
-mod ros2;
 mod scenes;
 mod servo;
 mod slopes;

@@ -2,6 +2,7 @@
 //! heard in.
 
 use super::clock;
+use super::connect::connect;
 use super::fault::LinkFault;
 use super::joints::JointNames;
 use super::link::Link;
@@ -9,7 +10,7 @@ use super::mailbox::{Heard, Mailboxes, Postman};
 use super::net_ft::{NetFt, NetFtSettings, Record};
 use super::service::Service;
 use super::settings::BackendSettings;
-use super::topics::Topic;
+use super::topics::{Side, Topic};
 use super::transport::{Connect, TransportError};
 use crate::backend::pace::Pace;
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
@@ -41,6 +42,15 @@ const ANSWER_S: f64 = 0.5;
 const HEARD: [Topic; 4] = [Topic::Joints, Topic::Wrench, Topic::Tactile, Topic::Status];
 
 impl Lab {
+    /// Joins the arm of `chain` over the transport that `settings` name.
+    ///
+    /// # Errors
+    /// As [`connect`](Self::connect), and if this build lacks the transport.
+    pub fn join(settings: &BackendSettings, chain: &Chain) -> Result<Arc<Self>, LinkFault> {
+        let open = connect(settings, Side::Explorer, Service::COMMON.into())?;
+        Self::connect(settings, chain, open)
+    }
+
     /// Connects to the arm of `chain` and waits until every topic is heard.
     ///
     /// # Errors

@@ -10,7 +10,6 @@ pub mod fault;
 pub mod joints;
 pub mod link;
 pub mod mailbox;
-pub mod master;
 pub mod memory;
 pub mod message;
 pub mod net_ft;
@@ -25,3 +24,6 @@ pub mod status;
 pub mod tactile;
 pub mod topics;
 pub mod transport;
+
+#[cfg(feature = "ros1")]
+pub use ros1::spare_certificates;

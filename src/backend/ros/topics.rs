@@ -93,7 +93,7 @@ const USUAL: [Usual; 6] = [
         name: "/pa10/joint_velocity_cmd",
         types: &[JointTrajectory::<Header>::DEFINITION.name, Float64MultiArray::DEFINITION.name],
         rate_hz: 250.0,
-        age_s: 0.02,
+        age_s: 0.03,
     },
     Usual {
         name: "/palpate/heartbeat",

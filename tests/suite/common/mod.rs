@@ -2,6 +2,8 @@
 
 pub mod counting;
 pub mod fake;
+#[cfg(all(feature = "mujoco", feature = "nlopt"))]
+pub mod lab;
 #[cfg(feature = "mujoco")]
 #[allow(dead_code)] // The bench of finite elements uses the rest.
 pub mod presses;

@@ -1,129 +1,31 @@
 //! ROS 1, by roslibrust: for labs whose drivers are of that age.
-//!
-//! Its messages are those of ROS 2 but for the header, which counts too.
 
-use super::master::publisher_count;
-use super::message::{
-    BioTacHand, BiotacAll, Described, DiagnosticArray, Float64MultiArray, Header, JointState,
-    JointTrajectory, Time, WrenchStamped,
-};
-use super::packet::Packet;
-use super::service::{Answer, Service};
-use super::settings::BackendSettings;
-use super::topics::{Side, Topic, Topics};
-use super::transport::{Delivery, Transport, TransportError, Waker};
+mod definitions;
+mod master;
+#[cfg(unix)]
+mod nodelay;
+mod types;
+
+use crate::backend::ros::packet::Packet;
+use crate::backend::ros::service::{Answer, Service};
+use crate::backend::ros::settings::BackendSettings;
+use crate::backend::ros::topics::{Side, Topic, Topics};
+use crate::backend::ros::transport::{Delivery, Transport, TransportError, Waker};
+use master::Census;
+use roslibrust::RosMessageType;
 use roslibrust::ros1::{NodeHandle, Publisher, ServiceServer};
-use roslibrust::{MessageDescriptor, RosMessageType, RosServiceType};
-use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
+use types::*;
 
 /// Messages that wait in a reader or writer; chosen, more than come while a thread is held up.
 const QUEUE: usize = 64;
 
 /// How long an answer to a call from outside is waited for; chosen.
 const ANSWER: Duration = Duration::from_millis(500);
-
-/// A header as ROS 1 sends it.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Counted {
-    /// Consecutive number.
-    seq: u32,
-    /// When.
-    stamp: Time,
-    /// In which frame.
-    frame_id: String,
-}
-
-impl From<Header> for Counted {
-    fn from(Header { stamp, frame_id }: Header) -> Self {
-        Self { seq: 0, stamp, frame_id }
-    }
-}
-
-impl From<Counted> for Header {
-    fn from(Counted { stamp, frame_id, .. }: Counted) -> Self {
-        Self { stamp, frame_id }
-    }
-}
-
-/// The type of a message in ROS 1, with the MD5 sum of its definition (genmsg).
-macro_rules! ros1 {
-    ($type:ty, $name:expr, $md5:expr) => {
-        impl RosMessageType for $type {
-            const DESCRIPTION: MessageDescriptor = MessageDescriptor::new::<Self>(
-                $name,
-                $md5,
-                <$type as Described>::DEFINITION.fields,
-                "",
-                &[0; 32],
-            );
-        }
-    };
-}
-
-ros1!(JointState<Counted>, "sensor_msgs/JointState", "3066dcd76a6cfaef579bd0f34173e9fd");
-ros1!(WrenchStamped<Counted>, "geometry_msgs/WrenchStamped", "d78d3cb249ce23087ade7e7d0c40cfa7");
-ros1!(BioTacHand<Counted>, "biotac_sensors/BioTacHand", "d96f900cbfb096d61de125081e11dcab");
-ros1!(BiotacAll<Counted>, "sr_robot_msgs/BiotacAll", "0022d8afb0897596a0c41f523836ee37");
-ros1!(
-    DiagnosticArray<Counted>,
-    "diagnostic_msgs/DiagnosticArray",
-    "60810da900de1dd6ddd437c3503511da"
-);
-ros1!(
-    JointTrajectory<Counted>,
-    "trajectory_msgs/JointTrajectory",
-    "65b4f94a94d1ed67169da35a02f33d3f"
-);
-ros1!(Float64MultiArray, "std_msgs/Float64MultiArray", "4b7d974086d4060e7db4613a7e6c3ba4");
-
-impl RosMessageType for Counted {
-    const DESCRIPTION: MessageDescriptor = MessageDescriptor::new::<Self>(
-        "std_msgs/Header",
-        "2176decaecbce78abc3b96ef049fabed",
-        "uint32 seq\ntime stamp\nstring frame_id\n",
-        "",
-        &[0; 32],
-    );
-}
-
-/// `std_srvs/Trigger`.
-struct Trigger;
-
-/// Its request, which is empty.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-struct Request {}
-
-/// Its response.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-struct Response {
-    success: bool,
-    message: String,
-}
-
-/// MD5 sum of `std_srvs/Trigger` (genmsg).
-const TRIGGER_MD5: &str = "937c9679a518e3a18d831e57125ea522";
-
-impl RosMessageType for Request {
-    const DESCRIPTION: MessageDescriptor =
-        MessageDescriptor::new::<Self>("std_srvs/TriggerRequest", TRIGGER_MD5, "", "", &[0; 32]);
-}
-
-impl RosMessageType for Response {
-    const DESCRIPTION: MessageDescriptor =
-        MessageDescriptor::new::<Self>("std_srvs/TriggerResponse", TRIGGER_MD5, "", "", &[0; 32]);
-}
-
-impl RosServiceType for Trigger {
-    const ROS_SERVICE_NAME: &'static str = "std_srvs/Trigger";
-    const MD5SUM: &'static str = TRIGGER_MD5;
-    type Request = Request;
-    type Response = Response;
-}
 
 /// What comes out of the tasks.
 enum Item {
@@ -139,7 +41,7 @@ type Waiting = Arc<Mutex<HashMap<u64, Sender<Answer>>>>;
 pub struct Ros1 {
     runtime: Runtime,
     node: NodeHandle,
-    master: String,
+    census: Census,
     topics: Topics,
     inbox: Receiver<Item>,
     out: Sender<Item>,
@@ -147,6 +49,17 @@ pub struct Ros1 {
     /// Kept, for a service ends with it.
     _servers: Vec<ServiceServer>,
     waiting: Waiting,
+}
+
+/// Spares ROS 1 the loading of certificates, which nobody uses there: each attempt to reach a dead
+/// publisher would load them anew and hold messages up for 200 ms. To be called before any thread
+/// runs, as a program's first act.
+pub fn spare_certificates() {
+    // SAFETY: no other thread reads the environment yet.
+    unsafe {
+        std::env::set_var("SSL_CERT_FILE", "/dev/null");
+        std::env::set_var("SSL_CERT_DIR", "/nonexistent");
+    }
 }
 
 fn open<E: std::fmt::Display>(what: &str) -> impl Fn(E) -> TransportError {
@@ -165,19 +78,20 @@ impl Ros1 {
         services: Vec<Service>,
     ) -> Result<Self, TransportError> {
         let runtime = Runtime::new().map_err(open("threads"))?;
+        // A second node of the same name would end the first.
         let name = match side {
-            Side::Explorer => "/palpate_explorer",
-            Side::Arm => "/palpate_arm",
+            Side::Explorer => format!("/palpate_explorer_{}", std::process::id()),
+            Side::Arm => format!("/palpate_arm_{}", std::process::id()),
         };
         let master = settings.master.clone();
         let node = runtime
-            .block_on(NodeHandle::new(&master, name))
+            .block_on(NodeHandle::new(&master, &name))
             .map_err(open(&format!("a node at the master {master}")))?;
         let (out, inbox) = channel();
         let mut end = Self {
             runtime,
             node,
-            master,
+            census: Census::new(&master, &settings.topics),
             topics: settings.topics.clone(),
             inbox,
             out,
@@ -335,7 +249,7 @@ impl Transport for Ros1 {
     }
 
     fn publisher_count(&self, topic: Topic) -> usize {
-        publisher_count(&self.master, self.topics.line(topic).name).unwrap_or(0)
+        self.census.publishers(topic)
     }
 
     fn call(&mut self, service: &Service) -> Result<(), TransportError> {
@@ -369,25 +283,3 @@ impl Transport for Ros1 {
         }
     }
 }
-
-/// A message with the header of the one system and of the other.
-macro_rules! headed {
-    ($in:ident, $out:ident, $type:ident, $packet:ident, { $($field:ident),* }) => {
-        fn $in(message: $type<Counted>) -> Packet {
-            let $type { header, $($field),* } = message;
-            Packet::$packet($type { header: header.into(), $($field),* }.into())
-        }
-
-        fn $out(message: $type) -> $type<Counted> {
-            let $type { header, $($field),* } = message;
-            $type { header: header.into(), $($field),* }
-        }
-    };
-}
-
-headed!(joints_in, joints_out, JointState, Joints, { name, position, velocity, effort });
-headed!(wrench_in, wrench_out, WrenchStamped, Wrench, { wrench });
-headed!(hand_in, hand_out, BioTacHand, Hand, { hand_id, bt_data, bt_time });
-headed!(fingers_in, fingers_out, BiotacAll, Fingers, { tactiles });
-headed!(status_in, status_out, DiagnosticArray, Status, { status });
-headed!(command_in, command_out, JointTrajectory, Command, { joint_names, points });

@@ -1,14 +1,71 @@
 //! What the master of ROS 1 knows: who publishes.
 
+#[cfg(unix)]
+use super::nodelay::send_at_once;
+use crate::backend::ros::topics::{Topic, Topics};
 use std::io::{Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// How long the master is waited for; chosen.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// How many nodes publish `topic`, as the master at `uri` says; none if it does not say.
-pub fn publisher_count(uri: &str, topic: &str) -> Option<usize> {
+/// How often it is asked; chosen: it takes milliseconds to answer.
+const EVERY: Duration = Duration::from_millis(250);
+
+/// Known publishers of each topic, counted in a thread of its own, so that nobody waits for the
+/// master; it looks after new connections, too.
+pub struct Census {
+    counts: Arc<[AtomicUsize; Topic::ALL.len()]>,
+    /// Ends the thread when it is gone.
+    stop: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Census {
+    /// Of `topics`, as the master at `uri` says.
+    pub fn new(uri: &str, topics: &Topics) -> Self {
+        let counts: Arc<[AtomicUsize; Topic::ALL.len()]> = Arc::default();
+        let (uri, topics, shared) = (uri.to_owned(), topics.clone(), Arc::clone(&counts));
+        let (stop, stopped) = channel::<()>();
+        let thread = std::thread::spawn(move || {
+            loop {
+                let state = state(&uri).unwrap_or_default();
+                for (topic, shared) in Topic::ALL.into_iter().zip(&*shared) {
+                    let known = count(&state, topics.line(topic).name).unwrap_or(0);
+                    shared.store(known, Ordering::Relaxed);
+                }
+                #[cfg(unix)]
+                send_at_once();
+                if stopped.recv_timeout(EVERY) != Err(RecvTimeoutError::Timeout) {
+                    break;
+                }
+            }
+        });
+        Self { counts, stop: Some(stop), thread: Some(thread) }
+    }
+
+    /// How many nodes publish `topic`; none if the master does not say.
+    pub fn publishers(&self, topic: Topic) -> usize {
+        self.counts[topic as usize].load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Census {
+    fn drop(&mut self) {
+        self.stop = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What the master answers to `getSystemState`.
+fn state(uri: &str) -> Option<String> {
     let host = uri.strip_prefix("http://")?.trim_end_matches('/');
     let address = host.to_socket_addrs().ok()?.next()?;
     let mut stream = TcpStream::connect_timeout(&address, PATIENCE).ok()?;
@@ -22,10 +79,10 @@ pub fn publisher_count(uri: &str, topic: &str) -> Option<usize> {
     stream.write_all(request.as_bytes()).ok()?;
     let mut text = String::new();
     stream.read_to_string(&mut text).ok()?;
-    count(&text, topic)
+    Some(text)
 }
 
-/// Reads it from an answer to `getSystemState`, which is `[code, words, [publishers, subscribers,
+/// How many nodes publish `topic` by an answer to `getSystemState`, which is `[code, words, [publishers, subscribers,
 /// services]]`; each of the three is a list of `[topic, [node…]]`.
 fn count(text: &str, topic: &str) -> Option<usize> {
     let compact: String = text.chars().filter(|c| !c.is_whitespace()).collect();

@@ -1,0 +1,167 @@
+//! `palpate check`.
+
+use super::columns::aligned;
+use super::find::{EXPERIMENTS, find};
+use super::output::Force;
+use super::prepare::{bound_threads, simulation};
+use super::progress::{progress_bar, step, stop_on_interrupt};
+use super::terminal::{Ending, Talk, print};
+use crate::experiment::row::TrialRow;
+use crate::experiment::store::write_whole;
+use crate::experiment::{Experiment, Simulation, runner};
+use crate::report::check::{figure, junit, lines};
+use crate::study::check::{Baseline, Held, Rules, Verdict, differs, hold};
+use anyhow::{Context, bail};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate check toy --baseline experiments/baselines/toy.jsonl
+  palpate check toy --baseline experiments/baselines/toy.jsonl --bless 'length scales are fitted in logarithms'
+  palpate check bird --baseline bird.jsonl --tolerance 0.1 --max-trials 100 --junit check.xml --svg check.svg
+
+Runs the first ten trials of every planner. Rows that are the bytes of the baseline's are identical, and that is \
+all. Otherwise new and old are paired by trial, which share seeds, on the mean of the logarithm of the error over the \
+touches; trials are added by tens until an interval that holds at any time says better, ok (its upper end is below \
+the tolerance) or worse, or --max-trials are spent: undecided. Other measures stand beside it, corrected after Holm, and \
+can only be worse.
+
+Exit codes: 0 identical, better or ok, 1 worse or missing, 3 undecided, 2 could not.")]
+pub(super) struct Args {
+    /// An experiment (.toml), or the name of one in experiments/.
+    experiment: PathBuf,
+    /// What planners were: a file that --bless writes.
+    #[arg(long, value_name = "FILE")]
+    baseline: PathBuf,
+    /// Most trials of each planner.
+    #[arg(long, default_value_t = 50, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    max_trials: u32,
+    /// Share of an error that may be lost.
+    #[arg(long, default_value_t = 0.05, value_name = "SHARE", value_parser = tolerance)]
+    tolerance: f64,
+    /// Write the baseline as it is now, and why.
+    #[arg(long, value_name = "WHY")]
+    bless: Option<String>,
+    /// Write the verdicts as JUnit XML.
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Write the table as Markdown.
+    #[arg(long, value_name = "FILE")]
+    markdown: Option<PathBuf>,
+    /// Draw the changes with their intervals.
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Change one setting; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Threads; 0 means all cores. Results do not depend on it.
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
+    #[command(flatten)]
+    force: Force,
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|share| (1e-4..=10.0).contains(share));
+    share.ok_or("allowed is a share of 0.0001 to 10, as in 0.05".into())
+}
+
+pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+    let mut experiment = Experiment::load(&find(&args.experiment, EXPERIMENTS)?, &args.set)?;
+    experiment.trials = args.max_trials;
+    let name = experiment.name.clone();
+    for path in [&args.junit, &args.markdown, &args.svg].into_iter().flatten() {
+        args.force.claim(path)?;
+    }
+    let old = match &args.bless {
+        Some(_) if !args.baseline.exists() => None,
+        _ => {
+            let old = Baseline::read(&args.baseline)?;
+            old.check_pairs(&args.baseline, &experiment)?;
+            Some(old)
+        }
+    };
+    bound_threads(args.threads)?;
+    let simulation = simulation(experiment, talk)?;
+    if simulation.is_real() {
+        bail!("backend.kind: a check runs on the simulated body; allowed is \"simulated\"");
+    }
+    let stop = stop_on_interrupt("trials")?;
+    let rules = Rules { tolerance: args.tolerance, ..Rules::default() };
+    if let Some(why) = &args.bless {
+        return bless(args, &simulation, old.as_ref(), (why, &rules), &stop, talk);
+    }
+    let old = old.context("no baseline")?;
+    let bar = progress_bar(talk, &name, "trials", most(&simulation), 0);
+    let tick = |_: &TrialRow| step(talk, &bar);
+    let held = hold(&simulation, &old, &rules, args.threads.into(), &stop, &tick)?;
+    bar.finish_and_clear();
+    tell(args, &name, &old, &held, &rules)?;
+    Ok(match held.verdict() {
+        _ if held.is_stopped => Ending::Interrupted,
+        Verdict::Identical | Verdict::Better | Verdict::Ok => Ending::Done,
+        Verdict::Undecided => Ending::Undecided,
+        Verdict::Worse | Verdict::Missing => Ending::Failed,
+    })
+}
+
+fn most(simulation: &Simulation) -> u64 {
+    let experiment = simulation.experiment();
+    u64::from(experiment.trials) * experiment.planners.len() as u64
+}
+
+fn tell(args: &Args, name: &str, old: &Baseline, held: &Held, rules: &Rules) -> anyhow::Result<()> {
+    let mut table = vec![lines::HEAD.map(String::from)];
+    table.extend(lines::rows(held));
+    let file = args.baseline.display();
+    let mut text = format!("{name} against {file} ({})\n{}", old.header.why, aligned(&table));
+    for remark in lines::remarks(held, rules, args.max_trials) {
+        text += &format!("{remark}\n");
+    }
+    text += lines::word(held.verdict());
+    print(&text)?;
+    let write = |path: &PathBuf, text: String| {
+        write_whole(path, &text).with_context(|| path.display().to_string())
+    };
+    if let Some(path) = &args.junit {
+        write(path, junit::text(name, held, rules, args.max_trials)?)?;
+    }
+    if let Some(path) = &args.markdown {
+        write(path, lines::markdown(name, held, rules, args.max_trials))?;
+    }
+    if let Some(path) = &args.svg {
+        write(path, figure::draw(name, held, rules))?;
+    }
+    Ok(())
+}
+
+/// Makes every trial and writes what they are; of a baseline that is there it is said who differs.
+fn bless(
+    args: &Args,
+    simulation: &Simulation,
+    old: Option<&Baseline>,
+    (why, rules): (&str, &Rules),
+    stop: &AtomicBool,
+    talk: Talk,
+) -> anyhow::Result<Ending> {
+    args.force.claim(&args.baseline)?;
+    let bar = progress_bar(talk, &simulation.experiment().name, "trials", most(simulation), 0);
+    let tick = |_: &TrialRow| step(talk, &bar);
+    let jobs = runner::jobs(simulation.experiment(), &[]);
+    let threads = args.threads.into();
+    let rows = runner::rows(simulation, jobs, threads, stop, &tick)?;
+    bar.finish_and_clear();
+    if stop.load(Ordering::Relaxed) {
+        return Ok(Ending::Interrupted);
+    }
+    let told = old.map_or(Vec::new(), |old| differs(simulation, old, rules, &rows));
+    let new = Baseline::new(simulation, &rows, why, told.clone());
+    write_whole(&args.baseline, &new.text()?)?;
+    let count = rows.len();
+    let mut text = format!("{count} trials in {}", args.baseline.display());
+    told.iter().for_each(|line| text += &format!("\n{line}"));
+    print(&text)?;
+    Ok(Ending::Done)
+}

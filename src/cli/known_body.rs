@@ -1,0 +1,46 @@
+//! A ball or a plate on the command line.
+
+use crate::explore::registration::KnownBody;
+use anyhow::Context;
+use nalgebra::{UnitVector3, Vector3};
+
+#[derive(clap::Args)]
+pub(super) struct KnownBodyArgs {
+    /// A ball of this radius.
+    #[arg(long, value_name = "RADIUS_M", value_parser = radius, requires = "at", conflicts_with = "plate")]
+    ball: Option<f64>,
+    /// A plate with this normal, towards the finger, in W.
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers, requires = "at", allow_hyphen_values = true)]
+    plate: Option<[f64; 3]>,
+    /// Where the ball's centre or a point of the plate is, in W.
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers, allow_hyphen_values = true)]
+    at: Option<[f64; 3]>,
+}
+
+/// Radii that a finger can touch all around.
+const RADII_M: std::ops::RangeInclusive<f64> = 2e-3..=0.2;
+
+fn radius(text: &str) -> Result<f64, String> {
+    let radius_m = text.parse().ok().filter(|radius_m| RADII_M.contains(radius_m));
+    radius_m.ok_or(format!("allowed is {} to {} m", RADII_M.start(), RADII_M.end()))
+}
+
+pub(super) fn numbers(text: &str) -> Result<[f64; 3], String> {
+    let parsed: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let found = parsed.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+    let finite = found.filter(|numbers| numbers.iter().all(|number| number.abs() <= 1e3));
+    finite.ok_or("allowed are three numbers, as in 0,-0.65,0.5".into())
+}
+
+impl KnownBodyArgs {
+    /// What is named, if anything is.
+    pub(super) fn body(&self) -> anyhow::Result<Option<KnownBody>> {
+        let Some(at) = self.at else { return Ok(None) };
+        if let Some(radius_m) = self.ball {
+            return Ok(Some(KnownBody::Ball { centre_w: at.into(), radius_m }));
+        }
+        let normal = Vector3::from(self.plate.context("--at: of what? --ball or --plate says")?);
+        let normal_w = UnitVector3::try_new(normal, 1e-9).context("--plate: no direction")?;
+        Ok(Some(KnownBody::Plate { point_w: at.into(), normal_w }))
+    }
+}

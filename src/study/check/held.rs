@@ -1,0 +1,161 @@
+//! Trials run again until each planner is told from what it was, or is not.
+
+use super::baseline::{Baseline, Line, settings, span};
+use super::judged::{JUDGED, Judged};
+use super::verdict::{Judgement, Rules, Verdict, of_planner};
+use crate::experiment::Simulation;
+use crate::experiment::row::TrialRow;
+use crate::experiment::runner::{self, Job, RunError};
+use crate::explore::planner;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What came of it.
+#[derive(Debug)]
+pub struct Held {
+    /// One of each planner of experiment or baseline.
+    pub planners: Vec<Planner>,
+    /// Whether settings are those of the baseline.
+    pub same_settings: bool,
+    /// Whether it was stopped before it had told everything.
+    pub is_stopped: bool,
+    /// The rows that were made.
+    pub rows: Vec<TrialRow>,
+}
+
+/// What is said of a planner.
+#[derive(Debug)]
+pub struct Planner {
+    /// Its name.
+    pub name: String,
+    /// What is said of it.
+    pub verdict: Verdict,
+    /// Trials that pair with the baseline's.
+    pub trials: usize,
+    /// Trials that failed and did not in the baseline, with the reason of the first.
+    pub failed: Option<(usize, String)>,
+    /// Measure by measure; none if nothing pairs, or all is the same.
+    pub judgements: Vec<Judgement>,
+}
+
+impl Held {
+    /// The worst that is said.
+    pub fn verdict(&self) -> Verdict {
+        self.planners.iter().map(|planner| planner.verdict).max().unwrap_or(Verdict::Missing)
+    }
+}
+
+/// Runs the experiment's planners on the baseline's trials, a batch at a time.
+///
+/// # Errors
+/// If threads cannot be started.
+pub fn hold(
+    simulation: &Simulation,
+    baseline: &Baseline,
+    rules: &Rules,
+    threads: usize,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(&TrialRow) + Sync),
+) -> Result<Held, RunError> {
+    let experiment = simulation.experiment();
+    let names = &experiment.planners;
+    let mut open: Vec<&str> = names.iter().map(String::as_str).collect();
+    open.retain(|name| baseline.header.planners.iter().any(|known| known == name));
+    let mut rows: Vec<TrialRow> = Vec::new();
+    let last = experiment.trials.min(baseline.header.trials);
+    let mut first = 0;
+    while first < last && !open.is_empty() && !stop.load(Ordering::Relaxed) {
+        let until = last.min(first + rules.batch as u32);
+        let planners: Vec<_> = open.iter().filter_map(|name| planner::by_name(name)).collect();
+        let jobs: Vec<Job> = (first..until)
+            .flat_map(|trial| planners.iter().map(move |&planner| (trial, planner)))
+            .collect();
+        rows.extend(runner::rows(simulation, jobs, threads, stop, progress)?);
+        open.retain(|name| {
+            let verdict = planner_of(simulation, baseline, rules, &rows, name).verdict;
+            verdict == Verdict::Undecided
+        });
+        first = until;
+    }
+    let others = baseline.header.planners.iter().filter(|name| !names.contains(name));
+    let planners = names
+        .iter()
+        .chain(others)
+        .map(|name| planner_of(simulation, baseline, rules, &rows, name))
+        .collect();
+    let same_settings = baseline.header.settings == settings(experiment);
+    Ok(Held { planners, same_settings, is_stopped: stop.load(Ordering::Relaxed), rows })
+}
+
+/// Which planners of `rows` differ from the baseline's, and how: a line each.
+pub fn differs(
+    simulation: &Simulation,
+    baseline: &Baseline,
+    rules: &Rules,
+    rows: &[TrialRow],
+) -> Vec<String> {
+    let known = &baseline.header.planners;
+    let names = &simulation.experiment().planners;
+    let told = names.iter().filter_map(|name| {
+        if !known.contains(name) {
+            return Some(format!("{name}: new"));
+        }
+        let planner = planner_of(simulation, baseline, rules, rows, name);
+        let first = planner.judgements.first()?;
+        let percent = first.judged.percent(first.sequence.mean);
+        Some(format!("{name}: {} {percent:+.2} % in {} trials", first.judged.title, planner.trials))
+    });
+    let gone = known.iter().filter(|name| !names.contains(name));
+    told.chain(gone.map(|name| format!("{name}: gone"))).collect()
+}
+
+fn planner_of(
+    simulation: &Simulation,
+    baseline: &Baseline,
+    rules: &Rules,
+    rows: &[TrialRow],
+    name: &str,
+) -> Planner {
+    let span = span(simulation.experiment());
+    let pairs: Vec<(Line, &Line)> = rows
+        .iter()
+        .filter(|row| row.planner == name)
+        .filter_map(|row| Some((Line::of(row, span), baseline.line(row.trial, name)?)))
+        .collect();
+    let failures: Vec<&String> = pairs
+        .iter()
+        .filter(|(_, old)| old.failure.is_none())
+        .filter_map(|(new, _)| new.failure.as_ref())
+        .collect();
+    let failed = failures.first().map(|first| (failures.len(), (*first).clone()));
+    let trials = pairs.len();
+    let mut planner = Planner {
+        name: name.into(),
+        verdict: Verdict::Missing,
+        trials,
+        failed,
+        judgements: Vec::new(),
+    };
+    if trials > 0 && pairs.iter().all(|(new, old)| new.row == old.row) {
+        planner.verdict = Verdict::Identical;
+    } else if trials > 0 {
+        // What neither has is not judged.
+        let is_known = |judged: &&Judged| {
+            let has = |line: &Line| line.values.contains_key(judged.id);
+            pairs.iter().any(|(new, old)| has(new) || has(old))
+        };
+        let differences: Vec<(&Judged, Vec<f64>)> = JUDGED
+            .iter()
+            .filter(is_known)
+            .map(|judged| {
+                let difference = |(new, old): &(Line, &Line)| {
+                    Some(new.values.get(judged.id)? - old.values.get(judged.id)?)
+                };
+                (judged, pairs.iter().filter_map(difference).collect())
+            })
+            .collect();
+        planner.judgements = rules.judge(&differences);
+        let said = of_planner(&planner.judgements);
+        planner.verdict = if planner.failed.is_some() { Verdict::Missing } else { said };
+    }
+    planner
+}

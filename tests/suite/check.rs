@@ -1,0 +1,163 @@
+//! Planners held against what they were.
+
+use crate::common::program::palpate;
+use palpate::experiment::{Experiment, Simulation, runner};
+use palpate::math::seed;
+use palpate::study::check::judged::JUDGED;
+use palpate::study::check::sequence::Sequence;
+use palpate::study::check::verdict::of_planner;
+use palpate::study::check::{Baseline, Rules, Verdict, hold};
+use rand::RngExt;
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+const ALPHA: f64 = 0.05;
+
+/// Nearly normal: the sum of twelve uniform numbers, less six.
+fn normal(rng: &mut impl rand::Rng) -> f64 {
+    (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
+}
+
+/// Of normal values around nothing, and of skewed ones, an interval that one may look at after
+/// every ten of fifty leaves nothing out in at most five of a hundred samples.
+#[test]
+fn intervals_hold_whenever_one_looks() {
+    let samples = 2000;
+    for is_skewed in [false, true] {
+        let wrong = (0..samples).filter(|&i| {
+            let mut rng = seed::stream(5, i, "sequence");
+            let mut value = || match is_skewed {
+                false => normal(&mut rng),
+                true => -(1.0 - rng.random::<f64>()).ln() - 1.0,
+            };
+            let values: Vec<f64> = (0..50).map(|_| value()).collect();
+            (10..=50).step_by(10).any(|n| {
+                let sequence = Sequence::new(&values[..n], 10, ALPHA);
+                let [low, high] = sequence.interval;
+                let is_out = low > 0.0 || high < 0.0;
+                assert_eq!(is_out, sequence.p < ALPHA, "{sequence:?}");
+                is_out
+            })
+        });
+        let share = wrong.count() as f64 / samples as f64;
+        assert!(share <= ALPHA, "{is_skewed}: {share}");
+    }
+}
+
+/// A shift of a spread is found by twenty, and the interval holds it.
+#[test]
+fn what_differs_is_found() {
+    let mut found = 0;
+    for i in 0..200 {
+        let mut rng = seed::stream(6, i, "sequence");
+        let values: Vec<f64> = (0..20).map(|_| 1.0 + normal(&mut rng)).collect();
+        let sequence = Sequence::new(&values, 10, ALPHA);
+        found += u32::from(sequence.interval[0] > 0.0);
+        let wanted = sequence.wanted(1.0, ALPHA).unwrap();
+        assert!((5..40).contains(&wanted), "{wanted}");
+    }
+    assert!(found > 150, "{found}");
+    let all_same = Sequence::new(&[0.0; 10], 10, ALPHA);
+    assert!(all_same.is_zero && all_same.interval == [0.0, 0.0]);
+    let one = Sequence::new(&[3.0], 10, ALPHA);
+    assert_eq!((one.interval, one.p), ([f64::NEG_INFINITY, f64::INFINITY], 1.0));
+}
+
+/// Differences around `shift` that spread like `sd`, in every measure.
+fn judged(shift: f64, sd: f64, count: usize) -> Vec<palpate::study::check::Judgement> {
+    let mut rng = seed::stream(7, count as u64, "judged");
+    let mut values = || (0..count).map(|_| shift + sd * normal(&mut rng)).collect::<Vec<f64>>();
+    let differences: Vec<_> = JUDGED.iter().map(|judged| (judged, values())).collect();
+    Rules::default().judge(&differences)
+}
+
+#[test]
+fn verdicts_are_what_their_intervals_say() {
+    let said = |shift, sd, count| of_planner(&judged(shift, sd, count));
+    assert_eq!(said(-0.2, 0.05, 20), Verdict::Better);
+    assert_eq!(said(0.0, 0.01, 20), Verdict::Ok);
+    assert_eq!(said(0.2, 0.05, 20), Verdict::Worse);
+    assert_eq!(said(0.0, 0.5, 20), Verdict::Undecided);
+    assert_eq!(said(0.0, 0.0, 10), Verdict::Identical);
+    let none: Vec<_> = JUDGED.iter().map(|judged| (judged, Vec::new())).collect();
+    assert_eq!(of_planner(&Rules::default().judge(&none)), Verdict::Missing);
+}
+
+fn simulation(sets: &[&str]) -> Simulation {
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    Simulation::new(Experiment::load(Path::new("experiments/toy.toml"), &sets).unwrap()).unwrap()
+}
+
+const SHORT: [&str; 4] =
+    ["trials=4", "touches=8", "initial_touches=3", "planners=[\"active\",\"random\"]"];
+
+fn baseline(simulation: &Simulation) -> Baseline {
+    let stop = AtomicBool::new(false);
+    let jobs = runner::jobs(simulation.experiment(), &[]);
+    let rows = runner::rows(simulation, jobs, 0, &stop, &|_| ()).unwrap();
+    Baseline::new(simulation, &rows, "a test", Vec::new())
+}
+
+/// The same rows are identical; a planner that is not there any more, or whose trials are now
+/// other ones, is not.
+#[test]
+fn rows_are_held_against_a_baseline() {
+    let stop = AtomicBool::new(false);
+    let rules = Rules { batch: 2, ..Rules::default() };
+    let old = baseline(&simulation(&SHORT));
+    let hold = |sets: &[&str]| hold(&simulation(sets), &old, &rules, 0, &stop, &|_| ()).unwrap();
+    let same = hold(&SHORT);
+    assert_eq!((same.verdict(), same.same_settings), (Verdict::Identical, true));
+    assert_eq!(same.rows.len(), 4, "a batch is enough");
+    let gone = hold(&["trials=4", "touches=8", "initial_touches=3", "planners=[\"random\"]"]);
+    assert_eq!(gone.verdict(), Verdict::Missing);
+    let random = gone.planners.iter().find(|planner| planner.name == "random").unwrap();
+    assert_eq!(random.verdict, Verdict::Identical);
+    let mut other = SHORT.to_vec();
+    other.push("gp.noise_sd_m=0.3");
+    let other = hold(&other);
+    assert!(!other.same_settings && other.verdict() > Verdict::Identical, "{:?}", other.planners);
+    let text = old.text().unwrap();
+    assert_eq!(text.lines().count(), 9);
+}
+
+/// From the command line: written, held against, damaged, of another experiment.
+#[test]
+fn a_check_says_by_its_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("toy.jsonl");
+    let sets = ["touches=8", "initial_touches=3", "planners=[\"active\",\"random\"]"];
+    let check = |more: &[&str]| {
+        let mut arguments = vec!["--quiet", "check", "toy", "--max-trials", "4", "--baseline"];
+        arguments.push(file.to_str().unwrap());
+        sets.iter().for_each(|set| arguments.extend(["--set", *set]));
+        arguments.extend(more);
+        let output = palpate(Path::new("."), &arguments);
+        let said = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap()).concat();
+        (output.status.code(), said)
+    };
+    let (code, said) = check(&[]);
+    assert!(code == Some(2) && said.contains("toy.jsonl"), "{said}");
+    let (code, said) = check(&["--bless", "the first"]);
+    assert!(code == Some(0) && said.contains("8 trials"), "{said}");
+    let reports = ["xml", "md", "svg"].map(|it| folder.path().join(format!("check.{it}")));
+    let [junit, markdown, svg] = reports.each_ref().map(|path| path.to_str().unwrap());
+    let (code, said) = check(&["--junit", junit, "--markdown", markdown, "--svg", svg]);
+    assert!(code == Some(0) && said.trim_end().ends_with("identical"), "{said}");
+    let texts = reports.each_ref().map(|path| fs::read_to_string(path).unwrap());
+    assert!(texts[0].contains("<testcase name=\"active\"") && texts[0].contains("failures=\"0\""));
+    assert!(texts[1].contains("| active |") && texts[2].starts_with("<svg"));
+    // Of a planner that differs little can be said after four trials.
+    let (code, said) = check(&["--set", "gp.noise_sd_m=0.3", "--junit", junit]);
+    assert!([Some(1), Some(3)].contains(&code), "{code:?} {said}");
+    assert!(said.contains("settings, or the object's file"), "{said}");
+    let told = fs::read_to_string(junit).unwrap();
+    assert!(told.contains("<failure") || told.contains("<error"), "{told}");
+    let (code, said) = check(&["--set", "seed=5"]);
+    assert!(code == Some(2) && said.contains("`seed` is 0 there and 5"), "{said}");
+    let text = fs::read_to_string(&file).unwrap();
+    fs::write(&file, text.replacen("\"trial\":1", "\"trial\":x", 1)).unwrap();
+    let (code, said) = check(&[]);
+    assert!(code == Some(2) && said.contains("toy.jsonl:4:"), "{said}");
+}
