@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: demo paper paper-dynamic paper-planners test test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts growth bench-peers dist setup tools clean
+.PHONY: demo paper paper-dynamic paper-planners test check-planners test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts growth bench-peers dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -46,6 +46,15 @@ test: setup
 	cargo test --locked --features ros2
 	for example in $(EXAMPLES); do cargo run --quiet --locked --features ros2 --example $$example || exit; done
 	$(MAKE) test-ros2 TOUCHES=8 OVER_TOPICS='lab::a_peer lab::the_container lab::the_loop'
+
+# Planners are what experiments/baselines says: whoever changes one writes why (palpate check --bless).
+CHECKED := toy container bird
+
+check-planners: setup
+	for experiment in $(CHECKED); do \
+		cargo run --quiet --locked --features ros2 -- --quiet check $$experiment \
+			--baseline experiments/baselines/$$experiment.jsonl || exit; \
+	done
 
 # An explorer and a twin of the arm over ROS 2, and a peer of another implementation, in a network
 # namespace of their own: nothing leaves it.

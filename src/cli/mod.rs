@@ -11,6 +11,7 @@ mod fidelity;
 mod find;
 mod known_body;
 mod list;
+mod merge;
 mod new;
 mod output;
 mod patience;
@@ -68,6 +69,8 @@ enum Command {
     Run(run::Args),
     /// Run a recorded trial again on what was read then, and compare.
     Replay(replay::Args),
+    /// Put the shards of a run together.
+    Merge(merge::Args),
     /// Draw a run's figures and page again from its rows.
     Report(report::Args),
     /// Say what a mesh, scene, experiment or run folder holds.
@@ -113,6 +116,7 @@ pub fn main() -> ExitCode {
         Command::New(args) => new::run(&args),
         Command::Run(args) => run::run(&args, cli.talk),
         Command::Replay(args) => replay::run(&args, cli.talk),
+        Command::Merge(args) => merge::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Show(args) => show::run(&args, cli.talk),
         Command::Scan(args) => scan::run(&args, cli.talk),

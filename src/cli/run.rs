@@ -9,6 +9,7 @@ use crate::experiment::experiment::Experiment;
 use crate::experiment::lab_runner::{self, Halt, Outcome};
 use crate::experiment::row::TrialRow;
 use crate::experiment::runner;
+use crate::experiment::shard::Shard;
 use crate::experiment::store::{JOURNAL, Manifest, RECORDINGS, Run, RunFolder};
 use crate::report;
 use anyhow::{Context, bail};
@@ -21,6 +22,7 @@ Examples:
   palpate run experiments/container.toml
   palpate run experiments/toy.toml --out runs/noisy --set gp.noise='[0.01, 1]' --set trials=200
   palpate run runs/toy/resolved.toml --out runs/again    the same run again, to the byte
+  palpate run toy --shard 3/8                            an eighth of the trials: palpate merge
 
 Press Ctrl-C to stop after the trials in hand; the same command continues where it stopped.
 On a finished run, more trials or other planners are run beside those that are there, and trials or
@@ -43,6 +45,9 @@ pub(super) struct Args {
     /// Throw away what an earlier run left in the folder.
     #[arg(long)]
     fresh: bool,
+    /// Run every N-th trial only, the I-th of N shards, in runs/NAME-I-of-N; `palpate merge` puts them together.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
     /// Record every tick of every trial in recordings/PLANNER-TRIAL.mcap of the run's folder.
     #[arg(long)]
     record: bool,
@@ -76,7 +81,13 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
              allowed are \"kinematic\" and \"dynamic\""
         );
     }
-    let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(&experiment.name));
+    if args.shard.is_some() && simulation.is_real() {
+        bail!("--shard: a real arm makes one trial after another; leave it out");
+    }
+    let path = args.out.clone().unwrap_or_else(|| {
+        let part = args.shard.map(|it| format!("-{}-of-{}", it.index, it.count));
+        PathBuf::from("runs").join(format!("{}{}", experiment.name, part.unwrap_or_default()))
+    });
     let manifest = manifest(experiment);
     let (mut folder, done) =
         RunFolder::open(&path, experiment, simulation.truth(), &manifest, args.fresh)?;
@@ -87,18 +98,25 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     }
     let stop = stop_on_interrupt("trials")?;
 
-    let total = u64::from(experiment.trials) * experiment.planners.len() as u64;
+    let mut jobs = runner::jobs(experiment, &done);
+    if let Some(shard) = args.shard {
+        shard.keep(&mut jobs);
+    }
+    let total = (done.len() + jobs.len()) as u64;
     let bar = progress_bar(talk, &experiment.name, "trials", total, done.len() as u64);
     let begun = Instant::now();
     let threads = args.threads.into();
     let tick = |_: &TrialRow| step(talk, &bar);
-    let rows = (&mut folder, done.as_slice());
     let outcome = match simulation.is_real() {
-        true => lab_runner::run(&simulation, rows, &stop, recorded, &tick)?,
-        false => Outcome {
-            finished: runner::run(&simulation, rows, threads, &stop, recorded, &tick)?,
-            halt: None,
-        },
+        true => {
+            let rows = (&mut folder, done.as_slice());
+            lab_runner::run(&simulation, rows, &stop, recorded, &tick)?
+        }
+        false => {
+            let rows = (&mut folder, jobs);
+            let finished = runner::run(&simulation, rows, threads, &stop, recorded, &tick)?;
+            Outcome { finished, halt: None }
+        }
     };
     let count = outcome.finished;
     bar.finish_and_clear();
@@ -119,7 +137,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
             run.rows.len(),
             path.display()
         );
-    } else if args.no_report {
+    } else if args.no_report || args.shard.is_some() {
         text += &format!("\nrows and summary in {}", path.display());
     } else {
         report::write(&run, &analysis, &path)
@@ -164,7 +182,7 @@ fn tell_failures(run: &Run, talk: Talk) -> bool {
     count == of
 }
 
-fn manifest(experiment: &Experiment) -> Manifest {
+pub(super) fn manifest(experiment: &Experiment) -> Manifest {
     #[cfg(feature = "mujoco")]
     let mujoco = Some(crate::sim::mujoco::version().to_owned());
     #[cfg(not(feature = "mujoco"))]

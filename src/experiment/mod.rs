@@ -40,6 +40,7 @@ pub mod row;
 pub mod runner;
 pub mod scan;
 pub mod scan_truth;
+pub mod shard;
 pub mod simulation;
 pub mod statistics;
 pub mod store;

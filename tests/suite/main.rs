@@ -81,6 +81,8 @@ mod reproducible;
 mod rigid;
 mod scenes;
 mod servo;
+#[cfg(feature = "nlopt")]
+mod shards;
 mod slopes;
 mod stress;
 mod twin;

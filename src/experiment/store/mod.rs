@@ -15,6 +15,7 @@ mod error;
 mod file;
 mod journal;
 mod manifest;
+mod merge;
 mod resolved;
 mod rows;
 mod surface;
@@ -23,6 +24,7 @@ pub use error::StoreError;
 pub use file::write_whole;
 pub use journal::{Entry, JOURNAL, Journal};
 pub use manifest::{MANIFEST, Manifest};
+pub use merge::{MergeError, merge};
 pub use resolved::{RESOLVED, resolved, resolved_beside};
 
 use self::error::io_error;

@@ -107,10 +107,6 @@ const SPINS: usize = 12;
 /// Touches among which the best are looked for; chosen.
 const CANDIDATES: usize = 600;
 
-/// What is wanted of a place and of a turn; chosen.
-const WANTED_M: f64 = 2e-4;
-const WANTED_RAD: f64 = 5e-3;
-
 /// One touch more for each so many, of which the arm turns out not to be able to make some; chosen.
 const SPARE: usize = 2;
 
@@ -137,8 +133,6 @@ pub fn touch_settings(touch: &TouchSettings) -> TouchSettings {
     }
 }
 
-type Covariance = SMatrix<f64, PARAMETERS, PARAMETERS>;
-
 /// A touch that could be made.
 struct Candidate {
     touch: RegistrationTouch,
@@ -157,8 +151,7 @@ impl Candidate {
 
 impl Design {
     /// The `count` touches of `body` that tell the most: each is the one that shrinks the
-    /// parameters' variances most, in units of what is wanted of each, given those before it, among
-    /// those that `robot` reaches. Then
+    /// parameters' ellipsoid most, given those before it, among those that `robot` reaches. Then
     /// they are rehearsed in the order in which they will be made, and those left out that do not
     /// follow on from the one before.
     ///
@@ -179,12 +172,16 @@ impl Design {
         let mut all = candidates(&outline, robot, body, &free_w, rng);
         let tried = all.len();
         // What was plausible before; it keeps the first picks finite.
-        let mut information = Covariance::identity();
-        let weights = weights(body);
+        let mut information = SMatrix::<f64, PARAMETERS, PARAMETERS>::identity();
         let mut chosen: Vec<Candidate> = Vec::new();
         while chosen.len() < count + count / SPARE && !all.is_empty() {
             let Some(covariance) = information.try_inverse() else { break };
-            let told = |candidate: &Candidate| gain(&covariance, &weights, &candidate.rows);
+            let told = |candidate: &Candidate| {
+                let rows = &candidate.rows;
+                let inner = DMatrix::identity(rows.nrows(), rows.nrows())
+                    + rows * covariance * rows.transpose();
+                inner.determinant()
+            };
             let values: Vec<f64> = all.iter().map(told).collect();
             let best = (0..all.len()).max_by(|&a, &b| values[a].total_cmp(&values[b]));
             let candidate = all.swap_remove(best.unwrap_or_default());
@@ -233,27 +230,6 @@ impl Design {
             false => Err(DesignError::Poor { condition: self.condition }),
         }
     }
-}
-
-/// What each parameter's variance counts, in its own unit squared: one over the square of what is
-/// wanted of it. What the finger feels is wanted for the others only.
-fn weights(body: &KnownBody) -> [f64; PARAMETERS] {
-    parameters(body).map(|(name, unit)| match name {
-        name if FELT.contains(&name) => 0.0,
-        name if name.contains("turn") => (unit / WANTED_RAD).powi(2),
-        _ => (unit / WANTED_M).powi(2),
-    })
-}
-
-/// By how much the weighted variances shrink with a touch that tells `rows`.
-fn gain(covariance: &Covariance, weights: &[f64; PARAMETERS], rows: &DMatrix<f64>) -> f64 {
-    let told = covariance * rows.transpose();
-    let inner = DMatrix::identity(rows.nrows(), rows.nrows()) + rows * &told;
-    let Some(solved) = inner.cholesky().map(|factor| factor.solve(&told.transpose())) else {
-        return 0.0;
-    };
-    let shrunk = |i: usize| told.row(i).transpose().dot(&solved.column(i));
-    weights.iter().enumerate().map(|(i, weight)| weight * shrunk(i)).sum()
 }
 
 /// The side from which the robot comes: from the body's centre to the fingertip at home; a plate's

@@ -1,0 +1,31 @@
+//! `palpate merge`.
+
+use super::run::manifest;
+use super::terminal::{Ending, print};
+use crate::experiment::store::{Run, merge};
+use anyhow::Context;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate merge runs/toy runs/toy-*-of-8
+  palpate report runs/toy
+
+The shards of `palpate run EXPERIMENT --shard I/N`, put together: the rows are the bytes of a run in one process. A \
+trial that stands in two of them or in none, or a shard of another experiment, is refused.")]
+pub(super) struct Args {
+    /// The new run's folder.
+    out: PathBuf,
+    /// Run folders of the shards.
+    #[arg(required = true)]
+    shards: Vec<PathBuf>,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+    let first = args.shards.first().context("no shards")?;
+    let experiment = Run::read(first)?.experiment;
+    let count = merge(&args.out, &args.shards, &manifest(&experiment))?;
+    print(&format!("{count} trials in {}", args.out.display()))?;
+    Ok(Ending::Done)
+}

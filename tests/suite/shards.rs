@@ -1,0 +1,78 @@
+//! Parts of a run, put together.
+
+use crate::common::program::palpate;
+use palpate::experiment::shard::{NoShard, Shard};
+use std::fs;
+use std::path::Path;
+
+const SETS: [&str; 4] =
+    ["trials=7", "touches=8", "initial_touches=3", "planners=[\"active\",\"random\"]"];
+
+/// Runs the toy with `more` in `out`; how it ended and what it said.
+fn run(out: &Path, more: &[&str]) -> (Option<i32>, String) {
+    let mut arguments =
+        vec!["--quiet", "run", "toy", "--no-report", "--out", out.to_str().unwrap()];
+    SETS.iter().for_each(|set| arguments.extend(["--set", *set]));
+    arguments.extend(more);
+    said(&arguments)
+}
+
+fn said(arguments: &[&str]) -> (Option<i32>, String) {
+    let output = palpate(Path::new("."), arguments);
+    let said = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap()).concat();
+    (output.status.code(), said)
+}
+
+#[test]
+fn a_shard_is_every_nth_trial() {
+    let third: Shard = "3/8".parse().unwrap();
+    assert_eq!((0..24).filter(|&trial| third.has(trial)).collect::<Vec<_>>(), [2, 10, 18]);
+    for text in ["0/8", "9/8", "3", "3/", "/8", "-1/8", "a/b", "1/0"] {
+        assert_eq!(text.parse::<Shard>(), Err(NoShard), "{text}");
+    }
+}
+
+/// The bytes of a run in one process; and what is no whole is refused, and nothing written.
+#[test]
+fn shards_are_merged_to_the_bytes_of_one_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let text = |name: &str| at(name).to_str().unwrap().to_owned();
+    assert_eq!(run(&at("whole"), &[]).0, Some(0));
+    for shard in ["1", "2", "3"] {
+        // The second is stopped after its first trial and begun again.
+        if shard == "2" {
+            run(&at(shard), &["--shard", "2/3", "--set", "trials=2"]);
+            assert!(
+                fs::read_to_string(at(shard).join("trials.jsonl")).unwrap().lines().count() < 4
+            );
+        }
+        let (code, told) = run(&at(shard), &["--shard", &format!("{shard}/3")]);
+        assert_eq!(code, Some(0), "{told}");
+    }
+    let merge = |out: &str, parts: &[&str]| {
+        let parts: Vec<String> = parts.iter().map(|part| text(part)).collect();
+        let out = text(out);
+        let mut arguments = vec!["merge", &out];
+        arguments.extend(parts.iter().map(String::as_str));
+        said(&arguments)
+    };
+    let (code, told) = merge("merged", &["2", "3", "1"]);
+    assert!(code == Some(0) && told.contains("14 trials"), "{told}");
+    let rows = |name: &str| fs::read(at(name).join("trials.jsonl")).unwrap();
+    assert_eq!(rows("merged"), rows("whole"));
+    assert_eq!(said(&["report", &text("merged")]).0, Some(0));
+
+    let (code, told) = merge("missing", &["1", "3"]);
+    assert!(code == Some(2) && told.contains("4 of 14 trials are missing"), "{told}");
+    let (code, told) = merge("twice", &["1", "2", "3", "whole"]);
+    assert!(code == Some(2) && told.contains("stands in"), "{told}");
+    run(&at("foreign"), &["--shard", "1/3", "--set", "gp.noise_sd_m=0.01"]);
+    let (code, told) = merge("of-two", &["2", "foreign"]);
+    assert!(code == Some(2) && told.contains("another experiment"), "{told}");
+    let (code, told) = merge("merged", &["1", "2", "3"]);
+    assert!(code == Some(2) && told.contains("has rows already"), "{told}");
+    assert!(["missing", "twice", "of-two"].iter().all(|name| !at(name).exists()));
+    let (code, told) = run(&at("no"), &["--shard", "4/3"]);
+    assert!(code == Some(2) && told.contains("from 1 to N"), "{told}");
+}
