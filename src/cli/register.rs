@@ -30,7 +30,8 @@ Examples:
 Touches the ball or plate from many sides with many places of the finger, and writes registration.toml: \
 arm.tool_position_m and arm.tool_rotation_deg for the scene, where the body stands, and how sure each is.")]
 pub(super) struct Args {
-    /// A scene with an arm, or an experiment (.toml), whose [backend] says which arm, or the name of one.
+    /// A scene with an arm, or an experiment (.toml), whose [backend] says which arm, or the name
+    /// of one.
     file: PathBuf,
     /// What is touched, and where to about 1 cm.
     #[command(flatten)]

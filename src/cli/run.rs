@@ -45,7 +45,8 @@ pub(super) struct Args {
     /// Throw away what an earlier run left in the folder.
     #[arg(long)]
     fresh: bool,
-    /// Run every N-th trial only, the I-th of N shards, in runs/NAME-I-of-N; `palpate merge` puts them together.
+    /// Run every N-th trial only, the I-th of N shards, in runs/NAME-I-of-N; `palpate merge` puts
+    /// them together.
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// Record every tick of every trial in recordings/PLANNER-TRIAL.mcap of the run's folder.

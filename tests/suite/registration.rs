@@ -140,7 +140,10 @@ proptest! {
         let mut random = seed::stream(seed, 0, "touches");
         let give = if is_soft { (4e-4, 3e-4) } else { (0.0, 0.0) };
         let mut touches = touches(&robot, &error, &BALL, give, &mut random);
-        touches[7].x_wt.translation.vector.z += 5e-3;
+        // Away from the ball, where it is touched.
+        let KnownBody::Ball { centre_w, .. } = BALL else { panic!() };
+        let side_w = (touches[7].x_wt.translation.vector - centre_w.coords).normalize();
+        touches[7].x_wt.translation.vector += side_w.scale(5e-3);
         let believed = BALL.moved([0.4, -0.3, 0.2]);
         let found = conclude(&touches, &robot, &believed, touches.len()).unwrap();
         let (place_off, turn_off) = parts(&(found.found.correction.inverse() * error));

@@ -73,7 +73,8 @@ fn state(uri: &str) -> Option<String> {
     let body = "<?xml version=\"1.0\"?><methodCall><methodName>getSystemState</methodName>\
                 <params><param><value><string>/palpate</string></value></param></params></methodCall>";
     let request = format!(
-        "POST / HTTP/1.0\r\nHost: {host}\r\nContent-Type: text/xml\r\nContent-Length: {}\r\n\r\n{body}",
+        "POST / HTTP/1.0\r\nHost: {host}\r\nContent-Type: text/xml\r\n\
+         Content-Length: {}\r\n\r\n{body}",
         body.len()
     );
     stream.write_all(request.as_bytes()).ok()?;
@@ -82,8 +83,8 @@ fn state(uri: &str) -> Option<String> {
     Some(text)
 }
 
-/// How many nodes publish `topic` by an answer to `getSystemState`, which is `[code, words, [publishers, subscribers,
-/// services]]`; each of the three is a list of `[topic, [node…]]`.
+/// How many nodes publish `topic` by an answer to `getSystemState`, which is `[code, words,
+/// [publishers, subscribers, services]]`; each of the three is a list of `[topic, [node…]]`.
 fn count(text: &str, topic: &str) -> Option<usize> {
     let compact: String = text.chars().filter(|c| !c.is_whitespace()).collect();
     let publishers = list_at(compact.split_once("<methodResponse>")?.1, 3)?;
