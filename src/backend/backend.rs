@@ -83,4 +83,7 @@ pub trait Backend: Send {
     /// # Errors
     /// A fault ends the touch; the body is left at rest.
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault>;
+
+    /// Closes the brakes for the next step, which is told to stand still; without brakes, nothing.
+    fn brake(&mut self) {}
 }

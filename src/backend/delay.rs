@@ -50,4 +50,9 @@ impl Backend for Delayed {
         self.waiting.push_back(slot);
         reading
     }
+
+    /// Brakes need nobody's command.
+    fn brake(&mut self) {
+        self.inner.brake();
+    }
 }

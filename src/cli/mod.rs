@@ -4,6 +4,7 @@ mod align;
 mod calibrate;
 mod check;
 mod columns;
+mod compare;
 mod completions;
 mod effects;
 mod export;
@@ -15,6 +16,7 @@ mod merge;
 mod new;
 mod output;
 mod patience;
+mod plan;
 mod prepare;
 mod progress;
 mod reference;
@@ -69,8 +71,12 @@ enum Command {
     Run(run::Args),
     /// Run a recorded trial again on what was read then, and compare.
     Replay(replay::Args),
+    /// Say what each shard of an experiment will take.
+    Plan(plan::Args),
     /// Put the shards of a run together.
     Merge(merge::Args),
+    /// Hold planners against each other over several runs.
+    Compare(compare::Args),
     /// Draw a run's figures and page again from its rows.
     Report(report::Args),
     /// Say what a mesh, scene, experiment or run folder holds.
@@ -116,7 +122,9 @@ pub fn main() -> ExitCode {
         Command::New(args) => new::run(&args),
         Command::Run(args) => run::run(&args, cli.talk),
         Command::Replay(args) => replay::run(&args, cli.talk),
+        Command::Plan(args) => plan::run(&args, cli.talk),
         Command::Merge(args) => merge::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Show(args) => show::run(&args, cli.talk),
         Command::Scan(args) => scan::run(&args, cli.talk),

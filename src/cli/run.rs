@@ -11,10 +11,12 @@ use crate::experiment::row::TrialRow;
 use crate::experiment::runner;
 use crate::experiment::shard::Shard;
 use crate::experiment::store::{JOURNAL, Manifest, RECORDINGS, Run, RunFolder};
+use crate::experiment::sweep::cells;
 use crate::report;
 use anyhow::{Context, bail};
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 pub(super) const EXAMPLES: &str = "\
@@ -64,8 +66,34 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
-    let experiment = Experiment::load(&find(&args.experiment, EXPERIMENTS)?, &args.set)?;
+    let path = find(&args.experiment, EXPERIMENTS)?;
+    let cells = cells(&path)?;
     bound_threads(args.threads)?;
+    let mut stop = None;
+    if cells.is_empty() {
+        let out = args.out.clone();
+        return run_one(args, Experiment::load(&path, &args.set)?, out, &mut stop, talk);
+    }
+    // All of them are looked at before the first is run.
+    let load = |cell| Experiment::load_cell(&path, cell, &args.set);
+    let experiments = cells.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    for experiment in experiments {
+        let out = args.out.as_ref().map(|out| out.join(&experiment.name));
+        match run_one(args, experiment, out, &mut stop, talk)? {
+            Ending::Done => (),
+            other => return Ok(other),
+        }
+    }
+    Ok(Ending::Done)
+}
+
+fn run_one(
+    args: &Args,
+    experiment: Experiment,
+    out: Option<PathBuf>,
+    stop: &mut Option<Arc<AtomicBool>>,
+    talk: Talk,
+) -> anyhow::Result<Ending> {
     let mut simulation = simulation(experiment, talk)?;
     if let Some(lab) = simulation.connect()? {
         if args.clear_fault {
@@ -85,7 +113,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     if args.shard.is_some() && simulation.is_real() {
         bail!("--shard: a real arm makes one trial after another; leave it out");
     }
-    let path = args.out.clone().unwrap_or_else(|| {
+    let path = out.unwrap_or_else(|| {
         let part = args.shard.map(|it| format!("-{}-of-{}", it.index, it.count));
         PathBuf::from("runs").join(format!("{}{}", experiment.name, part.unwrap_or_default()))
     });
@@ -97,7 +125,10 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         let folder = path.join(RECORDINGS);
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     }
-    let stop = stop_on_interrupt("trials")?;
+    let stop = match stop {
+        Some(stop) => stop,
+        None => stop.insert(stop_on_interrupt("trials")?),
+    };
 
     let mut jobs = runner::jobs(experiment, &done);
     if let Some(shard) = args.shard {
@@ -111,11 +142,11 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let outcome = match simulation.is_real() {
         true => {
             let rows = (&mut folder, done.as_slice());
-            lab_runner::run(&simulation, rows, &stop, recorded, &tick)?
+            lab_runner::run(&simulation, rows, stop, recorded, &tick)?
         }
         false => {
             let rows = (&mut folder, jobs);
-            let finished = runner::run(&simulation, rows, threads, &stop, recorded, &tick)?;
+            let finished = runner::run(&simulation, rows, threads, stop, recorded, &tick)?;
             Outcome { finished, halt: None }
         }
     };

@@ -58,6 +58,17 @@ impl Loader {
         self.table.contains_key(key)
     }
 
+    /// Takes a key out of the table, with what stands there.
+    pub fn take(&mut self, key: &str) -> Option<Value> {
+        self.table.remove(key)
+    }
+
+    /// That `key` may not have this value.
+    pub fn not_allowed(&self, key: &str, value: &str, allowed: &str) -> ConfigError {
+        let (value, allowed) = (value.into(), allowed.into());
+        ConfigError::NotAllowed { origin: self.origin(key), key: key.into(), value, allowed }
+    }
+
     /// That what was read is `found`, and not what was asked for.
     pub fn other(&self, found: &'static str, remedy: &'static str) -> ConfigError {
         let path = self.sources.first().map(|source| source.path.clone()).unwrap_or_default();

@@ -70,6 +70,9 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
+/// The key of the table that makes several experiments of one file.
+pub(super) const SWEEP: &str = "sweep";
+
 /// Tables that may stand in a file of their own.
 const INCLUDED: [&str; 2] = ["scene", "backend"];
 
@@ -119,7 +122,12 @@ impl Experiment {
         Self::finish(Loader::of(path, text)?, sets)
     }
 
-    fn finish(mut loader: Loader, sets: &[String]) -> Result<Self, ConfigError> {
+    pub(super) fn finish(mut loader: Loader, sets: &[String]) -> Result<Self, ConfigError> {
+        if loader.has(SWEEP) {
+            let remedy =
+                "palpate run takes it; here one of its cells is asked for: runs/NAME/resolved.toml";
+            return Err(loader.other("a sweep of experiments", remedy));
+        }
         if !loader.has("scene") && !loader.has("planners") && loader.has("zone") {
             return Err(loader.other(
                 "a scene",

@@ -45,6 +45,7 @@ pub mod simulation;
 pub mod statistics;
 pub mod store;
 pub mod summary;
+pub mod sweep;
 pub mod trial;
 pub mod truth;
 pub mod verification;

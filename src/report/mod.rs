@@ -3,6 +3,7 @@
 pub mod axes;
 pub mod canvas;
 pub mod check;
+pub mod compare;
 pub mod explorer;
 pub mod figures;
 pub mod files;

@@ -5,10 +5,12 @@
 //! * [`effects`]: what does each piece of physics change, and what does it cost? One is switched,
 //!   the rest of the scene stays.
 //! * [`check`]: are planners what they were? The same trials again, held against a committed file.
+//! * [`compare`](mod@compare): planners over several runs.
 //! * [`stress`]: where does it break, and does it say so? Hard cases at rising severity, each with
 //!   the law it must keep.
 
 pub mod check;
+pub mod compare;
 pub mod effects;
 pub mod fidelity;
 pub mod stress;

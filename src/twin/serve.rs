@@ -164,6 +164,9 @@ impl Twin {
             self.pc.set_overruns(pace.overruns());
             command.qdot.clear();
             command.qdot.extend_from_slice(self.pc.advance(now_s));
+            if self.pc.status().brake {
+                self.body.brake();
+            }
             let reading = self.body.step(&command)?;
             let is_moving = reading.qdot.iter().any(|qdot| qdot.abs() > REST);
             let (packets, wrench) = packets(

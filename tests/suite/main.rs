@@ -14,6 +14,8 @@ mod check;
 mod collisions;
 #[cfg(feature = "nlopt")]
 mod commands;
+#[cfg(feature = "nlopt")]
+mod compare;
 mod control;
 mod distances;
 #[cfg(feature = "mujoco")]
@@ -85,4 +87,6 @@ mod servo;
 mod shards;
 mod slopes;
 mod stress;
+#[cfg(feature = "nlopt")]
+mod sweeps;
 mod twin;

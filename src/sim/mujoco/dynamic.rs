@@ -131,4 +131,8 @@ impl Backend for Dynamic {
         self.report();
         Ok(&self.reading)
     }
+
+    fn brake(&mut self) {
+        self.plant.brake();
+    }
 }

@@ -94,6 +94,12 @@ impl Plant {
         self.check()
     }
 
+    /// Brakes for the next step: they hold the arm's weight and damp what moves, as the servos do
+    /// without their integral; that they also rub is left out.
+    pub fn brake(&mut self) {
+        self.servo.hold(self.data.qfrc_bias());
+    }
+
     /// One time step with velocities commanded to the servos (rad/s or m/s) and `wrench` on the
     /// fingertip, given in `T` about its origin and kept through the step.
     ///
