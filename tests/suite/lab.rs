@@ -24,6 +24,30 @@ fn touches() -> u32 {
     std::env::var("PALPATE_TOUCHES").ok().and_then(|text| text.parse().ok()).unwrap_or(20)
 }
 
+/// Most times that a machine may be late.
+const LATE: u32 = 4;
+
+/// Runs an exploration; where the machine was too late for the arm's computer, the same command
+/// goes on.
+fn run_to_its_end(network: &Network, planner: &str, out: &Path) {
+    for halts in 0..=LATE {
+        let mut run = network.run(planner, touches(), out);
+        if halts > 0 {
+            run.arg("--clear-fault");
+        }
+        let output = run.output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        if output.status.success() {
+            println!("{planner}: {halts} halts because this machine was late");
+            return;
+        }
+        let is_late = said.contains("commands ceased") || said.contains("nothing new on");
+        assert!(is_late, "{planner}: {said}");
+        sleep(Duration::from_millis(500));
+    }
+    panic!("{planner}: late {LATE} times");
+}
+
 /// An exploration with each planner, one twin for each, at the same time; meanwhile a peer of another
 /// implementation reads what the explorer sends.
 #[test]
@@ -32,16 +56,15 @@ fn the_container_is_explored_over_topics_as_in_the_simulator() {
     let folder = tempfile::tempdir().unwrap();
     let jobs = [(Network::new(11), "active"), (Network::new(12), "random")];
     let twins = [0, 1].map(|i| TwinProcess::new(&jobs[i].0, EXPERIMENT, &[]));
-    let runs = [0, 1].map(|i| {
-        let (network, planner) = &jobs[i];
-        network.run(planner, touches(), &folder.path().join(planner)).spawn().unwrap()
+    let listener = std::thread::scope(|scope| {
+        for (network, planner) in &jobs {
+            let out = folder.path().join(planner);
+            scope.spawn(move || run_to_its_end(network, planner, &out));
+        }
+        sleep(Duration::from_secs(6));
+        jobs[0].0.peer("listen", &["8"]).output().unwrap()
     });
-    sleep(Duration::from_secs(6));
-    let listener = jobs[0].0.peer("listen", &["8"]).output().unwrap();
     let heard = String::from_utf8_lossy(&listener.stdout).into_owned();
-    for mut child in runs {
-        assert!(child.wait().unwrap().success());
-    }
     assert!(listener.status.success(), "{heard}");
     println!("a peer of another implementation heard of the explorer: {}", heard.trim());
     for (twin, (_, planner)) in twins.into_iter().zip(&jobs) {
