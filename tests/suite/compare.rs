@@ -33,7 +33,7 @@ proptest! {
         prop_assert!((both - 1.0).abs() < 1e-12);
         prop_assert_eq!(improvement(&one, &one), Some(0.5));
         let (mean, [low, high]) = interquartile(&[&a, &b], 3).unwrap();
-        prop_assert!(low <= high && mean >= 0.1 && mean <= 9.0);
+        prop_assert!(low <= high && (0.1..=9.0).contains(&mean));
         let shares: Vec<f64> = (0..=90).map(|i| profile(&one, f64::from(i) * 0.1)).collect();
         prop_assert!(shares.is_sorted() && shares[0] == 0.0 && shares[90] == 1.0);
     }
