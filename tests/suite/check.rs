@@ -12,7 +12,6 @@ use palpate::study::check::verdict::of_planner;
 use palpate::study::check::{Baseline, Rules, Verdict, hold};
 use palpate::task::Zone;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::fs;
 use std::path::Path;
@@ -170,39 +169,42 @@ fn a_check_says_by_its_exit_code() {
     assert!(code == Some(2) && said.contains("toy.jsonl:4:"), "{said}");
 }
 
-/// The paper's planner, but for some plans, which are random: worse on purpose.
-struct Slips {
+/// The paper's planner, but that it keeps away from the zone's border: worse on purpose.
+struct Shy {
     own: Box<dyn Planner>,
     zone: Zone,
-    rng: ChaCha8Rng,
-    slips: f64,
+    margin: f64,
 }
 
-/// How many of its plans; found so that the container's mean log RMSE is about 5 % more: a few
-/// random touches cost little, for the next ones make up for them.
-const SLIPS: f64 = 0.35;
+/// How far it keeps away, as a share of the zone's sides; found so that the container's mean log
+/// RMSE is about 5 % more.
+const MARGIN: f64 = 0.015;
 
-fn slips() -> f64 {
-    std::env::var("PALPATE_SLIPS").ok().and_then(|text| text.parse().ok()).unwrap_or(SLIPS)
+fn margin() -> f64 {
+    std::env::var("PALPATE_MARGIN").ok().and_then(|text| text.parse().ok()).unwrap_or(MARGIN)
 }
 
-impl Planner for Slips {
+impl Planner for Shy {
     fn plan(&mut self, belief: &Belief) -> Plan {
         let plan = self.own.plan(belief);
-        match self.rng.random::<f64>() < self.slips {
-            true => Plan { target: planner::uniform(&self.zone, &mut self.rng), ..plan },
-            false => plan,
-        }
+        let (low, high) = (self.zone.at(&[0.0; 2]), self.zone.at(&[1.0; 2]));
+        let sides = low.iter().zip(&high);
+        let target = (plan.target.iter().zip(sides))
+            .map(|(at, (low, high))| {
+                let off = self.margin * (high - low);
+                at.clamp(low + off, high - off)
+            })
+            .collect();
+        Plan { target, ..plan }
     }
 }
 
 static WORSE: Entry = Entry {
     name: "worse",
-    about: "active, but for some plans",
+    about: "active, but away from the border",
     make: |zone, settings, rng| {
-        let active = planner::by_name("active").unwrap();
-        let own = (active.make)(zone, settings, rng.clone());
-        Box::new(Slips { own, zone: zone.clone(), rng, slips: slips() })
+        let own = (planner::by_name("active").unwrap().make)(zone, settings, rng);
+        Box::new(Shy { own, zone: zone.clone(), margin: margin() })
     },
 };
 
@@ -247,23 +249,26 @@ fn one_check(name: &str, seed: u64, old: &Entry, new: &Entry) -> (Verdict, usize
 #[ignore = "takes minutes: cargo test --release --test suite -- --ignored --nocapture check::"]
 fn a_loss_of_five_percent_is_flagged_and_other_random_numbers_are_not() {
     let name = std::env::var("PALPATE_CHECKED").unwrap_or("container".into());
+    let checks = std::env::var("PALPATE_CHECKS").ok().and_then(|text| text.parse().ok());
+    let checks: u64 = checks.unwrap_or(100);
     for (old, new) in [("active", &WORSE), ("random", &RESEEDED)] {
         let old = planner::by_name(old).unwrap();
         let told: Vec<_> =
-            (0..100_u64).into_par_iter().map(|seed| one_check(&name, seed, old, new)).collect();
+            (0..checks).into_par_iter().map(|seed| one_check(&name, seed, old, new)).collect();
         let flagged = told.iter().filter(|(verdict, ..)| *verdict >= Verdict::Worse).count();
         let ok = told.iter().filter(|(verdict, ..)| *verdict < Verdict::Undecided).count();
-        let trials = told.iter().map(|(_, trials, _)| *trials).sum::<usize>() as f64 / 100.0;
-        let loss = told.iter().map(|(.., mean)| mean).sum::<f64>() / 100.0;
+        let trials =
+            told.iter().map(|(_, trials, _)| *trials).sum::<usize>() as f64 / checks as f64;
+        let loss = told.iter().map(|(.., mean)| mean).sum::<f64>() / checks as f64;
         println!(
-            "{name}, {} against {}: {:+.1} %, flagged {flagged} of 100, passed {ok}, {trials:.1} trials each",
+            "{name}, {} against {}: {:+.1} %, flagged {flagged} of {checks}, passed {ok}, {trials:.1} trials each",
             new.name,
             old.name,
             100.0 * loss.exp_m1()
         );
         match new.name {
-            "worse" => assert!(flagged >= 95, "{flagged}"),
-            _ => assert!(flagged <= 3, "{flagged}"),
+            "worse" => assert!(20 * flagged >= 19 * checks as usize, "{flagged}"),
+            _ => assert!(100 * flagged <= 3 * checks as usize, "{flagged}"),
         }
     }
 }
