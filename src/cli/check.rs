@@ -94,7 +94,8 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         return bless(args, &simulation, old.as_ref(), (why, &rules), &stop, talk);
     }
     let old = old.context("no baseline")?;
-    let bar = progress_bar(talk, &name, "trials", most(&simulation), 0);
+    let most = runner::jobs(simulation.experiment(), &[]).len() as u64;
+    let bar = progress_bar(talk, &name, "trials", most, 0);
     let tick = |_: &TrialRow| step(talk, &bar);
     let held = hold(&simulation, &old, &rules, args.threads.into(), &stop, &tick)?;
     bar.finish_and_clear();
@@ -105,11 +106,6 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         Verdict::Undecided => Ending::Undecided,
         Verdict::Worse | Verdict::Missing => Ending::Failed,
     })
-}
-
-fn most(simulation: &Simulation) -> u64 {
-    let experiment = simulation.experiment();
-    u64::from(experiment.trials) * experiment.planners.len() as u64
 }
 
 fn tell(args: &Args, name: &str, old: &Baseline, held: &Held, rules: &Rules) -> anyhow::Result<()> {
@@ -147,21 +143,20 @@ fn bless(
     talk: Talk,
 ) -> anyhow::Result<Ending> {
     args.force.claim(&args.baseline)?;
-    let bar = progress_bar(talk, &simulation.experiment().name, "trials", most(simulation), 0);
-    let tick = |_: &TrialRow| step(talk, &bar);
     let jobs = runner::jobs(simulation.experiment(), &[]);
+    let bar = progress_bar(talk, &simulation.experiment().name, "trials", jobs.len() as u64, 0);
+    let tick = |_: &TrialRow| step(talk, &bar);
     let threads = args.threads.into();
     let rows = runner::rows(simulation, jobs, threads, stop, &tick)?;
     bar.finish_and_clear();
     if stop.load(Ordering::Relaxed) {
         return Ok(Ending::Interrupted);
     }
-    let told = old.map_or(Vec::new(), |old| differs(simulation, old, rules, &rows));
-    let new = Baseline::new(simulation, &rows, why, told.clone());
+    let mut new = Baseline::new(simulation, &rows, why);
+    new.header.differs = old.map_or(Vec::new(), |old| differs(old, &new, rules));
     write_whole(&args.baseline, &new.text()?)?;
-    let count = rows.len();
-    let mut text = format!("{count} trials in {}", args.baseline.display());
-    told.iter().for_each(|line| text += &format!("\n{line}"));
+    let mut text = format!("{} trials in {}", rows.len(), args.baseline.display());
+    new.header.differs.iter().for_each(|line| text += &format!("\n{line}"));
     print(&text)?;
     Ok(Ending::Done)
 }

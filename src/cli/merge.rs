@@ -23,9 +23,11 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
-    let first = args.shards.first().context("no shards")?;
-    let experiment = Run::read(first)?.experiment;
-    let count = merge(&args.out, &args.shards, &manifest(&experiment))?;
+    let read = |path: &PathBuf| anyhow::Ok((path.clone(), Run::read(path)?));
+    let shards = args.shards.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    let (_, first) = shards.first().context("no shards")?;
+    let manifest = manifest(&first.experiment);
+    let count = merge(&args.out, shards, &manifest)?;
     print(&format!("{count} trials in {}", args.out.display()))?;
     Ok(Ending::Done)
 }

@@ -3,6 +3,7 @@
 
 use super::patience::with_patience;
 use super::terminal::Talk;
+use crate::backend::ros::arm::Lab;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
@@ -34,4 +35,13 @@ pub(super) fn simulator(environment: &Arc<Environment>, talk: Talk) -> anyhow::R
     simulator.check_reach()?;
     simulator.notices().iter().for_each(|notice| talk.note(notice));
     Ok(simulator)
+}
+
+/// Makes sure that a real arm may be moved; first clears what its side has latched, if the operator
+/// says so.
+pub(super) fn ready(lab: &Arc<Lab>, clear_fault: bool) -> anyhow::Result<()> {
+    if clear_fault {
+        lab.clear_fault()?;
+    }
+    Ok(lab.check_start()?)
 }

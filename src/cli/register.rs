@@ -3,11 +3,10 @@
 use super::find::{SCENES, find};
 use super::known_body::KnownBodyArgs;
 use super::output::Force;
-use super::prepare::simulator;
+use super::prepare::{ready, simulator};
 use super::progress::{progress_bar, step};
 use super::show::is_experiment;
 use super::terminal::{Ending, Talk, print};
-use crate::backend::interlock::gates::{Expected, check_start};
 use crate::backend::ros::arm::Lab;
 use crate::backend::ros::settings::{BackendKind, BackendSettings};
 use crate::experiment::Experiment;
@@ -79,11 +78,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         BackendKind::Simulated => simulator.probe(args.seed)?,
         _ => {
             let lab = Lab::join(&settings, &robot.chain)?;
-            if args.clear_fault {
-                lab.clear_fault()?;
-            }
-            let expected = Expected { q: None, sends_frames: true };
-            check_start(&mut lab.body(), &robot.chain, expected, &settings.gates, 0)?;
+            ready(&lab, args.clear_fault)?;
             let body = Box::new(lab.body());
             Box::new(simulator.servo_within(body, args.seed, &settings.interlocks)?)
         }

@@ -1,7 +1,7 @@
 //! `palpate run`.
 
 use super::find::{EXPERIMENTS, find};
-use super::prepare::{bound_threads, simulation};
+use super::prepare::{bound_threads, ready, simulation};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, error, print};
 use crate::experiment::analysis::Analysis;
@@ -96,10 +96,7 @@ fn run_one(
 ) -> anyhow::Result<Ending> {
     let mut simulation = simulation(experiment, talk)?;
     if let Some(lab) = simulation.connect()? {
-        if args.clear_fault {
-            lab.clear_fault()?;
-        }
-        simulation.check_start()?;
+        ready(&lab, args.clear_fault)?;
     }
     let simulation = simulation;
     let experiment = simulation.experiment();

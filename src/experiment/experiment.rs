@@ -15,6 +15,7 @@ use crate::explore::planner::PlanningSettings;
 use crate::sim::Scene;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 use std::path::Path;
 
 /// An experiment with everything that decides its results, and how they are shown.
@@ -164,6 +165,15 @@ impl Experiment {
     /// Whether a row is of one of the trials and planners that are listed.
     pub fn lists(&self, row: &TrialRow) -> bool {
         row.trial < self.trials && self.planners.contains(&row.planner)
+    }
+
+    /// Every trial of every planner that `rows` lack, trial by trial.
+    pub fn lacks(&self, rows: &[TrialRow]) -> Vec<(u32, &str)> {
+        let there: HashSet<_> = rows.iter().map(|row| (row.trial, row.planner.as_str())).collect();
+        (0..self.trials)
+            .flat_map(|trial| self.planners.iter().map(move |planner| (trial, planner.as_str())))
+            .filter(|trial_of| !there.contains(trial_of))
+            .collect()
     }
 
     /// Planners whose beliefs are drawn.

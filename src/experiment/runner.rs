@@ -9,7 +9,6 @@ use crate::explore::planner;
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, ParallelBridge, ParallelIterator,
 };
-use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -139,11 +138,6 @@ fn run_caught(
 
 /// Every trial of every planner that `done` lacks, trial by trial.
 pub fn jobs(experiment: &Experiment, done: &[TrialRow]) -> Vec<Job> {
-    let done: HashSet<_> = done.iter().map(|row| (row.trial, row.planner.as_str())).collect();
-    let planners: Vec<_> =
-        experiment.planners.iter().filter_map(|name| planner::by_name(name)).collect();
-    (0..experiment.trials)
-        .flat_map(|trial| planners.iter().map(move |&planner| (trial, planner)))
-        .filter(|(trial, planner)| !done.contains(&(*trial, planner.name)))
-        .collect()
+    let lacking = experiment.lacks(done).into_iter();
+    lacking.filter_map(|(trial, name)| Some((trial, planner::by_name(name)?))).collect()
 }

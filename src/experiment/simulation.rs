@@ -9,7 +9,6 @@ use super::scan_truth::LeftOut;
 use super::trial;
 use super::truth::Truth;
 use super::witness::Witness;
-use crate::backend::interlock::gates::{Expected, GateError, check_start};
 use crate::backend::ros::arm::Lab;
 use crate::backend::ros::fault::LinkFault;
 use crate::backend::ros::settings::BackendKind;
@@ -191,19 +190,6 @@ impl Simulation {
             None if self.is_real() => Err(Fault::Lacks { part: "a connection to the arm" }),
             None => self.simulator.body(),
         }
-    }
-
-    /// Holds the connected arm still, and looks whether joints and sensors are as they must be.
-    ///
-    /// # Errors
-    /// The first thing that is not.
-    pub fn check_start(&self) -> Result<(), GateError> {
-        let (Some(mut body), Some(chain)) = (self.body()?, self.environment().chain()) else {
-            return Ok(());
-        };
-        let expected = Expected { q: None, sends_frames: true };
-        let gates = &self.experiment.backend.gates;
-        check_start(&mut *body, &chain, expected, gates, 0).map(|_| ())
     }
 
     /// What drives `body` through touches, within the experiment's interlocks.

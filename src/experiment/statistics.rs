@@ -36,7 +36,7 @@ pub(super) fn middle(values: &mut [f64]) -> Option<f64> {
 }
 
 /// Samples of the bootstrap; Efron & Tibshirani 1993 ask for a thousand for an interval.
-const RESAMPLES: usize = 1000;
+pub const RESAMPLES: usize = 1000;
 
 /// The 95 % interval of the mean of `values` by the percentile bootstrap (Efron & Tibshirani 1993,
 /// ch. 13), the same for the same `seed`; none of fewer than two values.
@@ -76,7 +76,7 @@ pub(super) fn resampled<T>(
 }
 
 /// The ends of the middle 95 % of `found`, which is not empty.
-pub(super) fn percentiles_95(mut found: Vec<f64>) -> [f64; 2] {
+pub fn percentiles_95(mut found: Vec<f64>) -> [f64; 2] {
     found.sort_by(f64::total_cmp);
     let cut = found.len() / 40;
     [found[cut], found[found.len() - 1 - cut]]

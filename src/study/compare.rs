@@ -8,7 +8,7 @@
 use super::check::baseline::span;
 use super::check::judged::JUDGED;
 use crate::experiment::row::of_planner;
-use crate::experiment::statistics::mean;
+use crate::experiment::statistics::{RESAMPLES, mean, percentiles_95};
 use crate::experiment::store::Run;
 use crate::math::seed;
 use rand::RngExt;
@@ -57,9 +57,6 @@ pub enum CompareError {
         name: String,
     },
 }
-
-/// Samples of the bootstrap; as many as for the report's intervals.
-const RESAMPLES: usize = 1000;
 
 /// Of runs with their folders' names, in units of the planner `against`.
 ///
@@ -146,7 +143,7 @@ pub fn interquartile(strata: &[&[f64]], seed: u64) -> Option<(f64, [f64; 2])> {
     }
     let mut rng = seed::stream(seed, 0, "compare");
     let mut sample = Vec::new();
-    let mut found: Vec<f64> = (0..RESAMPLES)
+    let found = (0..RESAMPLES)
         .filter_map(|_| {
             sample.clear();
             for stratum in strata {
@@ -156,10 +153,7 @@ pub fn interquartile(strata: &[&[f64]], seed: u64) -> Option<(f64, [f64; 2])> {
             interquartile_mean(&sample)
         })
         .collect();
-    found.sort_by(f64::total_cmp);
-    let cut = found.len() / 40;
-    let all: Vec<f64> = strata.concat();
-    Some((interquartile_mean(&all)?, [found[cut], found[found.len() - 1 - cut]]))
+    Some((interquartile_mean(&strata.concat())?, percentiles_95(found)))
 }
 
 /// The probability that a trial of `one` is better than one of `other`, averaged over the objects

@@ -1,20 +1,9 @@
-"""An independent ROS 1 peer: rospy, written from the table of topics alone.
-
-    peer.py touch MASTER [hand|fingers]   drives a stage along -y until the finger feels something, and back
-    peer.py listen MASTER SECONDS         counts what an explorer sends, and checks it
-    peer.py echo MASTER SECONDS           answers every command with a joint state of the same stamp
-
-Prints one JSON object, and exits with 1 if something is not as the table says.
-"""
-import json
-import math
+"""An independent ROS 1 peer: rospy. What it does is in ../peer.py."""
 import os
+import pathlib
 import sys
 import threading
 import time
-
-MASTER = sys.argv[2]
-os.environ["ROS_MASTER_URI"], os.environ["ROS_IP"] = MASTER, "127.0.0.1"
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -24,6 +13,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+from peer import VALID_NS, main
 
 HEADER = "=" * 80 + "\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
 BIOTAC_HAND = generate_dynamic("biotac_sensors/BioTacHand", f"""std_msgs/Header header
@@ -62,6 +54,16 @@ int16 tdc
 int16[] electrodes
 """)["sr_robot_msgs/BiotacAll"]
 
+KINDS = {
+    "/joint_states": JointState,
+    "/ft_sensor/wrench": WrenchStamped,
+    "/pa10/status": DiagnosticArray,
+    "/biotac_pub": BIOTAC_HAND,
+    "/biotac_pub as BiotacAll": BIOTAC_ALL,
+    "/pa10/joint_velocity_cmd": JointTrajectory,
+    "/palpate/heartbeat": Header,
+}
+
 
 class Inbox:
     """What has come on a topic since it was last looked at."""
@@ -80,122 +82,49 @@ class Inbox:
         return messages
 
 
-def touch(tactile):
-    """One touch with a stage of three slides X, Y, Z: down at 15 mm/s until the pressure rises, and back."""
-    joints = Inbox("/joint_states", JointState)
-    wrench = Inbox("/ft_sensor/wrench", WrenchStamped)
-    status = Inbox("/pa10/status", DiagnosticArray)
-    frames = Inbox("/biotac_pub", BIOTAC_HAND if tactile == "hand" else BIOTAC_ALL)
-    command = rospy.Publisher("/pa10/joint_velocity_cmd", JointTrajectory, queue_size=10, tcp_nodelay=True)
-    counts = {"joints": 0, "wrench": 0, "status": 0, "frames": 0}
-    rest, felt, pressures, y, moved = [], None, [], [], False
-    problems = set()
-    rospy.wait_for_service("/pa10/unhold", 5.0)
-    if not rospy.ServiceProxy("/pa10/unhold", Trigger)().success:
-        problems.add("the arm is not released")
-    begun = time.time()
-    while time.time() - begun < 12:
-        for message in joints.take():
-            counts["joints"] += 1
-            if list(message.name) != ["X", "Y", "Z"] or len(message.position) != 3 or len(message.velocity) != 3:
-                problems.add(f"joint names {message.name}")
-            if abs(message.header.stamp.to_sec() - time.time()) > 0.5:
-                problems.add("the stamp of a joint state is not now")
-            y.append(message.position[1])
-        for message in wrench.take():
-            counts["wrench"] += 1
-            if not all(map(math.isfinite, (message.wrench.force.x, message.wrench.torque.z))):
-                problems.add("a force that is no number")
-        for message in status.take():
-            counts["status"] += 1
-            if message.status[0].name != "pa10" or not message.status[0].values:
-                problems.add("a status of something else")
-        for message in frames.take():
-            counts["frames"] += 1
-            data = message.bt_data[0] if tactile == "hand" else message.tactiles[0]
-            electrodes = data.electrode_data if tactile == "hand" else data.electrodes
-            pressures.append(data.pdc_data if tactile == "hand" else data.pdc)
-            if len(electrodes) != 19 or not all(0 < value < 4096 for value in electrodes):
-                problems.add(f"electrodes {electrodes}")
-        at = time.time() - begun
-        # Stand still for a second, go down, and back as soon as the pressure has risen.
-        speed = 0.0
-        if at < 1.0:
-            rest = pressures[-20:]
-        elif felt is None:
-            speed, moved = -0.015, True
-            mean = sum(rest) / max(len(rest), 1)
-            if rest and len(pressures) > 3 and min(pressures[-3:]) > mean + 10:
-                felt = y[-1]
-        elif y[-1] < felt + 0.01:
-            speed = 0.02
-        else:
-            break
-        message = JointTrajectory(joint_names=["X", "Y", "Z"])
+class Link:
+    def __init__(self, master):
+        os.environ["ROS_MASTER_URI"], os.environ["ROS_IP"] = master, "127.0.0.1"
+        rospy.init_node("peer", anonymous=True, disable_signals=True, disable_rostime=True)
+        self.command = None
+
+    def inbox(self, name):
+        return Inbox(name.split()[0], KINDS[name])
+
+    def publisher(self, name):
+        return rospy.Publisher(name, KINDS[name], queue_size=50, tcp_nodelay=True)
+
+    def engage(self):
+        self.command = self.publisher("/pa10/joint_velocity_cmd")
+        rospy.wait_for_service("/pa10/unhold", 5.0)
+        is_done = rospy.ServiceProxy("/pa10/unhold", Trigger)().success
+        return [] if is_done else ["the arm is not released"]
+
+    def drive(self, names, velocities):
+        message = JointTrajectory(joint_names=names)
         message.header.stamp = rospy.Time.from_sec(time.time())
-        message.points = [JointTrajectoryPoint(velocities=[0.0, speed, 0.0],
-                                               time_from_start=rospy.Duration.from_sec(0.03))]
-        command.publish(message)
-        time.sleep(0.004)
-    if felt is None or not moved:
-        problems.add("nothing was felt")
-    if min(counts.values()) < 20:
-        problems.add("a topic is silent")
-    print(json.dumps({"felt_y_m": felt, "counts": counts, "problems": sorted(problems)}))
-    return not problems
+        message.points = [JointTrajectoryPoint(velocities=velocities, time_from_start=rospy.Duration(0, VALID_NS))]
+        self.command.publish(message)
 
+    def seconds(self, stamp):
+        return stamp.to_sec()
 
-def listen(span):
-    commands = Inbox("/pa10/joint_velocity_cmd", JointTrajectory)
-    hearts = Inbox("/palpate/heartbeat", Header)
-    count, beats, fastest, problems, ages = 0, 0, 0.0, set(), []
-    begun = time.time()
-    while time.time() - begun < span:
-        for message in commands.take():
-            count += 1
-            point = message.points[0]
-            fastest = max([fastest, *map(abs, point.velocities)])
-            ages.append(time.time() - message.header.stamp.to_sec())
-            if len(message.points) != 1 or len(set(message.joint_names)) != len(point.velocities):
-                problems.add(f"names {message.joint_names}")
-            if not all(math.isfinite(value) for value in point.velocities) or point.positions:
-                problems.add("velocities that are no numbers")
-            if point.time_from_start.to_nsec() != 30_000_000:
-                problems.add("a validity that is not that of the table")
-        beats += len(hearts.take())
-        time.sleep(0.001)
-    if count < 100 * span / 2 or beats < 20 * span / 2 or fastest == 0.0:
-        problems.add("too little was sent")
-    if ages and sorted(ages)[len(ages) // 2] > 0.1:
-        problems.add("stamps are not of now")
-    print(json.dumps({"commands": count, "heartbeats": beats, "fastest_rad_s": fastest,
-                      "problems": sorted(problems)}))
-    return not problems
+    def validity_ns(self, point):
+        return point.time_from_start.to_nsec()
 
+    def echo(self, span):
+        joints, counts = self.publisher("/joint_states"), []
 
-def echo(span):
-    joints = rospy.Publisher("/joint_states", JointState, queue_size=50, tcp_nodelay=True)
-    counts = []
+        def answer(message):
+            velocities = message.points[0].velocities
+            joints.publish(JointState(header=message.header, name=message.joint_names, position=velocities,
+                                      velocity=velocities))
+            counts.append(1)
 
-    def answer(message):
-        velocities = message.points[0].velocities
-        joints.publish(JointState(header=message.header, name=message.joint_names, position=velocities,
-                                  velocity=velocities))
-        counts.append(1)
-
-    rospy.Subscriber("/pa10/joint_velocity_cmd", JointTrajectory, answer, tcp_nodelay=True)
-    time.sleep(span)
-    print(json.dumps({"echoed": len(counts)}))
-    return True
+        rospy.Subscriber("/pa10/joint_velocity_cmd", JointTrajectory, answer, tcp_nodelay=True)
+        time.sleep(span)
+        return len(counts)
 
 
 if __name__ == "__main__":
-    rospy.init_node("peer", anonymous=True, disable_signals=True, disable_rostime=True)
-    what, more = sys.argv[1], sys.argv[3:]
-    if what == "touch":
-        done = touch(more[0] if more else "hand")
-    elif what == "listen":
-        done = listen(float(more[0]))
-    else:
-        done = echo(float(more[0]))
-    sys.exit(0 if done else 1)
+    main(Link)

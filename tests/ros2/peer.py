@@ -1,13 +1,5 @@
-"""An independent ROS 2 peer: Eclipse Cyclone DDS, written from the table of topics alone.
-
-    peer.py touch DOMAIN [hand|fingers]   drives a stage along -y until the finger feels something, and back
-    peer.py listen DOMAIN SECONDS         counts what an explorer sends, and checks it
-    peer.py echo DOMAIN SECONDS           answers every command with a joint state of the same stamp
-
-Prints one JSON object, and exits with 1 if something is not as the table says.
-"""
-import json
-import math
+"""An independent ROS 2 peer: Eclipse Cyclone DDS. What it does is in ../peer.py."""
+import pathlib
 import sys
 import time
 from dataclasses import dataclass
@@ -151,147 +143,74 @@ class BiotacAll(IdlStruct, typename="sr_robot_msgs::msg::dds_::BiotacAll_"):
     header: Header
     tactiles: array[Biotac, 5]
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+from peer import VALID_NS, main
 
 RELIABLE = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.Volatile,
                Policy.History.KeepLast(50))
 
+KINDS = {
+    "/joint_states": JointState,
+    "/ft_sensor/wrench": WrenchStamped,
+    "/pa10/status": DiagnosticArray,
+    "/biotac_pub": BioTacHand,
+    "/biotac_pub as BiotacAll": BiotacAll,
+    "/pa10/joint_velocity_cmd": JointTrajectory,
+    "/palpate/heartbeat": Header,
+}
 
-class Peer:
+
+class Inbox:
+    def __init__(self, reader):
+        self.reader = reader
+
+    def take(self):
+        # A writer that leaves hands over a sample without data.
+        is_whole = lambda sample: any(getattr(sample, name, None) is not None for name in ("header", "stamp"))
+        return list(filter(is_whole, self.reader.take(N=100)))
+
+
+class Link:
     def __init__(self, domain):
-        self.participant = DomainParticipant(domain)
+        self.participant = DomainParticipant(int(domain))
+        self.command = None
 
-    def reader(self, name, kind):
-        return DataReader(self.participant, Topic(self.participant, "rt" + name, kind, qos=RELIABLE), qos=RELIABLE)
+    def topic(self, name):
+        return Topic(self.participant, "rt" + name.split()[0], KINDS[name], qos=RELIABLE)
 
-    def writer(self, name, kind):
-        return DataWriter(self.participant, Topic(self.participant, "rt" + name, kind, qos=RELIABLE), qos=RELIABLE)
+    def inbox(self, name):
+        return Inbox(DataReader(self.participant, self.topic(name), qos=RELIABLE))
 
+    def writer(self, name):
+        return DataWriter(self.participant, self.topic(name), qos=RELIABLE)
 
-def take(reader):
-    # A writer that leaves hands over a sample without data.
-    return [sample for sample in reader.take(N=100) if getattr(sample, "header", None) is not None]
+    def engage(self):
+        self.command = self.writer("/pa10/joint_velocity_cmd")
+        return []
 
+    def drive(self, names, velocities):
+        at = time.time()
+        header = Header(Time(int(at), int((at % 1) * 1e9)), "")
+        point = JointTrajectoryPoint([], velocities, [], [], Duration(0, VALID_NS))
+        self.command.write(JointTrajectory(header, names, [point]))
 
-def now():
-    at = time.time()
-    return Time(int(at), int((at % 1) * 1e9))
+    def seconds(self, stamp):
+        return stamp.sec + 1e-9 * stamp.nanosec
 
+    def validity_ns(self, point):
+        return point.time_from_start.nanosec
 
-def seconds(stamp):
-    return stamp.sec + 1e-9 * stamp.nanosec
-
-
-def touch(domain, tactile):
-    """One touch with a stage of three slides X, Y, Z: down at 15 mm/s until the pressure rises, and back."""
-    peer = Peer(domain)
-    joints = peer.reader("/joint_states", JointState)
-    wrench = peer.reader("/ft_sensor/wrench", WrenchStamped)
-    status = peer.reader("/pa10/status", DiagnosticArray)
-    frames = peer.reader("/biotac_pub", BioTacHand if tactile == "hand" else BiotacAll)
-    command = peer.writer("/pa10/joint_velocity_cmd", JointTrajectory)
-    counts = {"joints": 0, "wrench": 0, "status": 0, "frames": 0}
-    rest, felt, pressures, y, moved = [], None, [], [], False
-    begun = time.time()
-    problems = set()
-    while time.time() - begun < 12:
-        for message in take(joints):
-            counts["joints"] += 1
-            if list(message.name) != ["X", "Y", "Z"] or len(message.position) != 3 or len(message.velocity) != 3:
-                problems.add(f"joint names {message.name}")
-            if abs(seconds(message.header.stamp) - time.time()) > 0.5:
-                problems.add("the stamp of a joint state is not now")
-            y.append(message.position[1])
-        for message in take(wrench):
-            counts["wrench"] += 1
-            parts = (message.wrench.force.x, message.wrench.torque.z)
-            if not all(math.isfinite(part) for part in parts):
-                problems.add("a force that is no number")
-        for message in take(status):
-            counts["status"] += 1
-            if message.status[0].name != "pa10" or not message.status[0].values:
-                problems.add("a status of something else")
-        for message in take(frames):
-            counts["frames"] += 1
-            data = message.bt_data[0] if tactile == "hand" else message.tactiles[0]
-            electrodes = data.electrode_data if tactile == "hand" else data.electrodes
-            pressures.append(data.pdc_data if tactile == "hand" else data.pdc)
-            if len(electrodes) != 19 or not all(0 < value < 4096 for value in electrodes):
-                problems.add(f"electrodes {electrodes}")
-        at = time.time() - begun
-        # Stand still for a second, go down, and back as soon as the pressure has risen.
-        speed = 0.0
-        if at < 1.0:
-            rest = pressures[-20:]
-        elif felt is None:
-            speed, moved = -0.015, True
-            mean = sum(rest) / max(len(rest), 1)
-            if rest and len(pressures) > 3 and min(pressures[-3:]) > mean + 10:
-                felt = y[-1]
-        elif y[-1] < felt + 0.01:
-            speed = 0.02
-        else:
-            break
-        point = JointTrajectoryPoint([], [0.0, speed, 0.0], [], [], Duration(0, 30_000_000))
-        command.write(JointTrajectory(Header(now(), ""), ["X", "Y", "Z"], [point]))
-        time.sleep(0.004)
-    if felt is None or not moved:
-        problems.add("nothing was felt")
-    if min(counts.values()) < 20:
-        problems.add("a topic is silent")
-    print(json.dumps({"felt_y_m": felt, "counts": counts, "problems": sorted(problems)}))
-    return not problems
-
-
-def listen(domain, span):
-    peer = Peer(domain)
-    commands = peer.reader("/pa10/joint_velocity_cmd", JointTrajectory)
-    hearts = peer.reader("/palpate/heartbeat", Header)
-    count, beats, fastest, problems, ages = 0, 0, 0.0, set(), []
-    begun = time.time()
-    while time.time() - begun < span:
-        for message in take(commands):
-            count += 1
-            point = message.points[0]
-            fastest = max([fastest, *map(abs, point.velocities)])
-            ages.append(time.time() - seconds(message.header.stamp))
-            if len(message.points) != 1 or len(set(message.joint_names)) != len(point.velocities):
-                problems.add(f"names {message.joint_names}")
-            if not all(math.isfinite(value) for value in point.velocities) or point.positions:
-                problems.add("velocities that are no numbers")
-            if point.time_from_start.nanosec != 30_000_000:
-                problems.add("a validity that is not that of the table")
-        beats += len([beat for beat in hearts.take(N=100) if getattr(beat, "stamp", None)])
-        time.sleep(0.001)
-    if count < 100 * span / 2 or beats < 20 * span / 2 or fastest == 0.0:
-        problems.add("too little was sent")
-    if ages and sorted(ages)[len(ages) // 2] > 0.1:
-        problems.add("stamps are not of now")
-    print(json.dumps({"commands": count, "heartbeats": beats, "fastest_rad_s": fastest,
-                      "problems": sorted(problems)}))
-    return not problems
-
-
-def echo(domain, span):
-    peer = Peer(domain)
-    commands = peer.reader("/pa10/joint_velocity_cmd", JointTrajectory)
-    joints = peer.writer("/joint_states", JointState)
-    count, begun = 0, time.time()
-    while time.time() - begun < span:
-        for message in take(commands):
-            velocities = list(message.points[0].velocities)
-            joints.write(JointState(message.header, message.joint_names, velocities, velocities, []))
-            count += 1
-        time.sleep(0.0002)
-    print(json.dumps({"echoed": count}))
-    return True
+    def echo(self, span):
+        commands, joints = self.inbox("/pa10/joint_velocity_cmd"), self.writer("/joint_states")
+        count, begun = 0, time.time()
+        while time.time() - begun < span:
+            for message in commands.take():
+                velocities = list(message.points[0].velocities)
+                joints.write(JointState(message.header, message.joint_names, velocities, velocities, []))
+                count += 1
+            time.sleep(0.0002)
+        return count
 
 
 if __name__ == "__main__":
-    what, number = sys.argv[1], int(sys.argv[2])
-    if what == "touch":
-        done = touch(number, sys.argv[3] if len(sys.argv) > 3 else "hand")
-    elif what == "listen":
-        done = listen(number, float(sys.argv[3]))
-    else:
-        done = echo(number, float(sys.argv[3]))
-    sys.exit(0 if done else 1)
+    main(Link)

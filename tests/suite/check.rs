@@ -103,7 +103,7 @@ fn baseline(simulation: &Simulation) -> Baseline {
     let stop = AtomicBool::new(false);
     let jobs = runner::jobs(simulation.experiment(), &[]);
     let rows = runner::rows(simulation, jobs, 0, &stop, &|_| ()).unwrap();
-    Baseline::new(simulation, &rows, "a test", Vec::new())
+    Baseline::new(simulation, &rows, "a test")
 }
 
 /// The same rows are identical; a planner that is not there any more, or whose trials are now

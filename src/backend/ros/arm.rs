@@ -12,6 +12,7 @@ use super::service::Service;
 use super::settings::BackendSettings;
 use super::topics::{Side, Topic};
 use super::transport::{Connect, TransportError};
+use crate::backend::interlock::gates::{Expected, GateError, check_start};
 use crate::backend::pace::Pace;
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use crate::robot::arm::Chain;
@@ -98,6 +99,16 @@ impl Lab {
             pace: Pace::new(1.0 / self.settings.rate_hz),
             still: Command { qdot: vec![0.0; joints] },
         }
+    }
+
+    /// Holds the arm still, and looks whether joints and sensors are as they must be.
+    ///
+    /// # Errors
+    /// The first thing that is not.
+    pub fn check_start(self: &Arc<Self>) -> Result<(), GateError> {
+        let expected = Expected { q: None, sends_frames: true };
+        let gates = &self.settings.gates;
+        check_start(&mut self.body(), &self.chain, expected, gates, 0).map(|_| ())
     }
 
     /// Calls a service and waits for its answer.

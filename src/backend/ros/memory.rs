@@ -1,11 +1,11 @@
 //! A transport inside this process, for tests and for a twin without a network.
 
 use super::packet::Packet;
+use super::queue::{Inlet, Outlet, queue};
 use super::service::{Answer, Service};
 use super::topics::{Side, Topic};
 use super::transport::{Delivery, Transport, TransportError, Waker};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -22,12 +22,7 @@ struct Shared {
 struct End {
     id: u64,
     side: Side,
-    inbox: Sender<Item>,
-}
-
-enum Item {
-    Delivery(Delivery),
-    Wake,
+    inlet: Inlet,
 }
 
 /// One end.
@@ -35,17 +30,17 @@ pub struct Memory {
     hub: Hub,
     id: u64,
     side: Side,
-    inbox: Receiver<Item>,
-    wake: Sender<Item>,
+    inlet: Inlet,
+    outlet: Outlet,
 }
 
 impl Hub {
     /// An end on one side.
     pub fn end(&self, side: Side) -> Memory {
-        let (sender, inbox) = channel();
+        let (inlet, outlet) = queue();
         let id = self.0.count.fetch_add(1, Ordering::Relaxed);
-        self.lock().push(End { id, side, inbox: sender.clone() });
-        Memory { hub: self.clone(), id, side, inbox, wake: sender }
+        self.lock().push(End { id, side, inlet: inlet.clone() });
+        Memory { hub: self.clone(), id, side, inlet, outlet }
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<End>> {
@@ -57,7 +52,7 @@ impl Memory {
     fn to(&self, is_to: impl Fn(&End) -> bool, delivery: &Delivery) {
         for end in self.hub.lock().iter().filter(|end| is_to(end)) {
             // An end that was dropped hears nothing.
-            let _ = end.inbox.send(Item::Delivery(delivery.clone()));
+            end.inlet.put(delivery.clone());
         }
     }
 
@@ -75,30 +70,18 @@ impl Drop for Memory {
 
 impl Transport for Memory {
     fn waker(&self) -> Waker {
-        let wake = Mutex::new(self.wake.clone());
-        Arc::new(move || {
-            let _ = wake.lock().unwrap_or_else(PoisonError::into_inner).send(Item::Wake);
-        })
+        self.inlet.waker()
     }
 
     fn send(&mut self, packet: &Packet) -> Result<(), TransportError> {
         let packet = packet.clone();
         let delivery = Delivery::Packet { packet, sender: self.id, received: Instant::now() };
         self.to(self.others(), &delivery);
-
         Ok(())
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
-        let mut next = self.inbox.recv_timeout(timeout);
-        loop {
-            match next {
-                Ok(Item::Delivery(delivery)) => take(delivery),
-                Ok(Item::Wake) => (),
-                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
-            }
-            next = self.inbox.try_recv().map_err(|_| RecvTimeoutError::Timeout);
-        }
+        self.outlet.receive(timeout, take);
     }
 
     fn publisher_count(&self, topic: Topic) -> usize {

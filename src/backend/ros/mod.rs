@@ -14,6 +14,7 @@ pub mod memory;
 pub mod message;
 pub mod net_ft;
 pub mod packet;
+mod queue;
 #[cfg(feature = "ros1")]
 mod ros1;
 #[cfg(feature = "ros2")]

@@ -259,12 +259,7 @@ impl Transport for Ros2 {
 
     fn send(&mut self, packet: &Packet) -> Result<(), TransportError> {
         let sent = self.writers.iter().find_map(|writer| writer(packet));
-        let what = || self.topics.line(packet.topic()).name.to_owned();
-        match sent {
-            Some(Ok(())) => Ok(()),
-            Some(Err(words)) => Err(TransportError::Send { what: what(), words }),
-            None => Err(TransportError::Send { what: what(), words: "not this side's".into() }),
-        }
+        TransportError::of_sending(self.topics.line(packet.topic()).name, sent)
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {

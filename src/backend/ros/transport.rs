@@ -74,6 +74,14 @@ pub enum TransportError {
     },
 }
 
+impl TransportError {
+    /// What came of sending to `topic`: what the writer says, or none if it is not this side's.
+    pub(super) fn of_sending(topic: &str, sent: Option<Result<(), String>>) -> Result<(), Self> {
+        sent.unwrap_or(Err("not this side's".into()))
+            .map_err(|words| Self::Send { what: topic.into(), words })
+    }
+}
+
 /// Wakes a transport that waits, from another thread.
 pub type Waker = std::sync::Arc<dyn Fn() + Send + Sync>;
 

@@ -56,45 +56,41 @@ pub enum MergeError {
     },
 }
 
-/// Puts the rows of `shards` into a new run in `out`; how many.
+/// Puts the rows of `shards`, each with its folder, into a new run in `out`; how many.
 ///
 /// # Errors
 /// If they are not each trial of one experiment once.
-pub fn merge(out: &Path, shards: &[PathBuf], manifest: &Manifest) -> Result<usize, MergeError> {
-    let mut whole: Option<Run> = None;
-    let mut seen: HashMap<(u32, String), &PathBuf> = HashMap::new();
-    for path in shards {
-        let run = Run::read(path)?;
+pub fn merge(
+    out: &Path,
+    shards: Vec<(PathBuf, Run)>,
+    manifest: &Manifest,
+) -> Result<usize, MergeError> {
+    let mut whole: Option<(PathBuf, Run)> = None;
+    let mut seen: HashMap<(u32, String), PathBuf> = HashMap::new();
+    for (path, run) in shards {
         for row in &run.rows {
             let (trial, planner) = (row.trial, row.planner.clone());
-            if let Some(a) = seen.insert((trial, planner.clone()), path) {
-                return Err(MergeError::Twice { trial, planner, a: a.clone(), b: path.clone() });
+            if let Some(a) = seen.insert((trial, planner.clone()), path.clone()) {
+                return Err(MergeError::Twice { trial, planner, a, b: path });
             }
         }
         match &mut whole {
-            None => whole = Some(run),
-            Some(whole) if whole.experiment == run.experiment => whole.rows.extend(run.rows),
-            Some(_) => {
-                let (path, first) = (path.clone(), shards[0].clone());
-                return Err(MergeError::Foreign { path, first });
-            }
+            None => whole = Some((path, run)),
+            Some((_, whole)) if whole.experiment == run.experiment => whole.rows.extend(run.rows),
+            Some((first, _)) => return Err(MergeError::Foreign { path, first: first.clone() }),
         }
     }
-    let Some(mut whole) = whole else { return Ok(0) };
-    let experiment = &whole.experiment;
-    let wanted = (0..experiment.trials)
-        .flat_map(|trial| experiment.planners.iter().map(move |planner| (trial, planner.clone())));
-    let mut missing = wanted.filter(|key| !seen.contains_key(key));
-    if let Some((trial, planner)) = missing.next() {
-        let missing = 1 + missing.count();
-        let wanted = experiment.trials as usize * experiment.planners.len();
-        return Err(MergeError::Missing { missing, wanted, trial, planner });
+    let Some((_, Run { experiment, truth, mut rows, .. })) = whole else { return Ok(0) };
+    let missing = experiment.lacks(&rows);
+    if let Some(&(trial, planner)) = missing.first() {
+        let (missing, planner) = (missing.len(), planner.to_owned());
+        return Err(MergeError::Missing { missing, wanted: missing + rows.len(), trial, planner });
     }
-    super::rows::sort(&mut whole.rows, experiment);
-    let (mut folder, there) = RunFolder::open(out, experiment, &whole.truth, manifest, false)?;
+    super::rows::sort(&mut rows, &experiment);
+    let (mut folder, there) = RunFolder::open(out, &experiment, &truth, manifest, false)?;
     if !there.is_empty() {
         return Err(MergeError::Taken { path: out.into() });
     }
-    whole.rows.iter().try_for_each(|row| folder.append(row))?;
-    Ok(whole.rows.len())
+    rows.iter().try_for_each(|row| folder.append(row))?;
+    Ok(rows.len())
 }

@@ -152,18 +152,13 @@ pub fn span(experiment: &Experiment) -> Span {
 
 impl Baseline {
     /// Of all trials of an experiment, made for this reason.
-    pub fn new(
-        simulation: &Simulation,
-        rows: &[TrialRow],
-        why: &str,
-        differs: Vec<String>,
-    ) -> Self {
+    pub fn new(simulation: &Simulation, rows: &[TrialRow], why: &str) -> Self {
         let experiment = simulation.experiment();
         let header = Header {
             experiment: experiment.name.clone(),
             palpate: env!("CARGO_PKG_VERSION").into(),
             why: why.into(),
-            differs,
+            differs: Vec::new(),
             settings: settings(experiment),
             seed: experiment.seed,
             initial_touches: experiment.initial_touches,

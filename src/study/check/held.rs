@@ -18,8 +18,8 @@ pub struct Held {
     pub same_settings: bool,
     /// Whether it was stopped before it had told everything.
     pub is_stopped: bool,
-    /// The rows that were made.
-    pub rows: Vec<TrialRow>,
+    /// The trials that were made.
+    pub rows: Vec<Line>,
 }
 
 /// What is said of a planner.
@@ -57,10 +57,10 @@ pub fn hold(
     progress: &(dyn Fn(&TrialRow) + Sync),
 ) -> Result<Held, RunError> {
     let experiment = simulation.experiment();
-    let names = &experiment.planners;
+    let (names, span) = (&experiment.planners, span(experiment));
     let mut open: Vec<&str> = names.iter().map(String::as_str).collect();
     open.retain(|name| baseline.header.planners.iter().any(|known| known == name));
-    let mut rows: Vec<TrialRow> = Vec::new();
+    let mut rows: Vec<Line> = Vec::new();
     let last = experiment.trials.min(baseline.header.trials);
     let mut first = 0;
     while first < last && !open.is_empty() && !stop.load(Ordering::Relaxed) {
@@ -69,37 +69,26 @@ pub fn hold(
         let jobs: Vec<Job> = (first..until)
             .flat_map(|trial| planners.iter().map(move |&planner| (trial, planner)))
             .collect();
-        rows.extend(runner::rows(simulation, jobs, threads, stop, progress)?);
-        open.retain(|name| {
-            let verdict = planner_of(simulation, baseline, rules, &rows, name).verdict;
-            verdict == Verdict::Undecided
-        });
+        let made = runner::rows(simulation, jobs, threads, stop, progress)?;
+        rows.extend(made.iter().map(|row| Line::of(row, span)));
+        open.retain(|name| planner_of(baseline, rules, &rows, name).verdict == Verdict::Undecided);
         first = until;
     }
     let others = baseline.header.planners.iter().filter(|name| !names.contains(name));
-    let planners = names
-        .iter()
-        .chain(others)
-        .map(|name| planner_of(simulation, baseline, rules, &rows, name))
-        .collect();
+    let planners =
+        names.iter().chain(others).map(|name| planner_of(baseline, rules, &rows, name)).collect();
     let same_settings = baseline.header.settings == settings(experiment);
     Ok(Held { planners, same_settings, is_stopped: stop.load(Ordering::Relaxed), rows })
 }
 
-/// Which planners of `rows` differ from the baseline's, and how: a line each.
-pub fn differs(
-    simulation: &Simulation,
-    baseline: &Baseline,
-    rules: &Rules,
-    rows: &[TrialRow],
-) -> Vec<String> {
-    let known = &baseline.header.planners;
-    let names = &simulation.experiment().planners;
+/// Which planners differ in the baseline `new` from those in `old`, and how: a line each.
+pub fn differs(old: &Baseline, new: &Baseline, rules: &Rules) -> Vec<String> {
+    let (known, names) = (&old.header.planners, &new.header.planners);
     let told = names.iter().filter_map(|name| {
         if !known.contains(name) {
             return Some(format!("{name}: new"));
         }
-        let planner = planner_of(simulation, baseline, rules, rows, name);
+        let planner = planner_of(old, rules, &new.lines, name);
         let first = planner.judgements.first()?;
         let percent = first.judged.percent(first.sequence.mean);
         Some(format!("{name}: {} {percent:+.2} % in {} trials", first.judged.title, planner.trials))
@@ -108,18 +97,11 @@ pub fn differs(
     told.chain(gone.map(|name| format!("{name}: gone"))).collect()
 }
 
-fn planner_of(
-    simulation: &Simulation,
-    baseline: &Baseline,
-    rules: &Rules,
-    rows: &[TrialRow],
-    name: &str,
-) -> Planner {
-    let span = span(simulation.experiment());
-    let pairs: Vec<(Line, &Line)> = rows
+fn planner_of(baseline: &Baseline, rules: &Rules, rows: &[Line], name: &str) -> Planner {
+    let pairs: Vec<(&Line, &Line)> = rows
         .iter()
         .filter(|row| row.planner == name)
-        .filter_map(|row| Some((Line::of(row, span), baseline.line(row.trial, name)?)))
+        .filter_map(|row| Some((row, baseline.line(row.trial, name)?)))
         .collect();
     let failures: Vec<&String> = pairs
         .iter()
@@ -147,7 +129,7 @@ fn planner_of(
             .iter()
             .filter(is_known)
             .map(|judged| {
-                let difference = |(new, old): &(Line, &Line)| {
+                let difference = |(new, old): &(&Line, &Line)| {
                     Some(new.values.get(judged.id)? - old.values.get(judged.id)?)
                 };
                 (judged, pairs.iter().filter_map(difference).collect())

@@ -7,6 +7,7 @@ mod nodelay;
 mod types;
 
 use crate::backend::ros::packet::Packet;
+use crate::backend::ros::queue::{Inlet, Outlet, queue};
 use crate::backend::ros::service::{Answer, Service};
 use crate::backend::ros::settings::BackendSettings;
 use crate::backend::ros::topics::{Side, Topic, Topics};
@@ -15,7 +16,7 @@ use master::Census;
 use roslibrust::RosMessageType;
 use roslibrust::ros1::{NodeHandle, Publisher, ServiceServer};
 use std::collections::HashMap;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
@@ -27,12 +28,6 @@ const QUEUE: usize = 64;
 /// How long an answer to a call from outside is waited for; chosen.
 const ANSWER: Duration = Duration::from_millis(500);
 
-/// What comes out of the tasks.
-enum Item {
-    Delivery(Delivery),
-    Wake,
-}
-
 type Writer = Box<dyn Fn(&Runtime, &Packet) -> Option<Result<(), String>>>;
 /// Calls from outside that wait for their answer.
 type Waiting = Arc<Mutex<HashMap<u64, Sender<Answer>>>>;
@@ -43,8 +38,8 @@ pub struct Ros1 {
     node: NodeHandle,
     census: Census,
     topics: Topics,
-    inbox: Receiver<Item>,
-    out: Sender<Item>,
+    inlet: Inlet,
+    outlet: Outlet,
     writers: Vec<Writer>,
     /// Kept, for a service ends with it.
     _servers: Vec<ServiceServer>,
@@ -87,14 +82,14 @@ impl Ros1 {
         let node = runtime
             .block_on(NodeHandle::new(&master, &name))
             .map_err(open(&format!("a node at the master {master}")))?;
-        let (out, inbox) = channel();
+        let (inlet, outlet) = queue();
         let mut end = Self {
             runtime,
             node,
             census: Census::new(&master, &settings.topics),
             topics: settings.topics.clone(),
-            inbox,
-            out,
+            inlet,
+            outlet,
             writers: Vec::new(),
             _servers: Vec::new(),
             waiting: Waiting::default(),
@@ -173,7 +168,7 @@ impl Ros1 {
         }
         let mut subscriber =
             self.runtime.block_on(self.node.subscribe::<M>(&name, QUEUE)).map_err(open(&name))?;
-        let out = self.out.clone();
+        let inlet = self.inlet.clone();
         self.runtime.spawn(async move {
             while let Some(message) = subscriber.next().await {
                 let delivery = match message {
@@ -184,7 +179,7 @@ impl Ros1 {
                     Err(error) if error.to_string().contains("lag") => continue,
                     Err(error) => Delivery::Garbled { topic, words: error.to_string() },
                 };
-                if out.send(Item::Delivery(delivery)).is_err() {
+                if !inlet.put(delivery) {
                     break;
                 }
             }
@@ -195,14 +190,12 @@ impl Ros1 {
     /// A service is answered by the link's loop; the caller's task waits for it.
     fn serve(&mut self, number: usize, service: Service) -> Result<(), TransportError> {
         let name = service.name();
-        let (out, waiting) = (Mutex::new(self.out.clone()), Arc::clone(&self.waiting));
+        let (inlet, waiting) = (self.inlet.clone(), Arc::clone(&self.waiting));
         let number = number as u64;
         let answer = move |_: Request| {
             let (sender, answer) = channel();
             waiting.lock().unwrap_or_else(PoisonError::into_inner).insert(number, sender);
-            let delivery = Delivery::Call { service: service.clone(), call: number };
-            let _ =
-                out.lock().unwrap_or_else(PoisonError::into_inner).send(Item::Delivery(delivery));
+            inlet.put(Delivery::Call { service: service.clone(), call: number });
             Ok(match answer.recv_timeout(ANSWER) {
                 Ok(Answer { is_done, words }) => Response { success: is_done, message: words },
                 Err(_) => Response { success: false, message: "not answered in time".into() },
@@ -219,33 +212,16 @@ impl Ros1 {
 
 impl Transport for Ros1 {
     fn waker(&self) -> Waker {
-        let wake = Mutex::new(self.out.clone());
-        Arc::new(move || {
-            let _ = wake.lock().unwrap_or_else(PoisonError::into_inner).send(Item::Wake);
-        })
+        self.inlet.waker()
     }
 
     fn send(&mut self, packet: &Packet) -> Result<(), TransportError> {
         let sent = self.writers.iter().find_map(|writer| writer(&self.runtime, packet));
-        let words = match sent {
-            Some(Ok(())) => return Ok(()),
-            Some(Err(words)) => words,
-            None => "not this side's".into(),
-        };
-        let what = self.topics.line(packet.topic()).name.to_owned();
-        Err(TransportError::Send { what, words })
+        TransportError::of_sending(self.topics.line(packet.topic()).name, sent)
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
-        let mut next = self.inbox.recv_timeout(timeout);
-        loop {
-            match next {
-                Ok(Item::Delivery(delivery)) => take(delivery),
-                Ok(Item::Wake) => (),
-                Err(_) => break,
-            }
-            next = self.inbox.try_recv().map_err(|_| RecvTimeoutError::Timeout);
-        }
+        self.outlet.receive(timeout, take);
     }
 
     fn publisher_count(&self, topic: Topic) -> usize {
@@ -253,7 +229,7 @@ impl Transport for Ros1 {
     }
 
     fn call(&mut self, service: &Service) -> Result<(), TransportError> {
-        let (node, out, service) = (self.node.clone(), self.out.clone(), service.clone());
+        let (node, inlet, service) = (self.node.clone(), self.inlet.clone(), service.clone());
         self.runtime.spawn(async move {
             let answer = match node.service_client::<Trigger>(&service.name()).await {
                 Ok(client) => match client.call(&Request {}).await {
@@ -264,7 +240,7 @@ impl Transport for Ros1 {
                 },
                 Err(error) => Answer { is_done: false, words: error.to_string() },
             };
-            let _ = out.send(Item::Delivery(Delivery::Answered { service, answer }));
+            inlet.put(Delivery::Answered { service, answer });
         });
         Ok(())
     }
