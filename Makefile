@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: demo paper paper-dynamic paper-planners test check-planners test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts growth bench-peers dist setup tools clean
+.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts growth bench-peers dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -45,6 +45,7 @@ paper-planners: setup
 test: setup
 	cargo test --locked --features ros2
 	for example in $(EXAMPLES); do cargo run --quiet --locked --features ros2 --example $$example || exit; done
+	tests/clusters/test.sh target/debug/palpate
 	$(MAKE) test-ros2 TOUCHES=8 OVER_TOPICS='lab::a_peer lab::the_container lab::the_loop'
 
 # Planners are what experiments/baselines says: whoever changes one writes why (palpate check --bless).
@@ -55,6 +56,14 @@ check-planners: setup
 		cargo run --quiet --locked --features ros2 -- --quiet check $$experiment \
 			--baseline experiments/baselines/$$experiment.jsonl || exit; \
 	done
+
+# Shards by GNU parallel and by a Slurm of one node, each skipped where it is not there.
+test-clusters: setup
+	cargo build --locked --features ros2
+	tests/clusters/test.sh target/debug/palpate
+
+install-clusters:
+	apt-get install --yes --no-install-recommends parallel slurm-wlm munge
 
 # An explorer and a twin of the arm over ROS 2, and a peer of another implementation, in a network
 # namespace of their own: nothing leaves it.

@@ -1,4 +1,4 @@
-//! Files that somebody named, read whole.
+//! Files that somebody named.
 //!
 //! Only regular files of a bounded size are read: a pipe or a device may never answer or never end.
 
@@ -12,11 +12,11 @@ pub const TEXT_MAX: u64 = 64 << 20;
 /// What some programs put before UTF-8, to say that it is UTF-8.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// The bytes of a file of at most `most` bytes.
+/// Opens a file to be read.
 ///
 /// # Errors
-/// If it is missing, forbidden, a folder, a pipe, a device or larger.
-pub fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+/// If it is missing, forbidden, a folder, a pipe or a device.
+pub fn open(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?;
     if kind.is_dir() {
         return Err(io::ErrorKind::IsADirectory.into());
@@ -24,10 +24,19 @@ pub fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     if !kind.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
     }
+    File::open(path)
+}
+
+/// The bytes of a file of at most `most` bytes.
+///
+/// # Errors
+/// As [`open`], and if it is larger.
+pub fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let file = open(path)?;
     let mut bytes = Vec::new();
-    bytes.try_reserve_exact(kind.len().min(most) as usize)?;
+    bytes.try_reserve_exact(file.metadata()?.len().min(most) as usize)?;
     // A file may grow while it is read, and some say that they are empty and never end.
-    File::open(path)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
+    file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
     match bytes.len() as u64 > most {
         true => Err(io::Error::new(
             io::ErrorKind::FileTooLarge,

@@ -1,5 +1,6 @@
 //! `palpate check`.
 
+use super::check_cost::{count, tell as tell_cost};
 use super::columns::aligned;
 use super::find::{EXPERIMENTS, find};
 use super::output::Force;
@@ -10,6 +11,7 @@ use crate::experiment::row::TrialRow;
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, Simulation, runner};
 use crate::report::check::{figure, junit, lines};
+use crate::study::check::cost::Cost;
 use crate::study::check::{Baseline, Held, Rules, Verdict, differs, hold};
 use anyhow::{Context, bail};
 use std::path::PathBuf;
@@ -21,12 +23,14 @@ Examples:
   palpate check toy --baseline experiments/baselines/toy.jsonl
   palpate check toy --baseline experiments/baselines/toy.jsonl --bless 'length scales are fitted in logarithms'
   palpate check bird --baseline bird.jsonl --tolerance 0.1 --max-trials 100 --junit check.xml --svg check.svg
+  palpate check toy --baseline experiments/baselines/toy.jsonl --cost
 
-Runs the first ten trials of every planner. Rows that are the bytes of the baseline's are identical, and that is \
+Runs the first four trials of every planner. Rows that are the bytes of the baseline's are identical, and that is \
 all. Otherwise new and old are paired by trial, which share seeds, on the mean of the logarithm of the error over the \
 touches; trials are added by tens until an interval that holds at any time says better, ok (its upper end is below \
 the tolerance) or worse, or --max-trials are spent: undecided. Other measures stand beside it, corrected after Holm, and \
-can only be worse.
+can only be worse. No time is judged; --cost counts the instructions of one trial of each planner, which are the same on a \
+busy machine, and skips where there is no valgrind.
 
 Exit codes: 0 identical, better or ok, 1 worse or missing, 3 undecided, 2 could not.")]
 pub(super) struct Args {
@@ -44,6 +48,10 @@ pub(super) struct Args {
     /// Write the baseline as it is now, and why.
     #[arg(long, value_name = "WHY")]
     bless: Option<String>,
+    /// Count a trial's instructions with valgrind instead, or too if a baseline is written; 2 %
+    /// more are worse.
+    #[arg(long, conflicts_with_all = ["junit", "markdown", "svg"])]
+    cost: bool,
     /// Write the verdicts as JUnit XML.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
@@ -69,7 +77,8 @@ fn tolerance(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
-    let mut experiment = Experiment::load(&find(&args.experiment, EXPERIMENTS)?, &args.set)?;
+    let path = find(&args.experiment, EXPERIMENTS)?;
+    let mut experiment = Experiment::load(&path, &args.set)?;
     experiment.trials = args.max_trials;
     let name = experiment.name.clone();
     for path in [&args.junit, &args.markdown, &args.svg].into_iter().flatten() {
@@ -84,6 +93,14 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         }
     };
     bound_threads(args.threads)?;
+    let cost = match args.cost {
+        true => count(&path, &args.set, &experiment, talk)?,
+        false => None,
+    };
+    if let (true, None, Some(old)) = (args.cost, &args.bless, &old) {
+        let told = cost.map(|cost| tell_cost(&args.baseline, old, &cost)).transpose()?;
+        return Ok(told.map_or(Ending::Done, ending));
+    }
     let simulation = simulation(experiment, talk)?;
     if simulation.is_real() {
         bail!("backend.kind: a check runs on the simulated body; allowed is \"simulated\"");
@@ -91,7 +108,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let stop = stop_on_interrupt("trials")?;
     let rules = Rules { tolerance: args.tolerance, ..Rules::default() };
     if let Some(why) = &args.bless {
-        return bless(args, &simulation, old.as_ref(), (why, &rules), &stop, talk);
+        return bless(args, &simulation, (old.as_ref(), cost), (why, &rules), &stop, talk);
     }
     let old = old.context("no baseline")?;
     let most = runner::jobs(simulation.experiment(), &[]).len() as u64;
@@ -100,12 +117,19 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let held = hold(&simulation, &old, &rules, args.threads.into(), &stop, &tick)?;
     bar.finish_and_clear();
     tell(args, &name, &old, &held, &rules)?;
-    Ok(match held.verdict() {
-        _ if held.is_stopped => Ending::Interrupted,
+    Ok(match held.is_stopped {
+        true => Ending::Interrupted,
+        false => ending(held.verdict()),
+    })
+}
+
+/// How a check ends that has said so.
+fn ending(verdict: Verdict) -> Ending {
+    match verdict {
         Verdict::Identical | Verdict::Better | Verdict::Ok => Ending::Done,
         Verdict::Undecided => Ending::Undecided,
         Verdict::Worse | Verdict::Missing => Ending::Failed,
-    })
+    }
 }
 
 fn tell(args: &Args, name: &str, old: &Baseline, held: &Held, rules: &Rules) -> anyhow::Result<()> {
@@ -137,7 +161,7 @@ fn tell(args: &Args, name: &str, old: &Baseline, held: &Held, rules: &Rules) -> 
 fn bless(
     args: &Args,
     simulation: &Simulation,
-    old: Option<&Baseline>,
+    (old, cost): (Option<&Baseline>, Option<Cost>),
     (why, rules): (&str, &Rules),
     stop: &AtomicBool,
     talk: Talk,
@@ -153,6 +177,7 @@ fn bless(
         return Ok(Ending::Interrupted);
     }
     let mut new = Baseline::new(simulation, &rows, why);
+    new.header.cost = cost.or_else(|| old?.header.cost.clone());
     new.header.differs = old.map_or(Vec::new(), |old| differs(old, &new, rules));
     write_whole(&args.baseline, &new.text()?)?;
     let mut text = format!("{} trials in {}", rows.len(), args.baseline.display());

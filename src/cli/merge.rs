@@ -2,7 +2,7 @@
 
 use super::run::manifest;
 use super::terminal::{Ending, print};
-use crate::experiment::store::{Run, merge};
+use crate::experiment::store::Shards;
 use anyhow::Context;
 use std::path::PathBuf;
 
@@ -23,11 +23,8 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
-    let read = |path: &PathBuf| anyhow::Ok((path.clone(), Run::read(path)?));
-    let shards = args.shards.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-    let (_, first) = shards.first().context("no shards")?;
-    let manifest = manifest(&first.experiment);
-    let count = merge(&args.out, shards, &manifest)?;
+    let shards = Shards::open(&args.shards)?.context("no shards")?;
+    let count = shards.merge(&args.out, &manifest(shards.experiment()))?;
     print(&format!("{count} trials in {}", args.out.display()))?;
     Ok(Ending::Done)
 }

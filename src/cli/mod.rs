@@ -3,6 +3,7 @@
 mod align;
 mod calibrate;
 mod check;
+mod check_cost;
 mod columns;
 mod compare;
 mod completions;

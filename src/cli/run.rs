@@ -7,10 +7,10 @@ use super::terminal::{Ending, Talk, error, print};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::lab_runner::{self, Halt, Outcome};
-use crate::experiment::row::TrialRow;
+use crate::experiment::row::{TrialId, TrialRow};
 use crate::experiment::runner;
 use crate::experiment::shard::Shard;
-use crate::experiment::store::{JOURNAL, Manifest, RECORDINGS, Run, RunFolder};
+use crate::experiment::store::{JOURNAL, Manifest, RECORDINGS, Run, RunFolder, Tally};
 use crate::experiment::sweep::cells;
 use crate::report;
 use anyhow::{Context, bail};
@@ -61,7 +61,7 @@ pub(super) struct Args {
     #[arg(long)]
     no_report: bool,
     /// Print the summary as JSON instead of a table.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "shard")]
     json: bool,
 }
 
@@ -149,15 +149,20 @@ fn run_one(
     };
     let count = outcome.finished;
     bar.finish_and_clear();
-    folder.sort(experiment)?;
+    let tally = folder.sort(experiment)?;
+    let finished = tally.trials as u64 == total;
+    let mut made = format!("{count} trials in {:.1} s", begun.elapsed().as_secs_f64());
+    if !done.is_empty() {
+        made += &format!(", {} were there already", done.len());
+    }
+    // A part of a run is not looked at: its rows need not fit into memory.
+    if args.shard.is_some() {
+        print(&format!("{made}\nrows in {}", path.display()))?;
+        return Ok(ending(&tally, finished, talk));
+    }
 
     let run = Run::read(&path)?;
-    let finished = run.rows.len() as u64 == total;
-    let mut text = report::tables::summary::text(&run);
-    text += &format!("\n{count} trials in {:.1} s", begun.elapsed().as_secs_f64());
-    if !done.is_empty() {
-        text += &format!(", {} were there already", done.len());
-    }
+    let mut text = format!("{}\n{made}", report::tables::summary::text(&run));
     let analysis = Analysis::of(&run);
     report::write_tables(&run, &analysis, &path)?;
     if !finished {
@@ -166,7 +171,7 @@ fn run_one(
             run.rows.len(),
             path.display()
         );
-    } else if args.no_report || args.shard.is_some() {
+    } else if args.no_report {
         text += &format!("\nrows and summary in {}", path.display());
     } else {
         report::write(&run, &analysis, &path)
@@ -188,27 +193,27 @@ fn run_one(
         }
         talk.note(kept);
     }
-    Ok(match tell_failures(&run, talk) {
-        _ if !finished => Ending::Interrupted,
-        true => Ending::Failed,
-        false => Ending::Done,
-    })
+    Ok(ending(&tally, finished, talk))
 }
 
-/// Says on standard error how many trials failed and why the first did; whether all of them did.
-fn tell_failures(run: &Run, talk: Talk) -> bool {
-    let failed = || run.rows.iter().filter_map(|row| Some((row, row.failure.as_ref()?)));
-    let Some((row, reason)) = failed().next() else { return false };
-    let (count, of) = (failed().count(), run.rows.len());
-    let words = format!(
-        "{count} of {of} trials failed, the first ({}, trial {}): {reason}",
-        row.planner, row.trial
-    );
-    match count == of {
-        true => error(words),
-        false => talk.note(words),
+/// How a run ended; says on standard error how many trials failed and why the first did.
+fn ending(tally: &Tally, finished: bool, talk: Talk) -> Ending {
+    let &Tally { trials, failed, ref first } = tally;
+    let all_failed = trials > 0 && failed == trials;
+    if let Some((TrialId { trial, planner }, reason)) = first {
+        let words = format!(
+            "{failed} of {trials} trials failed, the first ({planner}, trial {trial}): {reason}"
+        );
+        match all_failed {
+            true => error(words),
+            false => talk.note(words),
+        }
     }
-    count == of
+    match () {
+        () if !finished => Ending::Interrupted,
+        () if all_failed => Ending::Failed,
+        () => Ending::Done,
+    }
 }
 
 pub(super) fn manifest(experiment: &Experiment) -> Manifest {

@@ -5,7 +5,7 @@
 //! there; rows of trials or planners that are no longer listed are kept, but not shown.
 
 use super::report_settings::{ReportSettings, TOUCHES_MAX};
-use super::row::TrialRow;
+use super::row::TrialId;
 use super::scan_truth::ScanTruth;
 use crate::backend::ros::settings::BackendSettings;
 use crate::config::{Checked, ConfigError, Loader, Rules};
@@ -162,14 +162,15 @@ impl Experiment {
         }
     }
 
-    /// Whether a row is of one of the trials and planners that are listed.
-    pub fn lists(&self, row: &TrialRow) -> bool {
-        row.trial < self.trials && self.planners.contains(&row.planner)
+    /// Whether a trial is one of those that are listed.
+    pub fn lists(&self, id: &TrialId) -> bool {
+        id.trial < self.trials && self.planners.contains(&id.planner)
     }
 
-    /// Every trial of every planner that `rows` lack, trial by trial.
-    pub fn lacks(&self, rows: &[TrialRow]) -> Vec<(u32, &str)> {
-        let there: HashSet<_> = rows.iter().map(|row| (row.trial, row.planner.as_str())).collect();
+    /// Every trial of every planner that is not among `done`, trial by trial.
+    pub fn lacks<'a>(&self, done: impl IntoIterator<Item = &'a TrialId>) -> Vec<(u32, &str)> {
+        let there: HashSet<_> =
+            done.into_iter().map(|id| (id.trial, id.planner.as_str())).collect();
         (0..self.trials)
             .flat_map(|trial| self.planners.iter().map(move |planner| (trial, planner.as_str())))
             .filter(|trial_of| !there.contains(trial_of))

@@ -2,7 +2,7 @@
 
 use super::recorded_trial::{self, recording_path};
 use super::resumed::Resumed;
-use super::row::{TouchRow, TrialRow};
+use super::row::{TouchRow, TrialId, TrialRow};
 use super::runner::jobs;
 use super::simulation::Simulation;
 use super::store::{Entry, Journal, RunFolder, StoreError};
@@ -42,7 +42,7 @@ pub struct Halt {
 /// If a row or touch cannot be stored.
 pub fn run(
     simulation: &Simulation,
-    (folder, done): (&mut RunFolder, &[TrialRow]),
+    (folder, done): (&mut RunFolder, &[TrialId]),
     stop: &AtomicBool,
     recorded: Option<&Path>,
     progress: &(dyn Fn(&TrialRow) + Sync),

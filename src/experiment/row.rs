@@ -8,6 +8,15 @@ use crate::gp::fit::Fit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Which of an experiment's trials.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct TrialId {
+    /// Its number.
+    pub trial: u32,
+    /// Its planner.
+    pub planner: String,
+}
+
 /// One trial of one planner. Holds no wall time, so that it is the same bytes on every run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TrialRow {
@@ -64,6 +73,11 @@ pub struct TouchRow {
 }
 
 impl TrialRow {
+    /// Which trial it is.
+    pub fn id(&self) -> TrialId {
+        TrialId { trial: self.trial, planner: self.planner.clone() }
+    }
+
     /// Of a trial that had to be given up before its first touch.
     pub fn unstarted(trial: u32, planner: &str, fault: &Fault) -> Self {
         Self {

@@ -2,7 +2,7 @@
 
 use super::experiment::Experiment;
 use super::recorded_trial::{self, recording_path};
-use super::row::TrialRow;
+use super::row::{TrialId, TrialRow};
 use super::simulation::Simulation;
 use super::store::{RunFolder, StoreError};
 use crate::explore::planner;
@@ -137,7 +137,7 @@ fn run_caught(
 }
 
 /// Every trial of every planner that `done` lacks, trial by trial.
-pub fn jobs(experiment: &Experiment, done: &[TrialRow]) -> Vec<Job> {
+pub fn jobs(experiment: &Experiment, done: &[TrialId]) -> Vec<Job> {
     let lacking = experiment.lacks(done).into_iter();
     lacking.filter_map(|(trial, name)| Some((trial, planner::by_name(name)?))).collect()
 }

@@ -1,7 +1,9 @@
 //! Parts of a run, put together.
 
+use crate::common::counting::peak_bytes;
 use crate::common::program::palpate;
 use palpate::experiment::shard::{NoShard, Shard};
+use palpate::experiment::store::{Manifest, Shards};
 use std::fs;
 use std::path::Path;
 
@@ -75,4 +77,29 @@ fn shards_are_merged_to_the_bytes_of_one_run() {
     assert!(["missing", "twice", "of-two"].iter().all(|name| !at(name).exists()));
     let (code, told) = run(&at("no"), &["--shard", "4/3"]);
     assert!(code == Some(2) && told.contains("from 1 to N"), "{told}");
+}
+
+/// What is kept of a row is which trial it is and where it stands.
+#[test]
+fn rows_are_merged_without_being_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let more = ["--shard", "1/1", "--set", "trials=300", "--set", "grid=10"];
+    assert_eq!(run(&at("1"), &more).0, Some(0));
+    let size = fs::metadata(at("1").join("trials.jsonl")).unwrap().len();
+    let mut count = 0;
+    let peak = peak_bytes(|| {
+        let shards = Shards::open(&[at("1")]).unwrap().unwrap();
+        let manifest = Manifest {
+            version: "",
+            commit: "",
+            mujoco: None,
+            platform: String::new(),
+            cpu_features: Vec::new(),
+            seed: shards.experiment().seed,
+        };
+        count = shards.merge(&at("whole"), &manifest).unwrap();
+    });
+    assert_eq!(count, 600);
+    assert!((peak as u64) < size / 4, "{peak} bytes of {size}");
 }

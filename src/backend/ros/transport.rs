@@ -74,6 +74,7 @@ pub enum TransportError {
     },
 }
 
+#[cfg(any(feature = "ros1", feature = "ros2"))]
 impl TransportError {
     /// What came of sending to `topic`: what the writer says, or none if it is not this side's.
     pub(super) fn of_sending(topic: &str, sent: Option<Result<(), String>>) -> Result<(), Self> {

@@ -1,8 +1,8 @@
 //! Files of a run's folder: written whole or not at all.
 
 use super::error::StoreError;
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes a file so that a reader sees all of it or none.
@@ -10,8 +10,21 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// If it cannot be written.
 pub fn write_whole(path: &Path, text: &str) -> Result<(), StoreError> {
+    write_whole_by(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// As [`write_whole`], with what `write` writes.
+pub(super) fn write_whole_by(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), StoreError> {
     let partial = partial(path);
-    let written = fs::write(&partial, text).and_then(|()| fs::rename(&partial, path));
+    let written = File::create(&partial).and_then(|file| {
+        let mut file = BufWriter::new(file);
+        write(&mut file)?;
+        file.flush()?;
+        fs::rename(&partial, path)
+    });
     written.map_err(|cause| {
         // What a full disk has taken of it is in the way there.
         let _ = fs::remove_file(&partial);

@@ -1,7 +1,13 @@
 //! Shards of a run, put together: the bytes of one that ran in a single process.
 
-use super::{Manifest, Run, RunFolder, StoreError};
-use std::collections::HashMap;
+use super::error::io_error;
+use super::rows::{self, Place};
+use super::surface::{self, SURFACE};
+use super::{Manifest, RunFolder, StoreError, TRIALS, resolved};
+use crate::experiment::experiment::Experiment;
+use crate::experiment::row::TrialId;
+use crate::experiment::truth::Truth;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -13,7 +19,7 @@ pub enum MergeError {
     Store(#[from] StoreError),
     /// One is of another experiment.
     #[error(
-        "{}: another experiment than {}: settings, planners or trials differ", path.display(), first.display()
+        "{}: another experiment than {}: settings, planners, trials or the object differ", path.display(), first.display()
     )]
     Foreign {
         /// It.
@@ -56,41 +62,78 @@ pub enum MergeError {
     },
 }
 
-/// Puts the rows of `shards`, each with its folder, into a new run in `out`; how many.
-///
-/// # Errors
-/// If they are not each trial of one experiment once.
-pub fn merge(
-    out: &Path,
-    shards: Vec<(PathBuf, Run)>,
-    manifest: &Manifest,
-) -> Result<usize, MergeError> {
-    let mut whole: Option<(PathBuf, Run)> = None;
-    let mut seen: HashMap<(u32, String), PathBuf> = HashMap::new();
-    for (path, run) in shards {
-        for row in &run.rows {
-            let (trial, planner) = (row.trial, row.planner.clone());
-            if let Some(a) = seen.insert((trial, planner.clone()), path.clone()) {
-                return Err(MergeError::Twice { trial, planner, a, b: path });
+/// Folders that hold each trial of an experiment once, all of them together.
+pub struct Shards {
+    experiment: Experiment,
+    truth: Truth,
+    paths: Vec<PathBuf>,
+    /// Which of `paths` has a row, and where, in the rows' order.
+    places: Vec<(usize, Place)>,
+}
+
+impl Shards {
+    /// Looks at the folders, row by row.
+    ///
+    /// # Errors
+    /// If they are not each trial of one experiment once.
+    pub fn open(paths: &[PathBuf]) -> Result<Option<Self>, MergeError> {
+        let Some(first) = paths.first() else { return Ok(None) };
+        super::require_run(first)?;
+        let experiment = resolved::read(first, &[])?;
+        let truth = surface::read(&first.join(SURFACE), &experiment)?;
+        let mut places: Vec<(usize, Place)> = Vec::new();
+        for (i, path) in paths.iter().enumerate() {
+            super::require_run(path)?;
+            let is_same = resolved::read(path, &[])? == experiment
+                && surface::read(&path.join(SURFACE), &experiment)? == truth;
+            if !is_same {
+                return Err(MergeError::Foreign { path: path.clone(), first: first.clone() });
             }
+            let mut own = rows::places(&path.join(TRIALS), &experiment)?;
+            own.retain(|place| experiment.lists(&place.id));
+            places.extend(own.into_iter().map(|place| (i, place)));
         }
-        match &mut whole {
-            None => whole = Some((path, run)),
-            Some((_, whole)) if whole.experiment == run.experiment => whole.rows.extend(run.rows),
-            Some((first, _)) => return Err(MergeError::Foreign { path, first: first.clone() }),
+        places.sort_by(|(_, a), (_, b)| rows::order(&a.id, &b.id, &experiment));
+        let mut pairs = places.array_windows();
+        if let Some([(a, place), (b, _)]) = pairs.find(|[(_, a), (_, b)]| a.id == b.id) {
+            let TrialId { trial, planner } = place.id.clone();
+            let (a, b) = (paths[*a].clone(), paths[*b].clone());
+            return Err(MergeError::Twice { trial, planner, a, b });
         }
+        let missing = experiment.lacks(places.iter().map(|(_, place)| &place.id));
+        if let Some(&(trial, planner)) = missing.first() {
+            let (missing, planner) = (missing.len(), planner.to_owned());
+            let wanted = missing + places.len();
+            return Err(MergeError::Missing { missing, wanted, trial, planner });
+        }
+        Ok(Some(Self { experiment, truth, paths: paths.into(), places }))
     }
-    let Some((_, Run { experiment, truth, mut rows, .. })) = whole else { return Ok(0) };
-    let missing = experiment.lacks(&rows);
-    if let Some(&(trial, planner)) = missing.first() {
-        let (missing, planner) = (missing.len(), planner.to_owned());
-        return Err(MergeError::Missing { missing, wanted: missing + rows.len(), trial, planner });
+
+    /// What was run.
+    pub fn experiment(&self) -> &Experiment {
+        &self.experiment
     }
-    super::rows::sort(&mut rows, &experiment);
-    let (mut folder, there) = RunFolder::open(out, &experiment, &truth, manifest, false)?;
-    if !there.is_empty() {
-        return Err(MergeError::Taken { path: out.into() });
+
+    /// Puts their rows into a new run in `out`; how many.
+    ///
+    /// # Errors
+    /// If there are rows already, or it cannot be written.
+    pub fn merge(&self, out: &Path, manifest: &Manifest) -> Result<usize, MergeError> {
+        let (mut folder, there) =
+            RunFolder::open(out, &self.experiment, &self.truth, manifest, false)?;
+        if !there.is_empty() {
+            return Err(MergeError::Taken { path: out.into() });
+        }
+        let mut line = Vec::new();
+        for (i, place) in &self.places {
+            line.clear();
+            let path = self.paths[*i].join(TRIALS);
+            // One at a time: there may be more shards than files that a process may have open.
+            File::open(&path)
+                .and_then(|mut file| rows::copy(&mut file, &place.bytes, &mut line))
+                .map_err(io_error(&path))?;
+            folder.append_line(&line)?;
+        }
+        Ok(self.places.len())
     }
-    rows.iter().try_for_each(|row| folder.append(row))?;
-    Ok(rows.len())
 }

@@ -24,14 +24,15 @@ pub use error::StoreError;
 pub use file::write_whole;
 pub use journal::{Entry, JOURNAL, Journal};
 pub use manifest::{MANIFEST, Manifest};
-pub use merge::{MergeError, merge};
+pub use merge::{MergeError, Shards};
 pub use resolved::{RESOLVED, resolved, resolved_beside};
 
 use self::error::io_error;
-use self::file::{partial, remove};
+use self::file::{partial, remove, write_whole_by};
+use self::rows::Place;
 use self::surface::SURFACE;
 use crate::experiment::experiment::Experiment;
-use crate::experiment::row::TrialRow;
+use crate::experiment::row::{TrialId, TrialRow};
 use crate::experiment::truth::Truth;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
@@ -68,8 +69,8 @@ impl RunFolder {
     /// Opens `path` for `experiment`: makes it, or continues what was begun there, or, if
     /// `fresh` or if that has no row yet, throws it away.
     ///
-    /// Returns the rows that are already there of those that the experiment lists. A last line cut
-    /// short by a crash is dropped.
+    /// Returns the trials that are already there of those that the experiment lists. A last line
+    /// cut short by a crash is dropped.
     ///
     /// # Errors
     /// If the folder holds something else, is being written, or cannot be.
@@ -79,7 +80,7 @@ impl RunFolder {
         truth: &Truth,
         manifest: &Manifest,
         fresh: bool,
-    ) -> Result<(Self, Vec<TrialRow>), StoreError> {
+    ) -> Result<(Self, Vec<TrialId>), StoreError> {
         fs::create_dir_all(path).map_err(io_error(path))?;
         let file = path.join(TRIALS);
         refuse_foreign(path)?;
@@ -99,14 +100,15 @@ impl RunFolder {
         }
         resolved::same_run(path, experiment)?;
         surface::write_or_compare(path, experiment, truth)?;
-        let (mut rows, good_bytes) = rows::read(&file, experiment)?;
+        let mut done = Vec::new();
+        let good_bytes = rows::scan(&file, experiment, |row, _| done.push(row.id()))?;
         if trials.metadata().map_err(io_error(&file))?.len() > good_bytes {
             trials.set_len(good_bytes).map_err(io_error(&file))?;
         }
         resolved::write(path, experiment)?;
-        rows.retain(|row| experiment.lists(row));
+        done.retain(|id| experiment.lists(id));
         let unsigned = Some(manifest.clone());
-        Ok((Self { path: path.into(), trials, unsigned }, rows))
+        Ok((Self { path: path.into(), trials, unsigned }, done))
     }
 
     /// Adds a row and hands it to the operating system, so that a later kill cannot lose it.
@@ -121,10 +123,14 @@ impl RunFolder {
             return Err(StoreError::BadRow { path: file, line: 0, message: error.to_string() });
         }
         line.push(b'\n');
+        self.append_line(&line)
+    }
+
+    fn append_line(&mut self, line: &[u8]) -> Result<(), StoreError> {
         if let Some(manifest) = self.unsigned.take() {
             manifest::sign(&self.path.join(MANIFEST), &manifest)?;
         }
-        self.trials.write_all(&line).map_err(io_error(&file))
+        self.trials.write_all(line).map_err(io_error(&self.path.join(TRIALS)))
     }
 
     /// The touches and faults of a real arm.
@@ -136,24 +142,53 @@ impl RunFolder {
     }
 
     /// Puts the rows in order of trial and planner: the same bytes whoever finished first, and
-    /// however often trials and planners were added.
+    /// however often trials and planners were added. What the rows are that the experiment lists.
     ///
     /// # Errors
     /// If the file cannot be read back or replaced.
-    pub fn sort(self, experiment: &Experiment) -> Result<(), StoreError> {
+    pub fn sort(self, experiment: &Experiment) -> Result<Tally, StoreError> {
         let file = self.path.join(TRIALS);
-        let (mut rows, _) = rows::read(&file, experiment)?;
-        if rows::is_sorted(&rows, experiment) {
-            return Ok(());
+        let (mut places, mut tally) = (Vec::new(), Tally::default());
+        rows::scan(&file, experiment, |row, bytes| {
+            let id = row.id();
+            if experiment.lists(&id) {
+                tally.add(row);
+            }
+            places.push(Place { id, bytes });
+        })?;
+        if !rows::is_sorted(&places, experiment) {
+            places.sort_by(|a, b| rows::order(&a.id, &b.id, experiment));
+            let mut from = File::open(&file).map_err(io_error(&file))?;
+            write_whole_by(&file, |to| {
+                places.iter().try_for_each(|place| rows::copy(&mut from, &place.bytes, to))
+            })?;
         }
-        rows::sort(&mut rows, experiment);
-        let mut text = String::new();
-        for row in &rows {
-            text +=
-                &serde_json::to_string(row).map_err(io::Error::from).map_err(io_error(&file))?;
-            text.push('\n');
+        Ok(tally)
+    }
+}
+
+/// What rows came to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// How many there are.
+    pub trials: usize,
+    /// How many of them failed.
+    pub failed: usize,
+    /// The first that did, and why.
+    pub first: Option<(TrialId, String)>,
+}
+
+impl Tally {
+    fn add(&mut self, row: TrialRow) {
+        self.trials += 1;
+        let id = row.id();
+        if let Some(reason) = row.failure {
+            self.failed += 1;
+            let is_first = self.first.as_ref().is_none_or(|(first, _)| id.trial < first.trial);
+            if is_first {
+                self.first = Some((id, reason));
+            }
         }
-        write_whole(&file, &text)
     }
 }
 
@@ -166,11 +201,16 @@ impl Run {
         require_run(path)?;
         let experiment = resolved::read(path, &[])?;
         let truth = surface::read(&path.join(SURFACE), &experiment)?;
-        let (mut rows, _) = rows::read(&path.join(TRIALS), &experiment)?;
-        let all = rows.len();
-        rows.retain(|row| experiment.lists(row));
-        rows::sort(&mut rows, &experiment);
-        let unlisted = all - rows.len();
+        let (mut rows, mut unlisted) = (Vec::new(), 0);
+        rows::scan(&path.join(TRIALS), &experiment, |row, _| {
+            let id = row.id();
+            match experiment.lists(&id) {
+                true => rows.push((id, row)),
+                false => unlisted += 1,
+            }
+        })?;
+        rows.sort_by(|(a, _), (b, _)| rows::order(a, b, &experiment));
+        let rows = rows.into_iter().map(|(_, row)| row).collect();
         Ok(Self { experiment, truth, rows, unlisted })
     }
 }

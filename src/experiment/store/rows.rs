@@ -2,11 +2,13 @@
 
 use super::error::{StoreError, io_error};
 use crate::experiment::experiment::Experiment;
-use crate::experiment::row::{TouchRow, TrialRow};
+use crate::experiment::row::{TouchRow, TrialId, TrialRow};
 use crate::{files, words};
+use std::cmp::Ordering;
 use std::collections::HashSet;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::Path;
 
 /// Whether a results file has a whole line.
@@ -16,31 +18,59 @@ pub(super) fn has_some(trials: &File) -> io::Result<bool> {
     Ok(line.ends_with(b"\n"))
 }
 
-/// Rows of a results file and the number of bytes they fill; a last line without its end was cut
+/// Where a trial's row stands in its file.
+pub(super) struct Place {
+    pub id: TrialId,
+    pub bytes: Range<u64>,
+}
+
+/// Reads a results file row by row, none of which stays in memory, and hands each with the bytes
+/// that it fills to `each`; how many bytes all of them fill. A last line without its end was cut
 /// short and is left out.
 ///
 /// # Errors
 /// If a line is not a row, or none that `experiment` can have, or the same trial again.
-pub(super) fn read(
+pub(super) fn scan(
     path: &Path,
     experiment: &Experiment,
-) -> Result<(Vec<TrialRow>, u64), StoreError> {
-    let bytes = files::bytes(path, u64::MAX).map_err(io_error(path))?;
-    let (mut rows, mut good) = (Vec::new(), 0);
-    let mut seen = HashSet::new();
-    let lines = bytes.split_inclusive(|&byte| byte == b'\n').filter(|line| line.ends_with(b"\n"));
-    for (i, line) in lines.enumerate() {
-        let bad = |message| StoreError::BadRow { path: path.into(), line: i + 1, message };
+    mut each: impl FnMut(TrialRow, Range<u64>),
+) -> Result<u64, StoreError> {
+    let mut file = BufReader::new(files::open(path).map_err(io_error(path))?);
+    let (mut seen, mut line) = (HashSet::new(), Vec::new());
+    let (mut number, mut good) = (0, 0);
+    loop {
+        line.clear();
+        let length = file.read_until(b'\n', &mut line).map_err(io_error(path))? as u64;
+        if !line.ends_with(b"\n") {
+            return Ok(good);
+        }
+        number += 1;
+        let bad = |message| StoreError::BadRow { path: path.into(), line: number, message };
         let row: TrialRow =
-            serde_json::from_slice(line).map_err(|error| bad(in_its_line(&error)))?;
+            serde_json::from_slice(&line).map_err(|error| bad(in_its_line(&error)))?;
         belongs(&row, experiment).map_err(bad)?;
-        if !seen.insert((row.trial, row.planner.clone())) {
+        if !seen.insert(row.id()) {
             return Err(bad(format!("trial {} of {} stands there twice", row.trial, row.planner)));
         }
-        rows.push(row);
-        good += line.len();
+        each(row, good..good + length);
+        good += length;
     }
-    Ok((rows, good as u64))
+}
+
+/// Where the rows of a results file stand.
+///
+/// # Errors
+/// As [`scan`].
+pub(super) fn places(path: &Path, experiment: &Experiment) -> Result<Vec<Place>, StoreError> {
+    let mut places = Vec::new();
+    scan(path, experiment, |row, bytes| places.push(Place { id: row.id(), bytes }))?;
+    Ok(places)
+}
+
+/// Copies the row at `bytes` of `from`.
+pub(super) fn copy(from: &mut File, bytes: &Range<u64>, to: &mut impl Write) -> io::Result<()> {
+    from.seek(SeekFrom::Start(bytes.start))?;
+    io::copy(&mut from.take(bytes.end - bytes.start), to).map(|_| ())
 }
 
 /// What is wrong with a line: the parser knows no other.
@@ -84,18 +114,18 @@ fn fits(touch: &TouchRow, dimension: usize) -> Result<(), String> {
     Ok(())
 }
 
-/// Puts rows in order of trial, and of the experiment's planners, those not listed last.
-pub(super) fn sort(rows: &mut [TrialRow], experiment: &Experiment) {
-    rows.sort_by(|a, b| key(a, experiment).cmp(&key(b, experiment)));
+/// The order of rows: by trial, and the experiment's planners, those not listed last.
+pub(super) fn order(a: &TrialId, b: &TrialId, experiment: &Experiment) -> Ordering {
+    let listed = |id: &TrialId| {
+        let found = experiment.planners.iter().position(|planner| *planner == id.planner);
+        found.unwrap_or(experiment.planners.len())
+    };
+    let by_planner = || listed(a).cmp(&listed(b)).then_with(|| a.planner.cmp(&b.planner));
+    a.trial.cmp(&b.trial).then_with(by_planner)
 }
 
 /// Whether the rows that the experiment lists stand in order; the others may stand anywhere.
-pub(super) fn is_sorted(rows: &[TrialRow], experiment: &Experiment) -> bool {
-    let listed = rows.iter().filter(|row| experiment.lists(row));
-    listed.map(|row| key(row, experiment)).is_sorted()
-}
-
-fn key<'a>(row: &'a TrialRow, experiment: &Experiment) -> (u32, usize, &'a str) {
-    let listed = experiment.planners.iter().position(|planner| *planner == row.planner);
-    (row.trial, listed.unwrap_or(experiment.planners.len()), &row.planner)
+pub(super) fn is_sorted(places: &[Place], experiment: &Experiment) -> bool {
+    let listed = places.iter().map(|place| &place.id).filter(|id| experiment.lists(id));
+    listed.is_sorted_by(|a, b| order(a, b, experiment).is_le())
 }

@@ -1,5 +1,6 @@
 //! What planners were: a file of JSON lines, a header and then a line for each trial.
 
+use super::cost::Cost;
 use super::judged::{JUDGED, Span};
 use crate::experiment::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
@@ -36,6 +37,9 @@ pub struct Header {
     pub trials: u32,
     /// Planners.
     pub planners: Vec<String>,
+    /// Instructions of a trial, if they were counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost: Option<Cost>,
 }
 
 /// A trial.
@@ -166,6 +170,7 @@ impl Baseline {
             grid: experiment.grid,
             trials: experiment.trials,
             planners: experiment.planners.clone(),
+            cost: None,
         };
         let lines = rows.iter().map(|row| Line::of(row, span(experiment))).collect();
         Self { header, lines }

@@ -44,7 +44,8 @@ impl Held {
     }
 }
 
-/// Runs the experiment's planners on the baseline's trials, a batch at a time.
+/// Runs the experiment's planners on the baseline's trials: a few, whether they are the same, then
+/// a batch at a time.
 ///
 /// # Errors
 /// If threads cannot be started.
@@ -64,14 +65,20 @@ pub fn hold(
     let last = experiment.trials.min(baseline.header.trials);
     let mut first = 0;
     while first < last && !open.is_empty() && !stop.load(Ordering::Relaxed) {
-        let until = last.min(first + rules.batch as u32);
+        let (some, batch) = (rules.first as u32, rules.batch as u32);
+        let until = last.min(if first < some { some } else { (first / batch + 1) * batch });
         let planners: Vec<_> = open.iter().filter_map(|name| planner::by_name(name)).collect();
         let jobs: Vec<Job> = (first..until)
             .flat_map(|trial| planners.iter().map(move |&planner| (trial, planner)))
             .collect();
         let made = runner::rows(simulation, jobs, threads, stop, progress)?;
         rows.extend(made.iter().map(|row| Line::of(row, span)));
-        open.retain(|name| planner_of(baseline, rules, &rows, name).verdict == Verdict::Undecided);
+        // The first rows only tell whether anything is other: intervals are looked at by batches.
+        let is_open = |verdict| match until < batch {
+            true => verdict != Verdict::Identical,
+            false => verdict == Verdict::Undecided,
+        };
+        open.retain(|name| is_open(planner_of(baseline, rules, &rows, name).verdict));
         first = until;
     }
     let others = baseline.header.planners.iter().filter(|name| !names.contains(name));

@@ -43,13 +43,15 @@ pub struct Rules {
     /// Probability of one false word about a planner's first measure, at any time; the other
     /// measures share as much, divided after Holm (1979).
     pub alpha: f64,
-    /// Trials between two looks.
+    /// Trials whose rows are looked at first, whether they are the same.
+    pub first: usize,
+    /// Trials between two looks at an interval.
     pub batch: usize,
 }
 
 impl Default for Rules {
     fn default() -> Self {
-        Self { tolerance: 0.05, alpha: 0.05, batch: 10 }
+        Self { tolerance: 0.05, alpha: 0.05, first: 4, batch: 10 }
     }
 }
 

@@ -1,0 +1,56 @@
+#!/usr/bin/env bash
+# Runs a command beside a Slurm of one node, whose files all lie in FOLDER and which talks to itself alone;
+# as root, in a network namespace of its own: unshare --net bash slurm.sh FOLDER COMMAND...
+set -eu
+here=$(realpath "$1")
+shift
+ip link set lo up
+# Slurm opens no port where there is no address but 127.0.0.1.
+ip addr add 10.77.0.1/32 dev lo
+node=$(hostname -s)
+mkdir -p "$here/state" "$here/spool" "$here/munge"
+chmod 755 "$here" "$here/munge"
+export SLURM_CONF=$here/slurm.conf
+cat >"$SLURM_CONF" <<CONF
+ClusterName=one
+SlurmctldHost=$node(127.0.0.1)
+AuthType=auth/munge
+AuthInfo=socket=$here/munge/socket
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+SlurmUser=root
+StateSaveLocation=$here/state
+SlurmdSpoolDir=$here/spool
+SlurmctldPidFile=$here/slurmctld.pid
+SlurmdPidFile=$here/slurmd.pid
+SlurmctldLogFile=$here/slurmctld.log
+SlurmdLogFile=$here/slurmd.log
+ReturnToService=2
+KillWait=1
+MinJobAge=600
+JobAcctGatherType=jobacct_gather/none
+AccountingStorageType=accounting_storage/none
+MpiDefault=none
+NodeName=$node NodeAddr=127.0.0.1 CPUs=$(nproc) State=UNKNOWN
+PartitionName=main Nodes=$node Default=YES MaxTime=INFINITE State=UP
+CONF
+stop() {
+    for pid in "$here"/slurmd.pid "$here"/slurmctld.pid "$here"/munge/pid; do
+        [ ! -s "$pid" ] || kill "$(cat "$pid")" 2>/dev/null || true
+    done
+    while pkill -0 -f "$here/munge/socket"; do sleep 0.1; done
+}
+trap stop EXIT
+head -c 1024 /dev/urandom >"$here/munge/key"
+chmod 400 "$here/munge/key"
+munged --force --key-file="$here/munge/key" --socket="$here/munge/socket" --pid-file="$here/munge/pid" \
+    --log-file="$here/munge/log" --seed-file="$here/munge/seed"
+slurmctld
+slurmd
+for _ in $(seq 60); do
+    if sinfo --noheader --format %T 2>/dev/null | grep -q idle; then break; fi
+    sleep 0.5
+done
+"$@"
