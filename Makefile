@@ -46,7 +46,7 @@ test: setup
 	cargo test --locked --features ros2
 	for example in $(EXAMPLES); do cargo run --quiet --locked --features ros2 --example $$example || exit; done
 	tests/clusters/test.sh target/debug/palpate
-	$(MAKE) test-ros2 TOUCHES=8 OVER_TOPICS='lab::a_peer lab::the_container lab::the_loop'
+	$(MAKE) test-ros2 TOUCHES=6 OVER_TOPICS='lab::a_peer lab::the_container lab::the_loop'
 
 # Planners are what experiments/baselines says: whoever changes one writes why (palpate check --bless).
 CHECKED := toy container bird

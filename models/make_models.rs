@@ -3,17 +3,16 @@
 //! `cargo run --release --example make_models` writes the same bytes each time and prints how far
 //! the triangles are from the surface. `SOURCE.md` describes the files.
 
+mod meshing;
+
+use anyhow::{Context, Result};
+use meshing::{Mesh, glb, nets, project};
+use nalgebra::{Point3, Vector3};
+use palpate::geometry::implicit::Implicit;
+use palpate::geometry::surfaces;
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
-
-use anyhow::{Context, Result};
-use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
-use nalgebra::{Point3, Vector3};
-use ndshape::{RuntimeShape, Shape};
-use palpate::geometry::implicit::Implicit;
-use palpate::geometry::surfaces;
-use serde_json::json;
 
 /// Edges whose middle is farther from the surface are split, metres. Chosen: the middle of an
 /// equal-sided triangle is 4/3 as far, well within the 0.05 mm that `tests/models.rs` asks for.
@@ -25,18 +24,15 @@ const RELAX_ROUNDS: usize = 5;
 /// Triangles are measured at the points whose barycentric coordinates are multiples of 1/6.
 const SAMPLES_PER_EDGE: usize = 6;
 
-/// A closed triangle mesh, metres, wound counterclockwise as seen from outside.
-struct Mesh {
-    vertices: Vec<Point3<f64>>,
-    triangles: Vec<[usize; 3]>,
-}
+/// Base colour of the bird.
+const PORCELAIN: (&str, [f64; 3]) = ("porcelain", [0.9, 0.9, 0.88]);
 
 fn main() -> Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
     // Cells chosen: the bird's nose, 5 mm thick, needs the finer ones.
     for (name, cell_m, file, encode) in [
         ("container", 3.0e-3, "container.obj", obj as fn(&Mesh) -> Result<Vec<u8>>),
-        ("bird", 2.0e-3, "bird.glb", glb),
+        ("bird", 2.0e-3, "bird.glb", |mesh| glb(mesh, "bird", PORCELAIN)),
     ] {
         let surface = surfaces::by_name(name).context("a known surface")?;
         let mesh = triangulate(surface, cell_m)?;
@@ -61,35 +57,6 @@ fn triangulate(surface: &dyn Implicit, cell_m: f64) -> Result<Mesh> {
     // Relaxing makes split edges longer again, so that the last splits go without.
     while split(&mut mesh, surface)? {}
     Ok(mesh)
-}
-
-fn nets(surface: &dyn Implicit, cell_m: f64) -> Result<Mesh> {
-    // A cell of air on every side, so that the mesh closes.
-    let [low, high] = surface.bounds();
-    let low = low.map(|x| x - cell_m);
-    let size = (high - low).map(|x| (x / cell_m).ceil() as u32 + 2);
-    let shape = RuntimeShape::<u32, 3>::new(size.into());
-    let values: Vec<f32> = (0..shape.size())
-        .map(|index| {
-            let [x, y, z] = shape.delinearize(index).map(f64::from);
-            surface.value(low + Vector3::new(x, y, z) * cell_m) as f32
-        })
-        .collect();
-    let mut buffer = SurfaceNetsBuffer::default();
-    surface_nets(&values, &shape, [0; 3], size.map(|n| n - 1).into(), &mut buffer);
-
-    let vertices = buffer
-        .positions
-        .iter()
-        .map(|p| project(surface, low + Vector3::from(p.map(f64::from)) * cell_m))
-        .collect::<Result<_>>()?;
-    let triangles =
-        buffer.indices.as_chunks().0.iter().map(|t: &[u32; 3]| t.map(|i| i as usize)).collect();
-    Ok(Mesh { vertices, triangles })
-}
-
-fn project(surface: &dyn Implicit, p: Point3<f64>) -> Result<Point3<f64>> {
-    surface.project(p).with_context(|| format!("{p} does not project onto the surface"))
 }
 
 /// Moves every vertex half way to the mean of its neighbours, along the surface.
@@ -208,74 +175,4 @@ fn obj(mesh: &Mesh) -> Result<Vec<u8>> {
         text += &format!("f {} {} {}\n", a + 1, b + 1, c + 1);
     }
     Ok(text.into_bytes())
-}
-
-/// Binary glTF 2.0 (Khronos Group, "glTF 2.0 specification", section 4.4). The vertices are in the
-/// bird's own frame; the node's matrix turns them to glTF's +y up, +z front.
-fn glb(mesh: &Mesh) -> Result<Vec<u8>> {
-    let vertices: Vec<[f32; 3]> =
-        mesh.vertices.iter().map(|v| [v.x as f32, v.y as f32, v.z as f32]).collect();
-    let mut binary: Vec<u8> =
-        vertices.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
-    let indices_start = binary.len();
-    for &index in mesh.triangles.as_flattened() {
-        binary.extend(u32::try_from(index)?.to_le_bytes());
-    }
-    let extreme = |pick: fn(f32, f32) -> f32| {
-        [0, 1, 2].map(|axis| vertices.iter().map(|v| v[axis]).reduce(pick))
-    };
-    // Component types 5126 and 5125 are f32 and u32; targets 34962 and 34963 vertices and indices.
-    let document = json!({
-        "asset": { "version": "2.0", "generator": "models/make_models.rs of Palpate" },
-        "scene": 0,
-        "scenes": [{ "nodes": [0] }],
-        "nodes": [{
-            "name": "bird",
-            "mesh": 0,
-            // By columns: (x, y, z) of the bird is (-x, z, y) of glTF.
-            "matrix": [-1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1],
-        }],
-        "meshes": [{
-            "name": "bird",
-            "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1, "material": 0 }],
-        }],
-        "materials": [{
-            "name": "porcelain",
-            "pbrMetallicRoughness": {
-                "baseColorFactor": [0.9, 0.9, 0.88, 1.0], "metallicFactor": 0, "roughnessFactor": 0.3,
-            },
-        }],
-        "accessors": [
-            {
-                "bufferView": 0, "componentType": 5126, "type": "VEC3",
-                "count": vertices.len(), "min": extreme(f32::min), "max": extreme(f32::max),
-            },
-            {
-                "bufferView": 1, "componentType": 5125, "type": "SCALAR",
-                "count": 3 * mesh.triangles.len(),
-            },
-        ],
-        "bufferViews": [
-            { "buffer": 0, "byteLength": indices_start, "target": 34962 },
-            {
-                "buffer": 0, "byteOffset": indices_start,
-                "byteLength": binary.len() - indices_start, "target": 34963,
-            },
-        ],
-        "buffers": [{ "byteLength": binary.len() }],
-    });
-    let mut text = serde_json::to_vec(&document)?;
-    // Chunks are padded to four bytes; the binary one already is.
-    text.resize(text.len().next_multiple_of(4), b' ');
-
-    let total = 12 + 8 + text.len() + 8 + binary.len();
-    let mut file = b"glTF".to_vec();
-    file.extend(2_u32.to_le_bytes());
-    file.extend(u32::try_from(total)?.to_le_bytes());
-    for (kind, chunk) in [(b"JSON", text), (b"BIN\0", binary)] {
-        file.extend(u32::try_from(chunk.len())?.to_le_bytes());
-        file.extend(kind);
-        file.extend(chunk);
-    }
-    Ok(file)
 }

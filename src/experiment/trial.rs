@@ -54,8 +54,9 @@ pub fn run(
             }
         };
         belief.observe(&plan.target, &touch);
-        let swept = probe.swept().filter(|_| experiment.gp.free_space);
+        let swept = probe.swept();
         swept.iter().for_each(|swept| belief.observe_swept(swept));
+        let swept = swept.filter(|_| experiment.gp.free_space);
         let contact = match &touch {
             Touch::Contact(contact) => Some(contact),
             Touch::Miss | Touch::Overload => None,

@@ -1,6 +1,7 @@
 //! What is known after some touches: a Gaussian process over the zone, and where it is unsure.
 
 use super::free_space::Ceiling;
+use super::presence::Presence;
 use super::probe::{Swept, Touch};
 use crate::config::{Checked, Rules};
 use crate::gp::covariance::CovarianceError;
@@ -129,6 +130,9 @@ pub struct Belief {
     contacts: Observations,
     /// What is known to be free, if that is asked for.
     ceiling: Option<Ceiling>,
+    presence: Presence,
+    /// Whether the last touch met nothing.
+    has_missed: bool,
     targets: Vec<Vec<f64>>,
     unreached: Vec<Vec<f64>>,
     fit: Option<Fit>,
@@ -144,6 +148,8 @@ impl Belief {
         Self {
             ceiling: settings.free_space.then(|| Ceiling::new(&zone)),
             kernel: kernel::by_name(&settings.kernel).unwrap_or(&kernel::SquaredExponential),
+            presence: Presence::new(&zone),
+            has_missed: false,
             zone,
             settings,
             contacts,
@@ -158,8 +164,10 @@ impl Belief {
     /// Takes in one touch; the belief changes with the next [`refit`](Self::refit).
     pub fn observe(&mut self, target: &[f64], touch: &Touch) {
         self.targets.push(target.into());
+        self.has_missed = *touch == Touch::Miss;
         let reached = match touch {
             Touch::Contact(contact) => {
+                self.presence.met(&contact.p_wc);
                 let place = self.zone.place(&contact.p_wc);
                 let height = self.zone.height_m(&contact.p_wc);
                 let slope = self.slope(&contact.normal_w);
@@ -175,8 +183,9 @@ impl Belief {
         }
     }
 
-    /// Takes in what the touch swept, if free space is asked for.
+    /// Takes in what the last touch swept.
     pub fn observe_swept(&mut self, swept: &Swept) {
+        self.presence.passed(swept, self.has_missed);
         if let Some(ceiling) = &mut self.ceiling {
             ceiling.lower(&self.zone, swept);
         }
@@ -290,6 +299,11 @@ impl Belief {
     /// contacted elsewhere, are no news. Its variance counts; its mean means nothing.
     pub fn explorable(&self) -> Option<&Posterior> {
         self.explored.as_ref().or(self.surface.as_ref())
+    }
+
+    /// Where there probably is a surface.
+    pub fn presence(&self) -> &Presence {
+        &self.presence
     }
 
     /// Every target asked for so far.

@@ -36,5 +36,6 @@ pub mod belief;
 pub mod control;
 mod free_space;
 pub mod planner;
+pub mod presence;
 pub mod probe;
 pub mod registration;

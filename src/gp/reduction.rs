@@ -9,6 +9,8 @@ use crate::math::simd::{dot, widest};
 pub struct Reduction<'a> {
     posterior: &'a Posterior,
     references: Observations,
+    /// How much each of them counts.
+    weights: Vec<f64>,
     /// L⁻¹·k(X, r) of each reference place r, one after the other.
     whitened: Vec<f64>,
 }
@@ -24,11 +26,18 @@ impl<'a> Reduction<'a> {
             posterior.whiten(place, &mut scratch);
             whitened.extend_from_slice(&scratch.solved);
         }
-        Self { posterior, references: places, whitened }
+        Self { posterior, weights: vec![1.0; places.len()], references: places, whitened }
+    }
+
+    /// With a weight for each reference; those that are not given count nothing.
+    pub fn weighted(mut self, mut weights: Vec<f64>) -> Self {
+        weights.resize(self.references.len(), 0.0);
+        self.weights = weights;
+        self
     }
 
     /// Mean fall of the variance at the references if `place` were observed,
-    /// (1/m)·Σ_r k(r, x)² / (σ²(x) + noise²) with the posterior covariance k and variance σ²:
+    /// (1/m)·Σ_r w_r·k(r, x)² / (σ²(x) + noise²) with the posterior covariance k and variance σ²:
     /// n² + n·m operations.
     pub fn at(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
         let explained = self.posterior.whiten(place, scratch);
@@ -39,8 +48,10 @@ impl<'a> Reduction<'a> {
         self.references.distances2(place.iter().copied(), lengths, 0, correlations);
         self.posterior.kernel().correlate(correlations);
         let squares: f64 = widest(|| {
-            let pairs = correlations.iter().enumerate();
-            pairs.map(|(r, prior)| (prior - self.explained(r, solved)).powi(2)).sum()
+            let pairs = correlations.iter().zip(&self.weights).enumerate();
+            pairs
+                .map(|(r, (prior, weight))| weight * (prior - self.explained(r, solved)).powi(2))
+                .sum()
         });
         let signal2 = hyperparameters.signal_sd.powi(2);
         let noise2 = hyperparameters.noise_sd.powi(2) / signal2 + self.posterior.jitter();

@@ -70,6 +70,7 @@ mod notices;
 mod page;
 #[cfg(feature = "nlopt")]
 mod planners;
+mod presence;
 mod probes;
 mod reach;
 #[cfg(feature = "nlopt")]

@@ -12,6 +12,7 @@ mod plan;
 mod random;
 mod search;
 pub mod settings;
+mod silhouette;
 mod slope;
 mod sobol;
 mod travel;
@@ -27,6 +28,7 @@ pub const PLANNERS: &[Entry] = &[
     sobol::ENTRY,
     grid::ENTRY,
     integrated_variance::ENTRY,
+    silhouette::ENTRY,
     slope::ENTRY,
     travel::ENTRY,
     ucb::ENTRY,

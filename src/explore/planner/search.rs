@@ -63,11 +63,9 @@ impl Search {
 
     /// Plans to touch `place`, or a random one if a touch there would tell nothing.
     pub(super) fn conclude(&mut self, belief: &Belief, place: Vec<f64>) -> Plan {
-        let mut scratch = Scratch::default();
-        let mut variance = |place: &[f64]| belief.explorable_variance(place, &mut [], &mut scratch);
-        let stall = self.stall(belief, &place, variance(&place));
+        let stall = self.stall(belief, &place);
         let target = if stall.is_none() { place } else { uniform(&self.zone, &mut self.rng) };
-        let sd_m = Some(variance(&target).sqrt());
+        let sd_m = Some(variance(belief, &target).sqrt());
         Plan { target, sd_m, stall }
     }
 
@@ -152,10 +150,11 @@ impl Search {
         hills
     }
 
-    fn stall(&self, belief: &Belief, place: &[f64], variance: f64) -> Option<Stall> {
+    /// Why a touch at `place` would tell nothing, if so.
+    pub(super) fn stall(&self, belief: &Belief, place: &[f64]) -> Option<Stall> {
         let lost_sd = LOST_IN_ROUNDING * belief.surface()?.hyperparameters().signal_sd;
         let same = |target: &Vec<f64>| self.zone.distance(target, place) < SAME_TARGET;
-        if variance <= lost_sd * lost_sd {
+        if variance(belief, place) <= lost_sd * lost_sd {
             Some(Stall::Collapsed)
         } else if belief.targets().iter().any(same) {
             Some(Stall::Repeated)
@@ -163,4 +162,8 @@ impl Search {
             None
         }
     }
+}
+
+fn variance(belief: &Belief, place: &[f64]) -> f64 {
+    belief.explorable_variance(place, &mut [], &mut Scratch::default())
 }

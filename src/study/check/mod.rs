@@ -2,8 +2,8 @@
 //!
 //! First the rows themselves are compared; where they are the same bytes, nothing has changed.
 //! Otherwise new and old are paired by trial, which share seeds, and trials are added in batches
-//! until an interval that holds at any time ([`sequence`]) tells. [`judged`] lists by what. [`cost`] is
-//! apart: instructions of one trial.
+//! until an interval that holds at any time ([`sequence`]) tells. [`judged`] lists by what.
+//! [`cost`] is apart: instructions of one trial.
 
 pub mod baseline;
 pub mod cost;

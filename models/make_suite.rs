@@ -1,0 +1,371 @@
+//! Makes the objects of the suite: `models/suite/NAME.glb` and the scenes that show them,
+//! `scenes/suite/NAME.toml`.
+//!
+//! `cargo run --release --example make_suite` writes the same bytes each time. All lengths are
+//! chosen, so that the objects differ: full faces and silhouettes over a third of their zone, holes,
+//! thin parts, steps, undercuts, reliefs, several pieces, tilted, small and large ones.
+
+mod meshing;
+
+use anyhow::{Context, Result};
+use meshing::{glb, nets};
+use nalgebra::{Point3, Vector3, point, vector};
+use palpate::geometry::implicit::{Field, Implicit};
+use std::fs;
+use std::path::Path;
+
+/// Cells along the longest side of an object.
+const CELLS: f64 = 36.0;
+/// How sharp edges are rounded, metres.
+const EDGE_M: f64 = 0.003;
+/// Base colour.
+const CLAY: (&str, [f64; 3]) = ("clay", [0.75, 0.55, 0.4]);
+
+/// An object in its own frame, origin in its middle, front towards +y, z up, metres.
+struct Shape {
+    name: &'static str,
+    /// Half of its extents.
+    half_m: [f64; 3],
+    /// Which share of its extents beside and above the zone is.
+    zone: f64,
+    field: fn(Point3<f64>) -> Field,
+}
+
+const SHAPES: &[Shape] = &[
+    // For choosing.
+    Shape { name: "bumps", half_m: [0.055, 0.034, 0.055], zone: 0.9, field: bumps },
+    Shape { name: "ring", half_m: [0.055, 0.014, 0.055], zone: 1.0, field: ring },
+    Shape { name: "mug", half_m: [0.065, 0.036, 0.05], zone: 1.0, field: mug },
+    Shape { name: "relief", half_m: [0.05, 0.014, 0.05], zone: 0.9, field: relief },
+    Shape { name: "pair", half_m: [0.06, 0.025, 0.05], zone: 1.0, field: pair },
+    Shape { name: "stairs", half_m: [0.05, 0.036, 0.06], zone: 0.95, field: stairs },
+    Shape { name: "hammer", half_m: [0.05, 0.016, 0.08], zone: 1.0, field: hammer },
+    Shape { name: "block", half_m: [0.06, 0.05, 0.055], zone: 1.0, field: block },
+    Shape { name: "star", half_m: [0.06, 0.016, 0.06], zone: 1.0, field: star },
+    Shape { name: "cone", half_m: [0.021, 0.021, 0.024], zone: 1.0, field: cone },
+    Shape { name: "boulder", half_m: [0.125, 0.08, 0.11], zone: 1.0, field: boulder },
+    Shape { name: "cross", half_m: [0.05, 0.012, 0.06], zone: 1.0, field: cross },
+    // For reporting.
+    Shape { name: "waves", half_m: [0.06, 0.025, 0.05], zone: 0.9, field: waves },
+    Shape { name: "horseshoe", half_m: [0.055, 0.016, 0.06], zone: 1.0, field: horseshoe },
+    Shape { name: "bottle", half_m: [0.032, 0.032, 0.08], zone: 1.0, field: bottle },
+    Shape { name: "coin", half_m: [0.05, 0.014, 0.05], zone: 0.7, field: coin },
+    Shape { name: "trio", half_m: [0.07, 0.03, 0.05], zone: 1.0, field: trio },
+    Shape { name: "terrace", half_m: [0.055, 0.03, 0.055], zone: 1.0, field: terrace },
+    Shape { name: "fork", half_m: [0.04, 0.01, 0.08], zone: 1.0, field: fork },
+    Shape { name: "slope", half_m: [0.05, 0.045, 0.055], zone: 0.9, field: slope },
+    Shape { name: "gear", half_m: [0.06, 0.014, 0.06], zone: 1.0, field: gear },
+    Shape { name: "knob", half_m: [0.018, 0.022, 0.018], zone: 1.0, field: knob },
+    Shape { name: "bowl", half_m: [0.09, 0.06, 0.09], zone: 1.0, field: bowl },
+    Shape { name: "vase", half_m: [0.045, 0.045, 0.07], zone: 1.0, field: vase },
+];
+
+fn main() -> Result<()> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let [models, scenes] = ["models/suite", "scenes/suite"].map(|folder| root.join(folder));
+    [&models, &scenes].into_iter().try_for_each(fs::create_dir_all)?;
+    for shape in SHAPES {
+        let longest_m = shape.half_m.into_iter().fold(0.0, f64::max);
+        let mesh = nets(shape, 2.0 * longest_m / CELLS).with_context(|| shape.name)?;
+        let bytes = glb(&mesh, shape.name, CLAY)?;
+        fs::write(models.join(format!("{}.glb", shape.name)), &bytes)?;
+        fs::write(scenes.join(format!("{}.toml", shape.name)), scene(shape))?;
+        println!("{}: {} triangles, {} bytes", shape.name, mesh.triangles.len(), bytes.len());
+    }
+    Ok(())
+}
+
+/// The object half a metre up, 0.65 m before the robot, as container and bird.
+fn scene(shape: &Shape) -> String {
+    let [x, _, z] = shape.half_m.map(|half_m| half_m * shape.zone);
+    format!(
+        "# Of the suite; made by models/make_suite.rs.\nbody = \"cast\"\n\n[object]\n\
+         mesh = \"../../models/suite/{}.glb\"\nposition_m = [0, -0.65, 0.5]\n\n[zone]\n\
+         x_m = [{:.4}, {:.4}]\nz_m = [{:.4}, {:.4}]\ndatum_y_m = -0.65\n",
+        shape.name,
+        -x,
+        x,
+        0.5 - z,
+        0.5 + z
+    )
+}
+
+impl Implicit for Shape {
+    fn field(&self, p: Point3<f64>) -> Field {
+        (self.field)(p)
+    }
+
+    fn bounds(&self) -> [Point3<f64>; 2] {
+        // What blends add.
+        let half_m = Vector3::from(self.half_m).add_scalar(EDGE_M);
+        [Point3::from(-half_m), Point3::from(half_m)]
+    }
+}
+
+fn ball(p: Point3<f64>, at: Point3<f64>, radius_m: f64) -> Field {
+    ellipsoid(p, at, [radius_m; 3])
+}
+
+fn ellipsoid(p: Point3<f64>, at: Point3<f64>, radii_m: [f64; 3]) -> Field {
+    Field::ellipsoid(p - at, radii_m.into())
+}
+
+fn rod(p: Point3<f64>, a: Point3<f64>, b: Point3<f64>, radius_m: f64) -> Field {
+    Field::round_cone(p, (a, radius_m), (b, radius_m))
+}
+
+fn half_space(p: Point3<f64>, at: Point3<f64>, outward: Vector3<f64>) -> Field {
+    Field::plane(p, at, outward.normalize())
+}
+
+/// A box with rounded edges.
+fn cuboid(p: Point3<f64>, at: Point3<f64>, half_m: [f64; 3]) -> Field {
+    let sides = [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().zip(half_m);
+    let planes = sides.flat_map(|(axis, half_m)| {
+        [axis, -axis].map(|outward| Field::plane(p, at + outward * half_m, outward))
+    });
+    planes.reduce(|a, b| a.intersection(b, EDGE_M)).unwrap_or(Field::plane(p, at, Vector3::y()))
+}
+
+/// A disc that faces +y.
+fn disc(p: Point3<f64>, at: Point3<f64>, radius_m: f64, half_depth_m: f64) -> Field {
+    let side = Field::ellipsoid(p - at, vector![radius_m, f64::INFINITY, radius_m]);
+    let [front, back] = [Vector3::y(), -Vector3::y()]
+        .map(|outward| Field::plane(p, at + outward * half_depth_m, outward));
+    side.intersection(front, EDGE_M).intersection(back, EDGE_M)
+}
+
+/// What `all` have together.
+fn together(all: impl IntoIterator<Item = Field>, blend_m: f64) -> Field {
+    let far = Field { value: f64::MAX, gradient: Vector3::zeros() };
+    all.into_iter().fold(far, |sum, each| sum.union(each, blend_m))
+}
+
+/// `a` without `b`.
+fn without(a: Field, b: Field) -> Field {
+    a.intersection(Field { value: -b.value, gradient: -b.gradient }, EDGE_M)
+}
+
+/// Eight directions around, the first up: of unit length up to a rounding.
+const AROUND: [[f64; 2]; 8] = [
+    [0.0, 1.0],
+    [0.6, 0.8],
+    [1.0, 0.0],
+    [0.8, -0.6],
+    [0.0, -1.0],
+    [-0.6, -0.8],
+    [-1.0, 0.0],
+    [-0.8, 0.6],
+];
+
+fn bumps(p: Point3<f64>) -> Field {
+    let slab = cuboid(p, point![0.0, -0.015, 0.0], [0.055, 0.008, 0.055]);
+    let hills = [
+        (point![-0.028, -0.006, 0.02], [0.018, 0.016, 0.022]),
+        (point![0.022, -0.006, 0.028], [0.014, 0.026, 0.014]),
+        (point![0.012, -0.006, -0.022], [0.026, 0.014, 0.018]),
+    ];
+    together([slab].into_iter().chain(hills.map(|(at, radii)| ellipsoid(p, at, radii))), 0.008)
+}
+
+fn ring(p: Point3<f64>) -> Field {
+    let side = Field::ellipsoid(p.coords, vector![0.042, f64::INFINITY, 0.042]);
+    side.tube(Field::plane(p, Point3::origin(), Vector3::y()), 0.012)
+}
+
+fn mug(p: Point3<f64>) -> Field {
+    let side = Field::ellipsoid(p - point![-0.025, 0.0, 0.0], vector![0.034, 0.034, f64::INFINITY]);
+    let [top, bottom] = [Vector3::z(), -Vector3::z()]
+        .map(|outward| Field::plane(p, Point3::origin() + outward * 0.048, outward));
+    let body = side.intersection(top, 0.006).intersection(bottom, 0.006);
+    let handle = [
+        rod(p, point![0.005, 0.0, 0.03], point![0.045, 0.0, 0.025], 0.006),
+        rod(p, point![0.045, 0.0, 0.025], point![0.05, 0.0, -0.015], 0.006),
+        rod(p, point![0.05, 0.0, -0.015], point![0.005, 0.0, -0.03], 0.006),
+    ];
+    together([body].into_iter().chain(handle), 0.006)
+}
+
+fn relief(p: Point3<f64>) -> Field {
+    let slab = cuboid(p, point![0.0, -0.004, 0.0], [0.05, 0.009, 0.05]);
+    let dots = AROUND
+        .map(|[x, z]| ellipsoid(p, point![0.028 * x, 0.004, 0.028 * z], [0.009, 0.003, 0.009]));
+    let bar = rod(p, point![-0.012, 0.002, -0.01], point![0.014, 0.002, 0.012], 0.005);
+    together([slab, bar].into_iter().chain(dots), 0.003)
+}
+
+fn pair(p: Point3<f64>) -> Field {
+    let balls = [(point![-0.033, 0.0, -0.022], 0.024), (point![0.034, 0.002, 0.024], 0.022)];
+    together(balls.map(|(at, radius_m)| ball(p, at, radius_m)), EDGE_M)
+}
+
+fn stairs(p: Point3<f64>) -> Field {
+    let step = |i: usize| {
+        let i = i as f64;
+        cuboid(
+            p,
+            point![0.0, -0.012 + 0.006 * i, 0.042 - 0.028 * i],
+            [0.05, 0.01 + 0.006 * i, 0.016],
+        )
+    };
+    together((0..4).map(step), 0.002)
+}
+
+fn hammer(p: Point3<f64>) -> Field {
+    let handle = rod(p, point![0.0, 0.0, -0.07], point![0.0, 0.0, 0.06], 0.008);
+    let head = cuboid(p, point![0.0, 0.0, 0.06], [0.046, 0.014, 0.015]);
+    handle.union(head, EDGE_M)
+}
+
+/// A box on one corner.
+fn block(p: Point3<f64>) -> Field {
+    let axes = [vector![0.8, 0.36, 0.48], vector![-0.6, 0.48, 0.64], vector![0.0, -0.8, 0.6]];
+    let planes = axes.into_iter().zip([0.034, 0.03, 0.036]).flat_map(|(axis, half_m)| {
+        [axis, -axis]
+            .map(|outward| half_space(p, Point3::origin() + outward.normalize() * half_m, outward))
+    });
+    planes.reduce(|a, b| a.intersection(b, EDGE_M)).unwrap_or(ball(p, Point3::origin(), 0.03))
+}
+
+fn star(p: Point3<f64>) -> Field {
+    let arms = [[0.0, 1.0], [0.951, 0.309], [0.588, -0.809], [-0.588, -0.809], [-0.951, 0.309]];
+    let arm = |[x, z]: [f64; 2]| {
+        Field::round_cone(p, (Point3::origin(), 0.015), (point![0.054 * x, 0.0, 0.054 * z], 0.005))
+    };
+    together(arms.map(arm), 0.006)
+}
+
+fn cone(p: Point3<f64>) -> Field {
+    Field::round_cone(p, (point![0.0, 0.0, -0.004], 0.019), (point![0.0, 0.0, 0.019], 0.004))
+}
+
+fn boulder(p: Point3<f64>) -> Field {
+    let parts = [
+        (point![-0.01, -0.01, -0.02], [0.11, 0.07, 0.085]),
+        (point![0.05, 0.015, 0.03], [0.06, 0.05, 0.06]),
+        (point![-0.05, 0.01, 0.06], [0.05, 0.05, 0.042]),
+    ];
+    together(parts.map(|(at, radii)| ellipsoid(p, at, radii)), 0.03)
+}
+
+fn cross(p: Point3<f64>) -> Field {
+    let post = cuboid(p, Point3::origin(), [0.012, 0.01, 0.058]);
+    post.union(cuboid(p, point![0.0, 0.0, 0.02], [0.048, 0.01, 0.011]), EDGE_M)
+}
+
+fn waves(p: Point3<f64>) -> Field {
+    let slab = cuboid(p, point![0.0, -0.014, 0.0], [0.06, 0.01, 0.05]);
+    let ridge = |i: usize| {
+        let x = 0.024 * (i as f64 - 2.0);
+        let height_m = [0.008, 0.012, 0.016, 0.011, 0.006][i];
+        ellipsoid(p, point![x, -0.006, 0.0], [0.01, height_m + 0.006, f64::INFINITY])
+            .intersection(Field::plane(p, point![0.0, 0.0, 0.048], Vector3::z()), EDGE_M)
+            .intersection(Field::plane(p, point![0.0, 0.0, -0.048], -Vector3::z()), EDGE_M)
+    };
+    together([slab].into_iter().chain((0..5).map(ridge)), 0.006)
+}
+
+fn horseshoe(p: Point3<f64>) -> Field {
+    let ends = [
+        [-0.038, -0.05],
+        [-0.042, -0.01],
+        [-0.028, 0.03],
+        [0.0, 0.045],
+        [0.028, 0.03],
+        [0.042, -0.01],
+        [0.038, -0.05],
+    ];
+    let parts = ends.windows(2).map(|two| {
+        rod(p, point![two[0][0], 0.0, two[0][1]], point![two[1][0], 0.0, two[1][1]], 0.011)
+    });
+    together(parts, 0.004)
+}
+
+fn bottle(p: Point3<f64>) -> Field {
+    let body =
+        Field::round_cone(p, (point![0.0, 0.0, -0.05], 0.028), (point![0.0, 0.0, 0.012], 0.027));
+    let neck = rod(p, point![0.0, 0.0, 0.03], point![0.0, 0.0, 0.066], 0.011);
+    let lip = ellipsoid(p, point![0.0, 0.0, 0.066], [0.016, 0.016, 0.007]);
+    body.union(neck, 0.02).union(lip, 0.004)
+}
+
+fn coin(p: Point3<f64>) -> Field {
+    let plate = disc(p, point![0.0, -0.004, 0.0], 0.049, 0.008);
+    let side = Field::ellipsoid(p.coords, vector![0.03, f64::INFINITY, 0.03]);
+    let rim = side.tube(Field::plane(p, point![0.0, 0.003, 0.0], Vector3::y()), 0.004);
+    let face = ellipsoid(p, point![0.004, 0.003, 0.002], [0.012, 0.004, 0.016]);
+    let nose = rod(p, point![-0.014, 0.002, 0.006], point![0.002, 0.002, -0.012], 0.004);
+    together([plate, rim, face, nose], EDGE_M)
+}
+
+fn trio(p: Point3<f64>) -> Field {
+    together(
+        [
+            ball(p, point![-0.045, 0.004, 0.02], 0.022),
+            rod(p, point![0.0, 0.0, -0.038], point![0.004, 0.006, 0.036], 0.01),
+            ellipsoid(p, point![0.045, -0.004, -0.015], [0.02, 0.026, 0.03]),
+        ],
+        EDGE_M,
+    )
+}
+
+fn terrace(p: Point3<f64>) -> Field {
+    let floors = [(0.053, -0.02), (0.038, -0.008), (0.022, 0.004), (0.01, 0.016)];
+    together(floors.map(|(radius_m, y)| disc(p, point![0.0, y, 0.0], radius_m, 0.009)), 0.002)
+}
+
+fn fork(p: Point3<f64>) -> Field {
+    let handle = rod(p, point![0.0, 0.0, -0.072], point![0.0, 0.0, 0.0], 0.007);
+    let bridge = rod(p, point![-0.03, 0.0, 0.005], point![0.03, 0.0, 0.005], 0.008);
+    let tines = [-0.03, 0.0, 0.03].map(|x| {
+        Field::round_cone(p, (point![x, 0.0, 0.005], 0.007), (point![x, 0.0, 0.073], 0.004))
+    });
+    together([handle, bridge].into_iter().chain(tines), 0.004)
+}
+
+fn slope(p: Point3<f64>) -> Field {
+    let front = half_space(p, Point3::origin(), vector![0.3, 0.8, 0.4]);
+    let body = cuboid(p, Point3::origin(), [0.05, 0.042, 0.055]).intersection(front, EDGE_M);
+    let knob = ball(p, point![0.012, 0.004, -0.02], 0.012);
+    body.union(knob, 0.004)
+}
+
+fn gear(p: Point3<f64>) -> Field {
+    let wheel = disc(p, Point3::origin(), 0.046, 0.01);
+    let teeth = AROUND.map(|[x, z]| {
+        rod(p, point![0.04 * x, 0.0, 0.04 * z], point![0.05 * x, 0.0, 0.05 * z], 0.008)
+    });
+    let hub = disc(p, point![0.0, 0.006, 0.0], 0.024, 0.007);
+    let body = together([wheel, hub].into_iter().chain(teeth), EDGE_M);
+    without(body, Field::ellipsoid(p.coords, vector![0.012, f64::INFINITY, 0.012]))
+}
+
+fn knob(p: Point3<f64>) -> Field {
+    let foot = disc(p, point![0.0, -0.016, 0.0], 0.016, 0.005);
+    let stem = rod(p, point![0.0, -0.014, 0.0], point![0.0, 0.008, 0.0], 0.006);
+    together([foot, stem, ball(p, point![0.0, 0.01, 0.0], 0.011)], EDGE_M)
+}
+
+fn bowl(p: Point3<f64>) -> Field {
+    let whole = ellipsoid(p, point![0.0, -0.01, 0.0], [0.087, 0.05, 0.087]);
+    let rim = Field::plane(p, point![0.0, 0.02, 0.0], Vector3::y());
+    let hollow = ellipsoid(p, point![0.0, 0.02, 0.0], [0.06, 0.05, 0.06]);
+    without(whole.intersection(rim, EDGE_M), hollow)
+}
+
+fn vase(p: Point3<f64>) -> Field {
+    together(
+        [
+            ball(p, point![0.0, 0.0, -0.022], 0.04),
+            rod(p, point![0.0, 0.0, 0.0], point![0.0, 0.0, 0.05], 0.015),
+            ellipsoid(p, point![0.0, 0.0, 0.058], [0.032, 0.032, 0.008]),
+            disc_up(p, -0.062),
+        ],
+        0.008,
+    )
+}
+
+/// A foot: a disc that lies at a height.
+fn disc_up(p: Point3<f64>, z: f64) -> Field {
+    ellipsoid(p, point![0.0, 0.0, z], [0.03, 0.03, 0.007])
+}

@@ -1,0 +1,140 @@
+//! Where there probably is a surface, and planners that ask.
+
+use nalgebra::{Point3, Vector3};
+use palpate::experiment::{Experiment, Simulation};
+use palpate::explore::belief::{Belief, GpSettings};
+use palpate::explore::planner;
+use palpate::explore::probe::{Contact, Swept, Touch};
+use palpate::geometry::import::import;
+use palpate::robot::Finger;
+use palpate::task::Zone;
+use proptest::prelude::any;
+use proptest::{collection, prop_assert, proptest};
+use std::path::{Path, PathBuf};
+
+const SIDE_M: f64 = 0.1;
+
+fn zone() -> Zone {
+    Zone::new([0.0, SIDE_M], Some([0.0, SIDE_M]))
+}
+
+/// A touch asked for at a target: a contact there, or none.
+fn touch(belief: &mut Belief, zone: &Zone, target: &[f64], meets: bool) {
+    let p_wt = zone.point(target, 0.0);
+    let contact = Contact { p_wc: p_wt, normal_w: Vector3::y() };
+    belief.observe(target, &if meets { Touch::Contact(contact) } else { Touch::Miss });
+    belief.observe_swept(&Swept { finger: Finger::default(), p_wt });
+}
+
+proptest! {
+    /// A probability everywhere, none where a hull has passed and met nothing; a touch is as likely to
+    /// meet something as any place under its hull.
+    #[test]
+    fn presence_is_a_probability(
+        touches in collection::vec((0.0..SIDE_M, 0.0..SIDE_M, any::<bool>()), 1..12),
+        at in [0.0..SIDE_M, 0.0..SIDE_M],
+    ) {
+        let zone = zone();
+        let mut belief = Belief::new(zone.clone(), GpSettings::default());
+        for (x, z, meets) in &touches {
+            touch(&mut belief, &zone, &[*x, *z], *meets);
+        }
+        let presence = belief.presence();
+        let [here, asked] = [presence.at(&at), presence.of_contact(&at)];
+        prop_assert!((0.0..=1.0).contains(&here) && (0.0..=1.0).contains(&asked));
+        prop_assert!(asked >= here, "{asked} {here}");
+        for (x, z, meets) in touches {
+            let missed = presence.at(&[x, z]) == 0.0;
+            prop_assert!(meets || missed);
+        }
+    }
+}
+
+/// What is never missed is everywhere; a miss says most where it was, a contact likewise.
+#[test]
+fn touches_speak_for_their_surroundings() {
+    let zone = zone();
+    let mut belief = Belief::new(zone.clone(), GpSettings::default());
+    assert_eq!(belief.presence().at(&[0.05, 0.05]), 1.0);
+    touch(&mut belief, &zone, &[0.02, 0.05], true);
+    assert_eq!(belief.presence().at(&[0.09, 0.05]), 1.0);
+    touch(&mut belief, &zone, &[0.08, 0.05], false);
+    let along: Vec<f64> =
+        (0..6).map(|i| belief.presence().at(&[0.02 + 0.01 * f64::from(i), 0.05])).collect();
+    assert!(along.is_sorted_by(|a, b| a >= b) && along[0] > 0.9 && along[5] < 0.5, "{along:?}");
+    // The finger slants down: it was below its target, not above.
+    let [below, above] = [-0.012, 0.012].map(|z| belief.presence().at(&[0.08, 0.05 + z]));
+    assert!(below == 0.0 && above > 0.0, "{below} {above}");
+}
+
+fn simulation(scene: &str) -> Simulation {
+    let mut sets = vec![format!("scene = \"scenes/suite/{scene}.toml\"")];
+    sets.extend(["touches=30", "initial_touches=5", "grid=21", "trials=2"].map(String::from));
+    sets.push("planners=[\"silhouette\",\"sobol\"]".into());
+    Simulation::new(Experiment::load(Path::new("experiments/bird.toml"), &sets).unwrap()).unwrap()
+}
+
+/// Squared error of the probability of a surface over the test places after a trial, and that of
+/// the share of them that have one, which nobody knows before.
+fn brier(simulation: &Simulation, planner: &str) -> [f64; 2] {
+    let row = simulation.trial(planner::by_name(planner).unwrap(), 0);
+    assert_eq!(row.failure, None);
+    let zone = simulation.task().zone();
+    let finger = simulation.environment().scene().finger.clone();
+    let far_m = simulation.task().depth_m()[1];
+    let mut belief = Belief::new(zone.clone(), GpSettings::default());
+    for row in &row.touches {
+        let p_wt = zone.x_wz() * zone.local(&row.target, -far_m);
+        let touch = row.contact.map_or(Touch::Miss, |p_w| {
+            Touch::Contact(Contact { p_wc: Point3::from(p_w), normal_w: Vector3::y() })
+        });
+        belief.observe(&row.target, &touch);
+        belief.observe_swept(&Swept { finger: finger.clone(), p_wt });
+    }
+    let truth = simulation.truth();
+    let share = truth.count() as f64 / truth.places.len() as f64;
+    let mut sums = [0.0; 2];
+    for (place, height) in truth.places.iter().zip(&truth.heights_m) {
+        let is_there = f64::from(u8::from(height.is_some()));
+        sums[0] += (belief.presence().at(place) - is_there).powi(2);
+        sums[1] += (share - is_there).powi(2);
+    }
+    sums.map(|sum| sum / truth.places.len() as f64)
+}
+
+/// Thirty touches tell more of where there are surfaces than their share of the zone, and no plan
+/// of the planner that asks for them repeats another.
+#[test]
+fn a_silhouette_is_found() {
+    let (mut found, mut by_share) = (0.0, 0.0);
+    for scene in ["ring", "star", "pair"] {
+        let simulation = simulation(scene);
+        let [own, share] = brier(&simulation, "sobol");
+        (found, by_share) = (found + own, by_share + share);
+        let row = simulation.trial(planner::by_name("silhouette").unwrap(), 1);
+        assert!(row.touches.iter().all(|touch| touch.stall.is_none()), "{scene}");
+    }
+    assert!(found < by_share, "{found} {by_share}");
+}
+
+/// Every object of the suite is closed, in front of the finger, and has the part of its zone that
+/// makes it differ.
+#[test]
+fn the_suite_is_whole() {
+    let scenes: Vec<PathBuf> =
+        std::fs::read_dir("scenes/suite").unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(scenes.len(), 24);
+    let mut shares = Vec::new();
+    for path in &scenes {
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        let mesh = import(&Path::new("models/suite").join(format!("{name}.glb")), 1.0);
+        let report = mesh.unwrap().1;
+        assert!(report.is_closed() && report.degenerate_removed.count == 0, "{name}");
+        let truth = simulation(name).truth().clone();
+        shares.push(truth.count() as f64 / truth.places.len() as f64);
+        println!("{name}: {:.0} %", 100.0 * shares[shares.len() - 1]);
+    }
+    let count =
+        |low: f64, high: f64| shares.iter().filter(|share| (low..=high).contains(*share)).count();
+    assert!(count(0.95, 1.0) >= 4 && count(0.3, 0.8) >= 8, "{shares:?}");
+}
