@@ -35,7 +35,7 @@ const ACROSS: [f64; 3] = [-0.8, 0.0, 0.8];
 pub struct Presence {
     contacts: Vec<Vector2<f64>>,
     misses: Vec<Stadium>,
-    /// The hull of the last touch, about its target.
+    /// The hull of the last touch; about another target its next one.
     hull: Option<Stadium>,
     zone: Zone,
 }
@@ -59,10 +59,6 @@ impl Stadium {
         let off = place - self.start;
         let share = off.dot(&self.along) / self.along.norm_squared().max(f64::MIN_POSITIVE);
         (off - self.along * share.clamp(0.0, 1.0)).norm() - self.radius_m
-    }
-
-    fn passes(&self, place: &Vector2<f64>) -> bool {
-        self.outside_m(place) <= 0.0
     }
 
     /// Places within it, about all of them.
@@ -91,7 +87,7 @@ impl Presence {
         self.contacts.push(flat(&self.zone.x_wz().inverse_transform_point(p_w)));
     }
 
-    /// Takes in a hull that went all the way, and whether it met something there.
+    /// Takes in where the hull of a touch ended, and whether it had met nothing by then.
     pub(super) fn passed(&mut self, swept: &Swept, has_missed: bool) {
         let tip = flat(&self.zone.x_wz().inverse_transform_point(&swept.p_wt));
         let hull = Stadium::new(&swept.finger, tip);
@@ -127,10 +123,11 @@ impl Presence {
         let weight = |distance_m: f64| (-0.5 * (distance_m / reach_m).powi(2)).exp();
         let mut missed = 0.0;
         for miss in &self.misses {
-            if miss.passes(place) {
+            let outside_m = miss.outside_m(place);
+            if outside_m <= 0.0 {
                 return 0.0;
             }
-            missed += weight(miss.outside_m(place));
+            missed += weight(outside_m);
         }
         let met: f64 = self.contacts.iter().map(|contact| weight((place - contact).norm())).sum();
         let (contacts, touches) = (self.contacts.len(), self.contacts.len() + self.misses.len());

@@ -13,16 +13,14 @@ pub(super) const ENTRY: Entry = Entry {
     name: "integrated_variance",
     about: "largest fall of the variance over the whole zone (Cohn's active learning)",
     make: |zone, settings, mut rng: ChaCha8Rng| {
-        let seed = rng.random();
         let count = settings.integrated_variance.places;
-        let places = (0..count).map(|index| sobol::place(zone, index, seed)).collect();
+        let places = sobol::places(zone, count, rng.random());
         Box::new(IntegratedVariance { places, search: Search::new(zone, settings, rng) })
     },
 };
 
 struct IntegratedVariance {
-    /// Where the variance is looked at: a Sobol sequence, which has no period in common with a
-    /// surface's.
+    /// Where the variance is looked at.
     places: Vec<Vec<f64>>,
     search: Search,
 }

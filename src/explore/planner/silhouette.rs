@@ -14,9 +14,8 @@ pub(super) const ENTRY: Entry = Entry {
     name: "silhouette",
     about: "integrated_variance where there probably is a surface, times the chance to meet one",
     make: |zone, settings, mut rng: ChaCha8Rng| {
-        let seed = rng.random();
         let count = settings.integrated_variance.places;
-        let places = (0..count).map(|index| sobol::place(zone, index, seed)).collect();
+        let places = sobol::places(zone, count, rng.random());
         Box::new(Silhouette { places, search: Search::new(zone, settings, rng) })
     },
 };
@@ -38,14 +37,15 @@ impl Planner for Silhouette {
             presence.of_contact(place) * reduction.at(place, scratch)
         };
         let (_, best) = self.search.maximum(self.search.differentiated(value));
-        if self.search.stall(belief, &best).is_none() {
-            return self.search.conclude(belief, best);
-        }
-        // What was asked before brings nothing new: the best of the places that were not.
+        // What was asked before brings nothing new: then the best of the places that were not.
+        let is_new = |place: &&Vec<f64>| self.search.stall(belief, place).is_none();
         let mut scratch = Scratch::default();
-        let fresh = self.places.iter().filter(|place| self.search.stall(belief, place).is_none());
-        let fresh = fresh.map(|place| (value(place, &mut scratch), place));
-        let fresh = fresh.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, place)| place.clone());
-        self.search.conclude(belief, fresh.unwrap_or(best))
+        let others = self.places.iter().filter(is_new);
+        let place = Some(&best).filter(is_new).or_else(|| {
+            let valued = others.map(|place| (value(place, &mut scratch), place));
+            valued.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, place)| place)
+        });
+        let place = place.unwrap_or(&best).clone();
+        self.search.conclude(belief, place)
     }
 }

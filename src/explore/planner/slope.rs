@@ -13,7 +13,7 @@ pub(super) const ENTRY: Entry = Entry {
     name: "slope",
     about: "standard deviation weighted by the slope of the posterior mean",
     make: |zone, settings, rng| {
-        let places = (0..MEAN_PLACES).map(|index| sobol::place(zone, index, 0)).collect();
+        let places = sobol::places(zone, MEAN_PLACES, 0);
         Box::new(Slope { places, search: Search::new(zone, settings, rng) })
     },
 };

@@ -29,8 +29,14 @@ impl Planner for Sobol {
     }
 }
 
+/// The first `count` places of the sequence that `seed` scrambles: evenly spread, with no period in
+/// common with a surface's.
+pub(super) fn places(zone: &Zone, count: u32, seed: u32) -> Vec<Vec<f64>> {
+    (0..count).map(|index| place(zone, index, seed)).collect()
+}
+
 /// Place `index` of the sequence that `seed` scrambles.
-pub(super) fn place(zone: &Zone, index: u32, seed: u32) -> Vec<f64> {
+fn place(zone: &Zone, index: u32, seed: u32) -> Vec<f64> {
     let fractions: Vec<f64> = (0..zone.dimension())
         .map(|axis| f64::from(sobol_burley::sample(index, axis as u32, seed)))
         .collect();
