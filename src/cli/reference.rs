@@ -1,6 +1,7 @@
 //! `palpate reference`.
 
 use crate::report::reference::{fields, measures, rows, settings};
+use crate::report::suite::SuiteRecord;
 use crate::report::tables::comparison::ComparisonRecord;
 use crate::report::tables::equal_error::EqualErrorRecord;
 use clap::Command;
@@ -22,12 +23,14 @@ pub(super) fn text(program: &Command) -> String {
          also how it differs from each baseline's in the same trials.\n\n{}\n\
          ## `comparison.csv`\n\n{}\n\
          ## `equal_error.csv`\n\n{}\n\
+         ## `suite.csv`\n\n{}\n\
          ## `trials.jsonl`\n\nOne line for each trial.\n\n{}",
         commands(program),
         settings(),
         measures(),
         fields::<ComparisonRecord>(),
         fields::<EqualErrorRecord>(),
+        fields::<SuiteRecord>(),
         rows(),
     )
 }

@@ -34,35 +34,35 @@ again. Whatever else is changed wants another folder (--out) or a new start (--f
 #[derive(clap::Args)]
 pub(super) struct Args {
     /// Experiment file (TOML), or the name of one in experiments/.
-    experiment: PathBuf,
+    pub(super) experiment: PathBuf,
     /// Change one setting: a dotted key and a TOML value; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    pub(super) set: Vec<String>,
     /// Folder for the results [default: runs/NAME].
     #[arg(long, value_name = "FOLDER")]
-    out: Option<PathBuf>,
+    pub(super) out: Option<PathBuf>,
     /// Threads; 0 means all cores. Results do not depend on it.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
-    threads: u16,
+    pub(super) threads: u16,
     /// Throw away what an earlier run left in the folder.
     #[arg(long)]
-    fresh: bool,
+    pub(super) fresh: bool,
     /// Run every N-th trial only, the I-th of N shards, in runs/NAME-I-of-N; `palpate merge` puts
     /// them together.
     #[arg(long, value_name = "I/N")]
-    shard: Option<Shard>,
+    pub(super) shard: Option<Shard>,
     /// Record every tick of every trial in recordings/PLANNER-TRIAL.mcap of the run's folder.
     #[arg(long)]
-    record: bool,
+    pub(super) record: bool,
     /// Clear what the side of a real arm has latched, before it is moved: the operator's to say.
     #[arg(long)]
-    clear_fault: bool,
+    pub(super) clear_fault: bool,
     /// Write rows and summary only, no figures.
     #[arg(long)]
-    no_report: bool,
+    pub(super) no_report: bool,
     /// Print the summary as JSON instead of a table.
     #[arg(long, conflicts_with = "shard")]
-    json: bool,
+    pub(super) json: bool,
 }
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
@@ -87,13 +87,36 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     Ok(Ending::Done)
 }
 
-fn run_one(
+/// What stands in a run's folder after it was run.
+pub(super) struct Made {
+    pub(super) path: PathBuf,
+    /// How many trials, and how long they took.
+    words: String,
+    tally: Tally,
+    /// How many there should be.
+    total: u64,
+    halt: Option<Halt>,
+}
+
+impl Made {
+    fn is_finished(&self) -> bool {
+        self.tally.trials as u64 == self.total
+    }
+
+    /// How it ended; says what failed.
+    pub(super) fn ending(&self, talk: Talk) -> Ending {
+        ending(&self.tally, self.is_finished(), talk)
+    }
+}
+
+/// Runs what is not there yet.
+pub(super) fn make(
     args: &Args,
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
     talk: Talk,
-) -> anyhow::Result<Ending> {
+) -> anyhow::Result<Made> {
     let mut simulation = simulation(experiment, talk)?;
     if let Some(lab) = simulation.connect()? {
         ready(&lab, args.clear_fault)?;
@@ -150,22 +173,33 @@ fn run_one(
     let count = outcome.finished;
     bar.finish_and_clear();
     let tally = folder.sort(experiment)?;
-    let finished = tally.trials as u64 == total;
-    let mut made = format!("{count} trials in {:.1} s", begun.elapsed().as_secs_f64());
+    let mut words = format!("{count} trials in {:.1} s", begun.elapsed().as_secs_f64());
     if !done.is_empty() {
-        made += &format!(", {} were there already", done.len());
+        words += &format!(", {} were there already", done.len());
     }
+    Ok(Made { path, words, tally, total, halt: outcome.halt })
+}
+
+fn run_one(
+    args: &Args,
+    experiment: Experiment,
+    out: Option<PathBuf>,
+    stop: &mut Option<Arc<AtomicBool>>,
+    talk: Talk,
+) -> anyhow::Result<Ending> {
+    let made = make(args, experiment, out, stop, talk)?;
+    let Made { path, words, total, halt, .. } = &made;
     // A part of a run is not looked at: its rows need not fit into memory.
     if args.shard.is_some() {
-        print(&format!("{made}\nrows in {}", path.display()))?;
-        return Ok(ending(&tally, finished, talk));
+        print(&format!("{words}\nrows in {}", path.display()))?;
+        return Ok(made.ending(talk));
     }
 
-    let run = Run::read(&path)?;
-    let mut text = format!("{}\n{made}", report::tables::summary::text(&run));
+    let run = Run::read(path)?;
+    let mut text = format!("{}\n{words}", report::tables::summary::text(&run));
     let analysis = Analysis::of(&run);
-    report::write_tables(&run, &analysis, &path)?;
-    if !finished {
+    report::write_tables(&run, &analysis, path)?;
+    if !made.is_finished() {
         text += &format!(
             "\nstopped with {} of {total} trials in {}; the same command continues",
             run.rows.len(),
@@ -174,26 +208,26 @@ fn run_one(
     } else if args.no_report {
         text += &format!("\nrows and summary in {}", path.display());
     } else {
-        report::write(&run, &analysis, &path)
-            .context("the rows are safe, but the report failed")?;
+        report::write(&run, &analysis, path).context("the rows are safe, but the report failed")?;
         text += &format!("\nreport: {}", path.join("report.html").display());
     }
     match args.json {
         true => print(&format!("{:#}", report::tables::summary::json(&run)))?,
         false => print(&text)?,
     }
-    if let Some(Halt { planner, trial, touches, reason }) = outcome.halt {
+    if let Some(Halt { planner, trial, touches, reason }) = halt {
         let kept = format!(
             "{planner}, trial {trial}: {reason}\n{touches} touches of it are kept in {}; mend what is \
              wrong, and the same command goes on (--clear-fault clears what the arm's side has latched)",
             path.join(JOURNAL).display()
         );
-        if !stop.load(Ordering::Relaxed) {
+        let is_asked = stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
+        if !is_asked {
             bail!(kept);
         }
         talk.note(kept);
     }
-    Ok(ending(&tally, finished, talk))
+    Ok(made.ending(talk))
 }
 
 /// How a run ended; says on standard error how many trials failed and why the first did.

@@ -7,7 +7,7 @@
 use super::report_settings::{ReportSettings, TOUCHES_MAX};
 use super::row::TrialId;
 use super::scan_truth::ScanTruth;
-use crate::backend::ros::settings::BackendSettings;
+use crate::backend::ros::settings::{BackendKind, BackendSettings};
 use crate::config::{Checked, ConfigError, Loader, Rules};
 use crate::explore::belief::GpSettings;
 use crate::explore::planner;
@@ -259,6 +259,10 @@ impl Checked for Experiment {
             rules.one_of(&format!("planners[{i}]"), name, &known);
             let first = !self.planners[..i].contains(name);
             rules.require(&format!("planners[{i}]"), name, first, || "each name once".into());
+            let is_seen = name != "oracle" || self.backend.kind == BackendKind::Simulated;
+            rules.require(&format!("planners[{i}]"), name, is_seen, || {
+                "planners that need not know how a touch will end, or a simulated backend".into()
+            });
         }
         rules.number("trials", self.trials.into(), 1.0..=1e6);
         rules.number("touches", self.touches.into(), 1.0..=TOUCHES_MAX);

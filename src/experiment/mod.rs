@@ -41,6 +41,7 @@ pub mod runner;
 pub mod scan;
 pub mod scan_truth;
 pub mod shard;
+mod sight;
 pub mod simulation;
 pub mod statistics;
 pub mod store;

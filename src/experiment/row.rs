@@ -47,8 +47,8 @@ pub struct TouchRow {
     /// The contact's normal in `W`; written where the belief observes it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub normal: Option<[f64; 3]>,
-    /// The centre of the fingertip's hemisphere in `W` where the approach ended; written where the
-    /// belief observes what was swept.
+    /// The centre of the fingertip's hemisphere in `W` where the approach ended; written of misses,
+    /// and of contacts where the belief takes in what they swept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tip: Option<[f64; 3]>,
     /// Time of the body at the touch's end, since its start; left out where a touch is no motion.

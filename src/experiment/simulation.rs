@@ -6,6 +6,7 @@ use super::notice;
 use super::notice::Notice;
 use super::row::TrialRow;
 use super::scan_truth::LeftOut;
+use super::sight::Sight;
 use super::trial;
 use super::truth::Truth;
 use super::witness::Witness;
@@ -238,7 +239,8 @@ impl Simulation {
         trial: u32,
         witness: &mut dyn Witness,
     ) -> TrialRow {
-        trial::run(&self.experiment, self.task(), &self.truth, probe, planner, trial, witness)
+        let sight = Sight { environment: self.environment(), truth: &self.truth };
+        trial::run(&self.experiment, &sight, probe, planner, trial, witness)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::experiment::Experiment;
 use super::row::{TouchRow, TrialRow};
-use super::truth::Truth;
+use super::sight::Sight;
 use super::verification::verify;
 use super::witness::{Touched, Witness};
 use crate::explore::belief::Belief;
@@ -10,15 +10,13 @@ use crate::explore::planner;
 use crate::explore::planner::{Plan, uniform};
 use crate::explore::probe::{Probe, Touch};
 use crate::math::seed;
-use crate::task::Task;
 
 /// Runs one trial of `planner` from start to end with the touches of `probe`, before `witness`.
 ///
 /// Its row depends on the experiment, the trial's number, the planner and the probe only.
 pub fn run(
     experiment: &Experiment,
-    task: &Task,
-    truth: &Truth,
+    sight: &Sight,
     probe: &mut dyn Probe,
     planner: &planner::Entry,
     trial: u32,
@@ -32,6 +30,7 @@ pub fn run(
         verification: Vec::new(),
     };
     let stream = |purpose| seed::stream(experiment.seed, trial.into(), purpose);
+    let task = sight.environment.task();
     let zone = task.zone();
     let mut start = stream("initial touches");
     let mut planner = (planner.make)(zone, &experiment.planning, stream(planner.name));
@@ -39,7 +38,7 @@ pub fn run(
     for count in 1..=experiment.touches {
         let plan = match count <= experiment.initial_touches {
             true => Plan { target: uniform(zone, &mut start), sd_m: None, stall: None },
-            false => planner.plan(&belief),
+            false => planner.plan_seeing(&belief, sight),
         };
         if !zone.contains(&plan.target) {
             let target = plan.target;
@@ -56,7 +55,7 @@ pub fn run(
         belief.observe(&plan.target, &touch);
         let swept = probe.swept();
         swept.iter().for_each(|swept| belief.observe_swept(swept));
-        let swept = swept.filter(|_| experiment.gp.free_space);
+        let swept = swept.filter(|_| experiment.gp.free_space || touch == Touch::Miss);
         let contact = match &touch {
             Touch::Contact(contact) => Some(contact),
             Touch::Miss | Touch::Overload => None,
@@ -79,7 +78,7 @@ pub fn run(
         if count >= experiment.initial_touches {
             match belief.refit() {
                 Ok((fit, surface)) => {
-                    touch_row.metrics = truth.compare(surface);
+                    touch_row.metrics = sight.truth.compare(surface);
                     touch_row.fit = Some(fit.clone());
                     touch_row.jitter = belief.jitter();
                 }

@@ -74,6 +74,18 @@ impl Truth {
         Some([heights_m().reduce(f64::min)?, heights_m().reduce(f64::max)?])
     }
 
+    /// Root mean square error of a belief wherever there is a surface; none if nobody knows of any.
+    pub fn rmse_m(&self, belief: &Posterior) -> Option<f64> {
+        let mut scratch = Scratch::default();
+        let mut errors = Errors::default();
+        for (place, truth) in self.places.iter().zip(&self.heights_m) {
+            if let Some(truth) = truth {
+                errors.add(truth - belief.mean(place, &mut scratch));
+            }
+        }
+        errors.rmse()
+    }
+
     /// Compares a belief with the truth wherever there is a surface; none if nobody knows of any.
     pub fn compare(&self, belief: &Posterior) -> Option<Metrics> {
         if self.count() == 0 {

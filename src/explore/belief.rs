@@ -123,6 +123,7 @@ const REACHED_WITHIN: f64 = 1e-3;
 const NORMAL_Y_MIN: f64 = 0.05;
 
 /// The belief of one trial.
+#[derive(Clone)]
 pub struct Belief {
     zone: Zone,
     kernel: &'static dyn Kernel,

@@ -34,6 +34,7 @@ const CUTS_MAX: usize = 16;
 const SOFTNESS_MIN: f64 = 1e-2;
 
 /// The lowest bound so far, on a grid over the zone.
+#[derive(Clone)]
 pub(super) struct Ceiling {
     places: Vec<Vec<f64>>,
     heights_m: Vec<f64>,

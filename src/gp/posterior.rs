@@ -100,6 +100,16 @@ impl Posterior {
         Ok(())
     }
 
+    /// Conditioned on the same, with length scales that are `scale` times its own: n³/3 operations.
+    ///
+    /// # Errors
+    /// [`CovarianceError`] if the covariance cannot be factored.
+    pub fn scaled(&self, scale: f64) -> Result<Self, CovarianceError> {
+        let mut hyperparameters = self.hyperparameters.clone();
+        hyperparameters.length_scales.iter_mut().for_each(|length| *length *= scale);
+        Self::new(self.kernel, hyperparameters, self.observations.clone())
+    }
+
     /// Conditions on imagined touches at `places` as well, whose heights are not known: the
     /// variance, which does not depend on them, is what it would be after these touches, and the
     /// mean means nothing. n² operations for each.

@@ -4,8 +4,9 @@ use super::canvas::escape;
 use super::figures::Drawing;
 use super::files::FORMATS;
 use super::findings;
-use super::style::ON_DARK;
-use super::tables::{Cell, Table, Verdict, claims, comparison, equal_error, summary};
+use super::html;
+use super::html::{section, table_body, wide};
+use super::tables::{Table, claims, comparison, equal_error, summary};
 use super::verdict;
 use crate::experiment::analysis::Analysis;
 use crate::experiment::store::Run;
@@ -33,11 +34,6 @@ pub fn html(
     explorer: &str,
     [settings, manifest]: [Option<&str>; 2],
 ) -> String {
-    let name = escape(&run.experiment.name);
-    let question = match run.experiment.question.trim() {
-        "" => String::new(),
-        question => format!("<p class=\"question\">{}</p>\n", escape(question)),
-    };
     let parts = [
         notices(&findings::notices(run)),
         explorer.into(),
@@ -51,14 +47,7 @@ pub fn html(
         details("What ran it", manifest),
         raw_files(drawings),
     ];
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{name} – Palpate</title>\n<style>{STYLE}{}</style>\n</head>\n<body>\n\
-         <p class=\"kind\">Palpate run</p>\n<h1>{name}</h1>\n{question}{}</body>\n</html>\n",
-        figures_on_dark(),
-        parts.concat(),
-    )
+    html::page("Palpate run", &run.experiment.name, &run.experiment.question, &parts.concat())
 }
 
 /// What a reader should know before anything else, a sentence each.
@@ -112,45 +101,6 @@ fn comparison_tables(run: &Run, analysis: &Analysis) -> String {
     section(equal) + &section(against)
 }
 
-/// A table whose words stand in its first column (`named`), its second (`counted`) or its first
-/// four (`told`).
-fn table_body(table: &Table, class: &str) -> String {
-    let head: String =
-        table.header.iter().map(|words| format!("<th>{}</th>", escape(words))).collect();
-    let lines: String = (table.lines.iter())
-        .map(|line| line.iter().enumerate().map(|(i, it)| cell(i, it)).collect::<String>())
-        .map(|cells| format!("<tr>{cells}</tr>\n"))
-        .collect();
-    wide(
-        &format!(
-            "<table class=\"{class}\">\n<thead><tr>{head}</tr></thead>\n\
-             <tbody>\n{lines}</tbody>\n</table>"
-        ),
-        "table",
-    )
-}
-
-/// A cell; the first one is the head of its line.
-fn cell(index: usize, Cell { words, verdict }: &Cell) -> String {
-    let words = escape(words);
-    match verdict.map(Verdict::word) {
-        _ if index == 0 => format!("<th scope=\"row\">{words}</th>"),
-        Some(verdict) => format!("<td class=\"{verdict}\">{words}: {verdict}</td>"),
-        None => format!("<td>{words}</td>"),
-    }
-}
-
-/// What scrolls in its own box where the page is narrower, by keyboard too.
-fn wide(content: &str, what: &str) -> String {
-    format!(
-        "<div class=\"wide\" role=\"region\" aria-label=\"{what}\" tabindex=\"0\">{content}</div>\n"
-    )
-}
-
-fn section(title: &str, body: &str, note: &str) -> String {
-    format!("<section>\n{title}{body}<p class=\"note\">{}</p>\n</section>\n", escape(note))
-}
-
 fn events(run: &Run) -> String {
     let mut items = summary::happened(run);
     let failures = run.rows.iter().filter_map(|row| {
@@ -194,18 +144,3 @@ fn raw_files(drawings: &[Drawing]) -> String {
     }
     format!("<section>\n<h2>Files beside this page</h2>\n<ul>\n{items}</ul>\n</section>\n")
 }
-
-/// Drawings keep their colours for light paper; on dark paper the page gives them others. Touches
-/// on a relief stay, because the relief does.
-fn figures_on_dark() -> String {
-    let rules = ON_DARK.iter().flat_map(|(light, dark)| {
-        ["fill", "stroke"].map(|property| {
-            format!(
-                "figure svg :not(.relief circle)[{property}=\"{light}\"] {{ {property}: {dark}; }}\n"
-            )
-        })
-    });
-    format!("@media (prefers-color-scheme: dark) {{\n{}}}\n", rules.collect::<String>())
-}
-
-const STYLE: &str = include_str!("page.css");

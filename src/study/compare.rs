@@ -7,7 +7,7 @@
 
 use super::check::baseline::span;
 use super::check::judged::JUDGED;
-use crate::experiment::row::of_planner;
+use crate::experiment::row::{TrialRow, of_planner};
 use crate::experiment::statistics::{RESAMPLES, mean, percentiles_95};
 use crate::experiment::store::Run;
 use crate::math::seed;
@@ -31,6 +31,19 @@ pub struct Contender {
     pub name: String,
     /// Scores of its trials on each object; none on one that it did not explore.
     pub scores: Vec<Vec<f64>>,
+    /// What that took on each object.
+    pub spent: Vec<Option<Spent>>,
+}
+
+/// What a planner's trials of one object took, after the initial touches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spent {
+    /// Share of the touches that met nothing.
+    pub missed: f64,
+    /// Share of the plans that its own rule could not decide.
+    pub stalled: f64,
+    /// Mean lateral travel of a trial.
+    pub travel_m: f64,
 }
 
 /// What cannot be compared.
@@ -91,7 +104,10 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Compar
                 }
                 objects.push(name.clone());
                 units.push(unit);
-                contenders.iter_mut().for_each(|it| it.scores.push(Vec::new()));
+                for contender in &mut contenders {
+                    contender.scores.push(Vec::new());
+                    contender.spent.push(None);
+                }
                 objects.len() - 1
             }
         };
@@ -109,10 +125,12 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Compar
             scores.sort_by_key(|(trial, _)| *trial);
             let place = contenders.iter().position(|it| it.name == label).unwrap_or_else(|| {
                 let scores = vec![Vec::new(); objects.len()];
-                contenders.push(Contender { name: label, scores });
+                let spent = vec![None; objects.len()];
+                contenders.push(Contender { name: label, scores, spent });
                 contenders.len() - 1
             });
             contenders[place].scores[index] = scores.into_iter().map(|(_, score)| score).collect();
+            contenders[place].spent[index] = spent(run, planner);
         }
     }
     Ok(Compared { objects, contenders })
@@ -124,6 +142,24 @@ fn logs(run: &Run, planner: &str) -> HashMap<u32, f64> {
     let of = JUDGED[0].of;
     let whole = of_planner(&run.rows, planner).filter(|row| row.failure.is_none());
     whole.filter_map(|row| Some((row.trial, of(row, span)?))).collect()
+}
+
+/// What a planner's whole trials took; none of none.
+fn spent(run: &Run, planner: &str) -> Option<Spent> {
+    let experiment = &run.experiment;
+    let whole: Vec<&TrialRow> =
+        of_planner(&run.rows, planner).filter(|row| row.failure.is_none()).collect();
+    let planned = || {
+        let initial = experiment.initial_touches as usize;
+        whole.iter().flat_map(move |row| row.touches.iter().skip(initial))
+    };
+    let share = |count: usize| count as f64 / planned().count().max(1) as f64;
+    let travels: Vec<f64> = whole.iter().filter_map(|row| row.path_m(experiment.touches)).collect();
+    (!whole.is_empty()).then(|| Spent {
+        missed: share(planned().filter(|touch| touch.contact.is_none() && !touch.overload).count()),
+        stalled: share(planned().filter(|touch| touch.stall.is_some()).count()),
+        travel_m: mean(&travels),
+    })
 }
 
 /// Mean of the middle half; none of nothing.

@@ -14,3 +14,4 @@ pub mod compare;
 pub mod effects;
 pub mod fidelity;
 pub mod stress;
+pub mod suite;

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 fn contender(scores: &[f64]) -> Contender {
-    Contender { name: "it".into(), scores: vec![scores.to_vec()] }
+    Contender { name: "it".into(), scores: vec![scores.to_vec()], spent: vec![None] }
 }
 
 #[test]

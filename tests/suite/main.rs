@@ -67,6 +67,7 @@ mod newcomer;
 #[cfg(feature = "nlopt")]
 mod no_truth;
 mod notices;
+mod objects;
 mod page;
 #[cfg(feature = "nlopt")]
 mod planners;

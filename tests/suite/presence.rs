@@ -1,6 +1,8 @@
 //! Where there probably is a surface, and planners that ask.
 
 use nalgebra::{Point3, Vector3};
+use palpate::experiment::resumed::Resumed;
+use palpate::experiment::sweep::cells;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::{Belief, GpSettings};
 use palpate::explore::planner;
@@ -115,6 +117,41 @@ fn a_silhouette_is_found() {
         assert!(row.touches.iter().all(|touch| touch.stall.is_none()), "{scene}");
     }
     assert!(found < by_share, "{found} {by_share}");
+}
+
+/// A trial that was broken off plans on as if it had not been: its rows say what its misses swept.
+#[test]
+fn a_trial_goes_on_where_it_was_broken_off() {
+    let simulation = simulation("star");
+    let planner = planner::by_name("silhouette").unwrap();
+    let whole = simulation.trial(planner, 0);
+    let made = whole.touches[..15].to_vec();
+    assert!(made.iter().any(|touch| touch.contact.is_none()));
+    assert!(whole.touches.iter().all(|touch| touch.tip.is_some() == touch.contact.is_none()));
+    let finger = simulation.environment().scene().finger.clone();
+    let mut probe = simulation.probe(0).unwrap();
+    let mut resumed = Resumed::new(made, finger, &mut *probe);
+    assert_eq!(simulation.trial_with(&mut resumed, planner, 0), whole);
+}
+
+/// Defaults and constants are chosen with one half of the suite and held against the other.
+#[test]
+fn every_object_stands_in_one_half() {
+    let of = |half: &str| {
+        let cells = cells(Path::new(&format!("experiments/suite/{half}.toml"))).unwrap();
+        cells.into_iter().map(|cell| cell.label).collect::<Vec<_>>()
+    };
+    let [choosing, reporting] = ["choosing", "reporting"].map(of);
+    assert_eq!((choosing.len(), reporting.len()), (12, 12));
+    let mut all: Vec<String> = [choosing, reporting].concat();
+    all.sort();
+    let mut scenes: Vec<String> = std::fs::read_dir("scenes/suite")
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .map(|path| format!("-scene-{}", path.file_stem().unwrap().to_str().unwrap()))
+        .collect();
+    scenes.sort();
+    assert_eq!(all, scenes);
 }
 
 /// Every object of the suite is closed, in front of the finger, and has the part of its zone that

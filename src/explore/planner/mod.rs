@@ -7,6 +7,7 @@ mod ei;
 mod grid;
 mod improvement;
 mod integrated_variance;
+mod oracle;
 mod pi;
 mod plan;
 mod random;
@@ -18,7 +19,7 @@ mod sobol;
 mod travel;
 mod ucb;
 
-pub use plan::{Entry, Plan, Planner, Stall, uniform};
+pub use plan::{Entry, Plan, Planner, Sight, Stall, uniform};
 pub use settings::PlanningSettings;
 
 /// Every planner; one line to add one.
@@ -34,6 +35,7 @@ pub const PLANNERS: &[Entry] = &[
     ucb::ENTRY,
     pi::ENTRY,
     ei::ENTRY,
+    oracle::ENTRY,
 ];
 
 /// The planner called `name`.

@@ -2,6 +2,7 @@
 
 use super::settings::PlanningSettings;
 use crate::explore::belief::Belief;
+use crate::gp::Posterior;
 use crate::task::Zone;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -35,6 +36,21 @@ pub enum Stall {
 pub trait Planner: Send {
     /// The next target, inside the zone.
     fn plan(&mut self, belief: &Belief) -> Plan;
+
+    /// As [`plan`](Self::plan), for yardsticks, which look at the truth; others do not.
+    fn plan_seeing(&mut self, belief: &Belief, _: &dyn Sight) -> Plan {
+        self.plan(belief)
+    }
+}
+
+/// The truth, as a yardstick sees it.
+pub trait Sight {
+    /// The belief with a touch at `target` taken in, not fitted again; none if nobody can tell how
+    /// that would end.
+    fn touched(&self, belief: &Belief, target: &[f64]) -> Option<Belief>;
+
+    /// Root mean square error of a belief; none where nobody knows the truth.
+    fn rmse_m(&self, belief: &Posterior) -> Option<f64>;
 }
 
 /// A planner as an experiment file names it.

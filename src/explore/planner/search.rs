@@ -2,11 +2,13 @@
 
 use super::plan::{Plan, Stall, uniform};
 use super::settings::PlanningSettings;
+use super::sobol;
 use crate::explore::belief::Belief;
 use crate::gp::posterior::Scratch;
 use crate::math::optimize;
 use crate::math::optimize::Bounds;
 use crate::task::Zone;
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 /// Two targets nearer than this, in units of the zone's sides, are the same touch; chosen.
@@ -96,6 +98,11 @@ impl Search {
         best
     }
 
+    /// Evenly spread places, others each time: none was asked for before.
+    pub(super) fn scattered(&mut self, count: u32) -> Vec<Vec<f64>> {
+        sobol::places(&self.zone, count, self.rng.random())
+    }
+
     /// `score` with its gradient by central differences, one-sided at the zone's border.
     pub(super) fn differentiated<S: Fn(&[f64], &mut Scratch) -> f64>(
         &self,
@@ -151,7 +158,7 @@ impl Search {
     }
 
     /// Why a touch at `place` would tell nothing, if so.
-    pub(super) fn stall(&self, belief: &Belief, place: &[f64]) -> Option<Stall> {
+    fn stall(&self, belief: &Belief, place: &[f64]) -> Option<Stall> {
         let lost_sd = LOST_IN_ROUNDING * belief.surface()?.hyperparameters().signal_sd;
         let same = |target: &Vec<f64>| self.zone.distance(target, place) < SAME_TARGET;
         if variance(belief, place) <= lost_sd * lost_sd {

@@ -14,6 +14,10 @@ pub struct PlanningSettings {
     pub lbfgs_evaluations: u32,
     /// Of `integrated_variance`.
     pub integrated_variance: IntegratedVarianceSettings,
+    /// Of `silhouette`.
+    pub silhouette: SilhouetteSettings,
+    /// Of `oracle`.
+    pub oracle: OracleSettings,
     /// Of `slope`.
     pub slope: SlopeSettings,
     /// Of `travel`.
@@ -33,6 +37,8 @@ impl Default for PlanningSettings {
             direct_evaluations: 500,
             lbfgs_evaluations: 50,
             integrated_variance: Default::default(),
+            silhouette: Default::default(),
+            oracle: Default::default(),
             slope: Default::default(),
             travel: Default::default(),
             ucb: Default::default(),
@@ -54,6 +60,41 @@ impl Default for IntegratedVarianceSettings {
     /// Chosen: about as many as the hundred touches of a trial tell apart, twice over.
     fn default() -> Self {
         Self { places: 256 }
+    }
+}
+
+/// Settings of `silhouette`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SilhouetteSettings {
+    /// Places over which the variance is summed.
+    pub places: u32,
+    /// Places at which a touch is considered; other ones for each touch.
+    pub candidates: u32,
+}
+
+impl Default for SilhouetteSettings {
+    /// Chosen: twice as many of both gain nothing on the suite.
+    fn default() -> Self {
+        Self { places: 256, candidates: 500 }
+    }
+}
+
+/// Settings of `oracle`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct OracleSettings {
+    /// Touches that are tried out for each that is made.
+    pub candidates: u32,
+    /// Whether the belief is fitted again after each that is tried, as it is after one that is
+    /// made; otherwise its hyperparameters stay.
+    pub refit: bool,
+}
+
+impl Default for OracleSettings {
+    /// Chosen: more candidates find little more.
+    fn default() -> Self {
+        Self { candidates: 120, refit: false }
     }
 }
 
@@ -124,6 +165,9 @@ impl Checked for PlanningSettings {
         rules.number("lbfgs_evaluations", self.lbfgs_evaluations.into(), 1.0..=1e6);
         let places = self.integrated_variance.places;
         rules.number("integrated_variance.places", places.into(), 1.0..=65536.0);
+        rules.number("silhouette.places", self.silhouette.places.into(), 1.0..=65536.0);
+        rules.number("silhouette.candidates", self.silhouette.candidates.into(), 1.0..=65536.0);
+        rules.number("oracle.candidates", self.oracle.candidates.into(), 1.0..=65536.0);
         rules.number("slope.weight", self.slope.weight, 0.0..=1e3);
         rules.number("travel.tour", self.travel.tour.into(), 1.0..=100.0);
         rules.number("ucb.sds", self.ucb.sds, 0.0..=1e3);

@@ -1,11 +1,14 @@
 //! Touch where the variance of the surface that there probably is falls most, times the chance that
 //! a touch meets anything.
+//!
+//! How far touches speak for their surroundings is what a few touches tell least: the variance is
+//! that of a committee of beliefs, whose length scales differ from the fitted ones.
 
 use super::plan::{Entry, Plan, Planner};
 use super::search::Search;
 use super::sobol;
 use crate::explore::belief::Belief;
-use crate::gp::posterior::Scratch;
+use crate::gp::posterior::{Posterior, Scratch};
 use crate::gp::reduction::Reduction;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -14,11 +17,16 @@ pub(super) const ENTRY: Entry = Entry {
     name: "silhouette",
     about: "integrated_variance where there probably is a surface, times the chance to meet one",
     make: |zone, settings, mut rng: ChaCha8Rng| {
-        let count = settings.integrated_variance.places;
+        let count = settings.silhouette.places;
         let places = sobol::places(zone, count, rng.random());
         Box::new(Silhouette { places, search: Search::new(zone, settings, rng) })
     },
 };
+
+/// Length scales of the committee in units of the fitted ones. Chosen on the suite's objects for
+/// choosing: the error is 0.887 of that of a Sobol sequence, with the fitted ones alone 0.905, with
+/// a third and three times 0.898.
+const COMMITTEE: [f64; 3] = [0.5, 1.0, 2.0];
 
 struct Silhouette {
     /// Where the variance is looked at.
@@ -30,22 +38,30 @@ impl Planner for Silhouette {
     fn plan(&mut self, belief: &Belief) -> Plan {
         let Some(posterior) = belief.explorable() else { return self.search.anywhere() };
         let presence = belief.presence();
-        let weights = self.places.iter().map(|place| presence.at(place)).collect();
-        let places = self.places.iter().map(Vec::as_slice);
-        let reduction = Reduction::new(posterior, places).weighted(weights);
-        let value = |place: &[f64], scratch: &mut Scratch| {
-            presence.of_contact(place) * reduction.at(place, scratch)
-        };
-        let (_, best) = self.search.maximum(self.search.differentiated(value));
-        // What was asked before brings nothing new: then the best of the places that were not.
-        let is_new = |place: &&Vec<f64>| self.search.stall(belief, place).is_none();
+        let weights: Vec<f64> = self.places.iter().map(|place| presence.at(place)).collect();
+        let committee: Vec<Posterior> =
+            COMMITTEE.iter().filter_map(|scale| posterior.scaled(*scale).ok()).collect();
+        let reductions: Vec<Reduction> = (committee.iter())
+            .map(|member| {
+                let places = self.places.iter().map(Vec::as_slice);
+                Reduction::new(member, places).weighted(weights.clone())
+            })
+            .collect();
         let mut scratch = Scratch::default();
-        let others = self.places.iter().filter(is_new);
-        let place = Some(&best).filter(is_new).or_else(|| {
-            let valued = others.map(|place| (value(place, &mut scratch), place));
-            valued.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, place)| place)
-        });
-        let place = place.unwrap_or(&best).clone();
-        self.search.conclude(belief, place)
+        let mut value = |place: &[f64]| -> f64 {
+            match presence.of_contact(place) {
+                0.0 => 0.0,
+                chance => {
+                    let falls = reductions.iter().map(|fall| fall.at(place, &mut scratch));
+                    chance * falls.sum::<f64>()
+                }
+            }
+        };
+        let candidates = self.search.scattered(self.search.settings.silhouette.candidates);
+        let valued = candidates.into_iter().map(|place| (value(&place), place));
+        match valued.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((_, place)) => self.search.conclude(belief, place),
+            None => self.search.anywhere(),
+        }
     }
 }

@@ -1,0 +1,37 @@
+//! Touches where, if the truth is looked at, the belief comes nearest to it: a yardstick of how
+//! much any planner could gain with its next touch.
+
+use super::plan::{Entry, Plan, Planner, Sight};
+use super::search::Search;
+use crate::explore::belief::Belief;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "oracle",
+    about: "what lowers the true error most (looks at the truth: only to measure others by)",
+    make: |zone, settings, rng| Box::new(Oracle(Search::new(zone, settings, rng))),
+};
+
+struct Oracle(Search);
+
+impl Planner for Oracle {
+    fn plan(&mut self, _: &Belief) -> Plan {
+        self.0.anywhere()
+    }
+
+    fn plan_seeing(&mut self, belief: &Belief, sight: &dyn Sight) -> Plan {
+        let settings = self.0.settings.oracle.clone();
+        let candidates = self.0.scattered(settings.candidates);
+        let told = candidates.into_iter().filter_map(|target| {
+            let mut after = sight.touched(belief, &target)?;
+            match settings.refit {
+                true => after.refit().map(|_| ()).ok()?,
+                false => after.condition(belief.surface()?.hyperparameters().clone()).ok()?,
+            }
+            Some((sight.rmse_m(after.surface()?)?, target))
+        });
+        match told.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((_, target)) => self.0.conclude(belief, target),
+            None => self.0.anywhere(),
+        }
+    }
+}

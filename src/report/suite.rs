@@ -1,0 +1,155 @@
+//! A suite of objects on one page: who is better on which, by how much, and what it took.
+
+use super::compare::draw;
+use super::html::{page, section, table_body, wide};
+use super::number::{digits, with_interval};
+use super::tables::{Cell, Table, Verdict, write_csv};
+use crate::experiment::measure::Direction;
+use crate::study::compare::{Compared, Contender};
+use crate::study::suite::{CEILING, Estimate, FLOOR, gap_closed, geometric};
+use schemars::JsonSchema;
+use serde::Serialize;
+use std::path::Path;
+
+/// Of the bootstraps.
+const SEED: u64 = 0;
+
+/// A planner's error in units of the reference's: on each object, in their order, and over all.
+fn errors(contender: &Contender) -> (Vec<Option<Estimate>>, Option<Estimate>) {
+    let strata: Vec<&[f64]> = contender.scores.iter().map(Vec::as_slice).collect();
+    (strata.iter().map(|scores| geometric(&[scores], SEED)).collect(), geometric(&strata, SEED))
+}
+
+fn verdict(error: &Estimate) -> Option<Verdict> {
+    Verdict::of(Some(error.interval), 1.0, Direction::Less)
+}
+
+fn cell(error: Option<&Estimate>) -> Cell {
+    let words = |it: &Estimate| with_interval(it.value, Some(it.interval), &digits);
+    let verdict = error.and_then(verdict);
+    Cell { words: error.map_or("-".into(), words), verdict }
+}
+
+/// A line for each planner: over all objects.
+pub fn overall(compared: &Compared) -> Table {
+    let count = compared.objects.len();
+    let all: Vec<usize> = (0..count).collect();
+    let header = ["planner", "error", "better on", "worse on", "gap closed", "missed", "stalled"];
+    let header = header.into_iter().chain(["travel m"]).map(String::from).collect();
+    let line = |it: &Contender| {
+        let (each, over_all) = errors(it);
+        let on = |asked: Verdict| {
+            let is_it = |error: &&Estimate| verdict(error) == Some(asked);
+            format!("{} of {count}", each.iter().flatten().filter(is_it).count())
+        };
+        let gap = gap_closed(compared, it, &all, SEED).map_or("-".into(), |gap| {
+            let [low, high] = gap.interval;
+            format!("{:.0} % [{:.0}, {:.0}]", 100.0 * gap.value, 100.0 * low, 100.0 * high)
+        });
+        let spent: Vec<_> = it.spent.iter().flatten().collect();
+        let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len().max(1) as f64;
+        let missed = mean(spent.iter().map(|it| it.missed).collect());
+        let stalled = mean(spent.iter().map(|it| it.stalled).collect());
+        let travel_m = mean(spent.iter().map(|it| it.travel_m).collect());
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        let start = [it.name.clone().into(), cell(over_all.as_ref())];
+        let counts = [on(Verdict::Better), on(Verdict::Worse), gap];
+        let costs = [percent(missed), percent(stalled), format!("{travel_m:.2}")];
+        start.into_iter().chain(counts.into_iter().chain(costs).map(Cell::from)).collect()
+    };
+    Table { header, lines: compared.contenders.iter().map(line).collect() }
+}
+
+/// A line for each object, a column for each planner.
+pub fn each(compared: &Compared) -> Table {
+    let names = compared.contenders.iter().map(|it| it.name.clone());
+    let told: Vec<_> = compared.contenders.iter().map(|it| errors(it).0).collect();
+    let line = |(object, name): (usize, &String)| {
+        let cells = told.iter().map(|errors| cell(errors[object].as_ref()));
+        std::iter::once(name.clone().into()).chain(cells).collect()
+    };
+    Table {
+        header: std::iter::once("object".to_owned()).chain(names).collect(),
+        lines: compared.objects.iter().enumerate().map(line).collect(),
+    }
+}
+
+/// What the numbers are.
+pub fn note(against: &str) -> String {
+    format!(
+        "Errors are exp(mean log RMSE over the touches after the initial ones) in units of {against}'s \
+         in the same trial: the geometric mean over trials and objects, with the 95 % interval of a \
+         bootstrap over trials. Less is better; better and worse: the interval excludes 1. The gap is \
+         that from {FLOOR} to {CEILING}, which looks at the truth, in mean log error. Missed: touches \
+         that met nothing; stalled: plans that the planner's own rule could not decide."
+    )
+}
+
+/// The page.
+pub fn html(name: &str, question: &str, compared: &Compared, against: &str) -> String {
+    let over_all = section(
+        "<h2>Over all objects</h2>\n",
+        &table_body(&overall(compared), "named"),
+        &note(against),
+    );
+    let each = section("<h2>Object by object</h2>\n", &table_body(&each(compared), "named"), "");
+    let profiles = draw(compared, against).map_or(String::new(), |svg| {
+        format!(
+            "<figure id=\"profiles\">\n{}<figcaption>Which share of the trials has how small an error, \
+             averaged over the objects; further left is better.</figcaption>\n</figure>\n",
+            wide(&svg, "figure")
+        )
+    });
+    page("Palpate suite", name, question, &[over_all, profiles, each].concat())
+}
+
+/// A record of `suite.csv`.
+#[derive(Serialize, JsonSchema)]
+pub struct SuiteRecord<'a> {
+    /// Which object.
+    pub object: &'a str,
+    /// Which planner.
+    pub planner: &'a str,
+    /// Its trials that were finished, and have one of the reference beside them.
+    pub trials: usize,
+    /// Geometric mean of its error in units of the reference's.
+    pub error: Option<f64>,
+    /// Lower end of its 95 % bootstrap interval.
+    pub error_low: Option<f64>,
+    /// Upper end.
+    pub error_high: Option<f64>,
+    /// Share of the way from random to the oracle, in mean log error.
+    pub gap_closed: Option<f64>,
+    /// Share of the touches after the initial ones that met nothing.
+    pub missed: Option<f64>,
+    /// Share of these touches that the planner's own rule could not decide.
+    pub stalled: Option<f64>,
+    /// Mean lateral travel of a trial.
+    pub travel_m: Option<f64>,
+}
+
+/// Writes `suite.csv`: a line per object and planner.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write(compared: &Compared, path: &Path) -> anyhow::Result<()> {
+    let records = compared.objects.iter().enumerate().flat_map(|(i, object)| {
+        compared.contenders.iter().map(move |it| {
+            let error = geometric(&[&it.scores[i]], SEED);
+            let spent = it.spent[i];
+            SuiteRecord {
+                object,
+                planner: &it.name,
+                trials: it.scores[i].len(),
+                error: error.map(|error| error.value),
+                error_low: error.map(|error| error.interval[0]),
+                error_high: error.map(|error| error.interval[1]),
+                gap_closed: gap_closed(compared, it, &[i], SEED).map(|gap| gap.value),
+                missed: spent.map(|spent| spent.missed),
+                stalled: spent.map(|spent| spent.stalled),
+                travel_m: spent.map(|spent| spent.travel_m),
+            }
+        })
+    });
+    write_csv(path, records)
+}

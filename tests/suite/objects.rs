@@ -1,0 +1,123 @@
+//! Planners over a suite of objects: what is said of them, and what the best of them can do.
+
+use crate::common::program::palpate;
+use palpate::experiment::sweep::cells;
+use palpate::experiment::{Experiment, Simulation};
+use palpate::explore::planner;
+use palpate::study::check::baseline::span;
+use palpate::study::check::judged::JUDGED;
+use palpate::study::compare::{Compared, Contender};
+use palpate::study::suite::{gap_closed, geometric};
+use proptest::prelude::*;
+use std::fs;
+use std::path::Path;
+
+fn compared(random: &[f64], own: &[f64], oracle: &[f64]) -> Compared {
+    let contender = |(name, scores): (&str, &[f64])| Contender {
+        name: name.into(),
+        scores: vec![scores.to_vec()],
+        spent: vec![None],
+    };
+    let named = [("random", random), ("own", own), ("oracle", oracle)];
+    Compared { objects: vec!["it".into()], contenders: named.map(contender).into() }
+}
+
+proptest! {
+    /// Random closes nothing of its gap and the oracle all, who is halfway in each trial half of it,
+    /// and the unit of the errors does not matter.
+    #[test]
+    fn a_gap_is_closed_from_random_to_the_oracle(
+        random in prop::collection::vec(1.0..9.0_f64, 2..20),
+        better in 1.1..9.0_f64,
+        unit in 0.1..9.0_f64,
+    ) {
+        let oracle: Vec<f64> = random.iter().map(|score| score / better).collect();
+        let halfway: Vec<f64> = random.iter().map(|score| score / better.sqrt()).collect();
+        let found = compared(&random, &halfway, &oracle);
+        for (contender, share) in found.contenders.iter().zip([0.0, 0.5, 1.0]) {
+            let gap = gap_closed(&found, contender, &[0], 1).unwrap();
+            prop_assert!((gap.value - share).abs() < 1e-9, "{gap:?}");
+            prop_assert!(gap.interval.iter().all(|end| (end - share).abs() < 1e-9), "{gap:?}");
+        }
+        let in_unit = |scores: &[f64]| scores.iter().map(|it| it * unit).collect::<Vec<f64>>();
+        let other = compared(&in_unit(&random), &in_unit(&halfway), &in_unit(&oracle));
+        let gap = gap_closed(&other, &other.contenders[1], &[0], 1).unwrap();
+        prop_assert!((gap.value - 0.5).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn every_object_counts_once() {
+    // Two trials of one object and four of another: (½·ln 1·4 + ¼·ln 1·1·16·16)/2 = ln 2√2.
+    let found = geometric(&[&[1.0, 4.0], &[1.0, 1.0, 16.0, 16.0]], 0).unwrap();
+    assert!((found.value - 8.0_f64.sqrt()).abs() < 1e-12, "{found:?}");
+    assert!(found.interval[0] < found.value && found.value < found.interval[1]);
+    assert_eq!(geometric(&[&[1.0], &[]], 0), None);
+    let none = compared(&[1.0, 2.0], &[1.0], &[0.5, 0.5]);
+    assert_eq!(gap_closed(&none, &none.contenders[1], &[0], 0), None);
+}
+
+/// Over six objects that differ, asking where there is a surface is ahead of an even spread, and
+/// never in doubt; and who sees the truth is ahead of both, also if the belief is fitted anew for
+/// each touch that is tried.
+#[test]
+fn planners_keep_their_order_on_six_objects() {
+    let path = Path::new("experiments/suite/six.toml");
+    let sets = ["trials=3", "planning.oracle.candidates=30", "grid=21"].map(String::from);
+    let names = ["sobol", "silhouette", "oracle"];
+    let mut sums = [0.0; 3];
+    for cell in cells(path).unwrap() {
+        let mut experiment = Experiment::load_cell(path, &cell, &sets).unwrap();
+        experiment.planning.oracle.refit = cell.label.ends_with("ring");
+        let span = span(&experiment);
+        let simulation = Simulation::new(experiment).unwrap();
+        for (sum, name) in sums.iter_mut().zip(names) {
+            let planner = planner::by_name(name).unwrap();
+            for trial in 0..3 {
+                let row = simulation.trial(planner, trial);
+                assert!(row.failure.is_none() && row.touches.iter().all(|it| it.stall.is_none()));
+                *sum += (JUDGED[0].of)(&row, span).unwrap();
+            }
+        }
+    }
+    let [sobol, silhouette, oracle] = sums.map(|sum| sum / 18.0);
+    println!("{:.3} {:.3}", (silhouette - sobol).exp(), (oracle - sobol).exp());
+    assert!(silhouette < sobol - 0.05 && oracle < silhouette - 0.1, "{sums:?}");
+}
+
+/// From the command line: a table, a page and numbers, where it left off; and what it refuses.
+#[test]
+fn a_suite_is_run_from_the_command_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let text = "name = \"two\"\nscene = \"toy\"\nplanners = [\"active\", \"random\", \"sobol\", \
+                \"oracle\"]\ntrials = 3\ngrid = 41\nseed = 1\ntouches = 8\ninitial_touches = 3\n[sweep]\n\
+                \"gp.noise_sd_m\" = [0.01, 0.05]\n";
+    let scene = fs::canonicalize("scenes/toy.toml").unwrap();
+    let text = text.replace("\"toy\"", &format!("{:?}", scene.to_str().unwrap()));
+    let file = at("two.toml");
+    fs::write(&file, &text).unwrap();
+    let out = at("out");
+    let suite = |arguments: &[&str]| {
+        let arguments = [&["--quiet", "suite"], arguments].concat();
+        let output = palpate(Path::new("."), &arguments);
+        let said = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap()).concat();
+        (output.status.code(), said)
+    };
+    let (code, said) = suite(&[&file, "--out", &out]);
+    assert!(code == Some(0) && said.contains("gap closed"), "{said}");
+    let page = fs::read_to_string(folder.path().join("out/suite.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("oracle") && page.contains("better on"));
+    let csv = fs::read_to_string(folder.path().join("out/suite.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + 2 * 4, "{csv}");
+    let (again, repeated) = suite(&[&file, "--out", &out]);
+    assert_eq!((again, repeated), (Some(0), said));
+    assert_eq!(fs::read_to_string(folder.path().join("out/suite.csv")).unwrap(), csv);
+
+    let (code, said) = suite(&[&file, "--out", &out, "--against", "grid"]);
+    assert!(code == Some(2) && said.contains("--against") && said.contains("sobol"), "{said}");
+    let (code, said) = suite(&["toy", "--out", &out]);
+    assert!(code == Some(2) && said.contains("[sweep]"), "{said}");
+    let (code, said) = suite(&[&file, "--out", &at("other"), "--set", "backend.kind=\"ros2\""]);
+    assert!(code == Some(2) && said.contains("simulated"), "{said}");
+}
