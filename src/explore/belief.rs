@@ -37,7 +37,7 @@ pub struct GpSettings {
     /// Range of the slopes' noise, as a fraction of the signal's standard deviation over the zone's
     /// shortest side.
     pub slope_noise: [f64; 2],
-    /// Whether the surface is held below the space that the finger has swept.
+    /// Whether the surface is held below the space that the finger has swept, where it met one.
     pub free_space: bool,
     /// What the hyperparameters probably are.
     pub prior: Priors,
@@ -184,10 +184,11 @@ impl Belief {
         }
     }
 
-    /// Takes in what the last touch swept.
+    /// Takes in what the last touch swept: of a contact that the surface is below, of a miss that
+    /// there is none.
     pub fn observe_swept(&mut self, swept: &Swept) {
         self.presence.passed(swept, self.has_missed);
-        if let Some(ceiling) = &mut self.ceiling {
+        if let Some(ceiling) = self.ceiling.as_mut().filter(|_| !self.has_missed) {
             ceiling.lower(&self.zone, swept);
         }
     }
@@ -235,7 +236,7 @@ impl Belief {
     fn posterior(&self, hyperparameters: Hyperparameters) -> Result<Posterior, CovarianceError> {
         let mut posterior = Posterior::new(self.kernel, hyperparameters, self.contacts.clone())?;
         if let Some(ceiling) = &self.ceiling {
-            ceiling.cut(&mut posterior);
+            ceiling.cut(&mut posterior, &self.presence);
         }
         Ok(posterior)
     }

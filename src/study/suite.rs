@@ -32,10 +32,10 @@ pub fn geometric(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
     Some(estimate(&counts(&logs), seed, of))
 }
 
-/// Share of the way from [`FLOOR`] to [`CEILING`] that a contender comes, in log error averaged over
-/// objects: (floor − contender) / (floor − ceiling). Trials are drawn together, for they are of the
-/// same start. None where one of the three lacks an object of `objects`, has other trials, or no way
-/// is left to go.
+/// Share of the way from [`FLOOR`] to [`CEILING`] that a contender comes, in log error averaged
+/// over objects: (floor − contender) / (floor − ceiling). Trials are drawn together, for they are
+/// of the same start. None where one of the three lacks an object of `objects`, has other trials,
+/// or no way is left to go.
 pub fn gap_closed(
     compared: &Compared,
     contender: &Contender,

@@ -7,6 +7,7 @@ use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::{Belief, GpSettings};
 use palpate::explore::planner;
 use palpate::explore::probe::{Contact, Swept, Touch};
+use palpate::gp::Posterior;
 use palpate::gp::posterior::Scratch;
 use palpate::math::seed;
 use palpate::robot::finger::shape::Finger;
@@ -69,11 +70,12 @@ fn the_surface_is_below_what_the_finger_has_swept() {
     }
 }
 
-/// Contacts on two ridges; between them a miss has shown that nothing is above a depth.
+/// Contacts on two ridges; between them a finger came to a depth. What is a little below the mean
+/// lowers it; far below, there is an edge rather than a surface, and the mean stays.
 #[test]
 fn a_bound_lowers_the_mean_under_it_and_leaves_the_variance_honest() {
-    let believe = |free_space| {
-        let settings = GpSettings { free_space, ..GpSettings::default() };
+    let believe = |depth_m: Option<f64>| {
+        let settings = GpSettings { free_space: depth_m.is_some(), ..GpSettings::default() };
         let mut belief = Belief::new(SQUARE, settings);
         for i in 0..5 {
             for x in [-0.04, 0.04] {
@@ -83,26 +85,30 @@ fn a_bound_lowers_the_mean_under_it_and_leaves_the_variance_honest() {
                 belief.observe(&[x, z], &Touch::Contact(contact));
             }
         }
-        let finger = Finger { length_m: 0.0, ..Finger::default() };
-        let p_wt = Point3::new(0.0, SQUARE.datum_y_m() + 0.02 + finger.radius_m, 0.0);
-        belief.observe_swept(&Swept { finger, p_wt });
+        if let Some(depth_m) = depth_m {
+            let finger = Finger { length_m: 0.0, ..Finger::default() };
+            let p_wt = Point3::new(0.0, SQUARE.datum_y_m() + depth_m + finger.radius_m, 0.0);
+            belief.observe_swept(&Swept { finger, p_wt });
+        }
         belief.refit().unwrap();
         belief.surface().unwrap().clone()
     };
-    let (without, with) = (believe(false), believe(true));
-    assert_eq!(without.hyperparameters(), with.hyperparameters());
+    let without = believe(None);
     let mut scratch = Scratch::default();
-    let mut at = |place: [f64; 2]| {
-        [&without, &with].map(|belief| {
-            (belief.mean(&place, &mut scratch), belief.variance(&place, &mut scratch).sqrt())
-        })
+    let mut at = |belief: &Posterior, place: [f64; 2]| {
+        (belief.mean(&place, &mut scratch), belief.variance(&place, &mut scratch).sqrt())
     };
-    let [(before, before_sd), (after, after_sd)] = at([0.0, 0.0]);
-    assert!(before > 0.025 && after < 0.02 + 5e-4, "{before} {after}");
+    let (before, before_sd) = at(&without, [0.0, 0.0]);
+    let lowered = believe(Some(before - 0.3 * before_sd.max(1e-3)));
+    assert_eq!(without.hyperparameters(), lowered.hyperparameters());
+    let (after, after_sd) = at(&lowered, [0.0, 0.0]);
+    assert!(after < before - 0.2 * before_sd, "{before} {before_sd} {after}");
     assert!(after_sd > 0.0 && after_sd <= before_sd, "{before_sd} {after_sd}");
     // The contacts are still met.
-    let [(before, _), (after, _)] = at([0.04, 0.0]);
-    assert!((before - after).abs() < 5e-4, "{before} {after}");
+    let [(here, _), (there, _)] = [&without, &lowered].map(|belief| at(belief, [0.04, 0.0]));
+    assert!((here - there).abs() < 5e-4, "{here} {there}");
+    let edge = believe(Some(before - 10.0 * before_sd.max(1e-3)));
+    assert_eq!(at(&edge, [0.0, 0.0]), (before, before_sd));
 }
 
 /// The mean turns as the normals say, which tell the two sides of one contact apart.

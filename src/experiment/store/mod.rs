@@ -152,7 +152,7 @@ impl RunFolder {
         rows::scan(&file, experiment, |row, bytes| {
             let id = row.id();
             if experiment.lists(&id) {
-                tally.add(row);
+                tally.add(row, experiment);
             }
             places.push(Place { id, bytes });
         })?;
@@ -179,13 +179,13 @@ pub struct Tally {
 }
 
 impl Tally {
-    fn add(&mut self, row: TrialRow) {
+    fn add(&mut self, row: TrialRow, experiment: &Experiment) {
         self.trials += 1;
         let id = row.id();
         if let Some(reason) = row.failure {
             self.failed += 1;
-            let is_first = self.first.as_ref().is_none_or(|(first, _)| id.trial < first.trial);
-            if is_first {
+            let is_before = |first: &TrialId| rows::order(&id, first, experiment).is_lt();
+            if self.first.as_ref().is_none_or(|(first, _)| is_before(first)) {
                 self.first = Some((id, reason));
             }
         }
