@@ -34,13 +34,26 @@ again. Whatever else is changed wants another folder (--out) or a new start (--f
 #[derive(clap::Args)]
 pub(super) struct Args {
     /// Experiment file (TOML), or the name of one in experiments/.
-    pub(super) experiment: PathBuf,
+    experiment: PathBuf,
     /// Change one setting: a dotted key and a TOML value; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
-    pub(super) set: Vec<String>,
+    set: Vec<String>,
     /// Folder for the results [default: runs/NAME].
     #[arg(long, value_name = "FOLDER")]
-    pub(super) out: Option<PathBuf>,
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    how: How,
+    /// Write rows and summary only, no figures.
+    #[arg(long)]
+    no_report: bool,
+    /// Print the summary as JSON instead of a table.
+    #[arg(long, conflicts_with = "shard")]
+    json: bool,
+}
+
+/// How trials are run, whatever is made of them.
+#[derive(clap::Args, Default)]
+pub(super) struct How {
     /// Threads; 0 means all cores. Results do not depend on it.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
     pub(super) threads: u16,
@@ -57,18 +70,12 @@ pub(super) struct Args {
     /// Clear what the side of a real arm has latched, before it is moved: the operator's to say.
     #[arg(long)]
     pub(super) clear_fault: bool,
-    /// Write rows and summary only, no figures.
-    #[arg(long)]
-    pub(super) no_report: bool,
-    /// Print the summary as JSON instead of a table.
-    #[arg(long, conflicts_with = "shard")]
-    pub(super) json: bool,
 }
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let path = find(&args.experiment, EXPERIMENTS)?;
     let cells = cells(&path)?;
-    bound_threads(args.threads)?;
+    bound_threads(args.how.threads)?;
     let mut stop = None;
     if cells.is_empty() {
         let out = args.out.clone();
@@ -103,15 +110,30 @@ impl Made {
         self.tally.trials as u64 == self.total
     }
 
-    /// How it ended; says what failed.
+    /// How it ended; says on standard error how many trials failed and why the first did.
     pub(super) fn ending(&self, talk: Talk) -> Ending {
-        ending(&self.tally, self.is_finished(), talk)
+        let Tally { trials, failed, first } = &self.tally;
+        let all_failed = *trials > 0 && failed == trials;
+        if let Some((TrialId { trial, planner }, reason)) = first {
+            let words = format!(
+                "{failed} of {trials} trials failed, the first ({planner}, trial {trial}): {reason}"
+            );
+            match all_failed {
+                true => error(words),
+                false => talk.note(words),
+            }
+        }
+        match () {
+            () if !self.is_finished() => Ending::Interrupted,
+            () if all_failed => Ending::Failed,
+            () => Ending::Done,
+        }
     }
 }
 
 /// Runs what is not there yet.
 pub(super) fn make(
-    args: &Args,
+    how: &How,
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
@@ -119,28 +141,28 @@ pub(super) fn make(
 ) -> anyhow::Result<Made> {
     let mut simulation = simulation(experiment, talk)?;
     if let Some(lab) = simulation.connect()? {
-        ready(&lab, args.clear_fault)?;
+        ready(&lab, how.clear_fault)?;
     }
     let simulation = simulation;
     let experiment = simulation.experiment();
-    if args.record && !experiment.scene.body.moves() && !simulation.is_real() {
+    if how.record && !experiment.scene.body.moves() && !simulation.is_real() {
         let body = experiment.scene.body.name();
         bail!(
             "--record: body = \"{body}\" touches without moving, so that there is nothing to record; \
              allowed are \"kinematic\" and \"dynamic\""
         );
     }
-    if args.shard.is_some() && simulation.is_real() {
+    if how.shard.is_some() && simulation.is_real() {
         bail!("--shard: a real arm makes one trial after another; leave it out");
     }
     let path = out.unwrap_or_else(|| {
-        let part = args.shard.map(|it| format!("-{}-of-{}", it.index, it.count));
+        let part = how.shard.map(|it| format!("-{}-of-{}", it.index, it.count));
         PathBuf::from("runs").join(format!("{}{}", experiment.name, part.unwrap_or_default()))
     });
     let manifest = manifest(experiment);
     let (mut folder, done) =
-        RunFolder::open(&path, experiment, simulation.truth(), &manifest, args.fresh)?;
-    let recorded = args.record.then_some(path.as_path());
+        RunFolder::open(&path, experiment, simulation.truth(), &manifest, how.fresh)?;
+    let recorded = how.record.then_some(path.as_path());
     if recorded.is_some() {
         let folder = path.join(RECORDINGS);
         std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
@@ -151,13 +173,13 @@ pub(super) fn make(
     };
 
     let mut jobs = runner::jobs(experiment, &done);
-    if let Some(shard) = args.shard {
+    if let Some(shard) = how.shard {
         shard.keep(&mut jobs);
     }
     let total = (done.len() + jobs.len()) as u64;
     let bar = progress_bar(talk, &experiment.name, "trials", total, done.len() as u64);
     let begun = Instant::now();
-    let threads = args.threads.into();
+    let threads = how.threads.into();
     let tick = |_: &TrialRow| step(talk, &bar);
     let outcome = match simulation.is_real() {
         true => {
@@ -187,10 +209,10 @@ fn run_one(
     stop: &mut Option<Arc<AtomicBool>>,
     talk: Talk,
 ) -> anyhow::Result<Ending> {
-    let made = make(args, experiment, out, stop, talk)?;
+    let made = make(&args.how, experiment, out, stop, talk)?;
     let Made { path, words, total, halt, .. } = &made;
     // A part of a run is not looked at: its rows need not fit into memory.
-    if args.shard.is_some() {
+    if args.how.shard.is_some() {
         print(&format!("{words}\nrows in {}", path.display()))?;
         return Ok(made.ending(talk));
     }
@@ -228,26 +250,6 @@ fn run_one(
         talk.note(kept);
     }
     Ok(made.ending(talk))
-}
-
-/// How a run ended; says on standard error how many trials failed and why the first did.
-fn ending(tally: &Tally, finished: bool, talk: Talk) -> Ending {
-    let &Tally { trials, failed, ref first } = tally;
-    let all_failed = trials > 0 && failed == trials;
-    if let Some((TrialId { trial, planner }, reason)) = first {
-        let words = format!(
-            "{failed} of {trials} trials failed, the first ({planner}, trial {trial}): {reason}"
-        );
-        match all_failed {
-            true => error(words),
-            false => talk.note(words),
-        }
-    }
-    match () {
-        () if !finished => Ending::Interrupted,
-        () if all_failed => Ending::Failed,
-        () => Ending::Done,
-    }
 }
 
 pub(super) fn manifest(experiment: &Experiment) -> Manifest {

@@ -4,6 +4,7 @@ use super::columns::aligned_rows;
 use super::find::{EXPERIMENTS, find};
 use super::prepare::bound_threads;
 use super::run;
+use super::run::How;
 use super::terminal::{Ending, Talk, print};
 use crate::backend::ros::settings::BackendKind;
 use crate::experiment::experiment::Experiment;
@@ -12,6 +13,7 @@ use crate::experiment::sweep::cells;
 use crate::report::suite;
 use crate::report::tables::{Cell, Table};
 use crate::study::compare::{Compared, compare};
+use crate::study::suite::standings;
 use anyhow::{Context, bail};
 use std::path::{Path, PathBuf};
 
@@ -63,7 +65,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         let allowed = first.planners.join(", ");
         bail!("--against: no planner \"{}\" is run; allowed are {allowed}", args.against);
     }
-    if first.backend.kind != BackendKind::Simulated {
+    if experiments.iter().any(|it| it.backend.kind != BackendKind::Simulated) {
         bail!(
             "backend.kind: a suite changes its object, which no arm does; allowed is \"simulated\""
         );
@@ -71,11 +73,12 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let name = first.name.strip_suffix(&cells[0].label).unwrap_or(&first.name).to_owned();
     let question = first.question.clone();
     let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(&name));
+    let how = How { threads: args.threads, fresh: args.fresh, ..How::default() };
     let mut runs = Vec::new();
     let mut stop = None;
     for experiment in experiments {
         let out = folder.join(&experiment.name);
-        let made = run::make(&args.as_run(), experiment, Some(out), &mut stop, talk)?;
+        let made = run::make(&how, experiment, Some(out), &mut stop, talk)?;
         match made.ending(talk) {
             Ending::Done => (),
             other => return Ok(other),
@@ -85,36 +88,22 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     }
     let mut compared = compare(&runs, &args.against)?;
     shorten(&mut compared, &name);
+    let standings = standings(&compared);
     let page = folder.join("suite.html");
-    write_whole(&page, &suite::html(&name, &question, &compared, &args.against))?;
-    suite::write(&compared, &folder.join("suite.csv")).context("suite.csv")?;
-    let tables = [suite::each(&compared), suite::overall(&compared)].map(|table| text(&table));
+    let html = suite::html(&name, &question, (&compared, &standings), &args.against);
+    write_whole(&page, &html)?;
+    suite::write(&compared, &standings, &folder.join("suite.csv")).context("suite.csv")?;
+    let tables = [suite::each(&compared, &standings), suite::overall(&compared, &standings)];
+    let tables = tables.map(|table| text(&table));
     print(&format!("{}\n{}\npage: {}", tables[0], tables[1], page.display()))?;
     Ok(Ending::Done)
-}
-
-impl Args {
-    fn as_run(&self) -> run::Args {
-        run::Args {
-            experiment: self.experiment.clone(),
-            set: Vec::new(),
-            out: None,
-            threads: self.threads,
-            fresh: self.fresh,
-            shard: None,
-            record: false,
-            clear_fault: false,
-            no_report: true,
-            json: false,
-        }
-    }
 }
 
 /// Leaves out what all names begin with.
 fn shorten(compared: &mut Compared, name: &str) {
     for object in &mut compared.objects {
         let label = object.strip_prefix(name).unwrap_or(object);
-        *object = label.strip_prefix("-scene-").unwrap_or(label).to_owned();
+        *object = label.trim_start_matches("-scene").trim_start_matches('-').to_owned();
     }
 }
 

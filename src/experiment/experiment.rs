@@ -259,7 +259,7 @@ impl Checked for Experiment {
             rules.one_of(&format!("planners[{i}]"), name, &known);
             let first = !self.planners[..i].contains(name);
             rules.require(&format!("planners[{i}]"), name, first, || "each name once".into());
-            let is_seen = name != "oracle" || self.backend.kind == BackendKind::Simulated;
+            let is_seen = name != planner::ORACLE || self.backend.kind == BackendKind::Simulated;
             rules.require(&format!("planners[{i}]"), name, is_seen, || {
                 "planners that need not know how a touch will end, or a simulated backend".into()
             });

@@ -3,11 +3,9 @@
 use super::truth::Truth;
 use crate::explore::belief::Belief;
 use crate::explore::planner;
-use crate::explore::probe::Probe;
 use crate::gp::Posterior;
 use crate::sim::Environment;
-use crate::sim::environment::Shape;
-use crate::sim::probe::{Cast, FunctionProbe};
+use crate::sim::probe::exact;
 use std::sync::Arc;
 
 /// The truth, and the object with a rigid finger.
@@ -20,14 +18,11 @@ pub struct Sight<'a> {
 
 impl planner::Sight for Sight<'_> {
     fn touched(&self, belief: &Belief, target: &[f64]) -> Option<Belief> {
-        let environment = Arc::clone(self.environment);
-        let approach = environment.task().approach(target);
-        let touched = match environment.shape() {
-            Shape::Function(_) => FunctionProbe::new(environment).touch(&approach),
-            _ => Cast::new(environment).touch(&approach),
-        };
+        let mut probe = exact(Arc::clone(self.environment));
+        let touch = probe.touch(&self.environment.task().approach(target)).ok()?;
         let mut after = belief.clone();
-        after.observe(target, &touched.ok()?);
+        after.observe(target, &touch);
+        probe.swept().iter().for_each(|swept| after.observe_swept(swept));
         Some(after)
     }
 

@@ -5,20 +5,13 @@ use super::html::{page, section, table_body, wide};
 use super::number::{digits, with_interval};
 use super::tables::{Cell, Table, Verdict, write_csv};
 use crate::experiment::measure::Direction;
-use crate::study::compare::{Compared, Contender};
-use crate::study::suite::{CEILING, Estimate, FLOOR, gap_closed, geometric};
+use crate::experiment::statistics::mean;
+use crate::explore::planner::ORACLE;
+use crate::study::compare::{Compared, Contender, Spent};
+use crate::study::suite::{Estimate, FLOOR, Standing};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::Path;
-
-/// Of the bootstraps.
-const SEED: u64 = 0;
-
-/// A planner's error in units of the reference's: on each object, in their order, and over all.
-fn errors(contender: &Contender) -> (Vec<Option<Estimate>>, Option<Estimate>) {
-    let strata: Vec<&[f64]> = contender.scores.iter().map(Vec::as_slice).collect();
-    (strata.iter().map(|scores| geometric(&[scores], SEED)).collect(), geometric(&strata, SEED))
-}
 
 fn verdict(error: &Estimate) -> Option<Verdict> {
     Verdict::of(Some(error.interval), 1.0, Direction::Less)
@@ -31,41 +24,43 @@ fn cell(error: Option<&Estimate>) -> Cell {
 }
 
 /// A line for each planner: over all objects.
-pub fn overall(compared: &Compared) -> Table {
+pub fn overall(compared: &Compared, standings: &[Standing]) -> Table {
     let count = compared.objects.len();
-    let all: Vec<usize> = (0..count).collect();
     let header = ["planner", "error", "better on", "worse on", "gap closed", "missed", "stalled"];
     let header = header.into_iter().chain(["travel m"]).map(String::from).collect();
-    let line = |it: &Contender| {
-        let (each, over_all) = errors(it);
+    let line = |(it, standing): (&Contender, &Standing)| {
         let on = |asked: Verdict| {
             let is_it = |error: &&Estimate| verdict(error) == Some(asked);
-            format!("{} of {count}", each.iter().flatten().filter(is_it).count())
+            format!("{} of {count}", standing.each.iter().flatten().filter(is_it).count())
         };
-        let gap = gap_closed(compared, it, &all, SEED).map_or("-".into(), |gap| {
+        let gap = standing.gap.map_or("-".into(), |gap| {
             let [low, high] = gap.interval;
             format!("{:.0} % [{:.0}, {:.0}]", 100.0 * gap.value, 100.0 * low, 100.0 * high)
         });
-        let spent: Vec<_> = it.spent.iter().flatten().collect();
-        let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len().max(1) as f64;
-        let missed = mean(spent.iter().map(|it| it.missed).collect());
-        let stalled = mean(spent.iter().map(|it| it.stalled).collect());
-        let travel_m = mean(spent.iter().map(|it| it.travel_m).collect());
+        let spent = |of: fn(&Spent) -> f64, words: fn(f64) -> String| {
+            let values: Vec<f64> = it.spent.iter().flatten().map(of).collect();
+            if values.is_empty() { "-".into() } else { words(mean(&values)) }
+        };
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-        let start = [it.name.clone().into(), cell(over_all.as_ref())];
-        let counts = [on(Verdict::Better), on(Verdict::Worse), gap];
-        let costs = [percent(missed), percent(stalled), format!("{travel_m:.2}")];
-        start.into_iter().chain(counts.into_iter().chain(costs).map(Cell::from)).collect()
+        let start = [it.name.clone().into(), cell(standing.over_all.as_ref())];
+        let rest = [
+            on(Verdict::Better),
+            on(Verdict::Worse),
+            gap,
+            spent(|it| it.missed, percent),
+            spent(|it| it.stalled, percent),
+            spent(|it| it.travel_m, |travel_m| format!("{travel_m:.2}")),
+        ];
+        start.into_iter().chain(rest.map(Cell::from)).collect()
     };
-    Table { header, lines: compared.contenders.iter().map(line).collect() }
+    Table { header, lines: compared.contenders.iter().zip(standings).map(line).collect() }
 }
 
 /// A line for each object, a column for each planner.
-pub fn each(compared: &Compared) -> Table {
+pub fn each(compared: &Compared, standings: &[Standing]) -> Table {
     let names = compared.contenders.iter().map(|it| it.name.clone());
-    let told: Vec<_> = compared.contenders.iter().map(|it| errors(it).0).collect();
     let line = |(object, name): (usize, &String)| {
-        let cells = told.iter().map(|errors| cell(errors[object].as_ref()));
+        let cells = standings.iter().map(|standing| cell(standing.each[object].as_ref()));
         std::iter::once(name.clone().into()).chain(cells).collect()
     };
     Table {
@@ -80,19 +75,28 @@ pub fn note(against: &str) -> String {
         "Errors are exp(mean log RMSE over the touches after the initial ones) in units of {against}'s \
          in the same trial: the geometric mean over trials and objects, with the 95 % interval of a \
          bootstrap over trials. Less is better; better and worse: the interval excludes 1. The gap is \
-         that from {FLOOR} to {CEILING}, which looks at the truth, in mean log error. Missed: touches \
+         that from {FLOOR} to {ORACLE}, which looks at the truth, in mean log error. Missed: touches \
          that met nothing; stalled: plans that the planner's own rule could not decide."
     )
 }
 
 /// The page.
-pub fn html(name: &str, question: &str, compared: &Compared, against: &str) -> String {
+pub fn html(
+    name: &str,
+    question: &str,
+    (compared, standings): (&Compared, &[Standing]),
+    against: &str,
+) -> String {
     let over_all = section(
         "<h2>Over all objects</h2>\n",
-        &table_body(&overall(compared), "named"),
+        &table_body(&overall(compared, standings), "named"),
         &note(against),
     );
-    let each = section("<h2>Object by object</h2>\n", &table_body(&each(compared), "named"), "");
+    let each = section(
+        "<h2>Object by object</h2>\n",
+        &table_body(&each(compared, standings), "named"),
+        "",
+    );
     let profiles = draw(compared, against).map_or(String::new(), |svg| {
         format!(
             "<figure id=\"profiles\">\n{}<figcaption>Which share of the trials has how small an error, \
@@ -132,11 +136,10 @@ pub struct SuiteRecord<'a> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn write(compared: &Compared, path: &Path) -> anyhow::Result<()> {
+pub fn write(compared: &Compared, standings: &[Standing], path: &Path) -> anyhow::Result<()> {
     let records = compared.objects.iter().enumerate().flat_map(|(i, object)| {
-        compared.contenders.iter().map(move |it| {
-            let error = geometric(&[&it.scores[i]], SEED);
-            let spent = it.spent[i];
+        compared.contenders.iter().zip(standings).map(move |(it, standing)| {
+            let (error, spent) = (standing.each[i], it.spent[i]);
             SuiteRecord {
                 object,
                 planner: &it.name,
@@ -144,7 +147,7 @@ pub fn write(compared: &Compared, path: &Path) -> anyhow::Result<()> {
                 error: error.map(|error| error.value),
                 error_low: error.map(|error| error.interval[0]),
                 error_high: error.map(|error| error.interval[1]),
-                gap_closed: gap_closed(compared, it, &[i], SEED).map(|gap| gap.value),
+                gap_closed: standing.gaps[i].map(|gap| gap.value),
                 missed: spent.map(|spent| spent.missed),
                 stalled: spent.map(|spent| spent.stalled),
                 travel_m: spent.map(|spent| spent.travel_m),

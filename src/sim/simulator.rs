@@ -5,7 +5,7 @@ use super::kinematic::Kinematic;
 #[cfg(feature = "mujoco")]
 use super::mujoco;
 use super::notice::Notice;
-use super::probe::{Cast, FunctionProbe};
+use super::probe::exact;
 use super::simulated_finger::Shell;
 use crate::backend::delay::Delayed;
 use crate::backend::interlock::InterlockSettings;
@@ -108,13 +108,9 @@ impl Simulator {
     /// # Errors
     /// If the body cannot be brought to its start.
     pub fn probe(&self, seed: u64) -> Result<Box<dyn Probe>, Fault> {
-        let environment = Arc::clone(&self.environment);
-        if let Some(body) = self.body()? {
-            return Ok(Box::new(self.servo(body, seed)?));
-        }
-        Ok(match environment.scene().body {
-            Body::Function => Box::new(FunctionProbe::new(environment)),
-            _ => Box::new(Cast::new(environment)),
+        Ok(match self.body()? {
+            Some(body) => Box::new(self.servo(body, seed)?),
+            None => exact(Arc::clone(&self.environment)),
         })
     }
 

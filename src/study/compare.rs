@@ -8,10 +8,8 @@
 use super::check::baseline::span;
 use super::check::judged::JUDGED;
 use crate::experiment::row::{TrialRow, of_planner};
-use crate::experiment::statistics::{RESAMPLES, mean, percentiles_95};
+use crate::experiment::statistics::{mean, percentiles_95, resampled_within};
 use crate::experiment::store::Run;
-use crate::math::seed;
-use rand::RngExt;
 use std::collections::HashMap;
 use thiserror::Error;
 
@@ -177,18 +175,16 @@ pub fn interquartile(strata: &[&[f64]], seed: u64) -> Option<(f64, [f64; 2])> {
     if strata.is_empty() || strata.iter().any(|stratum| stratum.is_empty()) {
         return None;
     }
-    let mut rng = seed::stream(seed, 0, "compare");
+    let sizes: Vec<usize> = strata.iter().map(|stratum| stratum.len()).collect();
     let mut sample = Vec::new();
-    let found = (0..RESAMPLES)
-        .filter_map(|_| {
-            sample.clear();
-            for stratum in strata {
-                let draw = |_| stratum[rng.random_range(0..stratum.len())];
-                sample.extend((0..stratum.len()).map(draw));
-            }
-            interquartile_mean(&sample)
-        })
-        .collect();
+    let found = resampled_within(&sizes, (seed, "compare"), |picks| {
+        sample.clear();
+        for (stratum, picks) in strata.iter().zip(picks) {
+            sample.extend(picks.iter().map(|pick| stratum[*pick]));
+        }
+        interquartile_mean(&sample)
+    });
+    let found = found.into_iter().flatten().collect();
     Some((interquartile_mean(&strata.concat())?, percentiles_95(found)))
 }
 

@@ -2,15 +2,14 @@
 //! much of what could be gained a planner gains.
 
 use super::compare::{Compared, Contender};
-use crate::experiment::statistics::{RESAMPLES, mean, percentiles_95};
-use crate::math::seed;
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::experiment::statistics::{mean, percentiles_95, resampled_within};
+use crate::explore::planner::ORACLE;
 
-/// Who gains nothing, and who gains all that can be.
+/// Who gains nothing; who gains all that can be is the [`ORACLE`].
 pub const FLOOR: &str = "random";
-/// See [`FLOOR`].
-pub const CEILING: &str = "oracle";
+
+/// Of the bootstraps.
+const SEED: u64 = 0;
 
 /// A number with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +18,35 @@ pub struct Estimate {
     pub value: f64,
     /// The interval, of a bootstrap over trials, drawn within each object.
     pub interval: [f64; 2],
+}
+
+/// What is said of a contender.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Standing {
+    /// Its error in units of the reference's on each object.
+    pub each: Vec<Option<Estimate>>,
+    /// The same over all.
+    pub over_all: Option<Estimate>,
+    /// How much of the gap it closes on each object.
+    pub gaps: Vec<Option<Estimate>>,
+    /// The same over all.
+    pub gap: Option<Estimate>,
+}
+
+/// Of every contender, in their order.
+pub fn standings(compared: &Compared) -> Vec<Standing> {
+    let all: Vec<usize> = (0..compared.objects.len()).collect();
+    let of = |it: &Contender| {
+        let strata: Vec<&[f64]> = it.scores.iter().map(Vec::as_slice).collect();
+        let gap = |objects: &[usize]| gap_closed(compared, it, objects, SEED);
+        Standing {
+            each: strata.iter().map(|scores| geometric(&[scores], SEED)).collect(),
+            over_all: geometric(&strata, SEED),
+            gaps: all.iter().map(|object| gap(&[*object])).collect(),
+            gap: gap(&all),
+        }
+    };
+    compared.contenders.iter().map(of).collect()
 }
 
 /// Geometric mean of a contender's scores over the objects, each object counted once; none where it
@@ -32,10 +60,10 @@ pub fn geometric(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
     Some(estimate(&counts(&logs), seed, of))
 }
 
-/// Share of the way from [`FLOOR`] to [`CEILING`] that a contender comes, in log error averaged
+/// Share of the way from [`FLOOR`] to the [`ORACLE`] that a contender comes, in log error averaged
 /// over objects: (floor − contender) / (floor − ceiling). Trials are drawn together, for they are
-/// of the same start. None where one of the three lacks an object of `objects`, has other trials,
-/// or no way is left to go.
+/// of the same start. None where one of the three lacks an object of `objects`, has another number
+/// of trials, or no way is left to go.
 pub fn gap_closed(
     compared: &Compared,
     contender: &Contender,
@@ -46,7 +74,7 @@ pub fn gap_closed(
     let of = |it: &Contender| -> Vec<Vec<f64>> {
         objects.iter().map(|object| logs(&it.scores[*object])).collect()
     };
-    let [floor, own, ceiling] = [of(named(FLOOR)?), of(contender), of(named(CEILING)?)];
+    let [floor, own, ceiling] = [of(named(FLOOR)?), of(contender), of(named(ORACLE)?)];
     let sizes = counts(&floor);
     if sizes.contains(&0) || counts(&own) != sizes || counts(&ceiling) != sizes {
         return None;
@@ -77,15 +105,7 @@ fn mean_of_means(strata: &[Vec<f64>], picks: &[Vec<usize>]) -> f64 {
 
 /// `of` all trials of strata of these sizes, and its interval.
 fn estimate(sizes: &[usize], seed: u64, of: impl Fn(&[Vec<usize>]) -> f64) -> Estimate {
-    let mut rng: ChaCha8Rng = seed::stream(seed, 0, "suite");
     let all: Vec<Vec<usize>> = sizes.iter().map(|size| (0..*size).collect()).collect();
-    let mut picks = all.clone();
-    let found = (0..RESAMPLES).map(|_| {
-        for (picks, size) in picks.iter_mut().zip(sizes) {
-            picks.iter_mut().for_each(|pick| *pick = rng.random_range(0..*size));
-        }
-        of(&picks)
-    });
-    let found = found.collect();
+    let found = resampled_within(sizes, (seed, "suite"), &of);
     Estimate { value: of(&all), interval: percentiles_95(found) }
 }

@@ -38,6 +38,9 @@ pub const PLANNERS: &[Entry] = &[
     oracle::ENTRY,
 ];
 
+/// Name of the yardstick that looks at the truth; it needs to know how touches will end.
+pub const ORACLE: &str = oracle::ENTRY.name;
+
 /// The planner called `name`.
 pub fn by_name(name: &str) -> Option<&'static Entry> {
     PLANNERS.iter().find(|entry| entry.name == name)
