@@ -47,7 +47,7 @@ pub struct Experiment {
     pub repeat_touches: u32,
     /// Test places along each side of the zone, on which the metrics are taken.
     pub grid: u32,
-    /// How the belief is fitted.
+    /// How the belief is fitted; or the path of a file that says it.
     #[serde(default)]
     pub gp: GpSettings,
     /// How planners search.
@@ -75,7 +75,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 pub(super) const SWEEP: &str = "sweep";
 
 /// Tables that may stand in a file of their own.
-const INCLUDED: [&str; 2] = ["scene", "backend"];
+const INCLUDED: [&str; 3] = ["scene", "backend", "gp"];
 
 /// Planners that the others are held against, if nobody says which: the paper's two.
 const BASELINES: [&str; 2] = ["random", "active"];

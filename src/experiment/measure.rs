@@ -180,6 +180,22 @@ pub static MEASURES: &[Measure] = &[
     .drawn(Scale::Undrawn)
     .untabled(),
     less("nlpd", "NLPD", PLAIN, |row, n| metrics(row, n)?.nlpd).drawn(Scale::Undrawn),
+    less("presence_brier", "Brier score of where there is a surface", PLAIN, |row, n| {
+        Some(touch(row, n)?.outline.as_ref()?.brier)
+    })
+    .drawn(Scale::Undrawn),
+    more("silhouette_iou", "silhouette, intersection over union", PLAIN, |row, n| {
+        Some(touch(row, n)?.outline.as_ref()?.iou)
+    })
+    .drawn(Scale::UpToOne),
+    less(
+        "silhouette_wrong",
+        "share of the zone on the wrong side of the silhouette",
+        PLAIN,
+        |row, n| Some(touch(row, n)?.outline.as_ref()?.wrong_share),
+    )
+    .drawn(Scale::Undrawn)
+    .untabled(),
     less("path_m", "lateral travel", METRES, TrialRow::path_m),
     less("time_s", "time of the body", SECONDS, |row, n| touch(row, n)?.time_s)
         .drawn(Scale::Undrawn),

@@ -32,6 +32,7 @@ pub mod lab_runner;
 pub mod measure;
 pub mod metrics;
 pub mod notice;
+pub mod outline;
 pub mod recorded_trial;
 pub mod replay;
 pub mod report_settings;

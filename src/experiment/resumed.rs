@@ -12,8 +12,8 @@ pub struct Resumed<'a> {
     made: std::vec::IntoIter<TouchRow>,
     finger: Finger,
     probe: &'a mut dyn Probe,
-    /// The last touch of before, if it was the last.
-    last: Option<TouchRow>,
+    /// The last touch of before, if it was the last, and where the finger would have turned back.
+    last: Option<(TouchRow, Point3<f64>)>,
     /// Time of the body when it was broken off.
     begun_s: f64,
 }
@@ -42,23 +42,27 @@ fn touch(row: &TouchRow, approach: &Approach) -> Touch {
 
 impl Probe for Resumed<'_> {
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
-        self.last = self.made.next();
+        self.last = self.made.next().map(|row| (row, approach.p_far_w));
         match &self.last {
-            Some(row) => Ok(touch(row, approach)),
+            Some((row, _)) => Ok(touch(row, approach)),
             None => self.probe.touch(approach),
         }
     }
 
     fn swept(&self) -> Option<Swept> {
         match &self.last {
-            Some(row) => Some(Swept { finger: self.finger.clone(), p_wt: Point3::from(row.tip?) }),
+            // Where a tip is not written, no more counts than that a finger passed.
+            Some((row, p_far_w)) => {
+                let p_wt = row.tip.map_or(*p_far_w, Point3::from);
+                Some(Swept { finger: self.finger.clone(), p_wt })
+            }
             None => self.probe.swept(),
         }
     }
 
     fn time_s(&self) -> Option<f64> {
         match &self.last {
-            Some(row) => row.time_s,
+            Some((row, _)) => row.time_s,
             None => self.probe.time_s().map(|time_s| self.begun_s + time_s),
         }
     }

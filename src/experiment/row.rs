@@ -1,6 +1,7 @@
 //! One line of `trials.jsonl`: everything a trial did.
 
 use super::metrics::Metrics;
+use super::outline::Outline;
 use super::verification_row::VerificationRow;
 use crate::backend::Fault;
 use crate::explore::planner::Stall;
@@ -70,6 +71,10 @@ pub struct TouchRow {
     /// The belief after this touch against the truth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metrics: Option<Metrics>,
+    /// Where a surface is believed to be against the truth; left out where the object fills its
+    /// zone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outline: Option<Outline>,
 }
 
 impl TrialRow {

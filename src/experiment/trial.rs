@@ -1,6 +1,7 @@
 //! Algorithm 1 of Yi et al. 2016: touch, fit, plan, again.
 
 use super::experiment::Experiment;
+use super::outline::Outline;
 use super::row::{TouchRow, TrialRow};
 use super::sight::Sight;
 use super::verification::verify;
@@ -74,6 +75,7 @@ pub fn run(
             fit: None,
             jitter: 0.0,
             metrics: None,
+            outline: None,
         };
         if count >= experiment.initial_touches {
             match belief.refit() {
@@ -84,6 +86,7 @@ pub fn run(
                 }
                 Err(error) => row.failure = Some(format!("fit after touch {count}: {error}")),
             }
+            touch_row.outline = outline(&belief, sight, count == experiment.touches);
         }
         let touched = Touched { count, touch: &touch, row: &touch_row, belief: &belief };
         if let Err(fault) = witness.touched(&touched) {
@@ -99,4 +102,11 @@ pub fn run(
         (row.verification, row.failure) = verify(experiment, task, &belief, probe, made);
     }
     row
+}
+
+/// How near the believed silhouette is to the true one; its reliability only of the last.
+fn outline(belief: &Belief, sight: &Sight, is_last: bool) -> Option<Outline> {
+    let outline = Outline::of(&belief.presence().silhouette(), sight.truth)?;
+    let reliability = outline.reliability.filter(|_| is_last);
+    Some(Outline { reliability, ..outline })
 }

@@ -19,6 +19,8 @@ pub struct Truth {
     pub is_edge: Vec<bool>,
     /// Whether some touch of the finger, asked for inside the zone, can meet the surface at each.
     pub is_reachable: Vec<bool>,
+    /// Whether a place without a height has no surface; otherwise none is known.
+    pub is_whole: bool,
 }
 
 /// The belief's variance is looked at in every so many places of the grid: it costs the square of
@@ -32,7 +34,8 @@ impl Truth {
         let heights_m: Vec<_> =
             places.iter().map(|place| environment.true_height_m(place)).collect();
         let is_reachable = reach::is_reachable(environment, &places, &heights_m);
-        Self::new(&environment.scene().zone, places, heights_m, is_reachable)
+        let zone = &environment.scene().zone;
+        Self { is_whole: true, ..Self::new(zone, places, heights_m, is_reachable) }
     }
 
     /// Of an object that nobody has measured: no height at any place.
@@ -47,7 +50,7 @@ impl Truth {
         self.heights_m.iter().any(Option::is_some)
     }
 
-    /// From recorded heights and reachabilities.
+    /// From what is known of heights and reachabilities.
     pub fn new(
         zone: &Zone,
         places: Vec<Vec<f64>>,
@@ -55,7 +58,7 @@ impl Truth {
         is_reachable: Vec<bool>,
     ) -> Self {
         let is_edge = places.iter().map(|place| zone.is_edge(place)).collect();
-        Self { places, heights_m, is_edge, is_reachable }
+        Self { places, heights_m, is_edge, is_reachable, is_whole: false }
     }
 
     /// How many test places have a surface.

@@ -10,6 +10,7 @@ use crate::gp::kernel;
 use crate::gp::kernel::{Hyperparameters, Kernel};
 use crate::gp::posterior::{Posterior, Scratch};
 use crate::gp::{LogNormal, Mean, Observation, Observations, Range, SearchBox, Slope};
+use crate::math::normal::BAND_95;
 use crate::task::Zone;
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -39,8 +40,26 @@ pub struct GpSettings {
     pub slope_noise: [f64; 2],
     /// Whether the surface is held below the space that the finger has swept, where it met one.
     pub free_space: bool,
+    /// What the standard deviations are scaled by.
+    #[serde(skip_serializing_if = "is_default")]
+    pub band: Band,
     /// What the hyperparameters probably are.
     pub prior: Priors,
+}
+
+/// What says how wide the belief's standard deviations are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Band {
+    /// The likelihood, as it fits all hyperparameters.
+    #[default]
+    Likelihood,
+    /// The contacts: that 95 of 100 lie within 1.96 of what all others say of them.
+    LeaveOneOut,
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// Log-normal priors, in the units of the ranges; left out, every value is as probable.
@@ -75,6 +94,7 @@ impl Default for GpSettings {
             normals: false,
             slope_noise: [1e-2, 1e1],
             free_space: false,
+            band: Band::default(),
             prior: Priors::default(),
         }
     }
@@ -168,7 +188,7 @@ impl Belief {
         self.has_missed = *touch == Touch::Miss;
         let reached = match touch {
             Touch::Contact(contact) => {
-                self.presence.met(&contact.p_wc);
+                self.presence.met(target, &contact.p_wc);
                 let place = self.zone.place(&contact.p_wc);
                 let height = self.zone.height_m(&contact.p_wc);
                 let slope = self.slope(&contact.normal_w);
@@ -215,7 +235,14 @@ impl Belief {
     /// If the covariance of the contacts cannot be factored.
     pub fn refit(&mut self) -> Result<(&Fit, &Posterior), CovarianceError> {
         let last = self.fit.take();
-        let fit = self.search_box().fit(self.kernel, &self.contacts, last.as_ref());
+        let mut fit = self.search_box().fit(self.kernel, &self.contacts, last.as_ref());
+        if self.settings.band == Band::LeaveOneOut {
+            let hyperparameters = fit.hyperparameters.clone();
+            let mut posterior =
+                Posterior::new(self.kernel, hyperparameters, self.contacts.clone())?;
+            posterior.widen(widening(&posterior.left_out()));
+            fit.hyperparameters = posterior.hyperparameters().clone();
+        }
         let posterior = self.posterior(fit.hyperparameters.clone())?;
         self.explore(&posterior)?;
         Ok((self.fit.insert(fit), self.surface.insert(posterior)))
@@ -236,7 +263,7 @@ impl Belief {
     fn posterior(&self, hyperparameters: Hyperparameters) -> Result<Posterior, CovarianceError> {
         let mut posterior = Posterior::new(self.kernel, hyperparameters, self.contacts.clone())?;
         if let Some(ceiling) = &self.ceiling {
-            ceiling.cut(&mut posterior, &self.presence);
+            ceiling.cut(&mut posterior, &self.presence.silhouette());
         }
         Ok(posterior)
     }
@@ -303,7 +330,7 @@ impl Belief {
         self.explored.as_ref().or(self.surface.as_ref())
     }
 
-    /// Where there probably is a surface.
+    /// What the touches say of where there is a surface.
     pub fn presence(&self) -> &Presence {
         &self.presence
     }
@@ -327,4 +354,16 @@ impl Belief {
             None => f64::NAN,
         }
     }
+}
+
+/// What takes the band of 95 % to where it holds that share of the deviations `z`: the smallest
+/// that holds (n + 1)·95 % of n, or all of them where that is more, in units of 1.96; never below
+/// 1, since a few contacts do not show how far off the rest may be.
+fn widening(z: &[f64]) -> f64 {
+    let mut far: Vec<f64> = z.iter().map(|z| z.abs()).collect();
+    far.sort_by(f64::total_cmp);
+    let held = (0.95 * (far.len() + 1) as f64).ceil() as usize;
+    let last = far.get(held.saturating_sub(1)).or(far.last());
+    let factor = last.map_or(1.0, |z| z / BAND_95);
+    if factor.is_finite() { factor.max(1.0) } else { 1.0 }
 }

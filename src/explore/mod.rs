@@ -39,3 +39,5 @@ pub mod planner;
 pub mod presence;
 pub mod probe;
 pub mod registration;
+pub mod silhouette;
+mod stadium;

@@ -20,6 +20,7 @@ pub mod pdf;
 pub mod png;
 pub mod points;
 pub mod reference;
+pub mod reliability;
 pub mod relief;
 pub mod relief_panel;
 pub mod replay;

@@ -2,12 +2,14 @@
 
 use super::compare::draw;
 use super::html::{page, section, table_body, wide};
+
 use super::number::{digits, with_interval};
+use super::reliability;
 use super::tables::{Cell, Table, Verdict, write_csv};
 use crate::experiment::measure::Direction;
 use crate::experiment::statistics::mean;
 use crate::explore::planner::ORACLE;
-use crate::study::compare::{Compared, Contender, Spent};
+use crate::study::compare::{Compared, Contender, Said, Spent};
 use crate::study::suite::{Estimate, FLOOR, Standing};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -27,7 +29,8 @@ fn cell(error: Option<&Estimate>) -> Cell {
 pub fn overall(compared: &Compared, standings: &[Standing]) -> Table {
     let count = compared.objects.len();
     let header = ["planner", "error", "better on", "worse on", "gap closed", "missed", "stalled"];
-    let header = header.into_iter().chain(["travel m"]).map(String::from).collect();
+    let more = ["travel m", "in the band", "Brier", "IoU"];
+    let header = header.into_iter().chain(more).map(String::from).collect();
     let line = |(it, standing): (&Contender, &Standing)| {
         let on = |asked: Verdict| {
             let is_it = |error: &&Estimate| verdict(error) == Some(asked);
@@ -41,6 +44,11 @@ pub fn overall(compared: &Compared, standings: &[Standing]) -> Table {
             let values: Vec<f64> = it.spent.iter().flatten().map(of).collect();
             if values.is_empty() { "-".into() } else { words(mean(&values)) }
         };
+        let said = |of: fn(&Said) -> Option<f64>| {
+            let values: Vec<f64> = it.said.iter().filter_map(of).collect();
+            if values.is_empty() { "-".into() } else { format!("{:.3}", mean(&values)) }
+        };
+        let honest = |said: &&Said| said.coverage.is_some_and(|it| (0.9..=0.98).contains(&it));
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);
         let start = [it.name.clone().into(), cell(standing.over_all.as_ref())];
         let rest = [
@@ -50,6 +58,9 @@ pub fn overall(compared: &Compared, standings: &[Standing]) -> Table {
             spent(|it| it.missed, percent),
             spent(|it| it.stalled, percent),
             spent(|it| it.travel_m, |travel_m| format!("{travel_m:.2}")),
+            format!("{} of {count}", it.said.iter().filter(honest).count()),
+            said(|it| it.brier),
+            said(|it| it.iou),
         ];
         start.into_iter().chain(rest.map(Cell::from)).collect()
     };
@@ -76,7 +87,10 @@ pub fn note(against: &str) -> String {
          in the same trial: the geometric mean over trials and objects, with the 95 % interval of a \
          bootstrap over trials. Less is better; better and worse: the interval excludes 1. The gap is \
          that from {FLOOR} to {ORACLE}, which looks at the truth, in mean log error. Missed: touches \
-         that met nothing; stalled: plans that the planner's own rule could not decide."
+         that met nothing; stalled: plans that the planner's own rule could not decide. After the last touch: on \
+         how many objects the band of 95 % holds 90 to 98 % of the truth; and where the object does not \
+         fill its zone, the mean squared error of the probability that a place has a surface (Brier), and \
+         the silhouette's intersection over union (IoU)."
     )
 }
 
@@ -97,6 +111,13 @@ pub fn html(
         &table_body(&each(compared, standings), "named"),
         "",
     );
+    let reliability = reliability::draw(compared).map_or(String::new(), |svg| {
+        format!(
+            "<figure id=\"reliability\">\n{}<figcaption>Of the places that are given a probability of \
+             a surface, how many have one; on the diagonal the belief is honest.</figcaption>\n</figure>\n",
+            wide(&svg, "figure")
+        )
+    });
     let profiles = draw(compared, against).map_or(String::new(), |svg| {
         format!(
             "<figure id=\"profiles\">\n{}<figcaption>Which share of the trials has how small an error, \
@@ -104,7 +125,7 @@ pub fn html(
             wide(&svg, "figure")
         )
     });
-    page("Palpate suite", name, question, &[over_all, profiles, each].concat())
+    page("Palpate suite", name, question, &[over_all, profiles, reliability, each].concat())
 }
 
 /// A record of `suite.csv`.
@@ -130,6 +151,12 @@ pub struct SuiteRecord<'a> {
     pub stalled: Option<f64>,
     /// Mean lateral travel of a trial.
     pub travel_m: Option<f64>,
+    /// Share of the truth in the 95 % band after the last touch.
+    pub coverage: Option<f64>,
+    /// Mean squared error of the probability of a surface then.
+    pub presence_brier: Option<f64>,
+    /// Intersection over union of the silhouettes then.
+    pub silhouette_iou: Option<f64>,
 }
 
 /// Writes `suite.csv`: a line per object and planner.
@@ -151,6 +178,9 @@ pub fn write(compared: &Compared, standings: &[Standing], path: &Path) -> anyhow
                 missed: spent.map(|spent| spent.missed),
                 stalled: spent.map(|spent| spent.stalled),
                 travel_m: spent.map(|spent| spent.travel_m),
+                coverage: it.said[i].coverage,
+                presence_brier: it.said[i].brier,
+                silhouette_iou: it.said[i].iou,
             }
         })
     });

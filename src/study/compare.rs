@@ -7,7 +7,8 @@
 
 use super::check::baseline::span;
 use super::check::judged::JUDGED;
-use crate::experiment::row::{TrialRow, of_planner};
+use crate::experiment::outline::TENTHS;
+use crate::experiment::row::{TouchRow, TrialRow, of_planner};
 use crate::experiment::statistics::{mean, percentiles_95, resampled_within};
 use crate::experiment::store::Run;
 use std::collections::HashMap;
@@ -31,6 +32,8 @@ pub struct Contender {
     pub scores: Vec<Vec<f64>>,
     /// What that took on each object.
     pub spent: Vec<Option<Spent>>,
+    /// What the belief said of itself on each object.
+    pub said: Vec<Said>,
 }
 
 /// What a planner's trials of one object took, after the initial touches.
@@ -42,6 +45,20 @@ pub struct Spent {
     pub stalled: f64,
     /// Mean lateral travel of a trial.
     pub travel_m: f64,
+}
+
+/// How honest the beliefs of a planner's trials of one object were after the last touch, each a mean
+/// over the trials that know it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Said {
+    /// Share of the truth in the 95 % band.
+    pub coverage: Option<f64>,
+    /// Brier score of where there is a surface.
+    pub brier: Option<f64>,
+    /// Intersection over union of the silhouettes.
+    pub iou: Option<f64>,
+    /// Places given a probability of a surface in each tenth, and those of them that have one.
+    pub reliability: [[u32; 2]; TENTHS],
 }
 
 /// What cannot be compared.
@@ -105,6 +122,7 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Compar
                 for contender in &mut contenders {
                     contender.scores.push(Vec::new());
                     contender.spent.push(None);
+                    contender.said.push(Said::default());
                 }
                 objects.len() - 1
             }
@@ -123,12 +141,14 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Compar
             scores.sort_by_key(|(trial, _)| *trial);
             let place = contenders.iter().position(|it| it.name == label).unwrap_or_else(|| {
                 let scores = vec![Vec::new(); objects.len()];
-                let spent = vec![None; objects.len()];
-                contenders.push(Contender { name: label, scores, spent });
+                let (spent, said) =
+                    (vec![None; objects.len()], vec![Said::default(); objects.len()]);
+                contenders.push(Contender { name: label, scores, spent, said });
                 contenders.len() - 1
             });
             contenders[place].scores[index] = scores.into_iter().map(|(_, score)| score).collect();
             contenders[place].spent[index] = spent(run, planner);
+            contenders[place].said[index] = said(run, planner);
         }
     }
     Ok(Compared { objects, contenders })
@@ -158,6 +178,28 @@ fn spent(run: &Run, planner: &str) -> Option<Spent> {
         stalled: share(planned().filter(|touch| touch.stall.is_some()).count()),
         travel_m: mean(&travels),
     })
+}
+
+/// What a planner's whole trials said of themselves at their end.
+fn said(run: &Run, planner: &str) -> Said {
+    let whole = || of_planner(&run.rows, planner).filter(|row| row.failure.is_none());
+    let over_trials = |of: fn(&TouchRow) -> Option<f64>| {
+        let values: Vec<f64> = whole().filter_map(|row| row.touches.last().and_then(of)).collect();
+        (!values.is_empty()).then(|| mean(&values))
+    };
+    let mut reliability = [[0; 2]; TENTHS];
+    let outlines = whole().filter_map(|row| row.touches.last()?.outline.as_ref());
+    for counted in outlines.filter_map(|outline| outline.reliability) {
+        for (sums, counts) in reliability.iter_mut().zip(counted) {
+            sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+        }
+    }
+    Said {
+        coverage: over_trials(|touch| touch.metrics.as_ref()?.coverage),
+        brier: over_trials(|touch| Some(touch.outline.as_ref()?.brier)),
+        iou: over_trials(|touch| Some(touch.outline.as_ref()?.iou)),
+        reliability,
+    }
 }
 
 /// Mean of the middle half; none of nothing.

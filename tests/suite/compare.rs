@@ -1,13 +1,20 @@
 //! Planners over several runs.
 
 use crate::common::program::palpate;
-use palpate::study::compare::{Contender, improvement, interquartile, interquartile_mean, profile};
+use palpate::study::compare::{
+    Contender, Said, improvement, interquartile, interquartile_mean, profile,
+};
 use proptest::prelude::*;
 use std::fs;
 use std::path::Path;
 
 fn contender(scores: &[f64]) -> Contender {
-    Contender { name: "it".into(), scores: vec![scores.to_vec()], spent: vec![None] }
+    Contender {
+        name: "it".into(),
+        scores: vec![scores.to_vec()],
+        spent: vec![None],
+        said: vec![Said::default()],
+    }
 }
 
 #[test]

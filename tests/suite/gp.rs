@@ -354,3 +354,32 @@ proptest! {
         prop_assert!(difference <= rounding.variance(&place), "variance {difference:e}");
     }
 }
+
+/// What all others say of an observation is what a belief without it says.
+#[test]
+fn an_observation_left_out_is_told_as_by_a_belief_without_it() {
+    let places: Vec<[f64; 2]> =
+        (0..9).map(|i| [0.37 * f64::from(i % 4), 0.29 * f64::from(i)]).collect();
+    let height = |place: &[f64; 2]| (2.0 * place[0]).sin() + 0.4 * place[1];
+    let believe = |without: Option<usize>| {
+        let kept = places.iter().enumerate().filter(|(i, _)| Some(*i) != without);
+        let observations = observations(kept.map(|(_, at)| (at.as_slice(), height(at))));
+        let hyperparameters = Hyperparameters::new(1.3, vec![0.8, 1.1], 0.1.into(), 0.2);
+        Posterior::new(&KERNEL, hyperparameters, observations).unwrap()
+    };
+    let whole = believe(None);
+    let mut scratch = Scratch::default();
+    for (i, z) in whole.left_out().into_iter().enumerate() {
+        let without = believe(Some(i));
+        let noise_sd = without.hyperparameters().noise_sd;
+        let sd = (without.variance(&places[i], &mut scratch) + noise_sd * noise_sd).sqrt();
+        let twin = (height(&places[i]) - without.mean(&places[i], &mut scratch)) / sd;
+        assert!((z - twin).abs() < 1e-9, "{i}: {z} {twin}");
+    }
+    let mut wide = whole.clone();
+    wide.widen(3.0);
+    let at = [0.5, 0.5];
+    assert_eq!(wide.mean(&at, &mut scratch), whole.mean(&at, &mut scratch));
+    let [sd, wide_sd] = [&whole, &wide].map(|it| it.variance(&at, &mut scratch).sqrt());
+    assert!((wide_sd - 3.0 * sd).abs() < 1e-12);
+}

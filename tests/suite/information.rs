@@ -206,3 +206,33 @@ fn a_kernel_without_slopes_is_refused_with_those_that_have_them() {
     assert!(load("container.toml", &["gp.normals=true", "gp.kernel=\"matern_52\""]).is_ok());
     assert!(load("container.toml", &["gp.free_space=true", "gp.kernel=\"matern_32\""]).is_ok());
 }
+
+/// A band as wide as the contacts say holds more of an object with edges than one as wide as the
+/// likelihood says, of the same surface.
+#[test]
+fn contacts_say_how_wide_the_band_is() {
+    let [likely, left_out] = ["likelihood", "leave_one_out"].map(|band| {
+        let sets = [format!("gp.band={band:?}"), "grid=21".into(), "touches=40".into()];
+        let path = "experiments/suite/reporting.toml";
+        let cells = palpate::experiment::sweep::cells(path.as_ref()).unwrap();
+        let cell = cells.iter().find(|cell| cell.label.ends_with("gear")).unwrap();
+        let experiment = Experiment::load_cell(path.as_ref(), cell, &sets).unwrap();
+        let sobol = planner::by_name("sobol").unwrap();
+        let row = Simulation::new(experiment).unwrap().trial(sobol, 0);
+        let last = row.touches.last().unwrap();
+        assert!(last.outline.as_ref().is_some_and(|outline| outline.reliability.is_some()));
+        last.metrics.unwrap()
+    });
+    assert!(left_out.coverage > likely.coverage, "{left_out:?} {likely:?}");
+    assert!(left_out.nlpd < likely.nlpd, "{left_out:?} {likely:?}");
+}
+
+/// The paper's belief, which stands in a file, is what holds where nothing is said.
+#[test]
+fn the_belief_of_the_paper_is_the_default() {
+    let [plain, paper] = [None, Some("gp=experiments/beliefs/paper.toml")]
+        .map(|set| load("toy.toml", &set.into_iter().collect::<Vec<_>>()).unwrap().gp);
+    assert_eq!(plain, paper);
+    let objects = load("toy.toml", &["gp=experiments/beliefs/objects.toml"]).unwrap().gp;
+    assert!(objects.free_space && objects.kernel == "matern_52");
+}

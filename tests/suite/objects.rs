@@ -6,7 +6,7 @@ use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::study::check::baseline::span;
 use palpate::study::check::judged::JUDGED;
-use palpate::study::compare::{Compared, Contender};
+use palpate::study::compare::{Compared, Contender, Said};
 use palpate::study::suite::{gap_closed, geometric};
 use proptest::prelude::*;
 use rayon::prelude::*;
@@ -18,6 +18,7 @@ fn compared(random: &[f64], own: &[f64], oracle: &[f64]) -> Compared {
         name: name.into(),
         scores: vec![scores.to_vec()],
         spent: vec![None],
+        said: vec![Said::default()],
     };
     let named = [("random", random), ("own", own), ("oracle", oracle)];
     Compared { objects: vec!["it".into()], contenders: named.map(contender).into() }

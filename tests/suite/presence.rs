@@ -41,32 +41,44 @@ proptest! {
         for (x, z, meets) in &touches {
             touch(&mut belief, &zone, &[*x, *z], *meets);
         }
-        let presence = belief.presence();
-        let [here, asked] = [presence.at(&at), presence.of_contact(&at)];
-        prop_assert!((0.0..=1.0).contains(&here) && (0.0..=1.0).contains(&asked));
-        prop_assert!(asked >= here, "{asked} {here}");
+        let silhouette = belief.presence().silhouette();
+        let [here, hoped] = [silhouette.at(&at), silhouette.hoped(&at)];
+        let asked = silhouette.of_contact(&at);
+        prop_assert!(here >= 0.0 && here <= hoped && hoped <= asked + 1e-9 && asked <= 1.0);
         for (x, z, meets) in touches {
-            let missed = presence.at(&[x, z]) == 0.0;
+            let missed = silhouette.at(&[x, z]) == 0.0;
             prop_assert!(meets || missed);
         }
     }
 }
 
-/// What is never missed is everywhere; a miss says most where it was, a contact likewise.
+/// Before any touch there is a surface everywhere; a miss says most where it was, a contact
+/// likewise, and one with the rim of the hull that there is less on the hull's side.
 #[test]
 fn touches_speak_for_their_surroundings() {
     let zone = zone();
     let mut belief = Belief::new(zone.clone(), GpSettings::default());
-    assert_eq!(belief.presence().at(&[0.05, 0.05]), 1.0);
+    assert_eq!(belief.presence().silhouette().at(&[0.05, 0.05]), 1.0);
     touch(&mut belief, &zone, &[0.02, 0.05], true);
-    assert_eq!(belief.presence().at(&[0.09, 0.05]), 1.0);
     touch(&mut belief, &zone, &[0.08, 0.05], false);
+    let silhouette = belief.presence().silhouette();
     let along: Vec<f64> =
-        (0..6).map(|i| belief.presence().at(&[0.02 + 0.01 * f64::from(i), 0.05])).collect();
-    assert!(along.is_sorted_by(|a, b| a >= b) && along[0] > 0.9 && along[5] < 0.5, "{along:?}");
+        (0..6).map(|i| silhouette.at(&[0.02 + 0.01 * f64::from(i), 0.05])).collect();
+    assert!(along.is_sorted_by(|a, b| a >= b) && along[0] > 0.8 && along[5] < 0.5, "{along:?}");
     // The finger slants down: it was below its target, not above.
-    let [below, above] = [-0.012, 0.012].map(|z| belief.presence().at(&[0.08, 0.05 + z]));
+    let [below, above] = [-0.012, 0.012].map(|z| silhouette.at(&[0.08, 0.05 + z]));
     assert!(below == 0.0 && above > 0.0, "{below} {above}");
+    let radius_m = Finger::default().radius_m;
+    let beyond = |offset: f64| {
+        let mut belief = Belief::new(zone.clone(), GpSettings::default());
+        let p_wc = zone.point(&[0.05 - offset * radius_m, 0.05], 0.0);
+        let contact = Contact { p_wc, normal_w: Vector3::y() };
+        belief.observe(&[0.05, 0.05], &Touch::Contact(contact));
+        let p_wt = zone.point(&[0.05, 0.05], 0.0);
+        belief.observe_swept(&Swept { finger: Finger::default(), p_wt });
+        belief.presence().silhouette().at(&[0.05 + radius_m, 0.05])
+    };
+    assert!(beyond(0.9) < 0.5 && beyond(0.1) > 0.6, "{} {}", beyond(0.9), beyond(0.1));
 }
 
 fn simulation(scene: &str) -> Simulation {
@@ -93,12 +105,13 @@ fn brier(simulation: &Simulation, planner: &str) -> [f64; 2] {
         belief.observe(&row.target, &touch);
         belief.observe_swept(&Swept { finger: finger.clone(), p_wt });
     }
+    let silhouette = belief.presence().silhouette();
     let truth = simulation.truth();
     let share = truth.count() as f64 / truth.places.len() as f64;
     let mut sums = [0.0; 2];
     for (place, height) in truth.places.iter().zip(&truth.heights_m) {
         let is_there = f64::from(u8::from(height.is_some()));
-        sums[0] += (belief.presence().at(place) - is_there).powi(2);
+        sums[0] += (silhouette.at(place) - is_there).powi(2);
         sums[1] += (share - is_there).powi(2);
     }
     sums.map(|sum| sum / truth.places.len() as f64)
@@ -116,7 +129,7 @@ fn a_silhouette_is_found() {
         let row = simulation.trial(planner::by_name("silhouette").unwrap(), 1);
         assert!(row.touches.iter().all(|touch| touch.stall.is_none()), "{scene}");
     }
-    assert!(found < by_share, "{found} {by_share}");
+    assert!(found < 0.65 * by_share, "{found} {by_share}");
 }
 
 /// A trial that was broken off plans on as if it had not been: its rows say what its misses swept.

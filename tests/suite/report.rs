@@ -3,6 +3,7 @@
 use crate::common::runs::{CURVE, SURFACE, run};
 use palpate::experiment::analysis::Analysis;
 use palpate::experiment::measure::{Direction, MEASURES, Scale};
+use palpate::experiment::outline::Outline;
 use palpate::experiment::report_settings::Claim;
 use palpate::experiment::store::Run;
 use palpate::report;
@@ -206,6 +207,7 @@ fn a_measure_is_told_wherever_measures_are() {
     let mut run = run(SURFACE);
     for touch in run.rows.iter_mut().flat_map(|row| &mut row.touches) {
         touch.time_s = Some(1.0);
+        touch.outline = Some(Outline { brier: 0.1, iou: 0.8, wrong_share: 0.1, reliability: None });
         touch.metrics.iter_mut().for_each(|metrics| metrics.unreachable_rmse_m = Some(0.1));
     }
     run.experiment.report.claims = vec![Claim {

@@ -103,6 +103,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
     };
     let is_fitted = count >= experiment.initial_touches;
     TouchRow {
+        outline: None,
         contact: height_m(&target).map(|height_m| zone.point(&target, height_m).coords.into()),
         target,
         overload: false,
