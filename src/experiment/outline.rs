@@ -35,8 +35,9 @@ impl Outline {
         let (mut squares, mut wrong, mut both, mut either) = (0.0, 0.0, 0.0, 0.0);
         let mut reliability = [[0; 2]; TENTHS];
         let one_if = |holds: bool| f64::from(u8::from(holds));
-        for (place, height_m) in truth.places.iter().zip(&truth.heights_m) {
-            let (probability, is_there) = (silhouette.at(place), height_m.is_some());
+        let probabilities = silhouette.over(truth.places.iter().map(Vec::as_slice));
+        for (probability, height_m) in probabilities.into_iter().zip(&truth.heights_m) {
+            let is_there = height_m.is_some();
             let is_believed = probability > 0.5;
             squares += (probability - one_if(is_there)).powi(2);
             wrong += one_if(is_believed != is_there);

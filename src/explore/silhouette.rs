@@ -17,6 +17,7 @@ use crate::gp::{Hyperparameters, Mean, NoiseRatio, Observations, Posterior, Rang
 use crate::math::normal;
 use crate::task::Zone;
 use nalgebra::Vector2;
+use std::cell::OnceCell;
 
 /// What evidence is returned to far from all of it, on the scale where none is −1 and a surface
 /// is 1: a little less than nobody knows. This, the noise and the divide are chosen on the suite's
@@ -51,7 +52,9 @@ pub struct Silhouette {
 struct Seen {
     hull: Stadium,
     misses: Vec<Stadium>,
-    table: Table,
+    belief: Posterior,
+    /// What the belief says all over the zone: made when a planner first asks, for it asks often.
+    table: OnceCell<Table>,
 }
 
 impl Silhouette {
@@ -64,8 +67,8 @@ impl Silhouette {
     ) -> Self {
         let seen = hull.and_then(|hull| {
             let belief = belief(hull.radius_m, &labels)?;
-            let table = Table::new(zone, hull, &belief);
-            Some(Seen { hull: hull.clone(), misses: misses.to_vec(), table })
+            let (hull, misses) = (hull.clone(), misses.to_vec());
+            Some(Seen { hull, misses, belief, table: OnceCell::new() })
         });
         Self { zone: zone.clone(), seen }
     }
@@ -77,12 +80,24 @@ impl Silhouette {
 
     /// The probability that there is a surface at `place`.
     pub fn at(&self, place: &[f64]) -> f64 {
-        self.above(DIVIDE, place)
+        self.over([place])[0]
     }
 
-    /// The same as who looks for surfaces sees it: a little too likely.
+    /// The same at each of `places`.
+    pub fn over<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
+        let flat = |place| flat(&self.zone.local(place, 0.0));
+        let places: Vec<Vector2<f64>> = places.into_iter().map(flat).collect();
+        match &self.seen {
+            None => vec![1.0; places.len()],
+            Some(seen) => seen.over(&places),
+        }
+    }
+
+    /// The probability at `place` as who looks for surfaces sees it, a little too likely; between
+    /// places half a radius apart.
     pub fn hoped(&self, place: &[f64]) -> f64 {
-        self.above(0.0, place)
+        let place = flat(&self.zone.local(place, 0.0));
+        self.seen.as_ref().map_or(1.0, |seen| seen.hoped(&self.zone, &place))
     }
 
     /// The chance that a touch asked for at `target` meets something, as hoped: 1 − (1 − p)² with
@@ -90,25 +105,30 @@ impl Silhouette {
     pub fn of_contact(&self, target: &[f64]) -> f64 {
         let Some(seen) = &self.seen else { return 1.0 };
         let hull = seen.hull.about(flat(&self.zone.local(target, 0.0)));
-        let likeliest = places(&hull).map(|place| seen.above(0.0, &place)).fold(0.0, f64::max);
+        let likeliest =
+            places(&hull).map(|place| seen.hoped(&self.zone, &place)).fold(0.0, f64::max);
         1.0 - (1.0 - likeliest).powi(2)
-    }
-
-    fn above(&self, divide: f64, place: &[f64]) -> f64 {
-        let place = flat(&self.zone.local(place, 0.0));
-        self.seen.as_ref().map_or(1.0, |seen| seen.above(divide, &place))
     }
 }
 
 impl Seen {
-    /// The probability that the evidence is above `divide`.
-    fn above(&self, divide: f64, place: &Vector2<f64>) -> f64 {
+    fn over(&self, places: &[Vector2<f64>]) -> Vec<f64> {
+        let believed = self.belief.predict(places.iter().map(|place| place.as_slice()));
+        let told = places.iter().zip(believed);
+        told.map(|(place, at)| self.above(DIVIDE, place, PRIOR + at.mean, at.variance)).collect()
+    }
+
+    fn hoped(&self, zone: &Zone, place: &Vector2<f64>) -> f64 {
+        let table = self.table.get_or_init(|| Table::new(zone, &self.hull, &self.belief));
+        let [mean, variance] = table.at(place);
+        self.above(0.0, place, mean, variance)
+    }
+
+    /// The probability that evidence of this mean and variance at `place` is above `divide`.
+    fn above(&self, divide: f64, place: &Vector2<f64>, mean: f64, variance: f64) -> f64 {
         match self.misses.iter().any(|miss| miss.holds(place)) {
             true => 0.0,
-            false => {
-                let [mean, variance] = self.table.at(place);
-                normal::cumulative((mean - divide) / (variance + NOISE_VARIANCE).sqrt())
-            }
+            false => normal::cumulative((mean - divide) / (variance + NOISE_VARIANCE).sqrt()),
         }
     }
 }

@@ -47,8 +47,8 @@ pub struct Spent {
     pub travel_m: f64,
 }
 
-/// How honest the beliefs of a planner's trials of one object were after the last touch, each a mean
-/// over the trials that know it.
+/// How honest the beliefs of a planner's trials of one object were after the last touch, each a
+/// mean over the trials that know it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Said {
     /// Share of the truth in the 95 % band.
