@@ -23,6 +23,11 @@ struct Source {
 /// tables are walked by recursion.
 const DEPTH_MAX: usize = 16;
 
+/// Whether a setting is left at its default, and need not be written.
+pub fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 /// A word that no setting knows.
 const UNKNOWN: &str = "\u{0}";
 

@@ -8,7 +8,7 @@ use super::report_settings::{ReportSettings, TOUCHES_MAX};
 use super::row::TrialId;
 use super::scan_truth::ScanTruth;
 use crate::backend::ros::settings::{BackendKind, BackendSettings};
-use crate::config::{Checked, ConfigError, Loader, Rules};
+use crate::config::{Checked, ConfigError, Loader, Rules, is_default};
 use crate::explore::belief::GpSettings;
 use crate::explore::planner;
 use crate::explore::planner::PlanningSettings;
@@ -65,10 +65,6 @@ pub struct Experiment {
     pub truth: Option<ScanTruth>,
     /// The scene, or in a file the path of one, relative to that file.
     pub scene: Scene,
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }
 
 /// The key of the table that makes several experiments of one file.

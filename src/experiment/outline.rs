@@ -1,7 +1,7 @@
 //! How near the believed silhouette is to the object's own.
 
 use super::truth::Truth;
-use crate::explore::silhouette::Silhouette;
+use crate::explore::presence::Presence;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -25,11 +25,15 @@ pub struct Outline {
 }
 
 impl Outline {
-    /// Of `silhouette` on the test places; none where every place has a surface, or it is not known
-    /// which have none, or no finger was seen to pass.
-    pub fn of(silhouette: &Silhouette, truth: &Truth) -> Option<Self> {
+    /// Of what `presence` says at the test places; none where every place has a surface, or it is
+    /// not known which have none, or no finger was seen to pass.
+    pub fn of(presence: &Presence, truth: &Truth) -> Option<Self> {
         let count = truth.places.len();
-        if !truth.is_whole || truth.count() == count || !silhouette.is_seen() {
+        if !truth.is_whole || truth.count() == count {
+            return None;
+        }
+        let silhouette = presence.silhouette();
+        if !silhouette.is_seen() {
             return None;
         }
         let (mut squares, mut wrong, mut both, mut either) = (0.0, 0.0, 0.0, 0.0);

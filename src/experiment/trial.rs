@@ -106,7 +106,7 @@ pub fn run(
 
 /// How near the believed silhouette is to the true one; its reliability only of the last.
 fn outline(belief: &Belief, sight: &Sight, is_last: bool) -> Option<Outline> {
-    let outline = Outline::of(&belief.presence().silhouette(), sight.truth)?;
+    let outline = Outline::of(belief.presence(), sight.truth)?;
     let reliability = outline.reliability.filter(|_| is_last);
     Some(Outline { reliability, ..outline })
 }

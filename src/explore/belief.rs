@@ -3,7 +3,7 @@
 use super::free_space::Ceiling;
 use super::presence::Presence;
 use super::probe::{Swept, Touch};
-use crate::config::{Checked, Rules};
+use crate::config::{Checked, Rules, is_default};
 use crate::gp::covariance::CovarianceError;
 use crate::gp::fit::Fit;
 use crate::gp::kernel;
@@ -56,10 +56,6 @@ pub enum Band {
     Likelihood,
     /// The contacts: that 95 of 100 lie within 1.96 of what all others say of them.
     LeaveOneOut,
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }
 
 /// Log-normal priors, in the units of the ranges; left out, every value is as probable.
@@ -241,6 +237,7 @@ impl Belief {
             let mut posterior =
                 Posterior::new(self.kernel, hyperparameters, self.contacts.clone())?;
             posterior.widen(widening(&posterior.left_out()));
+            // Below it is conditioned again, to be what the recorded numbers make to the last bit.
             fit.hyperparameters = posterior.hyperparameters().clone();
         }
         let posterior = self.posterior(fit.hyperparameters.clone())?;

@@ -8,7 +8,6 @@
 use super::probe::Swept;
 use super::silhouette::Silhouette;
 use super::stadium::{Stadium, flat};
-use crate::gp::{Observation, Observations};
 use crate::task::Zone;
 use nalgebra::{Point3, Vector2};
 
@@ -64,29 +63,25 @@ impl Presence {
 
     /// Where there probably is a surface, as far as the touches tell.
     pub fn silhouette(&self) -> Silhouette {
-        Silhouette::new(&self.zone, self.hull.as_ref(), &self.misses, self.labels())
+        Silhouette::new(&self.zone, self.hull.as_ref(), &self.misses, &self.labels())
     }
 
     /// Places with the probability that there is a surface, in the terms of one touch.
-    fn labels(&self) -> Observations {
-        let mut labels = Observations::new(2);
+    fn labels(&self) -> Vec<(Vector2<f64>, f64)> {
+        let mut labels = Vec::new();
         let Some(hull) = &self.hull else { return labels };
-        let mut label = |place: Vector2<f64>, height| {
-            let place = [place.x, place.y];
-            labels.take_in(&Observation::height(&place, height));
-        };
         for Felt { target, contact } in &self.contacts {
-            label(*contact, 1.0);
+            labels.push((*contact, 1.0));
             let inwards = hull.about(*target).nearest(contact) - contact;
             let offset = inwards.norm() / hull.radius_m;
             if offset > 0.0 {
-                let beyond = contact + inwards / offset;
-                label(beyond, BEYOND_A_FACE - LESS_AT_THE_RIM * offset.min(1.0).powi(2));
+                let share = BEYOND_A_FACE - LESS_AT_THE_RIM * offset.min(1.0).powi(2);
+                labels.push((contact + inwards / offset, share));
             }
         }
         for miss in &self.misses {
             for i in 0..ALONG {
-                label(miss.start + miss.along * (i as f64 / (ALONG - 1) as f64), 0.0);
+                labels.push((miss.start + miss.along * (i as f64 / (ALONG - 1) as f64), 0.0));
             }
         }
         labels

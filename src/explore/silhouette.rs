@@ -63,10 +63,10 @@ impl Silhouette {
         zone: &Zone,
         hull: Option<&Stadium>,
         misses: &[Stadium],
-        labels: Observations,
+        labels: &[(Vector2<f64>, f64)],
     ) -> Self {
         let seen = hull.and_then(|hull| {
-            let belief = belief(hull.radius_m, &labels)?;
+            let belief = belief(hull.radius_m, labels)?;
             let (hull, misses) = (hull.clone(), misses.to_vec());
             Some(Seen { hull, misses, belief, table: OnceCell::new() })
         });
@@ -148,11 +148,10 @@ fn places(hull: &Stadium) -> impl Iterator<Item = Vector2<f64>> {
 }
 
 /// The belief of the evidence, on the scale from −1 to 1 above the prior; none without evidence.
-fn belief(radius_m: f64, labels: &Observations) -> Option<Posterior> {
+fn belief(radius_m: f64, labels: &[(Vector2<f64>, f64)]) -> Option<Posterior> {
     let mut evidence = Observations::new(2);
-    for (i, probability) in labels.heights().iter().enumerate() {
-        let place: Vec<f64> = labels.place(i).collect();
-        evidence.push(&place, 2.0 * probability - 1.0 - PRIOR);
+    for (place, probability) in labels {
+        evidence.push(place.as_slice(), 2.0 * probability - 1.0 - PRIOR);
     }
     if evidence.is_empty() {
         return None;

@@ -1,8 +1,8 @@
 //! Reliability: of the places that are given a probability of a surface, how many have one.
 
 use super::axes::{Axis, Panel};
-use super::canvas::{Area, Canvas};
-use super::legend::{Legend, Swatch};
+use super::canvas::Area;
+use super::compare::Sheet;
 use super::style;
 use super::style::FAINT_INK;
 use crate::experiment::outline::TENTHS;
@@ -15,24 +15,17 @@ const PLACES_MIN: u32 = 50;
 
 /// Draws a curve for each planner, over all objects; none where every object fills its zone.
 pub fn draw(compared: &Compared) -> Option<String> {
-    let names: Vec<String> = compared.contenders.iter().map(|it| it.name.clone()).collect();
     let curves: Vec<Vec<(f64, f64)>> = compared.contenders.iter().map(curve).collect();
     if curves.iter().all(Vec::is_empty) {
         return None;
     }
-    let colours: Vec<_> = names.iter().map(|name| style::planner(&names, name)).collect();
-    let swatch = |colour: &&'static str| Swatch::Line(style::stroke(colour, 2.0));
-    let entries = names.iter().zip(&colours).map(|(name, colour)| (swatch(colour), name.as_str()));
-    let legend = Legend::new(PANEL_PX.width, entries);
-    let area = Area { top: PANEL_PX.top + legend.more_px(), ..PANEL_PX };
-    let mut canvas = Canvas::new(area.right() + 20.0, area.bottom() + 50.0);
-    legend.draw(&mut canvas, [area.left, 22.0]);
+    let Sheet { mut canvas, area, strokes } = Sheet::new(compared, PANEL_PX);
     let axis = || Axis::linear(0.0, 1.0, 6.0);
     let panel = Panel { area, x: axis(), y: axis() };
     panel.frame(&mut canvas);
     canvas.line([panel.at(0.0, 0.0), panel.at(1.0, 1.0)], &style::dashed(FAINT_INK, 1.0, "4 3"));
-    for (curve, colour) in curves.iter().zip(&colours) {
-        panel.curve(&mut canvas, curve, &style::stroke(colour, 2.0));
+    for (curve, stroke) in curves.iter().zip(&strokes) {
+        panel.curve(&mut canvas, curve, stroke);
     }
     panel.name_axes(&mut canvas, "probability of a surface, in tenths", "share that has one");
     Some(canvas.finish())

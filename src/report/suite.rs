@@ -111,20 +111,24 @@ pub fn html(
         &table_body(&each(compared, standings), "named"),
         "",
     );
-    let reliability = reliability::draw(compared).map_or(String::new(), |svg| {
-        format!(
-            "<figure id=\"reliability\">\n{}<figcaption>Of the places that are given a probability of \
-             a surface, how many have one; on the diagonal the belief is honest.</figcaption>\n</figure>\n",
-            wide(&svg, "figure")
-        )
-    });
-    let profiles = draw(compared, against).map_or(String::new(), |svg| {
-        format!(
-            "<figure id=\"profiles\">\n{}<figcaption>Which share of the trials has how small an error, \
-             averaged over the objects; further left is better.</figcaption>\n</figure>\n",
-            wide(&svg, "figure")
-        )
-    });
+    let figure = |id: &str, svg: Option<String>, caption: &str| {
+        svg.map_or(String::new(), |svg| {
+            let svg = wide(&svg, "figure");
+            format!("<figure id=\"{id}\">\n{svg}<figcaption>{caption}</figcaption>\n</figure>\n")
+        })
+    };
+    let profiles = figure(
+        "profiles",
+        draw(compared, against),
+        "Which share of the trials has how small an error, averaged over the objects; further left is \
+         better.",
+    );
+    let reliability = figure(
+        "reliability",
+        reliability::draw(compared),
+        "Of the places that are given a probability of a surface, how many have one; on the diagonal the \
+         belief is honest.",
+    );
     page("Palpate suite", name, question, &[over_all, profiles, reliability, each].concat())
 }
 

@@ -2,7 +2,7 @@
 
 use super::function::Function;
 use super::solver::SolverSettings;
-use crate::config::{Checked, ConfigError, Loader, Rules};
+use crate::config::{Checked, ConfigError, Loader, Rules, is_default};
 use crate::geometry::import::Buffers;
 use crate::geometry::surfaces;
 use crate::math::pose::pose;
@@ -53,10 +53,6 @@ pub struct Scene {
 /// A force must stand this many standard deviations of its noise above it to say contact: an
 /// approach is a thousand readings (chosen).
 const SDS_OF_CONTACT: f64 = 5.0;
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
-}
 
 /// How faithfully a touch is carried out, cheapest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -5,7 +5,7 @@ use super::net_ft::NetFtSettings;
 use super::topics::Topics;
 use crate::backend::interlock::InterlockSettings;
 use crate::backend::interlock::gates::GateSettings;
-use crate::config::{Checked, Rules};
+use crate::config::{Checked, Rules, is_default};
 use crate::robot::arm::Chain;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,10 +66,6 @@ pub struct BackendSettings {
     pub gates: GateSettings,
     /// The table of topics.
     pub topics: Topics,
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }
 
 /// Most ticks in a second: the cycle of the PA-10's servo driver, 2 ms (`hydro`, Orca robotics).

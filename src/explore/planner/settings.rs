@@ -92,7 +92,7 @@ pub struct OracleSettings {
 }
 
 impl Default for OracleSettings {
-    /// Chosen: a trial of thirty touches takes a second or two.
+    /// Chosen: a trial of thirty touches takes a second or two, with free space ten times that.
     fn default() -> Self {
         Self { candidates: 120, refit: false }
     }

@@ -1,9 +1,9 @@
 //! Touch where the variance of the surface that there probably is falls most, times the chance that
 //! a touch meets anything.
 //!
-//! Places count with the square root of their probability: at the edges of what was found heights
-//! change more than a belief of even surfaces knows. On the suite's objects for choosing the error
-//! is 0.904 of that of a Sobol sequence, with the probability itself and the hope gone 0.937.
+//! Places count with the square root of their hoped probability, chosen: on the suite's objects for
+//! choosing the error is 0.904 of that of a Sobol sequence, with the probability itself and without
+//! the hope 0.937.
 //!
 //! How far touches speak for their surroundings is what a few touches tell least: the variance is
 //! that of a committee of beliefs, whose length scales differ from the fitted ones.
