@@ -110,6 +110,24 @@ fn a_single_spike_of_force_is_none() {
     (0..300).for_each(|tick| assert!(body.step(&command(7, tick)).is_ok()));
 }
 
+/// While a touch is thought about nobody reads, and noise may bring back the value of before.
+#[test]
+fn an_electrode_that_reads_the_same_before_and_after_a_pause_is_not_frozen() {
+    let world = World {
+        breaks: Some((99, |tick, reading| {
+            if tick <= 100 {
+                electrode(reading, 18, 2000.0);
+            }
+            if tick >= 100 {
+                reading.time_s += 0.7;
+            }
+        })),
+        ..World::real()
+    };
+    let (mut body, _) = interlocks(&arm(), &InterlockSettings::default(), world);
+    (0..300).for_each(|tick| body.step(&command(7, tick)).map(|_| ()).unwrap());
+}
+
 #[test]
 fn a_simulated_body_is_cleared_by_its_reset() {
     let world =

@@ -11,8 +11,7 @@ pub const ENTRY: Entry = Entry {
     name: NAME,
     make: |_, settings, capabilities| {
         let frozen_s = settings.frozen_s;
-        let electrodes =
-            Electrodes { frozen_s, since: [(f64::NAN, 0.0); ELECTRODES], ends: [0; ELECTRODES] };
+        let electrodes = Electrodes { frozen_s, still: NOTHING, ends: [0; ELECTRODES] };
         capabilities.real_time.then(|| Box::new(electrodes) as _)
     },
 };
@@ -22,10 +21,27 @@ const NAME: &str = "electrode";
 /// Frames in a row at an end of the range.
 const FRAMES: u32 = 2;
 
+/// Frames in a row with the same value that are no chance, whatever time lies between them: nobody
+/// reads while the next touch is thought about. Noise of several counts makes two the same in one of
+/// ten, so many in one of a hundred thousand.
+const STILL_FRAMES: u32 = 6;
+
+const NOTHING: [Still; ELECTRODES] =
+    [Still { count: f64::NAN, since_s: 0.0, frames: 0 }; ELECTRODES];
+
+/// Last value of an electrode.
+#[derive(Clone, Copy)]
+struct Still {
+    count: f64,
+    /// Since when it has been that.
+    since_s: f64,
+    /// In how many frames.
+    frames: u32,
+}
+
 struct Electrodes {
     frozen_s: f64,
-    /// Last value of each, and since when it has been that.
-    since: [(f64, f64); ELECTRODES],
+    still: [Still; ELECTRODES],
     /// Frames in a row at an end of the range.
     ends: [u32; ELECTRODES],
 }
@@ -35,9 +51,13 @@ impl Interlock for Electrodes {
         for counts in reading.frames.iter().filter_map(|frame| frame.electrode_counts) {
             for (i, &count) in counts.iter().enumerate() {
                 let part = || format!("E{}", i + 1);
-                if count != self.since[i].0 {
-                    self.since[i] = (count, now.time_s);
+                let still = &mut self.still[i];
+                if count != still.count {
+                    *still = Still { count, since_s: now.time_s, frames: 0 };
                 }
+                still.frames += 1;
+                let frozen_s = now.time_s - still.since_s;
+                let is_frozen = frozen_s > self.frozen_s && still.frames >= STILL_FRAMES;
                 let is_end = count <= 0.0 || count >= FULL_SCALE_COUNTS;
                 self.ends[i] = if is_end { self.ends[i] + 1 } else { 0 };
                 if self.ends[i] >= FRAMES {
@@ -45,8 +65,7 @@ impl Interlock for Electrodes {
                     let (interlock, part) = ("value", part());
                     return Err(Trip { interlock, part, found: count, limit, unit: "counts" });
                 }
-                let frozen_s = now.time_s - self.since[i].1;
-                if frozen_s > self.frozen_s {
+                if is_frozen {
                     let (interlock, part) = ("standstill", part());
                     let limit = self.frozen_s;
                     return Err(Trip { interlock, part, found: frozen_s, limit, unit: "s" });
@@ -57,6 +76,6 @@ impl Interlock for Electrodes {
     }
 
     fn reset(&mut self) {
-        (self.since, self.ends) = ([(f64::NAN, 0.0); ELECTRODES], [0; ELECTRODES]);
+        (self.still, self.ends) = (NOTHING, [0; ELECTRODES]);
     }
 }
