@@ -94,7 +94,7 @@ impl FingerKind {
     fn kit(self) -> Kit {
         match self {
             Self::Rigid => {
-                Kit { body: "cast", scene: String::new(), gp: "", takes: "a few seconds" }
+                Kit { body: "cast", scene: String::new(), gp: EXACT, takes: "half a minute" }
             }
             Self::Soft => Kit {
                 body: "kinematic",
@@ -124,6 +124,10 @@ fn biotac(motion: &str) -> String {
 const ARM: &str = "\n[arm]                       # a Mitsubishi PA-10; its base is the origin\n";
 
 const SLOWER: &str = "approach_m_s = 0.015        # slower than a stage: the servos need 0.04 s to stop the finger\n";
+
+/// A rigid finger's contacts say how steep the surface is; those of electrodes are too often tilted
+/// the same way (docs/gaussian-process.md).
+const EXACT: &str = "normals = true              # a contact says how steep the surface is, too\n";
 
 /// What contacts that electrodes locate are off the surface, RMS (docs/finger.md).
 const LOCATED: &str =

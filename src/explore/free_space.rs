@@ -75,7 +75,7 @@ impl Ceiling {
         let mut scratch = Scratch::default();
         let mut bounds: Vec<Bound> = self.bounds().collect();
         let places = bounds.iter().map(|bound| bound.place);
-        let mut means = Means::at(belief.observations().dimension(), places);
+        let mut means = Means::at(belief, places);
         for _ in 0..CUTS_MAX {
             let excess = means.of(belief).iter().zip(&bounds).map(|(mean, at)| mean - at.height_m);
             let mut above: Vec<(usize, f64)> = (excess.enumerate())

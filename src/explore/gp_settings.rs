@@ -21,7 +21,7 @@ pub struct GpSettings {
     /// The touch noise's standard deviation, if it is known: then it is not fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_sd_m: Option<f64>,
-    /// What it is at least: the sensor's own, beside what the kernel cannot follow, which is fitted.
+    /// What it is at least: the sensor's own. What the kernel cannot follow is fitted on top.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_sd_min_m: Option<f64>,
     /// Range of the signal's standard deviation, as a fraction of the heights' root mean square.

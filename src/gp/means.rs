@@ -1,52 +1,62 @@
 //! The mean at places that stay the same while observations are added.
 
+use super::kernel::Hyperparameters;
 use super::observations::Observations;
 use super::posterior::{Posterior, Scratch};
-use crate::math::simd::widest;
+use crate::math::simd::{dot, widest};
 
 /// Places, and their correlations with what was observed so far.
 pub struct Means {
     places: Observations,
-    /// Of all places with each observation, one observation after the other.
-    correlations: Vec<f64>,
+    /// Of each place with all numbers that were observed at first, one place after the other.
+    first: Vec<f64>,
+    /// How many numbers, and at how many places, that was.
+    order: usize,
+    count: usize,
+    /// Of all places with each height since, one height after the other.
+    since: Vec<f64>,
     means: Vec<f64>,
 }
 
 impl Means {
-    /// Prepares for `places` of so many coordinates.
-    pub fn at<'a>(dimension: usize, places: impl Iterator<Item = &'a [f64]>) -> Self {
-        let mut all = Observations::new(dimension);
-        places.for_each(|place| all.push(place, 0.0));
-        Self { places: all, correlations: Vec::new(), means: Vec::new() }
+    /// Prepares for `places`, by what `belief` was conditioned on so far.
+    pub fn at<'a>(belief: &Posterior, places: impl Iterator<Item = &'a [f64]>) -> Self {
+        let observations = belief.observations();
+        let mut all = Observations::new(observations.dimension());
+        let mut first = Vec::new();
+        let mut scratch = Scratch::default();
+        for place in places {
+            all.push(place, 0.0);
+            first.extend_from_slice(belief.mean_with_correlations(place, &mut scratch).1);
+        }
+        let (order, count) = (observations.order(), observations.len());
+        let means = Vec::with_capacity(all.len());
+        Self { places: all, first, order, count, since: Vec::new(), means }
     }
 
-    /// The means of `belief`, of which what it was conditioned on may have grown since the last
-    /// time, and nothing else: for m places and n observations m·n operations, and a correlation for
-    /// each place and new observation.
+    /// The means of `belief`, which since [`at`](Self::at) may have taken in heights, and nothing
+    /// else: for m places and n observations m·n operations, and a correlation for each place and
+    /// new height.
     pub fn of(&mut self, belief: &Posterior) -> &[f64] {
+        let Hyperparameters { mean, length_scales, .. } = belief.hyperparameters();
         let observations = belief.observations();
-        let lengths = &belief.hyperparameters().length_scales;
-        let count = self.places.len();
-        self.means.clear();
-        if observations.has_slopes() {
-            let mut scratch = Scratch::default();
-            self.means.extend((0..count).map(|i| {
-                let place: Vec<f64> = self.places.place(i).collect();
-                belief.mean(&place, &mut scratch)
-            }));
-            return &self.means;
-        }
-        let known = self.correlations.len() / count.max(1);
-        for j in known..observations.len() {
-            let begin = self.correlations.len();
-            self.correlations.resize(begin + count, 0.0);
-            let new = &mut self.correlations[begin..];
-            self.places.distances2(observations.place(j), lengths, 0, new);
+        let many = self.places.len();
+        let begun = self.since.len() / many.max(1);
+        for j in self.count + begun..observations.len() {
+            let begin = self.since.len();
+            self.since.resize(begin + many, 0.0);
+            let new = &mut self.since[begin..];
+            self.places.distances2(observations.place(j), length_scales, 0, new);
             belief.kernel().correlate(new);
         }
-        self.means.resize(count, belief.hyperparameters().mean);
-        let columns = self.correlations.chunks_exact(count.max(1));
-        for (column, weight) in columns.zip(belief.weights()) {
+        let (first, since) = belief.weights().split_at(self.order);
+        self.means.clear();
+        widest(|| {
+            let rows = self.first.chunks_exact(self.order.max(1));
+            self.means.extend(rows.map(|row| mean + dot(row, first)));
+        });
+        self.means.resize(many, *mean);
+        for (column, weight) in self.since.chunks_exact(many.max(1)).zip(since) {
             widest(|| {
                 for (mean, correlation) in self.means.iter_mut().zip(column) {
                     *mean += weight * correlation;
@@ -80,7 +90,7 @@ mod tests {
             let mut belief = Posterior::new(&Matern52, at, observations).unwrap();
             let places: Vec<[f64; 2]> =
                 (0..37).map(|i| [0.03 * f64::from(i), (0.7 * f64::from(i)).fract()]).collect();
-            let mut means = Means::at(2, places.iter().map(|place| &place[..]));
+            let mut means = Means::at(&belief, places.iter().map(|place| &place[..]));
             for added in [[0.5, 0.5], [0.1, 0.9]] {
                 let mut scratch = Scratch::default();
                 for (place, mean) in places.iter().zip(means.of(&belief)) {

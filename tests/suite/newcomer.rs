@@ -98,6 +98,7 @@ fn every_finger_has_a_scene_that_can_be_built() {
         let toy = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/toy.toml");
         let objects = ["gp=experiments/beliefs/objects.toml".to_owned()];
         let mut belief = Experiment::load(&toy, &objects).unwrap().gp;
+        belief.normals = finger == "rigid";
         belief.noise_sd_min_m = (finger != "rigid").then_some(0.0003);
         assert_eq!(written.gp, belief);
     }

@@ -5,8 +5,8 @@
 //! choosing the error is 0.904 of that of a Sobol sequence, with the probability itself and without
 //! the hope 0.937.
 //!
-//! With `planning.silhouette.touch_way_m` what counts is the fall per time: a touch takes as long as so
-//! much way, and the way to it comes on top.
+//! With `planning.silhouette.touch_way_m` what counts is the fall per time: a touch takes as long
+//! as so much way, and the way to it comes on top.
 //!
 //! How far touches speak for their surroundings is what a few touches tell least: the variance is
 //! that of a committee of beliefs, whose length scales differ from the fitted ones.

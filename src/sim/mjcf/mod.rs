@@ -1,5 +1,6 @@
 //! Scene → MJCF, the text a MuJoCo model is compiled from. Numbers are SI, in `W`.
 
+mod fingertip;
 mod height_field;
 mod hull;
 mod mesh;
@@ -55,6 +56,11 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
         Mode::Picture => PICTURE_STEP_S,
         Mode::Dynamic { step_s } => step_s,
     };
+    let is_soft = shown && environment.scene().effects.skin.is_some();
+    let skin = match is_soft {
+        true => format!("  <asset>{}</asset>\n", fingertip::assets(&environment.scene().finger)),
+        false => String::new(),
+    };
     let mut text = String::new();
     // Writing to a String cannot fail. A diverging state must be seen, not reset in silence.
     let _ = write!(
@@ -68,9 +74,9 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     <torque name="torque" site="mount"/>
   </sensor>
   <keyframe><key name="home" qpos="{home}"/></keyframe>
-{scenery}</mujoco>
+{skin}{scenery}</mujoco>
 "#,
-        robot = robot::robot(environment.scene(), &chain, collides, bumps),
+        robot = robot::robot(environment.scene(), &chain, (collides, bumps), is_soft),
         discard = !shown,
         integrator = keyword(environment.scene().solver.integrator),
         home = list(chain.home.iter().take(chain.joints.len())),

@@ -1,5 +1,6 @@
 //! The arm or the stage with the finger on it.
 
+use super::fingertip;
 use super::text::{CONTACT, LINK, TABLE, pose};
 use crate::robot::arm::settings::TOOL_KG;
 use crate::robot::arm::{Chain, Links};
@@ -14,8 +15,14 @@ const STAGE: &str = include_str!("../../../models/stage.xml");
 const PASSING: &str = r#"contype="0" conaffinity="0""#;
 
 /// The robot's model without its outermost tags, with its base and its tool put in; the finger's
-/// hull is met by the object if it `collides`, and the links by all there is if the robot `bumps`.
-pub(super) fn robot(scene: &Scene, chain: &Chain, collides: bool, bumps: bool) -> String {
+/// hull is met by the object if it `collides`, and the links by all there is if the robot `bumps`;
+/// the finger has a pad and a nail if it `is_soft`.
+pub(super) fn robot(
+    scene: &Scene,
+    chain: &Chain,
+    (collides, bumps): (bool, bool),
+    is_soft: bool,
+) -> String {
     let model = match scene.arm.as_ref().map(|arm| arm.links) {
         Some(Links::C) => C,
         Some(Links::A) => A,
@@ -35,11 +42,11 @@ pub(super) fn robot(scene: &Scene, chain: &Chain, collides: bool, bumps: bool) -
         .map_or("", |(inner, _)| inner)
         .replace(PASSING, links)
         .replace("<body name=\"base\"", &format!("<body name=\"base\" {}", pose(&chain.base)))
-        .replace("<!-- tool -->", &tool(&scene.finger, tool_kg, chain, contact))
+        .replace("<!-- tool -->", &tool(&scene.finger, tool_kg, chain, (contact, is_soft)))
 }
 
 /// Adapter and finger as one body at the flange, where the force/torque sensor is.
-fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, contact: &str) -> String {
+fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, (contact, is_soft): (&str, bool)) -> String {
     let mount_m = chain.tool.translation.vector.norm();
     let heel_m = (mount_m - finger.length_m).max(0.0);
     // A rod of the tool's mass and length, radius 10 mm: m/12 (3 r² + l²) across, m r²/2 along.
@@ -57,17 +64,21 @@ fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, contact: &str) -> String {
         ),
         false => String::new(),
     };
+    let (radius, skin) = match is_soft {
+        true => (fingertip::core_m(finger), fingertip::geoms(&chain.tool)),
+        false => (finger.radius_m, String::new()),
+    };
     format!(
         r#"<body name="finger" {flange}>
           <inertial pos="0 0 {middle}" mass="{tool_kg}" diaginertia="{across} {across} {along}"/>
           {adapter}
           <geom name="finger" {hull} size="{radius}" rgba=".2 .35 .6 1" {contact}/>
+          {skin}
           <site name="mount" size=".005" group="4"/>
           <site name="tip" size=".002" group="4" {tip}/>
         </body>"#,
         flange = pose(&chain.flange),
         middle = mount_m / 2.0,
-        radius = finger.radius_m,
         tip = pose(&chain.tool),
     )
 }
