@@ -5,7 +5,7 @@
 
 use palpate::gp::covariance::CovarianceError;
 use palpate::gp::kernel::SquaredExponential;
-use palpate::gp::{Mean, Observations, Posterior, SearchBox};
+use palpate::gp::{Mean, Observations, Posterior, SearchBox, TouchNoise};
 
 fn toy_m(x_m: f64) -> f64 {
     let wave = if x_m.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x_m).sin() } else { 0.0 };
@@ -18,7 +18,7 @@ fn main() -> Result<(), CovarianceError> {
         length_scales: vec![(0.02, 4.0).into()],
         noise_ratio: (1e-4, 1e-2).into(),
         signal_sd: (1e-3, 1e3).into(),
-        noise_sd: None,
+        touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
     };
     let grid: Vec<[f64; 1]> = (0..=400).map(|i| [-2.0 + 0.01 * f64::from(i)]).collect();

@@ -5,7 +5,8 @@
 
 use nalgebra::{Point3, Vector3};
 use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
-use palpate::explore::belief::{Belief, GpSettings};
+use palpate::explore::belief::Belief;
+use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
 use palpate::explore::planner::PlanningSettings;
 use palpate::explore::probe::servo::Servo;

@@ -1,7 +1,7 @@
 //! What benches of the Gaussian process are made of.
 
 use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
-use palpate::gp::{Mean, Observations, SearchBox};
+use palpate::gp::{Mean, Observations, SearchBox, TouchNoise};
 
 pub static KERNEL: SquaredExponential = SquaredExponential;
 
@@ -32,7 +32,7 @@ pub fn search_box() -> SearchBox {
         length_scales: vec![(0.005, 1.0).into(); 2],
         noise_ratio: (1e-4, 1e-2).into(),
         signal_sd: (1e-3, 1e3).into(),
-        noise_sd: None,
+        touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
     }
 }

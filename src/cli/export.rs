@@ -5,6 +5,7 @@ use super::terminal::{Ending, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
 use crate::gp::posterior::Scratch;
+use crate::report::known::Known;
 use crate::report::points::Points;
 use crate::report::replay::Replay;
 use crate::report::{figures, files, style};
@@ -20,7 +21,8 @@ Examples:
 
 Beside FILE.ply or FILE.obj stand FILE.svg, FILE.png and FILE.pdf, the belief beside the true \
 surface. In a PLY the standard deviation is the property `sigma_m`; in an OBJ it stands in a \
-comment below its vertex. Both are coloured by it, viridis from 0 to the largest.")]
+comment below its vertex. Both are coloured by it, viridis from 0 to the largest. What the touches make \
+likelier to be no surface than one is left out.")]
 pub(super) struct Args {
     /// A run's folder.
     run: PathBuf,
@@ -113,10 +115,17 @@ fn chosen(run: &Run, args: &Args) -> anyhow::Result<u32> {
     Ok(touches)
 }
 
-/// The belief's mean as a surface in `W`.
+/// The belief's mean as a surface in `W`, where there probably is one.
 fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
     let zone = &run.experiment.scene.zone;
     let places = zone.grid(grid);
+    let known = Known::new(replay).over(places.iter().map(Vec::as_slice));
+    // The vertex that a place becomes, if it becomes one.
+    let mut count = 0..;
+    let vertices: Vec<Option<usize>> =
+        known.iter().map(|known| known.then(|| count.next()).flatten()).collect();
+    let places: Vec<Vec<f64>> =
+        places.into_iter().zip(known).filter(|(_, known)| *known).map(|(place, _)| place).collect();
     let predictions = replay.surface.predict(places.iter().map(Vec::as_slice));
     let mut scratch = Scratch::default();
     let mut slope = [0.0; 2];
@@ -136,6 +145,7 @@ fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
         let [before, below, both] = [here - 1, here - grid, here - grid - 1];
         [[both, before, here], [both, here, below]]
     });
+    let joined = triangles.filter_map(|[a, b, c]| Some([vertices[a]?, vertices[b]?, vertices[c]?]));
     Points {
         comments: vec![
             format!(
@@ -151,6 +161,6 @@ fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
         ],
         points,
         deviations: deviations_m.iter().map(|&sd_m| (sd_m, colour(sd_m))).collect(),
-        triangles: triangles.collect(),
+        triangles: joined.collect(),
     }
 }

@@ -20,9 +20,9 @@ const UNSURE: ColorRgba = ColorRgba { r: 0.94, g: 0.54, b: 0.38, a: 0.8 };
 /// Of contacts; chosen.
 const CONTACT: ColorRgba = ColorRgba { r: 0.1, g: 0.1, b: 0.1, a: 1.0 };
 
-/// The mean of the belief over the zone as a surface, or over an interval as a line, in `W`, its
-/// colour between those of the smallest and the largest standard deviation; and the contacts, as
-/// the belief has them. Before the first fit both are of no points.
+/// The mean of the belief over the zone as a surface, or over an interval as a line, in `W`, where
+/// there probably is one, its colour between those of the smallest and the largest standard
+/// deviation; and the contacts, as the belief has them. Before the first fit both are of no points.
 pub(super) fn shapes(zone: &Zone, belief: &Belief) -> [Marker; 2] {
     let shape = if zone.z_m.is_some() { Shape::TriangleList } else { Shape::LineStrip };
     // The corners of triangles are where they are: their scale is none.
@@ -30,7 +30,7 @@ pub(super) fn shapes(zone: &Zone, belief: &Belief) -> [Marker; 2] {
     let mut surface = Marker::new("belief", shape, size_m, SURE);
     let mut contacts = Marker::new("contacts", Shape::SphereList, SIZE_M, CONTACT);
     if let Some(posterior) = belief.surface() {
-        draw(zone, posterior, &mut surface);
+        draw(zone, belief, posterior, &mut surface);
         let seen = posterior.observations();
         let point = |(i, &height): (usize, &f64)| {
             zone.point(&seen.place(i).collect::<Vec<_>>(), height).into()
@@ -40,8 +40,9 @@ pub(super) fn shapes(zone: &Zone, belief: &Belief) -> [Marker; 2] {
     [surface, contacts]
 }
 
-fn draw(zone: &Zone, posterior: &Posterior, surface: &mut Marker) {
+fn draw(zone: &Zone, belief: &Belief, posterior: &Posterior, surface: &mut Marker) {
     let places = zone.grid(PER_SIDE);
+    let known = belief.presence().silhouette().is_likely(places.iter().map(Vec::as_slice));
     let predictions = posterior.predict(places.iter().map(Vec::as_slice));
     let deviations = || predictions.iter().map(|prediction| prediction.variance.max(0.0).sqrt());
     let (least, most) = deviations()
@@ -52,19 +53,21 @@ fn draw(zone: &Zone, posterior: &Posterior, surface: &mut Marker) {
         .map(|(place, prediction)| zone.point(place, prediction.mean).into())
         .collect();
     let order: Vec<usize> = match zone.z_m {
-        None => (0..PER_SIDE).collect(),
-        Some(_) => corners().collect(),
+        None => (0..PER_SIDE).filter(|&i| known[i]).collect(),
+        Some(_) => {
+            corners().filter(|corners| corners.iter().all(|&i| known[i])).flatten().collect()
+        }
     };
     surface.points = order.iter().map(|&i| points[i]).collect();
     surface.colors = order.iter().map(|&i| colors[i]).collect();
 }
 
 /// The corners of the triangles of a grid, counter-clockwise seen from where the finger comes.
-fn corners() -> impl Iterator<Item = usize> {
+fn corners() -> impl Iterator<Item = [usize; 3]> {
     let cells = (1..PER_SIDE).flat_map(|j| (1..PER_SIDE).map(move |i| j * PER_SIDE + i));
     cells.flat_map(|here| {
         let [before, below, both] = [here - 1, here - PER_SIDE, here - PER_SIDE - 1];
-        [both, before, here, both, here, below]
+        [[both, before, here], [both, here, below]]
     })
 }
 

@@ -9,7 +9,7 @@ use super::row::TrialId;
 use super::scan_truth::ScanTruth;
 use crate::backend::ros::settings::{BackendKind, BackendSettings};
 use crate::config::{Checked, ConfigError, Loader, Rules, is_default};
-use crate::explore::belief::GpSettings;
+use crate::explore::gp_settings::GpSettings;
 use crate::explore::planner;
 use crate::explore::planner::PlanningSettings;
 use crate::sim::Scene;

@@ -1,134 +1,17 @@
 //! What is known after some touches: a Gaussian process over the zone, and where it is unsure.
 
 use super::free_space::Ceiling;
+use super::gp_settings::{Band, GpSettings};
 use super::presence::Presence;
 use super::probe::{Swept, Touch};
-use crate::config::{Checked, Rules, is_default};
+use crate::gp::choice::Choice;
 use crate::gp::covariance::CovarianceError;
 use crate::gp::fit::Fit;
-use crate::gp::kernel;
-use crate::gp::kernel::{Hyperparameters, Kernel};
 use crate::gp::posterior::{Posterior, Scratch};
-use crate::gp::{LogNormal, Mean, Observation, Observations, Range, SearchBox, Slope};
+use crate::gp::{Hyperparameters, Observation, Observations, Range, SearchBox, Slope, TouchNoise};
 use crate::math::normal::BAND_95;
 use crate::task::Zone;
 use nalgebra::Vector3;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-/// How the Gaussian process is fitted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct GpSettings {
-    /// Name of the kernel.
-    pub kernel: String,
-    /// How the prior mean is chosen.
-    pub mean: Mean,
-    /// Range of each length scale, as a fraction of the zone's side.
-    pub length_scale: [f64; 2],
-    /// Range of the touch noise's standard deviation, as a fraction of the signal's.
-    pub noise: [f64; 2],
-    /// The touch noise's standard deviation, if it is known: then it is not fitted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub noise_sd_m: Option<f64>,
-    /// Range of the signal's standard deviation, as a fraction of the heights' root mean square.
-    pub signal: [f64; 2],
-    /// Whether contact normals are observed too, as slopes of the surface.
-    pub normals: bool,
-    /// Range of the slopes' noise, as a fraction of the signal's standard deviation over the zone's
-    /// shortest side.
-    pub slope_noise: [f64; 2],
-    /// Whether the surface is held below the space that the finger has swept, where it met one.
-    pub free_space: bool,
-    /// What the standard deviations are scaled by.
-    #[serde(skip_serializing_if = "is_default")]
-    pub band: Band,
-    /// What the hyperparameters probably are.
-    pub prior: Priors,
-}
-
-/// What says how wide the belief's standard deviations are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Band {
-    /// The likelihood, as it fits all hyperparameters.
-    #[default]
-    Likelihood,
-    /// The contacts: that 95 of 100 lie within 1.96 of what all others say of them.
-    LeaveOneOut,
-}
-
-/// Log-normal priors, in the units of the ranges; left out, every value is as probable.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Priors {
-    /// Of each length scale.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub length_scale: Option<LogNormal>,
-    /// Of the noise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub noise: Option<LogNormal>,
-    /// Of the signal.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub signal: Option<LogNormal>,
-}
-
-impl Default for GpSettings {
-    /// Chosen: no length scale beyond the zone, where the data cannot tell it from a constant;
-    /// no noise so small that the covariance of a few hundred touches nears singularity, and
-    /// none above a hundredth of the relief, or a curve not yet resolved passes for noise; a
-    /// signal range that never binds on heights that vary; slopes from what a mesh's facets leave
-    /// of them to what says nothing.
-    fn default() -> Self {
-        Self {
-            kernel: "squared_exponential".into(),
-            mean: Mean::Zero,
-            length_scale: [0.005, 1.0],
-            noise: [1e-4, 1e-2],
-            noise_sd_m: None,
-            signal: [1e-3, 1e3],
-            normals: false,
-            slope_noise: [1e-2, 1e1],
-            free_space: false,
-            band: Band::default(),
-            prior: Priors::default(),
-        }
-    }
-}
-
-impl Checked for GpSettings {
-    fn check(&self, rules: &mut Rules) {
-        let names: Vec<&str> = kernel::KERNELS.iter().map(|(name, _)| *name).collect();
-        rules.one_of("kernel", &self.kernel, &names);
-        rules.interval("length_scale", self.length_scale, 1e-4..=1e3);
-        rules.interval("noise", self.noise, 1e-7..=1e3);
-        rules.interval("signal", self.signal, 1e-9..=1e9);
-        rules.interval("slope_noise", self.slope_noise, 1e-6..=1e6);
-        let has_slopes = kernel::by_name(&self.kernel).is_none_or(|kernel| kernel.has_slopes());
-        rules.require("normals", self.normals, !self.normals || has_slopes, || {
-            let smooth = kernel::KERNELS.iter().filter(|(_, kernel)| kernel.has_slopes());
-            let names: Vec<&str> = smooth.map(|(name, _)| *name).collect();
-            format!(
-                "a kernel whose surfaces have slopes that vary continuously: {}",
-                names.join(", ")
-            )
-        });
-        if let Some(noise_sd_m) = self.noise_sd_m {
-            rules.number("noise_sd_m", noise_sd_m, 1e-9..=1e3);
-        }
-        let priors = [
-            ("prior.length_scale", self.prior.length_scale),
-            ("prior.noise", self.prior.noise),
-            ("prior.signal", self.prior.signal),
-        ];
-        for (key, prior) in priors {
-            if let Some(LogNormal { median, spread }) = prior {
-                rules.number(&format!("{key}.median"), median, 1e-9..=1e9);
-                rules.number(&format!("{key}.spread"), spread, 1.001..=1e6);
-            }
-        }
-    }
-}
 
 /// A contact farther than this from its target, in units of the zone's sides, leaves the target
 /// unreached; chosen well above rounding, below any grid a figure shows.
@@ -142,7 +25,7 @@ const NORMAL_Y_MIN: f64 = 0.05;
 #[derive(Clone)]
 pub struct Belief {
     zone: Zone,
-    kernel: &'static dyn Kernel,
+    kernels: Choice,
     settings: GpSettings,
     contacts: Observations,
     /// What is known to be free, if that is asked for.
@@ -159,12 +42,12 @@ pub struct Belief {
 }
 
 impl Belief {
-    /// Knows nothing yet. An unknown kernel name stands for the squared exponential.
+    /// Knows nothing yet. Kernels are chosen [`between`](Choice::between).
     pub fn new(zone: Zone, settings: GpSettings) -> Self {
         let contacts = Observations::new(zone.dimension());
         Self {
             ceiling: settings.free_space.then(|| Ceiling::new(&zone)),
-            kernel: kernel::by_name(&settings.kernel).unwrap_or(&kernel::SquaredExponential),
+            kernels: Choice::between(settings.kernel.names()),
             presence: Presence::new(&zone),
             has_missed: false,
             zone,
@@ -218,24 +101,23 @@ impl Belief {
     fn slope(&self, normal_w: &Vector3<f64>) -> Option<(Vec<f64>, f64)> {
         let normal_z = self.zone.x_wz().inverse_transform_vector(normal_w);
         let is_usable = self.settings.normals
-            && self.kernel.has_slopes()
+            && self.kernels.has_slopes()
             && normal_z.y >= NORMAL_Y_MIN * normal_z.norm();
         let slopes = [-normal_z.x / normal_z.y, -normal_z.z / normal_z.y];
         let noise = (1.0 + slopes.iter().map(|slope| slope * slope).sum::<f64>()).sqrt();
         is_usable.then(|| (slopes[..self.zone.dimension()].into(), noise))
     }
 
-    /// Finds the most likely hyperparameters and conditions on all contacts.
+    /// Finds the most likely kernel and hyperparameters and conditions on all contacts.
     ///
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
     pub fn refit(&mut self) -> Result<(&Fit, &Posterior), CovarianceError> {
-        let last = self.fit.take();
-        let mut fit = self.search_box().fit(self.kernel, &self.contacts, last.as_ref());
+        let mut fit = self.kernels.fit(&self.search_box(), &self.contacts);
         if self.settings.band == Band::LeaveOneOut {
             let hyperparameters = fit.hyperparameters.clone();
             let mut posterior =
-                Posterior::new(self.kernel, hyperparameters, self.contacts.clone())?;
+                Posterior::new(self.kernels.kernel(), hyperparameters, self.contacts.clone())?;
             posterior.widen(widening(&posterior.left_out()));
             // Below it is conditioned again, to be what the recorded numbers make to the last bit.
             fit.hyperparameters = posterior.hyperparameters().clone();
@@ -245,20 +127,21 @@ impl Belief {
         Ok((self.fit.insert(fit), self.surface.insert(posterior)))
     }
 
-    /// Conditions on all contacts with given hyperparameters, as when a recorded belief is
-    /// drawn again.
+    /// Conditions on all contacts with what a fit found, as when a recorded belief is drawn again.
     ///
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
-    pub fn condition(&mut self, hyperparameters: Hyperparameters) -> Result<(), CovarianceError> {
-        let posterior = self.posterior(hyperparameters)?;
+    pub fn condition(&mut self, fit: &Fit) -> Result<(), CovarianceError> {
+        self.kernels.follow(fit);
+        let posterior = self.posterior(fit.hyperparameters.clone())?;
         self.explore(&posterior)?;
         self.surface = Some(posterior);
         Ok(())
     }
 
     fn posterior(&self, hyperparameters: Hyperparameters) -> Result<Posterior, CovarianceError> {
-        let mut posterior = Posterior::new(self.kernel, hyperparameters, self.contacts.clone())?;
+        let contacts = self.contacts.clone();
+        let mut posterior = Posterior::new(self.kernels.kernel(), hyperparameters, contacts)?;
         if let Some(ceiling) = &self.ceiling {
             ceiling.cut(&mut posterior, &self.presence.silhouette());
         }
@@ -312,8 +195,17 @@ impl Belief {
                 high: largest * scale,
                 prior: prior.signal.map(|prior| prior.scaled(scale)),
             },
-            noise_sd: self.settings.noise_sd_m,
+            touch_noise: match (self.settings.noise_sd_m, self.settings.noise_sd_min_m) {
+                (Some(noise_sd_m), _) => TouchNoise::Known(noise_sd_m),
+                (None, Some(least_m)) => TouchNoise::AtLeast(least_m),
+                (None, None) => TouchNoise::Fitted,
+            },
         }
+    }
+
+    /// What the last [`refit`](Self::refit) found.
+    pub fn fit(&self) -> Option<&Fit> {
+        self.fit.as_ref()
     }
 
     /// The posterior of the surface, once fitted.

@@ -21,6 +21,7 @@
 
 use super::probe::Swept;
 use super::silhouette::Silhouette;
+use crate::gp::means::Means;
 use crate::gp::posterior::Scratch;
 use crate::gp::{Hyperparameters, Observation, Posterior};
 use crate::math::normal;
@@ -72,25 +73,33 @@ impl Ceiling {
         let &Hyperparameters { noise_sd, signal_sd, .. } = belief.hyperparameters();
         let soft_sd = noise_sd.max(SOFTNESS_MIN * signal_sd);
         let mut scratch = Scratch::default();
-        let mut bounds: Vec<(&[f64], f64)> = self.bounds().collect();
+        let mut bounds: Vec<Bound> = self.bounds().collect();
+        let places = bounds.iter().map(|bound| bound.place);
+        let mut means = Means::at(belief.observations().dimension(), places);
         for _ in 0..CUTS_MAX {
-            let mut above: Vec<(usize, f64)> = (bounds.iter().enumerate())
-                .map(|(i, (place, height_m))| (i, belief.mean(place, &mut scratch) - height_m))
-                .filter(|(_, excess)| *excess > soft_sd)
+            let excess = means.of(belief).iter().zip(&bounds).map(|(mean, at)| mean - at.height_m);
+            let mut above: Vec<(usize, f64)> = (excess.enumerate())
+                .filter(|(i, excess)| *excess > soft_sd && !bounds[*i].is_done)
                 .collect();
             above.sort_by(|a, b| b.1.total_cmp(&a.1));
             let mut there = |(i, excess): (usize, f64)| {
-                let (place, _) = bounds[i];
-                let variance = belief.variance(place, &mut scratch);
+                let bound = &mut bounds[i];
+                let chance = SURE * *bound.chance.get_or_insert_with(|| silhouette.at(bound.place));
+                // The mean is above the bound, so the surface is no likelier below it than not.
+                if 0.5 * chance < 1.0 - chance {
+                    bound.is_done = true;
+                    return None;
+                }
+                let variance = belief.variance(bound.place, &mut scratch);
                 let spread = (variance + soft_sd * soft_sd).sqrt();
-                let chance = SURE * silhouette.at(place);
                 let is_there = chance * normal::cumulative(-excess / spread) >= 1.0 - chance;
                 is_there.then_some((i, excess, variance))
             };
             let Some((worst, excess, variance)) = above.into_iter().find_map(&mut there) else {
                 return;
             };
-            let (place, height_m) = bounds.swap_remove(worst);
+            bounds[worst].is_done = true;
+            let Bound { place, height_m, .. } = bounds[worst];
             let Some((height, sd)) = site(height_m + excess, variance, height_m, soft_sd) else {
                 continue;
             };
@@ -101,10 +110,21 @@ impl Ceiling {
         }
     }
 
-    fn bounds(&self) -> impl Iterator<Item = (&[f64], f64)> {
-        let all = self.places.iter().map(Vec::as_slice).zip(self.heights_m.iter().copied());
-        all.filter(|(_, height_m)| height_m.is_finite())
+    fn bounds(&self) -> impl Iterator<Item = Bound<'_>> {
+        let all = self.places.iter().zip(self.heights_m.iter().copied());
+        let known = all.filter(|(_, height_m)| height_m.is_finite());
+        known.map(|(place, height_m)| Bound { place, height_m, chance: None, is_done: false })
     }
+}
+
+/// What is known of one place.
+struct Bound<'a> {
+    place: &'a [f64],
+    height_m: f64,
+    /// The probability that there is a surface, once it was asked for.
+    chance: Option<f64>,
+    /// Whether the belief was cut there, or never will be.
+    is_done: bool,
 }
 
 /// The observation (height, standard deviation) that takes N(μ, σ²) to its part below a bound;

@@ -6,7 +6,8 @@
 //!
 //! ```
 //! use nalgebra::Vector3;
-//! use palpate::explore::belief::{Belief, GpSettings};
+//! use palpate::explore::belief::Belief;
+//! use palpate::explore::gp_settings::GpSettings;
 //! use palpate::explore::planner::{self, PlanningSettings};
 //! use palpate::explore::probe::{Contact, Touch};
 //! use palpate::math::seed;
@@ -35,6 +36,7 @@
 pub mod belief;
 pub mod control;
 mod free_space;
+pub mod gp_settings;
 pub mod planner;
 pub mod presence;
 pub mod probe;

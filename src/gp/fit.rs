@@ -3,7 +3,7 @@
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::Observations;
 use super::search::{Peak, Search};
-use super::search_box::SearchBox;
+use super::search_box::{SearchBox, TouchNoise};
 use crate::math::optimize::Stop;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 /// What a fit found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fit {
+    /// Name of the kernel that made the data likeliest, where there was a choice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kernel: Option<String>,
     /// The most probable hyperparameters.
     #[serde(flatten)]
     pub hyperparameters: Hyperparameters,
@@ -42,7 +45,28 @@ impl SearchBox {
     /// fit before the newest touches, is one more start, or, while the box need not be scanned
     /// again, the only one beside shorter lengths. With no observations, or if no covariance can
     /// be factored, the middle of the box is returned with [`Stop::Failed`].
+    ///
+    /// Noise that is known to be at least that of the sensor is fitted, and is the sensor's where
+    /// less would be likelier.
     pub fn fit(
+        &self,
+        kernel: &'static dyn Kernel,
+        observations: &Observations,
+        last: Option<&Fit>,
+    ) -> Fit {
+        let TouchNoise::AtLeast(least) = self.touch_noise else {
+            return self.fit_plainly(kernel, observations, last);
+        };
+        let within = |touch_noise| Self { touch_noise, ..self.clone() };
+        let free = within(TouchNoise::Fitted).fit_plainly(kernel, observations, last);
+        if free.hyperparameters.noise_sd >= least {
+            return free;
+        }
+        let bound = within(TouchNoise::Known(least)).fit_plainly(kernel, observations, last);
+        Fit { factorisations: free.factorisations + bound.factorisations, ..bound }
+    }
+
+    fn fit_plainly(
         &self,
         kernel: &'static dyn Kernel,
         observations: &Observations,
@@ -69,6 +93,7 @@ impl SearchBox {
         }
         let peak = search.conclude().unwrap_or_else(|| self.middle(&lower, &upper));
         Fit {
+            kernel: None,
             hyperparameters: peak.hyperparameters,
             log_likelihood: peak.log_likelihood,
             factorisations: search.factorisations(),
@@ -81,9 +106,11 @@ impl SearchBox {
     fn middle(&self, lower: &[f64], upper: &[f64]) -> Peak {
         let middle: Vec<f64> = lower.iter().zip(upper).map(|(l, u)| 0.5 * (l + u)).collect();
         let (length_scales, noise) = self.parameters(&middle);
-        let signal_sd = match self.noise_sd {
-            Some(noise_sd) => noise_sd / noise.height,
-            None => (self.signal_sd.low * self.signal_sd.high).sqrt(),
+        let signal_sd = match self.touch_noise {
+            TouchNoise::Known(noise_sd) => noise_sd / noise.height,
+            TouchNoise::Fitted | TouchNoise::AtLeast(_) => {
+                (self.signal_sd.low * self.signal_sd.high).sqrt()
+            }
         };
         Peak {
             hyperparameters: Hyperparameters::new(signal_sd, length_scales, noise, 0.0),

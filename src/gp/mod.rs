@@ -12,7 +12,7 @@
 //! # #[cfg(feature = "nlopt")] {
 //! use palpate::gp::kernel::SquaredExponential;
 //! use palpate::gp::posterior::Scratch;
-//! use palpate::gp::{Mean, Observations, Posterior, SearchBox};
+//! use palpate::gp::{Mean, Observations, Posterior, SearchBox, TouchNoise};
 //!
 //! // Heights of a wave 20 mm high, observed every 0.5 m over 4 m; all in metres.
 //! let wave = |x_m: f64| 0.02 * (2.0 * x_m).sin();
@@ -29,7 +29,7 @@
 //!     length_scales: vec![(0.05, 4.0).into()],
 //!     noise_ratio: (1e-4, 1e-2).into(),
 //!     signal_sd: (1e-4, 1.0).into(),
-//!     noise_sd: None,
+//!     touch_noise: TouchNoise::Fitted,
 //!     slope_noise_ratio: None,
 //! };
 //! let fit = search_box.fit(&SquaredExponential, &observations, None);
@@ -54,13 +54,16 @@
 //! | [`observations`] | places, heights, and slopes if they are observed too |
 //! | [`posterior`] | mean, variance and their gradients at a place (Eq. 3 of Yi et al. 2016) |
 //! | [`batch`] | mean and variance at many places |
+//! | [`means`] | means at many places while observations are added |
 //! | [`likelihood`] | how well hyperparameters explain the observations |
+//! | [`choice`] | which kernel explains them best |
 //! | [`fit`], [`search_box`], [`range`] | the most likely hyperparameters, and where to seek them |
 //! | [`reduction`] | how much one more observation would tell |
 //! | [`covariance`], [`dense`], [`cholesky`] | the covariance matrix, factored whole or row by row
 //! |
 
 pub mod batch;
+pub mod choice;
 pub mod cholesky;
 mod correlations;
 pub mod covariance;
@@ -71,6 +74,7 @@ pub mod indefinite;
 pub mod kernel;
 pub mod likelihood;
 pub mod mean;
+pub mod means;
 pub mod observations;
 pub mod posterior;
 pub mod range;
@@ -85,4 +89,4 @@ pub use mean::Mean;
 pub use observations::{NoiseRatio, Observation, Observations, Slope};
 pub use posterior::Posterior;
 pub use range::{LogNormal, Range, Scale};
-pub use search_box::SearchBox;
+pub use search_box::{SearchBox, TouchNoise};

@@ -293,6 +293,11 @@ impl Posterior {
         self.factor.solve_lower(&mut scratch.solved)
     }
 
+    /// A⁻¹·(y − m).
+    pub(super) fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
     pub(super) fn kernel(&self) -> &'static dyn Kernel {
         self.kernel
     }

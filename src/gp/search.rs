@@ -5,7 +5,7 @@ use super::kernel::{Hyperparameters, Kernel};
 use super::likelihood::Likelihood;
 use super::observations::Observations;
 use super::range::Scale;
-use super::search_box::SearchBox;
+use super::search_box::{SearchBox, TouchNoise};
 use crate::math::optimize;
 use crate::math::optimize::{Optimum, Stop};
 
@@ -50,9 +50,9 @@ impl<'a> Search<'a> {
         lower: &'a [f64],
         upper: &'a [f64],
     ) -> Self {
-        let scale = match sought.noise_sd {
-            Some(noise_sd) => Scale::KnownNoise(noise_sd),
-            None => Scale::Best(sought.signal_sd),
+        let scale = match sought.touch_noise {
+            TouchNoise::Known(noise_sd) => Scale::KnownNoise(noise_sd),
+            TouchNoise::Fitted | TouchNoise::AtLeast(_) => Scale::Best(sought.signal_sd),
         };
         let likelihood = Likelihood::new(kernel, sought.mean, observations);
         let bounds = optimize::Bounds { lower, upper };

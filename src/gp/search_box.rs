@@ -23,19 +23,31 @@ pub struct SearchBox {
     pub slope_noise_ratio: Option<Range>,
     /// The signal's standard deviation, in the unit of the heights.
     pub signal_sd: Range,
-    /// The touch noise's standard deviation, if it is known and not to be fitted.
-    pub noise_sd: Option<f64>,
+    /// What is known of the touch noise.
+    pub touch_noise: TouchNoise,
+}
+
+/// What is known of the touch noise's standard deviation, in the unit of the heights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TouchNoise {
+    /// Nothing: it is fitted within the range of its ratio.
+    Fitted,
+    /// It is this.
+    Known(f64),
+    /// It is the sensor's, this, and what the kernel cannot follow comes on top: fitted where that
+    /// gives more.
+    AtLeast(f64),
 }
 
 impl SearchBox {
     /// The ranges searched over: lengths, then noise ratio, then slope noise ratio.
     pub(super) fn ranges(&self) -> impl Iterator<Item = Range> {
         // A known noise and a range of the signal leave a range of their ratio.
-        let noise_ratio = match self.noise_sd {
-            Some(noise_sd) => {
+        let noise_ratio = match self.touch_noise {
+            TouchNoise::Known(noise_sd) => {
                 (noise_sd / self.signal_sd.high, noise_sd / self.signal_sd.low).into()
             }
-            None => self.noise_ratio,
+            TouchNoise::Fitted | TouchNoise::AtLeast(_) => self.noise_ratio,
         };
         self.length_scales.iter().copied().chain([noise_ratio]).chain(self.slope_noise_ratio)
     }

@@ -55,7 +55,7 @@ impl<'a> Replay<'a> {
                 belief.observe_swept(&Swept { finger, p_wt: Point3::from(tip) });
             }
         }
-        belief.condition(fit.hyperparameters.clone()).with_context(place)?;
+        belief.condition(fit).with_context(place)?;
         let Some(surface) = belief.surface().cloned() else { return Ok(None) };
         Ok(Some(Self {
             belief,

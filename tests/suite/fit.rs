@@ -3,9 +3,12 @@
 use crate::common::shipped::toy;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
+use palpate::gp::choice::Choice;
+use palpate::gp::kernel;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::likelihood::Likelihood;
-use palpate::gp::{LogNormal, Mean, Observations, Range, Scale, SearchBox};
+use palpate::gp::posterior::{Posterior, Scratch};
+use palpate::gp::{Fit, LogNormal, Mean, Observations, Range, Scale, SearchBox, TouchNoise};
 use std::path::Path;
 
 static KERNEL: SquaredExponential = SquaredExponential;
@@ -18,7 +21,7 @@ fn search_box(mean: Mean, length_scales: Vec<Range>) -> SearchBox {
         length_scales,
         noise_ratio,
         signal_sd,
-        noise_sd: None,
+        touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
     }
 }
@@ -170,7 +173,49 @@ fn a_prior_pulls_a_known_noise_stays_and_a_constant_is_found() {
     let pulled = pulled.fit(&KERNEL, &touches, None).hyperparameters;
     let off = |length: f64| length.ln().abs();
     assert!(off(pulled.length_scales[0]) < off(found.length_scales[0]), "{pulled:?}");
-    let known = SearchBox { noise_sd: Some(0.05), ..free };
+    let known = SearchBox { touch_noise: TouchNoise::Known(0.05), ..free.clone() };
     let known = known.fit(&KERNEL, &touches, None).hyperparameters;
     assert!((known.noise_sd - 0.05).abs() < 1e-12, "{known:?}");
+    // A sensor that is better than what the kernel cannot follow changes nothing, a worse one counts.
+    let least = |sd| SearchBox { touch_noise: TouchNoise::AtLeast(sd), ..free.clone() };
+    let fitted = |sd| least(sd).fit(&KERNEL, &touches, None).hyperparameters;
+    assert_eq!(fitted(0.9 * found.noise_sd), found);
+    assert_eq!(fitted(0.05), known);
+}
+
+/// The likeliest of kernels is the one that is likeliest alone, and a row tells which it was.
+#[test]
+fn of_several_kernels_the_likeliest_is_taken() {
+    let bounds = search_box(Mean::Zero, vec![(0.05, 4.0).into()]);
+    let smooth = |x: f64| (3.0 * x).sin();
+    let edged = |x: f64| if x < 1.9 { 0.0 } else { 1.0 };
+    let mut chosen = Vec::new();
+    for surface in [smooth as fn(f64) -> f64, edged] {
+        let mut touches = Observations::new(1);
+        (0..25).for_each(|i| touches.push(&[0.16 * f64::from(i)], surface(0.16 * f64::from(i))));
+        let names = ["matern_32", "squared_exponential"].map(String::from);
+        let mut choice = Choice::between(&names);
+        let fit = choice.fit(&bounds, &touches);
+        let alone: Vec<Fit> = names
+            .iter()
+            .map(|name| bounds.fit(kernel::by_name(name).unwrap(), &touches, None))
+            .collect();
+        let best = alone.iter().map(|fit| fit.log_likelihood).fold(f64::MIN, f64::max);
+        assert_eq!(fit.log_likelihood, best);
+        assert_eq!(fit.factorisations, alone.iter().map(|fit| fit.factorisations).sum::<u32>());
+        let mut again = Choice::between(&names);
+        again.follow(&fit);
+        let at = |choice: &Choice| {
+            Posterior::new(choice.kernel(), fit.hyperparameters.clone(), touches.clone())
+        };
+        let [mean, told] = [&choice, &again]
+            .map(|choice| at(choice).unwrap().mean(&[0.2], &mut Scratch::default()));
+        assert_eq!(mean, told);
+        chosen.push(fit.kernel.unwrap());
+    }
+    assert_eq!(chosen, ["squared_exponential", "matern_32"]);
+    let mut one = Choice::between(&["matern_52".into()]);
+    let mut touches = Observations::new(1);
+    touches.push(&[0.1], 0.2);
+    assert_eq!(one.fit(&bounds, &touches).kernel, None);
 }

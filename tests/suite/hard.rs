@@ -8,7 +8,7 @@ use palpate::gp::covariance::CovarianceError;
 use palpate::gp::fit::Fit;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::posterior::Scratch;
-use palpate::gp::{Mean, Observations, Posterior, SearchBox};
+use palpate::gp::{Mean, Observations, Posterior, SearchBox, TouchNoise};
 use palpate::math::optimize::Stop;
 
 static KERNEL: SquaredExponential = SquaredExponential;
@@ -34,7 +34,7 @@ fn search_box(touches: &Observations, side: f64, noisiest: f64) -> SearchBox {
         length_scales: vec![(0.005 * side, side).into()],
         noise_ratio: (1e-4, noisiest).into(),
         signal_sd: (1e-3 * scale, 1e3 * scale).into(),
-        noise_sd: None,
+        touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
     }
 }

@@ -1,7 +1,8 @@
 //! Planners against what they promise.
 
 use nalgebra::{Point3, Vector3};
-use palpate::explore::belief::{Belief, GpSettings};
+use palpate::explore::belief::Belief;
+use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
 use palpate::explore::planner::{PLANNERS, PlanningSettings, Stall};
 use palpate::explore::probe::{Contact, Touch};

@@ -22,8 +22,8 @@ const NAME: &str = "electrode";
 const FRAMES: u32 = 2;
 
 /// Frames in a row with the same value that are no chance, whatever time lies between them: nobody
-/// reads while the next touch is thought about. Noise of several counts makes two the same in one of
-/// ten, so many in one of a hundred thousand.
+/// reads while the next touch is thought about. Noise of several counts makes two the same in one
+/// of ten, so many in one of a hundred thousand.
 const STILL_FRAMES: u32 = 6;
 
 const NOTHING: [Still; ELECTRODES] =

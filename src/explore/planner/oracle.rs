@@ -25,7 +25,7 @@ impl Planner for Oracle {
             let mut after = sight.touched(belief, &target)?;
             match settings.refit {
                 true => after.refit().map(|_| ()).ok()?,
-                false => after.condition(belief.surface()?.hyperparameters().clone()).ok()?,
+                false => after.condition(belief.fit()?).ok()?,
             }
             Some((sight.rmse_m(after.surface()?)?, target))
         });

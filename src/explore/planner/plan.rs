@@ -68,3 +68,8 @@ pub fn uniform(zone: &Zone, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let fractions: Vec<f64> = (0..zone.dimension()).map(|_| rng.random()).collect();
     zone.at(&fractions)
 }
+
+/// Straight way along the zone from one place to another.
+pub(super) fn distance_m(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}

@@ -71,12 +71,16 @@ pub struct SilhouetteSettings {
     pub places: u32,
     /// Places at which a touch is considered; other ones for each touch.
     pub candidates: u32,
+    /// The way along the zone that takes as long as a touch does from first to last. With it values
+    /// are those per time; without it, per touch.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub touch_way_m: Option<f64>,
 }
 
 impl Default for SilhouetteSettings {
     /// Chosen: twice as many candidates gain nothing on the suite.
     fn default() -> Self {
-        Self { places: 256, candidates: 500 }
+        Self { places: 256, candidates: 500, touch_way_m: None }
     }
 }
 
@@ -167,6 +171,9 @@ impl Checked for PlanningSettings {
         rules.number("integrated_variance.places", places.into(), 1.0..=65536.0);
         rules.number("silhouette.places", self.silhouette.places.into(), 1.0..=65536.0);
         rules.number("silhouette.candidates", self.silhouette.candidates.into(), 1.0..=65536.0);
+        if let Some(touch_way_m) = self.silhouette.touch_way_m {
+            rules.number("silhouette.touch_way_m", touch_way_m, 1e-6..=1e6);
+        }
         rules.number("oracle.candidates", self.oracle.candidates.into(), 1.0..=65536.0);
         rules.number("slope.weight", self.slope.weight, 0.0..=1e3);
         rules.number("travel.tour", self.travel.tour.into(), 1.0..=100.0);

@@ -5,10 +5,13 @@
 //! choosing the error is 0.904 of that of a Sobol sequence, with the probability itself and without
 //! the hope 0.937.
 //!
+//! With `planning.silhouette.touch_way_m` what counts is the fall per time: a touch takes as long as so
+//! much way, and the way to it comes on top.
+//!
 //! How far touches speak for their surroundings is what a few touches tell least: the variance is
 //! that of a committee of beliefs, whose length scales differ from the fitted ones.
 
-use super::plan::{Entry, Plan, Planner};
+use super::plan::{Entry, Plan, Planner, distance_m};
 use super::search::Search;
 use super::sobol;
 use crate::explore::belief::Belief;
@@ -62,7 +65,12 @@ impl Planner for Silhouette {
             }
         };
         let candidates = self.search.scattered(self.search.settings.silhouette.candidates);
-        let valued = candidates.into_iter().map(|place| (value(&place), place));
+        // In units of a touch that begins where the last one was.
+        let time = |place: &[f64]| {
+            let way = self.search.settings.silhouette.touch_way_m.zip(belief.targets().last());
+            1.0 + way.map_or(0.0, |(touch_way_m, here)| distance_m(here, place) / touch_way_m)
+        };
+        let valued = candidates.into_iter().map(|place| (value(&place) / time(&place), place));
         match valued.max_by(|a, b| a.0.total_cmp(&b.0)) {
             Some((_, place)) => self.search.conclude(belief, place),
             None => self.search.anywhere(),

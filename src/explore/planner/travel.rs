@@ -6,7 +6,7 @@
 //! them; then the next tour is planned with what was learnt. Every tour has the place where σ is
 //! largest, so that none is put off for ever.
 
-use super::plan::{Entry, Plan, Planner};
+use super::plan::{Entry, Plan, Planner, distance_m};
 use super::search::Search;
 use crate::explore::belief::Belief;
 use crate::gp::posterior::Scratch;
@@ -107,10 +107,6 @@ fn before<'a>(tour: &'a [Plan], start: &'a [f64], index: usize) -> &'a [f64] {
 
 /// A way must shorten by more than rounding, or it could be turned for ever.
 const SHORTER_M: f64 = 1e-9;
-
-fn distance_m(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
-}
 
 #[cfg(test)]
 mod tests {

@@ -222,14 +222,12 @@ fn belief(
 ) -> anyhow::Result<Option<Belief>> {
     let Some(replay) = Replay::new(run, planner, touches)? else { return Ok(None) };
     let predictions = replay.surface.predict(places.iter().copied());
-    let known = Known::new(run, &replay);
-    let drawn = |(place, prediction): (&&[f64], &Prediction)| {
-        known.at(place, prediction.variance).then_some(prediction.mean)
-    };
+    let known = Known::new(&replay).over(places.iter().copied());
+    let drawn = |(known, prediction): (&bool, &Prediction)| known.then_some(prediction.mean);
     Ok(Some(Belief {
         touches,
         score: replay.score(),
-        means_m: places.iter().zip(&predictions).map(drawn).collect(),
+        means_m: known.iter().zip(&predictions).map(drawn).collect(),
         deviations_m: predictions.iter().map(|prediction| prediction.variance.sqrt()).collect(),
     }))
 }

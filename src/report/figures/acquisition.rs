@@ -125,14 +125,14 @@ fn draw_curves(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
 /// Deviations along the zone in metres.
 fn read_deviations(run: &Run, replay: &Replay) -> Vec<Reading> {
     let mut scratch = Scratch::default();
-    let known = Known::new(run, replay);
+    let known = Known::new(replay);
     let places = run.experiment.scene.zone.grid(STEPS).into_iter();
     places.map(|place| reading(place, replay, &known, &mut scratch)).collect()
 }
 
 fn reading(place: Vec<f64>, replay: &Replay, known: &Known, scratch: &mut Scratch) -> Reading {
     let sd_m = deviation_m(&replay.belief, &place, scratch);
-    let is_drawn = known.at(&place, replay.surface.variance(&place, scratch));
+    let is_drawn = known.at(&place);
     (place, sd_m, is_drawn)
 }
 
@@ -193,7 +193,7 @@ fn draw_maps(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
     let maps: Vec<HeatMap> = replays
         .iter()
         .map(|replay| {
-            let (mut scratch, known) = (Scratch::default(), Known::new(run, replay));
+            let (mut scratch, known) = (Scratch::default(), Known::new(replay));
             HeatMap::read(zone, map_area, |place| {
                 let (_, sd_m, is_drawn) = reading(place, replay, &known, &mut scratch);
                 (unit.per_m * sd_m, is_drawn)

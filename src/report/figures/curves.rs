@@ -159,11 +159,11 @@ pub(super) fn draw_belief(
 /// (x, mean, standard deviation) along the zone, not finite where the belief is not drawn.
 fn read(run: &Run, replay: &Replay) -> Vec<(f64, f64, f64)> {
     let mut scratch = Scratch::default();
-    let known = Known::new(run, replay);
+    let known = Known::new(replay);
     (run.experiment.scene.zone.grid(STEPS).into_iter())
         .map(|place| {
             let variance = replay.surface.variance(&place, &mut scratch);
-            match known.at(&place, variance) {
+            match known.at(&place) {
                 true => (place[0], replay.surface.mean(&place, &mut scratch), variance.sqrt()),
                 false => (place[0], f64::NAN, f64::NAN),
             }

@@ -78,10 +78,9 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             };
             panel.frame(&mut canvas, &format!("{planner}, {count} touches"), &score);
             if let Some(replay) = replay {
-                let (mut scratch, known) = (Scratch::default(), Known::new(run, &replay));
+                let (mut scratch, known) = (Scratch::default(), Known::new(&replay));
                 let heights = grid.heights(|place, _| {
-                    let variance = replay.surface.variance(place, &mut scratch);
-                    known.at(place, variance).then(|| replay.surface.mean(place, &mut scratch))
+                    known.at(place).then(|| replay.surface.mean(place, &mut scratch))
                 });
                 let relief = Relief::new(&panel.view, &grid.xs, &grid.zs, &heights, &axis);
                 relief.draw(&mut canvas);

@@ -1,10 +1,10 @@
 //! The Gaussian process on data that break others.
 
 use super::case::{Case, Outcome, all, case, require};
-use crate::gp::SearchBox;
 use crate::gp::kernel::{Hyperparameters, SquaredExponential};
 use crate::gp::posterior::Scratch;
 use crate::gp::{Mean, Observations, Posterior};
+use crate::gp::{SearchBox, TouchNoise};
 use crate::math::optimize;
 use crate::math::optimize::Stop;
 
@@ -155,7 +155,7 @@ fn fitted(touches: &[(f64, f64)], misfit: f64) -> Outcome {
         length_scales: vec![(0.02, 4.0).into()],
         noise_ratio: (1e-4, 1e-2).into(),
         signal_sd: (1e-12 * scale, 1e3 * scale).into(),
-        noise_sd: None,
+        touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
     };
     let fit = search.fit(&KERNEL, &all_of, None);

@@ -8,6 +8,7 @@ use palpate::experiment::truth::Truth;
 use palpate::gp::fit::Fit;
 use palpate::gp::kernel::Hyperparameters;
 use palpate::math::optimize::Stop;
+use palpate::task::Zone;
 
 pub const CURVE: &str = r#"
 name = "curve"
@@ -69,6 +70,11 @@ fn row(experiment: &Experiment, trial: u32, planner: &str) -> TrialRow {
     TrialRow { trial, planner: planner.into(), failure: None, touches, verification: Vec::new() }
 }
 
+/// Where the finger turns back that meets nothing at `target`.
+pub fn tip_behind(zone: &Zone, target: &[f64]) -> [f64; 3] {
+    zone.point(target, -0.1).coords.into()
+}
+
 fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> TouchRow {
     let zone = &experiment.scene.zone;
     // Multiples of two irrational numbers spread evenly over the zone.
@@ -77,6 +83,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
     let step = f64::from(count + 100 * trial) + shift;
     let target = zone.at(&[(0.618 * step).fract(), (0.755 * step).fract()]);
     let fit = Fit {
+        kernel: None,
         hyperparameters: Hyperparameters {
             signal_sd: 0.05,
             length_scales: zone.extents_m().iter().map(|side| 0.3 * side).collect(),
@@ -105,10 +112,10 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
     TouchRow {
         outline: None,
         contact: height_m(&target).map(|height_m| zone.point(&target, height_m).coords.into()),
+        tip: height_m(&target).is_none().then(|| tip_behind(zone, &target)),
         target,
         overload: false,
         normal: None,
-        tip: None,
         time_s: None,
         planned_sd_m: (count > experiment.initial_touches).then_some(1e-3),
         stall: None,
