@@ -1,15 +1,19 @@
 //! `palpate calibrate`.
 
+use super::columns::{aligned, cell};
 use super::terminal::{Ending, print};
-use crate::sim::finger::calibration::{Free, Model, Residual, fit, residual};
+use crate::sim::finger::calibration::constants::Model;
+use crate::sim::finger::calibration::fit::{Fit, Free, fit};
+use crate::sim::finger::calibration::score::{HeldOut, Score, between, leave_one_out};
+use crate::sim::finger::calibration::session::Session;
 use crate::sim::finger::effects::Effects;
-use crate::sim::finger::effects::fluid::FluidEffect;
-use crate::sim::finger::plate::{Attitude, Recordings};
+use crate::sim::finger::recording::{Recording, Recordings};
 use crate::{files, words};
 use anyhow::{Context, anyhow};
 use std::path::PathBuf;
 
-/// Fit the finger's constants to recordings of it on a flat plate.
+/// Fit the finger's constants to recordings of it on a flat plate, and score them on sensors that
+/// they were not fitted to.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -18,7 +22,8 @@ Examples:
 pub struct Args {
     /// The recordings, as in tests/data/biotac_flat_plate.json.
     recordings: PathBuf,
-    /// Keep the constants and find only how the finger was held: a test of the constants.
+    /// Keep the constants and find only what belongs to each session (offset, gain, attitude): a
+    /// test of the constants.
     #[arg(long)]
     attitude_only: bool,
 }
@@ -31,35 +36,25 @@ pub fn run(args: &Args) -> anyhow::Result<Ending> {
         let (line, what) = (error.line(), words::json(&error));
         anyhow!("{name}:{line}: not a recording: {what}")
     })?;
-    let free = if args.attitude_only { Free::Attitude } else { Free::Constants };
-    for recording in &recordings.sensors {
-        let start = Model {
-            skin: Default::default(),
-            electrodes: Default::default(),
-            cavity_pa_m3: FluidEffect::default().stiffness_pa_m3,
-            attitude: Attitude { pitch_rad: 0.1, roll_rad: 0.0, roll_sd_rad: 0.1 },
-        };
-        let refused = || format!("{name}: sensor {} has no load of 2 N", recording.sensor);
-        let before = residual(&start, recording).with_context(refused)?;
-        let (model, after) = fit(&start, recording, free).with_context(refused)?;
-        print(&format!("sensor {}", recording.sensor))?;
-        print(&format!("  before   {}", line(&before)))?;
-        print(&format!("  after    {}", line(&after)))?;
-        let Attitude { pitch_rad, roll_rad, roll_sd_rad } = model.attitude;
-        print(&format!(
-            "  held at  pitch {:.1}°, roll {:.1}° ± {:.1}°",
-            pitch_rad.to_degrees(),
-            roll_rad.to_degrees(),
-            roll_sd_rad.to_degrees()
-        ))?;
-        if free == Free::Constants {
-            let effects = Effects {
-                skin: Some(model.skin),
-                electrodes: Some(model.electrodes),
-                ..Effects::default()
-            };
-            print(&format!("\n{}", toml::to_string(&Tables { effects })?))?;
+    recordings.check().with_context(|| format!("{name}: not a recording"))?;
+    let (start, sensors) = (Model::default(), &recordings.sensors);
+    let free = if args.attitude_only { Free::Sessions } else { Free::Constants };
+    let refused = || format!("{name}: cannot be fitted");
+    let held_out = leave_one_out(&start, sensors, free).with_context(refused)?;
+    for held in &held_out {
+        print(&told(held))?;
+    }
+    let whole: Vec<Score> = held_out.iter().map(HeldOut::whole).collect();
+    print(&table(vec![row("all sensors", &Score::of(whole.iter()))]))?;
+    if free == Free::Constants {
+        let all: Vec<&Recording> = sensors.iter().collect();
+        let fit = fit(&start, &all, free).with_context(refused)?;
+        print(&format!("constants fitted to {}", names(sensors.iter().map(|s| &s.sensor))))?;
+        print(&constants(&fit, &held_out))?;
+        for (session, recording) in fit.sessions.iter().zip(sensors) {
+            print(&format!("  {}: {}", recording.sensor, held_at(session)))?;
         }
+        print(&format!("\n{}", toml::to_string(&Tables { effects: fit.model.effects() })?))?;
     }
     Ok(Ending::Done)
 }
@@ -70,12 +65,72 @@ struct Tables {
     effects: Effects,
 }
 
-fn line(residual: &Residual) -> String {
+fn told(held: &HeldOut) -> String {
+    let from = match held.others.is_empty() {
+        true => "the constants of a scene without settings".into(),
+        false => format!("constants fitted to {}", names(held.others.iter())),
+    };
+    let mut text = format!("sensor {} with {from}\n", held.sensor);
+    text += &constants(&held.fit, &[]);
+    for session in &held.fit.sessions {
+        text += &format!("  its own: {}\n", held_at(session));
+    }
+    let mut rows = Vec::new();
+    for (force_n, score) in &held.loads {
+        rows.push(row(&format!("{force_n:.1} N"), score));
+    }
+    rows.push(row("all loads", &held.whole()));
+    text + &table(rows)
+}
+
+/// The constants of a fit; `held_out` are those without one sensor each.
+fn constants(fit: &Fit, held_out: &[HeldOut]) -> String {
+    let mut text = String::new();
+    for found in &fit.estimates {
+        text += &format!("  {:22} {:.2e} */÷ {:.2}", found.key, found.value, found.factor);
+        if let Some(factor) = between(held_out, found.key) {
+            text += &format!(", between sensors */÷ {factor:.2}");
+        }
+        text.push('\n');
+    }
+    for lost in &fit.refused {
+        text += &format!(
+            "  {:22} refused: it ran to its bound {:e}, the recordings do not determine it; it stays {:e}\n",
+            lost.key, lost.bound, lost.kept
+        );
+    }
+    text
+}
+
+fn held_at(session: &Session) -> String {
+    let rolls: Vec<String> =
+        session.roll_rad.iter().map(|roll| format!("{:.0}", roll.to_degrees())).collect();
     format!(
-        "mean error {:.0} counts, {:.0} % of signs right, pressure rises {:.2} as fast from 4 to \
-         8 N as to 1 N",
-        residual.mean_error_counts,
-        100.0 * residual.right_sign,
-        residual.saturation
+        "conductivity {:.2}, gain {:.2}, pitch {:.1}°, roll {}° by load",
+        session.offset,
+        session.gain,
+        session.pitch_rad.to_degrees(),
+        rolls.join(", ")
     )
+}
+
+fn names<'a>(sensors: impl Iterator<Item = &'a String>) -> String {
+    sensors.map(String::as_str).collect::<Vec<_>>().join(", ")
+}
+
+fn row(what: &str, score: &Score) -> [String; 6] {
+    [
+        format!("  {what}"),
+        cell(Some(score.model_counts), 0),
+        cell(Some(score.no_change_counts), 0),
+        cell(Some(score.offset_counts), 0),
+        cell(score.mean_change_counts, 0),
+        format!("{}/{}", score.right, score.signed),
+    ]
+}
+
+fn table(rows: Vec<[String; 6]>) -> String {
+    let head =
+        ["  mean error, counts", "model", "no change", "offset alone", "mean change", "signs"];
+    aligned(&[vec![head.map(String::from)], rows].concat())
 }

@@ -30,6 +30,11 @@ pub trait Problem {
         0.0
     }
 
+    /// A step that gains no more than this part of the cost is the last.
+    fn gained(&self) -> f64 {
+        GAINED
+    }
+
     /// Of which kind residual `i` is: each kind has a scatter of its own.
     fn kind(&self, _i: usize) -> usize {
         0
@@ -127,6 +132,20 @@ pub fn fit<P: Problem>(problem: &P, start: &P::State) -> Result<Solution<P::Stat
     conclude(problem, state, used)
 }
 
+/// The best parameters from `start` and their cost, no residual left out: one far off counts with
+/// its amount only.
+///
+/// # Errors
+/// If a residual is not finite, there is none, or no step helps.
+pub fn robust<P: Problem>(problem: &P, start: &P::State) -> Result<(P::State, f64), FitError> {
+    if problem.residuals(start).is_empty() {
+        return Err(FitError::Empty);
+    }
+    let state = settle(problem, start, huber)?;
+    let (_, cost) = huber(&problem.residuals(&state));
+    Ok((state, cost))
+}
+
 /// How well a problem's data would determine its parameters at `state`, before there are any.
 ///
 /// # Errors
@@ -181,7 +200,7 @@ fn settle<P: Problem>(
             }
             step *= 0.5;
         }
-        if gain <= GAINED * cost {
+        if gain <= problem.gained() * cost {
             return Ok(state);
         }
     }
@@ -190,13 +209,18 @@ fn settle<P: Problem>(
 
 /// Weights and cost in which an outlier counts with its amount; the scatter stays the expected one.
 fn huber(residuals: &DVector<f64>) -> (DVector<f64>, f64) {
-    let weights = residuals.map(|r| (HUBER / r.abs().max(HUBER)).min(1.0));
+    let weights = residuals.map(huber_weight);
     let costs = residuals.iter().map(|r| match r.abs() <= HUBER {
         true => 0.5 * r * r,
         false => HUBER * (r.abs() - 0.5 * HUBER),
     });
     let cost = costs.sum();
     (weights, cost)
+}
+
+/// Weight of a residual that beyond a limit counts with its amount (Huber 1964).
+pub fn huber_weight(residual: f64) -> f64 {
+    HUBER / residual.abs().max(HUBER)
 }
 
 /// Weights and cost of the residuals that are used.

@@ -43,6 +43,8 @@ pub struct SimulatedFinger {
 
 /// What is drawn for one trial by its seed.
 struct Drawn {
+    /// A fingertip that differs from the environment's; none if it does not.
+    own: Option<Box<Fingertip>>,
     state: FingertipState,
     gauge: Option<Gauge>,
     misplaced: Option<Misplaced>,
@@ -92,12 +94,11 @@ impl SimulatedFinger {
     /// [`Fault::Diverged`] if the motion is not finite, [`Fault::Inside`] if the object encloses
     /// the tip; and those of the [`Shell`].
     pub fn step(&mut self, motion: &TipMotion, dt_s: f64) -> Result<Wrench, Fault> {
-        let (Some(tip), Shape::Mesh { bvh, .. }) =
-            (self.environment.fingertip(), self.environment.shape())
-        else {
+        let Drawn { own, state, misplaced, .. } = &mut self.drawn;
+        let tip = own.as_deref().or(self.environment.fingertip());
+        let (Some(tip), Shape::Mesh { bvh, .. }) = (tip, self.environment.shape()) else {
             return Ok(Wrench::default());
         };
-        let Drawn { state, misplaced, .. } = &mut self.drawn;
         let motion = misplaced.as_ref().map_or(*motion, |misplaced| misplaced.motion(motion));
         self.load = match &mut self.shell {
             Some(shell) => state.step_loaded(tip, shell.step(&motion.x_wt, dt_s)?, &motion, dt_s),
@@ -161,8 +162,12 @@ impl Drawn {
         let stream = |purpose| seed::stream(seed, 0, purpose);
         let scene = environment.scene();
         let effects = &scene.effects;
+        let sensor = effects.variation.as_ref().map(|effect| effect.sensor(stream("variation")));
+        let own =
+            sensor.as_ref().map(|sensor| Fingertip::varied(&scene.finger, effects, sensor).into());
         let mut drawn = Self {
-            state: FingertipState::new(tip, &stream("finger")),
+            state: FingertipState::new(own.as_deref().unwrap_or(tip), &stream("finger")),
+            own,
             gauge: effects.wrench.as_ref().map(|effect| Gauge::new(effect, stream("wrench"))),
             misplaced: None,
         };
@@ -174,6 +179,10 @@ impl Drawn {
                 finger: effect.fixed(correction).map_or(error.finger, |fixed| fixed * error.finger),
                 object: x_wo * error.object.inverse() * x_wo.inverse(),
             });
+        }
+        if let Some(sensor) = &sensor {
+            let still = Misplaced { finger: Isometry3::identity(), object: Isometry3::identity() };
+            drawn.misplaced.get_or_insert(still).finger *= sensor.attitude;
         }
         drawn
     }

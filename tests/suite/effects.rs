@@ -86,7 +86,8 @@ fn effects_without_what_they_need_are_refused_and_dropped() {
 }
 
 /// Effects that a skin alone can be given, and whose state is the fingertip's.
-const BESIDE_SKIN: [&str; 5] = ["fluid", "fluid.vibration", "electrodes", "thermal", "friction"];
+const BESIDE_SKIN: [&str; 6] =
+    ["fluid", "fluid.vibration", "electrodes", "creep", "thermal", "friction"];
 
 #[test]
 fn an_effect_that_is_off_has_no_state_and_does_no_work() {

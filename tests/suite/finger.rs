@@ -246,11 +246,14 @@ fn work_of_a_cycle(effects: &Effects, slide_m: f64) -> (f64, f64) {
 
 #[test]
 fn a_press_and_release_creates_no_energy() {
-    let smooth = Effects { friction: None, ..Effects::all() };
+    let creeping = Effects { friction: None, ..Effects::all() };
+    let smooth = Effects { creep: None, ..creeping.clone() };
     let (work, peak) = work_of_a_cycle(&smooth, 0.0);
     near(work / peak, 0.0, 1e-3);
     let (work, peak) = work_of_a_cycle(&smooth, 2e-3);
     near(work / peak, 0.0, 1e-3);
+    let (work, peak) = work_of_a_cycle(&creeping, 0.0);
+    assert!(work < -0.01 * peak, "creep took {work} of {peak} J");
     let (work, peak) = work_of_a_cycle(&Effects::all(), 2e-3);
     assert!(work < -0.1 * peak, "friction took {work} of {peak} J");
 }
@@ -279,7 +282,7 @@ fn friction_sticks_then_slips_at_coulombs_limit_against_the_motion() {
 
 #[test]
 fn bad_numbers_and_a_finger_inside_are_errors_that_leave_the_state() {
-    let tip = Fingertip::new(&Finger::default(), &Effects::all());
+    let tip = Fingertip::new(&Finger::default(), &Effects { creep: None, ..Effects::all() });
     let bvh = MeshBvh::new(box_mesh(point(-0.1, -0.1, -0.1), point(0.1, 0.1, 0.0)));
     let mut feel = FingertipState::new(&tip, &stream(1, 0, "finger"));
     let good = TipMotion::at(over(Vector3::new(0.0, 0.0, 7e-3), &-Vector3::z()));

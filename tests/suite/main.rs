@@ -8,6 +8,7 @@ mod arm;
 mod arm_pc;
 mod backend;
 mod broken;
+mod calibration;
 #[cfg(feature = "nlopt")]
 mod check;
 #[cfg(feature = "mujoco")]
@@ -84,6 +85,7 @@ mod reproducible;
 #[cfg(feature = "mujoco")]
 mod rigid;
 mod scenes;
+mod sensors;
 mod servo;
 #[cfg(feature = "nlopt")]
 mod shards;

@@ -13,6 +13,10 @@ use serde::{Deserialize, Serialize};
 /// of 19 electrodes).
 const LEAST_COUNTS: f64 = 10.0;
 
+/// An electrode that reads less than this untouched is open: pressed hardest, a sound one reads 259
+/// (MiaoLi/syntouchcontact, F2).
+const OPEN_COUNTS: f64 = 200.0;
+
 /// What the sensor reads untouched.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tare {
@@ -59,13 +63,17 @@ pub struct PointOfContact {
 ///
 /// Only electrodes that fell count, as in tams_biotac: fluid that a contact pushes aside makes
 /// others rise on the far side, and they would draw the centroid into the core. Their positions are
-/// a BioTac's in the size of `finger`. None without electrodes, or if none fell.
+/// a BioTac's in the size of `finger`. An open electrode says nothing. None without electrodes, or
+/// if none fell.
 pub fn locate(finger: &Finger, tare: &Tare, frame: &Frame) -> Option<PointOfContact> {
     let (rest, now) = (tare.electrode_counts?, frame.electrode_counts?);
     let (mut sum, mut weights, mut fall_counts) = (Vector3::zeros(), 0.0, 0.0);
     for (i, position) in electrode_table::positions_t(finger.scale()).iter().enumerate() {
+        if rest[i] < OPEN_COUNTS {
+            continue;
+        }
         let fall = (rest[i] - now[i]).clamp(0.0, FULL_SCALE_COUNTS);
-        let weight = (fall / rest[i].max(1.0)).powi(2);
+        let weight = (fall / rest[i]).powi(2);
         sum += position.coords * weight;
         weights += weight;
         fall_counts += fall;

@@ -2,7 +2,7 @@
 
 use super::counter::count;
 use super::effects::Effects;
-use super::effects::electrodes::Electrodes;
+use super::effects::electrodes::{Common, Electrodes};
 use super::effects::fluid::Filter;
 use super::effects::timing::{Channel, channel};
 use crate::robot::finger::frame::{ELECTRODES, FRAME_S, Frame, SLOTS, SLOTS_HZ, VIBRATIONS};
@@ -36,8 +36,8 @@ pub(super) struct Parts<'a> {
     pub effects: &'a Effects,
 }
 
-/// The converter of one trial: each effect draws noise from a stream of its own, so that
-/// switching one leaves the others' noise as it was.
+/// The converter of one trial: electrodes, PDC, PAC and thermistor each draw noise from a stream of
+/// their own, so that switching one leaves the others' noise as it was.
 #[derive(Clone, Debug)]
 pub(super) struct Converter {
     before: Signals,
@@ -45,9 +45,10 @@ pub(super) struct Converter {
     frames: u64,
     slot: usize,
     frame: Frame,
-    drift_counts: f64,
+    common: Common,
     electrodes_rng: Option<ChaCha8Rng>,
     fluid_rng: Option<ChaCha8Rng>,
+    vibration_rng: Option<ChaCha8Rng>,
     filter: Option<Filter>,
     thermal_rng: Option<ChaCha8Rng>,
     queue: VecDeque<Frame>,
@@ -62,21 +63,22 @@ impl Converter {
             rng
         };
         let batch = parts.effects.timing.as_ref().map_or(1, |timing| timing.batch_frames);
+        let vibrates = parts.effects.fluid.as_ref().is_some_and(|fluid| fluid.vibration.is_some());
+        let mut electrodes_rng = parts.electrodes.map(|_| stream(1));
+        let common = parts.electrodes.zip(electrodes_rng.as_mut());
         Self {
             before,
             time_s: 0.0,
             frames: 0,
             slot: 0,
             frame: Frame::default(),
-            drift_counts: 0.0,
-            electrodes_rng: parts.electrodes.map(|_| stream(1)),
+            common: common.map_or_else(Default::default, |(electrodes, rng)| {
+                electrodes.next(&Common::default(), 0.0, rng)
+            }),
+            electrodes_rng,
             fluid_rng: parts.effects.fluid.as_ref().map(|_| stream(2)),
-            filter: parts
-                .effects
-                .fluid
-                .as_ref()
-                .and_then(|fluid| fluid.vibration.as_ref())
-                .map(|_| Filter::default()),
+            vibration_rng: vibrates.then(|| stream(4)),
+            filter: vibrates.then(Filter::default),
             thermal_rng: parts.effects.thermal.as_ref().map(|_| stream(3)),
             queue: VecDeque::with_capacity(KEPT + batch),
             ready: 0,
@@ -85,7 +87,7 @@ impl Converter {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        let rngs = [&self.electrodes_rng, &self.fluid_rng, &self.thermal_rng];
+        let rngs = [&self.electrodes_rng, &self.fluid_rng, &self.vibration_rng, &self.thermal_rng];
         rngs.into_iter().flatten().map(size_of_val).sum::<usize>()
             + self.filter.as_ref().map_or(0, size_of_val)
             + self.queue.capacity() * size_of::<Frame>()
@@ -137,7 +139,7 @@ impl Converter {
     fn pac(&mut self, parts: &Parts, i: usize, pressure_pa: f64) {
         if let Some(fluid) = &parts.effects.fluid
             && let (Some(vibration), Some(filter), Some(rng)) =
-                (&fluid.vibration, &mut self.filter, &mut self.fluid_rng)
+                (&fluid.vibration, &mut self.filter, &mut self.vibration_rng)
         {
             count("fluid.vibration");
             let counts = filter.pac_counts((fluid, vibration), pressure_pa, 2.0 / SLOTS_HZ, rng);
@@ -160,7 +162,7 @@ impl Converter {
                 {
                     let ideal = mix(before.electrode_counts[i], now.electrode_counts[i], part);
                     frame.electrode_counts.get_or_insert([0.0; ELECTRODES])[i] =
-                        electrodes.convert(i, ideal, self.drift_counts, rng);
+                        electrodes.convert(i, ideal, &self.common, rng);
                 }
             }
             Channel::Pdc => {
@@ -191,7 +193,7 @@ impl Converter {
     fn finish(&mut self, parts: &Parts, time_s: f64) {
         self.frame.time_s = time_s;
         if let (Some(electrodes), Some(rng)) = (parts.electrodes, &mut self.electrodes_rng) {
-            self.drift_counts = electrodes.drifted(self.drift_counts, FRAME_S, rng);
+            self.common = electrodes.next(&self.common, FRAME_S, rng);
         }
         let mut batch = 1;
         if let Some(timing) = &parts.effects.timing {

@@ -5,6 +5,7 @@ use super::counter::count;
 use super::effects::effect::Step;
 use super::effects::electrodes::Electrodes;
 use super::effects::skin::{Pressed, Skin, SkinEffect};
+use super::effects::variation::Sensor;
 use super::effects::{EffectStates, Effects};
 use super::lattice::Lattice;
 use super::load::{Load, PressError};
@@ -49,6 +50,20 @@ impl Fingertip {
             electrodes,
             effects: effects.clone(),
         }
+    }
+
+    /// The same of a sensor that differs.
+    pub fn varied(finger: &Finger, effects: &Effects, sensor: &Sensor) -> Self {
+        let own = Effects {
+            skin: effects.skin.as_ref().map(|skin| sensor.skin(skin)),
+            electrodes: effects.electrodes.as_ref().map(|nominal| sensor.electrodes(nominal)),
+            ..effects.clone()
+        };
+        let mut tip = Self::new(finger, &own);
+        if let (Some(electrodes), Some((i, factor))) = (&mut tip.electrodes, sensor.noisy) {
+            electrodes.worsen(i, factor);
+        }
+        tip
     }
 
     /// Its skin.

@@ -5,7 +5,7 @@
 //! over fluid over core, `cavity` couples columns by the fluid's pressure; `lattice` is the skin as
 //! a shell instead. `fingertip` puts together the effects that a scene names, `converter` makes
 //! tactile frames of what they sense, `counter` counts how often each did its work. `plate` presses
-//! the finger on a flat plate, `calibration` fits the constants to recordings of it, `stiffness`
+//! the finger on a flat plate, `calibration` fits the constants to a `recording` of it, `stiffness`
 //! asks it how stiff the skin is.
 
 pub mod calibration;
@@ -19,6 +19,7 @@ pub mod lattice;
 pub mod load;
 pub(crate) mod noise;
 pub mod plate;
+pub mod recording;
 pub mod samples;
 pub mod stiffness;
 

@@ -1,4 +1,4 @@
-//! A finger pressed on a flat plate: recordings of it, and the same in simulation.
+//! A finger pressed on a flat plate.
 
 use super::effects::electrodes::{Electrodes, ElectrodesEffect};
 use super::effects::skin::{Pressed, Skin, SkinEffect};
@@ -9,61 +9,18 @@ use crate::robot::finger::frame::ELECTRODES;
 use crate::robot::finger::profile::Profile;
 use crate::robot::finger::shape::Finger;
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
 
 /// Half the side of the plate the finger is pressed on.
 const PLATE_M: f64 = 0.1;
 
-/// Depths are halved this often to meet a force: below a nanometre.
-const HALVINGS: usize = 26;
+/// A height is found when its force is met to this part, or to a tenth of a nanometre (chosen).
+const FORCE_PART: f64 = 1e-9;
+const NEAR_M: f64 = 1e-10;
 
-/// Recordings of one or more sensors.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Recordings {
-    /// Where the numbers come from.
-    pub note: String,
-    /// One entry per sensor.
-    pub sensors: Vec<Recording>,
-}
-
-/// One sensor on the plate.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Recording {
-    /// Its name in the source.
-    pub sensor: String,
-    /// What it reads untouched.
-    pub no_contact_median_counts: [f64; ELECTRODES],
-    /// Spread of that.
-    pub no_contact_std_counts: [f64; ELECTRODES],
-    /// Means over bins of normal force.
-    pub near_normal_loads: Vec<Bin>,
-}
-
-/// Means over frames whose normal force lies in a range.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Bin {
-    /// The range.
-    pub normal_force_n: [f64; 2],
-    /// Mean normal force.
-    pub mean_normal_force_n: f64,
-    /// Number of frames.
-    pub frames: u32,
-    /// Mean of each electrode.
-    pub mean_counts: [f64; ELECTRODES],
-    /// Standard deviation of each electrode.
-    pub std_counts: [f64; ELECTRODES],
-}
-
-/// How a hand holds the finger over a plate.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Attitude {
-    /// From the pad towards the tip: 0 presses the pulp, 90° the apex.
-    pub pitch_rad: f64,
-    /// From the pad towards +y.
-    pub roll_rad: f64,
-    /// Standard deviation of the roll from press to press.
-    pub roll_sd_rad: f64,
-}
+/// Heights that are tried at most, the first of them by halving: far from the force its curve is
+/// no line (chosen).
+const TRIES: usize = 60;
+const HALVINGS: usize = 4;
 
 /// A fingertip over a flat plate.
 pub struct Plate {
@@ -85,6 +42,16 @@ impl Plate {
         let electrodes = Electrodes::new(electrodes, skin.samples(), profile.scale());
         let pressed = skin.relaxed();
         Some(Self { skin, electrodes, bvh: flat()?, pressed })
+    }
+
+    /// Its skin.
+    pub fn skin(&self) -> &Skin {
+        &self.skin
+    }
+
+    /// The skin in its last pose.
+    pub fn pressed(&self) -> &Pressed {
+        &self.pressed
     }
 
     /// Load and ideal counts with the plate across the direction `towards_t` and the origin of `T`
@@ -111,23 +78,32 @@ impl Plate {
         normal_force_n: f64,
     ) -> Result<f64, PressError> {
         let reach_m = self.skin.samples().iter().map(|s| s.point().coords.dot(towards_t));
-        let mut high_m = reach_m.fold(0.0, f64::max);
-        let mut low_m = 0.0;
-        for _ in 0..HALVINGS {
-            let middle_m = 0.5 * (low_m + high_m);
-            let load = self.skin.press(&self.bvh, &pose(towards_t, middle_m), &mut self.pressed);
-            let pushed_n = match load {
-                Ok(load) => -load.force_n.dot(towards_t),
+        // Illinois: the secant of a bracket, its older end halved (Dowell & Jarratt 1971).
+        let mut low = (0.0, f64::INFINITY);
+        let mut high = (reach_m.fold(0.0, f64::max), -normal_force_n);
+        let (mut at_m, mut was_deep) = (high.0, None);
+        for tried in 0..TRIES {
+            at_m = match low.1.is_finite() && tried >= HALVINGS {
+                true => (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1),
+                false => 0.5 * (low.0 + high.0),
+            };
+            let load = self.skin.press(&self.bvh, &pose(towards_t, at_m), &mut self.pressed);
+            let excess_n = match load {
+                Ok(load) => -load.force_n.dot(towards_t) - normal_force_n,
                 Err(PressError::Inside) => f64::INFINITY,
                 Err(error) => return Err(error),
             };
-            if pushed_n > normal_force_n {
-                low_m = middle_m;
-            } else {
-                high_m = middle_m;
+            let deep = excess_n > 0.0;
+            let (moved, other) = if deep { (&mut low, &mut high) } else { (&mut high, &mut low) };
+            *moved = (at_m, excess_n);
+            if was_deep.replace(deep) == Some(deep) {
+                other.1 *= 0.5;
+            }
+            if excess_n.abs() <= FORCE_PART * normal_force_n || high.0 - low.0 <= NEAR_M {
+                break;
             }
         }
-        Ok(high_m)
+        Ok(at_m)
     }
 
     /// Load and ideal counts at a given normal force.
@@ -141,25 +117,6 @@ impl Plate {
     ) -> Result<(Load, [f64; ELECTRODES]), PressError> {
         let height_m = self.height_m(towards_t, normal_force_n)?;
         self.press(towards_t, height_m)
-    }
-
-    /// Mean counts over the rolls of `attitude`, by three-point Gauss–Hermite quadrature.
-    ///
-    /// # Errors
-    /// See [`Skin::press`].
-    pub fn mean_counts(
-        &mut self,
-        attitude: &Attitude,
-        normal_force_n: f64,
-    ) -> Result<[f64; ELECTRODES], PressError> {
-        let off_rad = 3f64.sqrt() * attitude.roll_sd_rad;
-        let mut mean = [0.0; ELECTRODES];
-        for (off_rad, weight) in [(-off_rad, 1.0 / 6.0), (0.0, 2.0 / 3.0), (off_rad, 1.0 / 6.0)] {
-            let towards_t = direction_t(attitude.pitch_rad, attitude.roll_rad + off_rad);
-            let (_, counts) = self.press_to(&towards_t, normal_force_n)?;
-            mean.iter_mut().zip(counts).for_each(|(mean, counts)| *mean += weight * counts);
-        }
-        Ok(mean)
     }
 }
 

@@ -105,8 +105,9 @@ pub(super) const CASES: &[Case] = &[
     ),
 ];
 
+/// All whose loads follow from the pose alone, and friction.
 fn effects() -> Effects {
-    Effects { timing: None, ..Effects::all() }
+    Effects { creep: None, timing: None, ..Effects::all() }
 }
 
 /// Force grows with depth and pushes the finger away.

@@ -33,6 +33,8 @@ pub struct ElectrodesEffect {
     pub exponent: f64,
     /// White noise, as a factor on the recorded standard deviations; 0 is none.
     pub noise: f64,
+    /// Correlation of that noise between any two electrodes, which share their excitation.
+    pub noise_correlation: f64,
     /// Random walk shared by all electrodes, in counts per root second; 0 is none.
     pub drift_counts: f64,
     /// Whether counts are whole numbers.
@@ -44,7 +46,7 @@ pub struct ElectrodesEffect {
 impl Default for ElectrodesEffect {
     /// Baselines and noise: MiaoLi/syntouchcontact recordings, sensor F2. The recorded standard
     /// deviations contain drift; three quarters of them match the differences between frames
-    /// (2.1 to 5.8 counts). Drift: 6 to 16 counts over 11 s. Spread: fitted by `calibration` to the
+    /// (2.1 to 5.8 counts). Correlation: 0.26 to 0.34 on average over pairs of the same. Drift: 6 to 16 counts over 11 s. Spread: fitted by `calibration` to the
     /// same sensor on a flat plate. Exponent: the gap's resistance grows with its inverse.
     fn default() -> Self {
         Self {
@@ -52,6 +54,7 @@ impl Default for ElectrodesEffect {
             spread_m: 2.1e-3,
             exponent: 1.0,
             noise: 0.75,
+            noise_correlation: 0.3,
             drift_counts: 3.0,
             quantise: true,
             clip: true,
@@ -65,6 +68,7 @@ impl Checked for ElectrodesEffect {
         rules.number("spread_m", self.spread_m, 1e-5..=1e-1);
         rules.number("exponent", self.exponent, 0.1..=10.0);
         rules.number("noise", self.noise, 0.0..=1e3);
+        rules.number("noise_correlation", self.noise_correlation, 0.0..=1.0);
         rules.number("drift_counts", self.drift_counts, 0.0..=1e3);
     }
 }
@@ -81,6 +85,8 @@ impl Effect for ElectrodesEffect {
 #[derive(Clone, Debug)]
 pub struct Electrodes {
     effect: ElectrodesEffect,
+    /// Standard deviation of the noise.
+    noise_counts: [f64; ELECTRODES],
     /// Untouched impedances.
     z0_ohm: [f64; ELECTRODES],
     /// For each electrode, samples and what moving each inwards by a metre takes off g/g0.
@@ -111,7 +117,17 @@ impl Electrodes {
             let gap: f64 = near.iter().map(|&(i, weight)| weight * samples[i].layers.gap_m).sum();
             near.into_iter().map(|(i, weight)| (i, weight / gap)).collect()
         });
-        Self { z0_ohm: effect.baseline_counts.map(impedance_ohm), weights, effect: effect.clone() }
+        Self {
+            noise_counts: electrode_table::NOISE_COUNTS.map(|counts| effect.noise * counts),
+            z0_ohm: effect.baseline_counts.map(impedance_ohm),
+            weights,
+            effect: effect.clone(),
+        }
+    }
+
+    /// Makes electrode `i` that many times as noisy.
+    pub fn worsen(&mut self, i: usize, factor: f64) {
+        self.noise_counts.iter_mut().skip(i).take(1).for_each(|counts| *counts *= factor);
     }
 
     /// Bytes held.
@@ -143,18 +159,13 @@ impl Electrodes {
         })
     }
 
-    /// What the converter makes of ideal counts, with `drift_counts` on top.
-    pub fn convert(
-        &self,
-        i: usize,
-        ideal_counts: f64,
-        drift_counts: f64,
-        rng: &mut impl Rng,
-    ) -> f64 {
+    /// What the converter makes of ideal counts, with what is common on top.
+    pub fn convert(&self, i: usize, ideal_counts: f64, common: &Common, rng: &mut impl Rng) -> f64 {
         let effect = &self.effect;
-        let mut counts = ideal_counts + drift_counts;
+        let mut counts = ideal_counts + common.drift_counts;
         if effect.noise > 0.0 {
-            counts += effect.noise * electrode_table::NOISE_COUNTS[i] * normal(rng);
+            let own = (1.0 - effect.noise_correlation).sqrt() * normal(rng);
+            counts += self.noise_counts[i] * (common.noise + own);
         }
         if effect.quantise {
             counts = counts.round();
@@ -162,13 +173,27 @@ impl Electrodes {
         if effect.clip { counts.clamp(0.0, FULL_SCALE_COUNTS) } else { counts }
     }
 
-    /// The common drift after another `duration_s`.
-    pub fn drifted(&self, drift_counts: f64, duration_s: f64, rng: &mut impl Rng) -> f64 {
-        if self.effect.drift_counts == 0.0 {
-            return drift_counts;
+    /// What is common to the next frame, `duration_s` after the last one.
+    pub fn next(&self, common: &Common, duration_s: f64, rng: &mut impl Rng) -> Common {
+        let effect = &self.effect;
+        let mut next = Common { noise: 0.0, ..*common };
+        if effect.drift_counts > 0.0 {
+            next.drift_counts += effect.drift_counts * duration_s.sqrt() * normal(rng);
         }
-        drift_counts + self.effect.drift_counts * duration_s.sqrt() * normal(rng)
+        if effect.noise > 0.0 && effect.noise_correlation > 0.0 {
+            next.noise = effect.noise_correlation.sqrt() * normal(rng);
+        }
+        next
     }
+}
+
+/// What all electrodes of a frame have in common.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Common {
+    /// The drift so far.
+    pub drift_counts: f64,
+    /// Their common part of the noise, in standard deviations of each.
+    pub noise: f64,
 }
 
 /// Counts over impedance: E = 4095 / (1 + Z / 10 kΩ) (SynTouch BioTac SP manual, §5.1).

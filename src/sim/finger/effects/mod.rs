@@ -5,6 +5,7 @@
 //! switch and row in a study of effects follow from that line.
 
 pub mod collision;
+pub mod creep;
 pub mod effect;
 pub mod electrodes;
 pub mod flex;
@@ -16,6 +17,7 @@ pub mod switch;
 mod table;
 pub mod thermal;
 pub mod timing;
+pub mod variation;
 pub mod wrench;
 
 use super::counter::count;
@@ -35,6 +37,8 @@ table::effects! {
     fluid: fluid::FluidEffect,
     /// The impedance electrodes.
     electrodes: electrodes::ElectrodesEffect,
+    /// Silicone that gives way in time.
+    creep: creep::CreepEffect,
     /// Heat.
     thermal: thermal::ThermalEffect,
     /// Tangential forces.
@@ -43,6 +47,8 @@ table::effects! {
     wrench: wrench::WrenchEffect,
     /// Errors of the finger's and the object's place.
     registration: registration::RegistrationEffect,
+    /// How this sensor differs from the next.
+    variation: variation::VariationEffect,
     /// Skew and latency of the tactile frames, delay of commands.
     timing: timing::TimingEffect,
     /// Links, tool, object and table collide.

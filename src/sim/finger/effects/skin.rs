@@ -75,6 +75,18 @@ impl Checked for SkinEffect {
     }
 }
 
+impl SkinEffect {
+    /// The same of silicone `factor` times as stiff; the core stays.
+    pub fn stiffened(&self, factor: f64) -> Self {
+        Self {
+            modulus_pa: factor * self.modulus_pa,
+            flatten_pa_m: factor * self.flatten_pa_m,
+            inflate_pa_m: factor * self.inflate_pa_m,
+            ..self.clone()
+        }
+    }
+}
+
 impl Effect for SkinEffect {
     type State = ();
 

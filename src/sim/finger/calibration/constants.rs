@@ -1,0 +1,87 @@
+//! The constants that all sensors share.
+
+use crate::sim::finger::effects::Effects;
+use crate::sim::finger::effects::electrodes::ElectrodesEffect;
+use crate::sim::finger::effects::fluid::FluidEffect;
+use crate::sim::finger::effects::skin::SkinEffect;
+
+/// What is known about every finger of a kind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// Constants of the skin.
+    pub skin: SkinEffect,
+    /// Constants of the electrodes; baselines are each recording's own.
+    pub electrodes: ElectrodesEffect,
+    /// Stiffness of the fluid.
+    pub cavity_pa_m3: f64,
+}
+
+impl Default for Model {
+    /// What a scene without settings of its own has.
+    fn default() -> Self {
+        Self {
+            skin: SkinEffect::default(),
+            electrodes: ElectrodesEffect::default(),
+            cavity_pa_m3: FluidEffect::default().stiffness_pa_m3,
+        }
+    }
+}
+
+impl Model {
+    /// As tables of a scene.
+    pub fn effects(&self) -> Effects {
+        Effects {
+            skin: Some(self.skin.clone()),
+            electrodes: Some(self.electrodes.clone()),
+            ..Effects::default()
+        }
+    }
+}
+
+/// A constant that may be fitted; all are positive and are counted in logarithms.
+#[derive(Debug)]
+pub struct Constant {
+    /// Its key in a scene's `[effects]`.
+    pub key: &'static str,
+    /// Where it may lie; at either end the recordings do not determine it.
+    pub bounds: [f64; 2],
+    /// How far off it could plausibly be, as a logarithm.
+    pub plausible: f64,
+    of: fn(&mut Model) -> &mut f64,
+}
+
+impl Constant {
+    /// Its value in `model`.
+    pub fn value(&self, model: &Model) -> f64 {
+        *(self.of)(&mut model.clone())
+    }
+
+    /// Sets it.
+    pub fn set(&self, model: &mut Model, value: f64) {
+        *(self.of)(model) = value;
+    }
+}
+
+/// All of them. Bounds and what is plausible are chosen: a factor of ten for a stiffness, two for
+/// the spread. The skin's modulus and the stiffness against inflation are sourced: counts alone
+/// would have the pressure ten times too low as well; and the exponent is a gain that all share.
+pub const CONSTANTS: [Constant; 3] = [
+    Constant {
+        key: "skin.flatten_pa_m",
+        bounds: [1e4, 1e9],
+        plausible: 2.3,
+        of: |model| &mut model.skin.flatten_pa_m,
+    },
+    Constant {
+        key: "skin.core_pa_m",
+        bounds: [1e6, 1e11],
+        plausible: 2.3,
+        of: |model| &mut model.skin.core_pa_m,
+    },
+    Constant {
+        key: "electrodes.spread_m",
+        bounds: [5e-4, 6e-3],
+        plausible: 0.7,
+        of: |model| &mut model.electrodes.spread_m,
+    },
+];

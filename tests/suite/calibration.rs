@@ -1,0 +1,126 @@
+//! What recordings of real sensors say of the finger's constants.
+
+use palpate::math::least_squares::FitError;
+use palpate::robot::finger::frame::ELECTRODES;
+use palpate::sim::finger::calibration::bench::Bench;
+use palpate::sim::finger::calibration::constants::{CONSTANTS, Model};
+use palpate::sim::finger::calibration::fit::{Free, fit};
+use palpate::sim::finger::calibration::score::{HeldOut, Score, leave_one_out};
+use palpate::sim::finger::calibration::session::Session;
+use palpate::sim::finger::effects::electrodes::{counts, impedance_ohm};
+use palpate::sim::finger::recording::{Recording, RecordingError, Recordings};
+
+fn recordings() -> Recordings {
+    serde_json::from_str(include_str!("../data/biotac_flat_plate.json")).unwrap()
+}
+
+/// Fewer points of the skin than a scene has: the fit is faster, and a count off by a few.
+fn coarse() -> Model {
+    let mut model = Model::default();
+    model.skin.samples = 250;
+    model
+}
+
+/// The bars: 85 counts and 95 % of the signs (one sensor's table of counts used for the other
+/// is off by 69 and 82), and at every load better than if nothing changed.
+#[test]
+fn constants_of_one_sensor_predict_the_other() {
+    let held_out = leave_one_out(&coarse(), &recordings().sensors, Free::Constants).unwrap();
+    for held in &held_out {
+        println!("{} from {:?}: {:?}", held.sensor, held.others, held.whole());
+        assert_eq!(held.others.len(), 1);
+        assert!(held.fit.refused.is_empty(), "{:?}", held.fit.refused);
+        let whole = held.whole();
+        assert!(whole.model_counts < whole.mean_change_counts.unwrap(), "{whole:?}");
+        for (force_n, score) in &held.loads {
+            assert!(score.model_counts < score.no_change_counts, "{force_n} N: {score:?}");
+        }
+        // The offset is one that an untouched sensor shows too, 1.08 to 1.2.
+        let offset = held.fit.sessions[0].offset;
+        assert!((1.02..1.25).contains(&offset), "{offset}");
+    }
+    let whole: Vec<Score> = held_out.iter().map(HeldOut::whole).collect();
+    let all = Score::of(whole.iter());
+    assert!(all.model_counts <= 85.0 && all.right_sign() >= 0.95, "{all:?}");
+}
+
+/// What a session made with known numbers is found to be.
+#[test]
+fn a_fit_finds_what_a_recording_was_made_with() {
+    let mut model = coarse();
+    CONSTANTS[1].set(&mut model, 4e8);
+    let made = Session { offset: 1.12, gain: 0.9, pitch_rad: 0.2, roll_rad: vec![0.05; 6] };
+    let mut recording = recordings().sensors.remove(1);
+    let predicted = made.predict(&model, &recording, &mut Bench::default()).unwrap();
+    for (bin, counts) in recording.near_normal_loads.iter_mut().zip(predicted) {
+        bin.mean_counts = counts;
+    }
+    let found = fit(&model, &[&recording], Free::Sessions).unwrap();
+    let session = &found.sessions[0];
+    assert!((session.offset - made.offset).abs() < 0.02, "{session:?}");
+    assert!((session.gain - made.gain).abs() < 0.04, "{session:?}");
+    assert!((session.pitch_rad - made.pitch_rad).abs() < 0.02, "{session:?}");
+    assert!((session.mean_roll_rad() - 0.05).abs() < 0.02, "{session:?}");
+}
+
+/// An offset and nothing else: all electrodes better conducting, no load felt.
+#[test]
+fn an_offset_alone_is_told_as_one() {
+    let mut recording = recordings().sensors.remove(0);
+    let rest = recording.no_contact_median_counts;
+    for bin in &mut recording.near_normal_loads {
+        bin.mean_counts = rest.map(|rest| counts(impedance_ohm(rest) / 1.1));
+    }
+    let held = leave_one_out(&coarse(), &[recording], Free::Constants).unwrap().remove(0);
+    assert!(held.others.is_empty() && held.whole().mean_change_counts.is_none());
+    assert!(held.whole().offset_counts < 1.0, "{:?}", held.whole());
+    assert!(held.whole().no_change_counts > 50.0, "{:?}", held.whole());
+}
+
+#[test]
+fn a_constant_that_recordings_do_not_determine_is_refused() {
+    // Electrodes that fall to nothing at once are sensed through no spread at all.
+    let mut recording = recordings().sensors.remove(0);
+    recording.near_normal_loads.truncate(2);
+    for bin in &mut recording.near_normal_loads {
+        bin.mean_counts = std::array::from_fn(|i| if i == 16 { 1.0 } else { 3900.0 });
+    }
+    let found = fit(&coarse(), &[&recording], Free::Constants).unwrap();
+    assert!(!found.refused.is_empty(), "{found:?}");
+    for lost in &found.refused {
+        assert!(found.estimates.iter().all(|kept| kept.key != lost.key));
+        let constant = CONSTANTS.iter().find(|constant| constant.key == lost.key).unwrap();
+        assert_eq!(constant.value(&found.model), lost.kept);
+        assert!(constant.bounds.contains(&lost.bound));
+    }
+}
+
+#[test]
+fn what_no_sensor_can_say_is_refused_by_name() {
+    assert_eq!(recordings().check(), Ok(()));
+    let told = |change: fn(&mut Recording)| {
+        let mut all = recordings();
+        change(&mut all.sensors[1]);
+        all.check().unwrap_err().to_string()
+    };
+    let counts = told(|of| of.near_normal_loads[2].mean_counts[4] = 5000.0);
+    assert!(counts.contains("sensors[1].near_normal_loads[2].mean_counts[4] = 5000"), "{counts}");
+    assert!(counts.contains("less than 4095"), "{counts}");
+    assert!(told(|of| of.no_contact_median_counts[0] = f64::NAN).contains("NaN"));
+    assert!(told(|of| of.near_normal_loads[0].mean_normal_force_n = 0.0).contains("more than 0"));
+    assert!(told(|of| of.near_normal_loads.clear()).contains("near_normal_loads is empty"));
+    let empty = Recordings { note: String::new(), sensors: Vec::new() };
+    assert_eq!(empty.check(), Err(RecordingError::Empty { field: "sensors".into() }));
+    assert_eq!(fit(&coarse(), &[], Free::Sessions), Err(FitError::Empty));
+}
+
+/// Mean errors over loads weigh each entry alike.
+#[test]
+fn scores_add_up() {
+    let one =
+        Score { entries: ELECTRODES, model_counts: 10.0, signed: 3, right: 2, ..Score::default() };
+    let two = Score { entries: 2 * ELECTRODES, model_counts: 40.0, signed: 1, right: 1, ..one };
+    let all = Score::of([one, two].iter());
+    assert!((all.model_counts - 30.0).abs() < 1e-12);
+    assert_eq!((all.entries, all.signed, all.right), (3 * ELECTRODES, 4, 3));
+}
