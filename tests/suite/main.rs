@@ -62,6 +62,7 @@ mod memory;
 mod meshes;
 mod messages;
 mod models;
+mod needs;
 mod net_ft;
 mod newcomer;
 #[cfg(feature = "nlopt")]
