@@ -2,6 +2,8 @@
 
 use super::columns::{aligned, cell};
 use super::find::{SCENES, find};
+use super::needs;
+use super::needs::NeedsArgs;
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::statistics::Paired;
@@ -11,6 +13,7 @@ use crate::sim::scene::Body;
 use crate::study::effects::overhead::overheads;
 use crate::study::effects::{Baseline, Budget, Change, switches};
 use crate::study::fidelity::spread::Spread;
+use crate::study::fidelity::tolerance::Tolerance;
 use crate::study::fidelity::touches::targets;
 use anyhow::bail;
 use std::path::PathBuf;
@@ -22,18 +25,27 @@ Examples:
   palpate effects scenes/bird_finger.toml
   palpate effects scenes/bird_finger.toml --trials 0             touches and time only
   palpate effects scenes/container_finger.toml --set effects.friction={}
+  palpate effects scenes/bird_pa10.toml --tolerance 1mm          what it calls for, and the cheapest
+                                                                 scene that stays within 1 mm of it
+  palpate effects scenes/bird_finger.toml --tolerance 0.1N --full
 
 Each effect is switched alone, the rest of the scene being as it is. Times are paired and
-interleaved, so that what else the machine does falls on both sides alike.")]
+interleaved, so that what else the machine does falls on both sides alike.
+
+A tolerance is held by 95 % of the touches, with sensors without noise: in mm or um of the point of
+contact, N of force, or counts of the electrodes. An effect is needed if, switched alone, it takes
+more of them beyond it, not needed if not, by the 95 % interval of that share; about 72 touches, none
+of them beyond, is the least that can tell. The cheapest scene is held against the full one on fresh
+targets; exit code 1 if it does not stay within the tolerance there.")]
 pub(super) struct Args {
     /// Scene (TOML) with a body that feels.
     scene: PathBuf,
     /// Change one setting: a dotted key and a TOML value; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Touches compared.
-    #[arg(long, default_value_t = 16, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
-    touches: u16,
+    /// Touches compared [default: 16, with --tolerance 120].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    touches: Option<u16>,
     /// Pairs of touches that are timed.
     #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
     pairs: u16,
@@ -43,13 +55,32 @@ pub(super) struct Args {
     /// Touches of a trial.
     #[arg(long, default_value_t = 30, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=500))]
     trial_touches: u16,
+    /// Say which effects are needed within this error, and write the cheapest scene within it.
+    #[arg(long, value_name = "0.2mm|0.1N|20counts")]
+    tolerance: Option<Tolerance>,
+    #[command(flatten)]
+    needs: NeedsArgs,
 }
+
+/// Touches compared, unless it is said: as many as take seconds.
+const TOUCHES: u16 = 16;
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
     if matches!(scene.body, Body::Function | Body::Cast) {
         let (path, body) = (args.scene.display(), scene.body.name());
         bail!("{path}: body = \"{body}\" has no effects; effects need body = \"kinematic\"");
+    }
+    if let Some(tolerance) = args.tolerance {
+        let touches = args.touches.unwrap_or(needs::TOUCHES).into();
+        let name = args.scene.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+        return needs::run(
+            scene,
+            (&name, tolerance),
+            (touches, args.pairs.into()),
+            &args.needs,
+            talk,
+        );
     }
     let budget = Budget {
         pairs: args.pairs.into(),
@@ -63,7 +94,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         step(talk, &bar);
         !stop.load(Ordering::Relaxed)
     };
-    let targets = targets(&scene, args.touches.into(), 0);
+    let targets = targets(&scene, args.touches.unwrap_or(TOUCHES).into(), 0);
     let Some(baseline) = Baseline::new(&scene, targets, budget, &mut go_on)? else {
         return Ok(Ending::Interrupted);
     };

@@ -14,6 +14,7 @@ mod find;
 mod known_body;
 mod list;
 mod merge;
+mod needs;
 mod new;
 mod output;
 mod patience;

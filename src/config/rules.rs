@@ -25,6 +25,13 @@ impl Rules {
         rules.record.unwrap_or_default()
     }
 
+    /// Whether `checked` breaks none.
+    pub fn hold(checked: &impl Checked) -> bool {
+        let mut rules = Self::default();
+        checked.check(&mut rules);
+        rules.violation.is_none()
+    }
+
     fn note(&mut self, key: &str, allowed: impl FnOnce() -> String) {
         if let Some(record) = &mut self.record {
             record.insert(format!("{}{key}", self.prefix), allowed());

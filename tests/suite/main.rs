@@ -63,6 +63,7 @@ mod memory;
 mod meshes;
 mod messages;
 mod models;
+mod needs;
 mod net_ft;
 mod newcomer;
 #[cfg(feature = "nlopt")]

@@ -3,6 +3,7 @@
 
 use crate::common::shipped::scene;
 use mujoco_rs::wrappers::mj_data::MjData;
+use mujoco_rs::wrappers::mj_model::MjModel;
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 use palpate::backend::{Command, Fault, Wrench};
 use palpate::explore::probe::{Contact, Touch};
@@ -194,7 +195,9 @@ fn jerkiest(integrator: Integrator, step_s: f64) -> f64 {
 #[test]
 fn explicit_steps_are_as_short_as_the_stiffest_servo_needs() {
     for links in ["arm={links=\"C\"}", "arm={links=\"A\"}"] {
-        let environment = Environment::build(scene("container_pa10.toml", &[links])).unwrap();
+        // With Euler's steps the mass matrix is that of the arm.
+        let euler = ["solver={integrator=\"euler\", step_s=1e-3}", links];
+        let environment = Environment::build(scene("container_pa10.toml", &euler)).unwrap();
         let model = Models::new(&environment).unwrap().plant;
         let joints = environment.chain().unwrap().joints;
         let n = joints.len();
@@ -233,6 +236,39 @@ fn no_integrator_makes_the_servos_chatter() {
     }
     let chatter = jerkiest(Euler, 2e-3);
     assert!(chatter > 10.0 * SWING_RAD_S2, "{chatter}");
+}
+
+/// Where nothing rubs, a step with the servos' gains in the mass matrix is that of MuJoCo's own
+/// servos, which are implicit in their velocities; where joints rub, MuJoCo finds what they do as if
+/// no servo damped, and the arm moves otherwise.
+#[test]
+fn gains_in_the_mass_matrix_are_mujocos_servos_where_nothing_rubs() {
+    let environment = Environment::build(scene("container_pa10.toml", &[])).unwrap();
+    let home = environment.chain().unwrap().home;
+    let text = mjcf::scene(&environment, Mode::Dynamic { step_s: 2e-3 }).unwrap();
+    let apart_rad_s = |text: &str| {
+        let own = MjModel::from_xml_string(text).unwrap();
+        let mut plants =
+            [compile(text).unwrap(), own].map(|model| Plant::new(Arc::new(model)).unwrap());
+        let mut most: f64 = 0.0;
+        for plant in &mut plants {
+            plant.reset(home.as_slice()).unwrap();
+        }
+        for i in 0..250 {
+            let speed_rad_s =
+                SWING_RAD_S * (std::f64::consts::TAU * SWING_HZ * 2e-3 * f64::from(i)).sin();
+            let [a, b] = plants.each_mut().map(|plant| {
+                plant.step(&[speed_rad_s; 7], &Wrench::default()).unwrap();
+                plant.qdot().to_vec()
+            });
+            most = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(most, f64::max);
+        }
+        most
+    };
+    let rubbing = apart_rad_s(&text);
+    // A joint may carry numbers of a user's.
+    let smooth = apart_rad_s(&text.replace("frictionloss=", "user="));
+    assert!(smooth < 1e-9 && rubbing > 1e-3, "{smooth} {rubbing}");
 }
 
 /// At the same small step all integrators land where the default does: what is left of their

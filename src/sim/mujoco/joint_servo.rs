@@ -8,12 +8,12 @@ use crate::robot::arm::chain::MAX_JOINTS;
 const INTEGRAL_PER_S: f64 = 50.0;
 
 /// `force = kv · (u − qdot)` with `u = qdot_command + INTEGRAL_PER_S · lag` and
-/// `lag = ∫ (qdot_command − qdot) dt`. MuJoCo evaluates the first, implicitly in qdot as long as
-/// the force is within its limit; the integral is kept here.
+/// `lag = ∫ (qdot_command − qdot) dt`. A step is implicit in the qdot of the first
+/// ([`embed`](super::implicit_gain::embed)) but for explicit integrators; the integral is kept
+/// here, and its mean over the step is what is held through it.
 ///
 /// The gains kv are chosen and stand in the model: as stiff as leaves kv · 2 ms below twice the
-/// smallest inertia a joint can meet. Above that, a motor at its limit, which MuJoCo steps
-/// explicitly, would chatter between its limits for ever.
+/// smallest inertia a joint can meet.
 pub(super) struct JointServo {
     /// rad or m.
     lag: Joints,
@@ -48,9 +48,9 @@ impl JointServo {
     ) -> f64 {
         let error = command - qdot;
         let saturated = force.abs() >= self.limit[i] && error * force > 0.0;
-        if !saturated {
-            self.lag[i] += error * step_s;
-        }
-        command + INTEGRAL_PER_S * self.lag[i]
+        let grown = if saturated { 0.0 } else { error * step_s };
+        let mean = self.lag[i] + 0.5 * grown;
+        self.lag[i] += grown;
+        command + INTEGRAL_PER_S * mean
     }
 }

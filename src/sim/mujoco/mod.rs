@@ -2,6 +2,7 @@
 
 mod contact;
 mod dynamic;
+mod implicit_gain;
 mod joint_servo;
 mod models;
 #[cfg(feature = "render")]
@@ -78,7 +79,7 @@ pub fn version() -> &'static str {
     mujoco_rs::mujoco_version()
 }
 
-/// Compiles a model.
+/// Compiles a model; servos of an implicit integrator become a [`Plant`]'s own.
 ///
 /// # Errors
 /// If MuJoCo refuses it.
@@ -90,5 +91,8 @@ pub fn compile(mjcf: &str) -> Result<MjModel, ModelError> {
         // SAFETY: no thread can use MuJoCo yet, because every model is compiled here.
         unsafe { set_log_config(quiet) };
     });
-    MjModel::from_xml_string(mjcf).map_err(|cause| ModelError::Refused { cause })
+    let mut model =
+        MjModel::from_xml_string(mjcf).map_err(|cause| ModelError::Refused { cause })?;
+    implicit_gain::embed(&mut model);
+    Ok(model)
 }

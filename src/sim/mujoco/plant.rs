@@ -2,6 +2,7 @@
 
 use super::ModelError;
 use super::contact;
+use super::implicit_gain::embedded;
 use super::joint_servo::JointServo;
 use crate::backend::{Fault, IdealContact, Wrench};
 use crate::robot::arm::Joints;
@@ -20,6 +21,9 @@ use std::sync::Arc;
 pub struct Plant {
     data: MjData<Arc<MjModel>>,
     servo: JointServo,
+    /// What the model adds to the joints' inertias in place of its servos' damping; none if they
+    /// damp themselves.
+    gain_kg_m2: Option<Joints>,
     /// The site of `T` and the body it is on.
     tip: usize,
     finger: usize,
@@ -53,10 +57,15 @@ impl Plant {
         }
         let mut kv = Joints::zeros();
         let mut limit = Joints::zeros();
+        let mut gain_kg_m2 = Some(Joints::zeros());
         let motors = model.actuator_gainprm().iter().zip(model.actuator_forcerange());
         for (i, (gain, range)) in motors.enumerate().take(joints) {
             kv[i] = gain[0];
             limit[i] = range[1];
+            gain_kg_m2 = gain_kg_m2.zip(embedded(&model, i)).map(|(mut gains, gain)| {
+                gains[i] = gain;
+                gains
+            });
         }
         let local = |site: usize| {
             let [x, y, z] = model.site_pos()[site];
@@ -72,6 +81,7 @@ impl Plant {
         Ok(Self {
             data,
             servo: JointServo::new(kv, limit),
+            gain_kg_m2,
             tip,
             finger,
             x_tm,
@@ -117,7 +127,8 @@ impl Plant {
         for (i, &command) in qdot.iter().enumerate() {
             let (speed, force) = (self.data.qvel()[i], self.data.actuator_force()[i]);
             let control = self.servo.control(i, command, speed, force, step_s);
-            self.data.ctrl_mut()[i] = control;
+            let damped = if self.gain_kg_m2.is_some() { speed } else { 0.0 };
+            self.data.ctrl_mut()[i] = control - damped;
         }
         // MuJoCo takes a wrench about the body's centre of mass. Only what is applied this way
         // reaches the force/torque sensor.
@@ -189,6 +200,9 @@ impl Plant {
         let n = self.q().len();
         let mut inertia = vec![0.0; n * n];
         let whole = self.data.full_m(&mut inertia).is_ok();
+        for (i, gain) in self.gain_kg_m2.iter().flatten().enumerate().take(n) {
+            inertia[i * n + i] -= gain;
+        }
         let (linear, _) = self.data.jac_site(true, false, self.tip);
         let jacobian = DMatrix::from_row_slice(3, n, &linear);
         let solved = DMatrix::from_row_slice(n, n, &inertia).cholesky().filter(|_| whole);

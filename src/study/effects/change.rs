@@ -114,7 +114,7 @@ impl Baseline {
             shift_m: Spread::of(&shifts),
             force_n: spread(&|a, b| Some((a.force_n - b.force_n).abs())),
             electrode_counts: spread(&electrode_rms_counts),
-            time_ratio: time_ratio(without, with, &self.targets, budget.pairs)?,
+            time_ratio: median(&time_ratios(without, with, &self.targets, budget.pairs)?),
             state_bytes: state_bytes(with) - state_bytes(without),
             runs: runs(&switch.name, without, &self.targets)?
                 .zip(runs(&switch.name, with, &self.targets)?)
@@ -149,13 +149,14 @@ fn runs(
     Ok(count_of(name).zip(before).map(|(after, before)| after - before))
 }
 
-/// Interleaved, so that what else the machine does falls on both alike.
-fn time_ratio(
+/// Wall time of a touch with `with` over that of the same touch with `without`: interleaved, so
+/// that what else the machine does falls on both alike.
+pub(super) fn time_ratios(
     without: &Arc<Environment>,
     with: &Arc<Environment>,
     targets: &[Vec<f64>],
     pairs: usize,
-) -> Result<Option<f64>, MeasureError> {
+) -> Result<Vec<f64>, MeasureError> {
     let open = |environment: &Arc<Environment>| -> Result<_, MeasureError> {
         Ok(Simulator::new(Arc::clone(environment))?.probe(0)?)
     };
@@ -171,7 +172,7 @@ fn time_ratio(
         }
         ratios.push(taken_s[1] / taken_s[0]);
     }
-    Ok(median(&ratios))
+    Ok(ratios)
 }
 
 /// `active` against `random` in the same trials.

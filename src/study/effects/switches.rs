@@ -1,5 +1,6 @@
 //! What of a scene can be switched: every effect of the finger, its arm, and the masses.
 
+use crate::config::Rules;
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
 use crate::sim::finger::effects::switch::Switch;
@@ -7,9 +8,6 @@ use crate::sim::scene::Body;
 
 /// Every switch of a scene, the effects first, in the order of their table.
 pub fn switches() -> Vec<Switch<Scene>> {
-    let of_scene = |switch: Switch<Effects>| {
-        switch.within("", |scene: &Scene| &scene.effects, |scene| &mut scene.effects)
-    };
     let mut all: Vec<_> = Effects::switches().into_iter().map(of_scene).collect();
     all.push(Switch::table().within("arm", |scene: &Scene| &scene.arm, |scene| &mut scene.arm));
     #[cfg(feature = "mujoco")]
@@ -25,11 +23,30 @@ pub fn switches() -> Vec<Switch<Scene>> {
 pub fn switched(scene: &Scene, switch: &Switch<Scene>) -> Scene {
     let mut scene = scene.clone();
     let (was_soft, was_on) = (scene.effects.is_soft(), switch.is_on(&scene));
+    let had_masses = scene.body == Body::Dynamic;
     switch.set(&mut scene, !was_on);
     scene.effects.drop_unsupported();
     // A finger that has lost its skin is a rigid hull, and the simplest touch with one is a cast.
     if was_soft && !scene.effects.is_soft() {
         scene.body = Body::Cast;
     }
+    let Scene { body, effects, solver, .. } = &mut scene;
+    if had_masses && *body != Body::Dynamic {
+        effects.collision = None;
+        (solver.collision, solver.sdf) = (None, None);
+    }
     scene
+}
+
+/// `scene` with every effect that its body can have.
+pub fn full(scene: &Scene) -> Scene {
+    let effects = || Effects::switches().into_iter().map(of_scene);
+    effects().fold(scene.clone(), |scene, switch| {
+        let with = if switch.is_on(&scene) { scene.clone() } else { switched(&scene, &switch) };
+        if Rules::hold(&with) { with } else { scene }
+    })
+}
+
+fn of_scene(switch: Switch<Effects>) -> Switch<Scene> {
+    switch.within("", |scene: &Scene| &scene.effects, |scene| &mut scene.effects)
 }

@@ -19,15 +19,45 @@ struct Unit {
     name: &'static str,
     /// SI units per unit.
     size: f64,
-    error: fn(&RungResult) -> Option<Spread>,
+    quantity: Quantity,
+}
+
+/// What a tolerance is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Distance of the points of contact.
+    Contact,
+    /// Difference of the forces.
+    Force,
+    /// Root mean square difference over the electrodes.
+    Electrodes,
+}
+
+impl Quantity {
+    /// As sentences name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Contact => "point of contact",
+            Self::Force => "force",
+            Self::Electrodes => "electrodes",
+        }
+    }
+
+    fn of(self, rung: &RungResult) -> Option<Spread> {
+        match self {
+            Self::Contact => rung.off_reference_m,
+            Self::Force => rung.force_n,
+            Self::Electrodes => rung.electrode_counts,
+        }
+    }
 }
 
 /// What a tolerance may be given in, longest names first.
 const UNITS: [Unit; 4] = [
-    Unit { name: "counts", size: 1.0, error: |rung| rung.electrode_counts },
-    Unit { name: "mm", size: 1e-3, error: |rung| rung.off_reference_m },
-    Unit { name: "um", size: 1e-6, error: |rung| rung.off_reference_m },
-    Unit { name: "N", size: 1.0, error: |rung| rung.force_n },
+    Unit { name: "counts", size: 1.0, quantity: Quantity::Electrodes },
+    Unit { name: "mm", size: 1e-3, quantity: Quantity::Contact },
+    Unit { name: "um", size: 1e-6, quantity: Quantity::Contact },
+    Unit { name: "N", size: 1.0, quantity: Quantity::Force },
 ];
 
 impl FromStr for Tolerance {
@@ -51,9 +81,28 @@ impl fmt::Display for Tolerance {
 }
 
 impl Tolerance {
+    /// What it is of.
+    pub fn quantity(&self) -> Quantity {
+        self.unit.quantity
+    }
+
+    /// In m, N or counts.
+    pub fn size(&self) -> f64 {
+        self.value * self.unit.size
+    }
+
+    /// An error in m, N or counts, in the tolerance's unit; an infinite one is of touches of which
+    /// one has nothing to compare.
+    pub fn told(&self, error: f64) -> String {
+        match error.is_finite() {
+            true => format!("{:.3} {}", error / self.unit.size, self.unit.name),
+            false => "not alike".into(),
+        }
+    }
+
     /// 95 % of a rung's errors lie within this many of the tolerance's unit.
     pub fn error(&self, rung: &RungResult) -> Option<f64> {
-        (self.unit.error)(rung).map(|spread| spread.p95 / self.unit.size)
+        self.quantity().of(rung).map(|spread| spread.p95 / self.unit.size)
     }
 
     /// The cheapest rung within it; the reference, whose error is unknown, is left out.

@@ -30,7 +30,7 @@ pub struct Touches {
     pub contacts: Vec<Option<Contact>>,
     /// How the finger was loaded when it was read.
     pub loads: Vec<Option<ReferenceLoad>>,
-    /// Median wall time of a touch.
+    /// Median wall time of a touch; not a number if none was timed.
     pub wall_s: f64,
     /// Simulated time of a touch, in a body that has any.
     pub simulated_s: Option<f64>,
@@ -64,7 +64,8 @@ pub enum MeasureError {
     Fault(#[from] Fault),
 }
 
-/// Touches every target; `tick` is called after each and says whether to go on.
+/// Touches every target, once and as often as it takes to time it; `tick` is called after each and
+/// says whether to go on.
 ///
 /// # Errors
 /// If the body cannot be brought to its start.
@@ -73,6 +74,26 @@ pub fn touch_all(
     targets: &[Vec<f64>],
     seed: u64,
     tick: &mut dyn FnMut() -> bool,
+) -> Result<Option<Touches>, MeasureError> {
+    let mut timed = Simulator::new(Arc::clone(environment))?.probe(seed)?;
+    let mut walls_s = Vec::new();
+    let touches = touch_once(environment, targets, seed, &mut |approach| {
+        walls_s.push(wall_time_s(timed.as_mut(), approach));
+        tick()
+    })?;
+    let wall_s = median(&walls_s).unwrap_or(f64::NAN);
+    Ok(touches.map(|touches| Touches { wall_s, ..touches }))
+}
+
+/// Touches every target, without timing any; `after` each it says whether to go on.
+///
+/// # Errors
+/// If the body cannot be brought to its start.
+pub fn touch_once(
+    environment: &Arc<Environment>,
+    targets: &[Vec<f64>],
+    seed: u64,
+    after: &mut dyn FnMut(&Approach) -> bool,
 ) -> Result<Option<Touches>, MeasureError> {
     let simulator = Simulator::new(Arc::clone(environment))?;
     let noise_free = without_noise(&simulator)?;
@@ -85,7 +106,6 @@ pub fn touch_all(
         }
         _ => simulator.probe(seed)?,
     };
-    let mut timed = simulator.probe(seed)?;
     let mut touches = Touches {
         contacts: Vec::new(),
         loads: Vec::new(),
@@ -94,9 +114,10 @@ pub fn touch_all(
         faults: 0,
         fault: None,
     };
-    let (mut walls_s, mut simulated_s) = (Vec::new(), Vec::new());
+    let mut simulated_s = Vec::new();
     for target in targets {
-        let contact = match traced.touch(&environment.task().approach(target)) {
+        let approach = environment.task().approach(target);
+        let contact = match traced.touch(&approach) {
             Ok(Touch::Contact(contact)) => Some(contact),
             Ok(Touch::Miss | Touch::Overload) => None,
             Err(fault) => {
@@ -114,12 +135,10 @@ pub fn touch_all(
             touches.loads.push(None);
         }
         touches.contacts.push(contact);
-        walls_s.push(wall_time_s(timed.as_mut(), &environment.task().approach(target)));
-        if !tick() {
+        if !after(&approach) {
             return Ok(None);
         }
     }
-    touches.wall_s = median(&walls_s).unwrap_or(f64::NAN);
     touches.simulated_s = median(&simulated_s);
     Ok(Some(touches))
 }

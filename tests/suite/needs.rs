@@ -1,0 +1,159 @@
+//! What a scene is said to call for, where theory says what it does.
+
+use crate::common::program::{fails, palpate};
+use palpate::sim::Scene;
+use palpate::study::effects::need::{FullScene, Need};
+use palpate::study::effects::share::Share;
+use palpate::study::effects::{full, switches};
+use std::fs;
+use tempfile::TempDir;
+
+/// Rises along x by `slope_deg`.
+fn plane(slope_deg: f64) -> String {
+    let rise_m = 0.06 * slope_deg.to_radians().tan();
+    let corner =
+        |x: f64, z: f64| format!("v {} {} {}\n", 0.06 * x, -0.65 + rise_m * x, 0.5 + 0.06 * z);
+    let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)].map(|(x, z)| corner(x, z));
+    corners.concat() + "f 1 2 3\nf 1 3 4\n"
+}
+
+const SCENE: &str = "body = \"kinematic\"
+[object]
+mesh = \"plane.obj\"
+[zone]
+x_m = [-0.01, 0.01]
+z_m = [0.49, 0.51]
+datum_y_m = -0.65
+[effects.skin]
+[effects.fluid]
+[effects.electrodes]
+";
+
+/// A folder with a plane and a scene with `more` effects.
+fn folder(slope_deg: f64, more: &str) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("plane.obj"), plane(slope_deg)).unwrap();
+    fs::write(folder.path().join("scene.toml"), format!("{SCENE}{more}\n")).unwrap();
+    folder
+}
+
+/// Whether `effect` is needed on a plane; touches of one trial are ten.
+fn need(slope_deg: f64, more: &str, (effect, tolerance): (&str, &str), touches: usize) -> Need {
+    let folder = folder(slope_deg, more);
+    let scene = Scene::load(&folder.path().join("scene.toml"), &[]).unwrap();
+    let whole = FullScene::new(scene, tolerance.parse().unwrap(), touches).unwrap();
+    let switch = switches().into_iter().find(|switch| switch.name == effect).unwrap();
+    let judged = whole.judge(&switch).unwrap().unwrap();
+    println!("{effect} at {slope_deg} deg: {:?}", judged.difference);
+    Need::of(&judged.difference)
+}
+
+/// Coulomb: on a slope beyond the friction cone, atan 0.783 = 38°, the skin slips and friction adds
+/// √(1 + μ²) − 1 = 27 % to the force, 0.06 N of the 0.2 N of a usual touch; pressed at right
+/// angles it adds nothing. So it is whether the scene has friction or not.
+#[test]
+fn friction_is_needed_on_a_slope_beyond_its_cone() {
+    for more in ["", "[effects.friction]"] {
+        assert_eq!(need(50.0, more, ("friction", "0.03N"), 80), Need::Needed);
+        assert_eq!(need(0.0, more, ("friction", "0.03N"), 80), Need::NotNeeded);
+    }
+}
+
+/// A finger switched on in the cold warms by a third of 25 K in a touch's two seconds, and its
+/// fluid conducts by 2 % better for each: tens of counts of the thousands that electrodes read. One
+/// that is as warm as its own heat makes it does not.
+#[test]
+fn heat_is_needed_in_a_finger_that_warms_up() {
+    let cold = "[effects.thermal]\nstart_c = 15.0\nfinger_c = 40.0\ntime_constant_s = 5.0";
+    assert_eq!(need(0.0, cold, ("thermal", "20counts"), 80), Need::Needed);
+    assert_eq!(need(0.0, "[effects.thermal]", ("thermal", "20counts"), 80), Need::NotNeeded);
+}
+
+/// None of ten touches beyond the tolerance may be one in four of all.
+#[test]
+fn few_touches_cannot_tell() {
+    assert_eq!(need(0.0, "[effects.thermal]", ("thermal", "20counts"), 10), Need::CannotTell);
+    assert_eq!(need(50.0, "[effects.friction]", ("friction", "0.03N"), 10), Need::Needed);
+}
+
+/// What the full scene has beside the one given is what its body can have.
+#[test]
+fn the_full_scene_is_one_that_is_accepted() {
+    let folder = folder(0.0, "");
+    for body in ["kinematic", "dynamic"] {
+        let set = format!("body=\"{body}\"");
+        let scene = Scene::load(&folder.path().join("scene.toml"), &[set]).unwrap();
+        let whole = full(&scene);
+        let text = toml::to_string(&whole).unwrap();
+        fs::write(folder.path().join("full.toml"), text).unwrap();
+        assert_eq!(Scene::load(&folder.path().join("full.toml"), &[]).unwrap(), whole);
+        let friction = switches().into_iter().find(|switch| switch.name == "friction").unwrap();
+        assert!(friction.is_on(&whole) && !friction.is_on(&scene));
+        assert_eq!(whole.effects.collision.is_some(), body == "dynamic");
+    }
+}
+
+/// The scene that is written is one, lacks what it is said to lack, and stays within the tolerance
+/// on targets that it was not chosen on.
+#[test]
+fn the_cheapest_scene_is_written_and_held_against_the_full_one() {
+    let folder = folder(0.0, "[effects.thermal]\n[effects.friction]");
+    let folder = folder.path();
+    let mut arguments = vec!["--quiet", "effects", "scene.toml", "--tolerance", "0.05mm"];
+    arguments.extend(["--touches=80", "--fresh=20", "--pairs=2", "--out", "less.toml"]);
+    let output = palpate(folder, &arguments);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    println!("{text}");
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    for name in ["thermal", "friction"] {
+        let line = text.lines().find(|line| line.starts_with(name)).unwrap();
+        assert!(line.contains("on") && line.ends_with(" not needed"), "{line}");
+    }
+    let electrodes = text.lines().find(|line| line.starts_with("electrodes ")).unwrap();
+    assert!(electrodes.ends_with("  needed"), "{electrodes}");
+    assert!(text.contains("of 20 beyond") && text.contains("this one build"), "{text}");
+    let [whole, less] =
+        ["scene.toml", "less.toml"].map(|name| Scene::load(&folder.join(name), &[]).unwrap());
+    assert!(less.effects.thermal.is_none() && less.effects.friction.is_none());
+    let mut same = whole;
+    (same.effects.thermal, same.effects.friction) = (None, None);
+    assert_eq!(same, less);
+    fails(folder, &["effects", "scene.toml", "--tolerance", "2 feet"], &["--tolerance", "0.2mm"]);
+    // What is there is not replaced, unless Palpate wrote it.
+    fs::write(folder.join("mine.toml"), "body = \"cast\"\n").unwrap();
+    let last = arguments.len() - 1;
+    arguments[last] = "mine.toml";
+    fails(folder, &arguments, &["mine.toml", "--force"]);
+}
+
+/// Of touches that are a trial each.
+fn share(count: usize, of: usize) -> Share {
+    let touches = (0..of).map(|i| vec![i < count]).collect::<Vec<_>>();
+    Share::of(&touches).unwrap()
+}
+
+/// Of none in n, 1 − 0.025^(1/n); of 4 in 20, Clopper and Pearson's tables.
+#[test]
+fn an_interval_is_the_textbooks() {
+    let [low, high] = share(0, 100).interval;
+    assert!(low == 0.0 && (high - (1.0 - 0.025f64.powf(0.01))).abs() < 1e-9, "{high}");
+    let [low, high] = share(4, 20).interval;
+    assert!((low - 0.0573).abs() < 1e-4 && (high - 0.4366).abs() < 1e-4, "{low} {high}");
+    let [low, high] = share(100, 100).interval;
+    assert!((low - 0.025f64.powf(0.01)).abs() < 1e-9 && high == 1.0, "{low} {high}");
+    assert_eq!(Share::of(&[]), None);
+}
+
+/// Ten trials whose touches are all alike tell no more than ten touches.
+#[test]
+fn touches_that_are_alike_count_once() {
+    let alike: Vec<Vec<bool>> = (0..10).map(|i| vec![i < 4; 10]).collect();
+    let [low, high] = Share::of(&alike).unwrap().interval;
+    let ten = share(4, 10).interval;
+    assert!(low <= ten[0] && high >= ten[1], "{low} {high}");
+    assert!(high - low > 2.0 * (share(40, 100).interval[1] - share(40, 100).interval[0]));
+    // One touch in trials of ten is hardly more than none.
+    let one: Vec<Vec<bool>> = (0..12).map(|i| (0..10).map(|j| i + j == 0).collect()).collect();
+    let [_, high] = Share::of(&one).unwrap().interval;
+    assert!(high >= share(1, 120).interval[1], "{high}");
+}
