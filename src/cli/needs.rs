@@ -9,7 +9,7 @@ use crate::report::number::with_interval;
 use crate::sim::Scene;
 use crate::study::effects::difference::Difference;
 use crate::study::effects::full;
-use crate::study::effects::need::{Cheapest, FullScene, Judged, Need};
+use crate::study::effects::need::{Cheapest, FullScene, Judged};
 use crate::study::effects::share::Share;
 use crate::study::fidelity::tolerance::Tolerance;
 use std::path::{Path, PathBuf};
@@ -51,7 +51,7 @@ pub(super) fn run(
     let bar = progress_bar(talk, "effects", "effects", switches.len() as u64, 0);
     let mut judged = Vec::new();
     for switch in &switches {
-        judged.extend(whole.judge(switch)?);
+        judged.push(whole.judge(switch)?);
         step(talk, &bar);
         if stop.load(Ordering::Relaxed) {
             bar.finish_and_clear();
@@ -83,16 +83,18 @@ fn table(judged: &[Judged], tolerance: &Tolerance) -> String {
         ["effect", "here", "touches beyond", "95 % interval", "median", "95 %", "within it"];
     let mut lines = vec![header.map(String::from)];
     lines.extend(judged.iter().map(|judged| {
-        let Difference { beyond, median, p95 } = &judged.difference;
-        [
-            judged.name.clone(),
-            if judged.is_on { "on" } else { "off" }.into(),
-            format!("{} of {}", beyond.count, beyond.of),
-            interval(beyond),
-            tolerance.told(*median),
-            tolerance.told(*p95),
-            Need::of(&judged.difference).words().into(),
-        ]
+        let here = if judged.is_on { "on" } else { "off" };
+        let [beyond, interval, median, p95] = match &judged.difference {
+            Some(Difference { beyond, median, p95 }) => [
+                format!("{} of {}", beyond.count, beyond.of),
+                interval(beyond),
+                tolerance.told(*median),
+                tolerance.told(*p95),
+            ],
+            None => ["the scene is refused without it", "-", "-", "-"].map(String::from),
+        };
+        let need = judged.need().words().into();
+        [judged.name.clone(), here.into(), beyond, interval, median, p95, need]
     }));
     format!(
         "each effect switched alone, within {tolerance} of {}:\n{}\

@@ -43,9 +43,9 @@ fn need(slope_deg: f64, more: &str, (effect, tolerance): (&str, &str), touches: 
     let scene = Scene::load(&folder.path().join("scene.toml"), &[]).unwrap();
     let whole = FullScene::new(scene, tolerance.parse().unwrap(), touches).unwrap();
     let switch = switches().into_iter().find(|switch| switch.name == effect).unwrap();
-    let judged = whole.judge(&switch).unwrap().unwrap();
+    let judged = whole.judge(&switch).unwrap();
     println!("{effect} at {slope_deg} deg: {:?}", judged.difference);
-    Need::of(&judged.difference)
+    judged.need()
 }
 
 /// Coulomb: on a slope beyond the friction cone, atan 0.783 = 38°, the skin slips and friction adds
@@ -74,6 +74,26 @@ fn heat_is_needed_in_a_finger_that_warms_up() {
 fn few_touches_cannot_tell() {
     assert_eq!(need(0.0, "[effects.thermal]", ("thermal", "20counts"), 10), Need::CannotTell);
     assert_eq!(need(50.0, "[effects.friction]", ("friction", "0.03N"), 10), Need::Needed);
+}
+
+/// A dry finger that tells contact by a force sensor of such noise is refused, so the fluid is named
+/// and needed, whatever it changes.
+#[test]
+fn what_a_scene_is_refused_without_is_needed() {
+    assert_eq!(need(0.0, "[effects.wrench]", ("fluid", "1000mm"), 10), Need::Needed);
+    let names = |more: &str| -> Vec<String> {
+        let folder = folder(0.0, more);
+        let scene = Scene::load(&folder.path().join("scene.toml"), &[]).unwrap();
+        let whole = FullScene::new(scene, "1mm".parse().unwrap(), 1).unwrap();
+        whole.switches().into_iter().map(|switch| switch.name).collect()
+    };
+    let kinematic = names("[effects.wrench]");
+    assert!(
+        ["skin", "fluid", "electrodes", "wrench"]
+            .iter()
+            .all(|name| kinematic.contains(&name.to_string()))
+    );
+    assert!(!kinematic.contains(&"collision".to_string()));
 }
 
 /// What the full scene has beside the one given is what its body can have.

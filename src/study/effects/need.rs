@@ -49,8 +49,15 @@ pub struct Judged {
     pub name: String,
     /// Whether the scene has it.
     pub is_on: bool,
-    /// Of the scene with it switched.
-    pub difference: Difference,
+    /// Of the scene with it switched; none if that is not allowed.
+    pub difference: Option<Difference>,
+}
+
+impl Judged {
+    /// Whether the scene needs it; what it may not be without it does.
+    pub fn need(&self) -> Need {
+        self.difference.as_ref().map_or(Need::Needed, Need::of)
+    }
 }
 
 /// A time over another: the median of paired, interleaved touches, and its 95 % interval.
@@ -89,20 +96,23 @@ impl FullScene {
         Ok(Self { scene, tolerance, trials, touches })
     }
 
-    /// Everything that can be switched in it, one at a time.
+    /// Everything that it has, and all else that its body can have.
     pub fn switches(&self) -> Vec<Switch<Scene>> {
-        let valid = |switch: &Switch<Scene>| Rules::hold(&switched(&self.scene, switch));
-        switches().into_iter().filter(valid).collect()
+        let scene = &self.scene;
+        let is_due =
+            |switch: &Switch<Scene>| switch.is_on(scene) || Rules::hold(&switched(scene, switch));
+        switches().into_iter().filter(is_due).collect()
     }
 
-    /// What `switch` alone does; none without touches.
+    /// What `switch` alone does.
     ///
     /// # Errors
     /// If the switched scene cannot be built.
-    pub fn judge(&self, switch: &Switch<Scene>) -> Result<Option<Judged>, MeasureError> {
-        let difference = self.difference(&switched(&self.scene, switch))?;
-        let (name, is_on) = (switch.name.clone(), switch.is_on(&self.scene));
-        Ok(difference.map(|difference| Judged { name, is_on, difference }))
+    pub fn judge(&self, switch: &Switch<Scene>) -> Result<Judged, MeasureError> {
+        let other = switched(&self.scene, switch);
+        let is_allowed = Rules::hold(&other);
+        let difference = if is_allowed { self.difference(&other)? } else { None };
+        Ok(Judged { name: switch.name.clone(), is_on: switch.is_on(&self.scene), difference })
     }
 
     /// The cheapest scene that stays within the tolerance: what is not needed is left out, that
@@ -121,7 +131,7 @@ impl FullScene {
         let mut candidates = Vec::new();
         for switch in self.switches() {
             let judged = judged.iter().find(|judged| judged.name == switch.name);
-            if judged.is_some_and(|j| j.is_on && Need::of(&j.difference) == Need::NotNeeded) {
+            if judged.is_some_and(|judged| judged.is_on && judged.need() == Need::NotNeeded) {
                 let without = switched(&self.scene, &switch);
                 let (faster, _) = self.faster(&without, pairs, &self.trials)?;
                 candidates.push((faster, switch));
