@@ -1,5 +1,6 @@
 //! Mathematics that knows nothing of touch.
 
+pub mod banded;
 pub mod least_squares;
 pub mod normal;
 pub mod optimize;

@@ -87,6 +87,8 @@ mod scenes;
 mod servo;
 #[cfg(feature = "nlopt")]
 mod shards;
+mod shell;
+mod shell_elements;
 mod slopes;
 mod stress;
 #[cfg(feature = "nlopt")]
