@@ -6,7 +6,7 @@ use palpate::geometry::sweep::Capsule;
 use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
 use palpate::sim::environment::Shape;
-use palpate::sim::finger::effects::skin::SkinEffect;
+use palpate::sim::finger::effects::skin::{SkinEffect, SkinModel};
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
@@ -41,8 +41,14 @@ fn finger(c: &mut Criterion) {
             b.iter(|| bare.press(bvh, black_box(&motion.x_wt), &mut pressed));
         });
     }
-    for (name, effects) in [("skin", skin), ("skin and fluid", wet), ("everything", Effects::all())]
-    {
+    let shell = SkinEffect { model: SkinModel::Shell, ..SkinEffect::default() };
+    let shell = Effects { skin: Some(shell), ..wet.clone() };
+    for (name, effects) in [
+        ("skin", skin),
+        ("skin and fluid", wet),
+        ("shell and fluid", shell),
+        ("everything", Effects::all()),
+    ] {
         let tip = Fingertip::new(&environment.scene().finger, &effects);
         let mut feel = FingertipState::new(&tip, &stream(1, 0, "finger"));
         let mut group = c.benchmark_group(format!("fingertip, {name}"));

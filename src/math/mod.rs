@@ -1,5 +1,6 @@
 //! Mathematics that knows nothing of touch.
 
+pub mod banded;
 pub mod clustered;
 pub mod least_squares;
 pub mod normal;

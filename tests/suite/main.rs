@@ -90,6 +90,8 @@ mod sensors;
 mod servo;
 #[cfg(feature = "nlopt")]
 mod shards;
+mod shell;
+mod shell_elements;
 mod slopes;
 mod stress;
 #[cfg(feature = "nlopt")]

@@ -1,7 +1,7 @@
 //! The fluid under the skin: one pressure for all columns, from the volume they displace.
 
 use super::column::{Column, Response};
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 /// The balance is linear between the kinks of the columns, so Newton's steps end; this bounds the
 /// bisections among them (chosen).
@@ -9,6 +9,14 @@ const STEPS: usize = 100;
 
 /// Relative accuracy of the pressure (chosen).
 const ACCURACY: f64 = 1e-13;
+
+/// What all touches together do, but for the energy of their own responses.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Balance {
+    pub pressure_pa: f64,
+    pub displaced_m3: f64,
+    pub energy_j: f64,
+}
 
 /// A column whose ray meets the object.
 #[derive(Clone, Debug)]
@@ -20,6 +28,8 @@ pub(super) struct SkinContact {
     pub wet: bool,
     /// Negative where only a bulging skin would reach the object.
     pub indentation_m: f64,
+    /// Where it is met, in `T`.
+    pub point_t: Point3<f64>,
     /// Normal of the object, towards the finger, in `T`.
     pub normal_t: Vector3<f64>,
     /// Between ray and normal.

@@ -39,7 +39,7 @@ impl Fingertip {
         // Electrodes sense a shell through as many points as a default skin has.
         let shell = effects.flex.as_ref().map(|flex| {
             let samples = spread(&profile, SkinEffect::default().samples);
-            (Lattice::new(&profile, flex, &samples), samples)
+            (Lattice::new(&profile, [flex.along, flex.around], &samples), samples)
         });
         let samples = skin.as_ref().map(Skin::samples).or(shell.as_ref().map(|(_, all)| &all[..]));
         let electrodes = (effects.electrodes.as_ref().zip(samples))

@@ -1,7 +1,6 @@
-//! The shell of `[flex]` as triangles: where its nodes are, and what their motion is at the points
-//! of the skin over which electrodes sense.
+//! The skin over the fluid as triangles: where its nodes are, and what their motion is at the
+//! points of the skin over which electrodes sense.
 
-use super::effects::flex::FlexEffect;
 use super::samples::SkinSample;
 use crate::robot::finger::profile::Profile;
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -12,7 +11,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 pub struct Node {
     /// Where it rests.
     pub point: Point3<f64>,
-    /// Direction of the ray from the axis through it.
+    /// Where the ray from the axis through it starts.
+    pub start: Point3<f64>,
+    /// Direction of that ray.
     pub direction: UnitVector3<f64>,
     /// Thickness of the fluid under it.
     pub gap_m: f64,
@@ -41,13 +42,13 @@ struct Grid {
 impl Grid {
     /// Half of the cells are before the origin of `T`, where the profile bends most, in equal steps
     /// of an arc, and an even number, so that the corner at 45° is a node.
-    fn new(profile: &Profile, effect: &FlexEffect) -> Self {
+    fn new(profile: &Profile, [along, around]: [usize; 2]) -> Self {
         let (radius_m, length_m) = (profile.radius_m, profile.length_m);
-        let arc = 2 * effect.along.div_ceil(4);
-        let straight = if length_m > 0.0 { effect.along - arc } else { 0 };
+        let arc = 2 * along.div_ceil(4);
+        let straight = if length_m > 0.0 { along - arc } else { 0 };
         let behind = (0..straight).map(|i| -length_m * (1.0 - i as f64 / straight as f64));
         let before = (0..=arc).map(|i| radius_m * (FRAC_PI_2 * i as f64 / arc as f64).sin());
-        Self { stations_m: behind.chain(before).collect(), around: effect.around }
+        Self { stations_m: behind.chain(before).collect(), around }
     }
 
     fn node(&self, i: usize, j: usize) -> usize {
@@ -77,9 +78,10 @@ impl Grid {
 }
 
 impl Lattice {
-    /// The shell of this shape and resolution, read at `samples`.
-    pub fn new(profile: &Profile, effect: &FlexEffect, samples: &[SkinSample]) -> Self {
-        let grid = Grid::new(profile, effect);
+    /// The shell of this shape with so many cells along and around it, an even number of these,
+    /// read at `samples`.
+    pub fn new(profile: &Profile, cells: [usize; 2], samples: &[SkinSample]) -> Self {
+        let grid = Grid::new(profile, cells);
         let last = grid.stations_m.len() - 1;
         let mut thickness_m = 0.0;
         let mut nodes = Vec::new();
@@ -91,6 +93,7 @@ impl Lattice {
                 thickness_m = layers.skin_m;
                 nodes.push(Node {
                     point: start + direction.scale(layers.outer_m - layers.skin_m / 2.0),
+                    start,
                     direction,
                     gap_m: layers.gap_m,
                     area_m2: Vector3::zeros(),
@@ -132,6 +135,17 @@ impl Lattice {
     /// Corners of its triangles, counterclockwise seen from outside.
     pub fn triangles(&self) -> &[[usize; 3]] {
         &self.triangles
+    }
+
+    /// The skin's point over each node.
+    pub fn samples(&self, profile: &Profile) -> impl Iterator<Item = SkinSample> {
+        self.nodes.iter().map(|node| SkinSample {
+            start: node.start,
+            direction: node.direction,
+            layers: profile.layers(node.start.x, &node.direction),
+            normal: UnitVector3::try_new(node.area_m2, 0.0).unwrap_or(node.direction),
+            area_m2: node.area_m2.norm(),
+        })
     }
 
     /// Thickness of the skin.

@@ -1,12 +1,13 @@
 //! The physics of the fingertip: its soft skin, and the effects a scene names.
 //!
 //! `effects` has the table of them and each in a file of its own, the skin first. `profile` and
-//! `samples` say where skin and fluid of a BioTac are. `column` is the law of one column of skin
-//! over fluid over core, `cavity` couples columns by the fluid's pressure; `lattice` is the skin as
-//! a shell instead. `fingertip` puts together the effects that a scene names, `converter` makes
-//! tactile frames of what they sense, `counter` counts how often each did its work. `plate` presses
-//! the finger on a flat plate, `calibration` fits the constants to a `recording` of it, `stiffness`
-//! asks it how stiff the skin is.
+//! `samples` say where skin and fluid of a BioTac are, `patches` which of them may meet an object.
+//! `column` is the law of one column of skin over fluid over core, `cavity` couples columns by the
+//! fluid's pressure, `foundation` is a skin of them; `shell` carries load to its neighbours instead,
+//! over the triangles of `lattice`. `fingertip` puts together the effects that a scene names,
+//! `converter` makes tactile frames of what they sense, `counter` counts how often each did its
+//! work. `plate` presses the finger on a flat plate, `calibration` fits the constants to a
+//! `recording` of it, `stiffness` asks it how stiff the skin is.
 
 pub mod calibration;
 mod cavity;
@@ -15,12 +16,15 @@ mod converter;
 pub mod counter;
 pub mod effects;
 pub mod fingertip;
+mod foundation;
 pub mod lattice;
 pub mod load;
 pub(crate) mod noise;
+mod patches;
 pub mod plate;
 pub mod recording;
 pub mod samples;
+pub mod shell;
 pub mod stiffness;
 
 pub use effects::Effects;

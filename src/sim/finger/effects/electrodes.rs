@@ -46,8 +46,9 @@ pub struct ElectrodesEffect {
 impl Default for ElectrodesEffect {
     /// Baselines and noise: MiaoLi/syntouchcontact recordings, sensor F2. The recorded standard
     /// deviations contain drift; three quarters of them match the differences between frames
-    /// (2.1 to 5.8 counts). Correlation: 0.26 to 0.34 on average over pairs of the same. Drift: 6 to 16 counts over 11 s. Spread: fitted by `calibration` to the
-    /// same sensor on a flat plate. Exponent: the gap's resistance grows with its inverse.
+    /// (2.1 to 5.8 counts). Correlation: 0.26 to 0.34 on average over pairs of the same. Drift: 6
+    /// to 16 counts over 11 s. Spread: fitted by `calibration` to the same sensor on a flat plate.
+    /// Exponent: the gap's resistance grows with its inverse.
     fn default() -> Self {
         Self {
             baseline_counts: electrode_table::BASELINES_COUNTS,

@@ -1,44 +1,63 @@
-//! The soft skin: an elastic foundation against the exact mesh, coupled by the fluid under it.
+//! The soft skin against the exact mesh: an elastic foundation, or a shell, over the fluid.
 
 use super::effect::{Effect, Needs};
 use crate::config::{Checked, Rules};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::sweep::Capsule;
 use crate::robot::finger::profile::Profile;
-use crate::sim::finger::cavity;
 use crate::sim::finger::cavity::SkinContact;
 use crate::sim::finger::column::Column;
+use crate::sim::finger::foundation::Foundation;
+use crate::sim::finger::lattice::Lattice;
 use crate::sim::finger::load::{Load, PressError};
+use crate::sim::finger::patches::{Ball, Patch, key, patches};
 use crate::sim::finger::samples::{SkinSample, spread};
+use crate::sim::finger::shell::sheet::Material;
+use crate::sim::finger::shell::{Shell, ShellState};
 use nalgebra::{Isometry3, Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 
 /// A surface met at a flatter angle than this cosine counts as met at this one: a ray that grazes
 /// stands for no more than five times its section (chosen).
 const FLATTEST: f64 = 0.2;
 
-/// The fluid pushes the free skin out by no more than this part of the hull's radius: how far
-/// beyond the skin rays look (chosen; real skins bulge by 0.3 mm of 7).
+/// Fluid and neighbours push the free skin out by no more than this part of the hull's radius: how
+/// far beyond the skin rays look (chosen; real skins bulge by 0.3 mm of 7).
 const BULGE: f64 = 0.1;
-
-/// The samples are culled in this many slabs along the finger times sectors around it (chosen).
-const SLABS: usize = 8;
-const SECTORS: usize = 8;
 
 /// As long as nothing enters this part of the hull's radius around the axis, rays start there
 /// instead of on the axis (chosen: inside the core).
 const INNER: f64 = 0.5;
 
-/// Table `[skin]`: an elastic foundation over the exact mesh.
+/// How the skin passes load on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SkinModel {
+    /// Each point is a column of its own; the fluid's pressure is all that they share.
+    #[default]
+    Columns,
+    /// A thin shell of silicone carries load to its neighbours.
+    Shell,
+}
+
+/// Table `[skin]`: a soft skin against the exact mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SkinEffect {
-    /// Points of the skin.
+    /// How the skin passes load on.
+    pub model: SkinModel,
+    /// Points of the skin; of a shell those on the back.
     pub samples: usize,
-    /// Modulus of the skin in compression between object and fluid, in Pa.
+    /// A shell's cells along the finger, half of them over the cylinder and half over the tip's
+    /// arc.
+    pub along: usize,
+    /// A shell's cells around the finger, from nail to nail; even.
+    pub around: usize,
+    /// Modulus of the skin, in Pa: of columns in compression between object and fluid only.
     pub modulus_pa: f64,
+    /// Poisson's ratio of a shell.
+    pub poisson: f64,
     /// Stiffness of the membrane against being flattened, in Pa per metre.
     pub flatten_pa_m: f64,
     /// Stiffness of the membrane against being blown up, in Pa per metre.
@@ -51,11 +70,16 @@ impl Default for SkinEffect {
     /// Modulus E: NVlabs/biotac_sim. Inflation: that of a thin-walled tube, E t / R², with the
     /// skin's thickness t = 1.6 mm and the sides' radius R = 7 mm. Flattening and core: fitted by
     /// `calibration` to the MiaoLi/syntouchcontact recordings of sensor F2 on a flat plate. The fit
-    /// is flat: half or twice a value costs a few counts.
+    /// is flat: half or twice a value costs a few counts. Poisson's ratio: NVlabs/biotac_sim.
+    /// Cells: chosen, within 8 % of the force of 36 × 24 at 1 mm.
     fn default() -> Self {
         Self {
+            model: SkinModel::Columns,
             samples: 500,
+            along: 24,
+            around: 16,
             modulus_pa: 1.552e6,
+            poisson: 0.3165,
             flatten_pa_m: 3.5e6,
             inflate_pa_m: 5.07e7,
             core_pa_m: 1.4e9,
@@ -68,7 +92,11 @@ impl Checked for SkinEffect {
         rules.require("samples", self.samples, (10..=100_000).contains(&self.samples), || {
             "10 to 100000".into()
         });
+        rules.require("along", self.along, (4..=48).contains(&self.along), || "4 to 48".into());
+        let even = self.around.is_multiple_of(2) && (4..=32).contains(&self.around);
+        rules.require("around", self.around, even, || "an even number, 4 to 32".into());
         rules.number("modulus_pa", self.modulus_pa, 1e3..=1e9);
+        rules.number("poisson", self.poisson, 0.0..=0.49);
         rules.number("flatten_pa_m", self.flatten_pa_m, 1e3..=1e12);
         rules.number("inflate_pa_m", self.inflate_pa_m, 1e5..=1e12);
         rules.number("core_pa_m", self.core_pa_m, 1e3..=1e12);
@@ -100,36 +128,19 @@ impl Effect for SkinEffect {
 pub struct Skin {
     samples: Vec<SkinSample>,
     sections_m2: Vec<f64>,
-    /// Section of all columns that stand in the fluid.
-    wet_m2: f64,
     patches: Vec<Patch>,
     whole: Ball,
     inner: Capsule,
-    column: Column,
+    foundation: Foundation,
+    shell: Option<Shell>,
     bulge_m: f64,
-    /// Pressure per displaced volume, in Pa/m³; 0 without fluid.
-    cavity_pa_m3: f64,
-}
-
-/// Neighbouring samples and a ball around their rays.
-#[derive(Clone, Debug)]
-struct Patch {
-    range: Range<usize>,
-    /// Around rays from the axis, and around rays from the inner capsule.
-    from_axis: Ball,
-    from_inner: Ball,
-}
-
-#[derive(Clone, Debug)]
-struct Ball {
-    centre: Point3<f64>,
-    radius_m: f64,
 }
 
 /// One trial's memory for [`Skin::press`].
 #[derive(Clone, Debug, Default)]
 pub struct Pressed {
     touches: Vec<SkinContact>,
+    shell: Option<ShellState>,
     /// How far the inner side of the skin moved in at each sample, in metres.
     pub inward_m: Vec<f64>,
     /// How far the object compresses each sample's column, in metres; 0 where it is not met.
@@ -140,7 +151,9 @@ impl Pressed {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let numbers = self.inward_m.capacity() + self.indentation_m.capacity();
-        self.touches.capacity() * size_of::<SkinContact>() + numbers * size_of::<f64>()
+        self.shell.as_ref().map_or(0, ShellState::bytes)
+            + self.touches.capacity() * size_of::<SkinContact>()
+            + numbers * size_of::<f64>()
     }
 
     /// Whether no ray met anything: the skin is untouched and the fluid at rest.
@@ -158,47 +171,48 @@ impl Skin {
     /// A skin of this shape; `cavity_pa_m3` is the stiffness of the fluid, 0 for a dry finger.
     pub fn new(profile: &Profile, effect: &SkinEffect, cavity_pa_m3: f64) -> Self {
         let mut samples = spread(profile, effect.samples);
-        let patch = |sample: &SkinSample| {
-            let p = sample.point();
-            let along = (p.x + profile.length_m) / (profile.length_m + profile.radius_m);
-            let turn = (p.y.atan2(p.z) / std::f64::consts::TAU + 0.5) * SECTORS as f64;
-            let slab = ((along * SLABS as f64).max(0.0) as usize).min(SLABS - 1);
-            slab * SECTORS + (turn as usize).min(SECTORS - 1)
-        };
-        samples.sort_by_key(patch);
-        let bulge_m = if cavity_pa_m3 > 0.0 { BULGE * profile.radius_m } else { 0.0 };
+        let cells = [effect.along, effect.around];
+        let lattice = (effect.model == SkinModel::Shell).then(|| Lattice::new(profile, cells, &[]));
+        if let Some(lattice) = &lattice {
+            samples.retain(|sample| !sample.layers.wet);
+            samples.splice(0..0, lattice.samples(profile));
+        }
+        let nodes = lattice.as_ref().map_or(0, |lattice| lattice.nodes().len());
+        let mut order: Vec<usize> = (0..samples.len()).collect();
+        order.sort_by_key(|&i| key(profile, &samples[i]));
+        let samples: Vec<SkinSample> = order.iter().map(|&i| samples[i].clone()).collect();
+        let bulges = cavity_pa_m3 > 0.0 || lattice.is_some();
+        let bulge_m = if bulges { BULGE * profile.radius_m } else { 0.0 };
         let inner = Capsule {
             p0_w: Point3::origin(),
             p1_w: Point3::new(-profile.length_m, 0.0, 0.0),
             radius_m: INNER * profile.radius_m,
         };
-        let mut patches = Vec::new();
-        let mut first = 0;
-        for group in samples.chunk_by(|a, b| patch(a) == patch(b)) {
-            patches.push(Patch {
-                range: first..first + group.len(),
-                from_axis: Ball::around(group, 0.0, bulge_m),
-                from_inner: Ball::around(group, inner.radius_m, bulge_m),
-            });
-            first += group.len();
-        }
         let skin_m = samples.first().map_or(1.0, |sample| sample.layers.skin_m);
         let wet = samples.iter().filter(|sample| sample.layers.wet);
         Self {
-            wet_m2: wet.map(SkinSample::section_m2).sum(),
+            shell: lattice.map(|lattice| {
+                let node = order.iter().map(|&i| (i < nodes).then_some(i)).collect();
+                let (young_pa, poisson) = (effect.modulus_pa, effect.poisson);
+                let material = Material { young_pa, poisson, thickness_m: skin_m };
+                Shell::new(&lattice, node, &material, [effect.core_pa_m, cavity_pa_m3])
+            }),
             sections_m2: samples.iter().map(SkinSample::section_m2).collect(),
             whole: Ball::around(&samples, 0.0, bulge_m),
+            patches: patches(profile, &samples, inner.radius_m, bulge_m),
             inner,
-            column: Column {
-                skin_pa_m: effect.modulus_pa / skin_m,
-                flatten_pa_m: effect.flatten_pa_m,
-                inflate_pa_m: effect.inflate_pa_m,
-                core_pa_m: effect.core_pa_m,
+            foundation: Foundation {
+                column: Column {
+                    skin_pa_m: effect.modulus_pa / skin_m,
+                    flatten_pa_m: effect.flatten_pa_m,
+                    inflate_pa_m: effect.inflate_pa_m,
+                    core_pa_m: effect.core_pa_m,
+                },
+                wet_m2: wet.map(SkinSample::section_m2).sum(),
+                cavity_pa_m3,
             },
             samples,
-            patches,
             bulge_m,
-            cavity_pa_m3,
         }
     }
 
@@ -209,19 +223,21 @@ impl Skin {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.samples.len() * (size_of::<SkinSample>() + size_of::<f64>())
+        self.shell.as_ref().map_or(0, Shell::bytes)
+            + self.samples.len() * (size_of::<SkinSample>() + size_of::<f64>())
             + self.patches.len() * size_of::<Patch>()
     }
 
     /// The law of a column.
     pub fn column(&self) -> &Column {
-        &self.column
+        &self.foundation.column
     }
 
     /// Memory for [`press`](Self::press).
     pub fn relaxed(&self) -> Pressed {
         Pressed {
             touches: Vec::with_capacity(self.samples.len()),
+            shell: self.shell.as_ref().map(Shell::relaxed),
             inward_m: vec![0.0; self.samples.len()],
             indentation_m: vec![0.0; self.samples.len()],
         }
@@ -255,6 +271,9 @@ impl Skin {
             if !resting {
                 pressed.inward_m.fill(0.0);
                 pressed.indentation_m.fill(0.0);
+                if let (Some(shell), Some(state)) = (&self.shell, &mut pressed.shell) {
+                    shell.rest(state);
+                }
             }
             return Ok(Load::default());
         }
@@ -280,12 +299,15 @@ impl Skin {
                 if let Some(hit) = hit {
                     let slope = hit.normal.dot(&direction_w);
                     let facing = hit.normal * -slope.signum();
+                    let indentation_m = outer_m - skipped_m - hit.distance_m;
+                    let depth_m = outer_m - indentation_m;
                     touches.push(SkinContact {
                         sample: i,
+                        point_t: sample.start + sample.direction.scale(depth_m),
                         section_m2: self.sections_m2[i],
                         gap_m: sample.layers.gap_m,
                         wet: sample.layers.wet,
-                        indentation_m: outer_m - skipped_m - hit.distance_m,
+                        indentation_m,
                         normal_t: x_wt.rotation.inverse_transform_vector(&facing),
                         cosine: slope.abs().max(FLATTEST),
                         response: Default::default(),
@@ -295,45 +317,36 @@ impl Skin {
         }
     }
 
-    /// Finds the pressure and adds up what the columns do.
+    /// Finds the columns' pressure, or how the shell lies.
     fn balance(&self, pressed: &mut Pressed) -> Load {
-        let wet = pressed.touches.iter().filter(|touch| touch.wet);
-        let free_m2 = self.wet_m2 - wet.map(|touch| touch.section_m2).sum::<f64>();
-        let pressure_pa =
-            cavity::balance(&mut pressed.touches, &self.column, free_m2, self.cavity_pa_m3);
-        let free = self.column.respond(f64::NEG_INFINITY, 0.0, pressure_pa);
-        for (inward_m, sample) in pressed.inward_m.iter_mut().zip(&self.samples) {
-            *inward_m = if sample.layers.wet { free.inward_m } else { 0.0 };
-        }
-        pressed.indentation_m.fill(0.0);
-        let mut load = Load { pressure_pa, ..Load::default() };
-        load.energy_j = free.energy_j_m2 * free_m2;
-        if self.cavity_pa_m3 > 0.0 {
-            load.energy_j += 0.5 * pressure_pa * pressure_pa / self.cavity_pa_m3;
-        }
-        let mut moment = Vector3::zeros();
-        let mut weight_n = 0.0;
-        for touch in &pressed.touches {
+        let Pressed { touches, shell, inward_m, indentation_m } = pressed;
+        let balance = match (&self.shell, shell) {
+            (Some(shell), Some(state)) => shell.balance(touches, self.column(), state, inward_m),
+            _ => self.foundation.balance(touches, &self.samples, inward_m),
+        };
+        indentation_m.fill(0.0);
+        let mut load = Load {
+            pressure_pa: balance.pressure_pa,
+            displaced_m3: balance.displaced_m3,
+            energy_j: balance.energy_j,
+            ..Load::default()
+        };
+        let (mut moment, mut weight_n) = (Vector3::zeros(), 0.0);
+        for touch in touches.iter() {
             let (sample, response) = (&self.samples[touch.sample], &touch.response);
-            pressed.inward_m[touch.sample] = response.inward_m;
-            pressed.indentation_m[touch.sample] = touch.indentation_m.max(0.0);
+            indentation_m[touch.sample] = touch.indentation_m.max(0.0);
             load.energy_j += response.energy_j_m2 * touch.section_m2;
-            if sample.layers.wet {
-                load.displaced_m3 += response.inward_m.max(0.0) * touch.section_m2;
-            }
             if response.stress_pa <= 0.0 {
                 continue;
             }
             let area_m2 = touch.section_m2 / touch.cosine;
             let force_n = touch.normal_t * (response.stress_pa * area_m2);
-            let depth_m = sample.layers.outer_m - touch.indentation_m;
-            let point = sample.start + sample.direction.scale(depth_m);
             load.force_n += force_n;
-            load.torque_nm += point.coords.cross(&force_n);
+            load.torque_nm += touch.point_t.coords.cross(&force_n);
             load.area_m2 += area_m2;
             load.indentation_max_m = load.indentation_max_m.max(touch.indentation_m);
             load.on_core |= response.inward_m > sample.layers.gap_m;
-            moment += point.coords * force_n.norm();
+            moment += touch.point_t.coords * force_n.norm();
             weight_n += force_n.norm();
         }
         if weight_n > 0.0 {
@@ -341,25 +354,5 @@ impl Skin {
             load.normal_t = load.force_n.try_normalize(0.0).unwrap_or_default();
         }
         load
-    }
-}
-
-impl Ball {
-    /// Around the rays of `samples`, from `from_m` off the axis to `bulge_m` above the skin.
-    fn around(samples: &[SkinSample], from_m: f64, bulge_m: f64) -> Self {
-        let ends = || {
-            samples.iter().flat_map(|sample| {
-                let to_m = sample.layers.outer_m + bulge_m;
-                [from_m, to_m].map(|at_m| sample.start + sample.direction.scale(at_m))
-            })
-        };
-        let sum: Vector3<f64> = ends().map(|end| end.coords).sum();
-        let centre = Point3::from(sum / ends().count().max(1) as f64);
-        let radius_m = ends().map(|end| (end - centre).norm()).fold(0.0, f64::max);
-        Self { centre, radius_m }
-    }
-
-    fn meets(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>) -> bool {
-        bvh.touches(&(x_wt * self.centre), self.radius_m)
     }
 }

@@ -1,0 +1,144 @@
+//! Springs that push and never pull, on a body that answers linearly.
+//!
+//! Spring i of stiffness kᵢ is shorter than its rest by xᵢ = bᵢ − Σⱼ Wᵢⱼ fⱼ under all forces f ≥ 0,
+//! and pushes with fᵢ = kᵢ max(xᵢ, 0). W is symmetric and positive, so there is one answer. It is
+//! looked for among the loaded springs, which are those of the last guess that push and those
+//! beside them that are shortened; where that goes in a circle, one spring after the other.
+
+/// Guesses of what is loaded (chosen; two or three are usual).
+const GUESSES: usize = 12;
+
+/// Sweeps over the springs one by one, if the guesses go in a circle (chosen: they need not end,
+/// what they bring is on the way down).
+const SWEEPS: usize = 100;
+
+/// The springs and memory to solve for them.
+#[derive(Clone, Debug, Default)]
+pub struct Springs {
+    /// k, in N/m.
+    pub stiffness_n_m: Vec<f64>,
+    /// b, in m.
+    pub free_m: Vec<f64>,
+    /// W by rows, in m/N.
+    pub softness_m_n: Vec<f64>,
+    /// f: before [`solve`](Self::solve) a guess of what is loaded, then the answer, in N.
+    pub force_n: Vec<f64>,
+    loaded: Vec<usize>,
+    factor: Vec<f64>,
+    pushes: Vec<f64>,
+}
+
+impl Springs {
+    /// Forgets all springs.
+    pub fn clear(&mut self) {
+        for values in
+            [&mut self.stiffness_n_m, &mut self.free_m, &mut self.softness_m_n, &mut self.force_n]
+        {
+            values.clear();
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.stiffness_n_m.len()
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let values = [
+            &self.stiffness_n_m,
+            &self.free_m,
+            &self.softness_m_n,
+            &self.force_n,
+            &self.factor,
+            &self.pushes,
+        ];
+        let numbers: usize = values.iter().map(|values| values.capacity()).sum();
+        numbers * size_of::<f64>() + self.loaded.capacity() * size_of::<usize>()
+    }
+
+    /// How much spring `i` is shortened by everything but the forces.
+    fn shortened_m(&self, i: usize) -> f64 {
+        let row = &self.softness_m_n[i * self.len()..(i + 1) * self.len()];
+        let yielded = self.loaded.iter().map(|&j| row[j] * self.force_n[j]);
+        self.free_m[i] - yielded.sum::<f64>()
+    }
+
+    /// Finds the forces.
+    pub fn solve(&mut self) {
+        let count = self.len();
+        self.loaded.clear();
+        self.loaded.extend((0..count).filter(|&i| self.force_n[i] > 0.0));
+        for _ in 0..GUESSES {
+            self.push_loaded();
+            self.pushes.clear();
+            let mut settled = true;
+            let mut next = 0;
+            for i in 0..count {
+                let was = self.loaded.get(next) == Some(&i);
+                next += usize::from(was);
+                // What does not push yet will if it is shortened under these forces.
+                let is = if was { self.force_n[i] > 0.0 } else { self.shortened_m(i) > 0.0 };
+                settled &= is == was;
+                self.pushes.push(f64::from(u8::from(is)));
+            }
+            if settled {
+                return;
+            }
+            self.loaded.clear();
+            self.loaded.extend((0..count).filter(|&i| self.pushes[i] > 0.0));
+        }
+        self.sweep();
+    }
+
+    /// The forces with which the loaded springs are in balance, pulling allowed.
+    fn push_loaded(&mut self) {
+        let (count, size) = (self.len(), self.loaded.len());
+        self.factor.clear();
+        self.pushes.clear();
+        // Cholesky's factor and its forward solution, row by row.
+        for (row, &i) in self.loaded.iter().enumerate() {
+            let mut push = self.free_m[i];
+            for (column, &j) in self.loaded[..=row].iter().enumerate() {
+                let mut entry = self.softness_m_n[i * count + j];
+                let (own, other) = (row * size, column * size);
+                for k in 0..column {
+                    entry -= self.factor[own + k] * self.factor[other + k];
+                }
+                if column < row {
+                    entry /= self.factor[other + column];
+                    push -= entry * self.pushes[column];
+                } else {
+                    // With 1/k > 0 on it the diagonal stays positive but for rounding.
+                    let least = self.stiffness_n_m[i].recip();
+                    entry = (entry + least).max(1e-3 * least).sqrt();
+                    push /= entry;
+                }
+                self.factor.push(entry);
+            }
+            self.factor.resize((row + 1) * size, 0.0);
+            self.pushes.push(push);
+        }
+        self.force_n.fill(0.0);
+        for row in (0..size).rev() {
+            let push = self.pushes[row] / self.factor[row * size + row];
+            self.force_n[self.loaded[row]] = push;
+            for column in 0..row {
+                self.pushes[column] -= self.factor[row * size + column] * push;
+            }
+        }
+    }
+
+    /// Projected Gauss–Seidel: each sweep lowers the energy.
+    fn sweep(&mut self) {
+        let count = self.len();
+        self.loaded.clear();
+        self.loaded.extend(0..count);
+        self.force_n.iter_mut().for_each(|force_n| *force_n = force_n.max(0.0));
+        for i in (0..SWEEPS).flat_map(|_| 0..count) {
+            let own_m_n = self.softness_m_n[i * count + i];
+            let alone_m = self.shortened_m(i) + own_m_n * self.force_n[i];
+            let softness_m_n = own_m_n + self.stiffness_n_m[i].recip();
+            self.force_n[i] = (alone_m / softness_m_n).max(0.0);
+        }
+    }
+}
