@@ -3,8 +3,8 @@
 //! `effects` has the table of them and each in a file of its own, the skin first. `profile` and
 //! `samples` say where skin and fluid of a BioTac are, `patches` which of them may meet an object.
 //! `column` is the law of one column of skin over fluid over core, `cavity` couples columns by the
-//! fluid's pressure, `foundation` is a skin of them; `shell` carries load to its neighbours instead,
-//! over the triangles of `lattice`. `fingertip` puts together the effects that a scene names,
+//! fluid's pressure, `foundation` is a skin of them; `shell` carries load to its neighbours, over
+//! the triangles of `lattice`. `fingertip` puts together the effects that a scene names,
 //! `converter` makes tactile frames of what they sense, `counter` counts how often each did its
 //! work. `plate` presses the finger on a flat plate, `calibration` fits the constants to recordings
 //! of it, `stiffness` asks it how stiff the skin is.
