@@ -329,7 +329,8 @@ impl Membrane {
             }
             // Least of the parabola through what is known; not a number is none of it.
             let least = promised_j * part / (2.0 * (promised_j * part - freed_j));
-            part *= least.max(SHORTER[0]).min(SHORTER[1]);
+            let [shortest, longest] = SHORTER;
+            part *= if least.is_nan() { shortest } else { least.clamp(shortest, longest) };
         }
         std::mem::swap(&mut state.moved_m, &mut state.before_m);
         self.sheet.strain(&state.moved_m, &mut state.strained);
