@@ -62,12 +62,12 @@ fn asset(profile: &Profile, name: &str, begins: f64) -> String {
             let _ = match i + 1 < ALONG {
                 true => write!(
                     faces,
-                    "{here} {0} {1} {here} {1} {2} ",
+                    "{here} {1} {0} {here} {2} {1} ",
                     here + row,
                     here + row + 1,
                     here + 1
                 ),
-                false => write!(faces, "{here} {apex} {} ", here + 1),
+                false => write!(faces, "{here} {} {apex} ", here + 1),
             };
         }
     }
