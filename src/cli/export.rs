@@ -5,10 +5,11 @@ use super::terminal::{Ending, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
 use crate::gp::posterior::Scratch;
-use crate::report::known::Known;
+use crate::report::known;
 use crate::report::points::Points;
 use crate::report::replay::Replay;
 use crate::report::{figures, files, style};
+use crate::task::zone::grid_triangles;
 use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
 use std::path::PathBuf;
@@ -119,7 +120,7 @@ fn chosen(run: &Run, args: &Args) -> anyhow::Result<u32> {
 fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
     let zone = &run.experiment.scene.zone;
     let places = zone.grid(grid);
-    let known = Known::new(replay).over(places.iter().map(Vec::as_slice));
+    let known = known::over(replay, places.iter().map(Vec::as_slice));
     // The vertex that a place becomes, if it becomes one.
     let mut count = 0..;
     let vertices: Vec<Option<usize>> =
@@ -139,13 +140,8 @@ fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
     let deviations_m: Vec<f64> = predictions.iter().map(|p| p.variance.sqrt()).collect();
     let largest_m = deviations_m.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let colour = |deviation_m: f64| style::deviation_rgb(deviation_m / largest_m);
-    let corners = (1..grid).flat_map(|j| (1..grid).map(move |i| j * grid + i));
-    // Counter-clockwise seen from where the finger comes.
-    let triangles = corners.flat_map(|here| {
-        let [before, below, both] = [here - 1, here - grid, here - grid - 1];
-        [[both, before, here], [both, here, below]]
-    });
-    let joined = triangles.filter_map(|[a, b, c]| Some([vertices[a]?, vertices[b]?, vertices[c]?]));
+    let joined = grid_triangles(grid)
+        .filter_map(|[a, b, c]| Some([vertices[a]?, vertices[b]?, vertices[c]?]));
     Points {
         comments: vec![
             format!(

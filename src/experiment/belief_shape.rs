@@ -4,6 +4,7 @@ use crate::backend::recording::{ColorRgba, Marker, Point, Shape};
 use crate::explore::belief::Belief;
 use crate::gp::posterior::Posterior;
 use crate::task::Zone;
+use crate::task::zone::grid_triangles;
 
 /// Places along each side of the zone; chosen: to look at.
 const PER_SIDE: usize = 21;
@@ -54,21 +55,13 @@ fn draw(zone: &Zone, belief: &Belief, posterior: &Posterior, surface: &mut Marke
         .collect();
     let order: Vec<usize> = match zone.z_m {
         None => (0..PER_SIDE).filter(|&i| known[i]).collect(),
-        Some(_) => {
-            corners().filter(|corners| corners.iter().all(|&i| known[i])).flatten().collect()
-        }
+        Some(_) => grid_triangles(PER_SIDE)
+            .filter(|corners| corners.iter().all(|&i| known[i]))
+            .flatten()
+            .collect(),
     };
     surface.points = order.iter().map(|&i| points[i]).collect();
     surface.colors = order.iter().map(|&i| colors[i]).collect();
-}
-
-/// The corners of the triangles of a grid, counter-clockwise seen from where the finger comes.
-fn corners() -> impl Iterator<Item = [usize; 3]> {
-    let cells = (1..PER_SIDE).flat_map(|j| (1..PER_SIDE).map(move |i| j * PER_SIDE + i));
-    cells.flat_map(|here| {
-        let [before, below, both] = [here - 1, here - PER_SIDE, here - PER_SIDE - 1];
-        [[both, before, here], [both, here, below]]
-    })
 }
 
 fn between(share: f32) -> ColorRgba {

@@ -96,8 +96,10 @@ impl Silhouette {
     /// Whether a surface is likelier than not at each of `places`; it is everywhere as long as no
     /// touch has met nothing.
     pub fn is_likely<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<bool> {
-        let is_open = self.seen.as_ref().is_some_and(|seen| !seen.misses.is_empty());
-        self.over(places).into_iter().map(|probability| !is_open || probability > 0.5).collect()
+        match self.seen.as_ref().is_some_and(|seen| !seen.misses.is_empty()) {
+            true => self.over(places).into_iter().map(|probability| probability > 0.5).collect(),
+            false => places.into_iter().map(|_| true).collect(),
+        }
     }
 
     /// The probability at `place` as who looks for surfaces sees it, a little too likely; between

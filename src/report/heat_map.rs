@@ -18,12 +18,16 @@ pub struct HeatMap {
 }
 
 impl HeatMap {
-    /// Reads a value, and whether it is drawn, at the middle of every cell of a map of the size of
-    /// `area`.
-    pub fn read(zone: &Zone, area: Area, value: impl FnMut(Vec<f64>) -> (f64, bool)) -> Self {
+    /// Reads values, and whether they are drawn, at the middles of the cells of a map of the size
+    /// of `area`.
+    pub fn read(
+        zone: &Zone,
+        area: Area,
+        read: impl FnOnce(Vec<Vec<f64>>) -> Vec<(f64, bool)>,
+    ) -> Self {
         let cells = |side_px: f64| (side_px / CELL_PX).round().max(1.0) as usize;
         let (columns, rows) = (cells(area.width), cells(area.height));
-        let (values, is_drawn) = middles(zone, columns, rows).map(value).unzip();
+        let (values, is_drawn) = read(middles(zone, columns, rows).collect()).into_iter().unzip();
         Self { columns, rows, values, is_drawn }
     }
 

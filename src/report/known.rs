@@ -3,26 +3,11 @@
 
 use super::replay::Replay;
 use crate::experiment::store::Run;
-use crate::explore::silhouette::Silhouette;
 
-/// Tells where one belief is drawn: where the robot would say that there is a surface.
-pub struct Known(Silhouette);
-
-impl Known {
-    /// Of a belief.
-    pub fn new(replay: &Replay) -> Self {
-        Self(replay.belief.presence().silhouette())
-    }
-
-    /// Whether it is drawn at each of `places`.
-    pub fn over<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<bool> {
-        self.0.is_likely(places)
-    }
-
-    /// Whether it is drawn at a place.
-    pub fn at(&self, place: &[f64]) -> bool {
-        self.over([place])[0]
-    }
+/// Whether a belief is drawn at each of `places`: where the robot would say that there is a
+/// surface.
+pub fn over<'a>(replay: &Replay, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<bool> {
+    replay.belief.presence().silhouette().is_likely(places)
 }
 
 /// What a caption says of it; nothing where the surface is everywhere.

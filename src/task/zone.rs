@@ -180,3 +180,13 @@ impl Zone {
         squares.sum::<f64>().sqrt()
     }
 }
+
+/// The triangles between the places of a [`grid`](Zone::grid) with `per_side` along each of two
+/// sides, as their numbers, counter-clockwise seen from where the finger comes.
+pub fn grid_triangles(per_side: usize) -> impl Iterator<Item = [usize; 3]> {
+    let cells = (1..per_side).flat_map(move |j| (1..per_side).map(move |i| j * per_side + i));
+    cells.flat_map(move |here| {
+        let [before, below, both] = [here - 1, here - per_side, here - per_side - 1];
+        [[both, before, here], [both, here, below]]
+    })
+}

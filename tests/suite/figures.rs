@@ -3,7 +3,7 @@
 
 use crate::common::runs::{CURVE, SURFACE, run, tip_behind};
 use palpate::experiment::store::Run;
-use palpate::report::known::Known;
+use palpate::report::known;
 use palpate::report::legend::{Legend, Swatch};
 use palpate::report::replay::Replay;
 use palpate::report::style::{self, ON_DARK};
@@ -165,16 +165,16 @@ fn every_measure_has_a_band_from_the_first_belief_on() {
 fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     let run = run(SURFACE);
     let replay = Replay::new(&run, "active", 20).unwrap().unwrap();
-    let known = Known::new(&replay);
+    let is_known = |place: &[f64]| known::over(&replay, [place])[0];
     let mut missed = 0;
     for touch in replay.touches {
         missed += usize::from(touch.contact.is_none());
-        assert!(touch.contact.is_some() || !known.at(&touch.target), "{:?}", touch.target);
+        assert!(touch.contact.is_some() || !is_known(&touch.target), "{:?}", touch.target);
     }
     assert!(missed > 0);
     // The object ends at 46 mm on both sides.
     let places = run.truth.places.iter().map(Vec::as_slice);
-    let drawn = known.over(places.clone());
+    let drawn = known::over(&replay, places.clone());
     assert!(places.zip(&drawn).all(|(place, drawn)| *drawn || place[0].abs() > 0.03));
     assert!(drawn.iter().any(|drawn| !drawn));
     // Of an object that every touch meets, everything is drawn.
@@ -182,7 +182,7 @@ fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     full.rows.iter_mut().for_each(|row| row.touches.retain(|touch| touch.contact.is_some()));
     let replay = Replay::new(&full, "active", 8).unwrap().unwrap();
     let places = full.truth.places.iter().map(Vec::as_slice);
-    assert!(Known::new(&replay).over(places).iter().all(|drawn| *drawn));
+    assert!(known::over(&replay, places).iter().all(|drawn| *drawn));
 }
 
 /// One place keeps its surface, or there would be no range of heights: hardly anything is left.

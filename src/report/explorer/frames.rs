@@ -6,7 +6,7 @@ use crate::experiment::store::Run;
 use crate::gp::batch::Prediction;
 use crate::report::axes;
 use crate::report::axes::{Axis, Length};
-use crate::report::known::Known;
+use crate::report::known;
 use crate::report::relief::Space;
 use crate::report::replay;
 use crate::report::replay::Replay;
@@ -222,7 +222,7 @@ fn belief(
 ) -> anyhow::Result<Option<Belief>> {
     let Some(replay) = Replay::new(run, planner, touches)? else { return Ok(None) };
     let predictions = replay.surface.predict(places.iter().copied());
-    let known = Known::new(&replay).over(places.iter().copied());
+    let known = known::over(&replay, places.iter().copied());
     let drawn = |(known, prediction): (&bool, &Prediction)| known.then_some(prediction.mean);
     Ok(Some(Belief {
         touches,

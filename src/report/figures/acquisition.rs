@@ -9,7 +9,6 @@ use crate::report::axes::{Axis, Length, Panel, colour_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::heat_map::HeatMap;
 use crate::report::known;
-use crate::report::known::Known;
 use crate::report::legend::{Legend, Swatch};
 use crate::report::replay;
 use crate::report::replay::Replay;
@@ -124,16 +123,17 @@ fn draw_curves(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
 
 /// Deviations along the zone in metres.
 fn read_deviations(run: &Run, replay: &Replay) -> Vec<Reading> {
-    let mut scratch = Scratch::default();
-    let known = Known::new(replay);
-    let places = run.experiment.scene.zone.grid(STEPS).into_iter();
-    places.map(|place| reading(place, replay, &known, &mut scratch)).collect()
+    readings(run.experiment.scene.zone.grid(STEPS), replay)
 }
 
-fn reading(place: Vec<f64>, replay: &Replay, known: &Known, scratch: &mut Scratch) -> Reading {
-    let sd_m = deviation_m(&replay.belief, &place, scratch);
-    let is_drawn = known.at(&place);
-    (place, sd_m, is_drawn)
+fn readings(places: Vec<Vec<f64>>, replay: &Replay) -> Vec<Reading> {
+    let mut scratch = Scratch::default();
+    let drawn = known::over(replay, places.iter().map(Vec::as_slice));
+    let read = |(place, is_drawn): (Vec<f64>, bool)| {
+        let sd_m = deviation_m(&replay.belief, &place, &mut scratch);
+        (place, sd_m, is_drawn)
+    };
+    places.into_iter().zip(drawn).map(read).collect()
 }
 
 /// The belief in the panel above and its deviation in the one below.
@@ -193,10 +193,9 @@ fn draw_maps(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
     let maps: Vec<HeatMap> = replays
         .iter()
         .map(|replay| {
-            let (mut scratch, known) = (Scratch::default(), Known::new(replay));
-            HeatMap::read(zone, map_area, |place| {
-                let (_, sd_m, is_drawn) = reading(place, replay, &known, &mut scratch);
-                (unit.per_m * sd_m, is_drawn)
+            HeatMap::read(zone, map_area, |places| {
+                let read = readings(places, replay).into_iter();
+                read.map(|(_, sd_m, is_drawn)| (unit.per_m * sd_m, is_drawn)).collect()
             })
         })
         .collect();

@@ -6,7 +6,6 @@ use crate::gp::posterior::Scratch;
 use crate::report::axes::{Axis, Length, MM, Panel};
 use crate::report::canvas::{Anchor, Area, Canvas};
 use crate::report::known;
-use crate::report::known::Known;
 use crate::report::legend::{Legend, Swatch};
 use crate::report::replay;
 use crate::report::replay::Replay;
@@ -159,14 +158,15 @@ pub(super) fn draw_belief(
 /// (x, mean, standard deviation) along the zone, not finite where the belief is not drawn.
 fn read(run: &Run, replay: &Replay) -> Vec<(f64, f64, f64)> {
     let mut scratch = Scratch::default();
-    let known = Known::new(replay);
-    (run.experiment.scene.zone.grid(STEPS).into_iter())
-        .map(|place| {
-            let variance = replay.surface.variance(&place, &mut scratch);
-            match known.at(&place) {
-                true => (place[0], replay.surface.mean(&place, &mut scratch), variance.sqrt()),
-                false => (place[0], f64::NAN, f64::NAN),
+    let places = run.experiment.scene.zone.grid(STEPS);
+    let drawn = known::over(replay, places.iter().map(Vec::as_slice));
+    (places.iter().zip(drawn))
+        .map(|(place, is_drawn)| match is_drawn {
+            true => {
+                let variance = replay.surface.variance(place, &mut scratch);
+                (place[0], replay.surface.mean(place, &mut scratch), variance.sqrt())
             }
+            false => (place[0], f64::NAN, f64::NAN),
         })
         .collect()
 }

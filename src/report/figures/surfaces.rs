@@ -7,7 +7,6 @@ use crate::gp::posterior::Scratch;
 use crate::report::axes::{Axis, Length, colour_bar};
 use crate::report::canvas::{Area, Canvas, PointPx};
 use crate::report::known;
-use crate::report::known::Known;
 use crate::report::legend::{Legend, Swatch};
 use crate::report::relief::{Relief, Space};
 use crate::report::relief_panel::ReliefPanel;
@@ -78,10 +77,13 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             };
             panel.frame(&mut canvas, &format!("{planner}, {count} touches"), &score);
             if let Some(replay) = replay {
-                let (mut scratch, known) = (Scratch::default(), Known::new(&replay));
-                let heights = grid.heights(|place, _| {
-                    known.at(place).then(|| replay.surface.mean(place, &mut scratch))
-                });
+                let mut scratch = Scratch::default();
+                let drawn = known::over(&replay, grid.places().map(|(place, _)| place));
+                let heights: Vec<Option<f64>> = (grid.places().zip(drawn))
+                    .map(|((place, _), is_drawn)| {
+                        is_drawn.then(|| replay.surface.mean(place, &mut scratch))
+                    })
+                    .collect();
                 let relief = Relief::new(&panel.view, &grid.xs, &grid.zs, &heights, &axis);
                 relief.draw(&mut canvas);
                 canvas.grouped(ON_RELIEF, |canvas| {
@@ -95,7 +97,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     if run.truth.is_known() {
         let panel = ReliefPanel::new(unit, area(0.5 * (rows - 1.0), counts.len()), space);
         panel.frame(&mut canvas, "true object", "");
-        let heights = grid.heights(|_, height| height);
+        let heights: Vec<Option<f64>> = grid.places().map(|(_, height_m)| height_m).collect();
         Relief::new(&panel.view, &grid.xs, &grid.zs, &heights, &axis).draw(&mut canvas);
     }
     draw_colour_bar(&mut canvas, run, space, [0.5 * width, height - FOOT_PX + 14.0]);
@@ -134,16 +136,12 @@ impl<'a> Grid<'a> {
         Ok(Self { run, side, picked, xs, zs })
     }
 
-    /// A height for each place, given the true one.
-    fn heights(
-        &self,
-        mut height: impl FnMut(&[f64], Option<f64>) -> Option<f64>,
-    ) -> Vec<Option<f64>> {
+    /// Each place with the true height there.
+    fn places(&self) -> impl Iterator<Item = (&[f64], Option<f64>)> {
         let truth = &self.run.truth;
         (self.picked.iter())
-            .flat_map(|&j| self.picked.iter().map(move |&i| j * self.side + i))
-            .map(|index| height(&truth.places[index], truth.heights_m[index]))
-            .collect()
+            .flat_map(move |&j| self.picked.iter().map(move |&i| j * self.side + i))
+            .map(|index| (truth.places[index].as_slice(), truth.heights_m[index]))
     }
 }
 

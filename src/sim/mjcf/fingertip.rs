@@ -1,11 +1,11 @@
 //! What a BioTac looks like: the pad that senses, and the nail that holds the skin on its back.
 
+use super::mesh;
 use super::text::pose;
 use crate::robot::finger::Finger;
 use crate::robot::finger::profile::{CORE_M, Profile};
 use nalgebra::Isometry3;
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::fmt::Write;
 
 /// Cells along the finger and around each of its halves; chosen: smooth to look at.
 const ALONG: usize = 20;
@@ -40,38 +40,20 @@ pub(super) fn geoms(tip: &Isometry3<f64>) -> String {
 /// Half of the outer skin in `T`: rows from the back end to near the apex, and the apex.
 fn asset(profile: &Profile, name: &str, begins: f64) -> String {
     let whole_m = profile.length_m + profile.radius_m;
-    let mut vertices = String::new();
-    let mut put = |x_m: f64, turn: f64| {
-        let p = profile.skin_t(x_m, turn);
-        // Writing to a String cannot fail.
-        let _ = write!(vertices, "{} {} {} ", p.x, p.y, p.z);
-    };
-    for i in 0..ALONG {
+    let rows = (0..ALONG).flat_map(|i| {
         // Steps become smaller towards the apex, where the skin turns.
         let share = (FRAC_PI_2 * i as f64 / ALONG as f64).sin();
-        for j in 0..=AROUND {
-            put(-profile.length_m + whole_m * share, begins + PI * j as f64 / AROUND as f64);
-        }
-    }
-    put(profile.radius_m, begins);
+        let turn = move |j: usize| begins + PI * j as f64 / AROUND as f64;
+        (0..=AROUND).map(move |j| profile.skin_t(whole_m * share - profile.length_m, turn(j)))
+    });
     let (row, apex) = (AROUND + 1, ALONG * (AROUND + 1));
-    let mut faces = String::new();
-    for i in 0..ALONG {
-        for j in 0..AROUND {
-            let here = i * row + j;
-            let _ = match i + 1 < ALONG {
-                true => write!(
-                    faces,
-                    "{here} {1} {0} {here} {2} {1} ",
-                    here + row,
-                    here + row + 1,
-                    here + 1
-                ),
-                false => write!(faces, "{here} {} {apex} ", here + 1),
-            };
-        }
-    }
-    format!(r#"<mesh name="{name}" inertia="shell" vertex="{vertices}" face="{faces}"/>"#)
+    let cells = (0..ALONG).flat_map(|i| (0..AROUND).map(move |j| (i + 1 < ALONG, i * row + j)));
+    let faces = cells.flat_map(|(is_band, here)| match is_band {
+        true => vec![[here, here + row + 1, here + row], [here, here + 1, here + row + 1]],
+        false => vec![[here, here + 1, apex]],
+    });
+    let tip = std::iter::once(profile.skin_t(profile.radius_m, begins));
+    mesh::surface(name, rows.chain(tip), faces)
 }
 
 #[cfg(test)]
