@@ -6,6 +6,7 @@
 
 use super::environment::{CLEARANCE_M, Shape};
 use super::probe::rest;
+use crate::robot::finger::shape::Front;
 use crate::sim::Environment;
 use crate::sim::scene::Body;
 use rayon::prelude::*;
@@ -42,6 +43,7 @@ pub fn is_reachable(
 /// Fingers all over the zone, each let down onto the object when first asked for.
 struct Fingers<'a> {
     environment: &'a Environment,
+    front: Front,
     /// Their coordinates along each side of the zone; x varies fastest.
     sides_m: Vec<Vec<f64>>,
     /// The y in the zone's frame at which each tip rests; none for one that meets nothing.
@@ -68,7 +70,13 @@ impl<'a> Fingers<'a> {
             .sum();
         let count = sides_m.iter().map(Vec::len).product();
         let tips_y_m = (0..count).map(|_| OnceLock::new()).collect();
-        Self { environment, sides_m, tips_y_m, tolerance_m: TOLERANCE_M + missed_m }
+        Self {
+            environment,
+            front: environment.scene().finger.front(),
+            sides_m,
+            tips_y_m,
+            tolerance_m: TOLERANCE_M + missed_m,
+        }
     }
 
     /// Whether one of them touches the surface at `place`. Those are asked first that may come
@@ -104,8 +112,7 @@ impl<'a> Fingers<'a> {
     /// The fingers whose hull is over `place`, each with the y of its front there relative to its
     /// tip.
     fn over(&self, place: &[f64]) -> impl Iterator<Item = (usize, f64)> {
-        let axis_z_m = self.environment.scene().finger.axis_a().z;
-        self.near(place, [axis_z_m.max(0.0), -axis_z_m.min(0.0)]).filter_map(move |finger| {
+        self.near(place, self.front.axis_z_m()).filter_map(move |finger| {
             let away = place.iter().zip(self.target(finger)).map(|(at, target)| at - target);
             Some((finger, self.front_m(away)?))
         })
@@ -114,16 +121,16 @@ impl<'a> Fingers<'a> {
     /// The targets under the hull of `finger`, each with the y of its front there relative to its
     /// tip.
     fn under(&self, finger: usize) -> impl Iterator<Item = (usize, f64)> {
-        let axis_z_m = self.environment.scene().finger.axis_a().z;
+        let [above_m, below_m] = self.front.axis_z_m();
         let tip: Vec<f64> = self.target(finger).collect();
-        self.near(&tip, [-axis_z_m.min(0.0), axis_z_m.max(0.0)]).filter_map(move |at| {
+        self.near(&tip, [below_m, above_m]).filter_map(move |at| {
             let away = self.target(at).zip(&tip).map(|(at, tip)| at - tip);
             Some((at, self.front_m(away)?))
         })
     }
 
     fn front_m(&self, mut away: impl Iterator<Item = f64>) -> Option<f64> {
-        self.environment.scene().finger.front_m(away.next()?, away.next().unwrap_or(0.0))
+        self.front.y_m(away.next()?, away.next().unwrap_or(0.0))
     }
 
     /// The targets within a radius of `place`, along z within `more_m` than that below and above.

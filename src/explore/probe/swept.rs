@@ -24,9 +24,10 @@ impl Swept {
         places: impl Iterator<Item = &'a [f64]> + 'a,
     ) -> impl Iterator<Item = Option<f64>> + 'a {
         let p_zt = zone.x_wz().inverse_transform_point(&self.p_wt);
+        let front = self.finger.front();
         places.map(move |place| {
             let p_z = zone.local(place, 0.0);
-            let front_m = self.finger.front_m(p_z.x - p_zt.x, p_z.z - p_zt.z)?;
+            let front_m = front.y_m(p_z.x - p_zt.x, p_z.z - p_zt.z)?;
             Some(p_zt.y + front_m - zone.datum_y_m())
         })
     }

@@ -68,18 +68,37 @@ impl Finger {
         self.r_at().inverse() * -Vector3::y()
     }
 
+    /// The hull as seen along the approach.
+    pub fn front(&self) -> Front {
+        Front { radius_m: self.radius_m, axis: self.axis_a() }
+    }
+
+    /// As [`Front::y_m`], for one place.
+    pub fn front_m(&self, dx_m: f64, dz_m: f64) -> Option<f64> {
+        self.front().y_m(dx_m, dz_m)
+    }
+}
+
+/// The hull as seen along the approach, with its axis in the frame `A` worked out once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Front {
+    radius_m: f64,
+    axis: Vector3<f64>,
+}
+
+impl Front {
     /// The y of the hull's foremost point (towards −y) at (`dx_m`, `dz_m`) beside the hemisphere's
     /// centre, relative to it, in the frame `A`; none where the hull does not reach.
     ///
     /// A sphere whose centre lies at s·(a_y, a_z) on the axis has its front at
     /// s·a_y − sqrt(q² − (dz − s·a_z)²) with q² = r² − dx², which is least where
     /// dz − s·a_z = sign(a_z)·q·a_y / |a|.
-    pub fn front_m(&self, dx_m: f64, dz_m: f64) -> Option<f64> {
-        let q2 = self.radius_m * self.radius_m - dx_m * dx_m;
+    pub fn y_m(&self, dx_m: f64, dz_m: f64) -> Option<f64> {
+        let Self { radius_m, axis } = self;
+        let q2 = radius_m * radius_m - dx_m * dx_m;
         if q2 < 0.0 {
             return None;
         }
-        let axis = self.axis_a();
         let s = if axis.z == 0.0 {
             0.0
         } else {
@@ -89,6 +108,11 @@ impl Finger {
         let across_m = dz_m - s * axis.z;
         let depth2 = q2 - across_m * across_m;
         (depth2 >= 0.0).then(|| s * axis.y - depth2.sqrt())
+    }
+
+    /// How far above and below the hemisphere's centre the hull's axis reaches, in `A`.
+    pub fn axis_z_m(&self) -> [f64; 2] {
+        [self.axis.z.max(0.0), -self.axis.z.min(0.0)]
     }
 }
 
