@@ -52,6 +52,14 @@ struct Fingers<'a> {
     tolerance_m: f64,
 }
 
+/// A row of targets near a finger, and the y of its front over each relative to its tip.
+struct Strip {
+    /// Rows and columns from the finger's own target to the first.
+    row: isize,
+    column: isize,
+    front_m: Vec<f64>,
+}
+
 impl<'a> Fingers<'a> {
     fn new(environment: &'a Environment) -> Self {
         let zone = &environment.scene().zone;
@@ -98,15 +106,58 @@ impl<'a> Fingers<'a> {
     /// For each a y in the zone's frame below which its tip does not come, from the surface at
     /// every target: no hull lets it through.
     fn lowest_y_m(&self) -> Vec<f64> {
-        let surface_y_m: Vec<Option<f64>> =
-            (0..self.tips_y_m.len()).into_par_iter().map(|at| self.surface_y_m(at)).collect();
-        let lowest_y_m = |finger| {
-            let fronts = self
-                .under(finger)
-                .filter_map(|(at, front_m)| Some(surface_y_m[at]? - front_m - ROUNDING_M));
-            fronts.fold(f64::NEG_INFINITY, f64::max)
+        let surface_y_m: Vec<f64> = (0..self.tips_y_m.len())
+            .into_par_iter()
+            .map(|at| self.surface_y_m(at).unwrap_or(f64::NEG_INFINITY))
+            .collect();
+        let across = self.sides_m.first().map_or(1, Vec::len);
+        let strips = self.strips();
+        let lowest_y_m = |finger: usize| {
+            let (row, column) = (finger / across, finger % across);
+            let over_strip = |strip: &Strip| {
+                let row = row.checked_add_signed(strip.row)?;
+                let line = surface_y_m.chunks_exact(across).nth(row)?;
+                let (line, front_m) = match column.checked_add_signed(strip.column) {
+                    Some(first) => (line.get(first..)?, &strip.front_m[..]),
+                    None => (line, strip.front_m.get(strip.column.unsigned_abs() - column..)?),
+                };
+                line.iter().zip(front_m).map(|(y_m, front_m)| y_m - front_m).reduce(f64::max)
+            };
+            let highest = strips.iter().filter_map(over_strip).fold(f64::NEG_INFINITY, f64::max);
+            highest - ROUNDING_M
         };
         (0..self.tips_y_m.len()).into_par_iter().map(lowest_y_m).collect()
+    }
+
+    /// The hull's front over the targets around any finger, as targets stand at equal distances.
+    fn strips(&self) -> Vec<Strip> {
+        let step_m = |side: &Vec<f64>| match side[..] {
+            [first, .., last] => (last - first) / (side.len() - 1) as f64,
+            _ => f64::INFINITY,
+        };
+        let reach = |side: usize, way_m: f64| {
+            let steps = self.sides_m.get(side).map_or(0.0, |side| way_m / step_m(side));
+            let last = self.sides_m.get(side).map_or(0, |side| side.len() - 1);
+            (steps.ceil() as isize).min(last as isize)
+        };
+        let at = |side: usize, steps: isize| {
+            self.sides_m.get(side).map_or(0.0, |side| steps as f64 * step_m(side))
+        };
+        let radius_m = self.environment.scene().finger.radius_m;
+        let [above_m, below_m] = self.front.axis_z_m();
+        let (across, rows) =
+            (reach(0, radius_m), -reach(1, radius_m + below_m)..=reach(1, radius_m + above_m));
+        rows.filter_map(|row| {
+            let front_m = |column| self.front.y_m(at(0, column), at(1, row));
+            let mut columns = (-across..=across).filter(|&column| front_m(column).is_some());
+            let first = columns.next()?;
+            Some(Strip {
+                row,
+                column: first,
+                front_m: (first..=-first).filter_map(front_m).collect(),
+            })
+        })
+        .collect()
     }
 
     /// The fingers whose hull is over `place`, each with the y of its front there relative to its
@@ -115,17 +166,6 @@ impl<'a> Fingers<'a> {
         self.near(place, self.front.axis_z_m()).filter_map(move |finger| {
             let away = place.iter().zip(self.target(finger)).map(|(at, target)| at - target);
             Some((finger, self.front_m(away)?))
-        })
-    }
-
-    /// The targets under the hull of `finger`, each with the y of its front there relative to its
-    /// tip.
-    fn under(&self, finger: usize) -> impl Iterator<Item = (usize, f64)> {
-        let [above_m, below_m] = self.front.axis_z_m();
-        let tip: Vec<f64> = self.target(finger).collect();
-        self.near(&tip, [below_m, above_m]).filter_map(move |at| {
-            let away = self.target(at).zip(&tip).map(|(at, tip)| at - tip);
-            Some((at, self.front_m(away)?))
         })
     }
 
