@@ -71,9 +71,7 @@ impl ResolvedRate {
         if weights == free { Some(first) } else { self.weighted(&weights) }
     }
 
-    /// `qdot = D Jᴰ⁺ v + D (I − Jᴰ⁺ Jᴰ) z` with `Jᴰ = J D`. In the eigenvectors u of `Jᴰ Jᴰᵀ`, a
-    /// direction of singular value σ is multiplied by `σ / (σ² + λ²)` with
-    /// `λ² = SINGULAR² − σ²` below SINGULAR and 0 above (after Nakamura and Hanafusa 1986).
+    /// `qdot = D Jᴰ⁺ v + D (I − Jᴰ⁺ Jᴰ) z` with `Jᴰ = J D`.
     fn weighted(&self, weights: &Joints) -> Option<(Joints, f64)> {
         let mut jacobian = self.jacobian;
         for (mut column, weight) in jacobian.column_iter_mut().zip(weights.iter()) {
@@ -88,20 +86,11 @@ impl ResolvedRate {
         if !finite {
             return None;
         }
-        let eigen = SymmetricEigen::try_new(square, f64::EPSILON, 1000)?;
         let wish = jacobian * self.home;
-        let mut along = Vector6::zeros();
-        let mut damping: f64 = 0.0;
-        for (i, &value) in eigen.eigenvalues.iter().enumerate() {
-            let u = eigen.eigenvectors.column(i);
-            let damped = value.max(SINGULAR * SINGULAR);
-            damping = damping.max(1.0 - value.max(0.0) / damped);
-            along += u * (u.dot(&self.twist) / damped);
-            // Below rounding, J has no such direction and the null space owns it.
-            if value > 1e-10 {
-                along -= u * (u.dot(&wish) / value);
-            }
-        }
+        let (along, damping) = match regular(&square, &(self.twist - wish)) {
+            Some(along) => (along, 0.0),
+            None => damped(square, &self.twist, &wish)?,
+        };
         let qdot = jacobian.transpose() * along + self.home;
         Some((qdot.component_mul(weights), damping))
     }
@@ -110,5 +99,64 @@ impl ResolvedRate {
     pub(super) fn followed(&self, qdot: &Joints) -> f64 {
         let wanted = self.twist.norm_squared();
         if wanted > 0.0 { (self.jacobian * qdot).dot(&self.twist) / wanted } else { 1.0 }
+    }
+}
+
+/// `(Jᴰ Jᴰᵀ)⁻¹ r`, if no singular value is below SINGULAR: then `Jᴰ Jᴰᵀ − SINGULAR² I` has a
+/// Cholesky factor. A tenth of the work of the eigenvectors, and the usual case.
+fn regular(square: &Matrix6<f64>, rest: &Vector6<f64>) -> Option<Vector6<f64>> {
+    (square - Matrix6::identity() * (SINGULAR * SINGULAR)).cholesky()?;
+    Some(square.cholesky()?.solve(rest))
+}
+
+/// In the eigenvectors u of `Jᴰ Jᴰᵀ`, a direction of singular value σ is multiplied by
+/// `σ / (σ² + λ²)` with `λ² = SINGULAR² − σ²` below SINGULAR and 0 above (after Nakamura and
+/// Hanafusa 1986); and how much that damps, 0 to 1.
+fn damped(
+    square: Matrix6<f64>,
+    twist: &Vector6<f64>,
+    wish: &Vector6<f64>,
+) -> Option<(Vector6<f64>, f64)> {
+    let eigen = SymmetricEigen::try_new(square, f64::EPSILON, 1000)?;
+    let mut along = Vector6::zeros();
+    let mut damping: f64 = 0.0;
+    for (i, &value) in eigen.eigenvalues.iter().enumerate() {
+        let u = eigen.eigenvectors.column(i);
+        let damped = value.max(SINGULAR * SINGULAR);
+        damping = damping.max(1.0 - value.max(0.0) / damped);
+        along += u * (u.dot(twist) / damped);
+        // Below rounding, J has no such direction and the null space owns it.
+        if value > 1e-10 {
+            along -= u * (u.dot(wish) / value);
+        }
+    }
+    Some((along, damping))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Eigenvectors are the slow twin of the factor.
+        #[test]
+        fn without_a_singularity_both_ways_agree(
+            entries in prop::collection::vec(-1.0..1.0f64, 36),
+            twist in prop::array::uniform6(-1.0..1.0f64),
+            wish in prop::array::uniform6(-1.0..1.0f64),
+        ) {
+            let jacobian = Matrix6::from_column_slice(&entries);
+            let square = jacobian * jacobian.transpose();
+            let (twist, wish) = (Vector6::from(twist), Vector6::from(wish));
+            let (along, damping) = damped(square, &twist, &wish).unwrap();
+            match regular(&square, &(twist - wish)) {
+                Some(fast) => {
+                    prop_assert_eq!(damping, 0.0);
+                    prop_assert!((fast - along).norm() <= 1e-9 * along.norm().max(1.0));
+                }
+                None => prop_assert!(damping > 0.0),
+            }
+        }
     }
 }
