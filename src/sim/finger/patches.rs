@@ -2,28 +2,64 @@
 
 use super::samples::SkinSample;
 use crate::geometry::bvh::MeshBvh;
+use crate::geometry::mesh::Mesh;
+use crate::geometry::sweep::Capsule;
 use crate::robot::finger::profile::Profile;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::f64::consts::TAU;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// The samples are culled in this many slabs along the finger times sectors around it (chosen).
 const SLABS: usize = 8;
 const SECTORS: usize = 8;
 
+/// As long as nothing enters this part of the hull's radius around the axis, rays start there
+/// instead of on the axis (chosen: inside the core).
+const INNER: f64 = 0.5;
+
+/// What is this part of the hull's radius away is not looked at again before the finger has come as
+/// far (chosen: a few ticks of an approach).
+const MARGIN: f64 = 0.1;
+
+/// Less than 1 by more than rounding.
+const HELD: f64 = 0.999;
+
+/// All rays of a skin.
+#[derive(Clone, Debug)]
+pub(super) struct Patches {
+    patches: Vec<Patch>,
+    whole: Ball,
+    inner: Capsule,
+    margin_m: f64,
+    /// Farthest that a ball's centre or the axis lies from the origin of `T`.
+    reach_m: f64,
+}
+
 /// Neighbouring samples and a ball around their rays.
 #[derive(Clone, Debug)]
-pub(super) struct Patch {
-    pub range: Range<usize>,
-    /// Around rays from the axis, and around rays from `inner_m` off it.
-    pub from_axis: Ball,
-    pub from_inner: Ball,
+struct Patch {
+    range: Range<usize>,
+    /// Around rays from the axis, and around rays from `inner` off it.
+    from_axis: Ball,
+    from_inner: Ball,
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Ball {
+struct Ball {
     centre: Point3<f64>,
     radius_m: f64,
+}
+
+/// The patches that were within the margin of an object in some pose: all that can meet it until
+/// the finger has moved by the margin. One trial's memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Vicinity {
+    mesh: Option<Arc<Mesh>>,
+    x_wt: Isometry3<f64>,
+    near: Vec<usize>,
+    /// Whether the object was within the margin of the inner capsule.
+    is_deep: bool,
 }
 
 /// The patch to which a sample belongs: samples are sorted by it.
@@ -35,29 +71,106 @@ pub(super) fn key(profile: &Profile, sample: &SkinSample) -> usize {
     slab * SECTORS + (turn as usize).min(SECTORS - 1)
 }
 
-/// Patches of samples sorted by their `key`, whose rays end `bulge_m` above the skin.
-pub(super) fn patches(
-    profile: &Profile,
-    samples: &[SkinSample],
-    inner_m: f64,
-    bulge_m: f64,
-) -> Vec<Patch> {
-    let mut patches = Vec::new();
-    let mut first = 0;
-    for group in samples.chunk_by(|a, b| key(profile, a) == key(profile, b)) {
-        patches.push(Patch {
-            range: first..first + group.len(),
-            from_axis: Ball::around(group, 0.0, bulge_m),
-            from_inner: Ball::around(group, inner_m, bulge_m),
-        });
-        first += group.len();
+impl Patches {
+    /// Of samples sorted by their [`key`], whose rays end `bulge_m` above the skin.
+    pub fn new(profile: &Profile, samples: &[SkinSample], bulge_m: f64) -> Self {
+        let inner = Capsule {
+            p0_w: Point3::origin(),
+            p1_w: Point3::new(-profile.length_m, 0.0, 0.0),
+            radius_m: INNER * profile.radius_m,
+        };
+        let mut patches = Vec::new();
+        let mut first = 0;
+        for group in samples.chunk_by(|a, b| key(profile, a) == key(profile, b)) {
+            patches.push(Patch {
+                range: first..first + group.len(),
+                from_axis: Ball::around(group, 0.0, bulge_m),
+                from_inner: Ball::around(group, inner.radius_m, bulge_m),
+            });
+            first += group.len();
+        }
+        let whole = Ball::around(samples, 0.0, bulge_m);
+        let centres = (patches.iter())
+            .flat_map(|patch| [&patch.from_axis, &patch.from_inner])
+            .chain([&whole])
+            .map(|ball| ball.centre.coords.norm());
+        let reach_m = centres.fold(profile.length_m, f64::max);
+        Self { patches, whole, inner, margin_m: MARGIN * profile.radius_m, reach_m }
     }
-    patches
+
+    /// Memory for [`near`](Self::near).
+    pub fn vicinity(&self) -> Vicinity {
+        Vicinity { near: Vec::with_capacity(self.patches.len()), ..Vicinity::default() }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.patches.as_slice())
+    }
+
+    /// The ranges of samples whose rays may meet the object in pose `x_wt`, in order, and how far
+    /// off the axis these rays may start.
+    pub fn near<'a>(
+        &'a self,
+        bvh: &'a MeshBvh,
+        x_wt: &'a Isometry3<f64>,
+        vicinity: &'a mut Vicinity,
+    ) -> (f64, impl Iterator<Item = &'a Range<usize>>) {
+        if !vicinity.holds(self, bvh, x_wt) {
+            self.look(bvh, x_wt, vicinity);
+        }
+        let is_deep = vicinity.is_deep && self.is_deep(bvh, x_wt, 0.0);
+        let near = vicinity.near.iter().map(|&i| &self.patches[i]).filter(move |patch| {
+            let ball = if is_deep { &patch.from_axis } else { &patch.from_inner };
+            ball.meets(bvh, x_wt, 0.0)
+        });
+        (if is_deep { 0.0 } else { self.inner.radius_m }, near.map(|patch| &patch.range))
+    }
+
+    /// Finds what is within the margin.
+    fn look(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, vicinity: &mut Vicinity) {
+        let margin_m = self.margin_m;
+        vicinity.mesh = Some(bvh.mesh().clone());
+        vicinity.x_wt = *x_wt;
+        vicinity.near.clear();
+        vicinity.is_deep = false;
+        if !self.whole.meets(bvh, x_wt, margin_m) {
+            return;
+        }
+        vicinity.is_deep = self.is_deep(bvh, x_wt, margin_m);
+        let near = self.patches.iter().enumerate().filter(|(_, patch)| {
+            let ball = if vicinity.is_deep { &patch.from_axis } else { &patch.from_inner };
+            ball.meets(bvh, x_wt, margin_m)
+        });
+        vicinity.near.extend(near.map(|(i, _)| i));
+    }
+
+    /// Whether the object is within `margin_m` of the inner capsule.
+    fn is_deep(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, margin_m: f64) -> bool {
+        let Capsule { p0_w, p1_w, radius_m } = self.inner;
+        let radius_m = radius_m + margin_m;
+        bvh.enters(&Capsule { p0_w: x_wt * p0_w, p1_w: x_wt * p1_w, radius_m })
+    }
+}
+
+impl Vicinity {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.near.capacity() * size_of::<usize>()
+    }
+
+    /// Whether the finger is still within the margin of the pose in which it was found.
+    fn holds(&self, patches: &Patches, bvh: &MeshBvh, x_wt: &Isometry3<f64>) -> bool {
+        let is_same = self.mesh.as_ref().is_some_and(|mesh| Arc::ptr_eq(mesh, bvh.mesh()));
+        let way = x_wt.translation.vector - self.x_wt.translation.vector;
+        let turn_rad = self.x_wt.rotation.angle_to(&x_wt.rotation);
+        is_same && way.norm() + patches.reach_m * turn_rad < HELD * patches.margin_m
+    }
 }
 
 impl Ball {
     /// Around the rays of `samples`, from `from_m` off the axis to `bulge_m` above the skin.
-    pub fn around(samples: &[SkinSample], from_m: f64, bulge_m: f64) -> Self {
+    fn around(samples: &[SkinSample], from_m: f64, bulge_m: f64) -> Self {
         let ends = || {
             samples.iter().flat_map(|sample| {
                 let to_m = sample.layers.outer_m + bulge_m;
@@ -70,7 +183,8 @@ impl Ball {
         Self { centre, radius_m }
     }
 
-    pub fn meets(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>) -> bool {
-        bvh.touches(&(x_wt * self.centre), self.radius_m)
+    /// Whether the object is within `margin_m` of it.
+    fn meets(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, margin_m: f64) -> bool {
+        bvh.touches(&(x_wt * self.centre), self.radius_m + margin_m)
     }
 }

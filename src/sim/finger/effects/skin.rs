@@ -3,14 +3,13 @@
 use super::effect::{Effect, Needs};
 use crate::config::{Checked, Rules};
 use crate::geometry::bvh::MeshBvh;
-use crate::geometry::sweep::Capsule;
 use crate::robot::finger::profile::Profile;
 use crate::sim::finger::cavity::SkinContact;
 use crate::sim::finger::column::Column;
 use crate::sim::finger::foundation::Foundation;
 use crate::sim::finger::lattice::Lattice;
 use crate::sim::finger::load::{Load, PressError};
-use crate::sim::finger::patches::{Ball, Patch, key, patches};
+use crate::sim::finger::patches::{Patches, Vicinity, key};
 use crate::sim::finger::samples::{SkinSample, spread};
 use crate::sim::finger::shell::sheet::Material;
 use crate::sim::finger::shell::{Shell, ShellState};
@@ -25,10 +24,6 @@ const FLATTEST: f64 = 0.2;
 /// Fluid and neighbours push the free skin out by no more than this part of the hull's radius: how
 /// far beyond the skin rays look (chosen; real skins bulge by 0.3 mm of 7).
 const BULGE: f64 = 0.1;
-
-/// As long as nothing enters this part of the hull's radius around the axis, rays start there
-/// instead of on the axis (chosen: inside the core).
-const INNER: f64 = 0.5;
 
 /// How the skin passes load on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -128,9 +123,7 @@ impl Effect for SkinEffect {
 pub struct Skin {
     samples: Vec<SkinSample>,
     sections_m2: Vec<f64>,
-    patches: Vec<Patch>,
-    whole: Ball,
-    inner: Capsule,
+    patches: Patches,
     foundation: Foundation,
     shell: Option<Shell>,
     bulge_m: f64,
@@ -140,6 +133,7 @@ pub struct Skin {
 #[derive(Clone, Debug, Default)]
 pub struct Pressed {
     touches: Vec<SkinContact>,
+    vicinity: Vicinity,
     shell: Option<ShellState>,
     /// How far the inner side of the skin moved in at each sample, in metres.
     pub inward_m: Vec<f64>,
@@ -152,6 +146,7 @@ impl Pressed {
     pub fn bytes(&self) -> usize {
         let numbers = self.inward_m.capacity() + self.indentation_m.capacity();
         self.shell.as_ref().map_or(0, ShellState::bytes)
+            + self.vicinity.bytes()
             + self.touches.capacity() * size_of::<SkinContact>()
             + numbers * size_of::<f64>()
     }
@@ -183,11 +178,6 @@ impl Skin {
         let samples: Vec<SkinSample> = order.iter().map(|&i| samples[i].clone()).collect();
         let bulges = cavity_pa_m3 > 0.0 || lattice.is_some();
         let bulge_m = if bulges { BULGE * profile.radius_m } else { 0.0 };
-        let inner = Capsule {
-            p0_w: Point3::origin(),
-            p1_w: Point3::new(-profile.length_m, 0.0, 0.0),
-            radius_m: INNER * profile.radius_m,
-        };
         let skin_m = samples.first().map_or(1.0, |sample| sample.layers.skin_m);
         let wet = samples.iter().filter(|sample| sample.layers.wet);
         Self {
@@ -198,9 +188,7 @@ impl Skin {
                 Shell::new(&lattice, node, &material, [effect.core_pa_m, cavity_pa_m3])
             }),
             sections_m2: samples.iter().map(SkinSample::section_m2).collect(),
-            whole: Ball::around(&samples, 0.0, bulge_m),
-            patches: patches(profile, &samples, inner.radius_m, bulge_m),
-            inner,
+            patches: Patches::new(profile, &samples, bulge_m),
             foundation: Foundation {
                 column: Column {
                     skin_pa_m: effect.modulus_pa / skin_m,
@@ -225,7 +213,7 @@ impl Skin {
     pub fn bytes(&self) -> usize {
         self.shell.as_ref().map_or(0, Shell::bytes)
             + self.samples.len() * (size_of::<SkinSample>() + size_of::<f64>())
-            + self.patches.len() * size_of::<Patch>()
+            + self.patches.bytes()
     }
 
     /// The law of a column.
@@ -237,6 +225,7 @@ impl Skin {
     pub fn relaxed(&self) -> Pressed {
         Pressed {
             touches: Vec::with_capacity(self.samples.len()),
+            vicinity: self.patches.vicinity(),
             shell: self.shell.as_ref().map(Shell::relaxed),
             inward_m: vec![0.0; self.samples.len()],
             indentation_m: vec![0.0; self.samples.len()],
@@ -264,9 +253,7 @@ impl Skin {
         }
         let resting = pressed.is_resting();
         pressed.touches.clear();
-        if self.whole.meets(bvh, x_wt) {
-            self.meet(bvh, x_wt, &mut pressed.touches);
-        }
+        self.meet(bvh, x_wt, pressed);
         if pressed.is_resting() {
             if !resting {
                 pressed.inward_m.fill(0.0);
@@ -281,16 +268,11 @@ impl Skin {
     }
 
     /// Collects the rays that meet the object.
-    fn meet(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, touches: &mut Vec<SkinContact>) {
-        let Capsule { p0_w, p1_w, radius_m } = self.inner;
-        let deep = bvh.enters(&Capsule { p0_w: x_wt * p0_w, p1_w: x_wt * p1_w, radius_m });
-        let skipped_m = if deep { 0.0 } else { radius_m };
-        let near = self.patches.iter().filter(|patch| {
-            let ball = if deep { &patch.from_axis } else { &patch.from_inner };
-            ball.meets(bvh, x_wt)
-        });
-        for patch in near {
-            for i in patch.range.clone() {
+    fn meet(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, pressed: &mut Pressed) {
+        let Pressed { touches, vicinity, .. } = pressed;
+        let (skipped_m, near) = self.patches.near(bvh, x_wt, vicinity);
+        for range in near {
+            for i in range.clone() {
                 let sample = &self.samples[i];
                 let outer_m = sample.layers.outer_m;
                 let direction_w = x_wt.rotation * sample.direction;
@@ -319,7 +301,7 @@ impl Skin {
 
     /// Finds the columns' pressure, or how the shell lies.
     fn balance(&self, pressed: &mut Pressed) -> Load {
-        let Pressed { touches, shell, inward_m, indentation_m } = pressed;
+        let Pressed { touches, shell, inward_m, indentation_m, .. } = pressed;
         let balance = match (&self.shell, shell) {
             (Some(shell), Some(state)) => shell.balance(touches, self.column(), state, inward_m),
             _ => self.foundation.balance(touches, &self.samples, inward_m),
