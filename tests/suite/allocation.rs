@@ -59,6 +59,7 @@ fn the_plant_allocates_nothing() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
     let mut scene = Scene::load(&path, &[]).unwrap();
     scene.arm = Some(ArmSettings::default());
+    scene.effects.wrench = Some(Default::default());
     let environment = Environment::build(scene).unwrap();
     let text = mjcf::scene(&environment, Mode::Dynamic { step_s: 0.002 }).unwrap();
     let mut plant = Plant::new(compile(&text).unwrap().into()).unwrap();

@@ -10,6 +10,7 @@ fn environment(arm: Option<ArmSettings>) -> Environment {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
     let mut scene = Scene::load(&path, &[]).unwrap();
     scene.arm = arm;
+    scene.effects.wrench = Some(Default::default());
     Environment::build(scene).unwrap()
 }
 

@@ -36,10 +36,17 @@ pub enum Mode {
     },
 }
 
+/// What MuJoCo works out for `[effects.wrench]` alone.
+const SENSOR: &str = r#"  <sensor>
+    <force name="force" site="mount"/>
+    <torque name="torque" site="mount"/>
+  </sensor>
+"#;
+
 /// The scene as MJCF: the arm or stage at its home (keyframe `home`) with the finger on it, the
-/// force/torque sensor at the site `mount` and `T` at the site `tip`; in a picture also the
-/// object at its pose on a vertical board, the floor, a camera and lights. None for a scene
-/// without a mesh.
+/// site `mount`, with a force/torque sensor if the scene has one, and `T` at the site `tip`; in a
+/// picture also the object at its pose on a vertical board, the floor, a camera and lights. None for
+/// a scene without a mesh.
 pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     let mesh = environment.mesh()?;
     let chain = environment.chain()?;
@@ -61,22 +68,20 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
         true => format!("  <asset>{}</asset>\n", fingertip::assets(&environment.scene().finger)),
         false => String::new(),
     };
+    let senses = environment.scene().effects.wrench.is_some();
     let mut text = String::new();
-    // Writing to a String cannot fail. A diverging state must be seen, not reset in silence.
+    // One arm is one island: looking for others would cost a twentieth of a step. Writing to a String cannot fail. A diverging state must be seen, not reset in silence.
     let _ = write!(
         text,
         r#"<mujoco model="palpate">
 {robot}
   <compiler discardvisual="{discard}"/>
-  <option timestep="{step_s}" integrator="{integrator}"><flag autoreset="disable"/></option>
-  <sensor>
-    <force name="force" site="mount"/>
-    <torque name="torque" site="mount"/>
-  </sensor>
-  <keyframe><key name="home" qpos="{home}"/></keyframe>
+  <option timestep="{step_s}" integrator="{integrator}"><flag autoreset="disable" island="disable"/></option>
+{sensor}  <keyframe><key name="home" qpos="{home}"/></keyframe>
 {skin}{scenery}</mujoco>
 "#,
         robot = robot::robot(environment.scene(), &chain, (collides, bumps), is_soft),
+        sensor = if senses { SENSOR } else { "" },
         discard = !shown,
         integrator = keyword(environment.scene().solver.integrator),
         home = list(chain.home.iter().take(chain.joints.len())),

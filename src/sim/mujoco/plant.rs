@@ -52,8 +52,8 @@ impl Plant {
             return Err(ModelError::Lacks { part: "one servo for each of at most 7 joints" });
         }
         // Six numbers: the force, then the torque.
-        if model.nsensordata() != 6 {
-            return Err(ModelError::Lacks { part: "a force and a torque sensor" });
+        if ![0, 6].contains(&model.nsensordata()) {
+            return Err(ModelError::Lacks { part: "a force and a torque sensor, or neither" });
         }
         let mut kv = Joints::zeros();
         let mut limit = Joints::zeros();
@@ -212,7 +212,7 @@ impl Plant {
 
     /// What the force/torque sensor measured during the last step, carried over to `T` about its
     /// origin: the load of everything beyond it, so the wrench on the fingertip plus the weight
-    /// and inertia of adapter and finger.
+    /// and inertia of adapter and finger. Zero in a scene without the sensor.
     pub fn mount(&self) -> Wrench {
         let [fx, fy, fz, tx, ty, tz] = *self.data.sensordata() else { return Wrench::default() };
         // MuJoCo gives what the link does to the finger; the sensor feels the opposite.
