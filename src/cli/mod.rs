@@ -1,6 +1,7 @@
 //! The command line.
 
 mod align;
+mod bench;
 mod calibrate;
 mod check;
 mod check_cost;
@@ -103,6 +104,8 @@ enum Command {
     Effects(effects::Args),
     /// Run hard cases at rising severity until they break.
     Stress(stress::Args),
+    /// Time each piece of a trial, and say how far it is from what the machine can do.
+    Bench(bench::Args),
     /// List experiments, scenes, planners, measures and effects.
     List(list::Args),
     /// Print a script with which a shell completes commands.
@@ -145,6 +148,7 @@ pub fn main() -> ExitCode {
         Command::Register(args) => register::run(&args, cli.talk),
         Command::Align(args) => align::run(&args, cli.talk),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::Bench(args) => bench::run(&args, cli.talk),
         Command::List(args) => list::run(&args),
         Command::Completions(args) => completions::run(&args, Cli::command()),
         Command::Reference(_) => print(reference().trim_end()).map(|()| Ending::Done),

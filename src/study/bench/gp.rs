@@ -1,0 +1,137 @@
+//! Pieces of the Gaussian process and of the planners that ask it.
+
+use super::Piece;
+use crate::gp::kernel::SquaredExponential;
+use crate::gp::likelihood::Likelihood;
+use crate::gp::posterior::Scratch;
+use crate::gp::{Hyperparameters, Mean, Observations, Posterior, SearchBox, TouchNoise};
+use std::hint::black_box;
+
+static KERNEL: SquaredExponential = SquaredExponential;
+
+/// Evaluations of a climb.
+const EVALUATIONS: usize = 16;
+
+/// Places that are asked for at once.
+const PLACES: usize = 1024;
+
+pub fn pieces() -> Vec<Piece> {
+    let mut pieces: Vec<Piece> = [50, 100, 200, 1000].map(likelihood).into();
+    pieces.extend([50, 100].map(cold_fit));
+    pieces.extend([100, 1000].into_iter().filter_map(variance));
+    pieces.extend([100, 1000].into_iter().filter_map(variances));
+    pieces.extend(appended(1000));
+    pieces
+}
+
+/// n³/3 operations for the factor, as many for its inverse and for that of the matrix; buffers are
+/// shared by one fit's evaluations.
+fn likelihood(count: usize) -> Piece {
+    let touches = touches(count);
+    let (times, n) = (EVALUATIONS as f64, count as f64);
+    Piece {
+        name: format!("{EVALUATIONS} likelihoods with gradient, {count} touches"),
+        flops: times * n.powi(3),
+        bytes: times * 3.0 * 8.0 * n.powi(2),
+        run: Box::new(move || {
+            let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, &touches);
+            let mut gradient = [0.0; 4];
+            for _ in 0..EVALUATIONS {
+                let at = hyperparameters();
+                let _ = black_box(likelihood.value_gradient(black_box(&at), &mut gradient));
+            }
+        }),
+    }
+}
+
+fn cold_fit(count: usize) -> Piece {
+    let (bounds, touches) = (search_box(), touches(count));
+    Piece::uncounted(format!("cold fit, {count} touches"), move || {
+        let _ = black_box(bounds.fit(&KERNEL, black_box(&touches), None));
+    })
+}
+
+/// A triangular solve of n² operations, which reads half of the matrix.
+fn variance(count: usize) -> Option<Piece> {
+    let posterior = posterior(count)?;
+    let mut scratch = Scratch::default();
+    let n = count as f64;
+    Some(Piece {
+        name: format!("variance at a place, {count} touches"),
+        flops: n.powi(2),
+        bytes: 4.0 * n.powi(2),
+        run: Box::new(move || {
+            black_box(posterior.variance(black_box(&[0.31, 0.47]), &mut scratch));
+        }),
+    })
+}
+
+/// The same at many places, which read the matrix together.
+fn variances(count: usize) -> Option<Piece> {
+    let posterior = posterior(count)?;
+    let places: Vec<[f64; 2]> = (0..PLACES).map(place).collect();
+    let n = count as f64;
+    Some(Piece {
+        name: format!("mean and variance at {PLACES} places, {count} touches"),
+        flops: PLACES as f64 * n.powi(2),
+        bytes: 0.0,
+        run: Box::new(move || {
+            black_box(posterior.predict(places.iter().map(|place| &place[..])));
+        }),
+    })
+}
+
+/// One touch more: a triangular solve for its row, and two for the weights.
+fn appended(count: usize) -> Option<Piece> {
+    let posterior = posterior(count)?;
+    let n = count as f64;
+    Some(Piece {
+        name: format!("one more than {count} touches, with a copy of all"),
+        flops: 3.0 * n.powi(2),
+        bytes: 4.0 * 4.0 * n.powi(2),
+        run: Box::new(move || {
+            let mut posterior = posterior.clone();
+            let _ = black_box(posterior.add(black_box(&[0.313, 0.471]), 1.0));
+        }),
+    })
+}
+
+/// A low-discrepancy walk over the unit square.
+fn place(i: usize) -> [f64; 2] {
+    [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0]
+}
+
+/// `count` touches of a smooth surface.
+fn touches(count: usize) -> Observations {
+    let mut touches = Observations::new(2);
+    for place in (0..count).map(place) {
+        touches.push(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
+    }
+    touches
+}
+
+fn posterior(count: usize) -> Option<Posterior> {
+    Posterior::new(&KERNEL, hyperparameters(), touches(count)).ok()
+}
+
+fn hyperparameters() -> Hyperparameters {
+    Hyperparameters {
+        signal_sd: 1.0,
+        length_scales: vec![0.2, 0.4],
+        noise_sd: 1e-3,
+        slope_noise_sd: 0.0,
+        mean: 0.0,
+    }
+}
+
+/// The ranges that a belief searches by default.
+fn search_box() -> SearchBox {
+    SearchBox {
+        mean: Mean::Zero,
+        length_scales: vec![(0.005, 1.0).into(); 2],
+        noise_ratio: (1e-4, 1e-2).into(),
+        signal_sd: (1e-3, 1e3).into(),
+        touch_noise: TouchNoise::Fitted,
+        slope_noise_ratio: None,
+    }
+}
