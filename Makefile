@@ -140,6 +140,8 @@ lint-windows: setup
 	cargo clippy --locked --lib --bins --features render,viewer -- -D warnings
 
 bench: setup
+	cargo build --release --locked
+	$(PALPATE) bench
 	cargo bench --locked --bench kernels
 	cargo bench --locked --bench interlocks
 	cargo bench --locked --bench plant

@@ -7,6 +7,7 @@ mod approach;
 mod arm;
 mod arm_pc;
 mod backend;
+mod bench;
 mod broken;
 mod calibration;
 #[cfg(feature = "nlopt")]

@@ -45,8 +45,8 @@ const SENSOR: &str = r#"  <sensor>
 
 /// The scene as MJCF: the arm or stage at its home (keyframe `home`) with the finger on it, the
 /// site `mount`, with a force/torque sensor if the scene has one, and `T` at the site `tip`; in a
-/// picture also the object at its pose on a vertical board, the floor, a camera and lights. None for
-/// a scene without a mesh.
+/// picture also the object at its pose on a vertical board, the floor, a camera and lights. None
+/// for a scene without a mesh.
 pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     let mesh = environment.mesh()?;
     let chain = environment.chain()?;
@@ -70,7 +70,8 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     };
     let senses = environment.scene().effects.wrench.is_some();
     let mut text = String::new();
-    // One arm is one island: looking for others would cost a twentieth of a step. Writing to a String cannot fail. A diverging state must be seen, not reset in silence.
+    // Writing to a String cannot fail. A diverging state must be seen, not reset in silence. One
+    // arm is one island: to look for others costs a twentieth of a step.
     let _ = write!(
         text,
         r#"<mujoco model="palpate">

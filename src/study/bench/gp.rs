@@ -1,6 +1,6 @@
 //! Pieces of the Gaussian process and of the planners that ask it.
 
-use super::Piece;
+use super::piece::Piece;
 use crate::gp::kernel::SquaredExponential;
 use crate::gp::likelihood::Likelihood;
 use crate::gp::posterior::Scratch;

@@ -7,29 +7,12 @@
 
 mod gp;
 mod machine;
+mod piece;
 mod timing;
 mod touch;
 
+pub use piece::Piece;
 pub use timing::{Timed, time};
-
-/// A piece of work that can be done again and again.
-pub struct Piece {
-    /// Its name.
-    pub name: String,
-    /// Floating-point operations in the leading order; 0 where they are not counted.
-    pub flops: f64,
-    /// Bytes read and written that do not stay in registers; 0 where they are not counted.
-    pub bytes: f64,
-    /// Does it once.
-    pub run: Box<dyn FnMut()>,
-}
-
-impl Piece {
-    /// One whose operations are not counted.
-    fn uncounted(name: impl Into<String>, run: impl FnMut() + 'static) -> Self {
-        Self { name: name.into(), flops: 0.0, bytes: 0.0, run: Box::new(run) }
-    }
-}
 
 /// All pieces, the two of the machine first.
 pub fn pieces() -> Vec<Piece> {

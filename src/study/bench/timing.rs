@@ -1,6 +1,6 @@
 //! Pieces timed in turns, so that what else the machine does falls on all alike.
 
-use super::Piece;
+use super::piece::Piece;
 use std::time::Instant;
 
 /// Least time of a sample: far above a clock's tick (chosen).

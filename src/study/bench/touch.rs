@@ -1,6 +1,6 @@
 //! Pieces of a touch: geometry, the finger, the arm's control.
 
-use super::Piece;
+use super::piece::Piece;
 use crate::explore::control::{Controller, Goal};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::mesh::Mesh;
