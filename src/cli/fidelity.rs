@@ -15,7 +15,7 @@ use crate::study::fidelity::ladder::is_reference;
 use crate::study::fidelity::order::{Order, OrderRecord};
 use crate::study::fidelity::rung_result::{RungRecord, RungResult};
 use crate::study::fidelity::spread::Spread;
-use crate::study::fidelity::tolerance::Tolerance;
+use crate::study::fidelity::tolerance::{Quantity, Tolerance, Yardstick};
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -28,8 +28,10 @@ Examples:
   palpate fidelity scenes/container_finger.toml --touches 8 --out runs/quick
 
 The reference, the dearest rung, is touched first; what differs is the model, for sensor noise is
-switched off. A tolerance is held by 95 % of the touches against the reference: in mm or um of the
-point of contact, N of force, or counts of the electrodes. Ctrl-C keeps the rungs that are done.")]
+switched off. A tolerance is held by 95 % of the touches: in mm or um of the point of contact, N of
+force, or counts of the electrodes. It is told from the reference, which is as good as its model, and
+from the true surface, which knows points of contact alone; --from says which of them the scene
+that is written keeps to. Ctrl-C keeps the rungs that are done.")]
 pub(super) struct Args {
     /// Scene (TOML) with an object.
     scene: PathBuf,
@@ -45,6 +47,9 @@ pub(super) struct Args {
     /// Name the cheapest rung within this error and write a scene that uses it.
     #[arg(long, value_name = "0.2mm|0.1N|20counts")]
     tolerance: Option<Tolerance>,
+    /// What the tolerance is measured from.
+    #[arg(long, default_value = "reference", requires = "tolerance", value_name = "WHAT")]
+    from: From,
     /// Folder for the results [default: runs/fidelity-SCENE].
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -52,7 +57,19 @@ pub(super) struct Args {
     force: Force,
 }
 
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum From {
+    /// What the dearest rung says.
+    Reference,
+    /// The object's true surface.
+    Truth,
+}
+
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+    let is_of_contact = args.tolerance.is_none_or(|it| it.quantity() == Quantity::Contact);
+    if args.from == From::Truth && !is_of_contact {
+        bail!("--from truth: nobody knows the true forces; a tolerance in mm or um is allowed");
+    }
     let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
     if scene.object.is_none() {
         bail!("{}: a ladder needs a scene with an object to touch", args.scene.display());
@@ -82,33 +99,37 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         return Ok(Ending::Interrupted);
     }
     match args.tolerance {
-        Some(tolerance) => choose(&scene, &ladder, tolerance, &out),
+        Some(tolerance) => choose(&scene, &ladder, (tolerance, args.from), &out),
         None => Ok(Ending::Done),
     }
 }
 
+/// Tells the cheapest rung from either, and writes the scene of the one that was asked for.
 fn choose(
     scene: &Scene,
     ladder: &LadderComparison,
-    tolerance: Tolerance,
+    (tolerance, from): (Tolerance, From),
     out: &Path,
 ) -> anyhow::Result<Ending> {
-    let Some(row) = tolerance.cheapest(&ladder.rows) else {
-        let least = tolerance.least(&ladder.rows);
-        bail!(
-            "no rung keeps within {tolerance}: 95 % of the touches of the best lie within {}",
-            cell(least, 4)
-        );
+    let wanted = match from {
+        From::Reference => Yardstick::Reference,
+        From::Truth => Yardstick::Truth,
+    };
+    for yardstick in [Yardstick::Reference, Yardstick::Truth] {
+        let of = yardstick.name();
+        if let Some(row) = tolerance.cheapest(&ladder.rows, yardstick) {
+            let [name, price] = [row.rung.name(), duration(row.wall_s)];
+            print(&format!("cheapest within {tolerance} of {of}: {name}, {price} a touch"))?;
+        } else if let Some(least) = tolerance.least(&ladder.rows, yardstick) {
+            print(&format!("none within {tolerance} of {of}: 95 % within {least:.4} at best"))?;
+        }
+    }
+    let Some(row) = tolerance.cheapest(&ladder.rows, wanted) else {
+        bail!("no rung keeps within {tolerance} of {}: no scene is written", wanted.name());
     };
     let path = out.join("chosen.toml");
-    let text = toml::to_string(&row.rung.apply(scene))?;
-    write_whole(&path, &text)?;
-    print(&format!(
-        "cheapest within {tolerance}: {}, {} a touch; scene: {}",
-        row.rung.name(),
-        duration(row.wall_s),
-        path.display()
-    ))?;
+    write_whole(&path, &toml::to_string(&row.rung.apply(scene))?)?;
+    print(&format!("{}: scene in {}", row.rung.name(), path.display()))?;
     Ok(Ending::Done)
 }
 

@@ -10,10 +10,11 @@ use palpate::study::fidelity::ladder::{DIAGONAL, RUNGS, is_diagonal};
 use palpate::study::fidelity::order;
 use palpate::study::fidelity::reference_load::{ReferenceLoad, noise_free};
 use palpate::study::fidelity::rung::Senses;
+use palpate::study::fidelity::rung_result::RungResult;
 use palpate::study::fidelity::spread::Spread;
 #[cfg(feature = "mujoco")]
 use palpate::study::fidelity::step_in_contact;
-use palpate::study::fidelity::tolerance::Tolerance;
+use palpate::study::fidelity::tolerance::{Tolerance, Yardstick};
 use palpate::study::fidelity::touches::{targets, touch_all};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -91,6 +92,47 @@ fn a_tolerance_is_a_number_with_a_unit() {
     for bad in ["", "mm", "0.2", "-1mm", "nanN", "0N", "1kg", "infmm"] {
         assert!(bad.parse::<Tolerance>().unwrap_err().contains("0.2mm"), "{bad}");
     }
+}
+
+/// A fine rung is near its own model's reference, a rigid one nearer the truth; each is cheapest by
+/// its own yardstick, and the truth knows no forces.
+#[test]
+fn the_cheapest_rung_depends_on_what_it_is_measured_from() {
+    let of = |error_m: f64| Spread { mean: error_m, p95: error_m, ..Spread::default() };
+    let result = |number: usize, off_truth_m: f64, off_reference_m: f64, wall_s: f64| RungResult {
+        rung: RUNGS[number],
+        touches: 24,
+        contacts: 24,
+        faults: 0,
+        off_truth_m: Some(of(off_truth_m)),
+        off_reference_m: Some(of(off_reference_m)),
+        force_n: Some(of(0.01)),
+        pdc_counts: None,
+        electrode_counts: None,
+        surface_rmse_m: None,
+        wall_s,
+        real_time_factor: None,
+        finger_bytes: 0,
+    };
+    let reference = RUNGS.len() - 1;
+    let rows = [
+        result(0, 1e-5, 2e-3, 1e-4),
+        result(15, 5e-4, 1e-4, 1e-3),
+        result(reference, 3e-4, 0.0, 1.0),
+    ];
+    let within = |text: &str, from| -> Option<usize> {
+        let tolerance: Tolerance = text.parse().unwrap();
+        let cheapest = tolerance.cheapest(&rows, from)?;
+        rows.iter().position(|row| row.rung == cheapest.rung)
+    };
+    assert_eq!(within("0.2mm", Yardstick::Reference), Some(1));
+    assert_eq!(within("0.2mm", Yardstick::Truth), Some(0));
+    assert_eq!(within("0.05mm", Yardstick::Reference), None);
+    assert_eq!(within("0.1N", Yardstick::Reference), Some(0));
+    assert_eq!(within("0.1N", Yardstick::Truth), None);
+    let least = |from| "1mm".parse::<Tolerance>().unwrap().least(&rows, from).unwrap();
+    assert!((least(Yardstick::Reference) - 0.1).abs() < 1e-12);
+    assert!((least(Yardstick::Truth) - 0.01).abs() < 1e-12);
 }
 
 #[test]

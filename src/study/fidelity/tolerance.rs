@@ -6,7 +6,7 @@ use super::spread::Spread;
 use std::fmt;
 use std::str::FromStr;
 
-/// The largest error that 95 % of the touches may have against the reference.
+/// The largest error that 95 % of the touches may have.
 #[derive(Clone, Copy, Debug)]
 pub struct Tolerance {
     /// In the unit's own measure.
@@ -43,11 +43,33 @@ impl Quantity {
         }
     }
 
-    fn of(self, rung: &RungResult) -> Option<Spread> {
+    fn of(self, rung: &RungResult, from: Yardstick) -> Option<Spread> {
+        match (from, self) {
+            (Yardstick::Reference, Self::Contact) => rung.off_reference_m,
+            (Yardstick::Reference, Self::Force) => rung.force_n,
+            (Yardstick::Reference, Self::Electrodes) => rung.electrode_counts,
+            (Yardstick::Truth, Self::Contact) => rung.off_truth_m,
+            (Yardstick::Truth, Self::Force | Self::Electrodes) => None,
+        }
+    }
+}
+
+/// What errors are measured from: two questions, for a model may be near its own finest and far
+/// from the truth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Yardstick {
+    /// What the dearest rung of the same model says.
+    Reference,
+    /// The object's true surface, which tells of points of contact alone.
+    Truth,
+}
+
+impl Yardstick {
+    /// As sentences name it.
+    pub fn name(self) -> &'static str {
         match self {
-            Self::Contact => rung.off_reference_m,
-            Self::Force => rung.force_n,
-            Self::Electrodes => rung.electrode_counts,
+            Self::Reference => "the dearest rung",
+            Self::Truth => "the true surface",
         }
     }
 }
@@ -101,21 +123,24 @@ impl Tolerance {
     }
 
     /// 95 % of a rung's errors lie within this many of the tolerance's unit.
-    pub fn error(&self, rung: &RungResult) -> Option<f64> {
-        self.quantity().of(rung).map(|spread| spread.p95 / self.unit.size)
+    pub fn error(&self, rung: &RungResult, from: Yardstick) -> Option<f64> {
+        self.quantity().of(rung, from).map(|spread| spread.p95 / self.unit.size)
     }
 
-    /// The cheapest rung within it; the reference, whose error is unknown, is left out.
-    pub fn cheapest<'a>(&self, rows: &'a [RungResult]) -> Option<&'a RungResult> {
-        rows.iter()
-            .filter(|rung| !is_reference(&rung.rung))
-            .filter(|rung| self.error(rung).is_some_and(|error| error <= self.value))
+    /// The cheapest rung within it; from the reference, the reference is left out.
+    pub fn cheapest<'a>(&self, rows: &'a [RungResult], from: Yardstick) -> Option<&'a RungResult> {
+        judged(rows, from)
+            .filter(|rung| self.error(rung, from).is_some_and(|error| error <= self.value))
             .min_by(|a, b| a.wall_s.total_cmp(&b.wall_s))
     }
 
-    /// The smallest error of all rows but the reference.
-    pub fn least(&self, rows: &[RungResult]) -> Option<f64> {
-        let others = rows.iter().filter(|rung| !is_reference(&rung.rung));
-        others.filter_map(|rung| self.error(rung)).min_by(f64::total_cmp)
+    /// The smallest error of those rows.
+    pub fn least(&self, rows: &[RungResult], from: Yardstick) -> Option<f64> {
+        judged(rows, from).filter_map(|rung| self.error(rung, from)).min_by(f64::total_cmp)
     }
+}
+
+/// The rungs whose error is known.
+fn judged(rows: &[RungResult], from: Yardstick) -> impl Iterator<Item = &RungResult> {
+    rows.iter().filter(move |row| from == Yardstick::Truth || !is_reference(&row.rung))
 }
