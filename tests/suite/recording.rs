@@ -125,6 +125,7 @@ fn bits(reading: &Reading) -> Vec<Option<u64>> {
             bits.push(list.as_ref().map(|list| list.len() as u64));
             all.extend(list.into_iter().flatten());
         }
+        bits.push(frame.slip.map(u64::from));
     }
     bits.extend(all.into_iter().map(|value| Some(value.to_bits())));
     bits
@@ -138,14 +139,16 @@ fn any_number() -> impl Strategy<Value = f64> + Clone {
 fn any_frame() -> impl Strategy<Value = Frame> {
     let single = || proptest::option::of(any_number());
     let many = proptest::option::of(any_number());
-    (any_number(), many.clone(), single(), many, single(), single()).prop_map(
-        |(time_s, electrodes, pdc_counts, pac, tdc_counts, tac_counts)| Frame {
+    let slip = proptest::option::of(any::<bool>());
+    (any_number(), many.clone(), single(), many, single(), single(), slip).prop_map(
+        |(time_s, electrodes, pdc_counts, pac, tdc_counts, tac_counts, slip)| Frame {
             time_s,
             electrode_counts: electrodes.map(|one| std::array::from_fn(|i| one + i as f64)),
             pdc_counts,
             pac_counts: pac.map(|one| std::array::from_fn(|i| one - i as f64)),
             tdc_counts,
             tac_counts,
+            slip,
         },
     )
 }

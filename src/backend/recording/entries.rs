@@ -37,9 +37,8 @@ const KINDS: [(Kind, Definition); 3] = [
     (Kind::Touch, Touch::DEFINITION),
 ];
 
-/// An empty list at the end of a message, wherever that begins: up to three bytes that align its
-/// length, and the length.
-const EMPTY_LIST: [u8; 8] = [0; 8];
+/// An empty list: its length, behind lists that leave it aligned.
+const EMPTY_LIST: [u8; 4] = [0; 4];
 
 /// The entries of a file up to its end, also if that lies in the midst of a record.
 pub(super) struct Entries {

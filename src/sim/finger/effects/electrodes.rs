@@ -52,7 +52,7 @@ impl Default for ElectrodesEffect {
     fn default() -> Self {
         Self {
             baseline_counts: electrode_table::BASELINES_COUNTS,
-            spread_m: 2.1e-3,
+            spread_m: electrode_table::SPREAD_M,
             exponent: 1.0,
             noise: 0.75,
             noise_correlation: 0.3,
