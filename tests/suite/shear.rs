@@ -79,7 +79,7 @@ fn agreements() -> Vec<(String, Agreement, Agreement)> {
 
 /// The bars: a correlation of 0.8 with what was measured under lateral force on both sensors, and
 /// each of the eight largest slopes within a factor of two. Under axial force, which moves counts
-/// a quarter as far, measured patterns of two sensors correlate by 0.8 with each other.
+/// a quarter as far, the measured patterns of the two sensors correlate by 0.75 with each other.
 #[test]
 fn electrodes_answer_tangential_force_as_real_ones_do() {
     for (sensor, lateral, axial) in agreements() {

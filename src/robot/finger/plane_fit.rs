@@ -30,8 +30,10 @@ const DEPTHS_M: [f64; 9] = [7e-5, 1.5e-4, 3e-4, 5e-4, 7.5e-4, 1e-3, 1.3e-3, 1.6e
 /// the centre of pressure as over the fluid (chosen: rigid against soft).
 const CORE: f64 = 100.0;
 
-/// No electrode reads a gap as closed farther than this: what is left conducts too little to tell.
+/// No electrode reads a gap as closed farther than this, or as so many gaps more (chosen): what is
+/// left conducts too little to tell, or all that there is.
 const CLOSED: f64 = 0.97;
+const OPENED: f64 = 10.0;
 
 /// A millimetre, to weigh electrodes by the gap that they measure.
 const MM: f64 = 1e-3;
@@ -136,7 +138,7 @@ impl PlaneFit {
         let impedance = |counts: f64| FULL_SCALE_COUNTS / counts.max(1.0) - 1.0;
         let read = Gaps::from_fn(|i, _| {
             let gap = impedance(rest[i]) / impedance(now[i]).max(f64::MIN_POSITIVE);
-            if rest[i] < OPEN_COUNTS { 0.0 } else { (1.0 - gap).clamp(-1.0 / CLOSED, CLOSED) }
+            if rest[i] < OPEN_COUNTS { 0.0 } else { (1.0 - gap).clamp(-OPENED, CLOSED) }
         });
         let weights =
             Gaps::from_fn(|i, _| if rest[i] < OPEN_COUNTS { 0.0 } else { self.weights[i] });
