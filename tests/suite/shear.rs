@@ -7,6 +7,7 @@ use palpate::geometry::bvh::MeshBvh;
 use palpate::math::seed::stream;
 use palpate::robot::finger::contact_point::locate;
 use palpate::robot::finger::plane_fit::PlaneFit;
+use palpate::robot::finger::profile::Profile;
 use palpate::robot::finger::{Finger, Frame, PointOfContact, Tare, TipMotion};
 use palpate::sim::finger::calibration::constants::Model;
 use palpate::sim::finger::calibration::shear::{Agreement, ShearRecordings, compare};
@@ -16,6 +17,7 @@ use palpate::sim::finger::effects::friction::FrictionEffect;
 use palpate::sim::finger::effects::skin::SkinEffect;
 use palpate::sim::finger::plate::{Plate, direction_t, pose};
 use palpate::sim::finger::recording::Recordings;
+use palpate::sim::finger::samples::spread;
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 
 const TICK_S: f64 = 1e-3;
@@ -146,7 +148,7 @@ fn slip_is_told_in_the_frames_in_which_it_happens() {
     let slide = Vector3::x() * 0.02;
     let way = [(0.1, STILL), (0.01, slide), (0.29, slide), (0.2, STILL), (0.05, -slide)];
     let slips: Vec<bool> =
-        frames(&quiet(), 7.8e-3, &way).iter().map(|frame| frame.slip.unwrap()).collect();
+        frames(&quiet(), 7.3e-3, &way).iter().map(|frame| frame.slip.unwrap()).collect();
     // At rest, stretched, slipping, held at Coulomb's limit, and stretched the other way.
     assert!(slips[..10].iter().all(|slips| !slips), "{slips:?}");
     assert!(!slips[10] && slips[25..40].iter().all(|&slips| slips), "{slips:?}");
@@ -232,8 +234,8 @@ fn the_point_of_contact_is_known_under_shear() {
     assert!(plane.0 <= 2.0 && plane_sheared.0 <= 2.0, "{plane:?} {plane_sheared:?}");
 }
 
-/// Planes in many attitudes, shallow and deep, with a finger of another size: what was pressed is
-/// found, also if an electrode is open, and nothing is found where nothing fell.
+/// Planes against the pad of fingers of several sizes: what was pressed is found, also if an
+/// electrode is open, and nothing is found where nothing fell.
 #[test]
 fn a_plane_is_found_by_a_finger_of_any_size_and_without_an_electrode() {
     for radius_m in [5e-3, 7e-3, 1e-2] {
@@ -249,15 +251,11 @@ fn a_plane_is_found_by_a_finger_of_any_size_and_without_an_electrode() {
         let (_, rest) = reading(0.1, &-Vector3::z());
         let tare = Tare::of(std::slice::from_ref(&rest));
         assert!(fit.locate(&tare, &rest).is_none());
-        for towards_t in [direction_t(0.0, 0.0), direction_t(0.6, 0.4), direction_t(1.0, -0.3)] {
+        for towards_t in [direction_t(0.0, 0.0), direction_t(0.6, 0.4), direction_t(0.3, -0.5)] {
             let turned = Rotation3::rotation_between(&towards_t, &-Vector3::z()).unwrap();
-            let touching_m = palpate::sim::finger::samples::spread(
-                &palpate::robot::finger::profile::Profile::biotac(&finger),
-                4000,
-            )
-            .iter()
-            .map(|sample| -(turned * sample.point()).z)
-            .fold(0.0, f64::max);
+            let skin = spread(&Profile::biotac(&finger), 4000);
+            let lowest_m = skin.iter().map(|sample| (turned * sample.point()).z);
+            let touching_m = -lowest_m.fold(0.0, f64::min);
             let (load, frame) = reading(touching_m - 0.1 * radius_m, &towards_t);
             let found = fit.locate(&tare, &frame).unwrap();
             let off_m = (found.surface_t - load.centre_t).norm();

@@ -27,13 +27,16 @@ const ROLLS: (f64, f64, usize) = (-1.2, 0.15, 17);
 const DEPTHS_M: [f64; 9] = [7e-5, 1.5e-4, 3e-4, 5e-4, 7.5e-4, 1e-3, 1.3e-3, 1.6e-3, 2e-3];
 
 /// Where the gap is closed the core carries the load: a depth counts so many times as much towards
-/// the centre of pressure as over the fluid (chosen: rigid against soft).
-const CORE: f64 = 100.0;
+/// the centre of pressure as over the fluid (chosen: an order of magnitude).
+const CORE: f64 = 10.0;
 
 /// No electrode reads a gap as closed farther than this, or as so many gaps more (chosen): what is
 /// left conducts too little to tell, or all that there is.
 const CLOSED: f64 = 0.97;
 const OPENED: f64 = 10.0;
+
+/// An electrode senses no farther than so many spreads, where next to nothing is left (chosen).
+const REACH: f64 = 3.0;
 
 /// A millimetre, to weigh electrodes by the gap that they measure.
 const MM: f64 = 1e-3;
@@ -43,9 +46,10 @@ const MM: f64 = 1e-3;
 const HELD: f64 = 1e3;
 
 /// Presses count by how much worse they explain the gaps than the best: this part of its error,
-/// and what noise makes of it, in mm² (chosen: 0.02 mm of each gap that counts).
+/// and what noise makes of it, in mm² (chosen: five frames of 5 counts of noise close 0.003 of each
+/// gap, 19 of them of about a millimetre).
 const WORSE: f64 = 0.3;
-const NOISE_MM2: f64 = 4e-4;
+const NOISE_MM2: f64 = 1e-4;
 
 type Gaps = SVector<f64, ELECTRODES>;
 
@@ -68,20 +72,25 @@ struct Press {
     towards_t: Vector3<f64>,
 }
 
-/// A point of the skin with what an electrode needs to know of it.
+/// A point of the skin over the fluid.
 struct SkinPoint {
     start: Point3<f64>,
     direction: UnitVector3<f64>,
     outer_m: f64,
-    skin_m: f64,
     gap_m: f64,
     /// Area along its outward normal.
     area_m2: Vector3<f64>,
+    /// Electrodes that sense it, and what a metre inwards here closes of each one's gap.
+    senses: Vec<(usize, f64)>,
 }
 
 impl SkinPoint {
     fn section_m2(&self) -> f64 {
         self.area_m2.dot(&self.direction)
+    }
+
+    fn outer_t(&self) -> Point3<f64> {
+        self.start + self.direction.scale(self.outer_m)
     }
 }
 
@@ -91,39 +100,35 @@ impl PlaneFit {
         let profile = Profile::biotac(finger);
         let scale = profile.scale();
         let points = points(&profile);
-        let near = near(&points, scale);
-        let closed = |inward_m: &[f64]| {
-            Gaps::from_fn(|i, _| near[i].iter().map(|&(k, weight)| weight * inward_m[k]).sum())
-        };
         let mut presses = Vec::new();
         for pitch in steps(PITCHES) {
             for roll in steps(ROLLS) {
                 let (sin, cos) = pitch.sin_cos();
                 let towards_t = Vector3::new(sin, cos * roll.sin(), -cos * roll.cos());
-                for depth_m in DEPTHS_M {
-                    let (inward_m, centre_t) = pressed(&points, &towards_t, depth_m * scale);
-                    presses.push(Press { closed: closed(&inward_m), centre_t, towards_t });
-                }
+                press(&points, towards_t, scale, &mut presses);
             }
         }
+        let closed = |inward_m: &dyn Fn(&SkinPoint) -> f64| {
+            let mut closed = Gaps::zeros();
+            for p in &points {
+                p.senses.iter().for_each(|&(i, weight)| closed[i] += weight * inward_m(p));
+            }
+            closed
+        };
         // As a sleeve that the apex holds, over a fluid whose volume stays.
         let follows = |point: &SkinPoint| 1.0 - point.direction.x.max(0.0).powi(2);
         let lifted_m2: Vector3<f64> = points.iter().map(|p| p.area_m2 * follows(p)).sum();
         let wet_m2: f64 = points.iter().map(SkinPoint::section_m2).sum();
-        let carried = [0, 1, 2].map(|axis| {
-            let inward = |p: &SkinPoint| {
-                lifted_m2[axis] / wet_m2 - follows(p) * p.area_m2[axis] / p.section_m2()
-            };
-            closed(&points.iter().map(inward).collect::<Vec<f64>>())
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            closed(&|p| lifted_m2[axis] / wet_m2 - follows(p) * p.area_m2[axis] / p.section_m2())
         });
-        let [x, y, z] = carried;
         let gap_m = |position: Point3<f64>| {
             let start = Vector3::new(position.x.min(0.0), 0.0, 0.0);
             profile.layers(start.x, &(position.coords - start).normalize()).gap_m / scale
         };
         let gaps_m = electrode_table::positions_t(scale).map(gap_m);
         Self {
-            carried: [x, y, z, closed(&vec![-1.0; points.len()])],
+            carried: [x, y, z, closed(&|_| -1.0)],
             weights: Gaps::from_fn(|i, _| (gaps_m[i] / MM).powi(2)),
             finger: finger.clone(),
             presses,
@@ -185,60 +190,60 @@ fn points(profile: &Profile) -> Vec<SkinPoint> {
         let (x_m, turn) = at(i, j);
         profile.skin_t(x_m, turn)
     };
+    let spread_m = SPREAD_M * profile.scale();
+    let electrodes = electrode_table::positions_t(profile.scale());
+    let mut sums_m3 = [0.0; ELECTRODES];
     let mut points = Vec::new();
     for (i, j) in (0..along).flat_map(|i| (0..around).map(move |j| (i as f64, j as f64))) {
         let (x_m, turn) = at(i + 0.5, j + 0.5);
         let (start, direction) = profile.ray(x_m, turn);
         let layers = profile.layers(start.x, &direction);
-        let across = (skin(i + 1.0, j) - skin(i, j + 1.0), skin(i, j) - skin(i + 1.0, j + 1.0));
-        points.push(SkinPoint {
+        let diagonals = [skin(i + 1.0, j) - skin(i, j + 1.0), skin(i, j) - skin(i + 1.0, j + 1.0)];
+        let mut point = SkinPoint {
             start,
             direction,
             outer_m: layers.outer_m,
-            skin_m: layers.skin_m,
             gap_m: layers.gap_m,
-            area_m2: across.0.cross(&across.1) / 2.0,
-        });
+            area_m2: diagonals[0].cross(&diagonals[1]) / 2.0,
+            senses: Vec::new(),
+        };
+        let core_t = start + direction.scale(layers.outer_m - layers.skin_m - layers.gap_m);
+        for (i, electrode) in electrodes.iter().enumerate() {
+            let spreads = (core_t - electrode).norm() / spread_m;
+            if spreads < REACH {
+                let weight_m2 = point.section_m2() * (-0.5 * spreads * spreads).exp();
+                sums_m3[i] += weight_m2 * layers.gap_m;
+                point.senses.push((i, weight_m2));
+            }
+        }
+        points.push(point);
+    }
+    for (i, weight) in points.iter_mut().flat_map(|point| &mut point.senses) {
+        *weight /= sums_m3[*i];
     }
     points
 }
 
-/// For each electrode, points and what moving each inwards by a metre closes of its gap.
-fn near(points: &[SkinPoint], scale: f64) -> [Vec<(usize, f64)>; ELECTRODES] {
-    electrode_table::positions_t(scale).map(|electrode| {
-        let weight = |p: &SkinPoint| {
-            let core = p.start + p.direction.scale(p.outer_m - p.skin_m - p.gap_m);
-            let spreads = (core - electrode).norm() / (SPREAD_M * scale);
-            if spreads < 3.0 { p.section_m2() * (-0.5 * spreads * spreads).exp() } else { 0.0 }
-        };
-        let mut all: Vec<(usize, f64)> =
-            points.iter().map(weight).enumerate().filter(|&(_, weight)| weight > 0.0).collect();
-        let gap: f64 = all.iter().map(|&(k, weight)| weight * points[k].gap_m).sum();
-        all.iter_mut().for_each(|(_, weight)| *weight /= gap);
-        all
-    })
-}
-
-/// How far a plane that faces `towards_t`, `depth_m` deep, presses in each point, and the centre of
-/// its pressure.
-fn pressed(
-    points: &[SkinPoint],
-    towards_t: &Vector3<f64>,
-    depth_m: f64,
-) -> (Vec<f64>, Point3<f64>) {
-    let outer = |p: &SkinPoint| (p.start + p.direction.scale(p.outer_m)).coords.dot(towards_t);
-    let plane_m = points.iter().map(outer).fold(f64::NEG_INFINITY, f64::max) - depth_m;
-    let (mut moment, mut load) = (Vector3::zeros(), 0.0);
-    let mut inward_m = Vec::with_capacity(points.len());
-    for p in points {
-        let facing = p.direction.dot(towards_t);
-        let met_m = (plane_m - p.start.coords.dot(towards_t)) / facing;
-        let deep_m = if facing > 0.0 { (p.outer_m - met_m).max(0.0) } else { 0.0 };
-        inward_m.push(deep_m.min(p.gap_m));
-        let on_core_m = (deep_m - p.gap_m).max(0.0);
-        let share = p.section_m2() * (deep_m + CORE * on_core_m);
-        moment += (p.start + p.direction.scale(p.outer_m - deep_m)).coords * share;
-        load += share;
-    }
-    (inward_m, Point3::from(moment / load))
+/// Adds what planes that face `towards_t` do, from shallow to deep.
+fn press(points: &[SkinPoint], towards_t: Vector3<f64>, scale: f64, presses: &mut Vec<Press>) {
+    let farthest_m = points.iter().map(|p| p.outer_t().coords.dot(&towards_t));
+    let farthest_m = farthest_m.fold(f64::NEG_INFINITY, f64::max);
+    let deepest_m = DEPTHS_M.iter().fold(0.0, |deepest: f64, &depth_m| deepest.max(depth_m));
+    // How far each point that any of them meets lies behind the first, along its ray.
+    let met: Vec<(&SkinPoint, f64, f64)> = (points.iter())
+        .map(|p| (p, farthest_m - p.outer_t().coords.dot(&towards_t), p.direction.dot(&towards_t)))
+        .filter(|&(_, behind_m, facing)| behind_m < deepest_m * scale && facing > 0.0)
+        .collect();
+    presses.extend(DEPTHS_M.map(|depth_m| {
+        let (mut closed, mut moment, mut load) = (Gaps::zeros(), Vector3::zeros(), 0.0);
+        for &(p, behind_m, facing) in &met {
+            let deep_m = (depth_m * scale - behind_m).max(0.0) / facing;
+            let inward_m = deep_m.min(p.gap_m);
+            p.senses.iter().for_each(|&(i, weight)| closed[i] += weight * inward_m);
+            let share = p.section_m2() * (deep_m + CORE * (deep_m - inward_m));
+            moment += (p.start + p.direction.scale(p.outer_m - deep_m)).coords * share;
+            load += share;
+        }
+        Press { closed, centre_t: Point3::from(moment / load), towards_t }
+    }));
 }
