@@ -30,7 +30,7 @@ pub struct FrictionEffect {
 impl Default for FrictionEffect {
     /// Coefficient: NVlabs/biotac_sim. Stiffness: with it the electrodes answer lateral force as in
     /// MiaoLi/syntouchcontact's recordings (`palpate calibrate --shear`: F2 alone has 2050 N/m,
-    /// F1 1850). Roughness: chosen, 10 Pa at 20 mm/s, ten times PAC's own noise.
+    /// F1 1830). Roughness: chosen, 10 Pa at 20 mm/s, ten times PAC's own noise.
     fn default() -> Self {
         Self { coefficient: 0.783, stiffness_n_m: 2000.0, roughness_pa2_s_m: 5000.0 }
     }
