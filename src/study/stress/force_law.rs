@@ -43,7 +43,7 @@ pub(super) const CASES: &[Case] = &[
         "slide and lift",
         "a skin carried far over the core must not break the electrodes, nor stay there",
         "coefficient",
-        (&[0.783, 0.0, 10.0, 0.01], 4),
+        (&[0.0, 0.01, 0.783, 10.0], 4),
         slide,
     )
     .timed(),
