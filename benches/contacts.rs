@@ -11,6 +11,7 @@ use palpate::geometry::mesh::Mesh;
 use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::contact_point::locate;
+use palpate::robot::finger::plane_fit::PlaneFit;
 use palpate::robot::finger::{Detection, Detector, Finger, Frame, Tare};
 use palpate::sim::finger::plate::direction_t;
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
@@ -35,6 +36,7 @@ fn touch(
     bvh: &MeshBvh,
     over: Point3<f64>,
     towards_t: &Vector3<f64>,
+    plane_fit: Option<&PlaneFit>,
 ) -> Option<Error> {
     let turn = Rotation3::rotation_between(towards_t, &-Vector3::z())?;
     let turn = UnitQuaternion::from_rotation_matrix(&turn);
@@ -65,7 +67,11 @@ fn touch(
     }
     let mean = Tare::of(&frames[frames.len().checked_sub(5)?..]);
     let mean = Frame { electrode_counts: mean.electrode_counts, ..Frame::default() };
-    let found = locate(&Finger::default(), &tare?, &mean)?;
+    let tare = tare?;
+    let found = match plane_fit {
+        Some(plane_fit) => plane_fit.locate(&tare, &mean)?,
+        None => locate(&Finger::default(), &tare, &mean)?,
+    };
     Some(Error {
         point_m: found.surface_t - load.centre_t,
         normal_deg: found.normal_t.angle(&-load.normal_t).to_degrees(),
@@ -74,13 +80,25 @@ fn touch(
 
 fn report(name: &str, tip: &Fingertip, mesh: Mesh, places: &[Point3<f64>]) {
     let bvh = MeshBvh::new(mesh);
+    let plane_fit = PlaneFit::new(&Finger::default());
+    for (estimate, plane_fit) in [("Eq. 1", None), ("plane", Some(&plane_fit))] {
+        report_one(&format!("{name} | {estimate}"), (tip, &bvh), places, plane_fit);
+    }
+}
+
+fn report_one(
+    name: &str,
+    (tip, bvh): (&Fingertip, &MeshBvh),
+    places: &[Point3<f64>],
+    plane_fit: Option<&PlaneFit>,
+) {
     let mut errors = Vec::new();
     let mut lost = 0;
     for pitch_deg in [0.0, 15.0, 30.0, 45.0, 60.0, 75.0f64] {
         for roll_deg in [-30.0, 0.0, 30.0f64] {
             let towards_t = direction_t(pitch_deg.to_radians(), roll_deg.to_radians());
             for place in places {
-                match touch(tip, &bvh, *place, &towards_t) {
+                match touch(tip, bvh, *place, &towards_t, plane_fit) {
                     Some(error) => errors.push(error),
                     None => lost += 1,
                 }
@@ -114,9 +132,9 @@ fn main() {
     };
     let tip = Fingertip::new(&Finger::default(), &effects);
     println!(
-        "| shape | touches | bias x, y, z in T, mm | RMS mm | worst mm | median angle of normals ° | not located |"
+        "| shape | estimate | touches | bias x, y, z in T, mm | RMS mm | worst mm | median angle of normals ° | not located |"
     );
-    println!("|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|");
     report("plane", &tip, square(0.1, 2), &[point(0.0, 0.0, 0.0)]);
     for radius in [0.02, 0.005] {
         let ball = sphere_mesh(point(0.0, 0.0, -radius), radius, 120);

@@ -6,11 +6,14 @@ use crate::sim::finger::calibration::constants::Model;
 use crate::sim::finger::calibration::fit::{Fit, Free, fit};
 use crate::sim::finger::calibration::score::{HeldOut, Score, between, leave_one_out};
 use crate::sim::finger::calibration::session::Session;
+use crate::sim::finger::calibration::shear::{ShearRecordings, Sheared, compare};
 use crate::sim::finger::effects::Effects;
+use crate::sim::finger::effects::friction::FrictionEffect;
 use crate::sim::finger::recording::{Recording, Recordings};
 use crate::{files, words};
 use anyhow::{Context, anyhow};
-use std::path::PathBuf;
+use serde::de::DeserializeOwned;
+use std::path::{Path, PathBuf};
 
 /// Fit the finger's constants to recordings of it on a flat plate, and score them on sensors that
 /// they were not fitted to.
@@ -18,7 +21,8 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   palpate calibrate tests/data/biotac_flat_plate.json
-  palpate calibrate tests/data/biotac_flat_plate.json --attitude-only")]
+  palpate calibrate tests/data/biotac_flat_plate.json --attitude-only
+  palpate calibrate tests/data/biotac_flat_plate.json --shear tests/data/biotac_shear.json")]
 pub struct Args {
     /// The recordings, as in tests/data/biotac_flat_plate.json.
     recordings: PathBuf,
@@ -26,17 +30,29 @@ pub struct Args {
     /// test of the constants.
     #[arg(long)]
     attitude_only: bool,
+    /// Hold a skin under tangential force against this file of slopes instead, as in
+    /// tests/data/biotac_shear.json, with the constants of a scene without settings.
+    #[arg(long, value_name = "FILE", conflicts_with = "attitude_only")]
+    shear: Option<PathBuf>,
 }
 
 pub fn run(args: &Args) -> anyhow::Result<Ending> {
     let name = args.recordings.display();
-    let text = files::text(&args.recordings, files::TEXT_MAX)
-        .with_context(|| format!("cannot read {name}"))?;
-    let recordings: Recordings = serde_json::from_str(&text).map_err(|error| {
-        let (line, what) = (error.line(), words::json(&error));
-        anyhow!("{name}:{line}: not a recording: {what}")
-    })?;
+    let recordings: Recordings = read(&args.recordings)?;
     recordings.check().with_context(|| format!("{name}: not a recording"))?;
+    if let Some(path) = &args.shear {
+        let slopes: ShearRecordings = read(path)?;
+        slopes.check().with_context(|| format!("{}: not a recording", path.display()))?;
+        for of in &slopes.sensors {
+            let same = recordings.sensors.iter().find(|recording| recording.sensor == of.sensor);
+            let recording = same.with_context(|| format!("{name}: no sensor {}", of.sensor))?;
+            let refused = || format!("{name}: cannot be fitted");
+            let (model, friction) = (Model::default(), FrictionEffect::default());
+            let found = compare(&model, &friction, recording, of).with_context(refused)?;
+            print(&sheared(&found, friction.stiffness_n_m))?;
+        }
+        return Ok(Ending::Done);
+    }
     let (start, sensors) = (Model::default(), &recordings.sensors);
     let free = if args.attitude_only { Free::Sessions } else { Free::Constants };
     let refused = || format!("{name}: cannot be fitted");
@@ -57,6 +73,37 @@ pub fn run(args: &Args) -> anyhow::Result<Ending> {
         print(&format!("\n{}", toml::to_string(&Tables { effects: fit.model.effects() })?))?;
     }
     Ok(Ending::Done)
+}
+
+fn read<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
+    let name = path.display();
+    let text = files::text(path, files::TEXT_MAX).with_context(|| format!("cannot read {name}"))?;
+    serde_json::from_str(&text).map_err(|error| {
+        let (line, what) = (error.line(), words::json(&error));
+        anyhow!("{name}:{line}: not a recording: {what}")
+    })
+}
+
+/// What a sensor's electrodes answer to tangential force.
+fn sheared(found: &Sheared, stiffness_n_m: f64) -> String {
+    let Sheared { sensor, lateral, axial } = found;
+    let mut rows = vec![["  counts per N", "lateral", "model", "axial", "model"].map(String::from)];
+    rows.extend((0..lateral.measured.len()).map(|i| {
+        let [a, b, c, d] = [lateral.measured, lateral.model, axial.measured, axial.model]
+            .map(|slopes| cell(Some(slopes[i]), 0));
+        [format!("  E{}", i + 1), a, b, c, d]
+    }));
+    let table = aligned(&rows);
+    let told = [("lateral", lateral), ("axial", axial)].map(|(name, of)| {
+        let [least, most] = of.ratios();
+        format!(
+            "  {name}: correlation {:.2}; the eight largest slopes times {least:.2} to {most:.2}; \
+             best with {:.0} N/m",
+            of.correlation(),
+            stiffness_n_m / of.scale()
+        )
+    });
+    format!("sensor {sensor} with a skin of {stiffness_n_m} N/m\n{table}{}\n", told.join("\n"))
 }
 
 /// As they stand in a scene.

@@ -48,6 +48,9 @@ pub enum ContactEstimate {
     Skin,
     /// The centroid of Eq. 1 itself, among the electrodes, as in Yi et al. 2016.
     Electrodes,
+    /// Where a plane presses that explains all electrodes best, together with a skin that is
+    /// carried sideways; for fingers that press hard, or shear.
+    Plane,
 }
 
 impl Default for TouchSettings {

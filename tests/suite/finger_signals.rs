@@ -5,11 +5,9 @@ use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
-use palpate::robot::finger::contact_point::locate;
 use palpate::robot::finger::{Detection, Detector, Finger, Frame, Tare};
 use palpate::sim::finger::effects::electrodes::{ElectrodesEffect, counts, impedance_ohm};
 use palpate::sim::finger::effects::fluid::FluidEffect;
-use palpate::sim::finger::effects::friction::FrictionEffect;
 use palpate::sim::finger::effects::skin::SkinEffect;
 use palpate::sim::finger::effects::thermal::ThermalEffect;
 use palpate::sim::finger::effects::timing::{Channel, channel};
@@ -254,49 +252,4 @@ fn contact_is_found_after_enough_frames_and_lost_likewise() {
     assert_eq!(changes.len(), 2, "{changes:?}");
     assert!((changes[0] - 0.325).abs() < 0.01 && (changes[1] - 0.625).abs() < 0.01, "{changes:?}");
     assert_eq!(Tare::of(&[]), Tare { electrode_counts: None, pdc_counts: None });
-}
-
-#[test]
-fn the_point_of_contact_is_within_3_mm_and_its_normal_within_the_measured_band() {
-    let effects = Effects { friction: Some(FrictionEffect::default()), ..quiet() };
-    let tip = Fingertip::new(&Finger::default(), &effects);
-    let bvh = plane();
-    let untouched = frames(&effects, 1, 10, |_| height(0.02));
-    let tare = Tare::of(&untouched);
-    let mut dice = Dice(11);
-    let (mut squares, mut angles, mut count) = (0.0, Vec::new(), 0.0);
-    for pitch in [-0.1, 0.1, 0.3, 0.5, 0.7] {
-        for roll in [-0.6, -0.3, 0.0, 0.3, 0.6] {
-            for force_n in [1.0, 3.0, 6.0] {
-                let towards_t = direction_t(pitch, roll);
-                let mut plate =
-                    Plate::new(&SkinEffect::default(), 1e13, &ElectrodesEffect::default()).unwrap();
-                let height_m = plate.height_m(&towards_t, force_n).unwrap();
-                let mut feel = FingertipState::new(&tip, &stream(1, 0, "finger"));
-                // Shear in a random direction, from none to slipping.
-                let mut motion = over(Vector3::new(0.0, 0.0, height_m), &towards_t);
-                let turn = std::f64::consts::PI * dice.roll();
-                let slip_m = 0.783 * force_n / 3000.0;
-                let slide_m = slip_m * dice.roll().abs();
-                motion.linear_w = Vector3::new(turn.cos(), turn.sin(), 0.0) * slide_m / 0.01;
-                let load = feel.step(&tip, &bvh, &motion, 0.01).unwrap();
-                let Some(contact) = locate(&Finger::default(), &tare, &feel.frame().unwrap())
-                else {
-                    panic!("{load:?}")
-                };
-                squares += (contact.surface_t - load.centre_t).norm_squared();
-                count += 1.0;
-                angles.push(contact.normal_t.angle(&-load.force_n).to_degrees());
-            }
-        }
-    }
-    let rms_mm = 1e3 * f64::sqrt(squares / count);
-    angles.sort_by(f64::total_cmp);
-    let median_deg = angles[angles.len() / 2];
-    println!(
-        "RMS {rms_mm:.2} mm, median angle {median_deg:.1}°, p90 {:.1}°",
-        angles[angles.len() * 9 / 10]
-    );
-    assert!(rms_mm <= 3.0, "{rms_mm}");
-    assert!((10.0..=25.0).contains(&median_deg), "{median_deg}");
 }

@@ -91,6 +91,7 @@ mod sensors;
 mod servo;
 #[cfg(feature = "nlopt")]
 mod shards;
+mod shear;
 mod shell;
 mod shell_elements;
 mod slopes;

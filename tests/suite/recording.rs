@@ -5,6 +5,7 @@ use crate::common::counting::allocations;
 use crate::common::program::{MESH, command, ended, fails, said, succeeds};
 use crate::common::shipped;
 use mcap::MessageStream;
+use mcap::records::{MessageHeader, Record};
 use palpate::backend::recording::{
     About, Ending, Marker, Player, Recorded, Recorder, Recording, RecordingError, Shape, TOPICS,
     Tick, Touch, decoded,
@@ -18,6 +19,7 @@ use palpate::explore::planner;
 use palpate::robot::finger::Frame;
 use palpate::sim::simulator::Simulator;
 use proptest::prelude::*;
+use std::collections::HashMap;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -125,6 +127,7 @@ fn bits(reading: &Reading) -> Vec<Option<u64>> {
             bits.push(list.as_ref().map(|list| list.len() as u64));
             all.extend(list.into_iter().flatten());
         }
+        bits.push(frame.slip.map(u64::from));
     }
     bits.extend(all.into_iter().map(|value| Some(value.to_bits())));
     bits
@@ -138,14 +141,16 @@ fn any_number() -> impl Strategy<Value = f64> + Clone {
 fn any_frame() -> impl Strategy<Value = Frame> {
     let single = || proptest::option::of(any_number());
     let many = proptest::option::of(any_number());
-    (any_number(), many.clone(), single(), many, single(), single()).prop_map(
-        |(time_s, electrodes, pdc_counts, pac, tdc_counts, tac_counts)| Frame {
+    let slip = proptest::option::of(any::<bool>());
+    (any_number(), many.clone(), single(), many, single(), single(), slip).prop_map(
+        |(time_s, electrodes, pdc_counts, pac, tdc_counts, tac_counts, slip)| Frame {
             time_s,
             electrode_counts: electrodes.map(|one| std::array::from_fn(|i| one + i as f64)),
             pdc_counts,
             pac_counts: pac.map(|one| std::array::from_fn(|i| one - i as f64)),
             tdc_counts,
             tac_counts,
+            slip,
         },
     )
 }
@@ -278,6 +283,64 @@ fn short(ticks: u32) -> (Vec<u8>, Vec<Reading>) {
     recording.end(1.0, &Ending { failure: None }).unwrap();
     let bytes = paper.0.lock().unwrap().clone();
     (bytes, readings)
+}
+
+/// The same file with ticks that end before what they say of slips, as their definition then does.
+fn without_slips(bytes: &[u8]) -> Vec<u8> {
+    let mut writer = mcap::Writer::new(io::Cursor::new(Vec::new())).unwrap();
+    let (mut schemas, mut channels) = (HashMap::new(), HashMap::new());
+    let mut tick = None;
+    for record in mcap::read::ChunkFlattener::new(bytes).unwrap() {
+        match record.unwrap() {
+            Record::Metadata(metadata) => writer.write_metadata(&metadata).unwrap(),
+            Record::Schema { header, data } => {
+                let mut text = String::from_utf8(data.to_vec()).unwrap();
+                if header.name == "palpate_msgs/msg/Tick" {
+                    tick = Some(header.id);
+                    let from = text.find("# Of each frame whether the skin slipped").unwrap();
+                    let to = from + text[from..].find("slips\n").unwrap() + "slips\n".len();
+                    text.replace_range(from..to, "");
+                }
+                let id = writer.add_schema(&header.name, "ros2msg", text.as_bytes()).unwrap();
+                schemas.insert(header.id, id);
+            }
+            Record::Channel(channel) => {
+                let schema = schemas[&channel.schema_id];
+                let nothing = std::collections::BTreeMap::new();
+                let id = writer.add_channel(schema, &channel.topic, "cdr", &nothing).unwrap();
+                channels.insert(channel.id, (id, tick == Some(channel.schema_id)));
+            }
+            Record::Message { header, data } => {
+                let (channel_id, is_tick) = channels[&header.channel_id];
+                let end = match is_tick {
+                    true => data.len() - 4 - decoded::<Tick>(&data).unwrap().slips.len(),
+                    false => data.len(),
+                };
+                let header = MessageHeader { channel_id, ..header };
+                writer.write_to_known_channel(&header, &data[..end]).unwrap();
+            }
+            Record::DataEnd(_) => break,
+            _ => {}
+        }
+    }
+    writer.finish().unwrap();
+    writer.into_inner().into_inner()
+}
+
+#[test]
+fn a_recording_without_slips_is_read_as_ever() {
+    let (bytes, _) = short(40);
+    let shorter = without_slips(&bytes);
+    assert!(shorter != bytes);
+    let [now, before] = [bytes, shorter].map(|bytes| Recorded::of(bytes).unwrap());
+    assert_eq!((now.tick_count, &now.touches), (before.tick_count, &before.touches));
+    let mut told = 0;
+    for (now, before) in now.ticks().zip(before.ticks()) {
+        told += now.slips.len();
+        assert!(before.slips.is_empty());
+        assert_eq!(Tick { slips: Default::default(), ..now }, before);
+    }
+    assert!(told > 10, "{told}");
 }
 
 #[test]

@@ -27,11 +27,18 @@ pub(super) enum Entry {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Tick,
+    TickWithoutSlips,
     Touch,
 }
 
-const KINDS: [(Kind, Definition); 2] =
-    [(Kind::Tick, Tick::DEFINITION), (Kind::Touch, Touch::DEFINITION)];
+const KINDS: [(Kind, Definition); 3] = [
+    (Kind::Tick, Tick::DEFINITION),
+    (Kind::TickWithoutSlips, Tick::WITHOUT_SLIPS),
+    (Kind::Touch, Touch::DEFINITION),
+];
+
+/// An empty list: its length, behind lists that leave it aligned.
+const EMPTY_LIST: [u8; 4] = [0; 4];
 
 /// The entries of a file up to its end, also if that lies in the midst of a record.
 pub(super) struct Entries {
@@ -107,11 +114,10 @@ fn entry(
 ) -> Result<Option<Entry>, RecordingError> {
     match record.map_err(|error| damaged(at, error))? {
         Record::Schema { header, data } => {
-            let known = KINDS.iter().find(|(_, definition)| definition.name == header.name);
-            if let Some((kind, definition)) = known {
-                if *data != *definition.text().as_bytes() {
-                    return Err(RecordingError::Layout { name: definition.name });
-                }
+            let mut named = KINDS.iter().filter(|(_, known)| known.name == header.name).peekable();
+            if let Some((_, Definition { name, .. })) = named.peek() {
+                let found = named.find(|(_, known)| *data == *known.text().as_bytes());
+                let (kind, _) = found.ok_or(RecordingError::Layout { name })?;
                 schemas.insert(header.id, *kind);
             }
             Ok(None)
@@ -131,6 +137,9 @@ fn entry(
             let Some(kind) = channels.get(&header.channel_id) else { return Ok(None) };
             let entry = match kind {
                 Kind::Tick => decoded::<Tick<'static>>(&data).map(Entry::Tick),
+                Kind::TickWithoutSlips => {
+                    decoded::<Tick<'static>>(&[&data[..], &EMPTY_LIST].concat()).map(Entry::Tick)
+                }
                 Kind::Touch => decoded::<Touch<'static>>(&data).map(Entry::Touch),
             };
             let unreadable = || RecordingError::Damaged {

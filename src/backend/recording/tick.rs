@@ -33,23 +33,40 @@ pub struct Tick<'a> {
     /// Frames that arrived.
     #[serde(with = "frames")]
     pub frames: Cow<'a, [Frame]>,
+    /// The same frames: of each whether the skin slipped. It stands last, so that recordings
+    /// without it are beginnings of such a message.
+    #[serde(with = "slips")]
+    pub slips: Cow<'a, [Frame]>,
+}
+
+/// Fields of a tick with `more` at their end.
+macro_rules! fields {
+    ($($more:literal),*) => {
+        concat!(
+            "# One control tick of a body, every number as it was.\n\
+             # Ticks since the reset; 0 is the reset itself.\nuint64 tick\n\
+             # What the reset was given; 0 in a tick.\nuint64 seed\n\
+             # Joint velocities as given, rad/s or m/s; empty in a reset.\nfloat64[] command\n\
+             # Why there is no reading; empty if there is one.\nstring fault\n\
+             # The body's time since the reset.\nfloat64 time_s\n\
+             # Joint positions, rad or m.\nfloat64[] q\n\
+             # Joint velocities, rad/s or m/s.\nfloat64[] qdot\n\
+             # The command as applied, after every limit.\nfloat64[] applied\n\
+             # Force (N), then torque (N m), at the fingertip in its frame T; or empty.\nfloat64[] wrench\n\
+             # Point (m), normal and force (N) of an ideal contact in T; or empty.\nfloat64[] ideal\n\
+             palpate_msgs/Frame[] frames\n",
+            $($more),*
+        )
+    };
 }
 
 impl Described for Tick<'_> {
     const DEFINITION: Definition = Definition {
         name: "palpate_msgs/msg/Tick",
-        fields: "# One control tick of a body, every number as it was.\n\
-                 # Ticks since the reset; 0 is the reset itself.\nuint64 tick\n\
-                 # What the reset was given; 0 in a tick.\nuint64 seed\n\
-                 # Joint velocities as given, rad/s or m/s; empty in a reset.\nfloat64[] command\n\
-                 # Why there is no reading; empty if there is one.\nstring fault\n\
-                 # The body's time since the reset.\nfloat64 time_s\n\
-                 # Joint positions, rad or m.\nfloat64[] q\n\
-                 # Joint velocities, rad/s or m/s.\nfloat64[] qdot\n\
-                 # The command as applied, after every limit.\nfloat64[] applied\n\
-                 # Force (N), then torque (N m), at the fingertip in its frame T; or empty.\nfloat64[] wrench\n\
-                 # Point (m), normal and force (N) of an ideal contact in T; or empty.\nfloat64[] ideal\n\
-                 palpate_msgs/Frame[] frames\n",
+        fields: fields!(
+            "# Of each frame whether the skin slipped: 1, 0, or 2 if nobody knows; or empty.\n\
+             uint8[] slips\n"
+        ),
         parts: &[&Definition {
             name: "palpate_msgs/msg/Frame",
             fields: "# A tactile frame in counts; what the sensor does not have is empty.\n\
@@ -58,6 +75,12 @@ impl Described for Tick<'_> {
             parts: &[],
         }],
     };
+}
+
+impl Tick<'_> {
+    /// A tick of a recording that does not say whether the skin slipped.
+    pub(super) const WITHOUT_SLIPS: Definition =
+        Definition { fields: fields!(), ..Self::DEFINITION };
 }
 
 /// The numbers of a wrench or an ideal contact, where they lie while a tick is written.
@@ -91,12 +114,17 @@ impl<'a> Tick<'a> {
             wrench: loads.wrench.as_ref().map_or(&[][..], |all| all).into(),
             ideal: loads.ideal.as_ref().map_or(&[][..], |all| all).into(),
             frames: Cow::Borrowed(&reading.frames),
+            slips: Cow::Borrowed(&reading.frames),
             ..Self::default()
         }
     }
 
     /// Puts what was read into `reading`.
     pub(super) fn write_to(self, reading: &mut Reading) {
+        let mut frames = self.frames.into_owned();
+        for (frame, said) in frames.iter_mut().zip(&*self.slips) {
+            frame.slip = said.slip;
+        }
         let wrench = <[f64; 6]>::try_from(&*self.wrench).ok();
         let ideal = <[f64; 7]>::try_from(&*self.ideal).ok();
         *reading = Reading {
@@ -107,7 +135,7 @@ impl<'a> Tick<'a> {
                 force_n: Vector3::new(a, b, c),
                 torque_nm: Vector3::new(d, e, f),
             }),
-            frames: self.frames.into_owned(),
+            frames,
             ideal: ideal.map(|[a, b, c, d, e, f, force_n]| IdealContact {
                 p_tc: Point3::new(a, b, c),
                 normal_t: Vector3::new(d, e, f),
@@ -167,6 +195,7 @@ mod frames {
             pac_counts: array(&lists.pac)?,
             tdc_counts: single(&lists.tdc)?,
             tac_counts: single(&lists.tac)?,
+            slip: None,
         })
     }
 
@@ -177,5 +206,27 @@ mod frames {
                 E::invalid_value(Unexpected::Seq, &&*format!("none or {N} of {}", list.len()))
             }),
         }
+    }
+}
+
+/// Of each frame whether the skin slipped: 1, 0, or 2 if that is not known; nothing if it is of
+/// none.
+mod slips {
+    use crate::robot::finger::Frame;
+    use serde::{Deserialize, Deserializer, Serializer};
+    use std::borrow::Cow;
+
+    pub(super) fn serialize<S: Serializer>(frames: &[Frame], to: S) -> Result<S::Ok, S::Error> {
+        let known = frames.iter().any(|frame| frame.slip.is_some());
+        let told = if known { frames } else { &[] };
+        to.collect_seq(told.iter().map(|frame| frame.slip.map_or(2, u8::from)))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<Cow<'static, [Frame]>, D::Error> {
+        let told = Vec::<u8>::deserialize(from)?;
+        let slip = |told: u8| (told < 2).then_some(told == 1);
+        Ok(told.into_iter().map(|told| Frame { slip: slip(told), ..Frame::default() }).collect())
     }
 }

@@ -23,6 +23,7 @@ pub fn frame(packet: &Packet, finger: usize, time_s: f64) -> Option<Frame> {
                 pac_counts: Some(data.pac_data.map(f64::from)),
                 tdc_counts: Some(data.tdc_data.into()),
                 tac_counts: Some(data.tac_data.into()),
+                slip: None,
             })
         }
         Packet::Fingers(hand) => {
@@ -36,6 +37,7 @@ pub fn frame(packet: &Packet, finger: usize, time_s: f64) -> Option<Frame> {
                 pac_counts: pac.map(|pac| pac.map(f64::from)),
                 tdc_counts: Some(data.tdc.into()),
                 tac_counts: Some(data.tac.into()),
+                slip: None,
             })
         }
         _ => None,

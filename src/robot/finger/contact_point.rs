@@ -15,7 +15,7 @@ const LEAST_COUNTS: f64 = 10.0;
 
 /// An electrode that reads less than this untouched is open: pressed hardest, a sound one reads 259
 /// (MiaoLi/syntouchcontact, F2).
-const OPEN_COUNTS: f64 = 200.0;
+pub(super) const OPEN_COUNTS: f64 = 200.0;
 
 /// What the sensor reads untouched.
 #[derive(Clone, Debug, PartialEq)]

@@ -65,6 +65,10 @@ pub const NOISE_COUNTS: [f64; ELECTRODES] = [
     5.18, 4.15, 3.56,
 ];
 
+/// Standard deviation of the patch of fluid an electrode senses (fitted by `palpate calibrate` to
+/// MiaoLi/syntouchcontact's sensor F2 on a flat plate).
+pub const SPREAD_M: f64 = 2.1e-3;
+
 /// Positions on the core, in `T`, in metres, of a finger `scale` times as large as a BioTac.
 pub fn positions_t(scale: f64) -> [Point3<f64>; ELECTRODES] {
     POSITIONS_MM.map(|p| Point3::from(Vector3::from(p) * 1e-3 * scale))

@@ -37,6 +37,9 @@ pub struct Frame {
     pub tdc_counts: Option<f64>,
     /// Change of temperature (TAC).
     pub tac_counts: Option<f64>,
+    /// Whether the skin slipped on the object since the last frame. A sensor does not send it: it
+    /// is none but where friction is simulated.
+    pub slip: Option<bool>,
 }
 
 impl Frame {

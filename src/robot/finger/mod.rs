@@ -5,6 +5,7 @@ pub mod contact_point;
 pub mod electrode_table;
 pub mod frame;
 pub mod motion;
+pub mod plane_fit;
 pub mod profile;
 pub mod shape;
 

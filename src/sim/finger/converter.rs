@@ -5,6 +5,7 @@ use super::effects::Effects;
 use super::effects::electrodes::{Common, Electrodes};
 use super::effects::fluid::Filter;
 use super::effects::timing::{Channel, channel};
+use super::noise::normal;
 use crate::robot::finger::frame::{ELECTRODES, FRAME_S, Frame, SLOTS, SLOTS_HZ, VIBRATIONS};
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
@@ -27,6 +28,8 @@ pub struct Signals {
     pub temperature_c: f64,
     /// Its rate of change within the sensor's band.
     pub warming_c_s: f64,
+    /// Speed at which the skin slips on the object, during the whole step that ends now.
+    pub slip_m_s: f64,
 }
 
 /// What converts signals: the electrodes of a fingertip and the settings of the rest.
@@ -36,8 +39,8 @@ pub(super) struct Parts<'a> {
     pub effects: &'a Effects,
 }
 
-/// The converter of one trial: electrodes, PDC, PAC and thermistor each draw noise from a stream of
-/// their own, so that switching one leaves the others' noise as it was.
+/// The converter of one trial: electrodes, PDC, PAC, thermistor and slip each draw noise from a
+/// stream of their own, so that switching one leaves the others' noise as it was.
 #[derive(Clone, Debug)]
 pub(super) struct Converter {
     before: Signals,
@@ -51,6 +54,7 @@ pub(super) struct Converter {
     vibration_rng: Option<ChaCha8Rng>,
     filter: Option<Filter>,
     thermal_rng: Option<ChaCha8Rng>,
+    slip_rng: Option<ChaCha8Rng>,
     queue: VecDeque<Frame>,
     ready: usize,
 }
@@ -80,6 +84,7 @@ impl Converter {
             vibration_rng: vibrates.then(|| stream(4)),
             filter: vibrates.then(Filter::default),
             thermal_rng: parts.effects.thermal.as_ref().map(|_| stream(3)),
+            slip_rng: parts.effects.friction.as_ref().filter(|_| vibrates).map(|_| stream(5)),
             queue: VecDeque::with_capacity(KEPT + batch),
             ready: 0,
         }
@@ -87,8 +92,9 @@ impl Converter {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        let rngs = [&self.electrodes_rng, &self.fluid_rng, &self.vibration_rng, &self.thermal_rng];
-        rngs.into_iter().flatten().map(size_of_val).sum::<usize>()
+        let slow = [&self.electrodes_rng, &self.fluid_rng, &self.thermal_rng];
+        let fast = [&self.vibration_rng, &self.slip_rng];
+        slow.into_iter().chain(fast).flatten().map(size_of_val).sum::<usize>()
             + self.filter.as_ref().map_or(0, size_of_val)
             + self.queue.capacity() * size_of::<Frame>()
     }
@@ -103,6 +109,7 @@ impl Converter {
     /// interpolated.
     pub fn advance(&mut self, parts: &Parts, time_s: f64, now: &Signals) {
         let (start_s, before) = (self.time_s, self.before);
+        self.note_slip(parts, now);
         loop {
             let slots = self.frames * SLOTS as u64 + self.slot as u64 + 1;
             let slot_s = slots as f64 / SLOTS_HZ;
@@ -114,6 +121,9 @@ impl Converter {
             self.slot += 1;
             if self.slot == SLOTS {
                 self.finish(parts, slot_s);
+                if slot_s + SOON_S < time_s {
+                    self.note_slip(parts, now);
+                }
             }
         }
         (self.time_s, self.before) = (time_s, *now);
@@ -124,7 +134,8 @@ impl Converter {
         let skewed = parts.effects.timing.is_some();
         match channel(self.slot) {
             Channel::Pac(i) => {
-                self.pac(parts, i, mix(before.pressure_pa, now.pressure_pa, part));
+                let shaken_pa = self.shaken_pa(parts, now);
+                self.pac(parts, i, mix(before.pressure_pa, now.pressure_pa, part) + shaken_pa);
                 if last && !skewed {
                     for slot in (0..SLOTS).step_by(2) {
                         self.convert(parts, channel(slot), before, now, part);
@@ -133,6 +144,23 @@ impl Converter {
             }
             slow if skewed => self.convert(parts, slow, before, now, part),
             _ => {}
+        }
+    }
+
+    /// Notes in the frame at hand whether the skin slips.
+    fn note_slip(&mut self, parts: &Parts, now: &Signals) {
+        if parts.effects.friction.is_some() {
+            *self.frame.slip.get_or_insert(false) |= now.slip_m_s > 0.0;
+        }
+    }
+
+    /// What the object's texture adds to the pressure while the skin slips.
+    fn shaken_pa(&mut self, parts: &Parts, now: &Signals) -> f64 {
+        match (&parts.effects.friction, &mut self.slip_rng) {
+            (Some(friction), Some(rng)) if now.slip_m_s > 0.0 => {
+                friction.vibration_pa(now.slip_m_s) * normal(rng)
+            }
+            _ => 0.0,
         }
     }
 

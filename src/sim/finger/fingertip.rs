@@ -4,12 +4,14 @@ use super::converter::{Converter, Parts, Signals};
 use super::counter::count;
 use super::effects::effect::Step;
 use super::effects::electrodes::Electrodes;
+use super::effects::friction::Bristle;
 use super::effects::skin::{Pressed, Skin, SkinEffect};
 use super::effects::variation::Sensor;
 use super::effects::{EffectStates, Effects};
 use super::lattice::Lattice;
 use super::load::{Load, PressError};
 use super::samples::spread;
+use super::shear::Shear;
 use crate::geometry::bvh::MeshBvh;
 use crate::robot::finger::TipMotion;
 use crate::robot::finger::frame::Frame;
@@ -27,6 +29,7 @@ pub struct Fingertip {
     skin: Option<Skin>,
     lattice: Option<Lattice>,
     electrodes: Option<Electrodes>,
+    shear: Option<Shear>,
     effects: Effects,
 }
 
@@ -44,7 +47,9 @@ impl Fingertip {
         let samples = skin.as_ref().map(Skin::samples).or(shell.as_ref().map(|(_, all)| &all[..]));
         let electrodes = (effects.electrodes.as_ref().zip(samples))
             .map(|(effect, samples)| Electrodes::new(effect, samples, profile.scale()));
+        let sheared = effects.friction.as_ref().and(electrodes.as_ref()).zip(samples);
         Self {
+            shear: sheared.map(|(electrodes, samples)| Shear::new(electrodes, samples)),
             skin,
             lattice: shell.map(|(lattice, _)| lattice),
             electrodes,
@@ -83,8 +88,9 @@ impl Fingertip {
 
     /// Bytes held by skin and electrodes.
     pub fn bytes(&self) -> usize {
-        let skin = self.skin.as_ref().map_or(0, |skin| skin.bytes());
-        skin + self.electrodes.as_ref().map_or(0, Electrodes::bytes)
+        self.skin.as_ref().map_or(0, Skin::bytes)
+            + self.electrodes.as_ref().map_or(0, Electrodes::bytes)
+            + self.shear.as_ref().map_or(0, Shear::bytes)
     }
 
     fn parts(&self) -> Parts<'_> {
@@ -232,7 +238,8 @@ impl FingertipState {
     }
 
     fn signals(&self, tip: &Fingertip, pressure_pa: f64) -> Signals {
-        let mut signals = Signals { pressure_pa, ..Signals::default() };
+        let slip_m_s = self.effects.friction.as_ref().map_or(0.0, Bristle::slip_m_s);
+        let mut signals = Signals { pressure_pa, slip_m_s, ..Signals::default() };
         let mut conductivity = 1.0;
         if let (Some(thermal), Some(heat)) = (&tip.effects.thermal, &self.effects.thermal) {
             signals.temperature_c = heat.temperature_c;
@@ -242,7 +249,11 @@ impl FingertipState {
         let moved_m = self.pressed.as_ref().map_or(&self.shell_m[..], Pressed::moved_m);
         if let Some(electrodes) = &tip.electrodes {
             count("electrodes");
-            signals.electrode_counts = electrodes.counts_over(moved_m, conductivity);
+            let mut closed = electrodes.closed(moved_m);
+            if let (Some(shear), Some(bristle)) = (&tip.shear, &self.effects.friction) {
+                shear.add(bristle.skin_t(), &mut closed);
+            }
+            signals.electrode_counts = electrodes.counts_closed(&closed, conductivity);
         }
         signals
     }

@@ -5,7 +5,8 @@
 //! `column` is the law of one column of skin over fluid over core, `cavity` couples columns by the
 //! fluid's pressure, `foundation` is a skin of them; `shell` carries load to its neighbours
 //! instead, over the triangles of `lattice`. `fingertip` puts together the effects that a scene
-//! names, `converter` makes tactile frames of what they sense, `counter` counts how often each did
+//! names, `shear` says what the electrodes feel of friction,
+//! `converter` makes tactile frames of what they sense, `counter` counts how often each did
 //! its work. `plate` presses the finger on a flat plate, `calibration` fits the constants to a
 //! `recording` of it, `stiffness` asks it how stiff the skin is.
 
@@ -24,6 +25,7 @@ mod patches;
 pub mod plate;
 pub mod recording;
 pub mod samples;
+pub mod shear;
 pub mod shell;
 pub mod stiffness;
 

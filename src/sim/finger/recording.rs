@@ -87,14 +87,20 @@ impl Recording {
         filled(&loads, self.near_normal_loads.len())?;
         for (i, bin) in self.near_normal_loads.iter().enumerate() {
             let field = |name: &str| format!("{loads}[{i}].{name}");
-            within(&field("mean_normal_force_n"), &[bin.mean_normal_force_n], FORCE_MAX_N)?;
+            force(&field("mean_normal_force_n"), bin.mean_normal_force_n)?;
             within(&field("mean_counts"), &bin.mean_counts, FULL_SCALE_COUNTS)?;
         }
         Ok(())
     }
 }
 
-fn filled(field: &str, count: usize) -> Result<(), RecordingError> {
+/// Whether `force_n` can be on a BioTac.
+pub(super) fn force(field: &str, force_n: f64) -> Result<(), RecordingError> {
+    within(field, &[force_n], FORCE_MAX_N)
+}
+
+/// Whether a list has something in it.
+pub(super) fn filled(field: &str, count: usize) -> Result<(), RecordingError> {
     if count > 0 { Ok(()) } else { Err(RecordingError::Empty { field: field.into() }) }
 }
 

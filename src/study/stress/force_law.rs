@@ -40,6 +40,14 @@ pub(super) const CASES: &[Case] = &[
     )
     .timed(),
     case(
+        "slide and lift",
+        "a skin carried far over the core must not break the electrodes, nor stay there",
+        "coefficient",
+        (&[0.0, 0.01, 0.783, 10.0], 4),
+        slide,
+    )
+    .timed(),
+    case(
         "long hold",
         "rounding and filters may drift while nothing moves",
         "ticks",
@@ -210,6 +218,40 @@ fn slip(speed_m_s: f64, period_s: f64) -> Outcome {
             }
         }
         Ok(Outcome::Stable)
+    })
+}
+
+/// Dragged over the wall for long by the softest of skins, every frame is finite and within the
+/// converter's range; lifted off, the electrodes read what those of a finger read that never
+/// touched.
+fn slide(coefficient: f64, period_s: f64) -> Outcome {
+    let mut effects = Effects { thermal: None, ..effects() };
+    effects.friction = Some(crate::sim::finger::effects::friction::FrictionEffect {
+        coefficient,
+        stiffness_n_m: 1.0,
+        ..Default::default()
+    });
+    with_finger(&effects, |setup| {
+        let (mut state, mut other) = (setup.untouched(), setup.untouched());
+        let (ticks, away) = (1000, setup.at(-0.01, 0.0));
+        let mut last = [None, None];
+        for i in 0..2 * ticks {
+            let mut motion = if i < ticks { setup.at(1e-3, 0.0) } else { away };
+            motion.linear_w.x = if i < ticks { 0.5 } else { 0.0 };
+            setup.press(&mut state, &motion, period_s)?;
+            setup.press(&mut other, &away, period_s)?;
+            for (last, state) in last.iter_mut().zip([&mut state, &mut other]) {
+                while let Some(frame) = state.frame() {
+                    let counts = frame.electrode_counts.unwrap_or_default();
+                    let fits = counts.iter().all(|counts| (0.0..=4095.0).contains(counts));
+                    if !frame.is_finite() || !fits {
+                        return Ok(Outcome::Wrong(format!("{frame:?}")));
+                    }
+                    *last = Some(counts);
+                }
+            }
+        }
+        Ok(require(last[0] == last[1], || format!("not at rest: {last:?}")))
     })
 }
 

@@ -3,6 +3,7 @@
 use crate::backend::{IdealContact, Reading};
 use crate::robot::finger::contact_point;
 use crate::robot::finger::contact_point::Detector;
+use crate::robot::finger::plane_fit::PlaneFit;
 use crate::robot::finger::{Finger, Frame, Tare};
 use crate::task::touch::{ContactEstimate, TouchSettings};
 use nalgebra::{Point3, Vector3};
@@ -31,10 +32,13 @@ pub(super) struct ContactMonitor {
     force_at_rest_n: Option<Vector3<f64>>,
     /// Sum and count of the forces since [`forget`](Self::forget).
     forces: (Vector3<f64>, f64),
+    /// Where that is asked for.
+    plane_fit: Option<PlaneFit>,
 }
 
 impl ContactMonitor {
-    pub(super) fn new(settings: &TouchSettings) -> Self {
+    pub(super) fn new(settings: &TouchSettings, finger: &Finger) -> Self {
+        let by_plane = settings.point == ContactEstimate::Plane;
         Self {
             settings: settings.clone(),
             detector: Detector::new(settings.detection.clone()),
@@ -46,6 +50,7 @@ impl ContactMonitor {
             force_n: 0.0,
             force_at_rest_n: None,
             forces: (Vector3::zeros(), 0.0),
+            plane_fit: by_plane.then(|| PlaneFit::new(finger)),
         }
     }
 
@@ -122,9 +127,13 @@ impl ContactMonitor {
         }
         let mean = Tare::of(&self.frames);
         let mean = Frame { electrode_counts: mean.electrode_counts, ..Frame::default() };
-        let found = contact_point::locate(finger, self.tare.as_ref()?, &mean)?;
+        let tare = self.tare.as_ref()?;
+        let mut found = contact_point::locate(finger, tare, &mean)?;
+        if let Some(plane_fit) = &self.plane_fit {
+            found = plane_fit.locate(tare, &mean)?;
+        }
         let p_tc = match point {
-            ContactEstimate::Skin => found.surface_t,
+            ContactEstimate::Skin | ContactEstimate::Plane => found.surface_t,
             ContactEstimate::Electrodes => found.centroid_t,
         };
         Some((p_tc, -found.normal_t))

@@ -66,7 +66,7 @@ impl Servo {
         let mut state = State::default();
         state.take(body.reset(seed)?)?;
         Ok(Self {
-            monitor: ContactMonitor::new(&settings),
+            monitor: ContactMonitor::new(&settings, &robot.finger),
             command: Command { qdot: vec![0.0; robot.chain.joints.len()] },
             robot,
             body,

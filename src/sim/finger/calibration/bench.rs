@@ -3,6 +3,7 @@
 use super::constants::Model;
 use crate::sim::finger::effects::electrodes::{Electrodes, ElectrodesEffect};
 use crate::sim::finger::plate::{Plate, direction_t};
+use crate::sim::finger::shear::Shear;
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -42,6 +43,12 @@ impl Bench {
     pub fn electrodes(&self, effect: &ElectrodesEffect) -> Electrodes {
         let samples = self.worn.as_ref().map_or(&[][..], |(_, plate)| plate.skin().samples());
         Electrodes::new(effect, samples, 1.0)
+    }
+
+    /// What `electrodes` under the skin feel of shear; nothing if none is worn.
+    pub fn shear(&self, electrodes: &Electrodes) -> Shear {
+        let samples = self.worn.as_ref().map_or(&[][..], |(_, plate)| plate.skin().samples());
+        Shear::new(electrodes, samples)
     }
 
     /// Presses with a normal force at pitch and roll; none if that has no answer.

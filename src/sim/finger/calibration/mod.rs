@@ -6,7 +6,8 @@
 //! than another, and a hand held the finger at an attitude that nobody wrote down. `session` has
 //! these apart from the `constants`, which all sensors share; `problem` fits both to every load
 //! there is, `fit` says how sure it is, and `score` tries constants on a sensor that they were not
-//! fitted to, beside what knows nothing of force.
+//! fitted to, beside what knows nothing of force. `shear` holds the model against how electrodes
+//! answer tangential force.
 
 pub mod bench;
 pub mod constants;
@@ -14,3 +15,4 @@ pub mod fit;
 mod problem;
 pub mod score;
 pub mod session;
+pub mod shear;

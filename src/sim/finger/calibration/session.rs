@@ -4,7 +4,9 @@ use super::bench::Bench;
 use super::constants::Model;
 use crate::robot::finger::frame::ELECTRODES;
 use crate::sim::finger::effects::electrodes::{Electrodes, ElectrodesEffect};
+use crate::sim::finger::plate::direction_t;
 use crate::sim::finger::recording::Recording;
+use nalgebra::Vector3;
 
 /// Standard deviation of the roll from press to press of a hand at one load (chosen, as fits that
 /// leave it free find 0.01 to 0.27).
@@ -40,33 +42,43 @@ impl Session {
         recording: &Recording,
         bench: &mut Bench,
     ) -> Option<Vec<[f64; ELECTRODES]>> {
-        let electrodes = ElectrodesEffect {
-            baseline_counts: recording.no_contact_median_counts,
-            exponent: model.electrodes.exponent * self.gain,
-            ..model.electrodes.clone()
-        };
         bench.wear(model)?;
-        let electrodes = bench.electrodes(&electrodes);
+        let electrodes = bench.electrodes(&self.electrodes(model, recording));
         let loads = recording.near_normal_loads.iter().zip(&self.roll_rad);
         loads
             .map(|(bin, &roll_rad)| {
-                self.mean_counts(bin.mean_normal_force_n, roll_rad, &electrodes, bench)
+                let load = [bin.mean_normal_force_n, roll_rad];
+                self.mean_counts(load, &electrodes, &|_, _| {}, bench)
             })
             .collect()
     }
 
-    fn mean_counts(
+    /// The electrodes of the recorded sensor.
+    pub(super) fn electrodes(&self, model: &Model, recording: &Recording) -> ElectrodesEffect {
+        ElectrodesEffect {
+            baseline_counts: recording.no_contact_median_counts,
+            exponent: model.electrodes.exponent * self.gain,
+            ..model.electrodes.clone()
+        }
+    }
+
+    /// Mean counts over the presses of a hand with a normal force about a roll, where `carry`
+    /// changes how much of each gap is closed, given the direction that faces the plate; none if a
+    /// pose has no answer.
+    pub(super) fn mean_counts(
         &self,
-        force_n: f64,
-        roll_rad: f64,
+        [force_n, roll_rad]: [f64; 2],
         electrodes: &Electrodes,
+        carry: &dyn Fn(&Vector3<f64>, &mut [f64; ELECTRODES]),
         bench: &mut Bench,
     ) -> Option<[f64; ELECTRODES]> {
         let mut mean = [0.0; ELECTRODES];
         for (off, weight) in QUADRATURE {
             let angles_rad = [self.pitch_rad, roll_rad + off * PRESS_SD_RAD];
             let press = bench.press(angles_rad, force_n)?;
-            let counts = electrodes.counts_over(&press.inward_m, self.offset);
+            let mut closed = electrodes.closed(&press.inward_m);
+            carry(&direction_t(angles_rad[0], angles_rad[1]), &mut closed);
+            let counts = electrodes.counts_closed(&closed, self.offset);
             mean.iter_mut().zip(counts).for_each(|(mean, counts)| *mean += weight * counts);
         }
         Some(mean)

@@ -52,7 +52,7 @@ impl Default for ElectrodesEffect {
     fn default() -> Self {
         Self {
             baseline_counts: electrode_table::BASELINES_COUNTS,
-            spread_m: 2.1e-3,
+            spread_m: electrode_table::SPREAD_M,
             exponent: 1.0,
             noise: 0.75,
             noise_correlation: 0.3,
@@ -145,6 +145,12 @@ impl Electrodes {
 
     /// The same over samples whose skin moved inwards by `inward_m`, one each, or none at rest.
     pub fn counts_over(&self, inward_m: &[f64], conductivity: f64) -> [f64; ELECTRODES] {
+        self.counts_closed(&self.closed(inward_m), conductivity)
+    }
+
+    /// The part of each gap that is closed by skin that moved inwards by `inward_m`, one each, or
+    /// none at rest; negative where it lifted.
+    pub fn closed(&self, inward_m: &[f64]) -> [f64; ELECTRODES] {
         // An untouched skin is the usual case and needs no sums.
         let moved = |weights: &[(usize, f64)]| match inward_m.is_empty() {
             true => 0.0,
@@ -153,9 +159,17 @@ impl Electrodes {
                 weights.iter().filter_map(part).sum()
             }
         };
+        std::array::from_fn(|i| moved(&self.weights[i]))
+    }
+
+    /// Ideal counts with that part of each gap closed.
+    pub fn counts_closed(
+        &self,
+        closed: &[f64; ELECTRODES],
+        conductivity: f64,
+    ) -> [f64; ELECTRODES] {
         std::array::from_fn(|i| {
-            let closed = moved(&self.weights[i]);
-            let gap = (1.0 - closed).max(FILM);
+            let gap = (1.0 - closed[i]).max(FILM);
             counts(self.z0_ohm[i] / (gap.powf(self.effect.exponent) * conductivity))
         })
     }

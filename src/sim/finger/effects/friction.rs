@@ -1,4 +1,8 @@
-//! Stick and slip: one elastic bristle between skin and object, dragged along at Coulomb's limit.
+//! Stick and slip: one elastic bristle between finger and object, dragged along at Coulomb's limit.
+//!
+//! What yields is the skin: the bristle's stretch is how far the object carries it over the core,
+//! which the electrodes feel ([`Shear`](crate::sim::finger::shear::Shear)). While it slips, the
+//! object's texture makes the fluid vibrate.
 
 use super::effect::{Effect, OnLoad};
 use crate::config::{Checked, Rules};
@@ -7,21 +11,28 @@ use nalgebra::{Isometry3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Table `[friction]`: tangential force of the skin.
+/// Slower than this the skin creeps and does not slip (chosen): far below any speed of a touch,
+/// far above what rounding at Coulomb's limit makes of a finger at rest.
+const SLIP_M_S: f64 = 1e-5;
+
+/// Table `[friction]`: tangential force of the skin, its shear over the core, and slip.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FrictionEffect {
     /// Coulomb's coefficient.
     pub coefficient: f64,
-    /// Tangential stiffness while the contact sticks, in N/m.
+    /// Tangential stiffness of the skin on the core, in N/m.
     pub stiffness_n_m: f64,
+    /// Roughness of the object: the power of the pressure's noise, in Pa², per m/s of slip.
+    pub roughness_pa2_s_m: f64,
 }
 
 impl Default for FrictionEffect {
-    /// Coefficient: NVlabs/biotac_sim. Stiffness: chosen, a pad of 1 cm² and 1.6 mm with a shear
-    /// modulus of 50 kPa.
+    /// Coefficient: NVlabs/biotac_sim. Stiffness: with it the electrodes answer lateral force as in
+    /// MiaoLi/syntouchcontact's recordings (`palpate calibrate --shear`: F2 alone has 2050 N/m,
+    /// F1 1830). Roughness: chosen, 10 Pa at 20 mm/s, ten times PAC's own noise.
     fn default() -> Self {
-        Self { coefficient: 0.783, stiffness_n_m: 3000.0 }
+        Self { coefficient: 0.783, stiffness_n_m: 2000.0, roughness_pa2_s_m: 5000.0 }
     }
 }
 
@@ -29,6 +40,7 @@ impl Checked for FrictionEffect {
     fn check(&self, rules: &mut Rules) {
         rules.number("coefficient", self.coefficient, 0.0..=10.0);
         rules.number("stiffness_n_m", self.stiffness_n_m, 1.0..=1e9);
+        rules.number("roughness_pa2_s_m", self.roughness_pa2_s_m, 0.0..=1e9);
     }
 }
 
@@ -45,13 +57,35 @@ impl Effect for FrictionEffect {
     }
 }
 
-/// How far the skin is sheared over the object: one trial's state.
+impl FrictionEffect {
+    /// Standard deviation of the pressure while the skin slips at a speed.
+    ///
+    /// A surface whose spectrum falls with the square of the wave number (a random walk's) passes
+    /// at v with power in proportion to v in any fixed band.
+    pub fn vibration_pa(&self, slip_m_s: f64) -> f64 {
+        (self.roughness_pa2_s_m * slip_m_s).sqrt()
+    }
+}
+
+/// How far finger and object are sheared against each other: one trial's state.
 #[derive(Clone, Debug, Default)]
 pub struct Bristle {
     stretch_w: Vector3<f64>,
+    skin_t: Vector3<f64>,
+    slip_m_s: f64,
 }
 
 impl Bristle {
+    /// How far the object carries the skin over the core, in `T`.
+    pub fn skin_t(&self) -> &Vector3<f64> {
+        &self.skin_t
+    }
+
+    /// Speed at which the skin slipped on the object in the last step; 0 while it sticks.
+    pub fn slip_m_s(&self) -> f64 {
+        self.slip_m_s
+    }
+
     /// Moves the skin with the velocity of T for `dt_s` and adds the friction to `load`, at the
     /// centre of pressure.
     ///
@@ -68,7 +102,7 @@ impl Bristle {
     ) {
         let normal_n = load.force_n.norm();
         if normal_n == 0.0 {
-            self.stretch_w = Vector3::zeros();
+            *self = Self::default();
             return;
         }
         let arm_w = x_wt.rotation * load.centre_t.coords;
@@ -76,8 +110,11 @@ impl Bristle {
         self.stretch_w += (linear_w + angular_w.cross(&arm_w)) * dt_s;
         self.stretch_w -= normal_w * normal_w.dot(&self.stretch_w);
         let limit_m = effect.coefficient * normal_n / effect.stiffness_n_m;
+        let slipped_m = (self.stretch_w.norm() - limit_m).max(0.0);
+        self.slip_m_s = if slipped_m > SLIP_M_S * dt_s { slipped_m / dt_s } else { 0.0 };
         self.stretch_w = self.stretch_w.cap_magnitude(limit_m);
         let force_t = x_wt.rotation.inverse() * (self.stretch_w * -effect.stiffness_n_m);
+        self.skin_t = force_t / effect.stiffness_n_m;
         load.force_n += force_t;
         load.torque_nm += load.centre_t.coords.cross(&force_t);
     }

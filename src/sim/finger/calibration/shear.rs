@@ -1,0 +1,157 @@
+//! How the electrodes answer tangential force: what was measured, and what the model says.
+
+use super::bench::Bench;
+use super::constants::Model;
+use super::fit::{Free, fit};
+use super::session::Session;
+use crate::math::least_squares::FitError;
+use crate::robot::finger::frame::ELECTRODES;
+use crate::sim::finger::effects::friction::FrictionEffect;
+use crate::sim::finger::recording::{Recording, RecordingError, filled, force};
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+/// Tangential force to either side over which the model's slopes are taken; chosen: about what a
+/// hand that presses with 3 to 6 N does.
+const ASIDE_N: f64 = 1.0;
+
+/// So many electrodes with the largest slopes are held against each other one by one (chosen).
+const LARGEST: usize = 8;
+
+/// Slopes of one or more sensors.
+#[derive(Clone, Debug, Deserialize)]
+pub struct ShearRecordings {
+    /// Where the numbers come from.
+    pub note: String,
+    /// One entry per sensor.
+    pub sensors: Vec<ShearRecording>,
+}
+
+/// Least-squares slopes of the counts over the force on the finger, E1 to E19.
+#[derive(Clone, Debug, Deserialize)]
+pub struct ShearRecording {
+    /// The sensor's name in the source.
+    pub sensor: String,
+    /// Mean normal force of the frames.
+    pub mean_normal_force_n: f64,
+    /// Over the force along +y of `T`.
+    pub counts_per_n_lateral: [f64; ELECTRODES],
+    /// Over that along +x.
+    pub counts_per_n_axial: [f64; ELECTRODES],
+}
+
+impl ShearRecordings {
+    /// Whether there are sensors and forces can be theirs.
+    ///
+    /// # Errors
+    /// The first that cannot.
+    pub fn check(&self) -> Result<(), RecordingError> {
+        filled("sensors", self.sensors.len())?;
+        for (i, of) in self.sensors.iter().enumerate() {
+            force(&format!("sensors[{i}].mean_normal_force_n"), of.mean_normal_force_n)?;
+        }
+        Ok(())
+    }
+}
+
+/// Slopes of the model against measured ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Agreement {
+    /// Counts per N that were measured.
+    pub measured: [f64; ELECTRODES],
+    /// Those of the model.
+    pub model: [f64; ELECTRODES],
+}
+
+impl Agreement {
+    /// Pearson's correlation over the electrodes.
+    pub fn correlation(&self) -> f64 {
+        let about_mean = |all: &[f64; ELECTRODES]| {
+            let mean = all.iter().sum::<f64>() / ELECTRODES as f64;
+            all.map(|slope| slope - mean)
+        };
+        let [measured, model] = [&self.measured, &self.model].map(about_mean);
+        dot(&measured, &model) / (dot(&measured, &measured) * dot(&model, &model)).sqrt()
+    }
+
+    /// Least and greatest ratio of the model's slope to the measured one, over the eight electrodes
+    /// whose measured slopes are largest.
+    pub fn ratios(&self) -> [f64; 2] {
+        let mut order: Vec<usize> = (0..ELECTRODES).collect();
+        order.sort_by(|&a, &b| self.measured[b].abs().total_cmp(&self.measured[a].abs()));
+        let ratios = order.iter().take(LARGEST).map(|&i| self.model[i] / self.measured[i]);
+        ratios.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], ratio| {
+            [least.min(ratio), most.max(ratio)]
+        })
+    }
+
+    /// What the model's slopes are best multiplied by (least squares).
+    pub fn scale(&self) -> f64 {
+        dot(&self.measured, &self.model) / dot(&self.model, &self.model)
+    }
+}
+
+/// A sensor under tangential force.
+#[derive(Clone, Debug)]
+pub struct Sheared {
+    /// The sensor.
+    pub sensor: String,
+    /// Under force along y of `T`.
+    pub lateral: Agreement,
+    /// Under force along x.
+    pub axial: Agreement,
+}
+
+/// Holds the model against what was measured on a sensor, in the session that fits its
+/// `recording` under normal force. Nothing is fitted to the slopes: the finger does not roll while
+/// it is sheared.
+///
+/// # Errors
+/// As [`fit`].
+pub fn compare(
+    model: &Model,
+    friction: &FrictionEffect,
+    recording: &Recording,
+    sheared: &ShearRecording,
+) -> Result<Sheared, FitError> {
+    let own = fit(model, &[recording], Free::Sessions)?;
+    let session = own.sessions.first().ok_or(FitError::Empty)?;
+    let force_n = sheared.mean_normal_force_n;
+    let against = |axis: Vector3<f64>, measured: &[f64; ELECTRODES]| {
+        let model = slopes(model, friction, (session, recording), force_n, &axis);
+        Ok(Agreement { measured: *measured, model: model.ok_or(FitError::NotFinite)? })
+    };
+    Ok(Sheared {
+        sensor: sheared.sensor.clone(),
+        lateral: against(Vector3::y(), &sheared.counts_per_n_lateral)?,
+        axial: against(Vector3::x(), &sheared.counts_per_n_axial)?,
+    })
+}
+
+/// Counts per N of tangential force on the finger along `axis_t`; none if a pose has no answer.
+fn slopes(
+    model: &Model,
+    friction: &FrictionEffect,
+    (session, recording): (&Session, &Recording),
+    force_n: f64,
+    axis_t: &Vector3<f64>,
+) -> Option<[f64; ELECTRODES]> {
+    let mut bench = Bench::default();
+    bench.wear(model)?;
+    let electrodes = bench.electrodes(&session.electrodes(model, recording));
+    let shear = bench.shear(&electrodes);
+    let mut counts = |aside_n: f64| {
+        let carry = |towards_t: &Vector3<f64>, closed: &mut [f64; ELECTRODES]| {
+            let along_t = (axis_t - towards_t * towards_t.dot(axis_t)).normalize();
+            shear.add(&(along_t * (aside_n / friction.stiffness_n_m)), closed);
+        };
+        let roll_rad = session.mean_roll_rad();
+        session.mean_counts([force_n, roll_rad], &electrodes, &carry, &mut bench)
+    };
+    let (more, less) = (counts(ASIDE_N)?, counts(-ASIDE_N)?);
+    Some(std::array::from_fn(|i| (more[i] - less[i]) / (2.0 * ASIDE_N)))
+}
+
+fn dot(a: &[f64; ELECTRODES], b: &[f64; ELECTRODES]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
