@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts growth bench-peers dist setup tools clean
+.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -152,6 +152,10 @@ bench: setup
 # How far the electrodes' point of contact lies from the exact one.
 contacts: setup
 	cargo bench --locked --bench contacts
+
+# The force at which contact is told, and how often it is told of nothing.
+detection: setup
+	cargo bench --locked --bench detection
 
 # How the cost grows with the number of touches; draws docs/growth.svg.
 growth: setup

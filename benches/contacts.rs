@@ -52,14 +52,15 @@ fn touch(
         let motion = TipMotion::at(Isometry3::from_parts(p_wt.into(), turn));
         load = feel.step(tip, bvh, &motion, TICK_S).ok()?;
         while let Some(frame) = feel.frame() {
-            if let Some(tare) = &tare {
-                let touching = detector.update(tare, &frame);
+            if tare.is_some() {
+                let touching = detector.update(&frame);
                 pressed += usize::from(touching || pressed > 0);
             }
             frames.push(frame);
         }
         if tare.is_none() && frames.len() == 5 {
             tare = Some(Tare::of(&frames));
+            detector.tare(&frames);
         }
         if pressed == 10 {
             break;

@@ -3,17 +3,17 @@
 use super::columns::{aligned, cell};
 use super::find::{SCENES, find};
 use super::needs;
-use super::needs::NeedsArgs;
+use super::needs::{Effort, NeedsArgs, ONE_BUILD};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::statistics::Paired;
 use crate::report::number::with_interval;
 use crate::sim::Scene;
 use crate::sim::scene::Body;
+use crate::study::effects::need::Within;
 use crate::study::effects::overhead::overheads;
 use crate::study::effects::{Baseline, Budget, Change, switches};
 use crate::study::fidelity::spread::Spread;
-use crate::study::fidelity::tolerance::Tolerance;
 use crate::study::fidelity::touches::targets;
 use anyhow::bail;
 use std::path::PathBuf;
@@ -28,6 +28,8 @@ Examples:
   palpate effects scenes/bird_pa10.toml --tolerance 1mm          what it calls for, and the cheapest
                                                                  scene that stays within 1 mm of it
   palpate effects scenes/bird_finger.toml --tolerance 0.1N --full
+  palpate effects scenes/container_finger.toml --tolerance verdict      what must be simulated so that
+                                                                 the planners compare as they do
 
 Each effect is switched alone, the rest of the scene being as it is. Times are paired and
 interleaved, so that what else the machine does falls on both sides alike.
@@ -36,7 +38,12 @@ A tolerance is held by 95 % of the touches, with sensors without noise: in mm or
 contact, N of force, or counts of the electrodes. An effect is needed if, switched alone, it takes
 more of them beyond it, not needed if not, by the 95 % interval of that share; about 72 touches, none
 of them beyond, is the least that can tell. The cheapest scene is held against the full one on fresh
-targets; exit code 1 if it does not stay within the tolerance there.")]
+targets; exit code 1 if it does not stay within the tolerance there.
+
+With --tolerance verdict planners are compared: active against random, in the same trials with the
+effect and without. It is needed if the 95 % interval of what that changes lies beyond the margin, not
+needed if it lies within, else these trials cannot tell. The margin is stated (verdict:0.1mm) or is
+what cannot turn the scene's own verdict round: the end of its interval that is nearest to zero.")]
 pub(super) struct Args {
     /// Scene (TOML) with a body that feels.
     scene: PathBuf,
@@ -49,15 +56,17 @@ pub(super) struct Args {
     /// Pairs of touches that are timed.
     #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
     pairs: u16,
-    /// Trials of each planner; 0 leaves the planners out.
-    #[arg(long, default_value_t = 10, value_name = "N")]
-    trials: u16,
+    /// Trials of each planner; 0 leaves the planners out
+    /// [default: 10, with --tolerance verdict 40].
+    #[arg(long, value_name = "N")]
+    trials: Option<u16>,
     /// Touches of a trial.
     #[arg(long, default_value_t = 30, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=500))]
     trial_touches: u16,
-    /// Say which effects are needed within this error, and write the cheapest scene within it.
-    #[arg(long, value_name = "0.2mm|0.1N|20counts")]
-    tolerance: Option<Tolerance>,
+    /// Say which effects are needed within this error, or for the same verdict on planners, and
+    /// write the cheapest scene within it.
+    #[arg(long, value_name = "0.2mm|0.1N|20counts|verdict")]
+    tolerance: Option<Within>,
     #[command(flatten)]
     needs: NeedsArgs,
 }
@@ -65,28 +74,26 @@ pub(super) struct Args {
 /// Touches compared, unless it is said: as many as take seconds.
 const TOUCHES: u16 = 16;
 
+/// Trials of each planner, unless it is said: the same.
+const TRIALS: u16 = 10;
+
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
     if matches!(scene.body, Body::Function | Body::Cast) {
         let (path, body) = (args.scene.display(), scene.body.name());
         bail!("{path}: body = \"{body}\" has no effects; effects need body = \"kinematic\"");
     }
-    if let Some(tolerance) = args.tolerance {
-        let touches = args.touches.unwrap_or(needs::TOUCHES).into();
+    if let Some(within) = args.tolerance {
         let name = args.scene.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
-        return needs::run(
-            scene,
-            (&name, tolerance),
-            (touches, args.pairs.into()),
-            &args.needs,
-            talk,
-        );
+        let effort = Effort {
+            touches: args.touches.unwrap_or(needs::TOUCHES).into(),
+            pairs: args.pairs.into(),
+            trials: [args.trials.unwrap_or(needs::TRIALS), args.trial_touches].map(u32::from),
+        };
+        return needs::run(scene, (&name, within), &effort, &args.needs, talk);
     }
-    let budget = Budget {
-        pairs: args.pairs.into(),
-        trials: args.trials.into(),
-        touches: args.trial_touches.into(),
-    };
+    let trials = args.trials.unwrap_or(TRIALS).into();
+    let budget = Budget { pairs: args.pairs.into(), trials, touches: args.trial_touches.into() };
     let stop = stop_on_interrupt("effect")?;
     let switches = switches();
     let bar = progress_bar(talk, "effects", "effects", switches.len() as u64 + 1, 0);
@@ -116,7 +123,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
             text += &format!("  {kept:<18} {ratio:+.2} % [{low:+.2}, {high:+.2}]\n");
         }
     }
-    print(&text)?;
+    print(&format!("{}\n{ONE_BUILD}", text.trim_end()))?;
     Ok(if finished { Ending::Done } else { Ending::Interrupted })
 }
 

@@ -34,6 +34,7 @@ mod suite;
 mod terminal;
 mod twin;
 mod watch;
+mod within;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;

@@ -265,13 +265,13 @@ impl Checked for Scene {
         rules.require("effects.collision", "(given)", bumps, || {
             "no collision: only links of body = \"dynamic\" are kept apart by MuJoCo".into()
         });
-        if let (Some(wrench), None) = (&self.effects.wrench, &self.effects.fluid) {
+        if let (Some(wrench), false) = (&self.effects.wrench, self.frames_tell_contact()) {
             let least_n = SDS_OF_CONTACT * wrench.noise_max_n();
             let told = self.touch.detection_n >= least_n;
             rules.require("touch.detection_n", self.touch.detection_n, told, || {
                 format!(
                     "at least {least_n} N, {SDS_OF_CONTACT} standard deviations of effects.wrench, \
-                     because no fluid says contact"
+                     because no frame says contact"
                 )
             });
         }
@@ -334,9 +334,15 @@ impl Scene {
         let ahead_t = self.finger.ahead_t();
         let layers = Profile::biotac(&self.finger).layers(0.0, &ahead_t);
         let batch = effects.timing.as_ref().map_or(1, |timing| timing.batch_frames);
-        let told_by_frames = effects.fluid.is_some().then_some(batch);
+        let told_by_frames = self.frames_tell_contact().then_some(batch);
         let depth_m = layers.skin_m + layers.gap_m;
         Some(self.touch.approach_limit_m_s(self.period_s(), told_by_frames, depth_m))
+    }
+
+    /// Whether contact is told by tactile frames, and not by force.
+    fn frames_tell_contact(&self) -> bool {
+        let effects = self.felt_effects();
+        self.touch.detection.by.is_heard(effects.fluid.is_some(), effects.electrodes.is_some())
     }
 
     /// Reads a scene file and applies `--set` assignments.

@@ -2,7 +2,7 @@
 //! retract.
 
 use crate::config::{Checked, Rules};
-use crate::robot::finger::contact_point::Detection;
+use crate::robot::finger::Detection;
 use crate::robot::finger::frame::FRAME_S;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,16 +20,17 @@ pub struct TouchSettings {
     pub approach_m_s: f64,
     /// Distance kept between the finger's hull and the object's foremost point while travelling.
     pub standoff_m: f64,
-    /// When the pressure says contact.
+    /// When pressure or electrodes say contact.
     pub detection: Detection,
-    /// Force that says contact where no pressure is sensed.
+    /// Force that says contact where no pressure is sensed, or what else `detection.by` names.
     pub detection_n: f64,
     /// How far beyond the place where contact was told a soft finger is held and read; a rigid one
     /// stays there.
     pub press_m: f64,
     /// Time the finger rests on the object before it is read.
     pub settle_s: f64,
-    /// Tactile frames averaged, at rest before the approach and on the object.
+    /// Tactile frames averaged, at rest before the approach and on the object; before the first
+    /// one at least 20 with `detection.threshold_sds`, which learns from them.
     pub frames: usize,
     /// Force at which the finger retreats without reading.
     pub force_limit_n: f64,

@@ -242,9 +242,9 @@ fn contact_is_found_after_enough_frames_and_lost_likewise() {
     let felt = frames(&Effects { timing: None, ..Effects::all() }, 2, 1000, |t| {
         height(if (0.3..0.6).contains(&t) { 8.0e-3 } else { 9e-3 })
     });
-    let tare = Tare::of(&felt[..20]);
     let mut detector = Detector::new(Detection::default());
-    let touching: Vec<bool> = felt.iter().map(|frame| detector.update(&tare, frame)).collect();
+    detector.tare(&felt[..20]);
+    let touching: Vec<bool> = felt.iter().map(|frame| detector.update(frame)).collect();
     let changes: Vec<f64> = (1..felt.len())
         .filter(|&i| touching[i] != touching[i - 1])
         .map(|i| felt[i].time_s)

@@ -19,6 +19,7 @@ mod commands;
 #[cfg(feature = "nlopt")]
 mod compare;
 mod control;
+mod detection;
 mod distances;
 #[cfg(feature = "mujoco")]
 mod dynamic;
@@ -38,6 +39,8 @@ mod finger_signals;
 mod fit;
 #[cfg(feature = "mujoco")]
 mod flex;
+#[cfg(feature = "mujoco")]
+mod flex_material;
 mod floors;
 #[cfg(feature = "nlopt")]
 mod folders;

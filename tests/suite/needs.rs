@@ -2,8 +2,9 @@
 
 use crate::common::program::{fails, palpate};
 use palpate::sim::Scene;
-use palpate::study::effects::need::{FullScene, Need};
+use palpate::study::effects::need::FullScene;
 use palpate::study::effects::share::Share;
+use palpate::study::effects::yardstick::Need;
 use palpate::study::effects::{full, switches};
 use std::fs;
 use tempfile::TempDir;
@@ -44,8 +45,8 @@ fn need(slope_deg: f64, more: &str, (effect, tolerance): (&str, &str), touches: 
     let whole = FullScene::new(scene, tolerance.parse().unwrap(), touches).unwrap();
     let switch = switches().into_iter().find(|switch| switch.name == effect).unwrap();
     let judged = whole.judge(&switch).unwrap();
-    println!("{effect} at {slope_deg} deg: {:?}", judged.difference);
-    judged.need()
+    println!("{effect} at {slope_deg} deg: {:?}", judged.off);
+    judged.need
 }
 
 /// Coulomb: on a slope beyond the friction cone, atan 0.783 = 38°, the skin slips and friction adds
@@ -138,12 +139,74 @@ fn the_cheapest_scene_is_written_and_held_against_the_full_one() {
     let mut same = whole;
     (same.effects.thermal, same.effects.friction) = (None, None);
     assert_eq!(same, less);
-    fails(folder, &["effects", "scene.toml", "--tolerance", "2 feet"], &["--tolerance", "0.2mm"]);
+    for wrong in ["2 feet", "verdikt", "verdict 1mm", "verdict:1N", "verdict:0mm"] {
+        let named = ["--tolerance", "0.2mm", "verdict:0.1mm", wrong];
+        fails(folder, &["effects", "scene.toml", "--tolerance", wrong], &named);
+    }
     // What is there is not replaced, unless Palpate wrote it.
     fs::write(folder.join("mine.toml"), "body = \"cast\"\n").unwrap();
     let last = arguments.len() - 1;
     arguments[last] = "mine.toml";
     fails(folder, &arguments, &["mine.toml", "--force"]);
+}
+
+/// What is said of a change is where its interval lies about the margin.
+#[test]
+fn a_change_is_needed_beyond_the_margin_and_not_within() {
+    let need = |low: f64, high: f64| Need::of_change(Some([low, high]), Some(1.0));
+    for (low, high) in [(-0.9, 0.9), (0.0, 0.0), (0.2, 0.5)] {
+        assert_eq!(need(low, high), Need::NotNeeded);
+    }
+    for (low, high) in [(1.1, 5.0), (-3.0, -1.1)] {
+        assert_eq!(need(low, high), Need::Needed);
+    }
+    for (low, high) in [(0.5, 1.5), (-2.0, 0.0), (-2.0, 2.0)] {
+        assert_eq!(need(low, high), Need::CannotTell);
+    }
+    assert_eq!(Need::of_change(None, Some(1.0)), Need::CannotTell);
+    assert_eq!(Need::of_change(Some([0.0, 0.0]), None), Need::CannotTell);
+}
+
+/// Vibration moves no contact, so it changes no verdict, at any margin; electrodes, which err where
+/// exact contacts do not, do. Both are held to a verdict of planners that do not see them.
+#[test]
+fn a_verdict_calls_for_what_changes_it() {
+    let folder = folder(20.0, "[effects.fluid.vibration]");
+    let folder = folder.path();
+    let mut arguments = vec!["--quiet", "effects", "scene.toml", "--trials=6", "--pairs=2"];
+    arguments.extend(["--trial-touches=9", "--fresh=4", "--out=less.toml", "--tolerance"]);
+    let run = |within: &'static str| {
+        let output = palpate(folder, &[&arguments[..], &[within]].concat());
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        println!("{text}{}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!(output.status.code(), Some(0));
+        text
+    };
+    let said = |text: &str, name: &str| {
+        let line = text.lines().find(|line| line.split_whitespace().next() == Some(name)).unwrap();
+        line.trim_end().to_owned()
+    };
+    let text = run("verdict:0.001um");
+    let vibration = said(&text, "fluid.vibration");
+    assert!(vibration.contains(" 0.000 [0.000, 0.000] ") && vibration.ends_with(" not needed"));
+    assert!(!said(&text, "electrodes").ends_with("not needed"));
+    assert!(text.contains("without fluid.vibration\n") && text.contains("it stays within"));
+    assert!(text.contains("in 6 trials") && text.contains("in 4 fresh trials"));
+    assert!(text.contains("this one build"));
+    let less = Scene::load(&folder.join("less.toml"), &[]).unwrap();
+    assert!(less.effects.fluid.unwrap().vibration.is_none() && less.effects.electrodes.is_some());
+    // Within a metre nothing matters.
+    let text = run("verdict:1000mm");
+    assert!(said(&text, "electrodes").ends_with("not needed"), "{text}");
+}
+
+/// Touches that all planners share make no difference between them.
+#[test]
+fn where_nobody_wins_there_is_no_verdict_to_change() {
+    let folder = folder(0.0, "");
+    let arguments = ["effects", "scene.toml", "--trials=4", "--trial-touches=5", "--tolerance"];
+    let wants = ["in 4 trials", "nobody wins", "verdict:0.1mm", "--trials"];
+    fails(folder.path(), &[&arguments[..], &["verdict"]].concat(), &wants);
 }
 
 /// Of touches that are a trial each.

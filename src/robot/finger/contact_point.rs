@@ -1,13 +1,10 @@
-//! From a tactile frame to a contact: is there one, and where (Eq. 1 of Yi et al. 2016).
+//! From a tactile frame to the point of contact (Eq. 1 of Yi et al. 2016).
 
 use super::electrode_table;
 use super::frame::FULL_SCALE_COUNTS;
 use super::frame::{ELECTRODES, Frame};
 use super::shape::Finger;
-use crate::config::{Checked, Rules};
 use nalgebra::{Point3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Electrodes that fell by less than this in all say nothing of a place (chosen: below the noise
 /// of 19 electrodes).
@@ -85,59 +82,4 @@ pub fn locate(finger: &Finger, tare: &Tare, frame: &Frame) -> Option<PointOfCont
     let axis_t = Point3::new(centroid_t.x.min(0.0), 0.0, 0.0);
     let normal_t = (centroid_t - axis_t).try_normalize(0.0)?;
     Some(PointOfContact { centroid_t, surface_t: axis_t + normal_t * finger.radius_m, normal_t })
-}
-
-/// When a rise of fluid pressure counts as contact.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Detection {
-    /// Rise of PDC above its tare.
-    pub threshold_counts: f64,
-    /// Frames in a row that must agree.
-    pub frames: u32,
-}
-
-impl Default for Detection {
-    /// Threshold: tams_biotac and balakumar-s/biotac_force_net. Frames: chosen, 30 ms; the latter
-    /// waits for 10.
-    fn default() -> Self {
-        Self { threshold_counts: 10.0, frames: 3 }
-    }
-}
-
-impl Checked for Detection {
-    fn check(&self, rules: &mut Rules) {
-        rules.number("threshold_counts", self.threshold_counts, 0.0..=FULL_SCALE_COUNTS);
-        rules.require("frames", self.frames, (1..=1000).contains(&self.frames), || {
-            "1 to 1000".into()
-        });
-    }
-}
-
-/// Says whether there is contact, and changes its mind only when enough frames agree.
-#[derive(Clone, Debug)]
-pub struct Detector {
-    detection: Detection,
-    touching: bool,
-    against: u32,
-}
-
-impl Detector {
-    /// A detector that saw no contact yet.
-    pub fn new(detection: Detection) -> Self {
-        Self { detection, touching: false, against: 0 }
-    }
-
-    /// Whether the skin is touched, after another frame. Without PDC nothing changes.
-    pub fn update(&mut self, tare: &Tare, frame: &Frame) -> bool {
-        if let (Some(rest), Some(now)) = (tare.pdc_counts, frame.pdc_counts) {
-            let above = now - rest > self.detection.threshold_counts;
-            self.against = if above == self.touching { 0 } else { self.against + 1 };
-            if self.against >= self.detection.frames {
-                self.touching = above;
-                self.against = 0;
-            }
-        }
-        self.touching
-    }
 }

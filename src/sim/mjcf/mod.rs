@@ -11,7 +11,7 @@ mod shell;
 mod surroundings;
 mod text;
 
-pub use shell::flex;
+pub use shell::{elasticity, flex};
 
 use super::collision::Collision;
 use super::environment::Environment;

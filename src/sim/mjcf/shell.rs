@@ -111,12 +111,31 @@ fn shell(lattice: &Lattice, effect: &FlexEffect) -> String {
             false => write!(bodies, "n{k} ").and(write!(vertices, "0 0 0 ")),
         };
     }
-    let FlexEffect { young_pa, poisson, damping_s, .. } = effect;
     let thickness_m = lattice.thickness_m();
     format!(
-        r#"<flex name="skin" dim="2" radius="{radius_m}" body="{bodies}" vertex="{vertices}" element="{elements}"><elasticity young="{young_pa}" poisson="{poisson}" damping="{damping_s}" thickness="{thickness_m}" elastic2d="both"/><contact selfcollide="none" {UNTOUCHED}/></flex>"#,
+        r#"<flex name="skin" dim="2" radius="{radius_m}" body="{bodies}" vertex="{vertices}" element="{elements}">{elasticity}<contact selfcollide="none" {UNTOUCHED}/></flex>"#,
         radius_m = thickness_m / 2.0,
+        elasticity = elasticity([effect.young_pa, effect.poisson], thickness_m, effect.damping_s),
         elements = super::text::list(lattice.triangles().iter().flatten()),
+    )
+}
+
+/// What MuJoCo must be told so that a sheet of this modulus and Poisson's ratio stretches and bends
+/// like one.
+///
+/// With E' and ν' its membrane has the Lamé constants µ'/4 and λ'/2, where λ' is the one of three
+/// dimensions (measured, MuJoCo 3.17). Those of a sheet, µ = E/(2(1 + ν)) and λ = Eν/(1 − ν²), are
+/// had with ν' = ν/2 and E' = 4E(1 + ν/2)/(1 + ν). Its bending is then (1 − ν) times the cotangent
+/// formula of Wardetzky et al. 2007 with the plate's stiffness; a third of that bends a clamped
+/// plate of 8 to 16 cells as theory has it (`tests/suite/flex_material.rs`). So the sheet is
+/// stated thinner by √(1/(3(1 − ν))), and its modulus by as much larger, as the membrane is.
+pub fn elasticity([young_pa, poisson]: [f64; 2], thickness_m: f64, damping_s: f64) -> String {
+    let thinner = (3.0 * (1.0 - poisson)).sqrt().recip();
+    let young_pa = 4.0 * young_pa * (1.0 + 0.5 * poisson) / (1.0 + poisson) / thinner;
+    format!(
+        r#"<elasticity young="{young_pa}" poisson="{poisson}" damping="{damping_s}" thickness="{thickness_m}" elastic2d="both"/>"#,
+        poisson = 0.5 * poisson,
+        thickness_m = thinner * thickness_m,
     )
 }
 

@@ -1,10 +1,9 @@
 //! What one effect does to touches, their cost, and the verdict on planners.
 
 use super::switches::switched;
+use super::verdict::{GRID, advantages, verdict};
 use crate::experiment::statistics::{Paired, median};
 use crate::experiment::truth::Truth;
-use crate::experiment::{Experiment, Simulation};
-use crate::explore::planner;
 use crate::robot::finger::TipMotion;
 use crate::sim::finger::FingertipState;
 use crate::sim::finger::counter::count_of;
@@ -15,7 +14,6 @@ use crate::study::fidelity::reference_load::ReferenceLoad;
 use crate::study::fidelity::rung_result::electrode_rms_counts;
 use crate::study::fidelity::spread::Spread;
 use crate::study::fidelity::touches::{MeasureError, Touches, touch_all};
-use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -52,9 +50,6 @@ pub struct Budget {
     pub touches: u32,
 }
 
-/// Test places along each side of the zone; chosen.
-const GRID: usize = 31;
-
 /// The scene as it is, measured once.
 pub struct Baseline {
     environment: Arc<Environment>,
@@ -80,7 +75,7 @@ impl Baseline {
         let Some(touches) = touch_all(&environment, &targets, 0, &mut || true)? else {
             return Ok(None);
         };
-        let verdict = verdict(&environment, &truth, budget);
+        let verdict = verdict(&advantages(&environment, &truth, 0..budget.trials, budget.touches));
         Ok(tick().then_some(Self { environment, targets, touches, truth, verdict }))
     }
 
@@ -103,7 +98,8 @@ impl Baseline {
                 .collect();
             Spread::of(&values)
         };
-        let other = verdict(&environment, &self.truth, budget);
+        let trials = 0..budget.trials;
+        let other = verdict(&advantages(&environment, &self.truth, trials, budget.touches));
         let [without, with] = match is_on {
             true => [&environment, &self.environment],
             false => [&self.environment, &environment],
@@ -173,27 +169,4 @@ pub(super) fn time_ratios(
         ratios.push(taken_s[1] / taken_s[0]);
     }
     Ok(ratios)
-}
-
-/// `active` against `random` in the same trials.
-fn verdict(environment: &Arc<Environment>, truth: &Truth, budget: Budget) -> Option<Paired> {
-    let planners = [planner::by_name("active")?, planner::by_name("random")?];
-    if budget.trials == 0 || !truth.is_known() {
-        return None;
-    }
-    let names = planners.map(|planner| planner.name);
-    let experiment = Experiment::on(environment.scene(), &names, budget.trials, budget.touches);
-    let environment = Arc::clone(environment);
-    let simulation = Simulation::against(experiment, environment, truth.clone()).ok()?;
-    let pairs: Vec<(f64, f64)> = (0..budget.trials)
-        .into_par_iter()
-        .filter_map(|number| {
-            let [active, random] = planners.map(|planner| {
-                let row = simulation.trial(planner, number);
-                row.touches.last().and_then(|touch| Some(touch.metrics?.rmse_m))
-            });
-            active.zip(random)
-        })
-        .collect();
-    Paired::new(&pairs, 0)
 }

@@ -2,6 +2,7 @@
 //! with sensors without noise, so that what differs is the model.
 
 use super::share::Share;
+use super::yardstick::{FRESH, Need, Yardstick};
 use crate::experiment::statistics::median;
 use crate::sim::{Environment, Scene};
 use crate::study::fidelity::reference_load::noise_free;
@@ -50,6 +51,53 @@ impl Trials {
             })
             .filter_map(Result::transpose)
             .collect()
+    }
+}
+
+/// Holds scenes against each other by their touches, of which 5 % may be beyond a tolerance.
+pub struct ByTouches {
+    tolerance: Tolerance,
+    trials: Trials,
+    touches: Vec<Touches>,
+}
+
+impl ByTouches {
+    /// Touches `count` targets with `scene`, in trials from number `first` on.
+    ///
+    /// # Errors
+    /// If it cannot be built.
+    pub fn new(
+        scene: &Scene,
+        tolerance: Tolerance,
+        (count, first): (usize, u64),
+    ) -> Result<Self, MeasureError> {
+        let trials = Trials::new(scene, count, first);
+        let touches = trials.touch(scene)?;
+        Ok(Self { tolerance, trials, touches })
+    }
+}
+
+impl Yardstick for ByTouches {
+    type Off = Difference;
+
+    fn off(&self, scene: &Scene) -> Result<Option<Difference>, MeasureError> {
+        Ok(Difference::of(&self.touches, &self.trials.touch(scene)?, &self.tolerance))
+    }
+
+    fn need(&self, off: &Difference) -> Need {
+        match off.beyond.interval {
+            [low, _] if low > ALLOWED => Need::Needed,
+            [_, high] if high < ALLOWED => Need::NotNeeded,
+            _ => Need::CannotTell,
+        }
+    }
+
+    fn fresh(&self, full: &Scene, count: usize) -> Result<Self, MeasureError> {
+        Self::new(full, self.tolerance, (count, FRESH))
+    }
+
+    fn timed(&self) -> Vec<Vec<f64>> {
+        self.trials.targets()
     }
 }
 

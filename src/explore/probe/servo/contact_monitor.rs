@@ -2,9 +2,8 @@
 
 use crate::backend::{IdealContact, Reading};
 use crate::robot::finger::contact_point;
-use crate::robot::finger::contact_point::Detector;
 use crate::robot::finger::plane_fit::PlaneFit;
-use crate::robot::finger::{Finger, Frame, Tare};
+use crate::robot::finger::{Detector, Finger, Frame, Tare};
 use crate::task::touch::{ContactEstimate, TouchSettings};
 use nalgebra::{Point3, Vector3};
 
@@ -58,8 +57,8 @@ impl ContactMonitor {
     pub(super) fn take(&mut self, reading: &Reading) {
         for frame in reading.frames.iter().filter(|frame| frame.is_finite()) {
             self.heard_s = Some(reading.time_s);
-            if let Some(tare) = &self.tare {
-                self.touching = self.detector.update(tare, frame);
+            if self.tare.is_some() {
+                self.touching = self.detector.update(frame);
             }
             self.frames.push(frame.clone());
         }
@@ -76,25 +75,31 @@ impl ContactMonitor {
 
     /// What is felt now.
     pub(super) fn approach_end(&self) -> Option<ApproachEnd> {
+        let last = self.frames.last();
         let pressure = (self.tare.as_ref().and_then(|tare| tare.pdc_counts))
-            .zip(self.frames.last().and_then(|frame| frame.pdc_counts))
+            .zip(last.and_then(|frame| frame.pdc_counts))
             .map(|(rest, now)| now - rest);
         if self.force_n > self.settings.force_limit_n
             || pressure.is_some_and(|rise| rise > self.settings.pressure_limit_counts)
         {
             return Some(ApproachEnd::Overload);
         }
-        let is_felt = match pressure {
-            Some(_) => self.touching,
-            None => self.force_n > self.settings.detection_n,
+        let is_felt = match last.is_some_and(|frame| self.detector.hears(frame)) {
+            true => self.touching,
+            false => self.force_n > self.settings.detection_n,
         };
         is_felt.then_some(ApproachEnd::Contact)
+    }
+
+    /// Frames that the next [`tare`](Self::tare) needs.
+    pub(super) fn frames_of_tare(&self) -> usize {
+        self.settings.frames.max(self.detector.wants())
     }
 
     /// What was felt since [`forget`](Self::forget) is the rest.
     pub(super) fn tare(&mut self) {
         self.tare = Some(Tare::of(&self.frames));
-        self.detector = Detector::new(self.settings.detection.clone());
+        self.detector.tare(&self.frames);
         self.touching = false;
         self.force_at_rest_n = (self.forces.1 > 0.0).then(|| self.forces.0 / self.forces.1);
     }

@@ -211,11 +211,11 @@ impl Probe for Servo {
     /// way.
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         refuse_unless_finite(approach)?;
-        let TouchSettings { travel_m_s, approach_m_s, frames, .. } = self.settings;
+        let TouchSettings { travel_m_s, approach_m_s, .. } = self.settings;
         let above = standoff(&self.robot, self.settings.standoff_m, approach);
         self.withdraw(approach, &above)?;
         self.go("the stand-off", above, travel_m_s, false)?;
-        self.rest(above, frames)?;
+        self.rest(above, self.monitor.frames_of_tare())?;
         self.monitor.tare();
         let below = turning_point(&self.robot, approach);
         let end = self.go("the object", below, approach_m_s, true)?;

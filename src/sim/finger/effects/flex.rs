@@ -15,7 +15,7 @@ pub struct FlexEffect {
     pub along: usize,
     /// Cells around it, from nail to nail; even, so that left and right are alike.
     pub around: usize,
-    /// Young's modulus of the skin, in Pa.
+    /// Young's modulus of the skin, in Pa; what MuJoCo is told so that its shell has it is another.
     pub young_pa: f64,
     /// Poisson's ratio of the skin.
     pub poisson: f64,

@@ -1,0 +1,308 @@
+//! When frames say contact: how often of nothing, and from what force on.
+
+use crate::common::shapes::square;
+use palpate::config::Rules;
+use palpate::geometry::bvh::MeshBvh;
+use palpate::math::normal::{cumulative, density};
+use palpate::math::seed::stream;
+use palpate::robot::finger::detection::Alarm;
+use palpate::robot::finger::electrode_table::{BASELINES_COUNTS, NOISE_COUNTS};
+use palpate::robot::finger::frame::{ELECTRODES, FRAME_S};
+use palpate::robot::finger::rest::Rest;
+use palpate::robot::finger::{Detection, Detector, Finger, Frame, TipMotion};
+use palpate::sim::finger::effects::electrodes::{Common, Electrodes, ElectrodesEffect};
+use palpate::sim::finger::effects::fluid::FluidEffect;
+use palpate::sim::finger::effects::skin::{Skin, SkinEffect};
+use palpate::sim::finger::effects::variation::Sensor;
+use palpate::sim::finger::effects::variation::VariationEffect;
+use palpate::sim::finger::plate::{direction_t, pose};
+use palpate::sim::finger::{Effects, Fingertip, FingertipState};
+use rand_chacha::ChaCha8Rng;
+
+const PITCHES_DEG: [f64; 4] = [90.0, 70.0, 45.0, 20.0];
+
+/// Frames of a tare, and of the way after it.
+const TARE: usize = 5;
+const WAY: usize = 100;
+
+fn sds(by: Alarm, threshold_sds: f64, frames: u32) -> Detection {
+    Detection { by, threshold_sds: Some(threshold_sds), frames, ..Detection::default() }
+}
+
+/// A sensor that nobody touches, without its skin: only noise.
+struct Untouched {
+    electrodes: Electrodes,
+    fluid: FluidEffect,
+    counts: [f64; ELECTRODES],
+    common: Common,
+    rng: ChaCha8Rng,
+    drift: f64,
+}
+
+impl Untouched {
+    /// With an open electrode and one ten times as noisy, if they are named. PDC is not rounded, so
+    /// that its noise is normal.
+    fn new(seed: u64, bad: Option<[usize; 2]>) -> Self {
+        let mut effect = ElectrodesEffect::default();
+        if let Some([open, _]) = bad {
+            effect.baseline_counts[open] = 1.0;
+        }
+        let profile = palpate::robot::finger::profile::Profile::biotac(&Finger::default());
+        let few = SkinEffect { samples: 50, ..SkinEffect::default() };
+        let skin = Skin::new(&profile, &few, 1e13);
+        let mut electrodes = Electrodes::new(&effect, skin.samples(), 1.0);
+        if let Some([_, noisy]) = bad {
+            electrodes.worsen(noisy, 10.0);
+        }
+        Self {
+            counts: effect.baseline_counts,
+            electrodes,
+            fluid: FluidEffect { noise_counts: 1.0, quantise: false, ..Default::default() },
+            common: Common::default(),
+            rng: stream(seed, 0, "untouched"),
+            drift: 0.0,
+        }
+    }
+
+    fn frame(&mut self) -> Frame {
+        self.common = self.electrodes.next(&self.common, FRAME_S, &mut self.rng);
+        let Self { electrodes, common, rng, counts, drift, .. } = self;
+        // As the fluid conducts better: dE/d ln G = E (1 − E / 4095).
+        let counts = std::array::from_fn(|i| {
+            let ideal = counts[i] + *drift * counts[i] * (1.0 - counts[i] / 4095.0);
+            electrodes.convert(i, ideal, common, rng)
+        });
+        Frame {
+            electrode_counts: Some(counts),
+            pdc_counts: Some(self.fluid.pdc_counts(0.0, &mut self.rng)),
+            ..Frame::default()
+        }
+    }
+
+    fn frames(&mut self, count: usize) -> Vec<Frame> {
+        (0..count).map(|_| self.frame()).collect()
+    }
+
+    /// How many of so many ways, each after a tare, end in an alarm.
+    fn alarms(&mut self, detection: &Detection, ways: usize) -> usize {
+        let mut detector = Detector::new(detection.clone());
+        let mut alarmed = 0;
+        for _ in 0..ways {
+            let rest = self.frames(TARE.max(detector.wants()));
+            detector.tare(&rest);
+            alarmed += usize::from(self.frames(WAY).iter().any(|frame| detector.update(frame)));
+        }
+        alarmed
+    }
+}
+
+/// Probability that frame after frame in `WAY` frames `n` in a row are beyond `threshold`, where
+/// they share the error of a tare whose variance is `share` of theirs: for each error u, runs of
+/// length n of independent frames (Feller), then the mean over u.
+fn alarm_probability(threshold: f64, n: u32, share: f64) -> f64 {
+    let runs = |p: f64| {
+        // state[k]: k frames in a row so far; the last is the alarm.
+        let n = n as usize;
+        let mut state = vec![0.0; n + 1];
+        state[0] = 1.0;
+        for _ in 0..WAY {
+            let mut next = vec![0.0; n + 1];
+            next[n] = state[n];
+            for k in 0..n {
+                next[0] += state[k] * (1.0 - p);
+                next[k + 1] += state[k] * p;
+            }
+            state = next;
+        }
+        state[n]
+    };
+    let step = 0.05;
+    let at = |i: i32| step * f64::from(i);
+    let beyond = |u: f64| cumulative(-(threshold * (1.0 + share).sqrt() + u * share.sqrt()));
+    (-160..=160).map(|i| step * density(at(i)) * runs(beyond(at(i)))).sum()
+}
+
+/// The law: how often a finger that touches nothing is told that it does follows from the threshold
+/// in standard deviations and the frames that must agree. By the pressure exactly; electrodes share
+/// of a tare's error next to nothing in their sum of squares, so they lie between frames that
+/// share it and frames that do not. Neither drift nor shared noise, neither an open nor a noisy
+/// electrode is in it.
+#[test]
+fn false_alarms_follow_from_threshold_and_frames() {
+    let ways = 1500;
+    for (threshold, n) in [(2.0, 1), (3.0, 1), (2.0, 2), (1.5, 3)] {
+        let [shared, own] =
+            [1.0 / TARE as f64, 0.0].map(|share| alarm_probability(threshold, n, share));
+        let pressure = Untouched::new(1, None).alarms(&sds(Alarm::Pressure, threshold, n), ways);
+        let bad = [None, Some([16, 17])];
+        let electrodes = bad
+            .map(|bad| Untouched::new(2, bad).alarms(&sds(Alarm::Electrodes, threshold, n), ways));
+        let [shared, own] = [shared, own].map(|probability| probability * ways as f64);
+        println!(
+            "{threshold} sd, {n} frames: {pressure} of {shared:.1}, {electrodes:?} of {own:.1}"
+        );
+        // Four standard deviations of what is counted, and a fifth for what Student's and the cube
+        // root's approximations leave.
+        let within = |found: usize, low: f64, high: f64| {
+            let found = found as f64;
+            found > 0.8 * low - 4.0 * low.sqrt() && found < 1.2 * high + 4.0 * high.sqrt()
+        };
+        assert!(within(pressure, shared, shared), "{pressure} {shared}");
+        for electrodes in electrodes {
+            assert!(within(electrodes, shared.min(own), shared.max(own)), "{electrodes} {own}");
+        }
+    }
+}
+
+/// At four standard deviations in two frames, a quarter of an hour of ways is without alarm, by the
+/// law less than one in a hundred hours.
+#[test]
+fn at_four_standard_deviations_nothing_is_told_of_nothing() {
+    let an_hour = 3600.0 / FRAME_S / WAY as f64 * alarm_probability(4.0, 2, 1.0 / TARE as f64);
+    assert!(an_hour < 0.01, "{an_hour}");
+    for bad in [None, Some([3, 8])] {
+        assert_eq!(Untouched::new(5, bad).alarms(&sds(Alarm::Both, 4.0, 2), 450), 0);
+    }
+}
+
+/// While the fluid warms, electrodes go up together, by 0.1 in the logarithm of what it conducts
+/// or 70 to 100 counts each, ten times their noise: that is no contact. One that changes alone by
+/// that is. A threshold on the mean of their changes would take the first for it.
+#[test]
+fn common_drift_is_no_contact_and_a_change_of_its_own_is() {
+    let mut sensor = Untouched::new(3, None);
+    let mut detector = Detector::new(sds(Alarm::Electrodes, 4.0, 2));
+    detector.tare(&sensor.frames(detector.wants()));
+    for i in 0..1000 {
+        sensor.drift = 0.1 * f64::from(i) / 1000.0;
+        assert!(!detector.update(&sensor.frame()), "{i}");
+    }
+    sensor.counts[12] -= 20.0 * NOISE_COUNTS[12];
+    assert!(!detector.update(&sensor.frame()) && detector.update(&sensor.frame()));
+    // It says so until the electrode is back, and for as many frames.
+    assert!(sensor.frames(50).iter().all(|frame| detector.update(frame)));
+    sensor.counts[12] = BASELINES_COUNTS[12];
+    assert!(detector.update(&sensor.frame()) && !detector.update(&sensor.frame()));
+}
+
+/// An electrode that grows noisy alarms at first; after twenty tares it is known to be noisy, and
+/// the others still tell.
+#[test]
+fn a_noisy_electrode_is_learnt() {
+    let mut sensor = Untouched::new(4, None);
+    let mut rest = Rest::default();
+    rest.tare(&sensor.frames(100));
+    sensor.electrodes.worsen(9, 10.0);
+    let above = |rest: &Rest, sensor: &mut Untouched| {
+        let frames = sensor.frames(200);
+        frames.iter().filter(|frame| rest.evidence(frame).electrodes.unwrap() > 4.0).count()
+    };
+    assert!(above(&rest, &mut sensor) > 50);
+    for _ in 0..20 {
+        rest.tare(&sensor.frames(TARE));
+    }
+    assert!(above(&rest, &mut sensor) <= 6, "{}", above(&rest, &mut sensor));
+    sensor.counts[10] -= 10.0 * NOISE_COUNTS[10];
+    assert!(above(&rest, &mut sensor) > 150);
+}
+
+/// A finger whose first touches come from a sensor that says nothing of noise: it wants frames
+/// until it knows.
+#[test]
+fn noise_is_learnt_from_twenty_frames_of_rest() {
+    let mut sensor = Untouched::new(6, None);
+    let mut detector = Detector::new(sds(Alarm::Both, 4.0, 2));
+    assert_eq!(detector.wants(), 20);
+    detector.tare(&sensor.frames(21));
+    assert_eq!(detector.wants(), 0);
+    assert_eq!(Detector::new(Detection::default()).wants(), 0);
+    // Without a tare nothing is heard, nor from a frame without the channels asked for.
+    assert!(!Detector::new(sds(Alarm::Both, 4.0, 2)).hears(&sensor.frame()));
+    let dry = Frame { pdc_counts: None, ..sensor.frame() };
+    assert!(detector.hears(&dry) && !detector.hears(&Frame::default()));
+}
+
+/// Force of a plane on the finger when contact is told, and the same by [`Detection::default`];
+/// infinite if it is not.
+fn told_n(effects: &Effects, sensor: Option<&Sensor>, pitch_deg: f64, speed_m_s: f64) -> [f64; 2] {
+    let finger = Finger::default();
+    let tip = match sensor {
+        Some(sensor) => Fingertip::varied(&finger, effects, sensor),
+        None => Fingertip::new(&finger, effects),
+    };
+    let towards_t = direction_t((90.0 - pitch_deg).to_radians(), 0.0);
+    let bvh = MeshBvh::new(square(0.1, 2));
+    let mut feel = FingertipState::new(&tip, &stream(7, 0, "finger"));
+    let mut detectors = [sds(Alarm::Both, 4.0, 2), Detection::default()].map(Detector::new);
+    let samples = tip.skin().unwrap().samples().iter();
+    let reach_m = samples.map(|s| s.point().coords.dot(&towards_t)).fold(0.0, f64::max);
+    let (mut rest, mut told_n) = (Vec::new(), [f64::INFINITY; 2]);
+    let mut at_m = reach_m + 0.1e-3;
+    while told_n.iter().any(|force_n| force_n.is_infinite()) && at_m > reach_m - 2e-3 {
+        if rest.len() >= 21 {
+            at_m -= speed_m_s * FRAME_S;
+        }
+        let motion = TipMotion::at(pose(&towards_t, at_m));
+        let load = feel.step(&tip, &bvh, &motion, FRAME_S).unwrap();
+        let frame = feel.frame().unwrap();
+        if rest.len() < 21 {
+            rest.push(frame);
+            if rest.len() == 21 {
+                detectors.iter_mut().for_each(|detector| detector.tare(&rest));
+            }
+            continue;
+        }
+        for (detector, told_n) in detectors.iter_mut().zip(&mut told_n) {
+            if detector.update(&frame) && told_n.is_infinite() {
+                *told_n = load.force_n.norm();
+            }
+        }
+    }
+    told_n
+}
+
+/// At any pitch a plane is felt at less than 0.1 N, by a finger so slow that it overruns nothing: by
+/// the nominal sensor and by others, an open and a noisy electrode among them.
+#[test]
+fn contact_is_told_below_a_tenth_of_a_newton_at_any_pitch() {
+    let effects = Effects::biotac();
+    let variation = VariationEffect { dead: 1.0, noisy: 1.0, ..VariationEffect::default() };
+    for pitch_deg in PITCHES_DEG {
+        let sensors = (0..3).map(|seed| Some(variation.sensor(stream(seed, 0, "variation"))));
+        for sensor in std::iter::once(None).chain(sensors) {
+            let [both_n, counts_n] = told_n(&effects, sensor.as_ref(), pitch_deg, 1e-3);
+            println!("{pitch_deg}°: {both_n:.3} N, by counts {counts_n:.3} N");
+            assert!(both_n > 0.0 && both_n < 0.1, "{pitch_deg}: {both_n}");
+            assert!(both_n <= counts_n, "{pitch_deg}: {both_n} {counts_n}");
+        }
+    }
+}
+
+/// What is overrun is speed times the frames that must agree: the force told at twice the speed is
+/// that of up to twice the way, and no slow finger presses harder than a fast one.
+#[test]
+fn the_rest_of_the_force_is_overrun() {
+    for pitch_deg in PITCHES_DEG {
+        let speeds_m_s = [0.5e-3, 5e-3, 20e-3];
+        let [slow, middle, fast] =
+            speeds_m_s.map(|speed| told_n(&Effects::biotac(), None, pitch_deg, speed)[0]);
+        println!("{pitch_deg}°: {slow:.3} {middle:.3} {fast:.3} N");
+        assert!(
+            slow < 0.05 && slow <= 1.5 * middle && middle <= 1.5 * fast,
+            "{slow} {middle} {fast}"
+        );
+    }
+}
+
+/// Files that say nothing of it mean what they did, and say nothing of it when they are written.
+#[test]
+fn detection_by_counts_is_written_as_ever() {
+    let written = toml::to_string(&Detection::default()).unwrap();
+    assert_eq!(written, "threshold_counts = 10.0\nframes = 3\n");
+    let read: Detection = toml::from_str("threshold_counts = 4.0").unwrap();
+    assert_eq!(read, Detection { threshold_counts: 4.0, ..Detection::default() });
+    assert!(Rules::hold(&sds(Alarm::Electrodes, 4.0, 2)));
+    for by in [Alarm::Electrodes, Alarm::Both] {
+        assert!(!Rules::hold(&Detection { by, ..Detection::default() }));
+    }
+}
