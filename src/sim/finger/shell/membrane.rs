@@ -11,9 +11,9 @@
 //! falls with every correction, whatever the press, and the shell cannot diverge.
 
 use super::sheet::{Material, Sheet, Strained};
+use super::softness::Softness;
 use super::springs::Springs;
-use crate::math::banded::{Banded, Factor};
-use crate::math::simd::{dot_single, widest};
+use crate::math::simd::{Quad, dot_quad, dot_single, quad, scaled, sum, widest};
 use crate::sim::finger::lattice::{Lattice, Node};
 use nalgebra::Vector3;
 
@@ -41,6 +41,9 @@ const SHORTENINGS: usize = 30;
 /// bulge in one tick; who comes in from farther away is there in the next correction).
 const NEAR_M: f64 = 5e-5;
 
+/// The shell goes on as it went by no more than so many times its last way (chosen).
+const FARTHEST: f64 = 2.0;
+
 /// An object before a node of the shell: a plane, for all that the node knows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Push {
@@ -60,39 +63,56 @@ pub struct Membrane {
     /// Nodes that can move, and each node's place among them.
     free: Vec<usize>,
     place: Vec<Option<usize>>,
-    factor: Factor,
-    /// Inverse of the sheet's stiffness at rest by rows, in m/N.
-    softness_m_n: Vec<f32>,
+    softness: Softness,
     /// Of each node: the skin's through its thickness and the core's, in N/m.
     skin_n_m: Vec<f64>,
     core_n_m: Vec<f64>,
     cavity_pa_m3: f64,
 }
 
+/// A way to lie.
+#[derive(Clone, Debug, Default)]
+struct Pose {
+    moved_m: Vec<Vector3<f64>>,
+    strained: Strained,
+}
+
 /// Where the shell is; one trial's memory.
 #[derive(Clone, Debug)]
 pub struct Settled {
-    /// How far each node moved, in `T`.
-    pub moved_m: Vec<Vector3<f64>>,
-    /// Energy and volume of it.
-    pub strained: Strained,
+    here: Pose,
+    /// Memory for the next.
+    there: Pose,
     at_rest: bool,
+    course: Course,
     links: Vec<Link>,
     springs: Springs,
-    before_m: Vec<Vector3<f64>>,
     residual_n: Vec<f64>,
     correction_m: Vec<f32>,
+    reaction_m: Vec<f32>,
+    halves: Vec<f32>,
     /// A₀⁻¹ v, K / (1 + K vᵀ A₀⁻¹ v), and how many corrections were made since rest.
     fluid_m_pa: Vec<f32>,
     fluid_pa_m3: f64,
     fluid_age: usize,
 }
 
+/// How shell and object went last.
+#[derive(Clone, Debug, Default)]
+struct Course {
+    went_m: Vec<Vector3<f64>>,
+    /// Of each node: overlap with the object, NaN without one, the one before, and by how much it
+    /// grew.
+    overlap_m: Vec<f64>,
+    before_m: Vec<f64>,
+    grew_m: Vec<f64>,
+}
+
 /// A spring of the contact problem.
 #[derive(Clone, Copy, Debug)]
 struct Link {
     place: usize,
-    normal_t: Vector3<f64>,
+    normal_t: Quad,
     overlap_m: f64,
     force_n: f64,
 }
@@ -108,18 +128,17 @@ impl Membrane {
         let free: Vec<usize> = (0..nodes.len()).filter(|&k| !held[k]).collect();
         let mut place = vec![None; nodes.len()];
         free.iter().enumerate().for_each(|(i, &k)| place[k] = Some(i));
-        let factor = factor(&sheet, &place, free.len());
+        let mirror: Vec<usize> = free.iter().filter_map(|&k| place[nodes[k].mirror]).collect();
         let area_m2 = |node: &Node| node.area_m2.norm();
         let skin_pa_m = material.young_pa / material.thickness_m;
         Self {
-            softness_m_n: inverse(&factor, 3 * free.len()),
+            softness: Softness::new(&sheet, &place, &mirror),
             skin_n_m: nodes.iter().map(|node| skin_pa_m * area_m2(node)).collect(),
             core_n_m: nodes.iter().map(|node| core_pa_m * area_m2(node)).collect(),
             sheet,
             nodes,
             free,
             place,
-            factor,
             cavity_pa_m3,
         }
     }
@@ -133,8 +152,7 @@ impl Membrane {
     pub fn bytes(&self) -> usize {
         let numbers = self.skin_n_m.len() + self.core_n_m.len() + self.free.len();
         self.sheet.bytes()
-            + self.factor.bytes()
-            + size_of_val(self.softness_m_n.as_slice())
+            + self.softness.bytes()
             + size_of_val(self.nodes.as_slice())
             + numbers * size_of::<f64>()
             + size_of_val(self.place.as_slice())
@@ -142,16 +160,27 @@ impl Membrane {
 
     /// Untouched.
     pub fn relaxed(&self) -> Settled {
-        let size = 3 * self.free.len();
-        Settled {
-            moved_m: vec![Vector3::zeros(); self.nodes.len()],
+        let (size, count) = (3 * self.free.len(), self.nodes.len());
+        let pose = || Pose {
+            moved_m: vec![Vector3::zeros(); count],
             strained: self.sheet.relaxed(),
+        };
+        Settled {
+            here: pose(),
+            there: pose(),
             at_rest: true,
+            course: Course {
+                went_m: vec![Vector3::zeros(); count],
+                overlap_m: vec![f64::NAN; count],
+                before_m: vec![f64::NAN; count],
+                grew_m: vec![f64::NAN; count],
+            },
             links: Vec::new(),
             springs: Springs::default(),
-            before_m: Vec::new(),
             residual_n: vec![0.0; size],
             correction_m: vec![0.0; size],
+            reaction_m: vec![0.0; size],
+            halves: vec![0.0; size],
             fluid_m_pa: vec![0.0; size],
             fluid_pa_m3: 0.0,
             fluid_age: 0,
@@ -161,38 +190,52 @@ impl Membrane {
     /// Lets go of everything.
     pub fn rest(&self, state: &mut Settled) {
         if !state.at_rest {
-            state.moved_m.fill(Vector3::zeros());
-            self.sheet.strain(&state.moved_m, &mut state.strained);
+            state.here.moved_m.fill(Vector3::zeros());
+            self.sheet.strain(&state.here.moved_m, &mut state.here.strained);
+            state.course.overlap_m.fill(f64::NAN);
+            state.course.grew_m.fill(f64::NAN);
             (state.at_rest, state.fluid_age) = (true, 0);
         }
     }
 
     /// Force with which the object pushes, along the push's normal.
     pub fn push_n(&self, push: &Push, state: &Settled) -> f64 {
-        let yielded_m = push.normal_t.dot(&state.moved_m[push.node]);
+        self.pushed_n(push, &state.here)
+    }
+
+    fn pushed_n(&self, push: &Push, pose: &Pose) -> f64 {
+        let yielded_m = push.normal_t.dot(&pose.moved_m[push.node]);
         self.skin_n_m[push.node] * (push.overlap_m - yielded_m).max(0.0)
     }
 
     /// How far a node moved towards the core.
     pub fn inward_m(&self, node: usize, state: &Settled) -> f64 {
-        -self.nodes[node].direction.dot(&state.moved_m[node])
+        self.sunk_m(node, &state.here)
+    }
+
+    fn sunk_m(&self, node: usize, pose: &Pose) -> f64 {
+        -self.nodes[node].direction.dot(&pose.moved_m[node])
     }
 
     /// Pressure of the fluid above rest.
     pub fn pressure_pa(&self, state: &Settled) -> f64 {
-        self.cavity_pa_m3 * state.strained.displaced_m3
+        self.cavity_pa_m3 * state.displaced_m3()
     }
 
     /// Energy of sheet, fluid, core, and skin under the pushes.
     pub fn energy_j(&self, pushes: &[Push], state: &Settled) -> f64 {
-        let smooth_j =
-            state.strained.energy_j + 0.5 * self.pressure_pa(state) * state.strained.displaced_m3;
+        self.held_j(pushes, &state.here)
+    }
+
+    fn held_j(&self, pushes: &[Push], pose: &Pose) -> f64 {
+        let Strained { energy_j, displaced_m3, .. } = pose.strained;
+        let smooth_j = energy_j + 0.5 * self.cavity_pa_m3 * displaced_m3 * displaced_m3;
         let pushed = pushes.iter().map(|push| {
-            let force_n = self.push_n(push, state);
+            let force_n = self.pushed_n(push, pose);
             0.5 * force_n * force_n / self.skin_n_m[push.node]
         });
         let on_core = self.free.iter().map(|&k| {
-            let beyond_m = (self.inward_m(k, state) - self.nodes[k].gap_m).max(0.0);
+            let beyond_m = (self.sunk_m(k, pose) - self.nodes[k].gap_m).max(0.0);
             0.5 * self.core_n_m[k] * beyond_m * beyond_m
         });
         smooth_j + pushed.sum::<f64>() + on_core.sum::<f64>()
@@ -200,7 +243,7 @@ impl Membrane {
 
     /// Brings the shell into balance with `pushes`, from where it was.
     pub fn settle(&self, pushes: &[Push], state: &mut Settled) {
-        state.at_rest = false;
+        let mut energy_j = self.go_on(pushes, state);
         for _ in 0..CORRECTIONS {
             if state.fluid_age.is_multiple_of(FLUID_AGES) {
                 self.feel_fluid(state);
@@ -208,11 +251,41 @@ impl Membrane {
             state.fluid_age += 1;
             self.link(pushes, state);
             let promised_j = self.correct(state);
-            let energy_j = self.energy_j(pushes, state);
-            if !self.go(pushes, energy_j, promised_j, state) || promised_j <= SETTLED * energy_j {
+            let Some(left_j) = self.go(pushes, energy_j, promised_j, state) else { break };
+            if promised_j <= SETTLED * energy_j {
                 break;
             }
+            energy_j = left_j;
         }
+        let Course { went_m, .. } = &mut state.course;
+        for (went_m, moved_m) in went_m.iter_mut().zip(&state.here.moved_m) {
+            *went_m += moved_m;
+        }
+    }
+
+    /// Goes on as shell and object went last, if that lowers the energy; the energy.
+    fn go_on(&self, pushes: &[Push], state: &mut Settled) -> f64 {
+        state.at_rest = false;
+        let times = state.course.times(pushes);
+        let Settled { here, there, course, .. } = state;
+        let mut energy_j = self.held_j(pushes, here);
+        for ((there_m, here_m), went_m) in
+            there.moved_m.iter_mut().zip(&here.moved_m).zip(&course.went_m)
+        {
+            *there_m = here_m + went_m * times;
+        }
+        for (went_m, here_m) in course.went_m.iter_mut().zip(&here.moved_m) {
+            *went_m = -here_m;
+        }
+        if times != 0.0 {
+            self.sheet.strain(&there.moved_m, &mut there.strained);
+            let there_j = self.held_j(pushes, there);
+            if there_j < energy_j {
+                std::mem::swap(here, there);
+                energy_j = there_j;
+            }
+        }
+        energy_j
     }
 
     /// A₀⁻¹ v for the volume's gradient as it is.
@@ -220,173 +293,186 @@ impl Membrane {
         if self.cavity_pa_m3 <= 0.0 {
             return;
         }
+        let volume_m2 = &state.here.strained.volume_m2;
         for (own, &k) in state.fluid_m_pa.chunks_exact_mut(3).zip(&self.free) {
-            (0..3).for_each(|a| own[a] = state.strained.volume_m2[k][a] as f32);
+            (0..3).for_each(|a| own[a] = volume_m2[k][a] as f32);
         }
-        self.factor.solve(&mut state.fluid_m_pa);
+        self.softness.solve(&mut state.fluid_m_pa, &mut state.halves);
         let own = state.fluid_m_pa.chunks_exact(3).zip(&self.free);
-        let softness_m3_pa: f64 =
-            own.map(|(s, &k)| state.strained.volume_m2[k].dot(&vector(s))).sum();
+        let softness_m3_pa: f64 = own.map(|(s, &k)| dot_quad(&volume_m2[k], &widened(s))).sum();
         state.fluid_pa_m3 = self.cavity_pa_m3 / (1.0 + self.cavity_pa_m3 * softness_m3_pa);
     }
 
     /// The springs that may push, and the forces that are not in balance.
     fn link(&self, pushes: &[Push], state: &mut Settled) {
-        state.links.clear();
-        state.springs.clear();
+        let Settled { here, links, springs, residual_n, .. } = state;
+        links.clear();
+        springs.clear();
+        let mut link = |place, normal_t: &Vector3<f64>, overlap_m: f64, stiffness_n_m: f64| {
+            if overlap_m > -NEAR_M {
+                let (normal_t, force_n) = (quad(normal_t), stiffness_n_m * overlap_m.max(0.0));
+                links.push(Link { place, normal_t, overlap_m, force_n });
+                springs.stiffness_n_m.push(stiffness_n_m);
+            }
+        };
         for push in pushes {
-            let overlap_m = push.overlap_m - push.normal_t.dot(&state.moved_m[push.node]);
-            if let (Some(place), true) = (self.place[push.node], overlap_m > -NEAR_M) {
-                let stiffness_n_m = self.skin_n_m[push.node];
-                state.links.push(Link::new(place, push.normal_t, overlap_m, stiffness_n_m));
-                state.springs.stiffness_n_m.push(stiffness_n_m);
+            if let Some(place) = self.place[push.node] {
+                let overlap_m = push.overlap_m - push.normal_t.dot(&here.moved_m[push.node]);
+                link(place, &push.normal_t, overlap_m, self.skin_n_m[push.node]);
             }
         }
-        let pressure_pa = self.pressure_pa(state);
+        let pressure_pa = self.cavity_pa_m3 * here.strained.displaced_m3;
         for (place, &k) in self.free.iter().enumerate() {
             let node = &self.nodes[k];
-            let overlap_m = self.inward_m(k, state) - node.gap_m;
-            if overlap_m > -NEAR_M {
-                let normal_t = node.direction.into_inner();
-                state.links.push(Link::new(place, normal_t, overlap_m, self.core_n_m[k]));
-                state.springs.stiffness_n_m.push(self.core_n_m[k]);
-            }
+            link(place, &node.direction, self.sunk_m(k, here) - node.gap_m, self.core_n_m[k]);
             let (gradient_n, volume_m2) =
-                (&state.strained.gradient_n[k], &state.strained.volume_m2[k]);
-            let smooth_n = gradient_n + volume_m2 * pressure_pa;
-            state.residual_n[3 * place..3 * place + 3].copy_from_slice(smooth_n.as_slice());
+                (&here.strained.gradient_n[k], &here.strained.volume_m2[k]);
+            let smooth_n = sum(gradient_n, &scaled(volume_m2, pressure_pa));
+            residual_n[3 * place..3 * place + 3].copy_from_slice(&smooth_n[..3]);
         }
-        for link in &state.links {
-            let own = &mut state.residual_n[3 * link.place..3 * link.place + 3];
+        for link in links {
+            let own = &mut residual_n[3 * link.place..3 * link.place + 3];
             (0..3).for_each(|a| own[a] -= link.normal_t[a] * link.force_n);
         }
     }
 
     /// Finds the correction; how much energy it promises to free.
     fn correct(&self, state: &mut Settled) -> f64 {
-        let Settled { links, springs, fluid_m_pa, correction_m, .. } = state;
+        let Settled { links, springs, fluid_m_pa, correction_m, reaction_m, residual_n, halves, .. } = state;
         let fluid_pa_m3 = state.fluid_pa_m3;
-        let unbalanced = correction_m.iter_mut().zip(&state.residual_n);
+        let mut yields = |forces_n: &mut [f32]| {
+            let share = (fluid_pa_m3 * f64::from(widest(|| dot_single(fluid_m_pa, forces_n)))) as f32;
+            self.softness.solve(forces_n, halves);
+            forces_n.iter_mut().zip(&*fluid_m_pa).for_each(|(moved_m, s)| *moved_m -= share * s);
+        };
+        let unbalanced = correction_m.iter_mut().zip(&*residual_n);
         unbalanced.for_each(|(force_n, residual_n)| *force_n = -residual_n as f32);
+        yields(correction_m);
         springs.force_n.extend(links.iter().map(|link| link.force_n));
-        let pressed = fluid_pa_m3 * f64::from(dot_single(fluid_m_pa, correction_m));
-        let swells = |link: &Link| link.normal_t.dot(&vector(&fluid_m_pa[3 * link.place..]));
-        for own in links.iter() {
-            let mut free_m = own.overlap_m - self.yields_m(own, correction_m);
-            free_m += pressed * swells(own);
+        springs.free_m.resize(links.len(), 0.0);
+        springs.softness_m_n.resize(links.len() * links.len(), 0.0);
+        let swells = |link: &Link| dot_quad(&link.normal_t, &widened(&fluid_m_pa[3 * link.place..]));
+        for (i, own) in links.iter().enumerate() {
+            let moved_m = widened(&correction_m[3 * own.place..]);
+            springs.free_m[i] += own.overlap_m - dot_quad(&own.normal_t, &moved_m);
             let swelling = fluid_pa_m3 * swells(own);
-            for other in links.iter() {
-                let softness_m_n = self.softness_m_n(own, other) - swelling * swells(other);
-                free_m += softness_m_n * other.force_n;
-                springs.softness_m_n.push(softness_m_n);
+            for (j, other) in links[..=i].iter().enumerate() {
+                let sheet_m_n = self.softness.between(
+                    (own.place, &own.normal_t),
+                    (other.place, &other.normal_t),
+                );
+                let softness_m_n = sheet_m_n - swelling * swells(other);
+                springs.softness_m_n[i * links.len() + j] = softness_m_n;
+                springs.softness_m_n[j * links.len() + i] = softness_m_n;
+                springs.free_m[i] += softness_m_n * other.force_n;
+                if j < i {
+                    springs.free_m[j] += softness_m_n * own.force_n;
+                }
             }
-            springs.free_m.push(free_m);
         }
         springs.solve();
+        reaction_m.fill(0.0);
         for (link, force_n) in links.iter().zip(&springs.force_n) {
-            let own = &mut correction_m[3 * link.place..3 * link.place + 3];
+            let own = &mut reaction_m[3 * link.place..3 * link.place + 3];
             let more_n = force_n - link.force_n;
             (0..3).for_each(|a| own[a] += (link.normal_t[a] * more_n) as f32);
         }
-        let share = (fluid_pa_m3 * f64::from(dot_single(fluid_m_pa, correction_m))) as f32;
-        self.factor.solve(correction_m);
-        correction_m.iter_mut().zip(&*fluid_m_pa).for_each(|(moved_m, s)| *moved_m -= share * s);
-        let corrected = correction_m.iter().zip(&state.residual_n);
-        -corrected.map(|(&moved_m, residual_n)| f64::from(moved_m) * residual_n).sum::<f64>()
+        yields(reaction_m);
+        let mut promised_j = 0.0;
+        for ((moved_m, more_m), residual_n) in
+            correction_m.iter_mut().zip(&*reaction_m).zip(&*residual_n)
+        {
+            *moved_m += more_m;
+            promised_j -= f64::from(*moved_m) * residual_n;
+        }
+        promised_j
     }
 
-    /// How far `link` moves along its normal under forces on the sheet alone.
-    fn yields_m(&self, link: &Link, forces_n: &[f32]) -> f64 {
-        let size = forces_n.len();
-        let rows = &self.softness_m_n[3 * link.place * size..];
-        let moved_m: [f32; 3] = widest(
-            #[inline(always)]
-            || std::array::from_fn(|a| dot_single(&rows[a * size..(a + 1) * size], forces_n)),
-        );
-        (0..3).map(|a| link.normal_t[a] * f64::from(moved_m[a])).sum()
-    }
-
-    /// How far `own` moves along its normal under a newton along that of `other`.
-    fn softness_m_n(&self, own: &Link, other: &Link) -> f64 {
-        let size = 3 * self.free.len();
-        let row =
-            |a: usize| vector(&self.softness_m_n[(3 * own.place + a) * size + 3 * other.place..]);
-        (0..3).map(|a| own.normal_t[a] * row(a).dot(&other.normal_t)).sum()
-    }
-
-    /// Moves along the correction as far as the energy falls; false if it does not.
-    fn go(&self, pushes: &[Push], energy_j: f64, promised_j: f64, state: &mut Settled) -> bool {
-        state.before_m.clone_from(&state.moved_m);
+    /// Moves along the correction as far as the energy falls, to what it then is; none if it does
+    /// not.
+    fn go(
+        &self,
+        pushes: &[Push],
+        energy_j: f64,
+        promised_j: f64,
+        state: &mut Settled,
+    ) -> Option<f64> {
+        let Settled { here, there, correction_m, .. } = state;
+        there.moved_m.clone_from(&here.moved_m);
         let mut part = 1.0;
         for _ in 0..SHORTENINGS {
-            for (correction_m, &k) in state.correction_m.chunks_exact(3).zip(&self.free) {
-                state.moved_m[k] = state.before_m[k] + vector(correction_m) * part;
+            for (correction_m, &k) in correction_m.chunks_exact(3).zip(&self.free) {
+                let [x, y, z, _] = widened(correction_m);
+                there.moved_m[k] = here.moved_m[k] + Vector3::new(x, y, z) * part;
             }
-            self.sheet.strain(&state.moved_m, &mut state.strained);
-            let freed_j = energy_j - self.energy_j(pushes, state);
+            self.sheet.strain(&there.moved_m, &mut there.strained);
+            let there_j = self.held_j(pushes, there);
+            let freed_j = energy_j - there_j;
             if freed_j >= BROUGHT * part * promised_j {
-                return true;
+                std::mem::swap(here, there);
+                return Some(there_j);
             }
             // Least of the parabola through what is known; not a number is none of it.
             let least = promised_j * part / (2.0 * (promised_j * part - freed_j));
             let [shortest, longest] = SHORTER;
             part *= if least.is_nan() { shortest } else { least.clamp(shortest, longest) };
         }
-        std::mem::swap(&mut state.moved_m, &mut state.before_m);
-        self.sheet.strain(&state.moved_m, &mut state.strained);
-        false
+        None
     }
 }
 
-impl Link {
-    fn new(place: usize, normal_t: Vector3<f64>, overlap_m: f64, stiffness_n_m: f64) -> Self {
-        Self { place, normal_t, overlap_m, force_n: stiffness_n_m * overlap_m.max(0.0) }
+impl Course {
+    /// How many times its last way the object went now; takes note of it.
+    fn times(&mut self, pushes: &[Push]) -> f64 {
+        let (mut along_m2, mut last_m2) = (0.0, 0.0);
+        std::mem::swap(&mut self.overlap_m, &mut self.before_m);
+        self.overlap_m.fill(f64::NAN);
+        for push in pushes {
+            let grew_m = &mut self.grew_m[push.node];
+            let grows_m = push.overlap_m - self.before_m[push.node];
+            if (grows_m * *grew_m).is_finite() {
+                along_m2 += grows_m * *grew_m;
+                last_m2 += *grew_m * *grew_m;
+            }
+            (*grew_m, self.overlap_m[push.node]) = (grows_m, push.overlap_m);
+        }
+        let times = along_m2 / last_m2;
+        if times.is_finite() { times.clamp(-FARTHEST, FARTHEST) } else { 0.0 }
     }
 }
 
 impl Settled {
+    /// How far each node moved, in `T`.
+    pub fn moved_m(&self) -> &[Vector3<f64>] {
+        &self.here.moved_m
+    }
+
+    /// Volume by which the cavity is smaller than at rest.
+    pub fn displaced_m3(&self) -> f64 {
+        self.here.strained.displaced_m3
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        let vectors = self.moved_m.capacity() + self.before_m.capacity();
-        let singles = [&self.correction_m, &self.fluid_m_pa];
+        let vectors =
+            self.here.moved_m.capacity() + self.there.moved_m.capacity() + self.course.went_m.capacity();
+        let numbers = self.residual_n.capacity()
+            + self.course.overlap_m.capacity()
+            + self.course.before_m.capacity()
+            + self.course.grew_m.capacity();
+        let singles = [&self.correction_m, &self.reaction_m, &self.halves, &self.fluid_m_pa];
         vectors * size_of::<Vector3<f64>>()
-            + self.strained.bytes()
+            + self.here.strained.bytes()
+            + self.there.strained.bytes()
             + self.links.capacity() * size_of::<Link>()
             + self.springs.bytes()
-            + self.residual_n.capacity() * size_of::<f64>()
+            + numbers * size_of::<f64>()
             + singles.map(|values| values.capacity() * size_of::<f32>()).iter().sum::<usize>()
     }
 }
 
-fn vector(values: &[f32]) -> Vector3<f64> {
-    Vector3::new(f64::from(values[0]), f64::from(values[1]), f64::from(values[2]))
-}
-
-/// The sheet's stiffness at rest, for the nodes that can move.
-fn factor(sheet: &Sheet, place: &[Option<usize>], count: usize) -> Factor {
-    let mut width = 0;
-    sheet.stiffness(|[p, q], _| {
-        if let (Some(i), Some(j)) = (place[p], place[q]) {
-            width = width.max(3 * i.abs_diff(j) + 2);
-        }
-    });
-    let mut banded = Banded::zeros(3 * count, width);
-    sheet.stiffness(|[p, q], block| {
-        if let (Some(i), Some(j)) = (place[p], place[q]) {
-            for (a, b) in (0..9).map(|k| (k / 3, k % 3)) {
-                banded.add(3 * i + a, 3 * j + b, block[(a, b)]);
-            }
-        }
-    });
-    banded.factor()
-}
-
-/// The inverse by rows.
-fn inverse(factor: &Factor, size: usize) -> Vec<f32> {
-    let mut rows = vec![0.0; size * size];
-    for (i, row) in rows.chunks_exact_mut(size.max(1)).enumerate() {
-        row[i] = 1.0;
-        factor.solve(row);
-    }
-    rows
+/// A vector in single precision, in double.
+#[inline(always)]
+fn widened(values: &[f32]) -> Quad {
+    [f64::from(values[0]), f64::from(values[1]), f64::from(values[2]), 0.0]
 }

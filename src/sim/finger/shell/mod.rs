@@ -6,6 +6,7 @@
 
 pub mod membrane;
 pub mod sheet;
+mod softness;
 pub mod springs;
 mod touching;
 
