@@ -90,6 +90,7 @@ pub struct Settled {
     residual_n: Vec<f64>,
     correction_m: Vec<f32>,
     reaction_m: Vec<f32>,
+    last_m: Vec<f32>,
     halves: Vec<f32>,
     /// A₀⁻¹ v, K / (1 + K vᵀ A₀⁻¹ v), and how many corrections were made since rest.
     fluid_m_pa: Vec<f32>,
@@ -180,6 +181,7 @@ impl Membrane {
             residual_n: vec![0.0; size],
             correction_m: vec![0.0; size],
             reaction_m: vec![0.0; size],
+            last_m: vec![0.0; size],
             halves: vec![0.0; size],
             fluid_m_pa: vec![0.0; size],
             fluid_pa_m3: 0.0,
@@ -244,15 +246,21 @@ impl Membrane {
     /// Brings the shell into balance with `pushes`, from where it was.
     pub fn settle(&self, pushes: &[Push], state: &mut Settled) {
         let mut energy_j = self.go_on(pushes, state);
-        for _ in 0..CORRECTIONS {
+        for correction in 0..CORRECTIONS {
             if state.fluid_age.is_multiple_of(FLUID_AGES) {
                 self.feel_fluid(state);
             }
             state.fluid_age += 1;
             self.link(pushes, state);
-            let promised_j = self.correct(state);
+            let mut promised_j = self.correct(state);
+            let settled = promised_j <= SETTLED * energy_j;
+            if correction > 0 {
+                promised_j = self.hurry(promised_j, state);
+            } else {
+                state.last_m.clone_from(&state.correction_m);
+            }
             let Some(left_j) = self.go(pushes, energy_j, promised_j, state) else { break };
-            if promised_j <= SETTLED * energy_j {
+            if settled {
                 break;
             }
             energy_j = left_j;
@@ -385,6 +393,36 @@ impl Membrane {
             *moved_m += more_m;
             promised_j -= f64::from(*moved_m) * residual_n;
         }
+        promised_j
+    }
+
+    /// Corrections that creep on the same way are taken together: the least of their combination
+    /// (Anderson 1965, with one correction before the last), if it leads downhill. `there` is where
+    /// the last one started. How much energy it promises to free.
+    fn hurry(&self, promised_j: f64, state: &mut Settled) -> f64 {
+        let Settled { here, there, correction_m, last_m, residual_n, .. } = state;
+        let (mut along, mut apart) = (0.0, 0.0);
+        for (now, last) in correction_m.iter().zip(&*last_m) {
+            let less = f64::from(now - last);
+            along += f64::from(*now) * less;
+            apart += less * less;
+        }
+        let back = along / apart;
+        let mut hurried_j = 0.0;
+        let ways = correction_m.chunks_exact(3).zip(last_m.chunks_exact_mut(3));
+        for ((now, last), (&k, residual_n)) in ways.zip(self.free.iter().zip(residual_n.chunks_exact(3))) {
+            let went_m = here.moved_m[k] - there.moved_m[k];
+            for a in 0..3 {
+                let (now, before) = (f64::from(now[a]), f64::from(last[a]) - went_m[a]);
+                last[a] = (now + back * (before - now)) as f32;
+                hurried_j -= f64::from(last[a]) * residual_n[a];
+            }
+        }
+        std::mem::swap(correction_m, last_m);
+        if hurried_j > 0.0 && back.abs() < 50.0 {
+            return hurried_j;
+        }
+        correction_m.clone_from(last_m);
         promised_j
     }
 
