@@ -7,6 +7,7 @@ use crate::sim::finger::calibration::fit::{Fit, Free, fit};
 use crate::sim::finger::calibration::score::{HeldOut, Score, between, leave_one_out};
 use crate::sim::finger::calibration::session::Session;
 use crate::sim::finger::effects::Effects;
+use crate::sim::finger::effects::skin::SkinModel;
 use crate::sim::finger::recording::{Recording, Recordings};
 use crate::{files, words};
 use anyhow::{Context, anyhow};
@@ -18,7 +19,8 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   palpate calibrate tests/data/biotac_flat_plate.json
-  palpate calibrate tests/data/biotac_flat_plate.json --attitude-only")]
+  palpate calibrate tests/data/biotac_flat_plate.json --attitude-only
+  palpate calibrate tests/data/biotac_flat_plate.json --model shell")]
 pub struct Args {
     /// The recordings, as in tests/data/biotac_flat_plate.json.
     recordings: PathBuf,
@@ -26,6 +28,18 @@ pub struct Args {
     /// test of the constants.
     #[arg(long)]
     attitude_only: bool,
+    /// How the skin passes load on.
+    #[arg(long, value_enum, default_value_t)]
+    model: Skin,
+}
+
+#[derive(Clone, Copy, Default, clap::ValueEnum)]
+enum Skin {
+    /// Each point is a column of its own.
+    #[default]
+    Columns,
+    /// A thin shell carries load to its neighbours; takes minutes.
+    Shell,
 }
 
 pub fn run(args: &Args) -> anyhow::Result<Ending> {
@@ -37,7 +51,11 @@ pub fn run(args: &Args) -> anyhow::Result<Ending> {
         anyhow!("{name}:{line}: not a recording: {what}")
     })?;
     recordings.check().with_context(|| format!("{name}: not a recording"))?;
-    let (start, sensors) = (Model::default(), &recordings.sensors);
+    let model = match args.model {
+        Skin::Columns => SkinModel::Columns,
+        Skin::Shell => SkinModel::Shell,
+    };
+    let (start, sensors) = (Model::of(model), &recordings.sensors);
     let free = if args.attitude_only { Free::Sessions } else { Free::Constants };
     let refused = || format!("{name}: cannot be fitted");
     let held_out = leave_one_out(&start, sensors, free).with_context(refused)?;

@@ -101,7 +101,11 @@ impl Triangle {
             let rows = first..(first + LANES).min(size);
             for column in 0..width {
                 // Places before the first column or after the last hold nothing.
-                let j = if upper { first + LANES + column } else { first + column - width.min(first + column) };
+                let j = if upper {
+                    first + LANES + column
+                } else {
+                    first + column - width.min(first + column)
+                };
                 let is_there = if upper { j < size } else { first + column >= width };
                 let of = |lane: usize| {
                     let i = first + lane;

@@ -91,6 +91,7 @@ mod servo;
 #[cfg(feature = "nlopt")]
 mod shards;
 mod shell;
+mod shell_accuracy;
 mod shell_elements;
 mod slopes;
 mod stress;

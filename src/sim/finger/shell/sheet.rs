@@ -168,8 +168,7 @@ impl Sheet {
         for (id, e) in self.edges.iter().enumerate() {
             for (&near, law) in [id].iter().chain(&e.near).zip(&e.laws) {
                 let f = &self.edges[near];
-                let [along_e, along_f] =
-                    [e, f].map(|edge| vector(&edge.axis(&self.rest)));
+                let [along_e, along_f] = [e, f].map(|edge| vector(&edge.axis(&self.rest)));
                 let stretch = along_e * along_f.transpose() * (4.0 * law[0]);
                 let bend = vector(&e.normal) * vector(&f.normal).transpose() * law[1];
                 for (p, q) in (0..16).map(|k| (k / 4, k % 4)) {

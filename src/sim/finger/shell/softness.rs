@@ -56,9 +56,8 @@ impl Softness {
                 own.solve(&mut column, &mut halves);
                 columns.iter_mut().zip(&column).for_each(|(row, entry)| row[a] = *entry);
             }
-            let block = |q: usize| {
-                std::array::from_fn(|a| std::array::from_fn(|b| columns[3 * q + b][a]))
-            };
+            let block =
+                |q: usize| std::array::from_fn(|a| std::array::from_fn(|b| columns[3 * q + b][a]));
             own.blocks.extend((0..=p).map(block));
         }
         own
@@ -141,7 +140,10 @@ fn each(
         let (Some(p), Some(q)) = (place[p], place[q]) else { return };
         for (a, b) in (0..9).map(|k| (k / 3, k % 3)) {
             let own = |parts: &[Part; 2]| {
-                parts.iter().find(|part| part.share != 0.0 && unknowns.contains(&part.unknown)).copied()
+                parts
+                    .iter()
+                    .find(|part| part.share != 0.0 && unknowns.contains(&part.unknown))
+                    .copied()
             };
             if let (Some(i), Some(j)) = (own(&parts[3 * p + a]), own(&parts[3 * q + b])) {
                 let share = f64::from(i.share) * f64::from(j.share);

@@ -92,7 +92,8 @@ impl Shell {
             };
             // Where the ball is nearest to the plane.
             let centre_t = self.membrane.nodes()[node].point + settled.moved_m()[node];
-            let above_m = self.half_m - push.overlap_m + push.normal_t.dot(&settled.moved_m()[node]);
+            let above_m =
+                self.half_m - push.overlap_m + push.normal_t.dot(&settled.moved_m()[node]);
             touch.point_t = centre_t - push.normal_t * above_m;
         }
         Balance {
