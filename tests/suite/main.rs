@@ -93,6 +93,7 @@ mod shards;
 mod shell;
 mod shell_accuracy;
 mod shell_elements;
+mod shell_reference;
 mod slopes;
 mod stress;
 #[cfg(feature = "nlopt")]

@@ -46,7 +46,7 @@ fn apart(found: &Load, right: &Load) -> [f64; 2] {
 fn ends(skin: &Skin, object: &Object, pitch_deg: f64, depth_m: f64) -> Load {
     let mut pressed = skin.relaxed();
     let x_wt = at(pitch_deg, depth_m);
-    (0..100).map(|_| press(skin, object, &x_wt, &mut pressed)).last().unwrap()
+    (0..40).map(|_| press(skin, object, &x_wt, &mut pressed)).last().unwrap()
 }
 
 /// The bars: 2 % of force and pressure up to 1 mm, 5 % up to 1.5 mm, ticks of 10 µm.
@@ -61,7 +61,7 @@ fn ticks_stay_near_where_the_shell_ends() {
         for tick in 1..=150 {
             let depth_m = 1e-5 * f64::from(tick);
             let load = press(&skin, object, &at(pitch_deg, depth_m), &mut pressed);
-            if tick % 25 != 0 {
+            if tick % 50 != 0 {
                 continue;
             }
             let off = apart(&load, &ends(&skin, object, pitch_deg, depth_m));

@@ -3,7 +3,8 @@
 //! `case` says what a case is and how its outcome is judged. The cases, one function for each law:
 //! `force_law` drives a finger pose by pose, `shapes`, `wall`, `arm` and `sensor` touch as a scene
 //! does, `belief` fits; with masses, `dynamic` touches and `stiff_press` presses along a given
-//! path. `shell` and `shell_touch` do the same with a skin that is a shell. `finger_on_wall`, `checked_touch` and `solids` are what they share.
+//! path; `shell` and `shell_touch` do the same with a skin that is a shell. `finger_on_wall`,
+//! `checked_touch` and `solids` are what they share.
 
 mod arm;
 mod belief;

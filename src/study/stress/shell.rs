@@ -4,7 +4,7 @@
 use super::case::{Case, Outcome, all, case, require};
 use super::finger_on_wall::{FingerOnWall, is_finite, with_finger};
 use super::force_law::{effects, laws_of, poses};
-use super::solids::{both, mesh, needle, wall};
+use super::solids::{both, mesh, needle};
 use crate::geometry::solids::block;
 use crate::sim::finger::effects::skin::SkinModel;
 use crate::sim::finger::{Effects, FingertipError};
@@ -201,7 +201,7 @@ fn pushed_into(solid: crate::geometry::solids::Triangles) -> Outcome {
         }
         let deepest = setup.at(2e-3, 0.0);
         let mut quick = setup.untouched();
-        let mut settled =
+        let settled =
             |state: &mut _| setup.press(state, &deepest, 0.01).map(|load| load.force_n.norm());
         let (mut slow_n, mut quick_n) = (0.0, 0.0);
         for _ in 0..SETTLING {

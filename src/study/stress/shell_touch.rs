@@ -1,6 +1,6 @@
 //! Whole touches by a body with masses whose skin is a shell.
 
-use super::case::{Case, Outcome, case};
+use super::case::{Case, case};
 use super::dynamic::{on_arm, with_masses};
 use super::shapes::{graze, slot, twins};
 use super::wall::on_wall;
