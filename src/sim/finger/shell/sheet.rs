@@ -99,6 +99,8 @@ impl Sheet {
             }
             edge.rest_slope = edge.slope(&sheet.rest);
         }
+        // By the same sums as later, so that it displaces nothing at rest.
+        sheet.volume_m3 = -sheet.relaxed().displaced_m3;
         sheet
     }
 
@@ -146,7 +148,6 @@ impl Sheet {
                 edge.laws[2 * side + turn] = law(b);
             }
         }
-        self.volume_m3 += p[0].dot(&p[1].cross(&p[2])) / 6.0;
     }
 
     /// Memory for [`strain`](Self::strain), at rest.
