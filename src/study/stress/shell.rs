@@ -79,7 +79,7 @@ pub(super) const CASES: &[Case] = &[
         "shell, any pose",
         "poses no touch would have",
         "poses",
-        (&[100.0, 1000.0, 10000.0], 2),
+        (&[100.0, 1000.0], 1),
         |count, _| poses(count, &shell()),
     ),
     case(
