@@ -13,6 +13,7 @@ use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::contact_point::locate;
 use palpate::robot::finger::plane_fit::PlaneFit;
 use palpate::robot::finger::{Detection, Detector, Finger, Frame, Tare};
+use palpate::sim::finger::effects::skin::{SkinEffect, SkinModel};
 use palpate::sim::finger::plate::direction_t;
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 use palpate::sim::{Environment, Scene};
@@ -125,8 +126,15 @@ fn report_one(
 }
 
 fn main() {
+    for model in [SkinModel::Columns, SkinModel::Shell] {
+        println!("\n{model:?}\n");
+        tables(model);
+    }
+}
+
+fn tables(model: SkinModel) {
     let effects = Effects {
-        skin: Some(Default::default()),
+        skin: Some(SkinEffect { model, ..SkinEffect::default() }),
         fluid: Some(Default::default()),
         electrodes: Some(Default::default()),
         ..Effects::default()

@@ -2,6 +2,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Point3, Translation3, UnitVector3, Vector3};
+use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::sweep::Capsule;
 use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
@@ -11,6 +12,7 @@ use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 use palpate::sim::{Environment, Scene};
 use std::hint::black_box;
 use std::path::Path;
+use std::time::Instant;
 
 fn finger(c: &mut Criterion) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
@@ -65,6 +67,46 @@ fn finger(c: &mut Criterion) {
         group.finish();
     }
     println!("the object is {:.0} mm high", 1e3 * (high - low).z);
+    beside(&environment, bvh, |depth_m| at(touching_m - depth_m));
+}
+
+/// What a tick of 10 µm down to 1.5 mm costs with a shell, and beside it with columns, both with
+/// fluid: turn by turn so that the machine is the same for both, of each tick the quickest.
+fn beside(environment: &Environment, bvh: &MeshBvh, at: impl Fn(f64) -> TipMotion) {
+    const TICKS: usize = 150;
+    let pressed = |model| {
+        let skin = SkinEffect { model, ..SkinEffect::default() };
+        let effects =
+            Effects { skin: Some(skin), fluid: Some(Default::default()), ..Effects::default() };
+        Fingertip::new(&environment.scene().finger, &effects)
+    };
+    let tips = [SkinModel::Columns, SkinModel::Shell].map(pressed);
+    let mut quickest_s = [[f64::INFINITY; TICKS]; 2];
+    for _ in 0..40 {
+        for (tip, quickest_s) in tips.iter().zip(&mut quickest_s) {
+            let mut feel = FingertipState::new(tip, &stream(1, 0, "finger"));
+            for (tick, quickest_s) in quickest_s.iter_mut().enumerate() {
+                let motion = at(1e-5 * (tick + 1) as f64);
+                let start = Instant::now();
+                let _ = black_box(feel.step(tip, bvh, &motion, 1e-3));
+                *quickest_s = quickest_s.min(start.elapsed().as_secs_f64());
+            }
+        }
+    }
+    for part in 0..3 {
+        let [columns_s, shell_s] = quickest_s.map(|quickest_s| {
+            let ticks = &quickest_s[part * TICKS / 3..(part + 1) * TICKS / 3];
+            ticks.iter().sum::<f64>() / ticks.len() as f64
+        });
+        println!(
+            "a tick at {:.1} to {:.1} mm: columns {:.0} µs, shell {:.0} µs, {:.2} times",
+            0.5 * part as f64,
+            0.5 * (part + 1) as f64,
+            1e6 * columns_s,
+            1e6 * shell_s,
+            shell_s / columns_s,
+        );
+    }
 }
 
 criterion_group!(benches, finger);

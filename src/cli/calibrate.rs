@@ -9,6 +9,7 @@ use crate::sim::finger::calibration::session::Session;
 use crate::sim::finger::calibration::shear::{ShearRecordings, Sheared, compare};
 use crate::sim::finger::effects::Effects;
 use crate::sim::finger::effects::friction::FrictionEffect;
+use crate::sim::finger::effects::skin::SkinModel;
 use crate::sim::finger::recording::{Recording, Recordings};
 use crate::{files, words};
 use anyhow::{Context, anyhow};
@@ -22,7 +23,8 @@ use std::path::{Path, PathBuf};
 Examples:
   palpate calibrate tests/data/biotac_flat_plate.json
   palpate calibrate tests/data/biotac_flat_plate.json --attitude-only
-  palpate calibrate tests/data/biotac_flat_plate.json --shear tests/data/biotac_shear.json")]
+  palpate calibrate tests/data/biotac_flat_plate.json --shear tests/data/biotac_shear.json
+  palpate calibrate tests/data/biotac_flat_plate.json --model shell")]
 pub struct Args {
     /// The recordings, as in tests/data/biotac_flat_plate.json.
     recordings: PathBuf,
@@ -34,28 +36,43 @@ pub struct Args {
     /// tests/data/biotac_shear.json, with the constants of a scene without settings.
     #[arg(long, value_name = "FILE", conflicts_with = "attitude_only")]
     shear: Option<PathBuf>,
+    /// How the skin passes load on.
+    #[arg(long, value_enum, default_value_t)]
+    model: Skin,
+}
+
+#[derive(Clone, Copy, Default, clap::ValueEnum)]
+enum Skin {
+    /// Each point is a column of its own.
+    #[default]
+    Columns,
+    /// A thin shell carries load to its neighbours; takes minutes.
+    Shell,
 }
 
 pub fn run(args: &Args) -> anyhow::Result<Ending> {
     let name = args.recordings.display();
     let recordings: Recordings = read(&args.recordings)?;
     recordings.check().with_context(|| format!("{name}: not a recording"))?;
+    let model = match args.model {
+        Skin::Columns => SkinModel::Columns,
+        Skin::Shell => SkinModel::Shell,
+    };
+    let (start, sensors) = (Model::of(model), &recordings.sensors);
+    let refused = || format!("{name}: cannot be fitted");
     if let Some(path) = &args.shear {
         let slopes: ShearRecordings = read(path)?;
         slopes.check().with_context(|| format!("{}: not a recording", path.display()))?;
         for of in &slopes.sensors {
-            let same = recordings.sensors.iter().find(|recording| recording.sensor == of.sensor);
+            let same = sensors.iter().find(|recording| recording.sensor == of.sensor);
             let recording = same.with_context(|| format!("{name}: no sensor {}", of.sensor))?;
-            let refused = || format!("{name}: cannot be fitted");
-            let (model, friction) = (Model::default(), FrictionEffect::default());
-            let found = compare(&model, &friction, recording, of).with_context(refused)?;
+            let friction = FrictionEffect::default();
+            let found = compare(&start, &friction, recording, of).with_context(refused)?;
             print(&sheared(&found, friction.stiffness_n_m))?;
         }
         return Ok(Ending::Done);
     }
-    let (start, sensors) = (Model::default(), &recordings.sensors);
     let free = if args.attitude_only { Free::Sessions } else { Free::Constants };
-    let refused = || format!("{name}: cannot be fitted");
     let held_out = leave_one_out(&start, sensors, free).with_context(refused)?;
     for held in &held_out {
         print(&told(held))?;

@@ -1,9 +1,13 @@
 //! Symmetric matrices with a band, factorised once and solved often.
 //!
 //! The factor is kept in single precision: half the memory is what a solution waits for. It is
-//! meant for corrections whose residual is known in double precision.
+//! meant for corrections whose residual is known in double precision. Rows are solved in blocks
+//! whose triangle is inverted beforehand, so that only blocks wait for each other.
 
-use super::simd::{dot, dot_single, widest};
+use super::simd::{dot, widest};
+
+/// Rows of a block: single-precision numbers in a vector of 256 bits.
+const LANES: usize = 8;
 
 /// A pivot below this part of its diagonal is taken for it: so singular a matrix has no factor in
 /// single precision (chosen).
@@ -16,11 +20,21 @@ pub struct Banded {
     width: usize,
 }
 
-/// L of A = L Lᵀ, row by row, the diagonal's inverse last.
+/// L and Lᵀ of A = L Lᵀ.
 #[derive(Clone, Debug)]
 pub struct Factor {
-    rows: Vec<f32>,
+    lower: Triangle,
+    upper: Triangle,
+}
+
+/// A triangular matrix by blocks of rows: `width` columns beside the block, then the inverse of its
+/// own triangle, both by columns.
+#[derive(Clone, Debug)]
+struct Triangle {
+    columns: Vec<[f32; LANES]>,
     width: usize,
+    /// Whether known columns come after the block instead of before.
+    upper: bool,
 }
 
 impl Banded {
@@ -54,7 +68,16 @@ impl Banded {
             let pivot = (row[width] - dot(left, left)).max(LEAST_PIVOT * row[width]);
             row[width] = pivot.sqrt().recip();
         }
-        Factor { rows: self.rows.iter().map(|&entry| entry as f32).collect(), width }
+        let entry = |i: usize, j: usize| match i - j {
+            0 => self.rows[i * stride + width].recip(),
+            apart if apart <= width => self.rows[i * stride + width - apart],
+            _ => 0.0,
+        };
+        let size = self.rows.len() / stride;
+        Factor {
+            lower: Triangle::new(size, width, false, |i, j| entry(i, j)),
+            upper: Triangle::new(size, width, true, |i, j| entry(j, i)),
+        }
     }
 }
 
@@ -66,7 +89,101 @@ impl Factor {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.rows.as_slice())
+        size_of_val(self.lower.columns.as_slice()) + size_of_val(self.upper.columns.as_slice())
+    }
+}
+
+impl Triangle {
+    /// Of the entries in row i and column j, which are asked for inside the triangle only.
+    fn new(size: usize, width: usize, upper: bool, entry: impl Fn(usize, usize) -> f64) -> Self {
+        let mut columns = Vec::new();
+        for first in (0..size).step_by(LANES) {
+            let rows = first..(first + LANES).min(size);
+            for column in 0..width {
+                // Places before the first column or after the last hold nothing.
+                let j = if upper {
+                    first + LANES + column
+                } else {
+                    first + column - width.min(first + column)
+                };
+                let is_there = if upper { j < size } else { first + column >= width };
+                let of = |lane: usize| {
+                    let i = first + lane;
+                    if is_there && rows.contains(&i) { entry(i, j) as f32 } else { 0.0 }
+                };
+                columns.push(std::array::from_fn(of));
+            }
+            // Row by row from where the triangle has one entry.
+            let mut inverse = [[0.0; LANES]; LANES];
+            for k in 0..LANES {
+                let order = |n: usize| if upper { LANES - 1 - n } else { n };
+                let i = order(k);
+                if first + i >= size {
+                    continue;
+                }
+                let pivot = entry(first + i, first + i);
+                for j in 0..LANES {
+                    let known: f64 = (0..k)
+                        .map(order)
+                        .filter(|m| first + m < size)
+                        .map(|m| entry(first + i, first + m) * inverse[j][m])
+                        .sum();
+                    inverse[j][i] = (f64::from(u8::from(i == j)) - known) / pivot;
+                }
+            }
+            columns.extend(inverse.map(|column| column.map(|entry| entry as f32)));
+        }
+        Self { columns, width, upper }
+    }
+
+    #[inline(always)]
+    fn solve(&self, x: &mut [f32]) {
+        let (size, width) = (x.len(), self.width);
+        let count = size.div_ceil(LANES);
+        for k in 0..count {
+            let first = LANES * if self.upper { count - 1 - k } else { k };
+            let last = (first + LANES).min(size);
+            let known = match self.upper {
+                true => last..(last + width).min(size),
+                false => first.saturating_sub(width)..first,
+            };
+            let own = &self.columns[first / LANES * (width + LANES)..][..width + LANES];
+            let (beside, inverse) = own.split_at(width);
+            let beside = match self.upper {
+                true => &beside[..known.len()],
+                false => &beside[width - known.len()..],
+            };
+            let mut sums = [[0.0; LANES]; 4];
+            let (values, rest) = x[known].as_chunks::<4>();
+            let (columns, rest_columns) = beside.as_chunks::<4>();
+            for (columns, values) in columns.iter().zip(values) {
+                for part in 0..4 {
+                    for lane in 0..LANES {
+                        sums[part][lane] += columns[part][lane] * values[part];
+                    }
+                }
+            }
+            for (column, value) in rest_columns.iter().zip(rest) {
+                for lane in 0..LANES {
+                    sums[0][lane] += column[lane] * value;
+                }
+            }
+            let mut left = [0.0; LANES];
+            left[..last - first].copy_from_slice(&x[first..last]);
+            for lane in 0..LANES {
+                left[lane] -= (sums[0][lane] + sums[1][lane]) + (sums[2][lane] + sums[3][lane]);
+            }
+            let mut found = [[0.0; LANES]; 2];
+            for j in 0..LANES {
+                for lane in 0..LANES {
+                    found[j % 2][lane] += inverse[j][lane] * left[j];
+                }
+            }
+            for lane in 0..LANES {
+                found[0][lane] += found[1][lane];
+            }
+            x[first..last].copy_from_slice(&found[0][..last - first]);
+        }
     }
 }
 
@@ -80,19 +197,7 @@ impl pulp::NullaryFnOnce for Solution<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { factor: Factor { rows, width }, x } = self;
-        let rows = rows.chunks_exact(width + 1);
-        for (i, row) in rows.clone().enumerate() {
-            let first = i.saturating_sub(*width);
-            let known = dot_single(&row[width + first - i..*width], &x[first..i]);
-            x[i] = (x[i] - known) * row[*width];
-        }
-        for (i, row) in rows.enumerate().rev() {
-            let first = i.saturating_sub(*width);
-            let value = x[i] * row[*width];
-            x[i] = value;
-            let left = &row[width + first - i..*width];
-            x[first..i].iter_mut().zip(left).for_each(|(x, entry)| *x -= value * entry);
-        }
+        self.factor.lower.solve(self.x);
+        self.factor.upper.solve(self.x);
     }
 }

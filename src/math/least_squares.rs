@@ -35,6 +35,12 @@ pub trait Problem {
         GAINED
     }
 
+    /// Part of a unit over which slopes are taken, by central differences: near the cube root of
+    /// the residuals' precision.
+    fn difference(&self) -> f64 {
+        DIFFERENCE
+    }
+
     /// Of which kind residual `i` is: each kind has a scatter of its own.
     fn kind(&self, _i: usize) -> usize {
         0
@@ -77,8 +83,7 @@ pub enum FitError {
 /// plausible; chosen.
 pub const NARROWER: f64 = 3.0;
 
-/// Part of a unit over which slopes are taken, by central differences; chosen, near the cube root
-/// of the residuals' precision.
+/// Unless a problem says otherwise; chosen, for residuals precise to rounding.
 const DIFFERENCE: f64 = 1e-4;
 
 /// Rounds of steps, and of leaving out; chosen, several times what is usual.
@@ -164,10 +169,10 @@ pub fn jacobian<P: Problem>(problem: &P, state: &P::State, count: usize) -> DMat
     let mut jacobian = DMatrix::zeros(count, parameters);
     for j in 0..parameters {
         let mut step = DVector::zeros(parameters);
-        step[j] = DIFFERENCE;
+        step[j] = problem.difference();
         let ahead = problem.residuals(&problem.moved(state, &step));
         let behind = problem.residuals(&problem.moved(state, &-step));
-        jacobian.set_column(j, &((ahead - behind) / (2.0 * DIFFERENCE)));
+        jacobian.set_column(j, &((ahead - behind) / (2.0 * problem.difference())));
     }
     jacobian
 }

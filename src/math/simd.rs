@@ -1,5 +1,7 @@
 //! Plain loops, compiled for the widest vectors this processor has.
 
+use nalgebra::Vector3;
+
 /// Runs `work` with its loops compiled once for each vector width and the widest one chosen.
 ///
 /// What it calls must be `#[inline(always)]` to be compiled along, and so must a long `work`,
@@ -39,6 +41,39 @@ pub fn dot_single(a: &[f32], b: &[f32]) -> f32 {
     }
     let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
     sums.iter().sum::<f32>() + rest
+}
+
+/// A vector with a zero behind it: what a processor takes at once.
+pub type Quad = [f64; 4];
+
+/// Of a vector.
+#[inline(always)]
+pub fn quad(v: &Vector3<f64>) -> Quad {
+    [v.x, v.y, v.z, 0.0]
+}
+
+/// a + b.
+#[inline(always)]
+pub fn sum(a: &Quad, b: &Quad) -> Quad {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
+}
+
+/// s a.
+#[inline(always)]
+pub fn scaled(a: &Quad, s: f64) -> Quad {
+    [s * a[0], s * a[1], s * a[2], s * a[3]]
+}
+
+/// a · b.
+#[inline(always)]
+pub fn dot_quad(a: &Quad, b: &Quad) -> f64 {
+    (a[0] * b[0] + a[2] * b[2]) + (a[1] * b[1] + a[3] * b[3])
+}
+
+/// a × b.
+#[inline(always)]
+pub fn cross(a: &Quad, b: &Quad) -> Quad {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0], 0.0]
 }
 
 /// e^x for x ≤ 0, to within a unit in the last place; 0 below -708, where e^x leaves the normal

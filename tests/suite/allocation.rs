@@ -95,3 +95,33 @@ fn a_tick_of_the_dynamic_body_allocates_nothing() {
     });
     assert_eq!(count, 0);
 }
+
+#[test]
+fn a_tick_with_a_shell_in_contact_allocates_nothing() {
+    use palpate::geometry::bvh::MeshBvh;
+    use palpate::math::seed::stream;
+    use palpate::robot::finger::{Finger, TipMotion};
+    use palpate::sim::finger::effects::skin::{SkinEffect, SkinModel};
+    use palpate::sim::finger::plate::{direction_t, pose};
+    use palpate::sim::finger::{Effects, Fingertip, FingertipState};
+    let skin = SkinEffect { model: SkinModel::Shell, ..SkinEffect::default() };
+    let effects = Effects { skin: Some(skin), ..Effects::all() };
+    let tip = Fingertip::new(&Finger::default(), &effects);
+    let plane = MeshBvh::new(crate::common::shapes::square(0.1, 2));
+    let mut state = FingertipState::new(&tip, &stream(1, 0, "finger"));
+    let motions: Vec<TipMotion> = (0..200)
+        .map(|tick| {
+            let depth_m = 1e-3 * (f64::from(tick) * 0.05).sin();
+            TipMotion::at(pose(&direction_t(0.3, 0.0), 8.0e-3 - depth_m))
+        })
+        .collect();
+    let mut go = || {
+        for motion in &motions {
+            state.step(&tip, &plane, motion, 0.001).unwrap();
+            while state.frame().is_some() {}
+        }
+    };
+    // The first way sizes what is remembered.
+    go();
+    assert_eq!(allocations(go), 0);
+}

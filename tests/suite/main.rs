@@ -96,7 +96,9 @@ mod servo;
 mod shards;
 mod shear;
 mod shell;
+mod shell_accuracy;
 mod shell_elements;
+mod shell_reference;
 mod slopes;
 mod stress;
 #[cfg(feature = "nlopt")]

@@ -22,27 +22,27 @@ use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 use std::sync::Arc;
 
-const CAVITY_PA_M3: f64 = 1e13;
+pub const CAVITY_PA_M3: f64 = 1e13;
 
-const SILICONE: Material = Material { young_pa: 1.552e6, poisson: 0.3165, thickness_m: 1.6e-3 };
+pub const SILICONE: Material = Material { young_pa: 1.552e6, poisson: 0.3165, thickness_m: 1.6e-3 };
 
-fn shell(cells: [usize; 2], cavity_pa_m3: f64) -> Skin {
+pub fn shell(cells: [usize; 2], cavity_pa_m3: f64) -> Skin {
     let [along, around] = cells;
     let effect = SkinEffect { model: SkinModel::Shell, along, around, ..SkinEffect::default() };
     Skin::new(&Profile::biotac(&Finger::default()), &effect, cavity_pa_m3)
 }
 
 /// Something to press on, whose foremost point is the origin of `W`, with normal z.
-struct Object {
-    bvh: MeshBvh,
+pub struct Object {
+    pub bvh: MeshBvh,
 }
 
-fn plane() -> Object {
+pub fn plane() -> Object {
     Object { bvh: MeshBvh::new(square(0.1, 2)) }
 }
 
 /// A cap of a sphere of 20 mm.
-fn ball() -> Object {
+pub fn ball() -> Object {
     let n = 80u32;
     let corner = |k: u32| {
         let part = |i: u32| 0.012 * (2.0 * f64::from(i) / f64::from(n) - 1.0);
@@ -58,7 +58,7 @@ fn ball() -> Object {
 }
 
 /// The pose in which the skin's foremost point is `depth_m` below the object's.
-fn at(pitch_deg: f64, depth_m: f64) -> Isometry3<f64> {
+pub fn at(pitch_deg: f64, depth_m: f64) -> Isometry3<f64> {
     let towards_t = direction_t(FRAC_PI_2 - pitch_deg.to_radians(), 0.0);
     let profile = Profile::biotac(&Finger::default());
     let foremost = |a: &Point3<f64>, b: &Point3<f64>| {
@@ -72,12 +72,12 @@ fn at(pitch_deg: f64, depth_m: f64) -> Isometry3<f64> {
     Isometry3::from_parts((-front_w.coords - Vector3::z() * depth_m).into(), turned.rotation)
 }
 
-fn press(skin: &Skin, object: &Object, x_wt: &Isometry3<f64>, pressed: &mut Pressed) -> Load {
+pub fn press(skin: &Skin, object: &Object, x_wt: &Isometry3<f64>, pressed: &mut Pressed) -> Load {
     skin.press(&object.bvh, x_wt, pressed).unwrap()
 }
 
 /// What one press brings when it is settled again and again.
-fn settled(skin: &Skin, object: &Object, x_wt: &Isometry3<f64>) -> Load {
+pub fn settled(skin: &Skin, object: &Object, x_wt: &Isometry3<f64>) -> Load {
     let mut pressed = skin.relaxed();
     (0..20).map(|_| press(skin, object, x_wt, &mut pressed)).last().unwrap()
 }
@@ -123,20 +123,6 @@ fn a_dry_press_agrees_with_mujocos_material() {
         (0..10).for_each(|_| membrane.settle(&pushes, &mut state));
         let found_n: f64 = pushes.iter().map(|push| membrane.push_n(push, &state)).sum();
         assert!((-0.12..0.02).contains(&(found_n / force_n - 1.0)), "{found_n} {force_n}");
-    }
-}
-
-#[test]
-fn the_default_cells_are_fine_enough() {
-    let [coarse, fine] = [[24, 16], [36, 24]].map(|cells| shell(cells, CAVITY_PA_M3));
-    for (object, pitch_deg) in [(plane(), 90.0), (plane(), 70.0), (plane(), 45.0), (ball(), 90.0)] {
-        let [found, better] =
-            [&coarse, &fine].map(|skin| settled(skin, &object, &at(pitch_deg, 1e-3)));
-        let apart = [
-            found.force_n.norm() / better.force_n.norm() - 1.0,
-            found.pressure_pa / better.pressure_pa - 1.0,
-        ];
-        assert!(apart.iter().all(|apart| apart.abs() < 0.08), "{pitch_deg}°: {apart:?}");
     }
 }
 
@@ -236,7 +222,7 @@ fn a_correction_never_adds_energy() {
             membrane.settle(&pushes, &mut state);
             let after_j = membrane.energy_j(&pushes, &state);
             assert!(after_j <= before_j, "{before_j} {after_j}");
-            assert!(state.moved_m.iter().flatten().all(|moved_m| moved_m.abs() < 7e-3));
+            assert!(state.moved_m().iter().flatten().all(|moved_m| moved_m.abs() < 7e-3));
         }
     }
 }

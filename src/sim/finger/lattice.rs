@@ -21,6 +21,8 @@ pub struct Node {
     pub area_m2: Vector3<f64>,
     /// Whether nail or back end hold it.
     pub clamped: bool,
+    /// Its mirror image across y = 0.
+    pub mirror: usize,
 }
 
 /// A shell over the half of the fingertip that has fluid under it; never changes.
@@ -98,6 +100,7 @@ impl Lattice {
                     gap_m: layers.gap_m,
                     area_m2: Vector3::zeros(),
                     clamped: i == 0 || (i < last && (j == 0 || j == grid.around)),
+                    mirror: grid.node(i, grid.around - j),
                 });
             }
         }

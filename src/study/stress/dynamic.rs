@@ -105,7 +105,7 @@ pub(super) fn with_masses(step_s: f64) -> Scene {
 }
 
 /// The same on a PA-10 that stands as far from the origin as from an object in its own scenes.
-fn on_arm(step_s: f64) -> Scene {
+pub(super) fn on_arm(step_s: f64) -> Scene {
     let arm = ArmSettings { base_position_m: [0.0, 0.65, -0.5], ..ArmSettings::default() };
     Scene { arm: Some(arm), ..with_masses(step_s) }
 }

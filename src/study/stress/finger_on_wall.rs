@@ -3,6 +3,7 @@
 use super::case::Outcome;
 use super::solids::{mesh, wall};
 use crate::geometry::bvh::MeshBvh;
+use crate::geometry::mesh::Mesh;
 use crate::math::seed;
 use crate::robot::finger::Finger;
 use crate::robot::finger::TipMotion;
@@ -24,13 +25,18 @@ pub(super) struct FingerOnWall {
 impl FingerOnWall {
     /// With these effects; `size` times a BioTac.
     pub(super) fn new(effects: &Effects, size: f64) -> Option<Self> {
+        Self::before(mesh(wall(0.05 * size), [0.0; 3])?, effects, size)
+    }
+
+    /// The same before another object, whose foremost point is the origin.
+    pub(super) fn before(object: Mesh, effects: &Effects, size: f64) -> Option<Self> {
         let standard = Finger::default();
         let finger = Finger {
             radius_m: size * standard.radius_m,
             length_m: size * standard.length_m,
             ..standard
         };
-        let wall = MeshBvh::new(mesh(wall(0.05 * size), [0.0; 3])?);
+        let wall = MeshBvh::new(object);
         let mut setup =
             Self { tip: Fingertip::new(&finger, effects), wall, finger, touching_m: 0.0 };
         let rotation = setup.finger.r_at();

@@ -61,7 +61,13 @@ pub(super) const CASES: &[Case] = &[
         (&[1e-2, 1e-6, 1e-12, 0.1, 1.0, 10.0], 5),
         ticks,
     ),
-    case("any pose", "poses no touch would have", "poses", (&[100.0, 1000.0, 10000.0], 3), poses),
+    case(
+        "any pose",
+        "poses no touch would have",
+        "poses",
+        (&[100.0, 1000.0, 10000.0], 3),
+        |count, _| poses(count, &effects()),
+    ),
     case(
         "numbers that are none",
         "a NaN that passes once is in every later number",
@@ -114,7 +120,7 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// All whose loads follow from the pose alone, and friction.
-fn effects() -> Effects {
+pub(super) fn effects() -> Effects {
     Effects { creep: None, timing: None, ..Effects::all() }
 }
 
@@ -297,8 +303,8 @@ fn ticks(tick_s: f64, _: f64) -> Outcome {
 }
 
 /// Poses all around and in the wall: a finite load or a fault that says where.
-fn poses(count: f64, _: f64) -> Outcome {
-    with_finger(&effects(), |setup| {
+pub(super) fn poses(count: f64, effects: &Effects) -> Outcome {
+    with_finger(effects, |setup| {
         let mut rng = seed::stream(0, 0, "poses");
         let mut state = setup.untouched();
         for _ in 0..count as u64 {
@@ -338,7 +344,7 @@ fn nan(component: f64, _: f64) -> Outcome {
 }
 
 /// A finger of other constants and size: finite, growing with depth, and repeating itself.
-fn laws_of(stiffer: f64, size: f64, effects: &Effects) -> Outcome {
+pub(super) fn laws_of(stiffer: f64, size: f64, effects: &Effects) -> Outcome {
     let mut effects = effects.clone();
     stiffen(&mut effects, stiffer);
     with_finger_of_size(&effects, size, |setup| {

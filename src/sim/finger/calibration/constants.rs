@@ -3,7 +3,7 @@
 use crate::sim::finger::effects::Effects;
 use crate::sim::finger::effects::electrodes::ElectrodesEffect;
 use crate::sim::finger::effects::fluid::FluidEffect;
-use crate::sim::finger::effects::skin::SkinEffect;
+use crate::sim::finger::effects::skin::{SkinEffect, SkinModel};
 
 /// What is known about every finger of a kind.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +28,20 @@ impl Default for Model {
 }
 
 impl Model {
+    /// The same whose skin passes load on like this.
+    pub fn of(model: SkinModel) -> Self {
+        let known = Self::default();
+        Self { skin: SkinEffect { model, ..known.skin }, ..known }
+    }
+
+    /// What may be fitted of it.
+    pub fn constants(&self) -> &'static [Constant] {
+        match self.skin.model {
+            SkinModel::Columns => &CONSTANTS,
+            SkinModel::Shell => &SHELL_CONSTANTS,
+        }
+    }
+
     /// As tables of a scene.
     pub fn effects(&self) -> Effects {
         Effects {
@@ -62,8 +76,22 @@ impl Constant {
     }
 }
 
-/// All of them. Bounds and what is plausible are chosen: a factor of ten for a stiffness, two for
-/// the spread. The skin's modulus and the stiffness against inflation are sourced: counts alone
+const CORE: Constant = Constant {
+    key: "skin.core_pa_m",
+    bounds: [1e6, 1e11],
+    plausible: 2.3,
+    of: |model| &mut model.skin.core_pa_m,
+};
+
+const SPREAD: Constant = Constant {
+    key: "electrodes.spread_m",
+    bounds: [5e-4, 6e-3],
+    plausible: 0.7,
+    of: |model| &mut model.electrodes.spread_m,
+};
+
+/// Those of columns. Bounds and what is plausible are chosen: a factor of ten for a stiffness, two
+/// for the spread. The skin's modulus and the stiffness against inflation are sourced: counts alone
 /// would have the pressure ten times too low as well; and the exponent is a gain that all share.
 pub const CONSTANTS: [Constant; 3] = [
     Constant {
@@ -72,16 +100,19 @@ pub const CONSTANTS: [Constant; 3] = [
         plausible: 2.3,
         of: |model| &mut model.skin.flatten_pa_m,
     },
+    CORE,
+    SPREAD,
+];
+
+/// Those of a shell, whose modulus is what resists being flattened. Two for it is what the hardness
+/// of the skin (Shore A 26, BioTac SP manual) and NVlabs/biotac_sim differ by.
+pub const SHELL_CONSTANTS: [Constant; 3] = [
     Constant {
-        key: "skin.core_pa_m",
-        bounds: [1e6, 1e11],
-        plausible: 2.3,
-        of: |model| &mut model.skin.core_pa_m,
-    },
-    Constant {
-        key: "electrodes.spread_m",
-        bounds: [5e-4, 6e-3],
+        key: "skin.modulus_pa",
+        bounds: [1e5, 1e7],
         plausible: 0.7,
-        of: |model| &mut model.electrodes.spread_m,
+        of: |model| &mut model.skin.modulus_pa,
     },
+    CORE,
+    SPREAD,
 ];

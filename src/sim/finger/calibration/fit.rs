@@ -1,6 +1,6 @@
 //! The fit itself, with how sure it is.
 
-use super::constants::{CONSTANTS, Constant, Model};
+use super::constants::{Constant, Model};
 use super::problem::Calibration;
 use super::session::Session;
 use crate::math::clustered::covariance;
@@ -66,7 +66,7 @@ pub struct Fit {
 pub fn fit(start: &Model, recordings: &[&Recording], free: Free) -> Result<Fit, FitError> {
     let mut constants: Vec<&'static Constant> = match free {
         Free::Sessions => Vec::new(),
-        Free::Constants => CONSTANTS.iter().collect(),
+        Free::Constants => start.constants().iter().collect(),
     };
     let mut refused = Vec::new();
     loop {

@@ -5,6 +5,7 @@ use super::constants::{Constant, Model};
 use super::session::Session;
 use crate::math::least_squares::Problem;
 use crate::robot::finger::frame::ELECTRODES;
+use crate::sim::finger::effects::skin::SkinModel;
 use crate::sim::finger::recording::Recording;
 use nalgebra::DVector;
 use std::cell::RefCell;
@@ -34,6 +35,11 @@ const SHARED: usize = 3;
 
 /// In place of residuals where a pose has no answer; no step goes there.
 const IMPOSSIBLE: f64 = 1e6;
+
+/// Part of a unit over which slopes are taken: columns are found to rounding, a shell to a
+/// thousandth of its force (chosen).
+const COLUMNS_DIFFERENCE: f64 = 1e-4;
+const SHELL_DIFFERENCE: f64 = 2e-2;
 
 /// A step that gains no more than this part of the cost is the last (chosen).
 const GAINED: f64 = 1e-4;
@@ -178,5 +184,12 @@ impl Problem for Calibration<'_> {
 
     fn gained(&self) -> f64 {
         GAINED
+    }
+
+    fn difference(&self) -> f64 {
+        match self.start.skin.model {
+            SkinModel::Columns => COLUMNS_DIFFERENCE,
+            SkinModel::Shell => SHELL_DIFFERENCE,
+        }
     }
 }

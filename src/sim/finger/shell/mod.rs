@@ -1,11 +1,15 @@
 //! The skin as a thin shell over the fluid: it carries load to its neighbours.
 //!
-//! `sheet` is the silicone, `springs` the contact problem of the places that may touch, `membrane`
-//! puts them together with fluid and core and finds where they are in balance, `touching` is that
-//! under the rays by which the skin meets an object.
+//! `sheet` is the silicone and `softness` how it gives way at rest, `membrane` is its energy with
+//! fluid, core and object, `settle` finds the least of it, with `springs` for the places that may
+//! touch and `course` for a first guess; `touching` is that under the rays by which the skin meets
+//! an object.
 
+mod course;
 pub mod membrane;
+mod settle;
 pub mod sheet;
+mod softness;
 pub mod springs;
 mod touching;
 

@@ -11,8 +11,12 @@
 //! ½ θᵀ Q θ. Slopes are read along the normals at rest, which turns of the sheet by an angle φ
 //! change by κ φ²/2 instead of not at all.
 //!
-//! *Volume* under the sheet: exact, of its triangles against the origin.
+//! *Volume* under the sheet: exact, of its triangles against the origin. A corner's gradient is a
+//! sixth of the sum of p × q over the edges pq across from it.
+//!
+//! What a processor goes through are edges: each knows the edges with which it shares a triangle.
 
+use crate::math::simd::{Quad, cross, dot_quad, quad, scaled, sum, widest};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 
@@ -32,31 +36,27 @@ pub struct Material {
 struct Edge {
     /// Ends, then the corners across; with one triangle only the third comes twice.
     corners: [usize; 4],
+    /// What makes a sixth of this edge's p × q the gradient of the volume at the corners across.
+    turns: [f64; 2],
     rest_m2: f64,
+    rest_slope: f64,
     /// How much each corner's motion along `normal` adds to the slope.
-    slopes_m: [f64; 4],
-    normal: Vector3<f64>,
-}
-
-#[derive(Clone, Debug)]
-struct Face {
-    corners: [usize; 3],
-    /// Each across the corner of the same place.
-    edges: [usize; 3],
-    /// C, in J/m⁴.
-    membrane: Matrix3<f64>,
-    /// Q, in J.
-    bending: Matrix3<f64>,
-    /// Volume between it and the origin at rest.
-    wedge_m3: f64,
+    slopes_m: Quad,
+    normal: Quad,
+    /// The edges with which it shares a triangle; where there is one triangle only, itself with
+    /// zeros in `laws`.
+    near: [usize; 4],
+    /// Of itself and of `near`: entries of C and Q, in J/m⁴ and J.
+    laws: [[f64; 2]; 5],
 }
 
 /// The sheet; never changes.
 #[derive(Clone, Debug)]
 pub struct Sheet {
-    rest: Vec<Vector3<f64>>,
+    rest: Vec<Quad>,
     edges: Vec<Edge>,
-    faces: Vec<Face>,
+    /// Volume under it at rest.
+    volume_m3: f64,
 }
 
 /// A state of the sheet, and memory to find it.
@@ -65,22 +65,14 @@ pub struct Strained {
     /// Elastic energy.
     pub energy_j: f64,
     /// Its gradient at each node, in N.
-    pub gradient_n: Vec<Vector3<f64>>,
+    pub gradient_n: Vec<Quad>,
     /// Volume by which it is smaller inside than at rest.
     pub displaced_m3: f64,
     /// The gradient of that at each node, in m².
-    pub volume_m2: Vec<Vector3<f64>>,
-    points: Vec<Vector3<f64>>,
-    edges: Vec<EdgeState>,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct EdgeState {
-    grown_m2: f64,
-    slope: f64,
-    /// Derivatives of the energy by these.
-    tension: f64,
-    moment: f64,
+    pub volume_m2: Vec<Quad>,
+    points: Vec<Quad>,
+    /// Of each edge: the square by which it grew, in m², and the change of slope.
+    grown: Vec<[f64; 2]>,
 }
 
 impl Sheet {
@@ -92,59 +84,70 @@ impl Sheet {
         held: &[bool],
         material: &Material,
     ) -> Self {
-        let mut sheet = Self { rest: points, edges: Vec::new(), faces: Vec::new() };
+        let rest = points.iter().map(|point| quad(point)).collect();
+        let mut sheet = Self { rest, edges: Vec::new(), volume_m3: 0.0 };
         let mut found = HashMap::new();
         for corners in triangles {
-            sheet.add(*corners, material, &mut found);
+            sheet.add(*corners, &points, material, &mut found);
         }
         for edge in &mut sheet.edges {
-            edge.normal = edge.normal.try_normalize(0.0).unwrap_or_default();
+            let normal = Vector3::from_fn(|a, _| edge.normal[a]);
+            edge.normal = quad(&normal.try_normalize(0.0).unwrap_or_default());
             if edge.corners[2] == edge.corners[3] {
                 let whole = if held[edge.corners[0]] && held[edge.corners[1]] { 2.0 } else { 0.0 };
-                edge.slopes_m = edge.slopes_m.map(|slope_m| whole * slope_m);
+                edge.slopes_m = scaled(&edge.slopes_m, whole);
             }
+            edge.rest_slope = edge.slope(&sheet.rest);
         }
+        // By the same sums as later, so that it displaces nothing at rest.
+        sheet.volume_m3 = -sheet.relaxed().displaced_m3;
         sheet
     }
 
     fn add(
         &mut self,
         corners: [usize; 3],
+        points: &[Vector3<f64>],
         material: &Material,
         found: &mut HashMap<[usize; 2], usize>,
     ) {
-        let p = corners.map(|k| self.rest[k]);
+        let p = corners.map(|k| points[k]);
         let sides = [p[2] - p[1], p[0] - p[2], p[1] - p[0]];
         let doubled_m2 = sides[2].cross(&-sides[1]);
-        let normal = doubled_m2.normalize();
-        let edges = std::array::from_fn(|a| {
-            let [low, high] = [corners[(a + 1) % 3], corners[(a + 2) % 3]];
-            let [low, high] = [low.min(high), low.max(high)];
-            let axis = self.rest[high] - self.rest[low];
+        let normal = quad(&doubled_m2.normalize());
+        let ids: [usize; 3] = std::array::from_fn(|a| {
+            let [first, second] = [corners[(a + 1) % 3], corners[(a + 2) % 3]];
+            let [low, high] = [first.min(second), first.max(second)];
+            let axis = points[high] - points[low];
             let height_m = doubled_m2.norm() / axis.norm();
-            let along = (p[a] - self.rest[low]).dot(&axis) / axis.norm_squared();
-            let slopes_m = [(along - 1.0) / height_m, -along / height_m, 1.0 / height_m];
+            let along = (p[a] - points[low]).dot(&axis) / axis.norm_squared();
             let id = *found.entry([low, high]).or_insert_with(|| {
-                self.edges.push(Edge {
-                    corners: [low, high, corners[a], corners[a]],
-                    rest_m2: axis.norm_squared(),
-                    slopes_m: [0.0; 4],
-                    normal: Vector3::zeros(),
-                });
-                self.edges.len() - 1
+                let id = self.edges.len();
+                self.edges.push(Edge::between([low, high], axis.norm_squared(), corners[a], id));
+                id
             });
             let edge = &mut self.edges[id];
-            let side = if edge.normal == Vector3::zeros() { 2 } else { 3 };
-            edge.corners[side] = corners[a];
-            edge.normal += normal;
-            edge.slopes_m[0] += slopes_m[0];
-            edge.slopes_m[1] += slopes_m[1];
-            edge.slopes_m[side] = slopes_m[2];
+            let side = usize::from(edge.turns[0] != 0.0);
+            edge.corners[2 + side] = corners[a];
+            edge.turns[side] = if first == low { 1.0 / 6.0 } else { -1.0 / 6.0 };
+            edge.normal = sum(&edge.normal, &normal);
+            edge.slopes_m[0] += (along - 1.0) / height_m;
+            edge.slopes_m[1] -= along / height_m;
+            edge.slopes_m[2 + side] += 1.0 / height_m;
             id
         });
         let (membrane, bending) = stiffness(&sides, material);
-        let wedge_m3 = p[0].dot(&p[1].cross(&p[2])) / 6.0;
-        self.faces.push(Face { corners, edges, membrane, bending, wedge_m3 });
+        for (a, &id) in ids.iter().enumerate() {
+            let law = |b: usize| [membrane[(a, b)], bending[(a, b)]];
+            let edge = &mut self.edges[id];
+            let side = usize::from(edge.turns[1] != 0.0);
+            (0..2).for_each(|kind| edge.laws[0][kind] += law(a)[kind]);
+            for turn in 1..3 {
+                let b = (a + turn) % 3;
+                edge.near[2 * side + turn - 1] = ids[b];
+                edge.laws[2 * side + turn] = law(b);
+            }
+        }
     }
 
     /// Memory for [`strain`](Self::strain), at rest.
@@ -156,66 +159,19 @@ impl Sheet {
 
     /// Its state with each node moved by `moved_m`.
     pub fn strain(&self, moved_m: &[Vector3<f64>], state: &mut Strained) {
-        state.points.clear();
-        state.points.extend(self.rest.iter().zip(moved_m).map(|(rest, moved_m)| rest + moved_m));
-        let points = &state.points[..];
-        state.edges.clear();
-        state.edges.extend(self.edges.iter().map(|edge| {
-            let [a, b, c, d] = edge.corners;
-            let [wa, wb, wc, wd] = edge.slopes_m;
-            let sum = moved_m[a] * wa + moved_m[b] * wb + moved_m[c] * wc + moved_m[d] * wd;
-            EdgeState {
-                grown_m2: (points[b] - points[a]).norm_squared() - edge.rest_m2,
-                slope: edge.normal.dot(&sum),
-                ..EdgeState::default()
-            }
-        }));
-        for gradient in [&mut state.gradient_n, &mut state.volume_m2] {
-            gradient.clear();
-            gradient.resize(points.len(), Vector3::zeros());
-        }
-        (state.energy_j, state.displaced_m3) = (0.0, 0.0);
-        for face in &self.faces {
-            let edges = face.edges.map(|k| state.edges[k]);
-            let grown_m2 = Vector3::from(edges.map(|edge| edge.grown_m2));
-            let slopes = Vector3::from(edges.map(|edge| edge.slope));
-            let (tensions, moments) = (face.membrane * grown_m2, face.bending * slopes);
-            state.energy_j += 0.5 * (tensions.dot(&grown_m2) + moments.dot(&slopes));
-            for (i, k) in face.edges.into_iter().enumerate() {
-                state.edges[k].tension += tensions[i];
-                state.edges[k].moment += moments[i];
-            }
-            let [a, b, c] = face.corners;
-            let [pa, pb, pc] = face.corners.map(|k| points[k]);
-            let across = pb.cross(&pc) / 6.0;
-            // Against its rest, triangle by triangle: no difference of large sums.
-            state.displaced_m3 -= pa.dot(&across) - face.wedge_m3;
-            state.volume_m2[a] -= across;
-            state.volume_m2[b] -= pc.cross(&pa) / 6.0;
-            state.volume_m2[c] -= pa.cross(&pb) / 6.0;
-        }
-        for (edge, strained) in self.edges.iter().zip(&state.edges) {
-            let [a, b, c, d] = edge.corners;
-            let pull_n = (points[b] - points[a]) * (2.0 * strained.tension);
-            let bend_nm = edge.normal * strained.moment;
-            state.gradient_n[a] += bend_nm * edge.slopes_m[0] - pull_n;
-            state.gradient_n[b] += bend_nm * edge.slopes_m[1] + pull_n;
-            state.gradient_n[c] += bend_nm * edge.slopes_m[2];
-            state.gradient_n[d] += bend_nm * edge.slopes_m[3];
-        }
+        widest(Straining { sheet: self, moved_m, state });
     }
 
     /// Hands out the blocks of the elastic energy's second derivative at rest, in N/m, by pairs of
     /// nodes; blocks of one pair add up.
     pub fn stiffness(&self, mut add: impl FnMut([usize; 2], Matrix3<f64>)) {
-        for face in &self.faces {
-            let edges = face.edges.map(|k| &self.edges[k]);
-            for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
-                let [e, f] = [edges[i], edges[j]];
-                let [along_e, along_f] =
-                    [e, f].map(|edge| self.rest[edge.corners[1]] - self.rest[edge.corners[0]]);
-                let stretch = along_e * along_f.transpose() * (4.0 * face.membrane[(i, j)]);
-                let bend = e.normal * f.normal.transpose() * face.bending[(i, j)];
+        let vector = |v: &Quad| Vector3::new(v[0], v[1], v[2]);
+        for (id, e) in self.edges.iter().enumerate() {
+            for (&near, law) in [id].iter().chain(&e.near).zip(&e.laws) {
+                let f = &self.edges[near];
+                let [along_e, along_f] = [e, f].map(|edge| vector(&edge.axis(&self.rest)));
+                let stretch = along_e * along_f.transpose() * (4.0 * law[0]);
+                let bend = vector(&e.normal) * vector(&f.normal).transpose() * law[1];
                 for (p, q) in (0..16).map(|k| (k / 4, k % 4)) {
                     let mut block = bend * (e.slopes_m[p] * f.slopes_m[q]);
                     if p < 2 && q < 2 {
@@ -229,18 +185,102 @@ impl Sheet {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.rest.as_slice())
-            + size_of_val(self.edges.as_slice())
-            + size_of_val(self.faces.as_slice())
+        size_of_val(self.rest.as_slice()) + size_of_val(self.edges.as_slice())
+    }
+}
+
+impl Edge {
+    /// With nothing across it yet.
+    fn between([low, high]: [usize; 2], rest_m2: f64, across: usize, id: usize) -> Self {
+        Self {
+            corners: [low, high, across, across],
+            turns: [0.0; 2],
+            rest_m2,
+            rest_slope: 0.0,
+            slopes_m: Quad::default(),
+            normal: Quad::default(),
+            near: [id; 4],
+            laws: [[0.0; 2]; 5],
+        }
+    }
+
+    #[inline(always)]
+    fn axis(&self, points: &[Quad]) -> Quad {
+        sum(&points[self.corners[1]], &scaled(&points[self.corners[0]], -1.0))
+    }
+
+    #[inline(always)]
+    fn slope(&self, points: &[Quad]) -> f64 {
+        let [a, b, c, d] = self.corners;
+        let [wa, wb, wc, wd] = self.slopes_m;
+        let ends = sum(&scaled(&points[a], wa), &scaled(&points[b], wb));
+        let across = sum(&scaled(&points[c], wc), &scaled(&points[d], wd));
+        dot_quad(&self.normal, &sum(&ends, &across))
+    }
+}
+
+struct Straining<'a> {
+    sheet: &'a Sheet,
+    moved_m: &'a [Vector3<f64>],
+    state: &'a mut Strained,
+}
+
+impl pulp::NullaryFnOnce for Straining<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Sheet { rest, edges, volume_m3 } = self.sheet;
+        let Strained { points, grown, gradient_n, volume_m2, .. } = self.state;
+        points.resize(rest.len(), Quad::default());
+        for ((point, at), moved_m) in points.iter_mut().zip(rest).zip(self.moved_m) {
+            *point = sum(at, &quad(moved_m));
+        }
+        grown.resize(edges.len(), [0.0; 2]);
+        for (edge, grown) in edges.iter().zip(grown.iter_mut()) {
+            let axis = edge.axis(points);
+            *grown = [dot_quad(&axis, &axis) - edge.rest_m2, edge.slope(points) - edge.rest_slope];
+        }
+        for gradient in [&mut *gradient_n, &mut *volume_m2] {
+            gradient.clear();
+            gradient.resize(points.len(), Quad::default());
+        }
+        let mut doubled_j = [0.0; 2];
+        for (edge, own) in edges.iter().zip(&*grown) {
+            // Tension and moment: derivatives of the energy by what grew.
+            let mut pull = [edge.laws[0][0] * own[0], edge.laws[0][1] * own[1]];
+            for k in 0..4 {
+                let (law, other) = (edge.laws[k + 1], grown[edge.near[k]]);
+                pull = [pull[0] + law[0] * other[0], pull[1] + law[1] * other[1]];
+            }
+            doubled_j = [doubled_j[0] + pull[0] * own[0], doubled_j[1] + pull[1] * own[1]];
+            let [a, b, c, d] = edge.corners;
+            let pull_n = scaled(&edge.axis(points), 2.0 * pull[0]);
+            let bend_nm = scaled(&edge.normal, pull[1]);
+            let [wa, wb, wc, wd] = edge.slopes_m;
+            let back_n = scaled(&pull_n, -1.0);
+            gradient_n[a] = sum(&gradient_n[a], &sum(&scaled(&bend_nm, wa), &back_n));
+            gradient_n[b] = sum(&gradient_n[b], &sum(&scaled(&bend_nm, wb), &pull_n));
+            gradient_n[c] = sum(&gradient_n[c], &scaled(&bend_nm, wc));
+            gradient_n[d] = sum(&gradient_n[d], &scaled(&bend_nm, wd));
+            let swept_m2 = cross(&points[a], &points[b]);
+            volume_m2[c] = sum(&volume_m2[c], &scaled(&swept_m2, -edge.turns[0]));
+            volume_m2[d] = sum(&volume_m2[d], &scaled(&swept_m2, -edge.turns[1]));
+        }
+        let mut tripled_m3 = 0.0;
+        for (point, volume_m2) in points.iter().zip(volume_m2.iter()) {
+            tripled_m3 += dot_quad(point, volume_m2);
+        }
+        self.state.energy_j = 0.5 * (doubled_j[0] + doubled_j[1]);
+        self.state.displaced_m3 = tripled_m3 / 3.0 + volume_m3;
     }
 }
 
 impl Strained {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        let vectors =
-            self.gradient_n.capacity() + self.volume_m2.capacity() + self.points.capacity();
-        vectors * size_of::<Vector3<f64>>() + self.edges.capacity() * size_of::<EdgeState>()
+        let quads = self.gradient_n.capacity() + self.volume_m2.capacity() + self.points.capacity();
+        quads * size_of::<Quad>() + self.grown.capacity() * size_of::<[f64; 2]>()
     }
 }
 

@@ -5,6 +5,8 @@
 //! looked for among the loaded springs, which are those of the last guess that push and those
 //! beside them that are shortened; where that goes in a circle, one spring after the other.
 
+use crate::math::simd::{dot, widest};
+
 /// Guesses of what is loaded (chosen; two or three are usual).
 const GUESSES: usize = 12;
 
@@ -69,7 +71,10 @@ impl Springs {
         self.loaded.clear();
         self.loaded.extend((0..count).filter(|&i| self.force_n[i] > 0.0));
         for _ in 0..GUESSES {
-            self.push_loaded();
+            widest(
+                #[inline(always)]
+                || self.push_loaded(),
+            );
             self.pushes.clear();
             let mut settled = true;
             let mut next = 0;
@@ -91,6 +96,7 @@ impl Springs {
     }
 
     /// The forces with which the loaded springs are in balance, pulling allowed.
+    #[inline(always)]
     fn push_loaded(&mut self) {
         let (count, size) = (self.len(), self.loaded.len());
         self.factor.clear();
@@ -99,11 +105,10 @@ impl Springs {
         for (row, &i) in self.loaded.iter().enumerate() {
             let mut push = self.free_m[i];
             for (column, &j) in self.loaded[..=row].iter().enumerate() {
-                let mut entry = self.softness_m_n[i * count + j];
                 let (own, other) = (row * size, column * size);
-                for k in 0..column {
-                    entry -= self.factor[own + k] * self.factor[other + k];
-                }
+                let left = &self.factor[own..own + column];
+                let known = dot(left, &self.factor[other..other + column]);
+                let mut entry = self.softness_m_n[i * count + j] - known;
                 if column < row {
                     entry /= self.factor[other + column];
                     push -= entry * self.pushes[column];

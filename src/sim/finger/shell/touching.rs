@@ -91,13 +91,14 @@ impl Shell {
                 ..Response::default()
             };
             // Where the ball is nearest to the plane.
-            let centre_t = self.membrane.nodes()[node].point + settled.moved_m[node];
-            let above_m = self.half_m - push.overlap_m + push.normal_t.dot(&settled.moved_m[node]);
+            let centre_t = self.membrane.nodes()[node].point + settled.moved_m()[node];
+            let above_m =
+                self.half_m - push.overlap_m + push.normal_t.dot(&settled.moved_m()[node]);
             touch.point_t = centre_t - push.normal_t * above_m;
         }
         Balance {
             pressure_pa: self.membrane.pressure_pa(settled),
-            displaced_m3: settled.strained.displaced_m3,
+            displaced_m3: settled.displaced_m3(),
             energy_j: self.membrane.energy_j(pushes, settled),
         }
     }

@@ -1,0 +1,154 @@
+//! How the sheet gives way at rest.
+//!
+//! A shell that is the same left and right moves symmetrically under the symmetric part of forces
+//! and antisymmetrically under the rest: its stiffness falls into two matrices of half the size and
+//! half the band, and a solution costs half.
+
+use super::sheet::Sheet;
+use crate::math::banded::{Banded, Factor};
+use crate::math::simd::Quad;
+use nalgebra::Matrix3;
+use std::f64::consts::FRAC_1_SQRT_2;
+
+/// The inverse of the sheet's stiffness at rest for the nodes that can move; never changes.
+#[derive(Clone, Debug)]
+pub struct Softness {
+    /// Of symmetric and of antisymmetric motions.
+    halves: [Factor; 2],
+    /// Unknowns of the symmetric ones, which come before the others.
+    symmetric: usize,
+    /// Of each node's three directions: its unknowns, and its shares in them.
+    parts: Vec<[Part; 2]>,
+    /// The inverse at nodes p and q ≤ p, in m/N, by rows of p.
+    blocks: Vec<[[f32; 3]; 3]>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Part {
+    unknown: usize,
+    share: f32,
+}
+
+impl Softness {
+    /// Of `sheet`, whose node k is at `place[k]` among those that can move; the one at place i has
+    /// its mirror image across y = 0 at place `mirror[i]`.
+    pub fn new(sheet: &Sheet, place: &[Option<usize>], mirror: &[usize]) -> Self {
+        let (parts, symmetric) = parts(mirror);
+        let size = parts.len();
+        let mut own = Self {
+            halves: [0..symmetric, symmetric..size].map(|unknowns| {
+                let mut width = 0;
+                each(sheet, place, &parts, &unknowns, |i, j, _| width = width.max(i.abs_diff(j)));
+                let mut half = Banded::zeros(unknowns.len(), width);
+                each(sheet, place, &parts, &unknowns, |i, j, value| half.add(i, j, value));
+                half.factor()
+            }),
+            symmetric,
+            parts,
+            blocks: Vec::new(),
+        };
+        let mut columns = vec![[0.0; 3]; size];
+        let (mut column, mut halves) = (vec![0.0; size], vec![0.0; size]);
+        for p in 0..mirror.len() {
+            for a in 0..3 {
+                column.fill(0.0);
+                column[3 * p + a] = 1.0;
+                own.solve(&mut column, &mut halves);
+                columns.iter_mut().zip(&column).for_each(|(row, entry)| row[a] = *entry);
+            }
+            let block =
+                |q: usize| std::array::from_fn(|a| std::array::from_fn(|b| columns[3 * q + b][a]));
+            own.blocks.extend((0..=p).map(block));
+        }
+        own
+    }
+
+    /// What `forces_n` displace by, in place; `halves` is memory of the same length.
+    pub fn solve(&self, forces_n: &mut [f32], halves: &mut [f32]) {
+        halves.fill(0.0);
+        for (force_n, parts) in forces_n.iter().zip(&self.parts) {
+            parts.iter().for_each(|part| halves[part.unknown] += part.share * force_n);
+        }
+        let (alike, opposite) = halves.split_at_mut(self.symmetric);
+        self.halves[0].solve(alike);
+        self.halves[1].solve(opposite);
+        for (moved_m, [alike, opposite]) in forces_n.iter_mut().zip(&self.parts) {
+            *moved_m =
+                alike.share * halves[alike.unknown] + opposite.share * halves[opposite.unknown];
+        }
+    }
+
+    /// How far one place moves along its normal under a newton along that of the other, in m/N.
+    #[inline]
+    pub fn between(&self, own: (usize, &Quad), other: (usize, &Quad)) -> f64 {
+        let ((p, normal_p), (q, normal_q)) =
+            if own.0 < other.0 { (other, own) } else { (own, other) };
+        let block = &self.blocks[p * (p + 1) / 2 + q];
+        let row = |a: usize| {
+            let [x, y, z] = block[a].map(f64::from);
+            x * normal_q[0] + y * normal_q[1] + z * normal_q[2]
+        };
+        normal_p[0] * row(0) + normal_p[1] * row(1) + normal_p[2] * row(2)
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.halves.iter().map(Factor::bytes).sum::<usize>()
+            + size_of_val(self.parts.as_slice())
+            + size_of_val(self.blocks.as_slice())
+    }
+}
+
+/// The unknowns of all directions, and how many of them are symmetric. Motion across y is symmetric
+/// if its images are opposite.
+fn parts(mirror: &[usize]) -> (Vec<[Part; 2]>, usize) {
+    let mut parts = vec![[Part::default(); 2]; 3 * mirror.len()];
+    let mut count = 0;
+    for (half, sign) in [1.0, -1.0].into_iter().enumerate() {
+        let symmetric = count;
+        for (own, &image) in mirror.iter().enumerate().filter(|(own, image)| own <= image) {
+            for (a, sign) in [sign, -sign, sign].into_iter().enumerate() {
+                let share = FRAC_1_SQRT_2 as f32;
+                if own < image {
+                    parts[3 * own + a][half] = Part { unknown: count, share };
+                    parts[3 * image + a][half] = Part { unknown: count, share: sign * share };
+                } else if sign > 0.0 {
+                    parts[3 * own + a][half] = Part { unknown: count, share: 1.0 };
+                } else {
+                    continue;
+                }
+                count += 1;
+            }
+        }
+        if half == 1 {
+            return (parts, symmetric);
+        }
+    }
+    (parts, count)
+}
+
+/// The entries of the stiffness between `unknowns`, counted from the first of them; those of one
+/// place add up.
+fn each(
+    sheet: &Sheet,
+    place: &[Option<usize>],
+    parts: &[[Part; 2]],
+    unknowns: &std::ops::Range<usize>,
+    mut add: impl FnMut(usize, usize, f64),
+) {
+    sheet.stiffness(|[p, q], block: Matrix3<f64>| {
+        let (Some(p), Some(q)) = (place[p], place[q]) else { return };
+        for (a, b) in (0..9).map(|k| (k / 3, k % 3)) {
+            let own = |parts: &[Part; 2]| {
+                parts
+                    .iter()
+                    .find(|part| part.share != 0.0 && unknowns.contains(&part.unknown))
+                    .copied()
+            };
+            if let (Some(i), Some(j)) = (own(&parts[3 * p + a]), own(&parts[3 * q + b])) {
+                let share = f64::from(i.share) * f64::from(j.share);
+                add(i.unknown - unknowns.start, j.unknown - unknowns.start, share * block[(a, b)]);
+            }
+        }
+    });
+}
