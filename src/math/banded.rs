@@ -75,7 +75,7 @@ impl Banded {
         };
         let size = self.rows.len() / stride;
         Factor {
-            lower: Triangle::new(size, width, false, |i, j| entry(i, j)),
+            lower: Triangle::new(size, width, false, entry),
             upper: Triangle::new(size, width, true, |i, j| entry(j, i)),
         }
     }
@@ -122,13 +122,13 @@ impl Triangle {
                     continue;
                 }
                 let pivot = entry(first + i, first + i);
-                for j in 0..LANES {
+                for (j, column) in inverse.iter_mut().enumerate() {
                     let known: f64 = (0..k)
                         .map(order)
                         .filter(|m| first + m < size)
-                        .map(|m| entry(first + i, first + m) * inverse[j][m])
+                        .map(|m| entry(first + i, first + m) * column[m])
                         .sum();
-                    inverse[j][i] = (f64::from(u8::from(i == j)) - known) / pivot;
+                    column[i] = (f64::from(u8::from(i == j)) - known) / pivot;
                 }
             }
             columns.extend(inverse.map(|column| column.map(|entry| entry as f32)));
@@ -173,16 +173,13 @@ impl Triangle {
             for lane in 0..LANES {
                 left[lane] -= (sums[0][lane] + sums[1][lane]) + (sums[2][lane] + sums[3][lane]);
             }
-            let mut found = [[0.0; LANES]; 2];
-            for j in 0..LANES {
-                for lane in 0..LANES {
-                    found[j % 2][lane] += inverse[j][lane] * left[j];
-                }
+            let [mut even, mut odd] = [[0.0; LANES]; 2];
+            for (j, (column, left)) in inverse.iter().zip(left).enumerate() {
+                let found = if j % 2 == 0 { &mut even } else { &mut odd };
+                found.iter_mut().zip(column).for_each(|(found, entry)| *found += entry * left);
             }
-            for lane in 0..LANES {
-                found[0][lane] += found[1][lane];
-            }
-            x[first..last].copy_from_slice(&found[0][..last - first]);
+            even.iter_mut().zip(odd).for_each(|(even, odd)| *even += odd);
+            x[first..last].copy_from_slice(&even[..last - first]);
         }
     }
 }

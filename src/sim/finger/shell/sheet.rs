@@ -84,7 +84,7 @@ impl Sheet {
         held: &[bool],
         material: &Material,
     ) -> Self {
-        let rest = points.iter().map(|point| quad(point)).collect();
+        let rest = points.iter().map(quad).collect();
         let mut sheet = Self { rest, edges: Vec::new(), volume_m3: 0.0 };
         let mut found = HashMap::new();
         for corners in triangles {
