@@ -100,7 +100,7 @@ pub(super) const CASES: &[Case] = &[
         "shell, stiff fluid",
         "an incompressible fluid leaves a saddle point",
         "Pa/m3",
-        (&[1e13, 1e6, 1e16, 1e20], 3),
+        (&[1e13, 1e6, 1e16, 1e20], 2),
         |stiffness_pa_m3, _| {
             let mut effects = shell();
             if let Some(fluid) = &mut effects.fluid {
