@@ -225,7 +225,11 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
             if new.cost > chord(new.radius) {
                 continue;
             }
-            while let [.., before, last] = kept.as_slice() {
+            while let [earlier @ .., before, last] = kept.as_slice() {
+                // As NLopt's, which drops nothing that only one corner stands before.
+                if earlier.is_empty() && before.len() < 2 {
+                    break;
+                }
                 let (before, last) = (&before[0], &last[0]);
                 let turn = (last.radius - before.radius) * (new.cost - before.cost)
                     - (last.cost - before.cost) * (new.radius - before.radius);

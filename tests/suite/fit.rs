@@ -152,13 +152,13 @@ fn a_fit_of_many_touches_reaches_the_global_maximum() {
     let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
     for surface in hard_surfaces() {
         let mut touches = Observations::new(2);
-        for i in 0..300 {
+        for i in 0..1100 {
             let step = f64::from(i);
             let place = [(step * 0.754_877_666) % 1.0, (step * 0.569_840_291) % 1.0];
             touches.push(&place, surface(place[0], place[1]));
         }
         let fit = bounds.fit(&KERNEL, &touches);
-        let best = best_on_grid(&bounds, &touches, [14, 2]);
+        let best = best_on_grid(&bounds, &touches, [6, 2]);
         assert!(fit.log_likelihood > best - 1e-3, "{} {best}", fit.log_likelihood);
         assert!(fit.factorisations < 400, "{}", fit.factorisations);
     }

@@ -54,7 +54,8 @@ fn direct_asks_for_the_places_of_nlopts() {
         let mut next = ours.iter();
         let found = theirs.iter().filter(|place| next.any(|ours| ours == *place)).count();
         assert_eq!((theirs.len(), found), (800, 800), "{dimension}: {}", ours.len());
-        assert!(ours.len() < 820, "{}", ours.len());
+        // More only where a better value was found within a round.
+        assert!(ours.len() < 900, "{}", ours.len());
     }
 }
 

@@ -1,4 +1,4 @@
-//! Where an acquisition function is largest: DIRECT finds its hills, climbs go up them side by side.
+//! Where an acquisition function is largest: DIRECT finds its hills, climbs go up side by side.
 //!
 //! The function is asked for whole lists of places: values of many cost less than many values.
 
