@@ -200,7 +200,7 @@ $(LIBRARY) $(MUJOCO_LICENCES) &: .cargo/mujoco.txt | tools
 	rm -rf $(DEPS)/mujoco
 	ln -sf libmujoco.so.$(MUJOCO) $@
 
-# cmake builds NLopt: the machine's own, or the one of the Python package.
+# cmake builds NLopt, which tests hold DIRECT against: the machine's own, or the one of the Python package.
 $(CMAKE): .cargo/cmake.txt | tools
 	mkdir -p $(DEPS)/bin
 	@if command -v cmake >/dev/null; then \

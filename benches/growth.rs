@@ -19,9 +19,6 @@ use std::time::Instant;
 
 const COUNTS: [usize; 9] = [10, 25, 50, 100, 200, 400, 1000, 2000, 4000];
 
-/// Cold fits are measured up to here; beyond, a fit is as many likelihoods as below.
-const FIT_MAX: usize = 1000;
-
 /// One measured quantity over the counts.
 struct Curve {
     name: &'static str,
@@ -58,14 +55,12 @@ fn measure() -> Vec<Curve> {
     for count in COUNTS {
         let n = count as f64;
         let touches = touches(count);
-        if count <= FIT_MAX {
-            fit.seconds.push((
-                n,
-                seconds(|| {
-                    black_box(bounds.fit(&KERNEL, &touches, None));
-                }),
-            ));
-        }
+        fit.seconds.push((
+            n,
+            seconds(|| {
+                black_box(bounds.fit(&KERNEL, &touches));
+            }),
+        ));
         let mut scorer = Likelihood::new(&KERNEL, Mean::Zero, &touches);
         let mut gradient = [0.0; 4];
         likelihood.seconds.push((

@@ -28,7 +28,7 @@ fn main() -> Result<(), CovarianceError> {
     }
     println!("heights  length m  signal m  largest sd m    rmse m    next x m");
     while observations.len() <= 30 {
-        let fit = search_box.fit(&SquaredExponential, &observations, None);
+        let fit = search_box.fit(&SquaredExponential, &observations);
         let found = &fit.hyperparameters;
         let belief = Posterior::new(&SquaredExponential, found.clone(), observations.clone())?;
         let predictions = belief.predict(grid.iter().map(|place| place.as_slice()));

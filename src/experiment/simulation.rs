@@ -17,7 +17,7 @@ use crate::backend::{Backend, Fault};
 use crate::explore::planner;
 use crate::explore::probe::Probe;
 use crate::explore::probe::servo::Servo;
-use crate::math::{optimize, seed};
+use crate::math::seed;
 use crate::sim::Environment;
 use crate::sim::environment::EnvironmentError;
 use crate::sim::simulator::{Simulator, SimulatorError};
@@ -47,12 +47,6 @@ pub enum SimulationError {
     /// Its body cannot be made.
     #[error(transparent)]
     Simulator(#[from] SimulatorError),
-    /// This build lacks what every experiment needs.
-    #[error("this build has no optimisers; build with the feature `{feature}` to run experiments")]
-    NotBuilt {
-        /// The missing feature.
-        feature: &'static str,
-    },
     /// The scan that is its truth cannot be read.
     #[error(transparent)]
     Cloud(#[from] CloudError),
@@ -110,9 +104,6 @@ impl Simulation {
         environment: Arc<Environment>,
         truth: Truth,
     ) -> Result<Self, SimulationError> {
-        if !optimize::BUILT {
-            return Err(SimulationError::NotBuilt { feature: "nlopt" });
-        }
         experiment.scene = environment.scene().clone();
         Ok(Self {
             experiment,

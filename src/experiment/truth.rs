@@ -2,7 +2,6 @@
 
 use super::metrics::{Calibration, Errors, Metrics, Sums};
 use crate::gp::Posterior;
-use crate::gp::posterior::Scratch;
 use crate::sim::Environment;
 use crate::sim::reach;
 use crate::task::Zone;
@@ -79,11 +78,11 @@ impl Truth {
 
     /// Root mean square error of a belief wherever there is a surface; none if nobody knows of any.
     pub fn rmse_m(&self, belief: &Posterior) -> Option<f64> {
-        let mut scratch = Scratch::default();
         let mut errors = Errors::default();
-        for (place, truth) in self.places.iter().zip(&self.heights_m) {
+        let means = belief.means(self.places.iter().map(Vec::as_slice));
+        for (mean, truth) in means.iter().zip(&self.heights_m) {
             if let Some(truth) = truth {
-                errors.add(truth - belief.mean(place, &mut scratch));
+                errors.add(truth - mean);
             }
         }
         errors.rmse()
@@ -97,11 +96,12 @@ impl Truth {
         let mut sums = Sums::default();
         let [mut edge, mut reachable, mut unreachable] = [Errors::default(); 3];
         let mut calibration = Calibration::default();
-        let mut scratch = Scratch::default();
+        let means = belief.means(self.places.iter().map(Vec::as_slice));
+        let calibrated: Vec<Vec<f64>> = self.places.iter().step_by(CALIBRATED).cloned().collect();
+        let variances = belief.variances(&calibrated, &mut []);
         let noise2 = belief.hyperparameters().noise_sd.powi(2);
-        for (i, place) in self.places.iter().enumerate() {
+        for (i, mean) in means.into_iter().enumerate() {
             let Some(truth) = self.heights_m[i] else { continue };
-            let mean = belief.mean(place, &mut scratch);
             sums.add(truth, mean);
             if self.is_edge[i] {
                 edge.add(truth - mean);
@@ -109,7 +109,7 @@ impl Truth {
             let reached = if self.is_reachable[i] { &mut reachable } else { &mut unreachable };
             reached.add(truth - mean);
             if i % CALIBRATED == 0 {
-                calibration.add(truth - mean, belief.variance(place, &mut scratch) + noise2);
+                calibration.add(truth - mean, variances[i / CALIBRATED] + noise2);
             }
         }
         Some(sums.metrics([edge, reachable, unreachable], calibration))

@@ -243,6 +243,18 @@ impl Belief {
             None => f64::NAN,
         }
     }
+
+    /// The same at each of `places`, with the gradients if there is room for them.
+    pub fn explorable_variances(
+        &self,
+        places: &[Vec<f64>],
+        gradients: &mut [Vec<f64>],
+    ) -> Vec<f64> {
+        match self.explorable() {
+            Some(posterior) => posterior.variances(places, gradients),
+            None => vec![f64::NAN; places.len()],
+        }
+    }
 }
 
 /// What takes the band of 95 % to where it holds that share of the deviations `z`: the smallest

@@ -1,12 +1,8 @@
-//! Mean and variance at many places: the factor is read once for sixteen of them.
+//! Mean, variance and its gradient at many places: the factor is read once for sixteen of them.
 
-use super::cholesky::Factor;
 use super::posterior::{Posterior, Scratch};
 use crate::math::simd::widest;
 use pulp::NullaryFnOnce;
-
-/// Places solved side by side: four vectors of four numbers hide the latency of their additions.
-pub(super) const LANES: usize = 16;
 
 /// Belief at one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,64 +13,241 @@ pub struct Prediction {
     pub variance: f64,
 }
 
+/// Places solved side by side: with four rows of the factor eight vectors of the widest kind.
+const MANY: usize = 16;
+/// As many for the last few.
+const FEW: usize = 8;
+
+/// What is asked of the places of one block.
+enum Asked<'a> {
+    Means,
+    Variances,
+    Both,
+    Gradients(&'a mut [Vec<f64>]),
+}
+
+/// Of as many places as fit side by side.
+#[derive(Default)]
+struct Lanes<const N: usize> {
+    correlations: Vec<[f64; N]>,
+    slopes: Vec<[f64; N]>,
+    solved: Vec<[f64; N]>,
+    scratch: Scratch,
+}
+
 impl Posterior {
-    /// [`mean`](Self::mean) and [`variance`](Self::variance) at each of `places`, in n² operations
-    /// each like theirs but with a sixteenth of the memory read.
+    /// [`mean`](Self::mean) and [`variance`](Self::variance) at each of `places`.
     pub fn predict<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<Prediction> {
-        let mut places = places.into_iter().peekable();
-        let mut lanes = vec![[0.0; LANES]; self.observations().order()];
-        let mut scratch = Scratch::default();
-        let mut predictions = Vec::new();
-        while places.peek().is_some() {
-            let begin = predictions.len();
-            for (lane, place) in places.by_ref().take(LANES).enumerate() {
-                let (mean, correlations) = self.mean_with_correlations(place, &mut scratch);
-                lanes.iter_mut().zip(correlations).for_each(|(row, entry)| row[lane] = *entry);
-                predictions.push(Prediction { mean, variance: 0.0 });
-            }
-            let explained = self.factor().solve_lanes(&mut lanes);
-            for (prediction, explained) in predictions[begin..].iter_mut().zip(explained) {
-                prediction.variance = self.remaining(explained);
-            }
-        }
+        let places: Vec<&[f64]> = places.into_iter().collect();
+        let mut predictions = Vec::with_capacity(places.len());
+        self.in_blocks(&places, |_| Asked::Both, |prediction| predictions.push(prediction));
         predictions
     }
-}
 
-impl Factor {
-    /// Replaces each lane b by L⁻¹·b and returns bᵀ·A⁻¹·b of each.
-    pub(super) fn solve_lanes(&self, lanes: &mut [[f64; LANES]]) -> [f64; LANES] {
-        widest(SolveLanes { factor: self, lanes })
+    /// [`mean`](Self::mean) at each of `places`.
+    pub fn means<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
+        let places: Vec<&[f64]> = places.into_iter().collect();
+        let mut means = Vec::with_capacity(places.len());
+        self.in_blocks(&places, |_| Asked::Means, |prediction| means.push(prediction.mean));
+        means
+    }
+
+    /// [`variance`](Self::variance) at each of `places`, with the gradients if there is room for
+    /// them.
+    pub fn variances(&self, places: &[Vec<f64>], gradients: &mut [Vec<f64>]) -> Vec<f64> {
+        let places: Vec<&[f64]> = places.iter().map(Vec::as_slice).collect();
+        let mut variances = Vec::with_capacity(places.len());
+        let mut gradients = gradients;
+        let asked = |count: usize| match std::mem::take(&mut gradients) {
+            [] => Asked::Variances,
+            all => {
+                let (now, later) = all.split_at_mut(count.min(all.len()));
+                gradients = later;
+                Asked::Gradients(now)
+            }
+        };
+        self.in_blocks(&places, asked, |prediction| variances.push(prediction.variance));
+        variances
+    }
+
+    fn in_blocks<'a>(
+        &self,
+        places: &[&[f64]],
+        mut asked: impl FnMut(usize) -> Asked<'a>,
+        mut tell: impl FnMut(Prediction),
+    ) {
+        let (mut many, mut few) = (Lanes::<MANY>::default(), Lanes::<FEW>::default());
+        for block in places.chunks(MANY) {
+            let asked = asked(block.len());
+            match block.len() <= FEW {
+                true => few.predict(self, block, asked, &mut tell),
+                false => many.predict(self, block, asked, &mut tell),
+            }
+        }
     }
 }
 
-struct SolveLanes<'a> {
-    factor: &'a Factor,
-    lanes: &'a mut [[f64; LANES]],
-}
+impl<const N: usize> Lanes<N> {
+    fn predict(
+        &mut self,
+        posterior: &Posterior,
+        places: &[&[f64]],
+        asked: Asked,
+        tell: &mut impl FnMut(Prediction),
+    ) {
+        self.correlate(posterior, places, matches!(asked, Asked::Gradients(_)));
+        let mut predictions = [Prediction { mean: f64::NAN, variance: f64::NAN }; N];
+        if matches!(asked, Asked::Means | Asked::Both) {
+            let mean = posterior.hyperparameters().mean;
+            let sums = self.weighted(posterior.weights());
+            predictions.iter_mut().zip(sums).for_each(|(at, sum)| at.mean = mean + sum);
+        }
+        if !matches!(asked, Asked::Means) {
+            self.solved.clone_from(&self.correlations);
+            let explained = posterior.factor().solve_lower_lanes(&mut self.solved);
+            for (at, explained) in predictions.iter_mut().zip(explained) {
+                at.variance = posterior.remaining(explained);
+            }
+        }
+        if let Asked::Gradients(gradients) = asked {
+            posterior.factor().solve_upper_lanes(&mut self.solved);
+            self.differentiate(posterior, places, gradients);
+        }
+        predictions[..places.len()].iter().for_each(|prediction| tell(*prediction));
+    }
 
-impl NullaryFnOnce for SolveLanes<'_> {
-    type Output = [f64; LANES];
+    /// Correlations of the places with what was observed, and their slopes if asked; lanes without
+    /// a place repeat the first.
+    fn correlate(&mut self, posterior: &Posterior, places: &[&[f64]], is_sloped: bool) {
+        let observations = posterior.observations();
+        let lengths = &posterior.hyperparameters().length_scales;
+        let Some(first) = places.first() else { return };
+        self.correlations.clear();
+        self.correlations.resize(observations.order(), [0.0; N]);
+        if observations.has_slopes() {
+            for (lane, place) in places.iter().enumerate() {
+                let row = posterior.mean_with_correlations(place, &mut self.scratch).1;
+                let lanes = self.correlations.iter_mut();
+                lanes.zip(row).for_each(|(lanes, entry)| lanes[lane] = *entry);
+            }
+            return;
+        }
+        for (axis, length) in lengths.iter().enumerate() {
+            let at: [f64; N] = std::array::from_fn(|lane| places.get(lane).unwrap_or(first)[axis]);
+            let per_length = 1.0 / length;
+            let column = observations.column(axis);
+            widest(AddSquares { r2: &mut self.correlations, at, column, per_length });
+        }
+        let entries = self.correlations.as_flattened_mut();
+        if is_sloped {
+            self.slopes.resize(observations.len(), [0.0; N]);
+            posterior.kernel().correlate_slope(entries, self.slopes.as_flattened_mut());
+        } else {
+            posterior.kernel().correlate(entries);
+        }
+    }
 
-    #[inline(always)]
-    fn call(self) -> [f64; LANES] {
-        let mut squares = [0.0; LANES];
-        for i in 0..self.lanes.len() {
-            let row = self.factor.row(i);
-            let (done, rest) = self.lanes.split_at_mut(i);
-            let mut sum = rest[0];
-            for (l, solved) in row.iter().zip(done) {
-                for lane in 0..LANES {
-                    sum[lane] -= l * solved[lane];
+    /// Σ_i w_i·c_i of each lane.
+    fn weighted(&self, weights: &[f64]) -> [f64; N] {
+        widest(Weighted { correlations: &self.correlations, weights })
+    }
+
+    /// The gradients of the variances, after A⁻¹·k* was solved.
+    fn differentiate(
+        &mut self,
+        posterior: &Posterior,
+        places: &[&[f64]],
+        gradients: &mut [Vec<f64>],
+    ) {
+        let observations = posterior.observations();
+        let at = posterior.hyperparameters();
+        let signal2 = at.signal_sd * at.signal_sd;
+        if observations.has_slopes() {
+            for (lane, (place, gradient)) in places.iter().zip(gradients).enumerate() {
+                let solved: Vec<f64> = self.solved.iter().map(|lanes| lanes[lane]).collect();
+                posterior.weighted_slopes(place, &solved, gradient, &mut self.scratch);
+                gradient.iter_mut().for_each(|slope| *slope *= -2.0 * signal2);
+            }
+            return;
+        }
+        for (axis, length) in at.length_scales.iter().enumerate() {
+            let places: [f64; N] =
+                std::array::from_fn(|lane| places.get(lane).unwrap_or(&places[0])[axis]);
+            let (solved, slopes) = (&self.solved, &self.slopes);
+            let column = observations.column(axis);
+            let sums = widest(Steps { solved, slopes, at: places, column });
+            for (gradient, sum) in gradients.iter_mut().zip(sums) {
+                if let Some(slope) = gradient.get_mut(axis) {
+                    *slope = -4.0 * signal2 * sum / (length * length);
                 }
             }
-            let scale = 1.0 / row[i];
-            for lane in 0..LANES {
-                sum[lane] *= scale;
-                squares[lane] += sum[lane] * sum[lane];
-            }
-            rest[0] = sum;
         }
-        squares
+    }
+}
+
+/// Adds ((at − x) / length)² of one axis.
+struct AddSquares<'a, const N: usize> {
+    r2: &'a mut [[f64; N]],
+    at: [f64; N],
+    column: &'a [f64],
+    per_length: f64,
+}
+
+impl<const N: usize> NullaryFnOnce for AddSquares<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (r2, x) in self.r2.iter_mut().zip(self.column) {
+            for lane in 0..N {
+                let step = (self.at[lane] - x) * self.per_length;
+                r2[lane] = step.mul_add(step, r2[lane]);
+            }
+        }
+    }
+}
+
+/// Σ_i w_i·c_i.
+struct Weighted<'a, const N: usize> {
+    correlations: &'a [[f64; N]],
+    weights: &'a [f64],
+}
+
+impl<const N: usize> NullaryFnOnce for Weighted<'_, N> {
+    type Output = [f64; N];
+
+    #[inline(always)]
+    fn call(self) -> [f64; N] {
+        let mut sums = [0.0; N];
+        for (correlations, weight) in self.correlations.iter().zip(self.weights) {
+            for lane in 0..N {
+                sums[lane] = weight.mul_add(correlations[lane], sums[lane]);
+            }
+        }
+        sums
+    }
+}
+
+/// Σ_i u_i·c′_i·(at − x_i) of one axis.
+struct Steps<'a, const N: usize> {
+    solved: &'a [[f64; N]],
+    slopes: &'a [[f64; N]],
+    at: [f64; N],
+    column: &'a [f64],
+}
+
+impl<const N: usize> NullaryFnOnce for Steps<'_, N> {
+    type Output = [f64; N];
+
+    #[inline(always)]
+    fn call(self) -> [f64; N] {
+        let mut sums = [0.0; N];
+        for ((solved, slopes), x) in self.solved.iter().zip(self.slopes).zip(self.column) {
+            for lane in 0..N {
+                let term = solved[lane] * slopes[lane];
+                sums[lane] = term.mul_add(self.at[lane] - x, sums[lane]);
+            }
+        }
+        sums
     }
 }

@@ -1,6 +1,6 @@
 //! A choice of kernels by how likely each makes the observations.
 
-use super::fit::Fit;
+use super::fit::{Fit, Refits};
 use super::kernel;
 use super::kernel::Kernel;
 use super::observations::Observations;
@@ -16,9 +16,7 @@ pub struct Choice {
 #[derive(Clone)]
 struct Candidate {
     name: &'static str,
-    kernel: &'static dyn Kernel,
-    /// The last fit, from which the next one starts.
-    last: Option<Fit>,
+    fits: Refits,
 }
 
 impl Choice {
@@ -28,8 +26,7 @@ impl Choice {
         let known = |name: &&(&str, &dyn Kernel)| names.iter().any(|asked| asked == name.0);
         let candidate = |(name, kernel): &(&'static str, &'static dyn Kernel)| Candidate {
             name,
-            kernel: *kernel,
-            last: None,
+            fits: Refits::of(*kernel),
         };
         let mut candidates: Vec<Candidate> =
             kernel::KERNELS.iter().filter(known).map(candidate).collect();
@@ -41,22 +38,19 @@ impl Choice {
 
     /// The chosen one.
     pub fn kernel(&self) -> &'static dyn Kernel {
-        self.candidates[self.chosen].kernel
+        self.candidates[self.chosen].fits.kernel()
     }
 
     /// Whether all of them can observe slopes.
     pub fn has_slopes(&self) -> bool {
-        self.candidates.iter().all(|candidate| candidate.kernel.has_slopes())
+        self.candidates.iter().all(|candidate| candidate.fits.kernel().has_slopes())
     }
 
     /// Fits all and chooses the likeliest. Names it if there was a choice; the factorisations are
     /// those of all.
     pub fn fit(&mut self, search_box: &SearchBox, observations: &Observations) -> Fit {
-        let fits: Vec<Fit> = (self.candidates.iter())
-            .map(|Candidate { kernel, last, .. }| {
-                search_box.fit(*kernel, observations, last.as_ref())
-            })
-            .collect();
+        let fit = |candidate: &mut Candidate| candidate.fits.fit(search_box, observations);
+        let fits: Vec<Fit> = self.candidates.iter_mut().map(fit).collect();
         let likelihood = |i: &usize| fits[*i].log_likelihood;
         // Of equals the first.
         let likeliest =
@@ -66,9 +60,6 @@ impl Choice {
         fit.factorisations = fits.iter().map(|fit| fit.factorisations).sum();
         if let [_, _, ..] = self.candidates[..] {
             fit.kernel = Some(self.candidates[self.chosen].name.into());
-        }
-        for (candidate, fit) in self.candidates.iter_mut().zip(fits) {
-            candidate.last = Some(fit);
         }
         fit
     }

@@ -1,20 +1,24 @@
-//! Cholesky factorisation and inversion of a whole covariance matrix: unblocked for the small ones,
-//! which a search factors by the thousand, and by faer's blocked algorithms for the others.
+//! Cholesky factorisation and inversion of a whole covariance matrix: in tiles where it fits into
+//! the cache, and by faer's blocked algorithms where it does not.
 
 use super::indefinite::NotPositiveDefinite;
-use super::unblocked;
-use crate::math::simd::{dot, widest};
+use super::tiles;
+use crate::math::simd::{widest, widest_dot};
+use crate::math::vector::vectorised;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::{Accum, Mat, Par};
 
-/// Largest order factored unblocked. Measured: at 32 that takes half of faer's time, at 64 as much.
-const UNBLOCKED_MAX: usize = 64;
+/// Largest order factored in tiles.
+const TILED_MAX: usize = 320;
 
 /// A symmetric matrix that is factored in place; only its lower triangle is read and written.
+///
+/// In tiles the order is rounded up, with the identity in what is added.
 pub struct Dense {
+    order: usize,
     matrix: Mat<f64>,
     inverse: Mat<f64>,
     scratch: MemBuffer,
@@ -24,9 +28,13 @@ pub struct Dense {
 impl Dense {
     /// All zeros, of order `n`.
     pub fn new(n: usize) -> Self {
+        let padded = if n <= TILED_MAX { n.next_multiple_of(tiles::WIDE) } else { n };
+        let mut matrix = Mat::zeros(padded, padded);
+        (n..padded).for_each(|i| matrix[(i, i)] = 1.0);
         let need = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
         Self {
-            matrix: Mat::zeros(n, n),
+            order: n,
+            matrix,
             inverse: Mat::zeros(0, 0),
             scratch: MemBuffer::new(need),
             log_determinant: 0.0,
@@ -35,18 +43,18 @@ impl Dense {
 
     /// Order of the matrix.
     pub fn order(&self) -> usize {
-        self.matrix.nrows()
+        self.order
     }
 
     /// Column `j` from its diagonal down.
     #[inline(always)]
     pub fn column(&self, j: usize) -> &[f64] {
-        &self.matrix.col_as_slice(j)[j..]
+        &self.matrix.col_as_slice(j)[j..self.order]
     }
 
     /// Column `j` from its diagonal down.
     pub fn column_mut(&mut self, j: usize) -> &mut [f64] {
-        &mut self.matrix.col_as_slice_mut(j)[j..]
+        &mut self.matrix.col_as_slice_mut(j)[j..self.order]
     }
 
     /// Replaces A by L with A = L·Lᵀ: n³/3 operations.
@@ -55,8 +63,8 @@ impl Dense {
     /// If A is not positive definite to within rounding: a pivot lost to cancellation is as good
     /// as none, its sign is noise. `largest` is A's largest diagonal entry.
     pub fn factor(&mut self, largest: f64) -> Result<(), NotPositiveDefinite> {
-        match self.order() <= UNBLOCKED_MAX {
-            true => widest(unblocked::Factor(self.matrix.as_mut()))?,
+        match self.order <= TILED_MAX {
+            true => vectorised(tiles::Factor(self.matrix.as_mut()))?,
             false => self.factor_blocked()?,
         }
         let is_lost = |i: &usize| {
@@ -104,24 +112,23 @@ impl Dense {
 
     /// Replaces b by L⁻ᵀ·b with the factored matrix.
     pub fn solve_upper(&self, b: &mut [f64]) {
-        widest(|| {
-            for j in (0..b.len()).rev() {
-                let column = self.column(j);
-                b[j] = (b[j] - dot(&column[1..], &b[j + 1..])) / column[0];
-            }
-        });
+        for j in (0..b.len()).rev() {
+            let column = self.column(j);
+            b[j] = (b[j] - widest_dot(&column[1..], &b[j + 1..])) / column[0];
+        }
     }
 
     /// Computes A⁻¹ = XᵀX with X = L⁻¹ of the factored matrix: 2n³/3 operations. The factor is
     /// used up: what needs it comes before.
     pub fn invert(&mut self) {
-        let n = self.order();
+        let n = self.matrix.nrows();
         if self.inverse.nrows() != n {
             self.inverse = Mat::zeros(n, n);
         }
-        if n <= UNBLOCKED_MAX {
-            let (factor, inverse) = (self.matrix.as_ref(), self.inverse.as_mut());
-            return widest(unblocked::Invert { factor, inverse });
+        if self.order <= TILED_MAX {
+            let (factor, upper) = (self.matrix.as_mut(), self.inverse.as_mut());
+            vectorised(tiles::Invert { factor, upper });
+            return std::mem::swap(&mut self.matrix, &mut self.inverse);
         }
         invert_lower_triangular(self.inverse.as_mut(), self.matrix.as_ref(), Par::Seq);
         triangular::matmul(
@@ -140,6 +147,6 @@ impl Dense {
 
     /// Column `j` of A⁻¹ from its diagonal down, after [`invert`](Self::invert).
     pub fn inverse_column(&self, j: usize) -> &[f64] {
-        &self.inverse.col_as_slice(j)[j..]
+        &self.inverse.col_as_slice(j)[j..self.order]
     }
 }

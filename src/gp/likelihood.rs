@@ -9,7 +9,7 @@ use super::kernel::{Hyperparameters, Kernel};
 use super::mean::Mean;
 use super::observations::{NoiseRatio, Observations};
 use super::range::Scale;
-use crate::math::simd::{dot, widest};
+use crate::math::simd::{widest, widest_dot};
 
 /// Scores hyperparameters against fixed observations; keeps its buffers between calls.
 ///
@@ -40,6 +40,15 @@ pub struct ProfiledLikelihood {
     pub signal_sd: f64,
     /// The mean that the model chooses.
     pub mean: f64,
+}
+
+/// The log marginal likelihood of `order` heights, given yᵀA⁻¹y and ln |A|.
+pub(super) fn of_height(fit: f64, signal_sd: f64, order: usize, log_determinant: f64) -> f64 {
+    let n = order as f64;
+    -0.5 * fit / (signal_sd * signal_sd)
+        - n * signal_sd.ln()
+        - 0.5 * log_determinant
+        - 0.5 * n * (2.0 * std::f64::consts::PI).ln()
 }
 
 impl<'a> Likelihood<'a> {
@@ -124,11 +133,8 @@ impl<'a> Likelihood<'a> {
     }
 
     fn value(&self, signal_sd: f64, length_scales: &[f64], fit: f64) -> f64 {
-        let n = self.observations.order() as f64;
-        let value = -0.5 * fit / (signal_sd * signal_sd)
-            - n * signal_sd.ln()
-            - 0.5 * self.dense.log_determinant()
-            - 0.5 * n * (2.0 * std::f64::consts::PI).ln();
+        let order = self.observations.order();
+        let value = of_height(fit, signal_sd, order, self.dense.log_determinant());
         let logs: f64 = length_scales.iter().map(|length| length.ln()).sum();
         value + self.observations.sloped() as f64 * logs
     }
@@ -145,7 +151,7 @@ impl<'a> Likelihood<'a> {
     fn whiten(&mut self, mean: f64, length_scales: &[f64]) -> f64 {
         self.observations.residuals(mean, length_scales, &mut self.weights);
         self.dense.solve_lower(&mut self.weights);
-        widest(|| dot(&self.weights, &self.weights))
+        widest_dot(&self.weights, &self.weights)
     }
 
     /// With respect to the logarithms of the length scales and of the noise ratio, by
@@ -185,13 +191,13 @@ impl<'a> Likelihood<'a> {
                     let column = observations.column(axis);
                     let (at, per_length) = (column[j], 1.0 / length);
                     self.scratch.resize(slopes.len(), 0.0);
-                    *by_length += widest(|| {
+                    widest(|| {
                         for (square, x) in self.scratch.iter_mut().zip(&column[j + 1..]) {
                             let step = (at - x) * per_length;
                             *square = step * step;
                         }
-                        dot(slopes, &self.scratch)
                     });
+                    *by_length += widest_dot(slopes, &self.scratch);
                 }
             }
         }

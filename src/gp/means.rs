@@ -3,7 +3,7 @@
 use super::kernel::Hyperparameters;
 use super::observations::Observations;
 use super::posterior::{Posterior, Scratch};
-use crate::math::simd::{dot, widest};
+use crate::math::simd::{widest, widest_dot};
 
 /// Places, and their correlations with what was observed so far.
 pub struct Means {
@@ -51,10 +51,8 @@ impl Means {
         }
         let (first, since) = belief.weights().split_at(self.order);
         self.means.clear();
-        widest(|| {
-            let rows = self.first.chunks_exact(self.order.max(1));
-            self.means.extend(rows.map(|row| mean + dot(row, first)));
-        });
+        let rows = self.first.chunks_exact(self.order.max(1));
+        self.means.extend(rows.map(|row| mean + widest_dot(row, first)));
         self.means.resize(many, *mean);
         for (column, weight) in self.since.chunks_exact(many.max(1)).zip(since) {
             widest(|| {

@@ -9,7 +9,6 @@
 //! Places and heights may be in any units: lengths and noise come out in the same.
 //!
 //! ```
-//! # #[cfg(feature = "nlopt")] {
 //! use palpate::gp::kernel::SquaredExponential;
 //! use palpate::gp::posterior::Scratch;
 //! use palpate::gp::{Mean, Observations, Posterior, SearchBox, TouchNoise};
@@ -32,7 +31,7 @@
 //!     touch_noise: TouchNoise::Fitted,
 //!     slope_noise_ratio: None,
 //! };
-//! let fit = search_box.fit(&SquaredExponential, &observations, None);
+//! let fit = search_box.fit(&SquaredExponential, &observations);
 //!
 //! // Between two observations it is right to a millimetre, and knows it.
 //! let belief = Posterior::new(&SquaredExponential, fit.hyperparameters, observations)?;
@@ -44,7 +43,6 @@
 //! // Far from all of them it falls back to its prior: mean 0, and the signal's deviation.
 //! let far_m = belief.variance(&[100.0], &mut scratch).sqrt();
 //! assert!((far_m - belief.hyperparameters().signal_sd).abs() < 1e-9);
-//! # }
 //! # Ok::<(), palpate::gp::covariance::CovarianceError>(())
 //! ```
 //!
@@ -72,6 +70,7 @@ mod derivative_covariance;
 pub mod fit;
 pub mod indefinite;
 pub mod kernel;
+mod lanes;
 pub mod likelihood;
 pub mod mean;
 pub mod means;
@@ -79,11 +78,12 @@ pub mod observations;
 pub mod posterior;
 pub mod range;
 pub mod reduction;
+mod scan;
 mod search;
 pub mod search_box;
-mod unblocked;
+mod tiles;
 
-pub use fit::Fit;
+pub use fit::{Fit, Refits};
 pub use kernel::{Hyperparameters, Kernel};
 pub use mean::Mean;
 pub use observations::{NoiseRatio, Observation, Observations, Slope};

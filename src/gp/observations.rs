@@ -104,6 +104,37 @@ impl Observations {
         self.slope_noise2.push(observation.slope.map_or(0.0, |slope| slope.noise * slope.noise));
     }
 
+    /// Whether the first ones are `others`.
+    pub(super) fn begin_with(&self, others: &Self) -> bool {
+        let count = others.len();
+        let same = |mine: &[f64], theirs: &[f64]| mine.get(..theirs.len()) == Some(theirs);
+        let columns = self.columns.iter().zip(&others.columns);
+        self.dimension() == others.dimension()
+            && columns.into_iter().all(|(mine, theirs)| same(mine, theirs))
+            && same(&self.heights, &others.heights)
+            && same(&self.height_noise2, &others.height_noise2)
+            && self.starts.get(..count) == Some(&others.starts)
+            && same(&self.slopes, &others.slopes)
+            && same(&self.slope_noise2, &others.slope_noise2)
+    }
+
+    /// Every second one.
+    pub(super) fn halved(&self) -> Self {
+        let mut half = Self::new(self.dimension());
+        for i in (0..self.len()).step_by(2) {
+            let place: Vec<f64> = self.place(i).collect();
+            let noise = self.slope_noise2[i].sqrt();
+            let gradient = self.slope(i);
+            half.take_in(&Observation {
+                place: &place,
+                height: self.heights[i],
+                noise: self.height_noise2[i].sqrt(),
+                slope: (!gradient.is_empty()).then_some(Slope { gradient, noise }),
+            });
+        }
+        half
+    }
+
     /// Number of coordinates.
     pub fn dimension(&self) -> usize {
         self.columns.len()

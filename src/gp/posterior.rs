@@ -9,7 +9,7 @@ use super::derivative_covariance::DerivativeCovariance;
 use super::indefinite::NotPositiveDefinite;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::{Observation, Observations};
-use crate::math::simd::{dot, widest};
+use crate::math::simd::widest_dot;
 
 /// Buffers of a query, so that asking allocates nothing.
 #[derive(Clone, Debug, Default)]
@@ -27,6 +27,8 @@ pub struct Posterior {
     hyperparameters: Hyperparameters,
     observations: Observations,
     factor: Factor,
+    /// L⁻¹·(y − m).
+    whitened: Vec<f64>,
     weights: Vec<f64>,
     jitter: f64,
 }
@@ -48,8 +50,9 @@ impl Posterior {
         let jitter =
             covariance::factor(&mut dense, kernel, &observations, lengths, noise_ratio, buffer)?;
         let factor = Factor::from(&dense);
-        let weights = Vec::new();
-        let mut new = Self { kernel, hyperparameters, observations, factor, weights, jitter };
+        let (whitened, weights) = (Vec::new(), Vec::new());
+        let mut new =
+            Self { kernel, hyperparameters, observations, factor, whitened, weights, jitter };
         new.weigh();
         Ok(new)
     }
@@ -130,10 +133,16 @@ impl Posterior {
         Self::new(self.kernel, self.hyperparameters.clone(), observations)
     }
 
+    /// Finds the weights: of what was weighed before only L⁻ᵀ is solved again.
     fn weigh(&mut self) {
         let Hyperparameters { mean, length_scales, .. } = &self.hyperparameters;
         self.observations.residuals(*mean, length_scales, &mut self.weights);
-        self.factor.solve_lower(&mut self.weights);
+        for (i, observed) in self.weights.iter().enumerate().skip(self.whitened.len()) {
+            let row = self.factor.row(i);
+            let known = widest_dot(&row[..i], &self.whitened);
+            self.whitened.push((observed - known) / row[i]);
+        }
+        self.weights.clone_from(&self.whitened);
         self.factor.solve_upper(&mut self.weights);
     }
 
@@ -165,8 +174,21 @@ impl Posterior {
         row.resize(self.observations.order(), 0.0);
         for (axis, (slope, length)) in gradient.iter_mut().zip(lengths).enumerate() {
             derivatives.covariances(&self.observations, lengths, Some(axis), row);
-            *slope = widest(|| dot(row, weights)) / length;
+            *slope = widest_dot(row, weights) / length;
         }
+    }
+
+    /// Writes the gradient of Σ_i w_i·k(place, i), in units of the signal's variance.
+    pub(super) fn weighted_slopes(
+        &self,
+        place: &[f64],
+        weights: &[f64],
+        gradient: &mut [f64],
+        scratch: &mut Scratch,
+    ) {
+        self.covariances(place, None, scratch);
+        let Scratch { derivatives, row, .. } = scratch;
+        self.gradient_with_slopes(weights, (derivatives, row), gradient);
     }
 
     /// How far each height lies from what all other observations say of it, in standard deviations
@@ -220,7 +242,7 @@ impl Posterior {
     ) -> (f64, &'a [f64]) {
         self.covariances(place, None, scratch);
         let correlations = &scratch.solved;
-        let mean = self.hyperparameters.mean + widest(|| dot(correlations, &self.weights));
+        let mean = self.hyperparameters.mean + widest_dot(correlations, &self.weights);
         (mean, correlations)
     }
 
@@ -231,7 +253,7 @@ impl Posterior {
             self.covariances(place, None, scratch);
             let Scratch { solved, derivatives, row, .. } = scratch;
             self.gradient_with_slopes(&self.weights, (derivatives, row), gradient);
-            return self.hyperparameters.mean + widest(|| dot(solved, &self.weights));
+            return self.hyperparameters.mean + widest_dot(solved, &self.weights);
         }
         let Scratch { solved, slopes, .. } = scratch;
         solved.resize(self.observations.len(), 0.0);
@@ -244,7 +266,7 @@ impl Posterior {
             let sum: f64 = terms.map(|((weight, slope), x)| weight * slope * (at - x)).sum();
             *slope = 2.0 * sum / (lengths[axis] * lengths[axis]);
         }
-        self.hyperparameters.mean + widest(|| dot(solved, &self.weights))
+        self.hyperparameters.mean + widest_dot(solved, &self.weights)
     }
 
     /// Variance of the surface (without touch noise) k** − k*ᵀ·K⁻¹·k* at `place`, in [0, k**].

@@ -3,7 +3,7 @@
 
 use super::observations::Observations;
 use super::posterior::{Posterior, Scratch};
-use crate::math::simd::{dot, widest};
+use crate::math::simd::widest_dot;
 
 /// A posterior and the places at which its variance counts.
 pub struct Reduction<'a> {
@@ -47,12 +47,10 @@ impl<'a> Reduction<'a> {
         let lengths = &hyperparameters.length_scales;
         self.references.distances2(place.iter().copied(), lengths, 0, correlations);
         self.posterior.kernel().correlate(correlations);
-        let squares: f64 = widest(|| {
-            let pairs = correlations.iter().zip(&self.weights).enumerate();
-            pairs
-                .map(|(r, (prior, weight))| weight * (prior - self.explained(r, solved)).powi(2))
-                .sum()
-        });
+        let pairs = correlations.iter().zip(&self.weights).enumerate();
+        let squares: f64 = pairs
+            .map(|(r, (prior, weight))| weight * (prior - self.explained(r, solved)).powi(2))
+            .sum();
         let signal2 = hyperparameters.signal_sd.powi(2);
         let noise2 = hyperparameters.noise_sd.powi(2) / signal2 + self.posterior.jitter();
         let variance = (1.0 - explained).max(0.0) + noise2;
@@ -60,9 +58,8 @@ impl<'a> Reduction<'a> {
     }
 
     /// What the observations say of the covariance of reference `r` with the place of `solved`.
-    #[inline(always)]
     fn explained(&self, r: usize, solved: &[f64]) -> f64 {
         let start = r * solved.len();
-        dot(&self.whitened[start..start + solved.len()], solved)
+        widest_dot(&self.whitened[start..start + solved.len()], solved)
     }
 }

@@ -1,21 +1,27 @@
 //! How the most likely hyperparameters are sought: a coarse scan finds the hills of the profiled
-//! likelihood, L-BFGS climbs those that may be the highest.
+//! likelihood, climbs go up those that may be the highest.
 
 use super::kernel::{Hyperparameters, Kernel};
-use super::likelihood::Likelihood;
+use super::likelihood::{Likelihood, ProfiledLikelihood};
 use super::observations::Observations;
 use super::range::Scale;
+use super::scan::{Grid, Scan};
 use super::search_box::{SearchBox, TouchNoise};
-use crate::math::optimize;
-use crate::math::optimize::{Optimum, Stop};
+use crate::math::climb::{Climb, Manner, climb};
+use crate::math::optimize::{Bounds, Stop};
 
-/// Evaluations allowed to one climb; most need a fifth of it.
-const CLIMB_BUDGET: u32 = 100;
+/// A climb ends where less than a ten-thousandth of a nat is to be won, which no data could tell;
+/// most need a tenth of the budget. The first step is a third of the way between two places of
+/// the scan; all chosen.
+const MANNER: Manner = Manner { first_step: 0.05, gain: 1e-4, relative_gain: 0.0, budget: 100 };
+/// A climb is given up that would stay below the highest top if it won so many times what its
+/// parabola says; chosen, see [`SearchBox::fit`] for what that misses.
+const HOPE: f64 = 4.0;
+/// Nor does it go on this near to the highest top, in units of the box's sides, and below it.
+const SAME_TOP: f64 = 0.02;
 /// Hills of the scan that are climbed at most; chosen: enough for the fits of the toy that were
 /// held against a dense grid.
 const CLIMBS: usize = 2;
-/// Noise levels of the scan, from the least to the largest; climbs find what lies between.
-const NOISE_LEVELS: usize = 2;
 /// Tops that differ by less nats are the same one; chosen above the likelihood's rounding.
 const GAIN_MIN: f64 = 1e-6;
 /// Where another noise makes the data less likely by up to this many nats, its own top may be the
@@ -29,16 +35,28 @@ pub(super) struct Peak {
     pub log_likelihood: f64,
     /// Why the climb to it stopped.
     pub stop: Stop,
+    /// Minus the second derivatives there, for the next climb in the same box.
+    pub curvature: Vec<f64>,
+}
+
+/// The highest top so far.
+struct Top {
+    x: Vec<f64>,
+    score: f64,
+    profile: ProfiledLikelihood,
+    stop: Stop,
+    curvature: Vec<f64>,
 }
 
 /// One search of a box, over (ln lengths, ln noise ratio, ln slope noise ratio if there is one).
 pub(super) struct Search<'a> {
     sought: &'a SearchBox,
+    kernel: &'static dyn Kernel,
+    observations: &'a Observations,
     likelihood: Likelihood<'a>,
     scale: Scale,
-    bounds: optimize::Bounds<'a>,
-    /// The highest top so far.
-    best: Option<Optimum>,
+    bounds: Bounds<'a>,
+    best: Option<Top>,
 }
 
 impl<'a> Search<'a> {
@@ -55,8 +73,8 @@ impl<'a> Search<'a> {
             TouchNoise::Fitted | TouchNoise::AtLeast(_) => Scale::Best(sought.signal_sd),
         };
         let likelihood = Likelihood::new(kernel, sought.mean, observations);
-        let bounds = optimize::Bounds { lower, upper };
-        Self { sought, likelihood, scale, bounds, best: None }
+        let bounds = Bounds { lower, upper };
+        Self { sought, kernel, observations, likelihood, scale, bounds, best: None }
     }
 
     /// How many matrices were factored so far.
@@ -65,37 +83,62 @@ impl<'a> Search<'a> {
     }
 
     fn best_score(&self) -> f64 {
-        self.best.as_ref().map_or(f64::NEG_INFINITY, |best| best.value)
+        self.best.as_ref().map_or(f64::NEG_INFINITY, |best| best.score)
     }
 
-    /// Climbs from `start` and keeps the top if it is the highest so far.
-    pub(super) fn climb(&mut self, start: &[f64]) {
-        let top = optimize::lbfgs(self.bounds, start, CLIMB_BUDGET, |x, gradient| {
-            score(self.sought, &mut self.likelihood, &self.scale, x, Some(gradient))
+    /// Climbs from `start`, if possible with the curvature of an earlier top, and keeps the top if
+    /// it is the highest so far.
+    pub(super) fn climb(&mut self, start: &[f64], curvature: Option<&[f64]>) {
+        let Self { sought, likelihood, scale, bounds, best, .. } = self;
+        let mut profile = None;
+        let (mut here, mut highest) = (None, f64::NEG_INFINITY);
+        let is_worth = |climb: &Climb| {
+            let Some(best) = &best else { return true };
+            let is_lower = climb.top().value < best.score;
+            let apart = |((x, top), (lower, upper)): ((&f64, &f64), (&f64, &f64))| {
+                (x - top).abs() > SAME_TOP * (upper - lower)
+            };
+            let sides = bounds.lower.iter().zip(bounds.upper);
+            let is_apart = climb.top().x.iter().zip(&best.x).zip(sides).any(apart);
+            let is_hopeless = climb.is_measured() && climb.hope(HOPE) < best.score;
+            !(is_lower && (is_hopeless || !is_apart))
+        };
+        let start = Climb::new(*bounds, start, curvature, MANNER);
+        let (top, curvature) = climb(start, is_worth, |x, gradient| {
+            let value = score(sought, likelihood, scale, x, Some(gradient), &mut here);
+            if value > highest {
+                (highest, profile) = (value, here);
+            }
+            value
         });
-        if top.value > self.best_score() + GAIN_MIN {
-            self.best = Some(top);
+        if let Some(profile) = profile.filter(|_| top.value > self.best_score() + GAIN_MIN) {
+            let (x, score, stop) = (top.x, top.value, top.stop);
+            self.best = Some(Top { x, score, profile, stop, curvature });
         }
     }
 
     /// Scores a grid over the box and climbs its highest hills, but for those that cannot reach
-    /// what was found already.
-    pub(super) fn scan(&mut self) {
-        let levels = self.levels();
-        let count: usize = levels.iter().product();
-        let values: Vec<f64> = (0..count)
+    /// what was found already. With a `scan` it is asked what it knows of the grid.
+    pub(super) fn scan(&mut self, scan: Option<&mut Scan>) {
+        let grid = Grid::new(self.bounds, self.sought.length_scales.len());
+        let known = scan.map(|scan| {
+            scan.profiles(self.sought, (&grid, &self.scale), self.kernel, self.observations)
+        });
+        let Self { sought, likelihood, scale, .. } = self;
+        let values: Vec<f64> = (0..grid.len())
             .map(|index| {
-                let at = self.grid_point(index, &levels);
-                let score = score(self.sought, &mut self.likelihood, &self.scale, &at, None);
+                let at = grid.place(index);
+                let known = known.as_ref().and_then(|known| known[index]);
+                let score = match known {
+                    Some(profile) => with_priors(sought, scale, &at, &profile),
+                    None => score(sought, likelihood, scale, &at, None, &mut None),
+                };
                 if score.is_nan() { f64::NEG_INFINITY } else { score }
             })
             .collect();
-        let mut hills: Vec<usize> =
-            (0..count).filter(|&index| is_hill(index, &levels, &values)).collect();
-        hills.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
-        for &hill in hills.iter().take(CLIMBS) {
-            if values[hill] + rise(hill, &levels, &values) > self.best_score() {
-                self.climb(&self.grid_point(hill, &levels));
+        for (hill, rise) in grid.hills(&values).into_iter().take(CLIMBS) {
+            if values[hill] + rise > self.best_score() {
+                self.climb(&grid.place(hill), None);
             }
         }
     }
@@ -104,14 +147,20 @@ impl<'a> Search<'a> {
     /// as likely there: noise and lengths may trade, and leave two tops that differ little.
     pub(super) fn cross_noise(&mut self) {
         let Some(best) = &self.best else { return };
-        let (value, top) = (best.value, best.x.clone());
+        let (value, top) = (best.score, best.x.clone());
         for noise in self.sought.length_scales.len()..top.len() {
             for level in [self.bounds.lower[noise], self.bounds.upper[noise]] {
                 let mut at = top.clone();
                 at[noise] = level;
-                let score = score(self.sought, &mut self.likelihood, &self.scale, &at, None);
+                let is_near = (level - top[noise]).abs()
+                    <= SAME_TOP * (self.bounds.upper[noise] - self.bounds.lower[noise]);
+                if is_near {
+                    continue;
+                }
+                let score =
+                    score(self.sought, &mut self.likelihood, &self.scale, &at, None, &mut None);
                 if score > value - NEARLY_AS_LIKELY {
-                    self.climb(&at);
+                    self.climb(&at, None);
                 }
             }
         }
@@ -119,38 +168,15 @@ impl<'a> Search<'a> {
 
     /// The highest top; none if no covariance could be factored.
     pub(super) fn conclude(&mut self) -> Option<Peak> {
-        let best = self.best.as_ref().filter(|best| best.value > f64::MIN)?;
-        let (length_scales, noise) = self.sought.parameters(&best.x);
-        let profile = self.likelihood.profile(&length_scales, noise, &self.scale, None).ok()?;
+        let Top { x, profile, stop, curvature, .. } = self.best.take()?;
+        let (length_scales, noise) = self.sought.parameters(&x);
         let (signal_sd, mean) = (profile.signal_sd, profile.mean);
         Some(Peak {
             hyperparameters: Hyperparameters::new(signal_sd, length_scales, noise, mean),
             log_likelihood: profile.log_likelihood,
-            stop: best.stop,
+            stop,
+            curvature,
         })
-    }
-
-    fn grid_point(&self, index: usize, levels: &[usize]) -> Vec<f64> {
-        digits(index, levels)
-            .zip(levels)
-            .zip(self.bounds.lower.iter().zip(self.bounds.upper))
-            .map(|((digit, &levels), (lower, upper))| {
-                lower + (upper - lower) * digit as f64 / (levels.max(2) - 1) as f64
-            })
-            .collect()
-    }
-
-    /// Grid points per parameter, the noises last.
-    fn levels(&self) -> Vec<usize> {
-        let lengths = self.sought.length_scales.len();
-        let per_length = match lengths {
-            1 => 18,
-            2 => 8,
-            _ => 5,
-        };
-        let mut levels = vec![per_length; lengths];
-        levels.resize(self.bounds.lower.len(), NOISE_LEVELS);
-        levels
     }
 }
 
@@ -162,58 +188,26 @@ fn score(
     scale: &Scale,
     x: &[f64],
     mut gradient: Option<&mut [f64]>,
+    told: &mut Option<ProfiledLikelihood>,
 ) -> f64 {
     let (lengths, noise) = sought.parameters(x);
     let profile = likelihood.profile(&lengths, noise, scale, gradient.as_deref_mut());
     let Ok(profile) = profile else { return f64::NAN };
-    let mut score = profile.log_likelihood + scale.log_prior(profile.signal_sd);
+    *told = Some(profile);
     for (i, (range, &log)) in sought.ranges().zip(x).enumerate() {
         let Some(prior) = range.prior else { continue };
-        score += prior.log_density(log);
         if let Some(slope) = gradient.as_deref_mut().and_then(|gradient| gradient.get_mut(i)) {
             *slope += prior.slope(log);
         }
     }
-    score
+    with_priors(sought, scale, x, &profile)
 }
 
-/// The place of grid point `index` along each parameter, the last varying fastest.
-fn digits(index: usize, levels: &[usize]) -> impl Iterator<Item = usize> {
-    let mut stride: usize = levels.iter().product();
-    let mut rest = index;
-    levels.iter().map(move |levels| {
-        stride /= levels;
-        let digit = rest / stride;
-        rest %= stride;
-        digit
-    })
-}
-
-/// The values of the neighbours of grid point `index`, parameter by parameter.
-fn neighbours(
-    index: usize,
-    levels: &[usize],
-    values: &[f64],
-) -> impl Iterator<Item = [Option<f64>; 2]> {
-    let mut stride = values.len();
-    digits(index, levels).zip(levels).map(move |(digit, levels)| {
-        stride /= levels;
-        let below = (digit > 0).then(|| values[index - stride]);
-        let above = (digit + 1 < *levels).then(|| values[index + stride]);
-        [below, above]
-    })
-}
-
-/// Whether no neighbour along any parameter is higher.
-fn is_hill(index: usize, levels: &[usize], values: &[f64]) -> bool {
-    let mut beside = neighbours(index, levels, values).flatten().flatten();
-    beside.all(|value| value <= values[index])
-}
-
-/// What a hill may rise above its highest grid point: along each parameter a quarter of its fall
-/// to the lower neighbour, where a parabola's top is at most an eighth of it higher.
-fn rise(index: usize, levels: &[usize], values: &[f64]) -> f64 {
-    let lowest =
-        |beside: [Option<f64>; 2]| beside.into_iter().flatten().fold(values[index], f64::min);
-    neighbours(index, levels, values).map(|beside| 0.25 * (values[index] - lowest(beside))).sum()
+/// Log likelihood plus log priors at `x`.
+fn with_priors(sought: &SearchBox, scale: &Scale, x: &[f64], at: &ProfiledLikelihood) -> f64 {
+    let priors = sought.ranges().zip(x).filter_map(|(range, &log)| {
+        let prior = range.prior?;
+        Some(prior.log_density(log))
+    });
+    priors.fold(at.log_likelihood + scale.log_prior(at.signal_sd), |sum, prior| sum + prior)
 }

@@ -1,10 +1,13 @@
 //! Mathematics that knows nothing of touch.
 
 pub mod banded;
+pub mod climb;
 pub mod clustered;
+pub mod direct;
 pub mod least_squares;
 pub mod normal;
 pub mod optimize;
 pub mod pose;
 pub mod seed;
 pub mod simd;
+pub mod vector;

@@ -29,7 +29,6 @@ impl Drop for Accepted {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn the_unbroken_folder_runs() {
     let folder = folder();
     let output = palpate(folder.path(), &["run", "small.toml"]);
@@ -224,7 +223,6 @@ fn broken_command_lines_are_refused() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn damaged_run_folders_are_refused_and_lose_nothing() {
     let folder = folder();
     let run =

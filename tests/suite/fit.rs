@@ -8,7 +8,9 @@ use palpate::gp::kernel;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::posterior::{Posterior, Scratch};
-use palpate::gp::{Fit, LogNormal, Mean, Observations, Range, Scale, SearchBox, TouchNoise};
+use palpate::gp::{
+    Fit, LogNormal, Mean, Observations, Range, Refits, Scale, SearchBox, TouchNoise,
+};
 use std::path::Path;
 
 static KERNEL: SquaredExponential = SquaredExponential;
@@ -73,7 +75,7 @@ fn fits_of_the_toys_trials_reach_the_global_maximum() {
             let best = best_on_grid(&bounds, &touches, [240, 30]);
             fits += 1;
             warm += usize::from(fit.log_likelihood < best - 1e-3);
-            let fit = bounds.fit(&KERNEL, &touches, None);
+            let fit = bounds.fit(&KERNEL, &touches);
             cold += usize::from(fit.log_likelihood < best - 1e-3);
         }
     }
@@ -89,19 +91,18 @@ fn fits_touch_by_touch_reach_what_cold_fits_reach() {
     let (mut fits, mut gaps) = (0, Vec::new());
     for trial in 0..4 {
         let mut touches = Observations::new(2);
-        let mut last = None;
+        let mut fits_so_far = Refits::of(&KERNEL);
         for i in 0..90 {
             let step = f64::from(trial) * 0.377 + f64::from(i);
             let place = [(step * 0.754_877_666) % 1.0, (step * 0.569_840_291) % 1.0];
             let bump = (-40.0 * ((place[0] - 0.6).powi(2) + (place[1] - 0.4).powi(2))).exp();
             touches.push(&place, 1.0 - place[0] * place[0] + 0.3 * bump);
-            let fit = bounds.fit(&KERNEL, &touches, last.as_ref());
+            let fit = fits_so_far.fit(&bounds, &touches);
             if i >= 20 && i % 5 == 0 {
-                let cold = bounds.fit(&KERNEL, &touches, None);
+                let cold = bounds.fit(&KERNEL, &touches);
                 fits += 1;
                 gaps.push(cold.log_likelihood - fit.log_likelihood);
             }
-            last = Some(fit);
         }
     }
     let short = gaps.iter().filter(|gap| **gap > 1e-3).count();
@@ -135,7 +136,7 @@ fn fits_of_hard_surfaces_reach_the_global_maximum_in_two_dimensions() {
                 let place = [(step * 0.754_877_666) % 1.0, (step * 0.569_840_291) % 1.0];
                 touches.push(&place, surface(place[0], place[1]));
             }
-            let fit = bounds.fit(&KERNEL, &touches, None);
+            let fit = bounds.fit(&KERNEL, &touches);
             gaps.push(best_on_grid(&bounds, &touches, [32, 4]) - fit.log_likelihood);
             fits += 1;
         }
@@ -143,6 +144,24 @@ fn fits_of_hard_surfaces_reach_the_global_maximum_in_two_dimensions() {
     let short = gaps.iter().filter(|gap| **gap > 1e-3).count();
     let worst = gaps.iter().fold(0.0, |worst: f64, gap| worst.max(*gap));
     assert!(fits == 36 && short <= 1 && worst < 0.1, "{short} of {fits}, worst {worst}");
+}
+
+/// With many touches the hills are sought with every second one, and so on; the top is that of all.
+#[test]
+fn a_fit_of_many_touches_reaches_the_global_maximum() {
+    let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
+    for surface in hard_surfaces() {
+        let mut touches = Observations::new(2);
+        for i in 0..1100 {
+            let step = f64::from(i);
+            let place = [(step * 0.754_877_666) % 1.0, (step * 0.569_840_291) % 1.0];
+            touches.push(&place, surface(place[0], place[1]));
+        }
+        let fit = bounds.fit(&KERNEL, &touches);
+        let best = best_on_grid(&bounds, &touches, [6, 2]);
+        assert!(fit.log_likelihood > best - 1e-3, "{} {best}", fit.log_likelihood);
+        assert!(fit.factorisations < 400, "{}", fit.factorisations);
+    }
 }
 
 #[test]
@@ -153,7 +172,7 @@ fn a_fit_recovers_the_lengths_of_an_anisotropic_surface() {
         touches.push(&place, (9.0 * place[0]).sin() + 0.3 * place[1]);
     }
     let bounds = search_box(Mean::Zero, vec![(0.005, 1.0).into(); 2]);
-    let fit = bounds.fit(&KERNEL, &touches, None).hyperparameters;
+    let fit = bounds.fit(&KERNEL, &touches).hyperparameters;
     assert!(fit.length_scales[1] > 2.0 * fit.length_scales[0], "{fit:?}");
 }
 
@@ -165,20 +184,20 @@ fn a_prior_pulls_a_known_noise_stays_and_a_constant_is_found() {
         touches.push(&[x], 1000.0 + toy(x));
     }
     let free = search_box(Mean::Constant, vec![(0.02, 4.0).into()]);
-    let found = free.fit(&KERNEL, &touches, None).hyperparameters;
+    let found = free.fit(&KERNEL, &touches).hyperparameters;
     assert!((found.mean - 1001.0).abs() < 1.0 && found.signal_sd < 2.0, "{found:?}");
     let prior = Some(LogNormal { median: 1.0, spread: 1.05 });
     let ranges = vec![Range { prior, ..free.length_scales[0] }];
     let pulled = SearchBox { length_scales: ranges, ..free.clone() };
-    let pulled = pulled.fit(&KERNEL, &touches, None).hyperparameters;
+    let pulled = pulled.fit(&KERNEL, &touches).hyperparameters;
     let off = |length: f64| length.ln().abs();
     assert!(off(pulled.length_scales[0]) < off(found.length_scales[0]), "{pulled:?}");
     let known = SearchBox { touch_noise: TouchNoise::Known(0.05), ..free.clone() };
-    let known = known.fit(&KERNEL, &touches, None).hyperparameters;
+    let known = known.fit(&KERNEL, &touches).hyperparameters;
     assert!((known.noise_sd - 0.05).abs() < 1e-12, "{known:?}");
     // A sensor that is better than what the kernel cannot follow changes nothing, a worse one counts.
     let least = |sd| SearchBox { touch_noise: TouchNoise::AtLeast(sd), ..free.clone() };
-    let fitted = |sd| least(sd).fit(&KERNEL, &touches, None).hyperparameters;
+    let fitted = |sd| least(sd).fit(&KERNEL, &touches).hyperparameters;
     assert_eq!(fitted(0.9 * found.noise_sd), found);
     assert_eq!(fitted(0.05), known);
 }
@@ -196,10 +215,8 @@ fn of_several_kernels_the_likeliest_is_taken() {
         let names = ["matern_32", "squared_exponential"].map(String::from);
         let mut choice = Choice::between(&names);
         let fit = choice.fit(&bounds, &touches);
-        let alone: Vec<Fit> = names
-            .iter()
-            .map(|name| bounds.fit(kernel::by_name(name).unwrap(), &touches, None))
-            .collect();
+        let alone: Vec<Fit> =
+            names.iter().map(|name| bounds.fit(kernel::by_name(name).unwrap(), &touches)).collect();
         let best = alone.iter().map(|fit| fit.log_likelihood).fold(f64::MIN, f64::max);
         assert_eq!(fit.log_likelihood, best);
         assert_eq!(fit.factorisations, alone.iter().map(|fit| fit.factorisations).sum::<u32>());

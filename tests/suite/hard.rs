@@ -56,7 +56,7 @@ fn believe_with(
     side: f64,
     noisiest: f64,
 ) -> (Fit, Posterior) {
-    let fit = search_box(touches, side, noisiest).fit(&KERNEL, touches, None);
+    let fit = search_box(touches, side, noisiest).fit(&KERNEL, touches);
     assert_ne!(fit.stop, Stop::Failed, "{name}");
     let posterior = Posterior::new(&KERNEL, fit.hyperparameters.clone(), touches.clone()).unwrap();
     let mut scratch = Scratch::default();
@@ -215,7 +215,7 @@ fn an_offset_of_a_million_wants_a_mean_and_gets_it() {
     for mean in [Mean::Data, Mean::Constant] {
         let range =
             SearchBox { mean, signal_sd: (1e-3, 1e3).into(), ..search_box(&touches, 4.0, 1e-2) };
-        let fit = range.fit(&KERNEL, &touches, None);
+        let fit = range.fit(&KERNEL, &touches);
         let posterior = Posterior::new(&KERNEL, fit.hyperparameters, touches.clone()).unwrap();
         assert!(misfit(&posterior, &touches) < 0.01, "{mean:?}");
     }
@@ -246,7 +246,7 @@ fn a_touch_that_is_not_finite_is_an_error_not_a_belief() {
         let height = data([(0.0, 1.0), (0.5, bad), (1.0, 1.0)]);
         let place = data([(0.0, 1.0), (bad, 1.0)]);
         for touches in [height, place] {
-            let fit = search_box(&touches, 4.0, 1e-2).fit(&KERNEL, &touches, None);
+            let fit = search_box(&touches, 4.0, 1e-2).fit(&KERNEL, &touches);
             assert_eq!(fit.stop, Stop::Failed);
             let refused = Posterior::new(&KERNEL, fit.hyperparameters, touches).err();
             assert_eq!(refused, Some(CovarianceError::NotFinite { index: 1 }));

@@ -93,14 +93,12 @@ fn with_data_uri(mut document: Value, binary: &[u8]) -> Vec<u8> {
 }
 
 /// A document with its bytes in itself.
-#[cfg(feature = "nlopt")]
 pub fn sample_gltf() -> Vec<u8> {
     let (document, bytes) = tetrahedron();
     with_data_uri(document, &bytes)
 }
 
 /// The same as a binary container.
-#[cfg(feature = "nlopt")]
 pub fn sample_glb() -> Vec<u8> {
     let (document, bytes) = tetrahedron();
     glb(&document, &bytes)

@@ -73,7 +73,6 @@ fn a_scan_is_the_surface_and_does_not_depend_on_threads() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn a_belief_is_exported_as_it_was_and_mistakes_say_what_is_allowed() {
     let folder = TempDir::new().unwrap();
     let run = folder.path().join("run");

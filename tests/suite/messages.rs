@@ -96,7 +96,6 @@ fn a_mesh_is_faulted_at_its_line() {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn a_damaged_row_is_faulted_at_its_line() {
     use crate::common::program::succeeds;
     let folder = folder();

@@ -63,7 +63,6 @@ fn folder() -> TempDir {
 }
 
 #[test]
-#[cfg(feature = "nlopt")]
 fn two_commands_lead_from_any_mesh_to_a_report() {
     let folder = folder();
     for (mesh, name) in [

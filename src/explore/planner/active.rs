@@ -3,11 +3,10 @@
 use super::plan::{Entry, Plan, Planner};
 use super::search::Search;
 use crate::explore::belief::Belief;
-use crate::gp::posterior::Scratch;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "active",
-    about: "largest posterior standard deviation, by DIRECT then L-BFGS (the paper's)",
+    about: "largest posterior standard deviation, by DIRECT then BFGS (the paper's)",
     make: |zone, settings, rng| Box::new(Active { search: Search::new(zone, settings, rng) }),
 };
 
@@ -21,9 +20,6 @@ impl Planner for Active {
         if belief.surface().is_none() {
             return self.search.anywhere();
         }
-        let mut scratch = Scratch::default();
-        self.search.plan(belief, |place, gradient| {
-            belief.explorable_variance(place, gradient, &mut scratch)
-        })
+        self.search.plan(belief, |places, gradients| belief.explorable_variances(places, gradients))
     }
 }

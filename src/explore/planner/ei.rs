@@ -19,9 +19,13 @@ impl Planner for Ei {
     fn plan(&mut self, belief: &Belief) -> Plan {
         let Some(surface) = belief.surface() else { return self.search.anywhere() };
         let goal = improvement::goal(surface, self.search.settings.ei.margin);
-        let score = self.search.differentiated(|place, scratch| {
-            let sd = belief.explorable_variance(place, &mut [], scratch).sqrt();
-            improvement::log_expected(surface.mean(place, scratch), sd, goal)
+        let score = self.search.differentiated(|places| {
+            let means = surface.means(places.iter().map(Vec::as_slice));
+            let variances = belief.explorable_variances(places, &mut []);
+            let beliefs = means.iter().zip(variances);
+            beliefs
+                .map(|(mean, variance)| improvement::log_expected(*mean, variance.sqrt(), goal))
+                .collect()
         });
         self.search.plan(belief, score)
     }

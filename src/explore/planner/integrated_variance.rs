@@ -5,6 +5,7 @@ use super::plan::{Entry, Plan, Planner};
 use super::search::Search;
 use super::sobol;
 use crate::explore::belief::Belief;
+use crate::gp::posterior::Scratch;
 use crate::gp::reduction::Reduction;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -29,7 +30,10 @@ impl Planner for IntegratedVariance {
     fn plan(&mut self, belief: &Belief) -> Plan {
         let Some(posterior) = belief.explorable() else { return self.search.anywhere() };
         let reduction = Reduction::new(posterior, self.places.iter().map(Vec::as_slice));
-        let score = self.search.differentiated(|place, scratch| reduction.at(place, scratch));
+        let mut scratch = Scratch::default();
+        let score = self.search.differentiated(|places| {
+            places.iter().map(|place| reduction.at(place, &mut scratch)).collect()
+        });
         self.search.plan(belief, score)
     }
 }

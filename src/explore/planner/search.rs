@@ -1,11 +1,14 @@
-//! Where an acquisition function is largest: DIRECT finds its hills, L-BFGS climbs them.
+//! Where an acquisition function is largest: DIRECT finds its hills, climbs go up side by side.
+//!
+//! The function is asked for whole lists of places: values of many cost less than many values.
 
 use super::plan::{Plan, Stall, uniform};
 use super::settings::PlanningSettings;
 use super::sobol;
 use crate::explore::belief::Belief;
 use crate::gp::posterior::Scratch;
-use crate::math::optimize;
+use crate::math::climb::{Climb, Manner};
+use crate::math::direct::direct;
 use crate::math::optimize::Bounds;
 use crate::task::Zone;
 use rand::RngExt;
@@ -18,7 +21,7 @@ const SAME_TARGET: f64 = 1e-6;
 /// of a covariance with the least noise allowed; chosen.
 const LOST_IN_ROUNDING: f64 = 1e-5;
 
-/// Hills that L-BFGS climbs, see [`MARGIN`].
+/// Hills that are climbed, see [`MARGIN`].
 const HILLS: usize = 8;
 
 /// DIRECT searches the zone with this fraction of its sides added all around, and what it asks
@@ -27,6 +30,15 @@ const HILLS: usize = 8;
 /// beliefs of the bird, 200 evaluations and one climb came within 2 % of the maximum on a dense
 /// grid 23 times; with the margin and eight climbs 73 times, and 500 evaluations 76 times.
 const MARGIN: f64 = 0.1;
+
+/// A climb is given up that would stay below the highest if it won so many times what its parabola
+/// says; chosen.
+const HOPE: f64 = 4.0;
+
+/// First step of a climb in units of the zone's sides, half the distance of two hills; and the
+/// share of the value that is not worth another step, far below what changes a plan. Chosen.
+const FIRST_STEP: f64 = 0.02;
+const RELATIVE_GAIN: f64 = 1e-6;
 
 /// Places nearer than this, in units of the zone's sides, are taken for the same hill; chosen.
 const SAME_HILL: f64 = 0.04;
@@ -52,12 +64,12 @@ impl Search {
         Plan { target: uniform(&self.zone, &mut self.rng), sd_m: None, stall: None }
     }
 
-    /// The place where `score` is largest; `score` writes its gradient into its second argument
-    /// unless that is empty.
+    /// The place where `score` is largest; `score` returns the values of places and writes their
+    /// gradients into its second argument unless that is empty.
     pub(super) fn plan(
         &mut self,
         belief: &Belief,
-        score: impl FnMut(&[f64], &mut [f64]) -> f64,
+        score: impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64>,
     ) -> Plan {
         let (_, place) = self.maximum(score);
         self.conclude(belief, place)
@@ -74,25 +86,50 @@ impl Search {
     /// The largest value of `score` that was found, and its place.
     pub(super) fn maximum(
         &self,
-        mut score: impl FnMut(&[f64], &mut [f64]) -> f64,
+        mut score: impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64>,
     ) -> (f64, Vec<f64>) {
         let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
         let (lower, upper) = self.corners(MARGIN);
-        let budget = self.settings.direct_evaluations;
-        optimize::direct(Bounds { lower: &lower, upper: &upper }, budget, |place| {
-            let place = self.clamped(place);
-            let value = score(&place, &mut []);
-            seen.push((value, place));
-            value
+        let bounds = Bounds { lower: &lower, upper: &upper };
+        direct(bounds, self.settings.direct_evaluations, |places| {
+            let places: Vec<_> = places.iter().map(|place| self.clamped(place)).collect();
+            let values = score(&places, &mut []);
+            seen.extend(values.iter().copied().zip(places));
+            values
         });
         let (lower, upper) = self.corners(0.0);
         let bounds = Bounds { lower: &lower, upper: &upper };
+        let manner = Manner {
+            first_step: FIRST_STEP,
+            gain: 0.0,
+            relative_gain: RELATIVE_GAIN,
+            budget: self.settings.lbfgs_evaluations,
+        };
+        let start = |start: Vec<f64>| Climb::new(bounds, &start, None, manner);
+        let mut climbs: Vec<Climb> = self.hills(seen).into_iter().map(start).collect();
+        loop {
+            let asked: Vec<Vec<f64>> =
+                climbs.iter().filter_map(|climb| climb.asked().map(<[f64]>::to_vec)).collect();
+            if asked.is_empty() {
+                break;
+            }
+            let mut gradients = vec![vec![0.0; self.zone.dimension()]; asked.len()];
+            let values = score(&asked, &mut gradients);
+            let going = climbs.iter_mut().filter(|climb| climb.asked().is_some());
+            for ((climb, value), gradient) in going.zip(values).zip(&gradients) {
+                climb.tell(value, gradient);
+            }
+            let tops = climbs.iter().map(|climb| climb.top().value);
+            let highest = tops.fold(f64::NEG_INFINITY, f64::max);
+            climbs.retain(|climb| {
+                climb.asked().is_none() || !climb.is_measured() || climb.hope(HOPE) >= highest
+            });
+        }
         let mut best = (f64::MIN, self.zone.at(&vec![0.5; self.zone.dimension()]));
-        for start in self.hills(seen) {
-            let budget = self.settings.lbfgs_evaluations;
-            let top = optimize::lbfgs(bounds, &start, budget, &mut score);
+        for climb in &climbs {
+            let top = climb.top();
             if top.value > best.0 {
-                best = (top.value, top.x);
+                best = (top.value, top.x.clone());
             }
         }
         best
@@ -103,28 +140,40 @@ impl Search {
         sobol::places(&self.zone, count, self.rng.random())
     }
 
-    /// `score` with its gradient by central differences, one-sided at the zone's border.
-    pub(super) fn differentiated<S: Fn(&[f64], &mut Scratch) -> f64>(
+    /// `values` with their gradients by central differences, one-sided at the zone's border.
+    pub(super) fn differentiated<V: FnMut(&[Vec<f64>]) -> Vec<f64>>(
         &self,
-        score: S,
-    ) -> impl FnMut(&[f64], &mut [f64]) -> f64 + use<S> {
+        mut values: V,
+    ) -> impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64> + use<V> {
         let sides: Vec<[f64; 2]> = self.zone.sides().collect();
-        let mut scratch = Scratch::default();
-        let mut beside = Vec::new();
-        move |place, gradient| {
-            for (axis, slope) in gradient.iter_mut().enumerate() {
-                let [low, high] = sides[axis];
-                let step = STEP * (high - low);
-                let ends = [(place[axis] - step).max(low), (place[axis] + step).min(high)];
-                let [before, after] = ends.map(|at| {
-                    beside.clear();
-                    beside.extend_from_slice(place);
-                    beside[axis] = at;
-                    score(&beside, &mut scratch)
-                });
-                *slope = (after - before) / (ends[1] - ends[0]);
+        move |places, gradients| {
+            if gradients.is_empty() {
+                return values(places);
             }
-            score(place, &mut scratch)
+            // Each place, then the one before and after it along each axis.
+            let mut all: Vec<Vec<f64>> = Vec::new();
+            for place in places {
+                all.push(place.clone());
+                for (axis, [low, high]) in sides.iter().enumerate() {
+                    let step = STEP * (high - low);
+                    for at in [(place[axis] - step).max(*low), (place[axis] + step).min(*high)] {
+                        let mut beside = place.clone();
+                        beside[axis] = at;
+                        all.push(beside);
+                    }
+                }
+            }
+            let told = values(&all);
+            let each = 1 + 2 * sides.len();
+            let around = all.chunks_exact(each).zip(told.chunks_exact(each));
+            for ((places, values), gradient) in around.zip(gradients) {
+                for (axis, slope) in gradient.iter_mut().enumerate() {
+                    let [before, after] = [1, 2].map(|side| 2 * axis + side);
+                    *slope = (values[after] - values[before])
+                        / (places[after][axis] - places[before][axis]);
+                }
+            }
+            told.into_iter().step_by(each).collect()
         }
     }
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct PlanningSettings {
     /// Evaluations of the acquisition function that DIRECT may spend on one plan.
     pub direct_evaluations: u32,
-    /// Evaluations that L-BFGS may spend on refining it.
+    /// Evaluations that each climb (BFGS) may spend on refining it.
     pub lbfgs_evaluations: u32,
     /// Of `integrated_variance`.
     pub integrated_variance: IntegratedVarianceSettings,

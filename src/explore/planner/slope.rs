@@ -35,9 +35,11 @@ impl Planner for Slope {
         let weight = self.search.settings.slope.weight;
         // A flat belief is steep nowhere.
         let per_slope = if mean > 0.0 { weight / mean } else { 0.0 };
-        let score = self.search.differentiated(|place, scratch| {
-            let sd = belief.explorable_variance(place, &mut [], scratch).sqrt();
-            sd * (1.0 + per_slope * slope(surface, place, scratch))
+        let score = self.search.differentiated(|places| {
+            let variances = belief.explorable_variances(places, &mut []);
+            let steep = places.iter().map(|place| slope(surface, place, &mut scratch));
+            let each = variances.iter().zip(steep);
+            each.map(|(variance, slope)| variance.sqrt() * (1.0 + per_slope * slope)).collect()
         });
         self.search.plan(belief, score)
     }

@@ -9,7 +9,6 @@
 use super::plan::{Entry, Plan, Planner, distance_m};
 use super::search::Search;
 use crate::explore::belief::Belief;
-use crate::gp::posterior::Scratch;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "travel",
@@ -54,20 +53,16 @@ impl Planner for Travel {
 impl Travel {
     /// The places of a tour, at least one: each where σ is largest given touches at those before.
     fn largest(&self, belief: &Belief) -> Vec<Vec<f64>> {
-        let mut scratch = Scratch::default();
-        let (_, first) = self
-            .search
-            .maximum(|place, gradient| belief.explorable_variance(place, gradient, &mut scratch));
+        let (_, first) =
+            self.search.maximum(|places, gradients| belief.explorable_variances(places, gradients));
         let mut places = vec![first];
         let mut known = belief.explorable().cloned();
         for _ in 1..self.search.settings.travel.tour {
             let last = places.last().map(Vec::as_slice);
             known = known.and_then(|known| known.fantasize(last.into_iter()).ok());
             let Some(posterior) = &known else { break };
-            let (_, place) = self.search.maximum(|place, gradient| match gradient {
-                [] => posterior.variance(place, &mut scratch),
-                _ => posterior.variance_gradient(place, gradient, &mut scratch),
-            });
+            let (_, place) =
+                self.search.maximum(|places, gradients| posterior.variances(places, gradients));
             places.push(place);
         }
         places

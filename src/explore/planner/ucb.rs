@@ -18,9 +18,14 @@ impl Planner for Ucb {
     fn plan(&mut self, belief: &Belief) -> Plan {
         let Some(surface) = belief.surface() else { return self.search.anywhere() };
         let sds = self.search.settings.ucb.sds;
-        let score = self.search.differentiated(|place, scratch| {
-            let sd = belief.explorable_variance(place, &mut [], scratch).sqrt();
-            surface.mean(place, scratch) + sds * sd
+        let score = self.search.differentiated(|places| {
+            let means = surface.means(places.iter().map(Vec::as_slice));
+            let variances = belief.explorable_variances(places, &mut []);
+            means
+                .iter()
+                .zip(variances)
+                .map(|(mean, variance)| mean + sds * variance.sqrt())
+                .collect()
         });
         self.search.plan(belief, score)
     }

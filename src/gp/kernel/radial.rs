@@ -1,6 +1,8 @@
 //! What a stationary kernel is: the formula of one correlation, and loops over many.
 
 use crate::math::simd::widest;
+use pulp::NullaryFnOnce;
+use std::marker::PhantomData;
 
 /// A correlation that depends on the scaled squared distance r² = Σ_d ((a_d − b_d) / l_d)².
 ///
@@ -37,17 +39,52 @@ pub trait Kernel: Send + Sync {
     fn correlate_derivatives(&self, r2: &mut [f64], derivatives: [&mut [f64]; 3]);
 }
 
+/// Loops over the formulas of `R`, each written for the widest vectors.
+struct Correlate<'a, R>(&'a mut [f64], PhantomData<R>);
+
+impl<R: Radial> NullaryFnOnce for Correlate<'_, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.0.iter_mut().for_each(|r2| *r2 = R::correlation_slope(*r2).0);
+    }
+}
+
+struct CorrelateSlope<'a, R>(&'a mut [f64], &'a mut [f64], PhantomData<R>);
+
+impl<R: Radial> NullaryFnOnce for CorrelateSlope<'_, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (r2, slope) in self.0.iter_mut().zip(self.1) {
+            (*r2, *slope) = R::correlation_slope(*r2);
+        }
+    }
+}
+
+/// The second and third derivatives.
+struct Curve<'a, R>(&'a [f64], &'a mut [f64], &'a mut [f64], PhantomData<R>);
+
+impl<R: Radial> NullaryFnOnce for Curve<'_, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (r2, (second, third)) in self.0.iter().zip(self.1.iter_mut().zip(self.2)) {
+            (*second, *third) = R::curvatures(*r2);
+        }
+    }
+}
+
 impl<R: Radial> Kernel for R {
     fn correlate(&self, r2: &mut [f64]) {
-        widest(|| r2.iter_mut().for_each(|r2| *r2 = R::correlation_slope(*r2).0));
+        widest(Correlate::<R>(r2, PhantomData));
     }
 
     fn correlate_slope(&self, r2: &mut [f64], slopes: &mut [f64]) {
-        widest(|| {
-            for (r2, slope) in r2.iter_mut().zip(slopes) {
-                (*r2, *slope) = R::correlation_slope(*r2);
-            }
-        });
+        widest(CorrelateSlope::<R>(r2, slopes, PhantomData));
     }
 
     fn has_slopes(&self) -> bool {
@@ -55,13 +92,8 @@ impl<R: Radial> Kernel for R {
     }
 
     fn correlate_derivatives(&self, r2: &mut [f64], [first, second, third]: [&mut [f64]; 3]) {
-        widest(|| {
-            let derivatives = first.iter_mut().zip(second).zip(third);
-            for (r2, ((first, second), third)) in r2.iter_mut().zip(derivatives) {
-                (*second, *third) = R::curvatures(*r2);
-                (*r2, *first) = R::correlation_slope(*r2);
-            }
-        });
+        widest(Curve::<R>(r2, second, third, PhantomData));
+        self.correlate_slope(r2, first);
     }
 }
 

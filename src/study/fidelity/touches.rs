@@ -182,9 +182,6 @@ pub fn surface_rmse_m(
     contacts: &[Option<Contact>],
     truth: &Truth,
 ) -> Option<f64> {
-    if !crate::math::optimize::BUILT {
-        return None;
-    }
     let mut belief = Belief::new(scene.zone.clone(), GpSettings::default());
     for (target, contact) in targets.iter().zip(contacts) {
         let touch = contact.clone().map_or(Touch::Miss, Touch::Contact);

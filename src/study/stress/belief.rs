@@ -5,7 +5,6 @@ use crate::gp::kernel::{Hyperparameters, SquaredExponential};
 use crate::gp::posterior::Scratch;
 use crate::gp::{Mean, Observations, Posterior};
 use crate::gp::{SearchBox, TouchNoise};
-use crate::math::optimize;
 use crate::math::optimize::Stop;
 
 static KERNEL: SquaredExponential = SquaredExponential;
@@ -119,7 +118,6 @@ pub(super) const CASES: &[Case] = &[
             touches[which as usize].1 = f64::NAN;
             match fitted(&touches, 0.01) {
                 Outcome::Faulted(words) => Outcome::Faulted(words),
-                _ if !optimize::BUILT => Outcome::Faulted("no optimisers in this build".into()),
                 _ => Outcome::Wrong("a belief was made of it".into()),
             }
         },
@@ -143,9 +141,6 @@ fn observations(touches: &[(f64, f64)]) -> Observations {
 /// Fits and holds the laws of any belief, and that it follows the touches within a share
 /// `misfit` of their range.
 fn fitted(touches: &[(f64, f64)], misfit: f64) -> Outcome {
-    if !optimize::BUILT {
-        return Outcome::Stable;
-    }
     let all_of = observations(touches);
     let heights: Vec<f64> = touches.iter().map(|(_, y)| *y).collect();
     let rms = (heights.iter().map(|y| y * y).sum::<f64>() / heights.len() as f64).sqrt();
@@ -158,7 +153,7 @@ fn fitted(touches: &[(f64, f64)], misfit: f64) -> Outcome {
         touch_noise: TouchNoise::Fitted,
         slope_noise_ratio: None,
     };
-    let fit = search.fit(&KERNEL, &all_of, None);
+    let fit = search.fit(&KERNEL, &all_of);
     if fit.stop == Stop::Failed {
         return Outcome::Faulted("the fit says that it failed".into());
     }

@@ -2,7 +2,7 @@
 
 pub mod counting;
 pub mod fake;
-#[cfg(all(feature = "mujoco", feature = "nlopt"))]
+#[cfg(feature = "mujoco")]
 pub mod lab;
 #[cfg(feature = "mujoco")]
 #[allow(dead_code)] // The bench of finite elements uses the rest.

@@ -27,7 +27,6 @@ pub fn contact(touch: Touch) -> Contact {
 }
 
 /// The paper's toy, Eq. 4.
-#[cfg(feature = "nlopt")]
 pub fn toy(x: f64) -> f64 {
     if x.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x).sin() + 1.0 } else { 1.0 }
 }

@@ -1,0 +1,204 @@
+//! Scores of a grid over the box of hyperparameters, kept while observations are added.
+//!
+//! The grid stays where it is, so that each of its covariances is factored once and grows by a row
+//! with each observation: n² operations where factoring again would take n³/3.
+
+use super::cholesky::Factor;
+use super::kernel::Kernel;
+use super::likelihood;
+use super::likelihood::ProfiledLikelihood;
+use super::mean::Mean;
+use super::observations::Observations;
+use super::range::Scale;
+use super::search_box::SearchBox;
+use crate::math::optimize::Bounds;
+use crate::math::simd::widest_dot;
+
+/// Noise levels, from the least to the largest; climbs find what lies between.
+const NOISE_LEVELS: usize = 2;
+
+/// A grid over a box.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Grid {
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    /// Places per parameter, the noises last.
+    levels: Vec<usize>,
+}
+
+impl Grid {
+    /// Over `bounds`, of which the first `lengths` are length scales.
+    pub(super) fn new(bounds: Bounds, lengths: usize) -> Self {
+        let per_length = match lengths {
+            1 => 18,
+            2 => 8,
+            _ => 5,
+        };
+        let mut levels = vec![per_length; lengths];
+        levels.resize(bounds.lower.len(), NOISE_LEVELS);
+        Self { lower: bounds.lower.to_vec(), upper: bounds.upper.to_vec(), levels }
+    }
+
+    /// How many places it has.
+    pub(super) fn len(&self) -> usize {
+        self.levels.iter().product()
+    }
+
+    /// Place `index`; the last parameter varies fastest.
+    pub(super) fn place(&self, index: usize) -> Vec<f64> {
+        digits(index, &self.levels)
+            .zip(&self.levels)
+            .zip(self.lower.iter().zip(&self.upper))
+            .map(|((digit, &levels), (lower, upper))| {
+                lower + (upper - lower) * digit as f64 / (levels.max(2) - 1) as f64
+            })
+            .collect()
+    }
+
+    /// The places that no neighbour along any parameter exceeds, the highest first, and what each
+    /// may rise above its value.
+    ///
+    /// Along each parameter that is a quarter of its fall to the lower neighbour, where a
+    /// parabola's top is at most an eighth of it higher.
+    pub(super) fn hills(&self, values: &[f64]) -> Vec<(usize, f64)> {
+        let is_hill = |index: &usize| {
+            let mut beside = self.neighbours(*index, values).flatten().flatten();
+            beside.all(|value| value <= values[*index])
+        };
+        let rise = |index: usize| -> f64 {
+            let lowest = |beside: [Option<f64>; 2]| {
+                beside.into_iter().flatten().fold(values[index], f64::min)
+            };
+            let beside = self.neighbours(index, values);
+            beside.map(|beside| 0.25 * (values[index] - lowest(beside))).sum()
+        };
+        let mut hills: Vec<usize> = (0..values.len()).filter(is_hill).collect();
+        hills.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
+        hills.into_iter().map(|index| (index, rise(index))).collect()
+    }
+
+    /// The values of the neighbours of place `index`, parameter by parameter.
+    fn neighbours(&self, index: usize, values: &[f64]) -> impl Iterator<Item = [Option<f64>; 2]> {
+        let mut stride = values.len();
+        digits(index, &self.levels).zip(&self.levels).map(move |(digit, levels)| {
+            stride /= levels;
+            let below = (digit > 0).then(|| values[index - stride]);
+            let above = (digit + 1 < *levels).then(|| values[index + stride]);
+            [below, above]
+        })
+    }
+}
+
+/// The digits of `index` as a number whose last one varies fastest.
+fn digits(index: usize, levels: &[usize]) -> impl Iterator<Item = usize> {
+    let mut stride: usize = levels.iter().product();
+    let mut rest = index;
+    levels.iter().map(move |levels| {
+        stride /= levels;
+        let digit = rest / stride;
+        rest %= stride;
+        digit
+    })
+}
+
+/// The factors at the places of a grid, and what they have taken in.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scan {
+    grid: Grid,
+    taken: Observations,
+    points: Vec<Point>,
+}
+
+/// One place of the grid.
+#[derive(Clone, Debug, Default)]
+struct Point {
+    factor: Factor,
+    /// L⁻¹·y of the heights y, and of a one for each of them.
+    heights: Vec<f64>,
+    ones: Vec<f64>,
+    log_determinant: f64,
+    /// Its covariance cannot be factored as it is.
+    is_lost: bool,
+}
+
+impl Scan {
+    /// The profile of each place of `grid`, none where the covariance cannot be factored as it is.
+    /// What was taken in before is kept, if it is of the same grid and the first of these
+    /// observations, which have heights only.
+    pub(super) fn profiles(
+        &mut self,
+        sought: &SearchBox,
+        (grid, scale): (&Grid, &Scale),
+        kernel: &dyn Kernel,
+        observations: &Observations,
+    ) -> Vec<Option<ProfiledLikelihood>> {
+        if self.grid != *grid || !observations.begin_with(&self.taken) {
+            let points = vec![Point::default(); grid.len()];
+            *self = Self { grid: grid.clone(), taken: observations.clone(), points };
+        }
+        let mut row = Vec::new();
+        let mut profiles = Vec::with_capacity(grid.len());
+        let noises: usize = grid.levels[sought.length_scales.len()..].iter().product();
+        for (group, points) in self.points.chunks_mut(noises.max(1)).enumerate() {
+            // The same lengths, and so the same correlations.
+            let (lengths, _) = sought.parameters(&grid.place(group * noises));
+            for i in points[0].heights.len()..observations.len() {
+                row.resize(i + 1, 0.0);
+                observations.distances2(observations.place(i), &lengths, 0, &mut row[..i]);
+                kernel.correlate(&mut row[..i]);
+                for (at, point) in points.iter_mut().enumerate() {
+                    let (_, noise) = sought.parameters(&grid.place(group * noises + at));
+                    row[i] = 1.0 + observations.height_noise2(i, noise);
+                    point.append(&row, observations.heights()[i]);
+                }
+            }
+            for (at, point) in points.iter().enumerate() {
+                let (_, noise) = sought.parameters(&grid.place(group * noises + at));
+                let profile = || point.profile(sought.mean, scale, noise.height, observations);
+                profiles.push((!point.is_lost).then(profile));
+            }
+        }
+        self.taken.clone_from(observations);
+        profiles
+    }
+}
+
+impl Point {
+    fn append(&mut self, row: &[f64], height: f64) {
+        self.is_lost = self.is_lost || self.factor.append(row).is_err();
+        let count = row.len() - 1;
+        if self.is_lost {
+            self.heights.push(f64::NAN);
+            return;
+        }
+        let row = self.factor.row(count);
+        let whiten =
+            |known: &[f64], new: f64| (new - widest_dot(&row[..count], known)) / row[count];
+        let (height, one) = (whiten(&self.heights, height), whiten(&self.ones, 1.0));
+        self.log_determinant += 2.0 * row[count].ln();
+        self.heights.push(height);
+        self.ones.push(one);
+    }
+
+    fn profile(
+        &self,
+        mean: Mean,
+        scale: &Scale,
+        noise: f64,
+        observations: &Observations,
+    ) -> ProfiledLikelihood {
+        let count = observations.len();
+        let mean = match mean {
+            Mean::Zero => 0.0,
+            Mean::Data => observations.heights().iter().sum::<f64>() / count.max(1) as f64,
+            Mean::Constant => {
+                widest_dot(&self.ones, &self.heights) / widest_dot(&self.ones, &self.ones)
+            }
+        };
+        let squares = self.heights.iter().zip(&self.ones).map(|(y, one)| (y - mean * one).powi(2));
+        let fit = squares.sum();
+        let signal_sd = scale.signal_sd(fit, count, noise);
+        let log_likelihood = likelihood::of_height(fit, signal_sd, count, self.log_determinant);
+        ProfiledLikelihood { log_likelihood, signal_sd, mean }
+    }
+}

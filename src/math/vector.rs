@@ -1,0 +1,176 @@
+//! Vectors of numbers by name, for the loops whose speed hangs on what stays in registers; other
+//! loops are [plain](super::simd).
+
+/// As many numbers as one instruction takes. Sums are the same bits with every kind: all of them
+/// multiply and add in one rounding.
+pub trait Vector: Copy {
+    /// How many: a divisor of 8.
+    const LANES: usize;
+    /// The same number in all lanes.
+    fn splat(value: f64) -> Self;
+    /// The first numbers of a slice; zeros where it is too short.
+    fn load(from: &[f64]) -> Self;
+    /// Writes all lanes to the beginning of a slice that has room for them.
+    fn store(self, to: &mut [f64]);
+    /// self·b + c.
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// self·b.
+    fn mul(self, b: Self) -> Self;
+    /// self − b.
+    fn sub(self, b: Self) -> Self;
+}
+
+/// Work that is written in vectors.
+pub trait Vectorised {
+    /// What it returns.
+    type Output;
+
+    /// Does it: `#[inline(always)]`, as all that it calls.
+    fn call<V: Vector>(self) -> Self::Output;
+}
+
+/// Runs `work` with the widest vectors of this processor.
+#[inline(always)]
+pub fn vectorised<Work: Vectorised>(work: Work) -> Work::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx512f") {
+            // SAFETY: the processor has what the function is compiled for.
+            return unsafe { x86::with_512_bits(work) };
+        }
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: as above.
+            return unsafe { x86::with_256_bits(work) };
+        }
+    }
+    work.call::<f64>()
+}
+
+impl Vector for f64 {
+    const LANES: usize = 1;
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn load(from: &[f64]) -> Self {
+        from.first().copied().unwrap_or(0.0)
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [f64]) {
+        to.iter_mut().take(1).for_each(|to| *to = self);
+    }
+
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        f64::mul_add(self, b, c)
+    }
+
+    #[inline(always)]
+    fn mul(self, b: Self) -> Self {
+        self * b
+    }
+
+    #[inline(always)]
+    fn sub(self, b: Self) -> Self {
+        self - b
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::{Vector, Vectorised};
+    use std::arch::x86_64::*;
+
+    #[target_feature(enable = "avx512f,avx2,fma")]
+    pub(super) fn with_512_bits<Work: Vectorised>(work: Work) -> Work::Output {
+        work.call::<Wide>()
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub(super) fn with_256_bits<Work: Vectorised>(work: Work) -> Work::Output {
+        work.call::<Narrow>()
+    }
+
+    /// Only [`with_512_bits`] makes one.
+    #[derive(Clone, Copy)]
+    struct Wide(__m512d);
+
+    /// Only [`with_256_bits`] makes one.
+    #[derive(Clone, Copy)]
+    struct Narrow(__m256d);
+
+    macro_rules! vector {
+        ($name:ident, $lanes:literal, $splat:ident, $load:ident, $store:ident, $mul_add:ident,
+         $mul:ident, $sub:ident) => {
+            impl Vector for $name {
+                const LANES: usize = $lanes;
+
+                #[inline(always)]
+                fn splat(value: f64) -> Self {
+                    // SAFETY: whoever runs this has checked that the processor can.
+                    Self(unsafe { $splat(value) })
+                }
+
+                #[inline(always)]
+                fn load(from: &[f64]) -> Self {
+                    match from.first_chunk::<$lanes>() {
+                        // SAFETY: as above, and there are as many numbers as are read.
+                        Some(from) => Self(unsafe { $load(from.as_ptr()) }),
+                        None => Self::splat(0.0),
+                    }
+                }
+
+                #[inline(always)]
+                fn store(self, to: &mut [f64]) {
+                    if let Some(to) = to.first_chunk_mut::<$lanes>() {
+                        // SAFETY: as above, and there is room for what is written.
+                        unsafe { $store(to.as_mut_ptr(), self.0) }
+                    }
+                }
+
+                #[inline(always)]
+                fn mul_add(self, b: Self, c: Self) -> Self {
+                    // SAFETY: as above.
+                    Self(unsafe { $mul_add(self.0, b.0, c.0) })
+                }
+
+                #[inline(always)]
+                fn mul(self, b: Self) -> Self {
+                    // SAFETY: as above.
+                    Self(unsafe { $mul(self.0, b.0) })
+                }
+
+                #[inline(always)]
+                fn sub(self, b: Self) -> Self {
+                    // SAFETY: as above.
+                    Self(unsafe { $sub(self.0, b.0) })
+                }
+            }
+        };
+    }
+
+    vector!(
+        Wide,
+        8,
+        _mm512_set1_pd,
+        _mm512_loadu_pd,
+        _mm512_storeu_pd,
+        _mm512_fmadd_pd,
+        _mm512_mul_pd,
+        _mm512_sub_pd
+    );
+    vector!(
+        Narrow,
+        4,
+        _mm256_set1_pd,
+        _mm256_loadu_pd,
+        _mm256_storeu_pd,
+        _mm256_fmadd_pd,
+        _mm256_mul_pd,
+        _mm256_sub_pd
+    );
+}
