@@ -47,7 +47,7 @@ fn likelihood(count: usize) -> Piece {
 fn cold_fit(count: usize) -> Piece {
     let (bounds, touches) = (search_box(), touches(count));
     Piece::uncounted(format!("cold fit, {count} touches"), move || {
-        let _ = black_box(bounds.fit(&KERNEL, black_box(&touches), None));
+        let _ = black_box(bounds.fit(&KERNEL, black_box(&touches)));
     })
 }
 
