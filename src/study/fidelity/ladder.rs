@@ -27,6 +27,11 @@ const fn rigid(collision: Collision) -> Rung {
     Rung { collision: Some(collision), approach_m_s: Some(RIGID_M_S), ..rung }
 }
 
+/// A thin shell of so many cells along and around.
+const fn shell(cells: [usize; 2], period_s: f64) -> Rung {
+    Rung { shell: Some(cells), ..kinematic(Senses::Full, 0, period_s) }
+}
+
 /// A skin of finite elements, so many along and around.
 const fn flex(cells: [usize; 2]) -> Rung {
     Rung { flex: Some(cells), ..dynamic(0, 0.002).at(FEW) }
@@ -60,6 +65,10 @@ pub const RUNGS: &[Rung] = &[
     dynamic(500, 0.001).by(Integrator::Euler),
     dynamic(500, 0.001).by(Integrator::Rk4),
     dynamic(500, 0.0005),
+    shell([12, 8], 0.01),
+    shell([24, 16], 0.01),
+    shell([24, 16], 0.002),
+    shell([36, 24], 0.002),
     flex([12, 8]),
     flex([18, 12]),
     kinematic(Senses::Full, 1000, 0.005),

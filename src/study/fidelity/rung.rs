@@ -3,6 +3,7 @@
 use crate::sim::Scene;
 use crate::sim::collision::Collision;
 use crate::sim::finger::effects::flex::FlexEffect;
+use crate::sim::finger::effects::skin::SkinModel;
 use crate::sim::scene::Body;
 use crate::sim::solver::Integrator;
 
@@ -28,6 +29,8 @@ pub struct Rung {
     pub senses: Senses,
     /// Points of the skin's foundation; 0 for another skin.
     pub samples: usize,
+    /// Cells along and around of a skin that is a thin shell.
+    pub shell: Option<[usize; 2]>,
     /// Cells along and around of a skin of finite elements.
     pub flex: Option<[usize; 2]>,
     /// Duration of a control tick, and of a step of a body with masses.
@@ -51,6 +54,7 @@ impl Rung {
             body,
             senses,
             samples,
+            shell: None,
             flex: None,
             period_s,
             integrator: Integrator::ImplicitFast,
@@ -110,7 +114,14 @@ impl Rung {
         keep(&mut effects.fluid, fluid);
         keep(&mut effects.electrodes, electrodes);
         if let Some(skin) = &mut effects.skin {
-            skin.samples = self.samples;
+            skin.model = SkinModel::Columns;
+            match self.shell {
+                Some(cells) => {
+                    skin.model = SkinModel::Shell;
+                    [skin.along, skin.around] = cells;
+                }
+                None => skin.samples = self.samples,
+            }
         }
         if !skin {
             *effects = Default::default();
@@ -128,6 +139,7 @@ impl Rung {
             words.push(self.senses.name().into());
             words.extend(self.collision.map(|collision| collision.name().into()));
             words.extend((self.samples > 0).then(|| self.samples.to_string()));
+            words.extend(self.shell.map(|[along, around]| format!("shell {along} × {around}")));
             words.extend(self.flex.map(|[along, around]| format!("flex {along} × {around}")));
             words.push(format!("{} ms", 1e3 * self.period_s));
         }
