@@ -14,8 +14,10 @@ use super::search_box::SearchBox;
 use crate::math::optimize::Bounds;
 use crate::math::simd::widest_dot;
 
-/// Noise levels, from the least to the largest; climbs find what lies between.
-const NOISE_LEVELS: usize = 2;
+/// Widest step between two noise levels, as the logarithm of their ratio; climbs find what lies
+/// between. Chosen: a noise that is fitted has a range of two decades, one that is known leaves six
+/// of its ratio, whose ends alone say nothing of the middle.
+const NOISE_STEP: f64 = 4.61;
 
 /// A grid over a box.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,7 +37,9 @@ impl Grid {
             _ => 5,
         };
         let mut levels = vec![per_length; lengths];
-        levels.resize(bounds.lower.len(), NOISE_LEVELS);
+        for (lower, upper) in bounds.lower.iter().zip(bounds.upper).skip(lengths) {
+            levels.push(((upper - lower) / NOISE_STEP).ceil().max(1.0) as usize + 1);
+        }
         Self { lower: bounds.lower.to_vec(), upper: bounds.upper.to_vec(), levels }
     }
 
