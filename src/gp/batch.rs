@@ -199,9 +199,9 @@ impl<const N: usize> NullaryFnOnce for AddSquares<'_, N> {
     #[inline(always)]
     fn call(self) {
         for (r2, x) in self.r2.iter_mut().zip(self.column) {
-            for lane in 0..N {
-                let step = (self.at[lane] - x) * self.per_length;
-                r2[lane] = step.mul_add(step, r2[lane]);
+            for (r2, at) in r2.iter_mut().zip(&self.at) {
+                let step = (at - x) * self.per_length;
+                *r2 = step.mul_add(step, *r2);
             }
         }
     }

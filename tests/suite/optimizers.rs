@@ -7,13 +7,15 @@ use palpate::math::optimize::{Bounds, Stop};
 const BOX: Bounds = Bounds { lower: &[-2.0, -2.0], upper: &[2.0, 2.0] };
 const MANNER: Manner = Manner { first_step: 0.05, gain: 1e-9, relative_gain: 0.0, budget: 200 };
 
+type Objective = fn(&[f64]) -> f64;
+
 fn hills(x: &[f64]) -> f64 {
     let hill = |a: f64, b: f64| (-8.0 * ((x[0] - a).powi(2) + (x[1] - b).powi(2))).exp();
     hill(-1.3, 0.4) + 1.2 * hill(1.1, -1.6)
 }
 
 /// Value and place of what was asked for, in the order in which it was.
-fn asked(evaluations: u32, lower: &[f64], upper: &[f64], f: fn(&[f64]) -> f64) -> Vec<Vec<f64>> {
+fn asked(evaluations: u32, lower: &[f64], upper: &[f64], f: Objective) -> Vec<Vec<f64>> {
     let mut all = Vec::new();
     direct(Bounds { lower, upper }, evaluations, |places| {
         all.extend_from_slice(places);
@@ -30,8 +32,7 @@ fn direct_asks_for_the_places_of_nlopts() {
     let line = |x: &[f64]| (3.0 * x[0]).sin() + 0.5 * (17.0 * x[0]).cos();
     let edge = |x: &[f64]| if x[0] + 0.3 * x[1] < 0.2 { 0.0 } else { x[1] };
     let three = |x: &[f64]| -(x[0] - 0.3).powi(2) - (x[1] + 0.1).powi(4) - (x[2] * x[0]).abs();
-    let objectives: [(usize, fn(&[f64]) -> f64); 4] =
-        [(1, line), (2, hills), (2, edge), (3, three)];
+    let objectives: [(usize, Objective); 4] = [(1, line), (2, hills), (2, edge), (3, three)];
     for (dimension, f) in objectives {
         let (lower, upper) = (vec![-2.0; dimension], vec![1.5; dimension]);
         let evaluate = |x: &[f64], _: Option<&mut [f64]>, seen: &mut Vec<Vec<f64>>| {
@@ -61,7 +62,7 @@ fn direct_asks_for_the_places_of_nlopts() {
 
 #[test]
 fn direct_finds_the_higher_of_two_hills_and_no_value_that_is_not_finite() {
-    let best = |places: Vec<Vec<f64>>, f: fn(&[f64]) -> f64| {
+    let best = |places: Vec<Vec<f64>>, f: Objective| {
         let finite = places.into_iter().filter(|place| f(place).is_finite());
         finite.max_by(|a, b| f(a).total_cmp(&f(b))).unwrap()
     };
