@@ -199,7 +199,7 @@ impl<const N: usize> NullaryFnOnce for AddSquares<'_, N> {
     #[inline(always)]
     fn call(self) {
         for (r2, x) in self.r2.iter_mut().zip(self.column) {
-            for (r2, at) in r2.iter_mut().zip(self.at) {
+            for (r2, at) in r2.iter_mut().zip(&self.at) {
                 let step = (at - x) * self.per_length;
                 *r2 = step.mul_add(step, *r2);
             }

@@ -74,9 +74,7 @@ fn lower<V: Vector, const N: usize, const WIDE: usize, const ROWS: usize>(
         for r in 0..count {
             for k in 0..r {
                 let l = V::splat(-rows[r][begin + k]);
-                for v in 0..WIDE {
-                    sums[r][v] = l.mul_add(sums[k][v], sums[r][v]);
-                }
+                sums[r] = std::array::from_fn(|v| l.mul_add(sums[k][v], sums[r][v]));
             }
             let scale = V::splat(1.0 / rows[r][begin + r]);
             for v in 0..WIDE {

@@ -147,24 +147,19 @@ type Corner = [[f64; WIDE]; WIDE];
 #[expect(clippy::needless_range_loop, reason = "rows and columns of a triangle are numbers")]
 #[inline(always)]
 fn corner(mut block: MatMut<'_, f64>, j: usize) -> Result<Corner, NotPositiveDefinite> {
-    let mut rows = [[0.0; WIDE]; WIDE];
-    for c in 0..WIDE {
-        let column = &slice(block.rb(), c)[j..];
-        (c..WIDE).for_each(|r| rows[r][c] = column[r]);
-    }
-    for c in 0..WIDE {
+    let columns: [&[f64]; WIDE] = std::array::from_fn(|c| &slice(block.rb(), c)[j..]);
+    let mut rows: Corner =
+        std::array::from_fn(|r| std::array::from_fn(|c| if c <= r { columns[c][r] } else { 0.0 }));
+    for (c, index) in (j..j + WIDE).enumerate() {
         let pivot = rows[c][c];
         let is_positive = pivot > 0.0;
         if !is_positive {
-            return Err(NotPositiveDefinite { index: j + c });
+            return Err(NotPositiveDefinite { index });
         }
         let root = pivot.sqrt();
         let scale = 1.0 / root;
         rows[c][c] = scale;
-        for r in c + 1..WIDE {
-            rows[r][c] *= scale;
-        }
-        // Row by row, so that it is vectorised.
+        rows[c + 1..].iter_mut().for_each(|row| row[c] *= scale);
         let column: [f64; WIDE] = std::array::from_fn(|r| if r > c { rows[r][c] } else { 0.0 });
         for r in c + 1..WIDE {
             for k in c + 1..=r {

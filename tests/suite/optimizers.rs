@@ -62,7 +62,7 @@ fn direct_asks_for_the_places_of_nlopts() {
 
 #[test]
 fn direct_finds_the_higher_of_two_hills_and_no_value_that_is_not_finite() {
-    let best = |places: Vec<Vec<f64>>, f: fn(&[f64]) -> f64| {
+    let best = |places: Vec<Vec<f64>>, f: Objective| {
         let finite = places.into_iter().filter(|place| f(place).is_finite());
         finite.max_by(|a, b| f(a).total_cmp(&f(b))).unwrap()
     };
