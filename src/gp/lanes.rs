@@ -44,7 +44,6 @@ impl<const N: usize> Vectorised for SolveLower<'_, N> {
 }
 
 /// For `WIDE` vectors of lanes from `lane` on, `ROWS` rows at a time.
-#[expect(clippy::needless_range_loop, reason = "columns of a triangle and lanes are numbers")]
 #[inline(always)]
 fn lower<V: Vector, const N: usize, const WIDE: usize, const ROWS: usize>(
     factor: &Factor,

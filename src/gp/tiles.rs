@@ -144,7 +144,6 @@ fn subtract_tile<V: Vector, const HIGH: usize, const COLUMNS: usize>(
 type Corner = [[f64; WIDE]; WIDE];
 
 /// Factors what stands on the diagonal of a block's first columns, at row `j`.
-#[expect(clippy::needless_range_loop, reason = "rows and columns of a triangle are numbers")]
 #[inline(always)]
 fn corner(mut block: MatMut<'_, f64>, j: usize) -> Result<Corner, NotPositiveDefinite> {
     let columns: [&[f64]; WIDE] = std::array::from_fn(|c| &slice(block.rb(), c)[j..]);
