@@ -187,6 +187,18 @@ fn a_sensor_that_falls_silent_and_joints_that_do_not_move_are_faults_with_their_
     assert!(time_s > 0.0 && quantity == Quantity::Positions && values[1].is_nan());
 }
 
+/// The clock of a real arm goes on while the next touch is thought about: that is no movement that
+/// does not end.
+#[test]
+fn an_arm_that_stood_still_for_a_minute_is_not_late() {
+    let environment = environment("container_finger.toml", &[]);
+    let (plain, _) = broken(&environment, |_, _| {});
+    let (paused, _) = broken(&environment, |_, reading| reading.time_s += 60.0);
+    // A larger clock rounds otherwise, and a tick of rest comes or goes.
+    let apart_m = (contact(paused.unwrap()).p_wc - contact(plain.unwrap()).p_wc).norm();
+    assert!(apart_m < 1e-4, "{apart_m}");
+}
+
 #[test]
 fn a_pressure_that_is_not_a_number_is_silence_and_a_frozen_one_ends_inside() {
     let environment = environment("container_finger.toml", &[]);

@@ -114,11 +114,15 @@ impl Servo {
         alert: bool,
     ) -> Result<Option<ApproachEnd>, Fault> {
         let mut path = StraightPath::new(self.x_wt().translation.vector, to, speed_m_s);
-        let deadline_s = self.state.time_s + path.patience_s();
+        // From the first reading on: the clock of a real arm goes on while the next touch is
+        // thought about.
+        let mut deadline_s = None;
         let period_s = self.period_s();
         loop {
             let goal = path.advance(period_s);
             self.tick(&goal)?;
+            let time_s = self.state.time_s;
+            let deadline_s = *deadline_s.get_or_insert(time_s + path.patience_s());
             if let Some(end) = self.monitor.approach_end().filter(|_| alert) {
                 return Ok(Some(end));
             }
@@ -126,7 +130,7 @@ impl Servo {
             if path.is_done() && away.norm() < ARRIVED_M {
                 return Ok(None);
             }
-            if self.state.time_s > deadline_s {
+            if time_s > deadline_s {
                 return Err(self.overdue(phase, &to));
             }
         }
