@@ -3,9 +3,6 @@
 //! Prints a table with measured exponents and the share of this machine's own matrix
 //! multiplication, and draws `docs/growth.svg` and `.png`. One thread.
 
-mod common;
-
-use common::{KERNEL, hyperparameters, search_box, touches};
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::posterior::Scratch;
 use palpate::gp::{Mean, Posterior};
@@ -13,6 +10,7 @@ use palpate::report::axes::{Axis, Panel};
 use palpate::report::canvas::{Area, Canvas};
 use palpate::report::legend::{Legend, Swatch};
 use palpate::report::{png, style};
+use palpate::study::bench::sample::{KERNEL, hyperparameters, search_box, touches};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;

@@ -1,8 +1,5 @@
 //! What one trial spends its time on, piece by piece.
 
-mod common;
-
-use common::{KERNEL, hyperparameters, search_box, touches};
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate::gp::likelihood::Likelihood;
@@ -11,6 +8,7 @@ use palpate::gp::{Mean, Posterior};
 use palpate::sim::environment::Shape;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
+use palpate::study::bench::sample::{KERNEL, hyperparameters, search_box, touches};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;

@@ -1,8 +1,7 @@
 //! What the sensor sends, and what can be read back from it.
 
-use crate::common::shapes::*;
+use crate::common::quiet::{plane, quiet};
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
-use palpate::geometry::bvh::MeshBvh;
 use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::{Detection, Detector, Finger, Frame, Tare};
@@ -24,25 +23,6 @@ fn over(origin_w: Vector3<f64>, towards_t: &Vector3<f64>) -> TipMotion {
 
 fn height(height_m: f64) -> TipMotion {
     over(Vector3::new(0.0, 0.0, height_m), &-Vector3::z())
-}
-
-fn plane() -> MeshBvh {
-    MeshBvh::new(square(0.1, 2))
-}
-
-/// Everything that makes a reading other than ideal is off.
-fn quiet() -> Effects {
-    Effects {
-        skin: Some(SkinEffect::default()),
-        fluid: Some(FluidEffect { noise_counts: 0.0, quantise: false, ..Default::default() }),
-        electrodes: Some(ElectrodesEffect {
-            noise: 0.0,
-            drift_counts: 0.0,
-            quantise: false,
-            ..Default::default()
-        }),
-        ..Effects::default()
-    }
 }
 
 /// Frames of a finger that moves as `motion` says over time.

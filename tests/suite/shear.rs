@@ -1,9 +1,9 @@
 //! Shear of the skin: what electrodes, frames and PAC make of friction, against real sensors, and
 //! where the finger says it is touched meanwhile.
 
-use crate::common::shapes::{Dice, square};
+use crate::common::quiet::{plane, quiet as ideal};
+use crate::common::shapes::Dice;
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3, Vector6};
-use palpate::geometry::bvh::MeshBvh;
 use palpate::math::seed::stream;
 use palpate::robot::finger::contact_point::locate;
 use palpate::robot::finger::plane_fit::PlaneFit;
@@ -12,7 +12,7 @@ use palpate::robot::finger::{Finger, Frame, PointOfContact, Tare, TipMotion};
 use palpate::sim::finger::calibration::constants::Model;
 use palpate::sim::finger::calibration::shear::{Agreement, ShearRecordings, compare};
 use palpate::sim::finger::effects::electrodes::ElectrodesEffect;
-use palpate::sim::finger::effects::fluid::{FluidEffect, VibrationEffect};
+use palpate::sim::finger::effects::fluid::VibrationEffect;
 use palpate::sim::finger::effects::friction::FrictionEffect;
 use palpate::sim::finger::effects::skin::SkinEffect;
 use palpate::sim::finger::plate::{Plate, direction_t, pose};
@@ -24,22 +24,7 @@ const TICK_S: f64 = 1e-3;
 
 /// Friction, and nothing that makes a reading other than ideal.
 fn quiet() -> Effects {
-    Effects {
-        skin: Some(SkinEffect::default()),
-        fluid: Some(FluidEffect { noise_counts: 0.0, quantise: false, ..Default::default() }),
-        electrodes: Some(ElectrodesEffect {
-            noise: 0.0,
-            drift_counts: 0.0,
-            quantise: false,
-            ..Default::default()
-        }),
-        friction: Some(FrictionEffect::default()),
-        ..Effects::default()
-    }
-}
-
-fn plane() -> MeshBvh {
-    MeshBvh::new(square(0.1, 2))
+    Effects { friction: Some(FrictionEffect::default()), ..ideal() }
 }
 
 /// Frames of a finger whose pad, flat on the plane, goes through `(seconds, velocity)` one after

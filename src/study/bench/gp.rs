@@ -1,13 +1,11 @@
 //! Pieces of the Gaussian process and of the planners that ask it.
 
 use super::piece::Piece;
-use crate::gp::kernel::SquaredExponential;
+use super::sample::{KERNEL, hyperparameters, place, search_box, touches};
 use crate::gp::likelihood::Likelihood;
 use crate::gp::posterior::Scratch;
-use crate::gp::{Hyperparameters, Mean, Observations, Posterior, SearchBox, TouchNoise};
+use crate::gp::{Mean, Posterior};
 use std::hint::black_box;
-
-static KERNEL: SquaredExponential = SquaredExponential;
 
 /// Evaluations of a climb.
 const EVALUATIONS: usize = 16;
@@ -96,42 +94,6 @@ fn appended(count: usize) -> Option<Piece> {
     })
 }
 
-/// A low-discrepancy walk over the unit square.
-fn place(i: usize) -> [f64; 2] {
-    [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0]
-}
-
-/// `count` touches of a smooth surface.
-fn touches(count: usize) -> Observations {
-    let mut touches = Observations::new(2);
-    for place in (0..count).map(place) {
-        touches.push(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
-    }
-    touches
-}
-
 fn posterior(count: usize) -> Option<Posterior> {
     Posterior::new(&KERNEL, hyperparameters(), touches(count)).ok()
-}
-
-fn hyperparameters() -> Hyperparameters {
-    Hyperparameters {
-        signal_sd: 1.0,
-        length_scales: vec![0.2, 0.4],
-        noise_sd: 1e-3,
-        slope_noise_sd: 0.0,
-        mean: 0.0,
-    }
-}
-
-/// The ranges that a belief searches by default.
-fn search_box() -> SearchBox {
-    SearchBox {
-        mean: Mean::Zero,
-        length_scales: vec![(0.005, 1.0).into(); 2],
-        noise_ratio: (1e-4, 1e-2).into(),
-        signal_sd: (1e-3, 1e3).into(),
-        touch_noise: TouchNoise::Fitted,
-        slope_noise_ratio: None,
-    }
 }

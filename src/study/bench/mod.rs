@@ -8,6 +8,7 @@
 mod gp;
 mod machine;
 mod piece;
+pub mod sample;
 mod timing;
 mod touch;
 

@@ -8,6 +8,7 @@ pub mod lab;
 #[allow(dead_code)] // The bench of finite elements uses the rest.
 pub mod presses;
 pub mod program;
+pub mod quiet;
 pub mod runs;
 pub mod shapes;
 pub mod shipped;

@@ -1,20 +1,26 @@
-//! What benches of the Gaussian process are made of.
+//! What pieces of the Gaussian process are made of.
 
-use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
-use palpate::gp::{Mean, Observations, SearchBox, TouchNoise};
+use crate::gp::kernel::{Hyperparameters, SquaredExponential};
+use crate::gp::{Mean, Observations, SearchBox, TouchNoise};
 
+/// The kernel of them all.
 pub static KERNEL: SquaredExponential = SquaredExponential;
 
-/// `count` touches of a smooth surface over a unit square, spread by a low-discrepancy walk.
+/// A low-discrepancy walk over the unit square.
+pub fn place(i: usize) -> [f64; 2] {
+    [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0]
+}
+
+/// `count` touches of a smooth surface.
 pub fn touches(count: usize) -> Observations {
     let mut touches = Observations::new(2);
-    for i in 0..count {
-        let place = [(i as f64 * 0.754_877_666) % 1.0, (i as f64 * 0.569_840_291) % 1.0];
+    for place in (0..count).map(place) {
         touches.push(&place, (7.0 * place[0]).sin() + (4.0 * place[1]).cos());
     }
     touches
 }
 
+/// Of a belief of them.
 pub fn hyperparameters() -> Hyperparameters {
     Hyperparameters {
         signal_sd: 1.0,
