@@ -10,7 +10,7 @@ use super::comparison::pairs;
 use super::experiment::Experiment;
 use super::measure::{MEASURES, Measure};
 use super::row::{TrialRow, of_planner};
-use super::statistics::{Ranked, percentiles_95, resampled};
+use super::statistics::{Ranked, Samples, percentiles_95};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::collections::BTreeMap;
 
@@ -78,9 +78,8 @@ pub fn equal_error<'a>(
     let everyone: Vec<usize> = (0..pairs.len()).collect();
     let goal = medians[1].errors.get(goal_index)?.median(&everyone, &mut counts)?;
     let found = meet(&medians, &everyone, goal_index, &mut counts);
-    let samples = resampled(pairs.len(), experiment.seed, |sample| {
-        meet(&medians, sample, goal_index, &mut counts)
-    });
+    let samples = Samples::new(pairs.len(), experiment.seed)
+        .each(|sample| meet(&medians, sample, goal_index, &mut counts));
     let first = f64::from(experiment.initial_touches);
     let estimate = |of: &dyn Fn(&[Met; 2]) -> f64| Estimate {
         value: of(&found),

@@ -85,37 +85,51 @@ pub const RESAMPLES: usize = 1000;
 /// ch. 13), the same for the same `seed`; none of fewer than two values.
 pub fn mean_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
     let mut drawn = vec![0.0; values.len()];
-    let means = resampled(values.len(), seed, |sample| {
+    let mean = |sample: &[usize]| {
         drawn.iter_mut().zip(sample).for_each(|(to, &index)| *to = values[index]);
         mean(&drawn)
-    });
+    };
+    let means = Samples::new(values.len(), seed).each(mean);
     (values.len() > 1).then(|| percentiles_95(means))
 }
 
 /// As [`mean_interval`], of the median.
 pub fn median_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
-    let (ranked, mut counts) = (Ranked::new(values), Vec::new());
-    let medians = resampled(values.len(), seed, |sample| {
-        ranked.median(sample, &mut counts).unwrap_or(f64::NAN)
-    });
-    (values.len() > 1).then(|| percentiles_95(medians))
+    Samples::new(values.len(), seed).median_interval(values)
 }
 
-/// A statistic of every bootstrap sample: `count` indices below `count`, drawn with replacement.
-pub(super) fn resampled<T>(
+/// The bootstrap samples of as many values: for each sample as many indices, drawn with
+/// replacement; none of a single value.
+pub(super) struct Samples {
     count: usize,
-    seed: u64,
-    mut statistic: impl FnMut(&[usize]) -> T,
-) -> Vec<T> {
-    let mut rng = seed::stream(seed, 0, "bootstrap");
-    let mut indices = vec![0; count];
-    let samples = if count > 1 { RESAMPLES } else { 0 };
-    (0..samples)
-        .map(|_| {
-            indices.fill_with(|| rng.random_range(0..count));
-            statistic(&indices)
-        })
-        .collect()
+    indices: Vec<usize>,
+}
+
+impl Samples {
+    /// The same for the same `seed`.
+    pub(super) fn new(count: usize, seed: u64) -> Self {
+        let mut rng = seed::stream(seed, 0, "bootstrap");
+        let samples = if count > 1 { RESAMPLES } else { 0 };
+        let indices = (0..samples * count).map(|_| rng.random_range(0..count)).collect();
+        Self { count, indices }
+    }
+
+    /// Of how many values.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// A statistic of every sample.
+    pub(super) fn each<T>(&self, statistic: impl FnMut(&[usize]) -> T) -> Vec<T> {
+        self.indices.chunks_exact(self.count.max(1)).map(statistic).collect()
+    }
+
+    /// See [`median_interval`]; of as many values.
+    pub(super) fn median_interval(&self, values: &[f64]) -> Option<[f64; 2]> {
+        let (ranked, mut counts) = (Ranked::new(values), Vec::new());
+        let medians = self.each(|sample| ranked.median(sample, &mut counts).unwrap_or(f64::NAN));
+        (!medians.is_empty()).then(|| percentiles_95(medians))
+    }
 }
 
 /// A statistic of every bootstrap sample of several strata of `sizes`: indices of each, drawn
