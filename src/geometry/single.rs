@@ -1,5 +1,5 @@
-//! Bounds of rays and balls in single precision, all three coordinates at once: a query asks dozens of
-//! boxes and few triangles.
+//! Bounds of rays and balls in single precision, all three coordinates at once: a query asks dozens
+//! of boxes and few triangles.
 //!
 //! What is asked about grows, and its bound shrinks, by more than rounding moves them: no bound is
 //! above the exact one.

@@ -58,6 +58,7 @@ struct Ball {
 pub(super) struct Vicinity {
     mesh: Option<Arc<Mesh>>,
     x_wt: Isometry3<f64>,
+    /// Each with the parts of the object that were within the margin of it.
     near: Vec<(usize, Nearby)>,
     /// Whether the object was within the margin of the inner capsule.
     is_deep: bool,
@@ -109,8 +110,8 @@ impl Patches {
         size_of_val(self.patches.as_slice())
     }
 
-    /// The ranges of samples whose rays may meet the object in pose `x_wt`, in order, each with what
-    /// of the object these may meet; and how far off the axis the rays may start.
+    /// The ranges of samples whose rays may meet the object in pose `x_wt`, in order, each with the
+    /// parts of it that these may meet; and how far off the axis the rays may start.
     pub fn near<'a>(
         &'a self,
         bvh: &'a MeshBvh,
