@@ -193,27 +193,29 @@ impl Scan {
         observations: &Observations,
     ) -> Vec<Option<ProfiledLikelihood>> {
         if self.grid != *grid || !observations.begin_with(&self.taken) {
-            let points = vec![Point::default(); grid.len()];
-            *self = Self { grid: grid.clone(), taken: observations.clone(), points };
+            self.grid.clone_from(grid);
+            self.points.resize_with(grid.len(), Point::default);
+            self.points.iter_mut().for_each(Point::forget);
         }
-        let mut row = Vec::new();
+        let (mut row, mut ratios) = (Vec::new(), Vec::new());
         let mut profiles = Vec::with_capacity(grid.len());
         let noises = grid.noises(sought.length_scales.len());
         for (group, points) in self.points.chunks_mut(noises.max(1)).enumerate() {
             // The same lengths, and so the same correlations.
             let (lengths, _) = sought.parameters(&grid.place(group * noises));
+            let places = (0..points.len()).map(|at| grid.place(group * noises + at));
+            ratios.clear();
+            ratios.extend(places.map(|place| sought.parameters(&place).1));
             for i in points[0].heights.len()..observations.len() {
                 row.resize(i + 1, 0.0);
                 observations.distances2(observations.place(i), &lengths, 0, &mut row[..i]);
                 kernel.correlate(&mut row[..i]);
-                for (at, point) in points.iter_mut().enumerate() {
-                    let (_, noise) = sought.parameters(&grid.place(group * noises + at));
-                    row[i] = 1.0 + observations.height_noise2(i, noise);
+                for (point, noise) in points.iter_mut().zip(&ratios) {
+                    row[i] = 1.0 + observations.height_noise2(i, *noise);
                     point.append(&row, observations.heights()[i]);
                 }
             }
-            for (at, point) in points.iter().enumerate() {
-                let (_, noise) = sought.parameters(&grid.place(group * noises + at));
+            for (point, noise) in points.iter().zip(&ratios) {
                 let profile = || point.profile(sought.mean, scale, noise.height, observations);
                 profiles.push((!point.is_lost).then(profile));
             }
@@ -224,6 +226,15 @@ impl Scan {
 }
 
 impl Point {
+    /// Back to no observations; its memory is kept for the next.
+    fn forget(&mut self) {
+        self.factor.truncate(0);
+        self.heights.clear();
+        self.ones.clear();
+        self.log_determinant = 0.0;
+        self.is_lost = false;
+    }
+
     fn append(&mut self, row: &[f64], height: f64) {
         self.is_lost = self.is_lost || self.factor.append(row).is_err();
         let count = row.len() - 1;
