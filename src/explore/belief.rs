@@ -118,10 +118,7 @@ impl Belief {
         let mut fit = match self.inducing() {
             None => self.kernels.fit(&search_box, &self.contacts),
             // Evenly thinned, so that some are near each other and tell the noise.
-            Some(most) => {
-                let thinned = self.contacts.every(self.contacts.len().div_ceil(most));
-                self.kernels.fit(&search_box, &thinned)
-            }
+            Some(most) => self.kernels.fit(&search_box, &self.contacts.thinned(most)),
         };
         if self.settings.band == Band::LeaveOneOut {
             let hyperparameters = fit.hyperparameters.clone();

@@ -118,10 +118,11 @@ impl Observations {
             && same(&self.slope_noise2, &others.slope_noise2)
     }
 
-    /// Every `step`th one.
-    pub fn every(&self, step: usize) -> Self {
+    /// As many as `most` of them, evenly spread over the order in which they were taken in.
+    pub fn thinned(&self, most: usize) -> Self {
+        let count = most.min(self.len());
         let mut some = Self::new(self.dimension());
-        for i in (0..self.len()).step_by(step.max(1)) {
+        for i in (0..count).map(|i| i * self.len() / count) {
             let place: Vec<f64> = self.place(i).collect();
             let noise = self.slope_noise2[i].sqrt();
             let gradient = self.slope(i);
