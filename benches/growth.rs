@@ -56,7 +56,7 @@ fn seconds(mut work: impl FnMut()) -> f64 {
     (0..3).map(round).fold(once, f64::min)
 }
 
-/// Curves of seconds, of bytes, and how far the approximation is off.
+/// Curves of seconds, of megabytes, and how far the approximation is off.
 fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
     let (at, bounds) = (hyperparameters(), search_box());
     let curve = |name, colour, expected| Curve { name, colour, expected, values: Vec::new() };
@@ -65,9 +65,9 @@ fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
     let mut add = curve("adding a touch", "#cc79a7", 2.0);
     let mut query = curve("σ at a place, with gradient", style::TRUTH, 2.0);
     let mut grid = curve("mean and σ at one of 1000 places", "#e69f00", 2.0);
-    let mut through = curve("conditioning through 500", "#009e73", 1.0);
-    let mut exact_bytes = curve("likelihood with gradient", "#d55e00", 2.0);
-    let mut through_bytes = curve("conditioning through 500", "#009e73", 0.0);
+    let mut through = curve("conditioning through 500", "#56b4e9", 1.0);
+    let mut exact_mb = curve("likelihood with gradient", "#d55e00", 2.0);
+    let mut through_mb = curve("conditioning through 500", "#56b4e9", 0.0);
     let mut off = Vec::new();
     let places: Vec<[f64; 2]> =
         (0..1000).map(|i| [f64::from(i % 32) / 31.0, f64::from(i / 32) / 31.0]).collect();
@@ -89,7 +89,7 @@ fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
             });
             likelihood.values.push((n, value));
         });
-        exact_bytes.values.push((n, bytes as f64));
+        exact_mb.values.push((n, bytes as f64 / 1e6));
         let induce = || Posterior::through(INDUCING, &KERNEL, at.clone(), &touches);
         through.values.push((
             n,
@@ -97,7 +97,7 @@ fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
                 let _ = black_box(induce());
             }),
         ));
-        through_bytes.values.push((n, peak_bytes(induce) as f64));
+        through_mb.values.push((n, peak_bytes(induce) as f64 / 1e6));
         let Ok(posterior) = Posterior::new(&KERNEL, at.clone(), touches) else { continue };
         let kernels: [(&str, &dyn Kernel); 2] =
             [("squared_exponential", &KERNEL), ("matern_52", &Matern52)];
@@ -136,7 +136,7 @@ fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
         ));
     }
     let seconds = vec![fit, likelihood, add, query, grid, through];
-    (seconds, vec![exact_bytes, through_bytes], off)
+    (seconds, vec![exact_mb, through_mb], off)
 }
 
 /// How far means and deviations are from the exact ones, in units of the exact deviation.
@@ -221,9 +221,9 @@ fn main() -> anyhow::Result<()> {
     if std::env::args().any(|argument| argument == "--test") {
         return Ok(());
     }
-    let (curves, bytes, off) = measure();
+    let (curves, megabytes, off) = measure();
     print("seconds", &curves);
-    print("bytes", &bytes);
+    print("MB", &megabytes);
     println!("through at most {INDUCING}, at 1000 places, hyperparameters known");
     println!(
         "kernel                 touches    kept  left, of a noise  mean off, of a sd   sd, of the exact"
@@ -239,7 +239,7 @@ fn main() -> anyhow::Result<()> {
             flops / 1e9
         );
     }
-    if let Some(svg) = draw([("seconds", &curves), ("bytes held at once", &bytes)]) {
+    if let Some(svg) = draw([("seconds", &curves), ("MB held at once", &megabytes)]) {
         let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
         std::fs::write(docs.join("growth.png"), png::render(&svg)?)?;
         std::fs::write(docs.join("growth.svg"), svg)?;

@@ -54,7 +54,7 @@ pub struct EqualError<'a> {
 
 /// Every planner against every baseline in every error that both have.
 pub fn equal_errors<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<EqualError<'a>> {
-    let asked = pairs(experiment).into_iter();
+    let asked = pairs(experiment);
     let asked: Vec<_> = asked.flat_map(|pair| errors().map(move |error| (pair, error))).collect();
     let found = asked.into_par_iter().filter_map(|((planner, baseline), measure)| {
         equal_error(experiment, rows, [planner, baseline], measure)
