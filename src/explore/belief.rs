@@ -117,8 +117,12 @@ impl Belief {
         let search_box = self.search_box();
         let mut fit = match self.inducing() {
             None => self.kernels.fit(&search_box, &self.contacts),
-            // Evenly thinned, so that some are near each other and tell the noise.
-            Some(most) => self.kernels.fit(&search_box, &self.contacts.thinned(most)),
+            // Evenly thinned, so that some are near each other and tell the noise; and the same
+            // ones for as long as possible, so that what the last fit knows still holds.
+            Some(most) => {
+                let thinned = self.contacts.every(self.contacts.len() / most);
+                self.kernels.fit(&search_box, &thinned)
+            }
         };
         if self.settings.band == Band::LeaveOneOut {
             let hyperparameters = fit.hyperparameters.clone();

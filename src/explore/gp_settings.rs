@@ -34,7 +34,8 @@ pub struct GpSettings {
     /// Whether the surface is held below the space that the finger has swept, where it met one.
     pub free_space: bool,
     /// With more touches than this the belief is conditioned on all of them through at most so
-    /// many, and fitted to as many: an approximation, whose rows say what it loses.
+    /// many, and fitted to between as many and twice that: an approximation, whose rows say what
+    /// it loses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inducing_touches: Option<u32>,
     /// What the standard deviations are scaled by.

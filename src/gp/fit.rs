@@ -125,7 +125,7 @@ impl Memory {
                     search.scan(Some(Arc::make_mut(&mut self.scan)));
                 }
                 None if count > HALVED => {
-                    let half = sought.fit(kernel, &observations.thinned(count.div_ceil(2)));
+                    let half = sought.fit(kernel, &observations.every(2));
                     in_half = half.factorisations;
                     search.climb(&sought.log_parameters(&half.hyperparameters), None);
                 }

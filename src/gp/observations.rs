@@ -118,11 +118,10 @@ impl Observations {
             && same(&self.slope_noise2, &others.slope_noise2)
     }
 
-    /// As many as `most` of them, evenly spread over the order in which they were taken in.
-    pub fn thinned(&self, most: usize) -> Self {
-        let count = most.min(self.len());
+    /// Every `step`th of them.
+    pub fn every(&self, step: usize) -> Self {
         let mut some = Self::new(self.dimension());
-        for i in (0..count).map(|i| i * self.len() / count) {
+        for i in (0..self.len()).step_by(step.max(1)) {
             let place: Vec<f64> = self.place(i).collect();
             let noise = self.slope_noise2[i].sqrt();
             let gradient = self.slope(i);
