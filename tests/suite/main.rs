@@ -62,6 +62,7 @@ mod no_truth;
 mod notices;
 mod objects;
 mod optimizers;
+mod own_planners;
 mod page;
 mod planners;
 mod presence;
