@@ -111,7 +111,8 @@ class Experiment:
             fresh: throw away what is there.
             threads: 0 means all cores; results do not depend on it.
             progress: say on standard error how far it is.
-            limit_s: seconds that a planner of your own may take for a target; None means for ever.
+            limit_s: seconds that a planner of your own may take for a target; None means for ever, and saves
+                the hand-over to a thread that could be left behind.
             isolate: run each planner of your own in a process of its own, which can be killed.
 
         Raises:

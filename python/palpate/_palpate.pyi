@@ -198,6 +198,22 @@ class Fitted:
     @property
     def log_likelihood(self) -> float: ...
 
+class Envs:
+    def __init__(
+        self,
+        scenes: Sequence[tuple[str, Sequence[str]]],
+        count: int,
+        touches: int,
+        initial: int,
+        grid: int,
+        reward: str,
+        threads: int,
+    ) -> None: ...
+    @property
+    def zone(self) -> Zone: ...
+    def reset(self, seeds: Sequence[int]) -> dict[str, Any]: ...
+    def step(self, actions: npt.NDArray[np.float32]) -> dict[str, Any]: ...
+
 class Experiment:
     @staticmethod
     def load(path: str, sets: Sequence[str]) -> Experiment: ...

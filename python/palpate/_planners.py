@@ -108,7 +108,9 @@ class Workers:
         self._limit_s = limit_s
         self._live: set[Worker] = set()
 
-    def __call__(self, zone: Any, seed: int) -> Worker:
+    def __call__(self, zone: Any, seed: int) -> Worker | Trusted:
+        if self._limit_s is None:
+            return Trusted(self._factory, zone, seed)
         worker = Worker(self, self._factory, zone, seed, self._limit_s)
         self._live.add(worker)
         return worker
@@ -123,11 +125,33 @@ class Workers:
         self._live.discard(worker)
 
 
+class Trusted:
+    """A planner of one trial that is called where the trial runs: nobody looks at the clock."""
+
+    def __init__(self, factory: Factory, zone: Any, seed: int) -> None:
+        self._make = (factory, zone, seed)
+        self._planner: Any = None
+
+    def plan(self, belief: Any) -> list[float]:
+        """As of a worker."""
+        try:
+            if self._planner is None:
+                self._planner = make(*self._make)
+            return target_of(self._planner.plan(belief))
+        except PlannerError:
+            raise
+        except BaseException as error:  # also of sys.exit in a planner
+            raise PlannerError(told(error)) from None
+
+    def close(self) -> None:
+        """The trial is over."""
+
+
 class Worker:
     """A planner of one trial on a thread of its own."""
 
     def __init__(
-        self, home: Workers, factory: Factory, zone: Any, seed: int, limit_s: float | None
+        self, home: Workers, factory: Factory, zone: Any, seed: int, limit_s: float
     ) -> None:
         self._home = home
         self._limit_s = limit_s

@@ -5,8 +5,10 @@
 
 mod belief;
 mod columns;
+mod envs;
 mod errors;
 mod experiment;
+mod exploration;
 mod gaussian_process;
 mod mesh;
 mod places;
@@ -22,6 +24,7 @@ use pyo3::prelude::*;
 fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<belief::Belief>()?;
+    module.add_class::<envs::Envs>()?;
     module.add_class::<experiment::Experiment>()?;
     module.add_class::<gaussian_process::Fitted>()?;
     module.add_class::<run::Run>()?;

@@ -38,7 +38,7 @@ def test_an_own_planner_is_paired_and_the_same_each_time(isolate):
     assert len(run.summary().query("planner == 'own:Middle'")) > 0
 
 
-@pytest.mark.parametrize("isolate", [False, True])
+@pytest.mark.parametrize("how", [{}, {"limit_s": None}, {"isolate": True}])
 @pytest.mark.parametrize(
     ("planner", "words"),
     [
@@ -51,8 +51,8 @@ def test_an_own_planner_is_paired_and_the_same_each_time(isolate):
         (own.Nothing, "no method plan"),
     ],
 )
-def test_a_planner_that_fails_is_a_row_with_the_reason(planner, words, isolate):
-    told = failures(planner, isolate=isolate)
+def test_a_planner_that_fails_is_a_row_with_the_reason(planner, words, how):
+    told = failures(planner, **how)
     assert len(told) == 2 and all(words in reason for reason in told)
 
 
@@ -72,6 +72,7 @@ def test_a_planner_that_does_not_return_is_a_row(planner, isolate):
 
 def test_a_planner_that_leaves_is_a_row():
     assert all("SystemExit" in reason for reason in failures(own.Exits))
+    assert all("SystemExit" in reason for reason in failures(own.Exits, limit_s=None))
     assert all("exit code 3" in reason for reason in failures(own.Exits, isolate=True))
 
 
@@ -84,7 +85,7 @@ def test_an_interrupt_does_not_wait_for_a_planner():
     timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        toy.run([own.Sleeps], trials=3, limit_s=None)
+        toy.run([own.Sleeps], trials=3)
 
 
 def test_what_is_no_planner_is_refused():
