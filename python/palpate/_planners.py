@@ -14,11 +14,11 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable
-from queue import Empty, SimpleQueue
 from typing import Any
 
 import numpy as np
 
+from . import _palpate
 from .errors import PlannerError
 
 #: Seconds that a planner may take for one target, unless another limit is asked for; chosen.
@@ -93,13 +93,6 @@ def told(error: BaseException) -> str:
     return f"{head}\n" + "".join(traceback.format_list(own)).rstrip()
 
 
-class Failure:
-    """Why there is no target."""
-
-    def __init__(self, reason: str) -> None:
-        self.reason = reason
-
-
 class Workers:
     """The planners of one name in one run, as the extension starts them."""
 
@@ -148,65 +141,38 @@ class Trusted:
 
 
 class Worker:
-    """A planner of one trial on a thread of its own."""
+    """A planner of one trial on a thread of its own, which the extension asks over a desk."""
 
-    def __init__(
-        self, home: Workers, factory: Factory, zone: Any, seed: int, limit_s: float
-    ) -> None:
+    def __init__(self, home: Workers, factory: Factory, zone: Any, seed: int, limit_s: float) -> None:
         self._home = home
-        self._limit_s = limit_s
-        self._requests: SimpleQueue[Any] = SimpleQueue()
-        self._replies: SimpleQueue[list[float] | Failure] = SimpleQueue()
-        arguments = (factory, zone, seed, self._requests, self._replies)
+        self.desk = _palpate.Desk(limit_s)
+        arguments = (factory, zone, seed, self.desk)
         self._thread = threading.Thread(target=_serve, args=arguments, daemon=True)
         self._thread.start()
 
-    def plan(self, belief: Any) -> list[float]:
-        """The next target.
-
-        Raises:
-            PlannerError: with the reason why there is none.
-        """
-        self._requests.put(belief)
-        try:
-            reply = self._replies.get(timeout=self._limit_s)
-        except Empty:
-            self._abandon()
-            raise PlannerError(f"it did not return within {self._limit_s:g} s") from None
-        if isinstance(reply, Failure):
-            raise PlannerError(reply.reason)
-        return reply
-
     def interrupt(self) -> None:
         """Lets whoever waits for a target go."""
-        self._replies.put(Failure("the run was stopped"))
-        self._abandon()
+        self.desk.fail("the run was stopped")
+        self.abandon()
 
     def close(self) -> None:
         """The trial is over."""
-        self._requests.put(None)
         self._home.forget(self)
 
-    def _abandon(self) -> None:
+    def abandon(self) -> None:
         """Asks the thread to end. One that waits outside Python ends when it comes back."""
         ident = ctypes.c_ulong(self._thread.ident or 0)
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ident, ctypes.py_object(SystemExit))
 
 
-def _serve(
-    factory: Factory,
-    zone: Any,
-    seed: int,
-    requests: SimpleQueue[Any],
-    replies: SimpleQueue[list[float] | Failure],
-) -> None:
+def _serve(factory: Factory, zone: Any, seed: int, desk: _palpate.Desk) -> None:
     try:
-        belief = requests.get()
+        belief = desk.next()
         planner: Any = make(factory, zone, seed) if belief is not None else None
         while belief is not None:
-            replies.put(target_of(planner.plan(belief)))
+            desk.answer(target_of(planner.plan(belief)))
             # Not kept while the next touch is made.
             del belief
-            belief = requests.get()
+            belief = desk.next()
     except BaseException as error:  # also of sys.exit in a planner
-        replies.put(Failure(str(error) if isinstance(error, PlannerError) else told(error)))
+        desk.fail(str(error) if isinstance(error, PlannerError) else told(error))

@@ -5,6 +5,7 @@
 
 mod belief;
 mod columns;
+mod desk;
 mod envs;
 mod errors;
 mod experiment;
@@ -24,6 +25,7 @@ use pyo3::prelude::*;
 fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<belief::Belief>()?;
+    module.add_class::<desk::Desk>()?;
     module.add_class::<envs::Envs>()?;
     module.add_class::<experiment::Experiment>()?;
     module.add_class::<gaussian_process::Fitted>()?;

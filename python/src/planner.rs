@@ -1,6 +1,7 @@
 //! A planner written in Python, as an experiment runs it.
 
 use crate::belief::Belief;
+use crate::desk::{Desk, NoTarget, Trial};
 use crate::zone::Zone;
 use palpate::explore::belief;
 use palpate::explore::planner::{Maker, Plan, Planner, PlanningSettings, Sight, Undecided};
@@ -13,8 +14,8 @@ use rand_chacha::ChaCha8Rng;
 pub(crate) struct PythonMaker {
     /// `MODULE:CLASS`.
     pub(crate) name: String,
-    /// Called with zone and seed; its result has `plan(belief) -> sequence of float` and `close()`,
-    /// and what it raises is the reason why there is no target.
+    /// Called with zone and seed. Its result has `close()`, and `desk` with `abandon()`, or
+    /// `plan(belief) -> sequence of float`; what that raises is the reason why there is no target.
     pub(crate) start: Py<PyAny>,
 }
 
@@ -33,18 +34,36 @@ impl Maker for PythonMaker {
         let begun = Python::attach(|py| {
             self.start.call1(py, (Zone(zone.clone()), seed)).map_err(|error| reason(py, &error))
         });
-        Box::new(PythonPlanner { begun, dimension: zone.dimension() })
+        let desk = begun.as_ref().ok().and_then(|begun| {
+            Python::attach(|py| {
+                let desk = begun.getattr(py, "desk").ok()?;
+                desk.cast_bound::<Desk>(py).ok()?.get().trial()
+            })
+        });
+        Box::new(PythonPlanner { begun, desk, dimension: zone.dimension() })
     }
 }
 
 struct PythonPlanner {
     begun: Result<Py<PyAny>, String>,
+    /// Where it is asked, if it sits on a thread of its own.
+    desk: Option<Trial>,
     dimension: usize,
 }
 
 impl PythonPlanner {
     fn target(&self, belief: &belief::Belief) -> Result<Vec<f64>, String> {
         let begun = self.begun.as_ref().map_err(Clone::clone)?;
+        if let Some(desk) = &self.desk {
+            return desk.ask(belief.clone()).map_err(|no_target| match no_target {
+                NoTarget::Said(reason) => reason,
+                NoTarget::Late(limit) => {
+                    // Nobody is left to be told that it could not be left behind.
+                    Python::attach(|py| begun.call_method0(py, "abandon").is_ok());
+                    format!("it did not return within {} s", limit.as_secs_f64())
+                }
+            });
+        }
         let belief = Belief(belief.clone());
         Python::attach(|py| {
             let planned = begun.call_method1(py, "plan", (belief,));
@@ -72,6 +91,8 @@ impl Planner for PythonPlanner {
 
 impl Drop for PythonPlanner {
     fn drop(&mut self) {
+        // So that its thread ends.
+        self.desk = None;
         if let Ok(begun) = &self.begun {
             // Nobody is left to be told that it could not be ended.
             Python::try_attach(|py| begun.call_method0(py, "close").is_ok());
