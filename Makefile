@@ -199,6 +199,8 @@ $(PYTHON): python/requirements.txt
 $(PYTHON_HOME): FORCE
 	rm -rf $@ && mkdir -p $@
 	cp -r experiments scenes models $@
+	mkdir $@/licences && cp LICENSE-* $@/licences
+	python3 .cargo/licences.py --package palpate-python > $@/licences/packages.txt
 	rm -r $@/models/*.rs $@/experiments/ci $@/experiments/slurm $@/experiments/kubernetes $@/experiments/baselines
 
 FORCE:

@@ -1,6 +1,5 @@
 //! Planners that are not built in: a program adds them to its simulation.
 
-use palpate::cli;
 use palpate::experiment::runner::{self, RunError};
 use palpate::experiment::store::{Manifest, Run, RunFolder};
 use palpate::experiment::{Experiment, Simulation};
@@ -10,6 +9,7 @@ use palpate::explore::planner::{
 };
 use palpate::task::Zone;
 use rand_chacha::ChaCha8Rng;
+use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
 /// Random touches, or none after some.
@@ -104,39 +104,27 @@ fn names_of_own_planners_have_a_module() {
     assert!(planner::PLANNERS.iter().all(|entry| !is_own(entry.name)));
 }
 
-/// The program takes a planner of its host's, and asks for it by the name on the command line.
+/// Planners named on the command line are run beside the file's; one that the program does not have
+/// is refused before anything is run, and says where it would be.
 #[test]
-fn the_program_runs_its_hosts_planners() {
+fn the_command_line_adds_planners() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
-    let arguments = [
-        "palpate",
-        "--quiet",
-        "run",
-        "experiments/toy.toml",
-        "--planner",
-        "mine:Random",
-        "--planner",
-        "active",
-        "--set",
-        "planners=[\"random\"]",
-        "--set",
-        "trials=2",
-        "--set",
-        "touches=8",
-        "--no-report",
-        "--json",
-        "--threads",
-        "2",
-        "--out",
-    ];
-    let arguments = arguments.map(Into::into).into_iter().chain([out.clone().into()]);
-    let code = cli::main_with(arguments, &|name| {
-        assert_eq!(name, "mine:Random");
-        Some(Ok(Box::new(Mine { touches: 8 })))
-    });
-    assert_eq!(code, 0);
-    let run = Run::read(&out).unwrap();
-    assert_eq!(run.experiment.planners, ["random", "mine:Random", "active"]);
-    assert_eq!(run.rows.len(), 6);
+    let run = |planner: &str| {
+        Command::new(env!("CARGO_BIN_EXE_palpate"))
+            .args(["--quiet", "run", "experiments/toy.toml", "--planner", planner, "--no-report"])
+            .args(["--set", "planners=[\"random\"]", "--set", "trials=2", "--set", "touches=8"])
+            .args(["--out".as_ref(), folder.path().join("run").as_os_str()])
+            .output()
+            .unwrap()
+    };
+    for (planner, words) in [("mine:Random", "Python"), ("activ", "active"), ("a b:c", "active")] {
+        let told = run(planner);
+        assert_eq!(told.status.code(), Some(2), "{planner}");
+        let error = String::from_utf8_lossy(&told.stderr).into_owned();
+        assert!(error.contains(planner) && error.contains(words), "{error}");
+    }
+    assert!(run("active").status.success());
+    let run = Run::read(&folder.path().join("run")).unwrap();
+    assert_eq!(run.experiment.planners, ["random", "active"]);
+    assert_eq!(run.rows.len(), 4);
 }
