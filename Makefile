@@ -187,6 +187,7 @@ test-python: setup $(PYTHON) $(PYTHON_HOME)
 	$(MATURIN) --profile dev --out target/wheels-dev
 	$(PYTHON) -m pip install --quiet --no-deps --force-reinstall target/wheels-dev/*.whl
 	cd python && $(abspath $(PYTHON)) -m mypy
+	cd python/tests && $(abspath $(PYTHON)) -m mypy.stubtest --ignore-disjoint-bases palpate._palpate
 	# Not beside the sources, which are not what is installed.
 	cd python/tests && $(abspath $(DEPS)/python/bin/pytest)
 

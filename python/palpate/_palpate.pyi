@@ -2,16 +2,32 @@
 
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, TypedDict
+from typing import Any, TypedDict, final
 
 import numpy as np
 import numpy.typing as npt
 
 __version__: str
 
+__all__ = [
+    "Belief",
+    "Desk",
+    "Envs",
+    "Experiment",
+    "Fitted",
+    "Run",
+    "Scene",
+    "Touch",
+    "Zone",
+    "__version__",
+    "main",
+    "planners",
+    "read_mesh",
+]
+
 _Array = npt.NDArray[np.float64]
 
-class Hyperparameters(TypedDict):
+class _Hyperparameters(TypedDict):
     """What a fit found."""
 
     signal_sd_m: float
@@ -19,6 +35,7 @@ class Hyperparameters(TypedDict):
     noise_sd_m: float
     mean_m: float
 
+@final
 class Zone:
     """The rectangle, or the interval, that is explored: targets are its places (x) or (x, z), metres."""
 
@@ -41,6 +58,7 @@ class Zone:
     def to_world(self, places: npt.ArrayLike, heights_m: npt.ArrayLike) -> _Array:
         """Points (..., 3) in the world of places (..., d) and heights (...) above the datum, metres."""
 
+@final
 class Belief:
     """What is known after some touches: a Gaussian process of the surface's height over the zone.
 
@@ -77,9 +95,10 @@ class Belief:
     def heights_m(self) -> _Array:
         """Heights of these contacts above the datum, shape (m,), metres."""
     @property
-    def hyperparameters(self) -> Hyperparameters | None:
+    def hyperparameters(self) -> _Hyperparameters | None:
         """What the last fit found; None before it."""
 
+@final
 class Touch:
     """What a touch ended with."""
 
@@ -105,6 +124,7 @@ class Touch:
     def time_s(self) -> float | None:
         """Time of the body since its start, seconds; None where a touch is no motion."""
 
+@final
 class Scene:
     """An object in its zone with the finger that touches it: from a scene's file, or of a mesh."""
 
@@ -172,19 +192,20 @@ class Scene:
     def mesh(self) -> tuple[_Array, npt.NDArray[np.uint32]] | None:
         """The object in the world: vertices (n, 3), metres, and triangles (m, 3); None for a function."""
 
+@final
 class Fitted:
-    def __init__(
-        self,
+    def __new__(
+        cls,
         places: _Array,
         heights: _Array,
-        kernel: str,
+        name: str,
         mean: str,
         lengths: Sequence[tuple[float, float]],
         noise: tuple[float, float],
         signal: tuple[float, float],
-    ) -> None: ...
+    ) -> Fitted: ...
     @staticmethod
-    def _of(places: _Array, heights: _Array, kernel: str, fit: str) -> Fitted: ...
+    def _of(places: _Array, heights: _Array, name: str, fit: str) -> Fitted: ...
     def predict(self, places: _Array) -> tuple[_Array, _Array]: ...
     def mean(self, places: _Array) -> _Array: ...
     @property
@@ -198,15 +219,17 @@ class Fitted:
     @property
     def log_likelihood(self) -> float: ...
 
+@final
 class Desk:
-    def __init__(self, limit_s: float) -> None: ...
+    def __new__(cls, limit_s: float) -> Desk: ...
     def next(self) -> Belief | None: ...
     def answer(self, target: Sequence[float]) -> None: ...
     def fail(self, reason: str) -> None: ...
 
+@final
 class Envs:
-    def __init__(
-        self,
+    def __new__(
+        cls,
         scenes: Sequence[tuple[str, Sequence[str]]],
         count: int,
         touches: int,
@@ -214,12 +237,13 @@ class Envs:
         grid: int,
         reward: str,
         threads: int,
-    ) -> None: ...
+    ) -> Envs: ...
     @property
     def zone(self) -> Zone: ...
     def reset(self, seeds: Sequence[int]) -> dict[str, Any]: ...
     def step(self, actions: npt.NDArray[np.float32]) -> dict[str, Any]: ...
 
+@final
 class Experiment:
     @staticmethod
     def load(path: str, sets: Sequence[str]) -> Experiment: ...
@@ -247,6 +271,7 @@ class Experiment:
         told: tuple[Callable[[int, int], None], Callable[[], None]],
     ) -> Run: ...
 
+@final
 class Run:
     @staticmethod
     def open(folder: str) -> Run: ...
