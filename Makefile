@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers wheel test-python dist setup tools clean
+.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers wheel test-python dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -56,6 +56,11 @@ check-planners: setup
 		cargo run --quiet --locked --features ros2 -- --quiet check $$experiment \
 			--baseline experiments/baselines/$$experiment.jsonl || exit; \
 	done
+
+# What fixed work costs is what experiments/baselines/cost.toml says; skipped where there is no valgrind. Built
+# whole: parts that are compiled apart take other numbers of instructions.
+check-cost: setup
+	CARGO_INCREMENTAL=0 cargo run --quiet --locked --features ros2 -- --quiet cost experiments/baselines/cost.toml
 
 # Shards by GNU parallel and by a Slurm of one node, each skipped where it is not there.
 test-clusters: setup

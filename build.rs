@@ -10,6 +10,7 @@ const HEAD_LOG: &str = ".git/logs/HEAD";
 
 fn main() {
     println!("cargo::rerun-if-env-changed=MUJOCO_DYNAMIC_LINK_DIR");
+    println!("cargo::rerun-if-env-changed=CARGO_INCREMENTAL");
     println!("cargo::rerun-if-changed=build.rs");
     if Path::new(HEAD_LOG).exists() {
         println!("cargo::rerun-if-changed={HEAD_LOG}");
@@ -40,7 +41,11 @@ fn build() -> String {
     let output = Command::new(variable("RUSTC")).arg("--version").output();
     let version = output.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
     let (target, level) = (variable("TARGET"), variable("OPT_LEVEL"));
-    format!("{}, {target}, level {level}", version.unwrap_or_default())
+    let parts = match (variable("CARGO_INCREMENTAL").as_str(), variable("PROFILE").as_str()) {
+        ("1", _) | ("", "debug") => ", in small parts",
+        _ => "",
+    };
+    format!("{}, {target}, level {level}{parts}", version.unwrap_or_default())
 }
 
 fn commit() -> Option<String> {

@@ -1,8 +1,16 @@
 //! How the cost of the Gaussian process grows with the number of touches: `make growth`.
 //!
-//! Prints a table with measured exponents and the share of this machine's own matrix
+//! Exact, and through at most 500 touches. Prints tables of seconds and of memory with measured
+//! exponents, what the approximation is off by, and the share of this machine's own matrix
 //! multiplication, and draws `docs/growth.svg` and `.png`. One thread.
 
+#[path = "../tests/suite/common/counting.rs"]
+#[allow(dead_code)]
+mod counting;
+
+use counting::peak_bytes;
+use palpate::gp::inducing::Induced;
+use palpate::gp::kernel::{Kernel, Matern52};
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::posterior::Scratch;
 use palpate::gp::{Mean, Posterior};
@@ -15,22 +23,30 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
-const COUNTS: [usize; 9] = [10, 25, 50, 100, 200, 400, 1000, 2000, 4000];
+const COUNTS: [usize; 11] = [10, 25, 50, 100, 200, 400, 1000, 2000, 4000, 7000, 10_000];
+/// A cold fit of more takes minutes.
+const FITTED_MAX: usize = 4000;
+/// Touches that the approximation goes through.
+const INDUCING: usize = 500;
 
 /// One measured quantity over the counts.
 struct Curve {
     name: &'static str,
     colour: &'static str,
-    /// The power of n that its operations grow with.
+    /// The power of n that its operations or its numbers grow with.
     expected: f64,
-    seconds: Vec<(f64, f64)>,
+    values: Vec<(f64, f64)>,
 }
 
-/// Seconds of one call: the least of three rounds that last some ten milliseconds each.
+/// Seconds of one call: the least of three rounds that last some ten milliseconds each, or of one
+/// call that lasts longer than a second.
 fn seconds(mut work: impl FnMut()) -> f64 {
     let begun = Instant::now();
     work();
     let once = begun.elapsed().as_secs_f64();
+    if once > 1.0 {
+        return once;
+    }
     let repeats = (0.01 / once).clamp(1.0, 1e5) as u32;
     let round = |_| {
         let begun = Instant::now();
@@ -40,38 +56,62 @@ fn seconds(mut work: impl FnMut()) -> f64 {
     (0..3).map(round).fold(once, f64::min)
 }
 
-fn measure() -> Vec<Curve> {
+/// Curves of seconds, of megabytes, and how far the approximation is off.
+fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
     let (at, bounds) = (hyperparameters(), search_box());
-    let curve = |name, colour, expected| Curve { name, colour, expected, seconds: Vec::new() };
+    let curve = |name, colour, expected| Curve { name, colour, expected, values: Vec::new() };
     let mut fit = curve("cold fit", "#0072b2", 3.0);
     let mut likelihood = curve("likelihood with gradient", "#d55e00", 3.0);
     let mut add = curve("adding a touch", "#cc79a7", 2.0);
     let mut query = curve("σ at a place, with gradient", style::TRUTH, 2.0);
     let mut grid = curve("mean and σ at one of 1000 places", "#e69f00", 2.0);
+    let mut through = curve("conditioning through 500", "#56b4e9", 1.0);
+    let mut exact_mb = curve("likelihood with gradient", "#d55e00", 2.0);
+    let mut through_mb = curve("conditioning through 500", "#56b4e9", 0.0);
+    let mut off = Vec::new();
     let places: Vec<[f64; 2]> =
         (0..1000).map(|i| [f64::from(i % 32) / 31.0, f64::from(i / 32) / 31.0]).collect();
     for count in COUNTS {
+        eprintln!("{count} touches");
         let n = count as f64;
         let touches = touches(count);
-        fit.seconds.push((
-            n,
-            seconds(|| {
+        if count <= FITTED_MAX {
+            let fitted = seconds(|| {
                 black_box(bounds.fit(&KERNEL, &touches));
-            }),
-        ));
-        let mut scorer = Likelihood::new(&KERNEL, Mean::Zero, &touches);
-        let mut gradient = [0.0; 4];
-        likelihood.seconds.push((
+            });
+            fit.values.push((n, fitted));
+        }
+        let bytes = peak_bytes(|| {
+            let mut scorer = Likelihood::new(&KERNEL, Mean::Zero, &touches);
+            let mut gradient = [0.0; 4];
+            let value = seconds(|| {
+                let _ = black_box(scorer.value_gradient(&at, &mut gradient));
+            });
+            likelihood.values.push((n, value));
+        });
+        exact_mb.values.push((n, bytes as f64 / 1e6));
+        let induce = || Posterior::through(INDUCING, &KERNEL, at.clone(), &touches);
+        through.values.push((
             n,
             seconds(|| {
-                let _ = black_box(scorer.value_gradient(&at, &mut gradient));
+                let _ = black_box(induce());
             }),
         ));
-        drop(scorer);
+        through_mb.values.push((n, peak_bytes(induce) as f64 / 1e6));
         let Ok(posterior) = Posterior::new(&KERNEL, at.clone(), touches) else { continue };
+        let kernels: [(&str, &dyn Kernel); 2] =
+            [("squared_exponential", &KERNEL), ("matern_52", &Matern52)];
+        for (name, kernel) in kernels.into_iter().filter(|_| count >= 1000) {
+            let exact = Posterior::new(kernel, at.clone(), posterior.observations().clone());
+            let induced =
+                Posterior::through(INDUCING, kernel, at.clone(), posterior.observations());
+            if let (Ok(exact), Ok(induced)) = (exact, induced) {
+                off.push(format!("{name:<22}{}", distance(&exact, &induced, &places)));
+            }
+        }
         let mut scratch = Scratch::default();
         let mut slope = [0.0; 2];
-        query.seconds.push((
+        query.values.push((
             n,
             seconds(|| {
                 black_box(posterior.variance_gradient(&[0.31, 0.47], &mut slope, &mut scratch));
@@ -80,11 +120,11 @@ fn measure() -> Vec<Curve> {
         let together = seconds(|| {
             black_box(posterior.predict(places.iter().map(|place| place.as_slice())));
         });
-        grid.seconds.push((n, together / places.len() as f64));
+        grid.values.push((n, together / places.len() as f64));
         // A touch at a time on one growing posterior, so that no copy is measured.
         let mut growing = posterior.clone();
         let mut step = 0.0;
-        add.seconds.push((
+        add.values.push((
             n,
             seconds(|| {
                 if growing.observations().len() > count + count / 10 + 3 {
@@ -95,12 +135,31 @@ fn measure() -> Vec<Curve> {
             }),
         ));
     }
-    vec![fit, likelihood, add, query, grid]
+    let seconds = vec![fit, likelihood, add, query, grid, through];
+    (seconds, vec![exact_mb, through_mb], off)
+}
+
+/// How far means and deviations are from the exact ones, in units of the exact deviation.
+fn distance(exact: &Posterior, induced: &Induced, places: &[[f64; 2]]) -> String {
+    let [exact_at, ours_at] = [exact, &induced.posterior]
+        .map(|posterior| posterior.predict(places.iter().map(|place| place.as_slice())));
+    let pairs = || ours_at.iter().zip(&exact_at);
+    let mean = pairs().map(|(ours, exact)| (ours.mean - exact.mean).abs() / exact.variance.sqrt());
+    let sds = || pairs().map(|(ours, exact)| (ours.variance / exact.variance).sqrt());
+    format!(
+        "{:>8}{:>8}{:>18.4}{:>18.4}{:>14.3} to {:.3}",
+        exact.observations().len(),
+        induced.posterior.observations().len(),
+        induced.left_sd / exact.hyperparameters().noise_sd,
+        mean.fold(0.0, f64::max),
+        sds().fold(f64::INFINITY, f64::min),
+        sds().fold(0.0, f64::max),
+    )
 }
 
 /// Exponent between the last two counts.
 fn exponent(curve: &Curve) -> f64 {
-    match curve.seconds.as_slice() {
+    match curve.values.as_slice() {
         [.., (n, before), (m, after)] => (after / before).ln() / (m / n).ln(),
         _ => f64::NAN,
     }
@@ -117,44 +176,61 @@ fn matmul_flops() -> f64 {
     2.0 * (n as f64).powi(3) / once
 }
 
-fn draw(curves: &[Curve]) -> Option<String> {
+/// Two panels below each other.
+fn draw(panels: [(&str, &[Curve]); 2]) -> Option<String> {
     let stroke = |curve: &Curve| style::stroke(curve.colour, 2.0);
-    let entries = curves.iter().map(|curve| (Swatch::Line(stroke(curve)), curve.name));
+    // Both panels use the same colours, and the first has them all.
+    let entries = panels[0].1.iter().map(|curve| (Swatch::Line(stroke(curve)), curve.name));
     let legend = Legend::new(640.0, entries);
-    let area = Area { left: 80.0, top: 50.0 + legend.more_px(), width: 640.0, height: 340.0 };
-    let mut canvas = Canvas::new(760.0, area.bottom() + 60.0);
+    let first = Area { left: 80.0, top: 50.0 + legend.more_px(), width: 640.0, height: 340.0 };
+    let second = Area { top: first.bottom() + 70.0, height: 220.0, ..first };
+    let mut canvas = Canvas::new(760.0, second.bottom() + 60.0);
     legend.draw(&mut canvas, [80.0, 24.0]);
-    let points = || curves.iter().flat_map(|curve| &curve.seconds);
-    let x = Axis::log(points().map(|(n, _)| *n))?;
-    let y = Axis::log(points().map(|(_, seconds)| *seconds))?;
-    let panel = Panel { area, x, y };
-    panel.frame(&mut canvas);
-    panel.label(&mut canvas, "", "touches n", "seconds");
-    for curve in curves {
-        panel.curve(&mut canvas, &curve.seconds, &stroke(curve));
-        if let Some((last, seconds)) = curve.seconds.last() {
-            let law = |(n, _): &(f64, f64)| (*n, seconds * (n / last).powf(curve.expected));
-            let upper = curve.seconds.iter().filter(|(n, _)| *n >= last / 10.0);
-            let law: Vec<(f64, f64)> = upper.map(law).collect();
-            panel.curve(&mut canvas, &law, &style::dashed(style::FAINT_INK, 1.0, "4 4"));
+    for ((unit, curves), area) in panels.into_iter().zip([first, second]) {
+        let points = || curves.iter().flat_map(|curve| &curve.values);
+        let x = Axis::log(points().map(|(n, _)| *n))?;
+        let y = Axis::log(points().map(|(_, value)| *value))?;
+        let panel = Panel { area, x, y };
+        panel.frame(&mut canvas);
+        panel.label(&mut canvas, "", "touches n", unit);
+        for curve in curves {
+            panel.curve(&mut canvas, &curve.values, &stroke(curve));
+            if let Some((last, value)) = curve.values.last() {
+                let law = |(n, _): &(f64, f64)| (*n, value * (n / last).powf(curve.expected));
+                let upper = curve.values.iter().filter(|(n, _)| *n >= last / 10.0);
+                let law: Vec<(f64, f64)> = upper.map(law).collect();
+                panel.curve(&mut canvas, &law, &style::dashed(style::FAINT_INK, 1.0, "4 4"));
+            }
         }
     }
     Some(canvas.finish())
+}
+
+fn print(unit: &str, curves: &[Curve]) {
+    let counts = COUNTS.map(|n| format!("{n:>10}")).concat();
+    println!("{:<34}{counts}", format!("{unit} at n ="));
+    for curve in curves {
+        let cells: String =
+            curve.values.iter().map(|(_, value)| format!("{value:>10.2e}")).collect();
+        let (measured, expected) = (exponent(curve), curve.expected);
+        println!("{:<34}{cells}   n^{measured:.2}, expected n^{expected}", curve.name);
+    }
 }
 
 fn main() -> anyhow::Result<()> {
     if std::env::args().any(|argument| argument == "--test") {
         return Ok(());
     }
-    let curves = measure();
-    println!("{:<30}{}", "seconds at n =", COUNTS.map(|n| format!("{n:>10}")).concat());
-    for curve in &curves {
-        let cells: String = curve.seconds.iter().map(|(_, s)| format!("{s:>10.2e}")).collect();
-        let (measured, expected) = (exponent(curve), curve.expected);
-        println!("{:<30}{cells}   n^{measured:.2}, operations n^{expected}", curve.name);
-    }
+    let (curves, megabytes, off) = measure();
+    print("seconds", &curves);
+    print("MB", &megabytes);
+    println!("through at most {INDUCING}, at 1000 places, hyperparameters known");
+    println!(
+        "kernel                 touches    kept  left, of a noise  mean off, of a sd   sd, of the exact"
+    );
+    off.iter().for_each(|line| println!("{line}"));
     let flops = matmul_flops();
-    if let Some((n, seconds)) = curves[1].seconds.iter().find(|(n, _)| *n == 1000.0) {
+    if let Some((n, seconds)) = curves[1].values.iter().find(|(n, _)| *n == 1000.0) {
         let share = n.powi(3) / seconds / flops;
         println!(
             "likelihood with gradient at n = 1000: {:.1} Gflop/s, {:.0} % of the {:.1} of a matrix product",
@@ -163,7 +239,7 @@ fn main() -> anyhow::Result<()> {
             flops / 1e9
         );
     }
-    if let Some(svg) = draw(&curves) {
+    if let Some(svg) = draw([("seconds", &curves), ("MB held at once", &megabytes)]) {
         let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
         std::fs::write(docs.join("growth.png"), png::render(&svg)?)?;
         std::fs::write(docs.join("growth.svg"), svg)?;

@@ -1,7 +1,9 @@
-"""Algorithm 1 on the toy with scikit-learn, egobox and Palpate: the same initial touches, one thread.
+"""Algorithm 1 on the toy and on the bird's face with scikit-learn, egobox and Palpate: the same initial touches,
+one thread.
 
-Run by `make bench-peers`, which makes the environment. Prints processor seconds per trial, ratios to Palpate,
-and the touches after which the mean R (Eq. 5) first reaches 0.99.
+Run by `make bench-peers`, which makes the environment. Prints processor seconds per trial, ratios to Palpate, and of
+the toy the touches after which the mean R (Eq. 5) first reaches 0.99. The others are told the bird's heights from a
+grid that Palpate has written; Palpate touches the mesh.
 """
 
 import json
@@ -20,13 +22,16 @@ for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"):
 
 import egobox
 import numpy as np
+from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import direct, minimize
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 warnings.filterwarnings("ignore")
-TRIALS, TOUCHES, LOW, HIGH = 10, 50, -2.0, 2.0
-TEST = np.linspace(LOW, HIGH, 401)[:, None]
+TRIALS, TOUCHES = 10, 50
+BIRD_TRIALS, BIRD_TOUCHES = 3, 120
+TOY_BOX = [(-2.0, 2.0)]
+TEST = np.linspace(*TOY_BOX[0], 401)[:, None]
 
 
 def toy(x):
@@ -71,32 +76,32 @@ class Egobox:
         return float(np.sqrt(max(0.0, np.asarray(self.model.predict_var(x[None])).item())))
 
 
-def next_touch(model):
+def next_touch(model, box):
     """DIRECT with 200 evaluations, refined by L-BFGS-B."""
     cost = lambda x: -model.deviation(np.asarray(x))
-    found = direct(cost, [(LOW, HIGH)], maxfun=200)
-    return minimize(cost, found.x, method="L-BFGS-B", bounds=[(LOW, HIGH)]).x
+    found = direct(cost, box, maxfun=200)
+    return minimize(cost, found.x, method="L-BFGS-B", bounds=box).x
 
 
-def explore(model, start):
-    """R after each touch, and seconds without scoring."""
-    x = np.array(start)[:, None]
+def explore(model, start, heights, box, touches, score=lambda model: None):
+    """The score after each touch, and seconds without it."""
+    x = np.array(start)
     scores, seconds = [], 0.0
     while True:
         begun = time.process_time()
-        model.fit(x, toy(x[:, 0]))
+        model.fit(x, heights(x))
         seconds += time.process_time() - begun
-        scores.append(correlation(toy(TEST[:, 0]), model.mean(TEST)))
-        if len(x) == TOUCHES:
+        scores.append(score(model))
+        if len(x) == touches:
             return scores, seconds
         begun = time.process_time()
-        x = np.vstack([x, next_touch(model)[None]])
+        x = np.vstack([x, next_touch(model, box)[None]])
         seconds += time.process_time() - begun
 
 
-def palpate(folder, trials, grid):
+def palpate(experiment, folder, trials, grid):
     """Runs Palpate on one thread; its seconds include start-up, writing rows, and scoring on `grid` places."""
-    command = ["target/release/palpate", "run", "experiments/toy.toml", "--out", folder, "--threads", "1"]
+    command = ["target/release/palpate", "run", f"experiments/{experiment}.toml", "--out", folder, "--threads", "1"]
     command += ["--no-report", "--set", f"trials={trials}", "--set", 'planners=["active"]']
     command += ["--set", "planning.direct_evaluations=200", "--set", f"grid={grid}"]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -107,28 +112,50 @@ def palpate(folder, trials, grid):
         return [json.loads(line)["touches"] for line in lines], seconds
 
 
+def bird(folder):
+    """The bird's heights as a function of places, its box, and starts."""
+    trials, _ = palpate("bird", folder, BIRD_TRIALS, 101)
+    table = np.loadtxt(os.path.join(folder, "surface.csv"), delimiter=",", skiprows=1, usecols=(0, 1, 2))
+    x, z = np.unique(table[:, 0]), np.unique(table[:, 1])
+    order = np.lexsort((table[:, 1], table[:, 0]))
+    heights = RegularGridInterpolator((x, z), table[order, 2].reshape(len(x), len(z)))
+    starts = [[touch["target"] for touch in touches[:20]] for touches in trials]
+    return heights, [(x[0], x[-1]), (z[0], z[-1])], starts
+
+
 def reached(curves, goal=0.99):
     mean = np.mean(curves, axis=0)
     first = np.flatnonzero(mean >= goal)
     return str(TOUCHES - len(mean) + 1 + first[0]) if len(first) else "-"
 
 
+def report(name, seconds, ours, goal):
+    print(f"{name:<24}{seconds:>9.3f}{seconds / ours:>8.1f}{goal:>9}", flush=True)
+
+
 def main():
-    with tempfile.TemporaryDirectory() as folder:
-        trials, _ = palpate(os.path.join(folder, "scored"), TRIALS, len(TEST))
-        _, ours = palpate(os.path.join(folder, "timed"), 10 * TRIALS, 2)
-    starts = [[touch["target"][0] for touch in touches[:3]] for touches in trials]
-    curves = [[touch["metrics"]["r"] for touch in touches[2:]] for touches in trials]
-    print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {TRIALS} trials of {TOUCHES} touches")
-    print(f"{'system':<24}{'s/trial':>9}{'ratio':>8}{'0.99 at':>9}")
-    print(f"{'Palpate':<24}{ours:>9.3f}{1:>8}{reached(curves):>9}", flush=True)
     two = lambda: Egobox(2)
+    with tempfile.TemporaryDirectory() as folder:
+        trials, _ = palpate("toy", os.path.join(folder, "scored"), TRIALS, len(TEST))
+        _, ours = palpate("toy", os.path.join(folder, "timed"), 10 * TRIALS, 2)
+        heights, box, bird_starts = bird(os.path.join(folder, "bird"))
+        _, ours_bird = palpate("bird", os.path.join(folder, "timed_bird"), 10 * BIRD_TRIALS, 2)
+    starts = [[touch["target"] for touch in touches[:3]] for touches in trials]
+    curves = [[touch["metrics"]["r"] for touch in touches[2:]] for touches in trials]
+    score = lambda model: correlation(toy(TEST[:, 0]), model.mean(TEST))
+    print(f"{platform.machine()}, Python {platform.python_version()}, one thread, {TRIALS} trials of {TOUCHES} touches")
+    print(f"{'toy':<24}{'s/trial':>9}{'ratio':>8}{'0.99 at':>9}")
+    report("Palpate", ours, ours, reached(curves))
     for name, model, note in (("egobox", Egobox, ""), ("egobox", two, " two starts"), ("scikit-learn", ScikitLearn, "")):
-        results = [explore(model(), start) for start in starts]
+        results = [explore(model(), start, lambda x: toy(x[:, 0]), TOY_BOX, TOUCHES, score) for start in starts]
         seconds = float(np.mean([seconds for _, seconds in results]))
-        goal = reached([scores for scores, _ in results])
-        label = f"{name} {version(name)}{note}"
-        print(f"{label:<24}{seconds:>9.3f}{seconds / ours:>8.0f}{goal:>9}", flush=True)
+        report(f"{name} {version(name)}{note}", seconds, ours, reached([scores for scores, _ in results]))
+    print(f"{f'bird, 20 to {BIRD_TOUCHES} touches':<24}{'s/trial':>9}{'ratio':>8}")
+    report("Palpate", ours_bird, ours_bird, "")
+    for name, model, note in (("egobox", Egobox, ""), ("egobox", two, " two starts")):
+        results = [explore(model(), start, heights, box, BIRD_TOUCHES) for start in bird_starts]
+        seconds = float(np.mean([seconds for _, seconds in results]))
+        report(f"{name} {version(name)}{note}", seconds, ours_bird, "")
 
 
 if __name__ == "__main__":

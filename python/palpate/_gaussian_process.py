@@ -28,17 +28,14 @@ else:
 
 __all__ = ["GaussianProcess"]
 
-#: Inputs of which a scan of all length scales takes less than a second; chosen.
-INPUTS_MAX = 4
-
 _Array = npt.NDArray[np.float64]
 
 
 class GaussianProcess(_Base):
     """Exact Gaussian-process regression; hyperparameters by maximum likelihood within ranges.
 
-    A fit scans the whole range of hyperparameters and climbs from its hills, so that it needs no restarts and
-    has no randomness.
+    A fit scans the whole range of hyperparameters (of more than three inputs at 125 places of a Sobol sequence)
+    and climbs from its hills, so that it needs no restarts and has no randomness.
 
     Args:
         kernel: "squared_exponential", "matern_52" or "matern_32", with a length scale for each input.
@@ -69,21 +66,16 @@ class GaussianProcess(_Base):
         self.signal = signal
 
     def fit(self, X: npt.ArrayLike, y: npt.ArrayLike) -> GaussianProcess:
-        """Finds the likeliest process of observations y (n,) at places X (n, d), d at most 4.
+        """Finds the likeliest process of observations y (n,) at places X (n, d).
 
         Raises:
-            ValueError: of more inputs, of another shape, of what is not finite, of a range that is none.
+            ValueError: of another shape, of what is not finite, of a range that is none.
         """
         places, heights = self._checked(X, y)
         for name in ("length_scale", "noise", "signal"):
             low, high = getattr(self, name)
             if not 0 < low <= high < np.inf:
                 raise ValueError(f"{name} = {(low, high)}: allowed is 0 < low <= high")
-        if places.shape[1] > INPUTS_MAX:
-            raise ValueError(
-                f"X has {places.shape[1]} features; allowed are at most {INPUTS_MAX}: "
-                "the ranges of hyperparameters are scanned whole"
-            )
         spans = np.ptp(places, axis=0)
         spans[spans == 0] = 1.0
         scale = float(np.sqrt(np.mean(heights**2))) or 1.0

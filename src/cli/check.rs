@@ -1,6 +1,6 @@
 //! `palpate check`.
 
-use super::check_cost::{count, tell as tell_cost};
+use super::check_cost::{NO_COUNTER, count, counted_by, tell as tell_cost};
 use super::columns::aligned;
 use super::find::{EXPERIMENTS, find};
 use super::output::Force;
@@ -93,10 +93,11 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         }
     };
     bound_threads(args.threads)?;
-    let cost = match args.cost {
-        true => count(&path, &args.set, &experiment, talk)?,
-        false => None,
-    };
+    let counter = if args.cost { counted_by() } else { None };
+    if args.cost && counter.is_none() {
+        print(NO_COUNTER)?;
+    }
+    let cost = counter.map(|by| count(&path, &args.set, &experiment, &by, talk)).transpose()?;
     if let (true, None, Some(old)) = (args.cost, &args.bless, &old) {
         let told = cost.map(|cost| tell_cost(&args.baseline, old, &cost)).transpose()?;
         return Ok(told.map_or(Ending::Done, ending));

@@ -1,11 +1,11 @@
-//! `palpate check --cost`: instructions of a trial, by valgrind.
+//! Instructions of a trial, by valgrind: `palpate check --cost` and `palpate cost`.
 
 use super::columns::aligned;
 use super::terminal::{Talk, print};
 use crate::experiment::Experiment;
 use crate::files;
 use crate::report::check::lines::word;
-use crate::study::check::cost::{Cost, TOLERANCE, total};
+use crate::study::check::cost::{Cost, CostJudgement, TOLERANCE, total};
 use crate::study::check::{Baseline, Verdict};
 use anyhow::{Context, bail};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -13,20 +13,36 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// Counts a trial of each planner of `experiment`, which `path` holds with `sets`; none where there
-/// is no valgrind.
+/// What is said where nothing counts.
+pub(super) const NO_COUNTER: &str =
+    "cost: skipped, there is no valgrind (Debian: apt-get install valgrind)";
+
+/// What decides the numbers beside the source: compiler, target, optimisation, vectors, and the
+/// valgrind that counts; none where there is no valgrind.
+pub(super) fn counted_by() -> Option<String> {
+    let found = Command::new("valgrind").arg("--version").output();
+    let version = found.ok().filter(|output| output.status.success())?;
+    let version = String::from_utf8_lossy(&version.stdout).trim().to_owned();
+    Some(format!("{}, {}, {version}", env!("PALPATE_BUILD"), vectors()))
+}
+
+/// How wide the vectors are that loops run on; valgrind knows none above 256 bits.
+fn vectors() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        return "256-bit vectors";
+    }
+    "narrow vectors"
+}
+
+/// Counts a trial of each planner of `experiment`, which `path` holds with `sets`.
 pub(super) fn count(
     path: &Path,
     sets: &[String],
     experiment: &Experiment,
+    by: &str,
     talk: Talk,
-) -> anyhow::Result<Option<Cost>> {
-    let found = Command::new("valgrind").arg("--version").output();
-    let Some(version) = found.ok().filter(|output| output.status.success()) else {
-        print("cost: skipped, there is no valgrind (Debian: apt-get install valgrind)")?;
-        return Ok(None);
-    };
-    let version = String::from_utf8_lossy(&version.stdout).trim().to_owned();
+) -> anyhow::Result<Cost> {
     let folder = tempfile::tempdir().context("a folder for what is counted")?;
     let what = Counted { path, sets, folder: folder.path() };
     talk.note("counting, which takes tens of times as long as a trial");
@@ -41,7 +57,7 @@ pub(super) fn count(
     let without = counts.first().copied().unwrap_or_default();
     let own = counts.iter().skip(1).map(|with| with.saturating_sub(without));
     let instructions = experiment.planners.iter().cloned().zip(own).collect();
-    Ok(Some(Cost { by: format!("{}, {version}", env!("PALPATE_BUILD")), instructions }))
+    Ok(Cost { by: by.to_owned(), instructions })
 }
 
 /// Runs of one trial of one planner.
@@ -97,17 +113,9 @@ pub(super) fn tell(file: &Path, baseline: &Baseline, new: &Cost) -> anyhow::Resu
     let Some(old) = &baseline.header.cost else {
         bail!("{}: holds no instructions; --bless WHY --cost counts them", file.display());
     };
-    let judged = new.judge(old);
-    let millions = |count: Option<u64>| {
-        count.map_or("–".into(), |count| format!("{:.1}", 1e-6 * count as f64))
-    };
+    let judged = new.judge(old, TOLERANCE);
     let mut table = vec![["planner", "before", "now", "change", "verdict"].map(String::from)];
-    table.extend(judged.iter().map(|said| {
-        let [old, new] = said.instructions.map(millions);
-        let change =
-            said.change().map_or("–".into(), |change| format!("{:+.2} %", 100.0 * change));
-        [said.planner.clone(), old, new, change, word(said.verdict).into()]
-    }));
+    table.extend(rows("", &judged));
     let mut text = format!("instructions of a trial, in millions\n{}", aligned(&table));
     if old.by != new.by {
         text += &format!("not comparable: counted of {}, now of {}\n", old.by, new.by);
@@ -116,4 +124,18 @@ pub(super) fn tell(file: &Path, baseline: &Baseline, new: &Cost) -> anyhow::Resu
     text += &format!("{} ({} % are borne)", word(worst), 100.0 * TOLERANCE);
     print(&text)?;
     Ok(worst)
+}
+
+/// A line for each planner: `of` and its name, instructions before and now in millions, the change,
+/// the verdict.
+pub(super) fn rows(of: &str, judged: &[CostJudgement]) -> impl Iterator<Item = [String; 5]> {
+    let millions = |count: Option<u64>| {
+        count.map_or("–".into(), |count| format!("{:.1}", 1e-6 * count as f64))
+    };
+    judged.iter().map(move |said| {
+        let [old, new] = said.instructions.map(millions);
+        let change =
+            said.change().map_or("–".into(), |change| format!("{:+.2} %", 100.0 * change));
+        [format!("{of}{}", said.planner), old, new, change, word(said.verdict).into()]
+    })
 }

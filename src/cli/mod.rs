@@ -8,6 +8,7 @@ mod check_cost;
 mod columns;
 mod compare;
 mod completions;
+mod cost;
 mod effects;
 mod export;
 mod fidelity;
@@ -103,6 +104,8 @@ enum Command {
     Export(export::Args),
     /// Hold planners against what they were: better, ok, worse, or undecided.
     Check(check::Args),
+    /// Hold the instructions of fixed work against a committed table.
+    Cost(cost::Args),
     /// Show what accuracy costs: errors and time over a ladder of scenes.
     Fidelity(fidelity::Args),
     /// Show what each effect of a scene changes and costs.
@@ -156,6 +159,7 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, bring: &Bring) -
         Command::Fidelity(args) => fidelity::run(&args, cli.talk),
         Command::Effects(args) => effects::run(&args, cli.talk),
         Command::Check(args) => check::run(&args, cli.talk),
+        Command::Cost(args) => cost::run(&args, cli.talk),
         Command::Stress(args) => stress::run(&args, cli.talk),
         Command::Register(args) => register::run(&args, cli.talk),
         Command::Align(args) => align::run(&args, cli.talk),

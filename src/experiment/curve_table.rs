@@ -4,7 +4,7 @@ use super::comparison::paired;
 use super::experiment::Experiment;
 use super::measure::{MEASURES, Measure};
 use super::row::TrialRow;
-use super::statistics::median_interval;
+use super::statistics::Samples;
 use super::summary;
 use super::summary::CurvePoint;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
@@ -49,8 +49,10 @@ pub fn curve_table(
 
 fn record(experiment: &Experiment, rows: &[TrialRow], point: &CurvePoint) -> CurveRecord {
     let mut values = Vec::new();
+    // Of all trials; measures that fewer of them have draw their own.
+    let samples = Samples::new(point.trials, experiment.seed);
     for measure in MEASURES {
-        values.extend(aggregates(experiment, rows, point, measure));
+        values.extend(aggregates((experiment, &samples), rows, point, measure));
         for baseline in experiment.baselines().into_iter().filter(|_| measure.is_error) {
             values.extend(differences(experiment, rows, (point, baseline), measure));
         }
@@ -59,7 +61,7 @@ fn record(experiment: &Experiment, rows: &[TrialRow], point: &CurvePoint) -> Cur
 }
 
 fn aggregates(
-    experiment: &Experiment,
+    (experiment, samples): (&Experiment, &Samples),
     rows: &[TrialRow],
     point: &CurvePoint,
     measure: &Measure,
@@ -71,7 +73,7 @@ fn aggregates(
         values.push(summary.and_then(|summary| summary.error));
     }
     if measure.aggregate.has_median() {
-        let interval = interval(experiment, rows, point, measure);
+        let interval = interval((experiment, samples), rows, point, measure);
         values.push(summary.map(|summary| summary.median));
         values.push(interval.map(|[low, _]| low));
         values.push(interval.map(|[_, high]| high));
@@ -81,7 +83,7 @@ fn aggregates(
 
 /// The 95 % bootstrap interval of the median; none of a single trial.
 fn interval(
-    experiment: &Experiment,
+    (experiment, samples): (&Experiment, &Samples),
     rows: &[TrialRow],
     point: &CurvePoint,
     measure: &Measure,
@@ -90,7 +92,10 @@ fn interval(
         .into_iter()
         .filter_map(|row| (measure.of)(row, point.touches))
         .collect();
-    median_interval(&all, experiment.seed)
+    match all.len() == samples.count() {
+        true => samples.median_interval(&all),
+        false => Samples::new(all.len(), experiment.seed).median_interval(&all),
+    }
 }
 
 /// How sure what speaks for a measure is: of a median its 95 % bootstrap interval, of a mean one
@@ -102,7 +107,8 @@ pub fn band(
     measure: &Measure,
 ) -> Option<[f64; 2]> {
     if measure.aggregate.has_median() {
-        return interval(experiment, rows, point, measure);
+        let samples = Samples::new(point.trials, experiment.seed);
+        return interval((experiment, &samples), rows, point, measure);
     }
     let summary = point.of(measure)?;
     summary.error.map(|error| [summary.mean - error, summary.mean + error])

@@ -10,7 +10,8 @@ use super::comparison::pairs;
 use super::experiment::Experiment;
 use super::measure::{MEASURES, Measure};
 use super::row::{TrialRow, of_planner};
-use super::statistics::{middle, percentiles_95, resampled};
+use super::statistics::{Ranked, Samples, percentiles_95};
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::collections::BTreeMap;
 
 /// Errors that are compared.
@@ -53,13 +54,12 @@ pub struct EqualError<'a> {
 
 /// Every planner against every baseline in every error that both have.
 pub fn equal_errors<'a>(experiment: &'a Experiment, rows: &[TrialRow]) -> Vec<EqualError<'a>> {
-    let mut found = Vec::new();
-    for (planner, baseline) in pairs(experiment) {
-        for measure in errors() {
-            found.extend(equal_error(experiment, rows, [planner, baseline], measure));
-        }
-    }
-    found
+    let asked = pairs(experiment);
+    let asked: Vec<_> = asked.flat_map(|pair| errors().map(move |error| (pair, error))).collect();
+    let found = asked.into_par_iter().filter_map(|((planner, baseline), measure)| {
+        equal_error(experiment, rows, [planner, baseline], measure)
+    });
+    found.collect()
 }
 
 /// One planner against another; none if no trial was finished by both.
@@ -73,13 +73,13 @@ pub fn equal_error<'a>(
     let pairs: Vec<[&Curve; 2]> =
         ours.iter().filter_map(|(trial, curve)| Some([curve, theirs.get(trial)?])).collect();
     let goal_index = (experiment.goal_touches() - experiment.initial_touches) as usize;
-    let mut buffer = Vec::new();
+    let medians = [0, 1].map(|which| Medians::new(pairs.iter().map(|pair| pair[which])));
+    let mut counts = Vec::new();
     let everyone: Vec<usize> = (0..pairs.len()).collect();
-    let goal = sampled_median(&everyone, &mut buffer, |trial| pairs[trial][1].errors[goal_index])?;
-    let found = meet(&pairs, &everyone, goal_index, &mut buffer);
-    let samples = resampled(pairs.len(), experiment.seed, |sample| {
-        meet(&pairs, sample, goal_index, &mut buffer)
-    });
+    let goal = medians[1].errors.get(goal_index)?.median(&everyone, &mut counts)?;
+    let found = meet(&medians, &everyone, goal_index, &mut counts);
+    let samples = Samples::new(pairs.len(), experiment.seed)
+        .each(|sample| meet(&medians, sample, goal_index, &mut counts));
     let first = f64::from(experiment.initial_touches);
     let estimate = |of: &dyn Fn(&[Met; 2]) -> f64| Estimate {
         value: of(&found),
@@ -103,6 +103,26 @@ struct Curve {
     errors: Vec<f64>,
     /// Lateral way since the last initial touch.
     paths_m: Vec<f64>,
+}
+
+/// What medians over samples of the trials are asked of, after every count.
+struct Medians {
+    errors: Vec<Ranked>,
+    paths_m: Vec<Ranked>,
+}
+
+impl Medians {
+    fn new<'a>(curves: impl Iterator<Item = &'a Curve> + Clone) -> Self {
+        let length = curves.clone().next().map_or(0, |curve| curve.errors.len());
+        let ranked = |of: &dyn Fn(&Curve, usize) -> f64| {
+            let at = |index| curves.clone().map(|curve| of(curve, index)).collect::<Vec<f64>>();
+            (0..length).map(|index| Ranked::new(&at(index))).collect()
+        };
+        Self {
+            errors: ranked(&|curve, index| curve.errors[index]),
+            paths_m: ranked(&|curve, index| curve.paths_m[index]),
+        }
+    }
 }
 
 /// When the goal was met.
@@ -136,42 +156,26 @@ fn curves(
 /// When the two of each pair meet the second's median error at `goal_index` in a sample of the
 /// pairs.
 fn meet(
-    pairs: &[[&Curve; 2]],
+    medians: &[Medians; 2],
     sample: &[usize],
     goal_index: usize,
-    buffer: &mut Vec<f64>,
+    counts: &mut Vec<u32>,
 ) -> [Met; 2] {
-    let goal = sampled_median(sample, buffer, |trial| pairs[trial][1].errors[goal_index]);
+    let goal = medians[1].errors.get(goal_index).and_then(|error| error.median(sample, counts));
     let goal = goal.unwrap_or(f64::NAN);
-    let length = pairs.first().map_or(0, |[curve, _]| curve.errors.len());
-    [0, 1].map(|which| {
-        let mut is_met = |index: usize| {
-            sampled_median(sample, buffer, |trial| pairs[trial][which].errors[index])
-                .is_some_and(|error| error <= goal)
-        };
+    medians.each_ref().map(|Medians { errors, paths_m }| {
+        let mut is_met =
+            |index: usize| errors[index].median(sample, counts).is_some_and(|error| error <= goal);
         let met = match is_met(goal_index) {
             true => (0..=goal_index).rev().take_while(|&index| is_met(index)).last(),
-            false => (goal_index + 1..length).find(|&index| is_met(index)),
+            false => (goal_index + 1..errors.len()).find(|&index| is_met(index)),
         };
-        let path = met.and_then(|index| {
-            sampled_median(sample, buffer, |trial| pairs[trial][which].paths_m[index])
-        });
+        let path = met.and_then(|index| paths_m[index].median(sample, counts));
         Met {
             after: met.map_or(f64::INFINITY, |index| index as f64),
             path_m: path.unwrap_or(f64::INFINITY),
         }
     })
-}
-
-/// The median of a number over a sample of trials.
-fn sampled_median(
-    sample: &[usize],
-    buffer: &mut Vec<f64>,
-    of: impl Fn(usize) -> f64,
-) -> Option<f64> {
-    buffer.clear();
-    buffer.extend(sample.iter().map(|&trial| of(trial)));
-    middle(buffer)
 }
 
 #[cfg(test)]
@@ -191,9 +195,9 @@ mod tests {
     }
 
     fn met(ours: &[Curve], theirs: &[Curve], goal_index: usize) -> [Met; 2] {
-        let pairs: Vec<[&Curve; 2]> = ours.iter().zip(theirs).map(Into::into).collect();
-        let sample: Vec<usize> = (0..pairs.len()).map(|i| i / 2).collect();
-        meet(&pairs, &sample, goal_index, &mut Vec::new())
+        let sample: Vec<usize> = (0..ours.len()).map(|i| i / 2).collect();
+        let medians = [ours, theirs].map(|curves| Medians::new(curves.iter()));
+        meet(&medians, &sample, goal_index, &mut Vec::new())
     }
 
     /// Twice the rate is half the touches, whichever trials are sampled.

@@ -76,6 +76,9 @@ const INCLUDED: [&str; 3] = ["scene", "backend", "gp"];
 /// Planners that the others are held against, if nobody says which: the paper's two.
 const BASELINES: [&str; 2] = ["random", "active"];
 
+/// Most touches that a belief is fitted to exactly: it costs the cube of their number.
+const EXACT_TOUCHES_MAX: u32 = 2000;
+
 /// Test places along each side of the zone, if nobody says how many; chosen.
 const GRID: u32 = 31;
 
@@ -263,6 +266,10 @@ impl Checked for Experiment {
         }
         rules.number("trials", self.trials.into(), 1.0..=1e6);
         rules.number("touches", self.touches.into(), 1.0..=TOUCHES_MAX);
+        let is_fitted = self.touches <= EXACT_TOUCHES_MAX || self.gp.inducing_touches.is_some();
+        rules.require("touches", self.touches, is_fitted, || {
+            format!("1 to {EXACT_TOUCHES_MAX}, or up to {TOUCHES_MAX} with gp.inducing_touches")
+        });
         rules.number("initial_touches", self.initial_touches.into(), 1.0..=self.touches.into());
         rules.number("verification_touches", self.verification_touches.into(), 0.0..=TOUCHES_MAX);
         rules.number("repeat_touches", self.repeat_touches.into(), 0.0..=TOUCHES_MAX);

@@ -45,8 +45,8 @@ pub struct Claim {
     pub measures: Vec<String>,
 }
 
-/// Most touches of a trial; a fit costs the cube of their number.
-pub(super) const TOUCHES_MAX: f64 = 2000.0;
+/// Most touches of a trial.
+pub(super) const TOUCHES_MAX: f64 = 20_000.0;
 
 /// Most beliefs drawn side by side.
 const DRAWN_MAX: usize = 8;

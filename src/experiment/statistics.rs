@@ -24,7 +24,7 @@ pub fn median(values: &[f64]) -> Option<f64> {
 }
 
 /// As [`median`], and reorders the values.
-pub(super) fn middle(values: &mut [f64]) -> Option<f64> {
+fn middle(values: &mut [f64]) -> Option<f64> {
     let half = values.len() / 2;
     if values.is_empty() {
         return None;
@@ -35,44 +35,101 @@ pub(super) fn middle(values: &mut [f64]) -> Option<f64> {
     Some(0.5 * (lower.unwrap_or(upper) + upper))
 }
 
+/// Values and their ranks: the median of a sample of them is found by counting.
+#[derive(Clone, Debug)]
+pub(super) struct Ranked {
+    sorted: Vec<f64>,
+    /// Where each value stands among the sorted ones.
+    ranks: Vec<usize>,
+}
+
+impl Ranked {
+    pub(super) fn new(values: &[f64]) -> Self {
+        let mut order: Vec<usize> = (0..values.len()).collect();
+        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+        let mut ranks = vec![0; values.len()];
+        order.iter().enumerate().for_each(|(rank, &index)| ranks[index] = rank);
+        Self { sorted: order.iter().map(|&index| values[index]).collect(), ranks }
+    }
+
+    /// The median of the values at `sample`, none of nothing. `counts` is room for as many numbers
+    /// as there are values.
+    pub(super) fn median(&self, sample: &[usize], counts: &mut Vec<u32>) -> Option<f64> {
+        counts.clear();
+        counts.resize(self.sorted.len(), 0);
+        sample.iter().for_each(|&index| counts[self.ranks[index]] += 1);
+        // The values are seen in order, each as often as it was drawn.
+        let mut ranks = counts.iter().zip(&self.sorted);
+        let mut seen = 0;
+        let mut nth = |n: usize, last: f64| {
+            while seen <= n {
+                let (count, value) = ranks.next()?;
+                seen += *count as usize;
+                if seen > n {
+                    return Some(*value);
+                }
+            }
+            Some(last)
+        };
+        let half = sample.len() / 2;
+        let lower = nth(half.checked_sub(1).unwrap_or(half), f64::NAN)?;
+        let upper = nth(half, lower)?;
+        Some(if sample.len().is_multiple_of(2) { 0.5 * (lower + upper) } else { upper })
+    }
+}
+
 /// Samples of the bootstrap; Efron & Tibshirani 1993 ask for a thousand for an interval.
 pub const RESAMPLES: usize = 1000;
 
 /// The 95 % interval of the mean of `values` by the percentile bootstrap (Efron & Tibshirani 1993,
 /// ch. 13), the same for the same `seed`; none of fewer than two values.
 pub fn mean_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
-    bootstrap(values, seed, |sample| mean(sample))
+    let mut drawn = vec![0.0; values.len()];
+    let mean = |sample: &[usize]| {
+        drawn.iter_mut().zip(sample).for_each(|(to, &index)| *to = values[index]);
+        mean(&drawn)
+    };
+    let means = Samples::new(values.len(), seed).each(mean);
+    (values.len() > 1).then(|| percentiles_95(means))
 }
 
 /// As [`mean_interval`], of the median.
 pub fn median_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
-    bootstrap(values, seed, |sample| middle(sample).unwrap_or(f64::NAN))
+    Samples::new(values.len(), seed).median_interval(values)
 }
 
-fn bootstrap(values: &[f64], seed: u64, statistic: impl Fn(&mut [f64]) -> f64) -> Option<[f64; 2]> {
-    let mut sample = vec![0.0; values.len()];
-    let found = resampled(values.len(), seed, |indices| {
-        sample.iter_mut().zip(indices).for_each(|(to, &index)| *to = values[index]);
-        statistic(&mut sample)
-    });
-    (values.len() > 1).then(|| percentiles_95(found))
-}
-
-/// A statistic of every bootstrap sample: `count` indices below `count`, drawn with replacement.
-pub(super) fn resampled<T>(
+/// The bootstrap samples of as many values: for each sample as many indices, drawn with
+/// replacement; none of a single value.
+pub(super) struct Samples {
     count: usize,
-    seed: u64,
-    mut statistic: impl FnMut(&[usize]) -> T,
-) -> Vec<T> {
-    let mut rng = seed::stream(seed, 0, "bootstrap");
-    let mut indices = vec![0; count];
-    let samples = if count > 1 { RESAMPLES } else { 0 };
-    (0..samples)
-        .map(|_| {
-            indices.fill_with(|| rng.random_range(0..count));
-            statistic(&indices)
-        })
-        .collect()
+    indices: Vec<usize>,
+}
+
+impl Samples {
+    /// The same for the same `seed`.
+    pub(super) fn new(count: usize, seed: u64) -> Self {
+        let mut rng = seed::stream(seed, 0, "bootstrap");
+        let samples = if count > 1 { RESAMPLES } else { 0 };
+        let indices = (0..samples * count).map(|_| rng.random_range(0..count)).collect();
+        Self { count, indices }
+    }
+
+    /// Of how many values.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// A statistic of every sample.
+    pub(super) fn each<T>(&self, statistic: impl FnMut(&[usize]) -> T) -> Vec<T> {
+        self.indices.chunks_exact(self.count.max(1)).map(statistic).collect()
+    }
+
+    /// See [`median_interval`]; of as many values.
+    pub(super) fn median_interval(&self, values: &[f64]) -> Option<[f64; 2]> {
+        let (ranked, mut counts) = (Ranked::new(values), Vec::new());
+        let medians = self.each(|sample| ranked.median(sample, &mut counts).unwrap_or(f64::NAN));
+        (!medians.is_empty()).then(|| percentiles_95(medians))
+    }
 }
 
 /// A statistic of every bootstrap sample of several strata of `sizes`: indices of each, drawn
@@ -177,6 +234,23 @@ mod tests {
         assert_eq!(median_interval(&values, 5), median_interval(&values, 5));
         assert_eq!(mean_interval(&[1.0], 5), None);
         assert_eq!(mean_interval(&[2.0; 9], 5), Some([2.0, 2.0]));
+    }
+
+    /// The slow twin: the sample's values, sorted.
+    #[test]
+    fn the_median_of_a_sample_is_that_of_its_values() {
+        let mut rng = stream(3, 0, "sampled");
+        for count in 1..40 {
+            // Few different values, so that many are equal.
+            let values: Vec<f64> =
+                (0..count).map(|_| f64::from(rng.random_range(-4..4)) / 3.0).collect();
+            let (ranked, mut counts) = (Ranked::new(&values), Vec::new());
+            for size in 0..2 * count {
+                let sample: Vec<usize> = (0..size).map(|_| rng.random_range(0..count)).collect();
+                let drawn: Vec<f64> = sample.iter().map(|&index| values[index]).collect();
+                assert_eq!(ranked.median(&sample, &mut counts), median(&drawn), "{sample:?}");
+            }
+        }
     }
 
     #[test]

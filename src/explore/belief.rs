@@ -7,6 +7,7 @@ use super::probe::{Swept, Touch};
 use crate::gp::choice::Choice;
 use crate::gp::covariance::CovarianceError;
 use crate::gp::fit::Fit;
+use crate::gp::inducing::Induced;
 use crate::gp::posterior::{Posterior, Scratch};
 use crate::gp::{Hyperparameters, Observation, Observations, Range, SearchBox, Slope, TouchNoise};
 use crate::math::normal::BAND_95;
@@ -113,7 +114,16 @@ impl Belief {
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
     pub fn refit(&mut self) -> Result<(&Fit, &Posterior), CovarianceError> {
-        let mut fit = self.kernels.fit(&self.search_box(), &self.contacts);
+        let search_box = self.search_box();
+        let mut fit = match self.inducing() {
+            None => self.kernels.fit(&search_box, &self.contacts),
+            // Evenly thinned, so that some are near each other and tell the noise; and the same
+            // ones for as long as possible, so that what the last fit knows still holds.
+            Some(most) => {
+                let thinned = self.contacts.every(self.contacts.len() / most);
+                self.kernels.fit(&search_box, &thinned)
+            }
+        };
         if self.settings.band == Band::LeaveOneOut {
             let hyperparameters = fit.hyperparameters.clone();
             let mut posterior =
@@ -122,7 +132,8 @@ impl Belief {
             // Below it is conditioned again, to be what the recorded numbers make to the last bit.
             fit.hyperparameters = posterior.hyperparameters().clone();
         }
-        let posterior = self.posterior(fit.hyperparameters.clone())?;
+        let (posterior, left_sd) = self.posterior(fit.hyperparameters.clone())?;
+        fit.left_sd = left_sd;
         self.explore(&posterior)?;
         Ok((self.fit.insert(fit), self.surface.insert(posterior)))
     }
@@ -133,26 +144,51 @@ impl Belief {
     /// If the covariance of the contacts cannot be factored.
     pub fn condition(&mut self, fit: &Fit) -> Result<(), CovarianceError> {
         self.kernels.follow(fit);
-        let posterior = self.posterior(fit.hyperparameters.clone())?;
+        let (posterior, _) = self.posterior(fit.hyperparameters.clone())?;
         self.explore(&posterior)?;
         self.surface = Some(posterior);
         Ok(())
     }
 
-    fn posterior(&self, hyperparameters: Hyperparameters) -> Result<Posterior, CovarianceError> {
-        let contacts = self.contacts.clone();
-        let mut posterior = Posterior::new(self.kernels.kernel(), hyperparameters, contacts)?;
+    /// Through how many touches all are taken in, if not exactly.
+    fn inducing(&self) -> Option<usize> {
+        let most = self.settings.inducing_touches? as usize;
+        (self.contacts.len() > most).then_some(most)
+    }
+
+    /// Conditioned on all contacts; and what of them is lost, if that is not exact.
+    fn posterior(
+        &self,
+        hyperparameters: Hyperparameters,
+    ) -> Result<(Posterior, Option<f64>), CovarianceError> {
+        let kernel = self.kernels.kernel();
+        let (mut posterior, left_sd) = match self.inducing() {
+            None => (Posterior::new(kernel, hyperparameters, self.contacts.clone())?, None),
+            Some(most) => {
+                let Induced { posterior, left_sd } =
+                    Posterior::through(most, kernel, hyperparameters, &self.contacts)?;
+                (posterior, Some(left_sd))
+            }
+        };
         if let Some(ceiling) = &self.ceiling {
             ceiling.cut(&mut posterior, &self.presence.silhouette());
         }
-        Ok(posterior)
+        Ok((posterior, left_sd))
     }
 
     /// Adds the unreached targets to what `surface` knows of its variance.
     fn explore(&mut self, surface: &Posterior) -> Result<(), CovarianceError> {
-        self.explored = match self.unreached.is_empty() {
-            true => None,
-            false => Some(surface.fantasize(self.unreached.iter().map(Vec::as_slice))?),
+        let unreached = self.unreached.iter().map(Vec::as_slice);
+        self.explored = match self.inducing() {
+            _ if self.unreached.is_empty() => None,
+            None => Some(surface.fantasize(unreached)?),
+            Some(most) => {
+                let mut all = self.contacts.clone();
+                unreached.for_each(|place| all.push(place, 0.0));
+                let hyperparameters = surface.hyperparameters().clone();
+                let kernel = self.kernels.kernel();
+                Some(Posterior::through(most, kernel, hyperparameters, &all)?.posterior)
+            }
         };
         Ok(())
     }

@@ -33,6 +33,11 @@ pub struct GpSettings {
     pub slope_noise: [f64; 2],
     /// Whether the surface is held below the space that the finger has swept, where it met one.
     pub free_space: bool,
+    /// With more touches than this the belief is conditioned on all of them through at most so
+    /// many, and fitted to between as many and twice that: an approximation, whose rows say what
+    /// it loses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inducing_touches: Option<u32>,
     /// What the standard deviations are scaled by.
     #[serde(skip_serializing_if = "is_default")]
     pub band: Band,
@@ -104,6 +109,7 @@ impl Default for GpSettings {
             normals: false,
             slope_noise: [1e-2, 1e1],
             free_space: false,
+            inducing_touches: None,
             band: Band::default(),
             prior: Priors::default(),
         }
@@ -141,6 +147,16 @@ impl Checked for GpSettings {
             rules.number("noise_sd_min_m", least_m, 1e-9..=1e3);
             rules.require("noise_sd_min_m", least_m, self.noise_sd_m.is_none(), || {
                 "this or noise_sd_m, which says that it is known".into()
+            });
+        }
+        if let Some(most) = self.inducing_touches {
+            rules.number("inducing_touches", most.into(), 10.0..=2000.0);
+            rules.require("normals", self.normals, !self.normals, || {
+                "false with inducing_touches, through which heights alone are taken in".into()
+            });
+            let by_likelihood = self.band == Band::Likelihood;
+            rules.require("band", "\"leave_one_out\"", by_likelihood, || {
+                "\"likelihood\" with inducing_touches, whose errors depend on each other".into()
             });
         }
         let priors = [

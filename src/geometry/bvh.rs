@@ -12,7 +12,9 @@ use obvhs::{BvhBuildParams, fast_stack};
 
 use super::bounds::{Box3, Slab, SweptBox, Tube, Wall};
 use super::mesh::Mesh;
+use super::nearby::{MOST, Nearby};
 use super::primitives::{Line, nearest_on_triangle, normal};
+use super::single::{SingleBall, SingleSlab};
 use super::sweep::{Capsule, Sweep};
 
 /// Boxes grow by this part of the mesh's diagonal: more than rounding to f32, and the rounding of
@@ -93,7 +95,7 @@ impl MeshBvh {
             .collect();
         let params = BvhBuildParams { max_prims_per_leaf: 4, ..BvhBuildParams::medium_build() };
         let bvh = build_bvh2(&boxes, params, &mut Duration::default());
-        let stack_size = depth(&bvh) + 1;
+        let stack_size = depth(&bvh) + MOST;
         Self { mesh, centre, bvh, stack_size }
     }
 
@@ -110,10 +112,22 @@ impl MeshBvh {
         direction: &UnitVector3<f64>,
         max_distance_m: f64,
     ) -> Option<RayHit> {
-        let slab = Slab::new(&(origin - self.centre), direction);
+        self.ray_near(&Nearby::WHOLE, origin, direction, max_distance_m)
+    }
+
+    /// The same of a ray that stays in the ball of `near`.
+    pub(crate) fn ray_near(
+        &self,
+        near: &Nearby,
+        origin: &Point3<f64>,
+        direction: &UnitVector3<f64>,
+        max_distance_m: f64,
+    ) -> Option<RayHit> {
+        let slab = SingleSlab::new(&(origin - self.centre), direction);
         let line = Line::along(direction);
         let mut hit = None;
         self.visit(
+            near,
             max_distance_m.next_up(),
             |node| slab.enter_m(node),
             |triangle, limit_m| {
@@ -144,8 +158,9 @@ impl MeshBvh {
         };
         let mut best = (reach(0), 0);
         self.visit(
+            &Nearby::WHOLE,
             best.0.0,
-            |node| node.distance_squared(&from, &from),
+            |node| Box3::of(node).distance_squared(&from, &from),
             |triangle, limit| {
                 let here = reach(triangle);
                 if here.0 < limit {
@@ -160,12 +175,23 @@ impl MeshBvh {
 
     /// Whether the mesh comes within `radius_m` of `centre`.
     pub fn touches(&self, centre: &Point3<f64>, radius_m: f64) -> bool {
-        let from = centre - self.centre;
+        self.touches_near(&Nearby::WHOLE, centre, radius_m)
+    }
+
+    /// What of the mesh lies within `radius_m` of `centre`, for queries that stay there.
+    pub(crate) fn nearby(&self, centre: &Point3<f64>, radius_m: f64) -> Nearby {
+        Nearby::new(&self.bvh, &(centre - self.centre), radius_m)
+    }
+
+    /// Whether what is `near` comes within `radius_m` of `centre`.
+    pub(crate) fn touches_near(&self, near: &Nearby, centre: &Point3<f64>, radius_m: f64) -> bool {
+        let ball = SingleBall::new(&(centre - self.centre));
         let mut touched = false;
         let reach = (radius_m * radius_m).next_up();
         self.visit(
+            near,
             reach,
-            |node| node.distance_squared(&from, &from),
+            |node| ball.distance_squared(node),
             |triangle, limit| {
                 let point = nearest_on_triangle(centre, &self.corners(triangle));
                 touched |= (point - centre).norm_squared() < limit;
@@ -215,22 +241,27 @@ impl MeshBvh {
             wall.get().travel_m(node).max(slab.enter_m(&body.grown(node))).max(tube.enter_m(node))
         };
         let mut hit = None;
-        self.visit(max_travel_m.next_up(), lower, |triangle, limit_m| {
-            let corners = self.corners(triangle);
-            let reach_m = wall.get().travel_to_m(&corners.map(|corner| corner - self.centre));
-            if reach_m >= limit_m || lower(&Box3::around(&corners, &self.centre)) >= limit_m {
-                return limit_m;
-            }
-            match sweep.travel_m(&corners).filter(|&travel_m| travel_m < limit_m) {
-                Some(travel_m) => {
-                    let contact = self.contact(capsule, direction, travel_m, triangle);
-                    wall.set(Wall::new(capsule, &self.centre, direction, &contact.normal));
-                    hit = Some(contact);
-                    travel_m
+        self.visit(
+            &Nearby::WHOLE,
+            max_travel_m.next_up(),
+            |node| lower(&Box3::of(node)),
+            |triangle, limit_m| {
+                let corners = self.corners(triangle);
+                let reach_m = wall.get().travel_to_m(&corners.map(|corner| corner - self.centre));
+                if reach_m >= limit_m || lower(&Box3::around(&corners, &self.centre)) >= limit_m {
+                    return limit_m;
                 }
-                None => limit_m,
-            }
-        });
+                match sweep.travel_m(&corners).filter(|&travel_m| travel_m < limit_m) {
+                    Some(travel_m) => {
+                        let contact = self.contact(capsule, direction, travel_m, triangle);
+                        wall.set(Wall::new(capsule, &self.centre, direction, &contact.normal));
+                        hit = Some(contact);
+                        travel_m
+                    }
+                    None => limit_m,
+                }
+            },
+        );
         hit
     }
 
@@ -241,18 +272,23 @@ impl MeshBvh {
         let lower = |node: &Box3| node.distance_squared(&low.into(), &high.into());
         let mut nearest = None;
         let reach = (capsule.radius_m * capsule.radius_m).next_up();
-        self.visit(reach, lower, |triangle, limit| {
-            let corners = self.corners(triangle);
-            if lower(&Box3::around(&corners, &self.centre)) >= limit {
-                return limit;
-            }
-            let (on_axis, on_mesh) = capsule.nearest(&corners);
-            let squared = (on_axis - on_mesh).norm_squared();
-            if squared < limit {
-                nearest = Some(triangle);
-            }
-            limit.min(squared)
-        });
+        self.visit(
+            &Nearby::WHOLE,
+            reach,
+            |node| lower(&Box3::of(node)),
+            |triangle, limit| {
+                let corners = self.corners(triangle);
+                if lower(&Box3::around(&corners, &self.centre)) >= limit {
+                    return limit;
+                }
+                let (on_axis, on_mesh) = capsule.nearest(&corners);
+                let squared = (on_axis - on_mesh).norm_squared();
+                if squared < limit {
+                    nearest = Some(triangle);
+                }
+                limit.min(squared)
+            },
+        );
         nearest
     }
 
@@ -280,39 +316,42 @@ impl MeshBvh {
         self.mesh.corners(triangle as usize)
     }
 
-    /// Shows `ask` the triangles whose boxes have a lower bound under the limit, near ones
-    /// first. `ask` returns the new limit.
+    /// Shows `ask` the triangles of some parts whose boxes have a lower bound under the limit, in
+    /// each part near ones first. `ask` returns the new limit.
     #[inline]
     fn visit(
         &self,
+        parts: &Nearby,
         mut limit: f64,
-        lower: impl Fn(&Box3) -> f64,
+        lower: impl Fn(&Aabb) -> f64,
         mut ask: impl FnMut(u32, f64) -> f64,
     ) {
         let nodes = &self.bvh.nodes;
-        fast_stack!((f64, u32), (64, 192), self.stack_size, stack, {
-            stack.push((lower(&Box3::of(nodes[0].aabb())), 0));
-            while let Some((bound, index)) = stack.pop() {
+        fast_stack!((f64, u32), (32, 128), self.stack_size, stack, {
+            for &part in parts.nodes() {
+                stack.push((lower(nodes[part as usize].aabb()), part));
+            }
+            'waiting: while let Some((bound, index)) = stack.pop() {
                 if bound.is_nan() || bound >= limit {
                     continue;
                 }
-                let node = &nodes[index as usize];
-                let first = node.first_index as usize;
-                if node.is_leaf() {
-                    for &triangle in
-                        &self.bvh.primitive_indices[first..][..node.prim_count as usize]
-                    {
-                        limit = ask(triangle, limit);
+                let mut node = &nodes[index as usize];
+                while !node.is_leaf() {
+                    let first = node.first_index;
+                    let bound = |index: u32| (lower(nodes[index as usize].aabb()), index);
+                    let (left, right) = (bound(first), bound(first + 1));
+                    let (near, far) = if left.0 <= right.0 { (left, right) } else { (right, left) };
+                    if far.0 < limit {
+                        stack.push(far);
                     }
-                    continue;
+                    if near.0.is_nan() || near.0 >= limit {
+                        continue 'waiting;
+                    }
+                    node = &nodes[near.1 as usize];
                 }
-                let left = (lower(&Box3::of(nodes[first].aabb())), node.first_index);
-                let right = (lower(&Box3::of(nodes[first + 1].aabb())), node.first_index + 1);
-                let (near, far) = if left.0 <= right.0 { (left, right) } else { (right, left) };
-                for child in [far, near] {
-                    if child.0 < limit {
-                        stack.push(child);
-                    }
+                let first = node.first_index as usize;
+                for &triangle in &self.bvh.primitive_indices[first..][..node.prim_count as usize] {
+                    limit = ask(triangle, limit);
                 }
             }
         });

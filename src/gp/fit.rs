@@ -21,6 +21,10 @@ pub struct Fit {
     pub hyperparameters: Hyperparameters,
     /// Their log marginal likelihood.
     pub log_likelihood: f64,
+    /// Where the touches are taken in through a few of them, the largest standard deviation that
+    /// these leave of a touch's height, in the heights' unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_sd: Option<f64>,
     /// How many covariance matrices were factored; those of the scan that grew by a row are not.
     pub factorisations: u32,
     /// With how many observations the whole box was last scanned, in this fit or one it began
@@ -121,7 +125,7 @@ impl Memory {
                     search.scan(Some(Arc::make_mut(&mut self.scan)));
                 }
                 None if count > HALVED => {
-                    let half = sought.fit(kernel, &observations.halved());
+                    let half = sought.fit(kernel, &observations.every(2));
                     in_half = half.factorisations;
                     search.climb(&sought.log_parameters(&half.hyperparameters), None);
                 }
@@ -139,6 +143,7 @@ impl Memory {
             kernel: None,
             hyperparameters: peak.hyperparameters,
             log_likelihood: peak.log_likelihood,
+            left_sd: None,
             factorisations,
             scanned_at: recent.map_or(count, |last| last.scanned_at),
             stop: peak.stop,

@@ -53,6 +53,7 @@
 //! | [`posterior`] | mean, variance and their gradients at a place (Eq. 3 of Yi et al. 2016) |
 //! | [`batch`] | mean and variance at many places |
 //! | [`means`] | means at many places while observations are added |
+//! | [`inducing`] | the posterior of very many touches through a few of them |
 //! | [`likelihood`] | how well hyperparameters explain the observations |
 //! | [`choice`] | which kernel explains them best |
 //! | [`fit`], [`search_box`], [`range`] | the most likely hyperparameters, and where to seek them |
@@ -69,6 +70,7 @@ pub mod dense;
 mod derivative_covariance;
 pub mod fit;
 pub mod indefinite;
+pub mod inducing;
 pub mod kernel;
 mod lanes;
 pub mod likelihood;

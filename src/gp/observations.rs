@@ -118,21 +118,33 @@ impl Observations {
             && same(&self.slope_noise2, &others.slope_noise2)
     }
 
-    /// Every second one.
-    pub(super) fn halved(&self) -> Self {
-        let mut half = Self::new(self.dimension());
-        for i in (0..self.len()).step_by(2) {
+    /// Every `step`th of them.
+    pub fn every(&self, step: usize) -> Self {
+        let mut some = Self::new(self.dimension());
+        for i in (0..self.len()).step_by(step.max(1)) {
             let place: Vec<f64> = self.place(i).collect();
             let noise = self.slope_noise2[i].sqrt();
             let gradient = self.slope(i);
-            half.take_in(&Observation {
+            some.take_in(&Observation {
                 place: &place,
                 height: self.heights[i],
                 noise: self.height_noise2[i].sqrt(),
                 slope: (!gradient.is_empty()).then_some(Slope { gradient, noise }),
             });
         }
-        half
+        some
+    }
+
+    /// Heights, all 0, at the places of those of `indices`.
+    pub(super) fn places(&self, indices: &[usize]) -> Self {
+        let mut places = Self::new(self.dimension());
+        indices.iter().for_each(|&i| places.push(&self.place(i).collect::<Vec<f64>>(), 0.0));
+        places
+    }
+
+    /// The same with other heights.
+    pub(super) fn with_heights(self, heights: Vec<f64>) -> Self {
+        Self { heights, ..self }
     }
 
     /// Number of coordinates.

@@ -49,12 +49,22 @@ impl Posterior {
         let buffer = &mut Correlations::default();
         let jitter =
             covariance::factor(&mut dense, kernel, &observations, lengths, noise_ratio, buffer)?;
-        let factor = Factor::from(&dense);
+        Ok(Self { jitter, ..Self::factored(kernel, hyperparameters, observations, &dense) })
+    }
+
+    /// Of observations whose covariance, with that of their errors, was factored already.
+    pub(super) fn factored(
+        kernel: &'static dyn Kernel,
+        hyperparameters: Hyperparameters,
+        observations: Observations,
+        covariance: &Dense,
+    ) -> Self {
+        let factor = Factor::from(covariance);
         let (whitened, weights) = (Vec::new(), Vec::new());
         let mut new =
-            Self { kernel, hyperparameters, observations, factor, whitened, weights, jitter };
+            Self { kernel, hyperparameters, observations, factor, whitened, weights, jitter: 0.0 };
         new.weigh();
-        Ok(new)
+        new
     }
 
     /// Takes in one more height without factoring again: n² operations. The hyperparameters stay.

@@ -19,13 +19,48 @@ use crate::math::simd::widest_dot;
 /// of its ratio, whose ends alone say nothing of the middle.
 const NOISE_STEP: f64 = 4.61;
 
+/// Most length scales that are gone through in every combination; the combinations of more are
+/// spread evenly, this many of them. Chosen: as many as of three.
+const COMBINED_MAX: usize = 3;
+const SPREAD: usize = 125;
+
 /// A grid over a box.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Grid {
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// Places per parameter, the noises last.
+    /// Places per parameter, the noises last; those of lengths that are spread are one entry.
     levels: Vec<usize>,
+    spread: Spread,
+}
+
+/// Places in a unit cube, evenly spread, and which of them lie next to each.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Spread {
+    places: Vec<Vec<f64>>,
+    beside: Vec<Vec<[usize; 2]>>,
+}
+
+impl Spread {
+    /// The first of Sobol's sequence; beside each lie as many as it would have on a grid.
+    fn new(dimension: usize) -> Self {
+        let at = |index: usize, axis| f64::from(sobol_burley::sample(index as u32, axis, 0));
+        let places: Vec<Vec<f64>> = (0..SPREAD)
+            .map(|index| (0..dimension as u32).map(|axis| at(index, axis)).collect())
+            .collect();
+        let beside = |place: &Vec<f64>| {
+            let squares = |other: &Vec<f64>| -> f64 {
+                place.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum()
+            };
+            let distances: Vec<f64> = places.iter().map(squares).collect();
+            let mut order: Vec<usize> = (0..SPREAD).collect();
+            order.sort_by(|a, b| distances[*a].total_cmp(&distances[*b]));
+            // The nearest is itself.
+            order[1..].as_chunks::<2>().0.iter().copied().take(dimension).collect()
+        };
+        let beside = places.iter().map(beside).collect();
+        Self { places, beside }
+    }
 }
 
 impl Grid {
@@ -36,11 +71,19 @@ impl Grid {
             2 => 8,
             _ => 5,
         };
-        let mut levels = vec![per_length; lengths];
+        let is_spread = lengths > COMBINED_MAX;
+        let spread = if is_spread { Spread::new(lengths) } else { Spread::default() };
+        let mut levels = if is_spread { vec![SPREAD] } else { vec![per_length; lengths] };
         for (lower, upper) in bounds.lower.iter().zip(bounds.upper).skip(lengths) {
             levels.push(((upper - lower) / NOISE_STEP).ceil().max(1.0) as usize + 1);
         }
-        Self { lower: bounds.lower.to_vec(), upper: bounds.upper.to_vec(), levels }
+        Self { lower: bounds.lower.to_vec(), upper: bounds.upper.to_vec(), levels, spread }
+    }
+
+    /// How many places have the same lengths.
+    fn noises(&self, lengths: usize) -> usize {
+        let entries = if self.spread.places.is_empty() { lengths } else { 1 };
+        self.levels[entries..].iter().product()
     }
 
     /// How many places it has.
@@ -50,12 +93,18 @@ impl Grid {
 
     /// Place `index`; the last parameter varies fastest.
     pub(super) fn place(&self, index: usize) -> Vec<f64> {
-        digits(index, &self.levels)
-            .zip(&self.levels)
-            .zip(self.lower.iter().zip(&self.upper))
-            .map(|((digit, &levels), (lower, upper))| {
-                lower + (upper - lower) * digit as f64 / (levels.max(2) - 1) as f64
-            })
+        let mut shares = Vec::with_capacity(self.lower.len());
+        for (entry, (digit, &levels)) in digits(index, &self.levels).zip(&self.levels).enumerate() {
+            match self.spread.places.get(digit).filter(|_| entry == 0) {
+                Some(place) => shares.extend(place.iter().map(|share| (*share, 1.0))),
+                None => shares.push((digit as f64, (levels.max(2) - 1) as f64)),
+            }
+        }
+        let sides = self.lower.iter().zip(&self.upper);
+        shares
+            .into_iter()
+            .zip(sides)
+            .map(|((steps, all), (lower, upper))| lower + (upper - lower) * steps / all)
             .collect()
     }
 
@@ -84,12 +133,19 @@ impl Grid {
     /// The values of the neighbours of place `index`, parameter by parameter.
     fn neighbours(&self, index: usize, values: &[f64]) -> impl Iterator<Item = [Option<f64>; 2]> {
         let mut stride = values.len();
-        digits(index, &self.levels).zip(&self.levels).map(move |(digit, levels)| {
+        let along = digits(index, &self.levels).zip(&self.levels).map(move |(digit, levels)| {
             stride /= levels;
             let below = (digit > 0).then(|| values[index - stride]);
             let above = (digit + 1 < *levels).then(|| values[index + stride]);
             [below, above]
-        })
+        });
+        let noises = values.len() / self.levels.first().copied().unwrap_or(1);
+        let spread = self.spread.beside.get(index / noises.max(1));
+        let spread = spread.into_iter().flatten();
+        let spread =
+            spread.map(move |pair| pair.map(|other| Some(values[other * noises + index % noises])));
+        let is_spread = !self.spread.beside.is_empty();
+        spread.chain(along.skip(usize::from(is_spread)))
     }
 }
 
@@ -137,27 +193,29 @@ impl Scan {
         observations: &Observations,
     ) -> Vec<Option<ProfiledLikelihood>> {
         if self.grid != *grid || !observations.begin_with(&self.taken) {
-            let points = vec![Point::default(); grid.len()];
-            *self = Self { grid: grid.clone(), taken: observations.clone(), points };
+            self.grid.clone_from(grid);
+            self.points.resize_with(grid.len(), Point::default);
+            self.points.iter_mut().for_each(Point::forget);
         }
-        let mut row = Vec::new();
+        let (mut row, mut ratios) = (Vec::new(), Vec::new());
         let mut profiles = Vec::with_capacity(grid.len());
-        let noises: usize = grid.levels[sought.length_scales.len()..].iter().product();
+        let noises = grid.noises(sought.length_scales.len());
         for (group, points) in self.points.chunks_mut(noises.max(1)).enumerate() {
             // The same lengths, and so the same correlations.
             let (lengths, _) = sought.parameters(&grid.place(group * noises));
+            let places = (0..points.len()).map(|at| grid.place(group * noises + at));
+            ratios.clear();
+            ratios.extend(places.map(|place| sought.parameters(&place).1));
             for i in points[0].heights.len()..observations.len() {
                 row.resize(i + 1, 0.0);
                 observations.distances2(observations.place(i), &lengths, 0, &mut row[..i]);
                 kernel.correlate(&mut row[..i]);
-                for (at, point) in points.iter_mut().enumerate() {
-                    let (_, noise) = sought.parameters(&grid.place(group * noises + at));
-                    row[i] = 1.0 + observations.height_noise2(i, noise);
+                for (point, noise) in points.iter_mut().zip(&ratios) {
+                    row[i] = 1.0 + observations.height_noise2(i, *noise);
                     point.append(&row, observations.heights()[i]);
                 }
             }
-            for (at, point) in points.iter().enumerate() {
-                let (_, noise) = sought.parameters(&grid.place(group * noises + at));
+            for (point, noise) in points.iter().zip(&ratios) {
                 let profile = || point.profile(sought.mean, scale, noise.height, observations);
                 profiles.push((!point.is_lost).then(profile));
             }
@@ -168,6 +226,15 @@ impl Scan {
 }
 
 impl Point {
+    /// Back to no observations; its memory is kept for the next.
+    fn forget(&mut self) {
+        self.factor.truncate(0);
+        self.heights.clear();
+        self.ones.clear();
+        self.log_determinant = 0.0;
+        self.is_lost = false;
+    }
+
     fn append(&mut self, row: &[f64], height: f64) {
         self.is_lost = self.is_lost || self.factor.append(row).is_err();
         let count = row.len() - 1;

@@ -6,54 +6,33 @@
 //! is, but for the few that a better value found meanwhile rules out.
 
 use super::optimize::Bounds;
-use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 /// Sides that differ by less than this share count as equal.
 const EQUAL_SIDES: f64 = 5e-2;
 const THIRD: f64 = 1.0 / 3.0;
 
-/// A part of the unit cube, with the cost, minus the value, at its middle.
+/// A part of the unit cube; its middle and sides lie beside those of all others.
 struct Rectangle {
+    /// Minus the value at its middle.
     cost: f64,
     age: u32,
-    middle: Vec<f64>,
-    sides: Vec<f64>,
-}
-
-impl Rectangle {
     /// From the middle to a corner; rounded, so that equal rectangles are equal to the last bit.
-    fn radius(&self) -> f32 {
-        let squares: f64 = self.sides.iter().map(|side| side * side).sum();
-        (0.5 * squares.sqrt()) as f32
-    }
-
-    /// The axes along which it is divided: of a cube all, otherwise the longest.
-    fn axes(&self) -> Vec<usize> {
-        let count = self.sides.len();
-        let mut longest = 0;
-        for axis in 1..count {
-            if self.sides[axis] > self.sides[longest] {
-                longest = axis;
-            }
-        }
-        let most = self.sides[longest];
-        let is_cube = self.sides.iter().all(|side| most - side <= most * EQUAL_SIDES);
-        if is_cube { (0..count).collect() } else { vec![longest] }
-    }
-
-    /// The middles of the outer thirds along each of its axes.
-    fn outer(&self) -> impl Iterator<Item = Vec<f64>> {
-        self.axes().into_iter().flat_map(move |axis| {
-            [-1.0, 1.0].map(|side| {
-                let mut middle = self.middle.clone();
-                middle[axis] += side * (self.sides[axis] * THIRD);
-                middle
-            })
-        })
-    }
+    radius: f32,
 }
+
+/// The rectangles of one radius.
+struct Equals {
+    radius: f32,
+    /// The one of least cost last, of these the oldest.
+    keys: Vec<Key>,
+}
+
+/// Cost, made to be compared as an integer, age and number of a rectangle.
+type Key = (u64, u32, usize);
 
 /// A rectangle on the lower hull of costs over radii, as it was before this round's divisions.
+#[derive(Clone, Copy)]
 struct Corner {
     radius: f64,
     cost: f64,
@@ -62,206 +41,274 @@ struct Corner {
 
 struct Division<'a, F> {
     bounds: Bounds<'a>,
-    /// Writes the values of places.
+    /// Returns the values of places.
     values: F,
     rectangles: Vec<Rectangle>,
-    /// By radius, then cost, then age. Both are positive or made to be compared as integers.
-    sorted: BTreeMap<u32, BTreeSet<(u64, u32, usize)>>,
+    /// As many numbers for each rectangle as there are coordinates.
+    middles: Vec<f64>,
+    sides: Vec<f64>,
+    /// By growing radius; one that was once there stays, if empty.
+    sorted: Vec<Equals>,
     least: f64,
     age: u32,
     left: u32,
+    /// Used again in each round.
+    hull: Vec<Corner>,
+    chosen: Vec<usize>,
+    places: Vec<Vec<f64>>,
+    pairs: Vec<(usize, [f64; 2])>,
 }
 
 /// Looks for the largest value in a box by exactly `evaluations` of them. `values` is given places
 /// and returns the value of each.
 pub fn direct(bounds: Bounds, evaluations: u32, values: impl FnMut(&[Vec<f64>]) -> Vec<f64>) {
     let count = bounds.lower.len();
-    let mut division = Division {
-        bounds,
-        values,
-        rectangles: Vec::new(),
-        sorted: BTreeMap::new(),
-        least: f64::INFINITY,
-        age: 0,
-        left: evaluations,
-    };
     if count == 0 || evaluations == 0 {
         return;
     }
-    let cost = division.costs(vec![vec![0.5; count]]);
-    division.least = cost[0];
-    division.insert(Rectangle {
-        cost: cost[0],
-        age: 0,
-        middle: vec![0.5; count],
+    let mut division = Division {
+        bounds,
+        values,
+        rectangles: Vec::with_capacity(evaluations as usize),
+        middles: vec![0.5; count],
         sides: vec![1.0; count],
-    });
+        sorted: Vec::new(),
+        least: f64::INFINITY,
+        age: 0,
+        left: evaluations,
+        hull: Vec::new(),
+        chosen: Vec::new(),
+        places: vec![vec![0.5; count]],
+        pairs: Vec::new(),
+    };
+    let cost = division.costs(1);
+    division.least = cost[0];
+    division.add(cost[0]);
     while division.left > 0 {
         division.round();
     }
 }
 
 impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
-    /// Costs at places of the unit cube, of as many as the budget has left.
-    fn costs(&mut self, mut places: Vec<Vec<f64>>) -> Vec<f64> {
-        places.truncate(self.left as usize);
+    fn dimension(&self) -> usize {
+        self.bounds.lower.len()
+    }
+
+    fn sides(&self, index: usize) -> &[f64] {
+        let count = self.dimension();
+        &self.sides[index * count..(index + 1) * count]
+    }
+
+    fn radius(&self, index: usize) -> f32 {
+        let squares: f64 = self.sides(index).iter().map(|side| side * side).sum();
+        (0.5 * squares.sqrt()) as f32
+    }
+
+    /// The axes along which a rectangle is divided: of a cube all, otherwise the longest.
+    fn axes(&self, index: usize) -> Range<usize> {
+        let sides = self.sides(index);
+        let mut longest = 0;
+        for axis in 1..sides.len() {
+            if sides[axis] > sides[longest] {
+                longest = axis;
+            }
+        }
+        let most = sides[longest];
+        let is_cube = sides.iter().all(|side| most - side <= most * EQUAL_SIDES);
+        if is_cube { 0..sides.len() } else { longest..longest + 1 }
+    }
+
+    /// Costs of the first `count` places, or of as many as the budget has left, which are taken
+    /// from the unit cube to the box.
+    fn costs(&mut self, count: usize) -> Vec<f64> {
+        let places = &mut self.places[..count.min(self.left as usize)];
         self.left -= places.len() as u32;
-        for place in &mut places {
+        for place in places.iter_mut() {
             let sides = self.bounds.lower.iter().zip(self.bounds.upper);
             for (at, (lower, upper)) in place.iter_mut().zip(sides) {
                 *at = lower + *at * (upper - lower);
             }
         }
-        let values = (self.values)(&places);
+        let mut values = (self.values)(places);
         // Where there is no value nobody looks; and zero has one sign.
-        values.iter().map(|value| if value.is_finite() { 0.0 - value } else { f64::MAX }).collect()
+        let cost = |value: f64| if value.is_finite() { 0.0 - value } else { f64::MAX };
+        values.iter_mut().for_each(|value| *value = cost(*value));
+        values
     }
 
-    fn key(&self, index: usize) -> (u32, (u64, u32, usize)) {
-        let rectangle = &self.rectangles[index];
-        let bits = rectangle.cost.to_bits();
-        let ordered = if rectangle.cost < 0.0 { !bits } else { bits | 1 << 63 };
-        (rectangle.radius().to_bits(), (ordered, rectangle.age, index))
+    fn key(&self, index: usize) -> Key {
+        let Rectangle { cost, age, .. } = self.rectangles[index];
+        let bits = cost.to_bits();
+        let ordered = if cost < 0.0 { !bits } else { bits | 1 << 63 };
+        (ordered, age, index)
     }
 
-    fn insert(&mut self, mut rectangle: Rectangle) {
-        rectangle.age = self.age;
+    /// Adds the rectangle whose middle and sides were added last.
+    fn add(&mut self, cost: f64) {
+        let index = self.rectangles.len();
+        let radius = self.radius(index);
+        self.rectangles.push(Rectangle { cost, age: self.age, radius });
         self.age += 1;
-        self.rectangles.push(rectangle);
-        self.file(self.rectangles.len() - 1);
+        self.file(index);
     }
 
     fn file(&mut self, index: usize) {
-        let (radius, key) = self.key(index);
-        self.sorted.entry(radius).or_default().insert(key);
+        let (radius, key) = (self.rectangles[index].radius, self.key(index));
+        let at = self.sorted.partition_point(|equals| equals.radius < radius);
+        if self.sorted.get(at).is_none_or(|equals| equals.radius != radius) {
+            self.sorted.insert(at, Equals { radius, keys: Vec::new() });
+        }
+        let keys = &mut self.sorted[at].keys;
+        keys.insert(keys.partition_point(|other| *other > key), key);
     }
 
     fn unfile(&mut self, index: usize) {
-        let (radius, key) = self.key(index);
-        if let Some(equals) = self.sorted.get_mut(&radius) {
-            equals.remove(&key);
-            if equals.is_empty() {
-                self.sorted.remove(&radius);
-            }
+        let (radius, key) = (self.rectangles[index].radius, self.key(index));
+        let at = self.sorted.partition_point(|equals| equals.radius < radius);
+        if let Some(Equals { keys, .. }) = self.sorted.get_mut(at) {
+            let at = keys.partition_point(|other| *other > key);
+            keys.remove(at);
         }
     }
 
     /// Divides all rectangles that may hold the least cost, whatever its slope.
     fn round(&mut self) {
-        let hull = self.hull();
-        let radius = |corner: &Corner| f64::from(self.rectangles[corner.index].radius());
-        let is_promising = |at: usize| may_hold_least(&hull, at, radius, self.least);
-        let chosen: Vec<usize> = (0..hull.len()).filter(|at| is_promising(*at)).collect();
-        let outer = |at: &usize| self.rectangles[hull[*at].index].outer();
-        let places: Vec<Vec<f64>> = chosen.iter().flat_map(outer).collect();
+        let mut hull = std::mem::take(&mut self.hull);
+        let mut chosen = std::mem::take(&mut self.chosen);
+        self.find_hull(&mut hull);
+        chosen.clear();
+        chosen.extend((0..hull.len()).filter(|at| self.may_hold_least(&hull, *at)));
+        let count = chosen.iter().fold(0, |count, at| self.hand_out(hull[*at].index, count));
         let before = self.left;
-        let costs = self.costs(places);
+        let costs = self.costs(count);
         self.left = before;
-        let mut costs = costs.into_iter();
-        for at in chosen {
-            let index = hull[at].index;
-            let axes = self.rectangles[index].axes();
-            let own: Vec<f64> = costs.by_ref().take(2 * axes.len()).collect();
-            let radius = |corner: &Corner| f64::from(self.rectangles[corner.index].radius());
-            if may_hold_least(&hull, at, radius, self.least) {
+        let mut costs = costs.as_slice();
+        for at in &chosen {
+            let index = hull[*at].index;
+            let axes = self.axes(index);
+            let needed = 2 * axes.len();
+            let (own, later) = costs.split_at(needed.min(costs.len()));
+            costs = later;
+            if self.may_hold_least(&hull, *at) {
                 self.left = self.left.saturating_sub(own.len() as u32);
-                if own.len() < 2 * axes.len() || self.left == 0 {
+                if own.len() < needed || self.left == 0 {
                     self.left = 0;
-                    return;
-                }
-                self.divide(index, &axes, &own);
-            }
-        }
-    }
-
-    fn divide(&mut self, index: usize, axes: &[usize], costs: &[f64]) {
-        self.least = costs.iter().copied().fold(self.least, f64::min);
-        let mut pairs: Vec<(usize, [f64; 2])> = (axes.iter().zip(costs.as_chunks::<2>().0))
-            .map(|(axis, pair)| (*axis, *pair))
-            .collect();
-        let lower = |pair: &[f64; 2]| pair[0].min(pair[1]);
-        pairs.sort_by(|a, b| lower(&a.1).total_cmp(&lower(&b.1)));
-        for (axis, pair) in pairs {
-            self.unfile(index);
-            let rectangle = &mut self.rectangles[index];
-            rectangle.sides[axis] *= THIRD;
-            rectangle.age = self.age;
-            self.age += 1;
-            let (middle, sides) = (rectangle.middle.clone(), rectangle.sides.clone());
-            self.file(index);
-            for (side, cost) in [-1.0, 1.0].into_iter().zip(pair) {
-                let mut middle = middle.clone();
-                middle[axis] += side * sides[axis];
-                self.insert(Rectangle { cost, age: 0, middle, sides: sides.clone() });
-            }
-        }
-    }
-
-    /// The lower hull of (radius, cost), with all that are equal, by growing radius.
-    fn hull(&self) -> Vec<Corner> {
-        let mut hull: Vec<Corner> = Vec::new();
-        let corner = |&index: &usize| {
-            let rectangle = &self.rectangles[index];
-            Corner { radius: rectangle.radius().into(), cost: rectangle.cost, index }
-        };
-        // Of each radius those of least cost.
-        let lowest = |equals: &BTreeSet<(u64, u32, usize)>| -> Vec<usize> {
-            let least = equals.first().map(|first| first.0);
-            equals.iter().take_while(|one| Some(one.0) == least).map(|one| one.2).collect()
-        };
-        let groups: Vec<Vec<Corner>> = (self.sorted.values())
-            .map(|equals| lowest(equals).iter().map(corner).collect())
-            .collect();
-        let (Some(first), Some(last)) = (groups.first(), groups.last()) else { return hull };
-        let (from, to) = (&first[0], &last[0]);
-        let chord = |radius: f64| {
-            let slope = (to.cost - from.cost) / (to.radius - from.radius);
-            from.cost + (radius - from.radius) * slope
-        };
-        // The hull's groups; those in between are dropped where they make a right turn.
-        let mut kept: Vec<&Vec<Corner>> = vec![first];
-        for group in groups.iter().skip(1).take(groups.len().saturating_sub(2)) {
-            let new = &group[0];
-            if new.cost > chord(new.radius) {
-                continue;
-            }
-            while let [earlier @ .., before, last] = kept.as_slice() {
-                // As NLopt's, which drops nothing that only one corner stands before.
-                if earlier.is_empty() && before.len() < 2 {
                     break;
                 }
-                let (before, last) = (&before[0], &last[0]);
-                let turn = (last.radius - before.radius) * (new.cost - before.cost)
-                    - (last.cost - before.cost) * (new.radius - before.radius);
+                self.divide(index, axes, own);
+            }
+        }
+        (self.hull, self.chosen) = (hull, chosen);
+    }
+
+    /// Writes the middles of the outer thirds along each axis of a rectangle behind the first
+    /// `count` places; returns how many there are then.
+    fn hand_out(&mut self, index: usize, mut count: usize) -> usize {
+        let middle = index * self.dimension()..(index + 1) * self.dimension();
+        for axis in self.axes(index) {
+            let third = self.sides(index)[axis] * THIRD;
+            for side in [-1.0, 1.0] {
+                if count == self.places.len() {
+                    self.places.push(Vec::new());
+                }
+                let place = &mut self.places[count];
+                place.clear();
+                place.extend_from_slice(&self.middles[middle.clone()]);
+                place[axis] += side * third;
+                count += 1;
+            }
+        }
+        count
+    }
+
+    fn divide(&mut self, index: usize, axes: Range<usize>, costs: &[f64]) {
+        self.least = costs.iter().copied().fold(self.least, f64::min);
+        let mut pairs = std::mem::take(&mut self.pairs);
+        pairs.clear();
+        pairs.extend(axes.zip(costs.as_chunks::<2>().0.iter().copied()));
+        let lower = |pair: &[f64; 2]| pair[0].min(pair[1]);
+        pairs.sort_by(|a, b| lower(&a.1).total_cmp(&lower(&b.1)));
+        let begin = index * self.dimension();
+        let own = begin..begin + self.dimension();
+        for (axis, pair) in &pairs {
+            self.unfile(index);
+            self.sides[begin + axis] *= THIRD;
+            self.rectangles[index].radius = self.radius(index);
+            self.rectangles[index].age = self.age;
+            self.age += 1;
+            self.file(index);
+            let step = self.sides[begin + axis];
+            for (side, cost) in [-1.0, 1.0].into_iter().zip(pair) {
+                let new = self.middles.len();
+                self.middles.extend_from_within(own.clone());
+                self.middles[new + axis] += side * step;
+                self.sides.extend_from_within(own.clone());
+                self.add(*cost);
+            }
+        }
+        self.pairs = pairs;
+    }
+
+    /// Finds the lower hull of (radius, cost), with all that are equal, by growing radius.
+    fn find_hull(&self, hull: &mut Vec<Corner>) {
+        hull.clear();
+        // Of each radius those of least cost; of these the first corner stands for all.
+        let lowest = |equals: &Equals| {
+            let (_, _, index) = *equals.keys.last()?;
+            Some((equals.radius.into(), self.rectangles[index].cost))
+        };
+        let mut groups = self.sorted.iter().filter_map(|equals| Some((lowest(equals)?, equals)));
+        let Some(first) = groups.next() else { return };
+        let last = groups.next_back();
+        let (from, to): ((f64, f64), (f64, f64)) = (first.0, last.map_or(first.0, |last| last.0));
+        let chord = |radius: f64| {
+            let slope = (to.1 - from.1) / (to.0 - from.0);
+            from.1 + (radius - from.0) * slope
+        };
+        // The hull's groups; those in between are dropped where they make a right turn.
+        let mut kept: Vec<((f64, f64), &Equals)> = vec![first];
+        for (new, equals) in groups {
+            if new.1 > chord(new.0) {
+                continue;
+            }
+            while let [earlier @ .., (before, group), (last, _)] = kept.as_slice() {
+                // As NLopt's, which drops nothing that only one corner stands before.
+                if earlier.is_empty() && group.lowest().nth(1).is_none() {
+                    break;
+                }
+                let turn = (last.0 - before.0) * (new.1 - before.1)
+                    - (last.1 - before.1) * (new.0 - before.0);
                 if turn >= 0.0 {
                     break;
                 }
                 kept.pop();
             }
-            kept.push(group);
+            kept.push((new, equals));
         }
-        if groups.len() > 1 {
-            kept.push(last);
+        for ((radius, cost), equals) in kept.into_iter().chain(last) {
+            hull.extend(equals.lowest().map(|index| Corner { radius, cost, index }));
         }
-        for group in kept {
-            hull.extend(group.iter().map(|Corner { radius, cost, index }| Corner {
-                radius: *radius,
-                cost: *cost,
-                index: *index,
-            }));
-        }
-        hull
+    }
+
+    /// Whether the line through the corner and a neighbour comes as low as the least cost at radius
+    /// 0. The neighbour before may have been divided meanwhile: its radius is that of today.
+    fn may_hold_least(&self, hull: &[Corner], at: usize) -> bool {
+        let radius = |corner: &Corner| f64::from(self.rectangles[corner.index].radius);
+        let here = &hull[at];
+        let slope = |other: &Corner| (here.cost - other.cost) / (here.radius - radius(other));
+        let before = hull[..at].iter().rev().find(|corner| radius(corner) != here.radius);
+        let after = hull[at + 1..].iter().find(|corner| radius(corner) != here.radius);
+        let Some(after) = after else { return true };
+        let steepest = before.map_or(f64::NEG_INFINITY, slope).max(slope(after));
+        here.cost - steepest * here.radius <= self.least
     }
 }
 
-/// Whether the line through the corner and a neighbour comes as low as `least` at radius 0. The
-/// neighbour before may have been divided meanwhile: its `radius` is that of today.
-fn may_hold_least(hull: &[Corner], at: usize, radius: impl Fn(&Corner) -> f64, least: f64) -> bool {
-    let here = &hull[at];
-    let slope = |other: &Corner| (here.cost - other.cost) / (here.radius - radius(other));
-    let before = hull[..at].iter().rev().find(|corner| radius(corner) != here.radius);
-    let after = hull[at + 1..].iter().find(|corner| radius(corner) != here.radius);
-    let Some(after) = after else { return true };
-    let steepest = before.map_or(f64::NEG_INFINITY, slope).max(slope(after));
-    here.cost - steepest * here.radius <= least
+impl Equals {
+    /// All of least cost, by growing age.
+    fn lowest(&self) -> impl Iterator<Item = usize> {
+        let least = self.keys.last().map(|key| key.0);
+        let is_least = move |key: &&Key| Some(key.0) == least;
+        self.keys.iter().rev().take_while(is_least).map(|key| key.2)
+    }
 }

@@ -7,6 +7,7 @@ use palpate::explore::planner::{self, Entry, Plan, Planner};
 use palpate::math::seed;
 use palpate::study::check::baseline::Line;
 use palpate::study::check::cost::{Cost, total};
+use palpate::study::check::cost_table::CostTable;
 use palpate::study::check::judged::{JUDGED, Span};
 use palpate::study::check::sequence::Sequence;
 use palpate::study::check::verdict::of_planner;
@@ -180,7 +181,7 @@ fn instructions_are_judged_planner_by_planner() {
     let old = cost("a", &[("active", 1000), ("gone", 1000), ("random", 1000), ("slope", 1000)]);
     let new = cost("a", &[("active", 1021), ("new", 5), ("random", 1019), ("slope", 979)]);
     let said = |new: &Cost| -> Vec<(String, Verdict)> {
-        new.judge(&old).into_iter().map(|said| (said.planner, said.verdict)).collect()
+        new.judge(&old, 0.02).into_iter().map(|said| (said.planner, said.verdict)).collect()
     };
     let wanted = [
         ("active", Verdict::Worse),
@@ -341,4 +342,36 @@ fn a_loss_of_five_percent_is_flagged_and_other_random_numbers_are_not() {
             _ => assert!(100 * flagged <= 3 * checks as usize, "{flagged}"),
         }
     }
+}
+
+/// A table of what fixed work costs is held against this program only where the numbers can be
+/// compared, and says why where not.
+#[test]
+fn counts_of_another_program_are_skipped() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("cost.toml");
+    let cost = |text: &str| {
+        fs::write(&file, text).unwrap();
+        let output = palpate(Path::new("."), &["--quiet", "cost", file.to_str().unwrap()]);
+        let said = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap()).concat();
+        (output.status.code(), said)
+    };
+    let work = "[[work]]\nexperiment = \"toy\"\n";
+    let (code, said) = cost(&format!("tolerance = 0.05\nby = \"another compiler\"\n{work}"));
+    assert!(code == Some(0) && said.contains("cost: skipped, "), "{said}");
+    let (code, said) = cost(&format!("tolerance = 2.0\n{work}"));
+    assert!(code == Some(2) && said.contains("`tolerance` = 2: allowed"), "{said}");
+    let (code, said) = cost("tolerance = 0.05\n");
+    assert!(code == Some(2) && said.contains("missing field `work`"), "{said}");
+}
+
+/// The committed table can be read, and what is written can be read again.
+#[test]
+fn the_committed_table_is_whole() {
+    let table = CostTable::read(Path::new("experiments/baselines/cost.toml")).unwrap();
+    assert!(table.work.iter().all(|work| !work.instructions.is_empty()));
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("cost.toml");
+    fs::write(&file, table.text().unwrap()).unwrap();
+    assert_eq!(CostTable::read(&file).unwrap(), table);
 }

@@ -329,3 +329,17 @@ mod mujoco {
         }
     }
 }
+
+/// Pose and Jacobian of a reading are found once; asking for the pose first changes no command.
+#[test]
+fn a_pose_that_was_asked_for_changes_no_command() {
+    let chain = arm();
+    let [mut asked, mut other] =
+        [(); 2].map(|()| Controller::new(chain.clone(), PERIOD_S).unwrap());
+    let goal = Goal::still(chain.forward(&chain.home));
+    for tick in 0..50 {
+        let q = chain.home + Joints::from_fn(|i, _| 0.1 * f64::from(tick + 7 * i as i32).sin());
+        assert_eq!(asked.x_wt(q.as_slice()), Ok(chain.forward(&q)));
+        assert_eq!(asked.step(q.as_slice(), &goal), other.step(q.as_slice(), &goal));
+    }
+}

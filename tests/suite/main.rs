@@ -43,6 +43,7 @@ mod geometry;
 mod gp;
 mod hard;
 mod import;
+mod inducing;
 mod information;
 #[cfg(feature = "mujoco")]
 mod installed;

@@ -3,7 +3,7 @@
 mod inverse;
 mod limits;
 
-use crate::robot::arm::{ArmError, Chain, Joints};
+use crate::robot::arm::{ArmError, Chain, Jacobian, Joints};
 use inverse::ResolvedRate;
 use nalgebra::{Isometry3, Vector6};
 
@@ -54,6 +54,8 @@ pub struct Controller {
     period_s: f64,
     /// The last command.
     qdot: Joints,
+    /// The joint positions last asked about, the tip's pose there and how it moves.
+    at: Option<(Joints, Isometry3<f64>, Jacobian)>,
 }
 
 impl Controller {
@@ -63,7 +65,7 @@ impl Controller {
     /// If the period is not a positive number.
     pub fn new(chain: Chain, period_s: f64) -> Result<Self, ArmError> {
         let usable = period_s.is_finite() && period_s > 0.0;
-        let controller = Self { chain, period_s, qdot: Joints::zeros() };
+        let controller = Self { chain, period_s, qdot: Joints::zeros(), at: None };
         if usable { Ok(controller) } else { Err(ArmError::NotFinite) }
     }
 
@@ -77,13 +79,34 @@ impl Controller {
         self.qdot = Joints::zeros();
     }
 
+    /// Pose of `T` in `W` at measured joint positions, by forward kinematics.
+    ///
+    /// # Errors
+    /// If there are not as many as joints.
+    pub fn x_wt(&mut self, q: &[f64]) -> Result<Isometry3<f64>, ArmError> {
+        let q = positions(&self.chain, q)?;
+        Ok(self.kinematics(&q).0)
+    }
+
+    /// Pose and Jacobian; of one reading, of which both are asked, found once.
+    fn kinematics(&mut self, q: &Joints) -> (Isometry3<f64>, Jacobian) {
+        match &self.at {
+            Some((known, x_wt, jacobian)) if known == q => (*x_wt, *jacobian),
+            _ => {
+                let (x_wt, jacobian) = self.chain.jacobian(q);
+                self.at = Some((*q, x_wt, jacobian));
+                (x_wt, jacobian)
+            }
+        }
+    }
+
     /// The command for the next period from measured joint positions, rad or m.
     ///
     /// # Errors
     /// If a number is not finite or missing; what was commanded last still holds.
     pub fn step(&mut self, q: &[f64], goal: &Goal) -> Result<JointMotion, ArmError> {
         let q = positions(&self.chain, q)?;
-        let (x_wt, jacobian) = self.chain.jacobian(&q);
+        let (x_wt, jacobian) = self.kinematics(&q);
         let twist = goal.twist + correction(&x_wt, &goal.x_wt);
         let task = ResolvedRate::new(&self.chain, &q, jacobian, twist);
         let (wanted, damping) = task.solve().ok_or(ArmError::NotFinite)?;

@@ -1,6 +1,6 @@
 //! A serial chain: where its tip is and how it moves.
 
-use nalgebra::{Isometry3, SMatrix, SVector, Translation3, UnitQuaternion, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, SMatrix, SVector, UnitQuaternion, UnitVector3, Vector3};
 
 /// Most joints of a chain.
 pub const MAX_JOINTS: usize = 7;
@@ -51,17 +51,16 @@ impl Joint {
         stops.min(self.qdot_limit)
     }
 
-    /// Pose of the joint's moved frame in the frame before it.
-    fn motion(&self, q: f64) -> Isometry3<f64> {
-        match self.kind {
-            Kind::Revolute => Isometry3::from_parts(
-                Translation3::from(self.origin_m),
-                UnitQuaternion::from_axis_angle(&self.axis, q),
-            ),
-            Kind::Prismatic => {
-                Isometry3::from(Translation3::from(self.origin_m + self.axis.scale(q)))
+    /// Pose of the joint's moved frame, if that of the frame before it is `x`.
+    #[inline]
+    fn moved(&self, x: &Isometry3<f64>, q: f64) -> Isometry3<f64> {
+        let (origin_m, rotation) = match self.kind {
+            Kind::Revolute => {
+                (self.origin_m, x.rotation * UnitQuaternion::from_axis_angle(&self.axis, q))
             }
-        }
+            Kind::Prismatic => (self.origin_m + self.axis.scale(q), x.rotation),
+        };
+        Isometry3::from_parts((x * Point3::from(origin_m)).into(), rotation)
     }
 }
 
@@ -110,7 +109,7 @@ impl Chain {
     /// `X_WT = X_WB · Π X_i(q_i) · X_flange · X_tool`.
     pub fn forward(&self, q: &Joints) -> Isometry3<f64> {
         let moved = self.joints.iter().zip(q.iter());
-        moved.fold(self.base, |x, (joint, &q)| x * joint.motion(q)) * self.flange * self.tool
+        moved.fold(self.base, |x, (joint, &q)| joint.moved(&x, q)) * self.flange * self.tool
     }
 
     /// Poses in `W` of the base and then of each joint's moved frame; beyond the chain's joints
@@ -120,7 +119,7 @@ impl Chain {
         let mut x = self.base;
         for (k, frame) in frames.iter_mut().enumerate().skip(1) {
             if let (Some(joint), Some(&q)) = (self.joints.get(k - 1), q.get(k - 1)) {
-                x *= joint.motion(q);
+                x = joint.moved(&x, q);
             }
             *frame = x;
         }
@@ -154,7 +153,7 @@ impl Chain {
         let mut axes = [(Vector3::zeros(), Vector3::zeros()); MAX_JOINTS];
         for ((joint, &q), (axis, origin)) in self.joints.iter().zip(q.iter()).zip(&mut axes) {
             *axis = x.rotation * joint.axis.into_inner();
-            x *= joint.motion(q);
+            x = joint.moved(&x, q);
             *origin = x.translation.vector;
         }
         let x_wt = x * self.flange * self.tool;

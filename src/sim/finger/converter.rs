@@ -39,6 +39,14 @@ pub(super) struct Parts<'a> {
     pub effects: &'a Effects,
 }
 
+impl Parts<'_> {
+    /// Whether anything is sampled before the last slot of a frame.
+    fn sample_within_frames(&self) -> bool {
+        let fluid = self.effects.fluid.as_ref();
+        self.effects.timing.is_some() || fluid.is_some_and(|fluid| fluid.vibration.is_some())
+    }
+}
+
 /// The converter of one trial: electrodes, PDC, PAC, thermistor and slip each draw noise from a
 /// stream of their own, so that switching one leaves the others' noise as it was.
 #[derive(Clone, Debug)]
@@ -111,6 +119,9 @@ impl Converter {
         let (start_s, before) = (self.time_s, self.before);
         self.note_slip(parts, now);
         loop {
+            if !parts.sample_within_frames() {
+                self.slot = SLOTS - 1;
+            }
             let slots = self.frames * SLOTS as u64 + self.slot as u64 + 1;
             let slot_s = slots as f64 / SLOTS_HZ;
             if slot_s > time_s + SOON_S {

@@ -3,6 +3,7 @@
 use super::samples::SkinSample;
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::mesh::Mesh;
+use crate::geometry::nearby::Nearby;
 use crate::geometry::sweep::Capsule;
 use crate::robot::finger::profile::Profile;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -57,7 +58,8 @@ struct Ball {
 pub(super) struct Vicinity {
     mesh: Option<Arc<Mesh>>,
     x_wt: Isometry3<f64>,
-    near: Vec<usize>,
+    /// Each with the parts of the object that were within the margin of it.
+    near: Vec<(usize, Nearby)>,
     /// Whether the object was within the margin of the inner capsule.
     is_deep: bool,
 }
@@ -108,23 +110,25 @@ impl Patches {
         size_of_val(self.patches.as_slice())
     }
 
-    /// The ranges of samples whose rays may meet the object in pose `x_wt`, in order, and how far
-    /// off the axis these rays may start.
+    /// The ranges of samples whose rays may meet the object in pose `x_wt`, in order, each with the
+    /// parts of it that these may meet; and how far off the axis the rays may start.
     pub fn near<'a>(
         &'a self,
         bvh: &'a MeshBvh,
         x_wt: &'a Isometry3<f64>,
         vicinity: &'a mut Vicinity,
-    ) -> (f64, impl Iterator<Item = &'a Range<usize>>) {
+    ) -> (f64, impl Iterator<Item = (&'a Range<usize>, &'a Nearby)>) {
         if !vicinity.holds(self, bvh, x_wt) {
             self.look(bvh, x_wt, vicinity);
         }
         let is_deep = vicinity.is_deep && self.is_deep(bvh, x_wt, 0.0);
-        let near = vicinity.near.iter().map(|&i| &self.patches[i]).filter(move |patch| {
+        let near = vicinity.near.iter().map(|(i, near)| (&self.patches[*i], near));
+        let met = near.filter(move |(patch, near)| {
             let ball = if is_deep { &patch.from_axis } else { &patch.from_inner };
-            ball.meets(bvh, x_wt, 0.0)
+            ball.meets(bvh, near, x_wt, 0.0)
         });
-        (if is_deep { 0.0 } else { self.inner.radius_m }, near.map(|patch| &patch.range))
+        let met = met.map(|(patch, near)| (&patch.range, near));
+        (if is_deep { 0.0 } else { self.inner.radius_m }, met)
     }
 
     /// Finds what is within the margin.
@@ -134,15 +138,18 @@ impl Patches {
         vicinity.x_wt = *x_wt;
         vicinity.near.clear();
         vicinity.is_deep = false;
-        if !self.whole.meets(bvh, x_wt, margin_m) {
+        let around = self.whole.nearby(bvh, x_wt, margin_m);
+        if !self.whole.meets(bvh, &around, x_wt, margin_m) {
             return;
         }
         vicinity.is_deep = self.is_deep(bvh, x_wt, margin_m);
-        let near = self.patches.iter().enumerate().filter(|(_, patch)| {
-            let ball = if vicinity.is_deep { &patch.from_axis } else { &patch.from_inner };
-            ball.meets(bvh, x_wt, margin_m)
+        let is_deep = vicinity.is_deep;
+        let near = self.patches.iter().enumerate().filter_map(|(i, patch)| {
+            let ball = if is_deep { &patch.from_axis } else { &patch.from_inner };
+            let is_met = ball.meets(bvh, &around, x_wt, margin_m);
+            is_met.then(|| (i, ball.nearby(bvh, x_wt, margin_m)))
         });
-        vicinity.near.extend(near.map(|(i, _)| i));
+        vicinity.near.extend(near);
     }
 
     /// Whether the object is within `margin_m` of the inner capsule.
@@ -156,7 +163,7 @@ impl Patches {
 impl Vicinity {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.near.capacity() * size_of::<usize>()
+        self.near.capacity() * size_of::<(usize, Nearby)>()
     }
 
     /// Whether the finger is still within the margin of the pose in which it was found.
@@ -183,8 +190,13 @@ impl Ball {
         Self { centre, radius_m }
     }
 
-    /// Whether the object is within `margin_m` of it.
-    fn meets(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, margin_m: f64) -> bool {
-        bvh.touches(&(x_wt * self.centre), self.radius_m + margin_m)
+    /// What of the object may be within `margin_m` of it.
+    fn nearby(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, margin_m: f64) -> Nearby {
+        bvh.nearby(&(x_wt * self.centre), self.radius_m + margin_m)
+    }
+
+    /// Whether the object, of which `near` is all that may be, is within `margin_m` of it.
+    fn meets(&self, bvh: &MeshBvh, near: &Nearby, x_wt: &Isometry3<f64>, margin_m: f64) -> bool {
+        bvh.touches_near(near, &(x_wt * self.centre), self.radius_m + margin_m)
     }
 }

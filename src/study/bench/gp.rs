@@ -19,6 +19,7 @@ pub fn pieces() -> Vec<Piece> {
     pieces.extend([100, 1000].into_iter().filter_map(variance));
     pieces.extend([100, 1000].into_iter().filter_map(variances));
     pieces.extend(appended(1000));
+    pieces.extend(through(500, 10_000));
     pieces
 }
 
@@ -90,6 +91,22 @@ fn appended(count: usize) -> Option<Piece> {
         run: Box::new(move || {
             let mut posterior = posterior.clone();
             let _ = black_box(posterior.add(black_box(&[0.313, 0.471]), 1.0));
+        }),
+    })
+}
+
+/// All of `count` touches through some of them: two products of a matrix for the touches, and a few
+/// of the order of those that are kept.
+fn through(most: usize, count: usize) -> Option<Piece> {
+    let touches = touches(count);
+    let induce = move || Posterior::through(most, &KERNEL, hyperparameters(), &touches);
+    let kept = induce().ok()?.posterior.observations().len() as f64;
+    Some(Piece {
+        name: format!("{count} touches through {most}, of which {kept} suffice"),
+        flops: 2.0 * count as f64 * kept.powi(2) + 3.0 * kept.powi(3),
+        bytes: 0.0,
+        run: Box::new(move || {
+            let _ = black_box(induce());
         }),
     })
 }

@@ -40,8 +40,9 @@ impl CostJudgement {
 }
 
 impl Cost {
-    /// Planner by planner; of numbers that are not comparable none is more than undecided.
-    pub fn judge(&self, old: &Self) -> Vec<CostJudgement> {
+    /// Planner by planner, where a share of `tolerance` may be lost; of numbers that are not
+    /// comparable none is more than undecided.
+    pub fn judge(&self, old: &Self, tolerance: f64) -> Vec<CostJudgement> {
         let mut names: Vec<&String> = old.instructions.keys().collect();
         names.extend(self.instructions.keys().filter(|name| !old.instructions.contains_key(*name)));
         let judged = names.into_iter().map(|name| {
@@ -51,8 +52,8 @@ impl Cost {
                 CostJudgement { planner: name.clone(), instructions, verdict: Verdict::Missing };
             said.verdict = match (said.change(), instructions) {
                 (Some(_), _) if self.by != old.by => Verdict::Undecided,
-                (Some(change), _) if change > TOLERANCE => Verdict::Worse,
-                (Some(change), _) if change < -TOLERANCE => Verdict::Better,
+                (Some(change), _) if change > tolerance => Verdict::Worse,
+                (Some(change), _) if change < -tolerance => Verdict::Better,
                 (Some(_), _) => Verdict::Ok,
                 (None, [None, Some(_)]) => Verdict::Undecided,
                 (None, _) => Verdict::Missing,

@@ -79,9 +79,9 @@ impl Servo {
     }
 
     /// Pose of the fingertip by forward kinematics.
-    fn x_wt(&self) -> Isometry3<f64> {
-        let chain = self.control.chain();
-        chain.joints_from(&self.state.q).map_or(chain.base, |q| chain.forward(&q))
+    fn x_wt(&mut self) -> Isometry3<f64> {
+        let x_wt = self.control.x_wt(&self.state.q);
+        x_wt.unwrap_or(self.control.chain().base)
     }
 
     fn period_s(&self) -> f64 {

@@ -170,7 +170,7 @@ impl Electrodes {
     ) -> [f64; ELECTRODES] {
         std::array::from_fn(|i| {
             let gap = (1.0 - closed[i]).max(FILM);
-            counts(self.z0_ohm[i] / (gap.powf(self.effect.exponent) * conductivity))
+            counts(self.z0_ohm[i] / (power(gap, self.effect.exponent) * conductivity))
         })
     }
 
@@ -211,6 +211,18 @@ pub struct Common {
     pub noise: f64,
 }
 
+/// `base` to the power of `exponent`; the default exponent and a gap at rest, both 1, need no work.
+#[inline]
+fn power(base: f64, exponent: f64) -> f64 {
+    if exponent == 1.0 || base == 1.0 { base } else { raised(base, exponent) }
+}
+
+/// Apart from [`power`], or the compiler computes it in any case and then chooses.
+#[inline(never)]
+fn raised(base: f64, exponent: f64) -> f64 {
+    base.powf(exponent)
+}
+
 /// Counts over impedance: E = 4095 / (1 + Z / 10 kΩ) (SynTouch BioTac SP manual, §5.1).
 pub fn counts(impedance_ohm: f64) -> f64 {
     FULL_SCALE_COUNTS / (1.0 + impedance_ohm / LOAD_OHM)
@@ -219,4 +231,19 @@ pub fn counts(impedance_ohm: f64) -> f64 {
 /// Impedance over counts: the inverse of [`counts`].
 pub fn impedance_ohm(counts: f64) -> f64 {
     (FULL_SCALE_COUNTS / counts - 1.0) * LOAD_OHM
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// What is no work is the same number.
+        #[test]
+        fn powers_of_one_are_as_computed(base in FILM..3.0f64, exponent in 0.1..10.0f64) {
+            prop_assert_eq!(power(base, 1.0), raised(base, 1.0));
+            prop_assert_eq!(power(1.0, exponent), raised(1.0, exponent));
+        }
+    }
 }

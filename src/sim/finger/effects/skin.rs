@@ -271,13 +271,14 @@ impl Skin {
     fn meet(&self, bvh: &MeshBvh, x_wt: &Isometry3<f64>, pressed: &mut Pressed) {
         let Pressed { touches, vicinity, .. } = pressed;
         let (skipped_m, near) = self.patches.near(bvh, x_wt, vicinity);
-        for range in near {
+        for (range, near) in near {
             for i in range.clone() {
                 let sample = &self.samples[i];
                 let outer_m = sample.layers.outer_m;
                 let direction_w = x_wt.rotation * sample.direction;
                 let start_w = x_wt * sample.start + direction_w.scale(skipped_m);
-                let hit = bvh.ray(&start_w, &direction_w, outer_m + self.bulge_m - skipped_m);
+                let reach_m = outer_m + self.bulge_m - skipped_m;
+                let hit = bvh.ray_near(near, &start_w, &direction_w, reach_m);
                 if let Some(hit) = hit {
                     let slope = hit.normal.dot(&direction_w);
                     let facing = hit.normal * -slope.signum();

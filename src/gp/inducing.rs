@@ -1,0 +1,259 @@
+//! Very many touches taken in through a few of them: inducing points (Snelson & Ghahramani 2006).
+//!
+//! What the touches say of the surface at a few kept places is, given that other touches tell of
+//! each other through these alone, again a normal distribution. So the posterior is that of as many
+//! touches as are kept, whose heights and whose errors, which depend on each other, are found in
+//! one pass over all. For n touches of which m are kept that takes n·m² + 4m³/3 operations and
+//! memory for m² numbers.
+//!
+//! A touch that is not kept counts as one of what the kept ones say of its place: what they leave
+//! of its variance is added to its noise. The largest that is left is what the approximation loses.
+
+use super::covariance::CovarianceError;
+use super::dense::Dense;
+use super::indefinite::NotPositiveDefinite;
+use super::kernel::{Hyperparameters, Kernel};
+use super::observations::Observations;
+use super::posterior::Posterior;
+use crate::math::simd::{dot, widest};
+use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place as solve_lower;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+
+/// No more touches are kept once all others vary, given those that are, by less than this share of
+/// the noise's variance. Chosen: their errors are then those of their own noise.
+const NEGLIGIBLE: f64 = 1e-4;
+/// Nor below this share of the signal's variance, which is rounding.
+const ROUNDING: f64 = 1e-12;
+/// Those that are kept are chosen from so many times as many, evenly spread ones; chosen.
+const CANDIDATES: usize = 2;
+/// Touches gone through at once; chosen so that a block of them stays in the cache.
+const BLOCK: usize = 256;
+/// The precision of what is kept is raised by this share of its trace, so that it can be factored.
+const JITTER: f64 = 1e-15;
+
+/// A posterior through some of its touches.
+pub struct Induced {
+    /// It, of the kept touches.
+    pub posterior: Posterior,
+    /// The largest standard deviation that the kept touches leave of another one's height, in the
+    /// heights' unit.
+    pub left_sd: f64,
+}
+
+impl Posterior {
+    /// Conditions the prior on the heights of `observations` through at most `most` of them.
+    ///
+    /// # Errors
+    /// [`CovarianceError`] if an observation is not finite, or the covariance cannot be factored.
+    pub fn through(
+        most: usize,
+        kernel: &'static dyn Kernel,
+        hyperparameters: Hyperparameters,
+        observations: &Observations,
+    ) -> Result<Induced, CovarianceError> {
+        if let Some(index) = observations.first_not_finite() {
+            return Err(CovarianceError::NotFinite { index });
+        }
+        let Kept { indices, factor } = Kept::choose(most, kernel, &hyperparameters, observations);
+        let count = indices.len();
+        let kept = observations.places(&indices);
+        let told = Told::by(kernel, &hyperparameters, observations, (&kept, factor.as_ref()))?;
+        let mut dense = Dense::new(count);
+        for j in 0..count {
+            let column = told.covariance.col_as_slice(j);
+            dense.column_mut(j).copy_from_slice(&column[j..]);
+        }
+        let largest = 1.0 + hyperparameters.noise_ratio().height.powi(2);
+        dense.factor(largest).map_err(|cause| indefinite(count, cause))?;
+        let heights = told.residuals.iter().map(|height| hyperparameters.mean + height);
+        let kept = kept.with_heights(heights.collect());
+        let left_sd = hyperparameters.signal_sd * told.left_variance.sqrt();
+        let posterior = Self::factored(kernel, hyperparameters, kept, &dense);
+        Ok(Induced { posterior, left_sd })
+    }
+}
+
+fn indefinite(count: usize, cause: NotPositiveDefinite) -> CovarianceError {
+    CovarianceError::Indefinite { count, jitter: 0.0, cause }
+}
+
+/// The touches that are kept, and the factor of the correlations of their heights.
+struct Kept {
+    indices: Vec<usize>,
+    factor: Mat<f64>,
+}
+
+impl Kept {
+    /// The most uncertain of evenly spread candidates, one after the other (a pivoted Cholesky
+    /// factorisation), until no other is uncertain.
+    fn choose(
+        most: usize,
+        kernel: &dyn Kernel,
+        hyperparameters: &Hyperparameters,
+        observations: &Observations,
+    ) -> Self {
+        let lengths = &hyperparameters.length_scales;
+        let candidates = spread(CANDIDATES * most, lengths, observations);
+        let places = observations.places(&candidates);
+        let noise2 = hyperparameters.noise_ratio().height.powi(2);
+        let enough = (NEGLIGIBLE * noise2).max(ROUNDING);
+        let mut left = vec![1.0f64; candidates.len()];
+        // Row after row of L⁻¹·K, of all candidates.
+        let mut rows: Vec<Vec<f64>> = Vec::new();
+        let mut chosen: Vec<usize> = Vec::new();
+        while chosen.len() < most {
+            let largest = (0..left.len()).max_by(|a, b| left[*a].total_cmp(&left[*b]));
+            let Some(next) = largest.filter(|next| left[*next] > enough) else { break };
+            let mut row = vec![0.0; candidates.len()];
+            places.distances2(places.place(next), lengths, 0, &mut row);
+            kernel.correlate(&mut row);
+            let scale = left[next].sqrt().recip();
+            widest(|| {
+                for known in &rows {
+                    let pulled = known[next];
+                    row.iter_mut().zip(known).for_each(|(row, known)| *row -= pulled * known);
+                }
+                for (row, left) in row.iter_mut().zip(&mut left) {
+                    *row *= scale;
+                    *left -= *row * *row;
+                }
+            });
+            left[next] = 0.0;
+            chosen.push(next);
+            rows.push(row);
+        }
+        let factor =
+            Mat::from_fn(
+                chosen.len(),
+                chosen.len(),
+                |i, j| {
+                    if j <= i { rows[j][chosen[i]] } else { 0.0 }
+                },
+            );
+        Self { indices: chosen.iter().map(|&i| candidates[i]).collect(), factor }
+    }
+}
+
+/// Up to `most` touches, each the farthest from all before it in units of the length scales.
+fn spread(most: usize, length_scales: &[f64], observations: &Observations) -> Vec<usize> {
+    let mut distances2 = vec![f64::INFINITY; observations.len()];
+    let mut from = vec![0.0; observations.len()];
+    let mut chosen = Vec::new();
+    while chosen.len() < most {
+        let farthest = (0..from.len()).max_by(|a, b| distances2[*a].total_cmp(&distances2[*b]));
+        let Some(next) = farthest.filter(|next| distances2[*next] > 0.0) else { break };
+        observations.distances2(observations.place(next), length_scales, 0, &mut from);
+        distances2.iter_mut().zip(&from).for_each(|(least, new)| *least = least.min(*new));
+        chosen.push(next);
+    }
+    chosen
+}
+
+/// What all touches tell of the kept ones.
+struct Told {
+    /// Of their heights with the errors, in units of the signal's variance.
+    covariance: Mat<f64>,
+    /// Their heights above the mean.
+    residuals: Vec<f64>,
+    /// The most that is left of any touch's variance, in units of the signal's.
+    left_variance: f64,
+}
+
+impl Told {
+    /// With `factor` the L of the correlations K = L·Lᵀ of the kept touches, V = L⁻¹·K(kept, all)
+    /// and D the noise of all touches, what they tell of L⁻¹ times the kept heights has the
+    /// precision B = V·D⁻¹·Vᵀ = R·Rᵀ; so the errors of the kept heights have the covariance W·Wᵀ
+    /// with W = L·R⁻ᵀ, and the heights are W·R⁻¹·V·D⁻¹·y.
+    fn by(
+        kernel: &dyn Kernel,
+        hyperparameters: &Hyperparameters,
+        observations: &Observations,
+        (kept, factor): (&Observations, MatRef<f64>),
+    ) -> Result<Self, CovarianceError> {
+        let count = kept.len();
+        let mut precision = Mat::<f64>::zeros(count, count);
+        let mut sums = Mat::<f64>::zeros(count, 1);
+        let mut left_variance: f64 = 0.0;
+        let mut block = Mat::<f64>::zeros(count, BLOCK);
+        for begin in (0..observations.len()).step_by(BLOCK) {
+            let length = BLOCK.min(observations.len() - begin);
+            let mut solved = block.as_mut().subcols_mut(0, length);
+            correlate(kernel, hyperparameters, (observations, begin), kept, solved.as_mut());
+            solve_lower(factor, solved.as_mut(), Par::Seq);
+            for (at, mut column) in solved.as_mut().col_iter_mut().enumerate() {
+                let i = begin + at;
+                let residual = observations.heights()[i] - hyperparameters.mean;
+                let Some(column) = column.as_mut().try_as_col_major_mut() else { continue };
+                let column = column.as_slice_mut();
+                let left = (1.0 - widest(|| dot(column, column))).max(0.0);
+                left_variance = left_variance.max(left);
+                let noise2 = observations.height_noise2(i, hyperparameters.noise_ratio()) + left;
+                let weight = noise2.sqrt().recip();
+                for (entry, sum) in column.iter_mut().zip(sums.col_as_slice_mut(0)) {
+                    *entry *= weight;
+                    *sum += *entry * (weight * residual);
+                }
+            }
+            let solved = solved.as_ref();
+            triangular::matmul(
+                precision.as_mut(),
+                BlockStructure::TriangularLower,
+                Accum::Add,
+                solved,
+                BlockStructure::Rectangular,
+                solved.transpose(),
+                BlockStructure::Rectangular,
+                1.0,
+                Par::Seq,
+            );
+        }
+        let trace: f64 = (0..count).map(|i| precision[(i, i)]).sum();
+        let mut root = Dense::new(count);
+        for j in 0..count {
+            root.column_mut(j).copy_from_slice(&precision.col_as_slice(j)[j..]);
+            root.column_mut(j)[0] += JITTER * trace;
+        }
+        root.factor(0.0).map_err(|cause| indefinite(count, cause))?;
+        let root =
+            Mat::from_fn(count, count, |i, j| if j <= i { root.column(j)[i - j] } else { 0.0 });
+        let mut transposed = factor.transpose().to_owned();
+        solve_lower(root.as_ref(), transposed.as_mut(), Par::Seq);
+        solve_lower(root.as_ref(), sums.as_mut(), Par::Seq);
+        let residuals = transposed.transpose() * &sums;
+        let mut covariance = Mat::<f64>::zeros(count, count);
+        for (left, right) in
+            [(transposed.transpose(), transposed.as_ref()), (factor, factor.transpose())]
+        {
+            triangular::matmul(
+                covariance.as_mut(),
+                BlockStructure::TriangularLower,
+                Accum::Add,
+                left,
+                BlockStructure::Rectangular,
+                right,
+                BlockStructure::Rectangular,
+                1.0,
+                Par::Seq,
+            );
+        }
+        Ok(Self { covariance, residuals: residuals.col_as_slice(0).to_vec(), left_variance })
+    }
+}
+
+/// Writes the correlations of the kept touches with those from `begin` on, one of these a column.
+fn correlate(
+    kernel: &dyn Kernel,
+    hyperparameters: &Hyperparameters,
+    (observations, begin): (&Observations, usize),
+    kept: &Observations,
+    mut out: MatMut<f64>,
+) {
+    let lengths = &hyperparameters.length_scales;
+    for at in 0..out.ncols() {
+        let Some(column) = out.as_mut().col_mut(at).try_as_col_major_mut() else { continue };
+        let column = column.as_slice_mut();
+        kept.distances2(observations.place(begin + at), lengths, 0, column);
+        kernel.correlate(column);
+    }
+}
