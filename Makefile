@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers dist setup tools clean
+.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers wheel test-python dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -135,7 +135,7 @@ reference: setup
 	PALPATE_WRITE_REFERENCE=1 cargo test --locked --test suite reference::
 
 lint: setup
-	cargo fmt --check
+	cargo fmt --all --check
 	cargo clippy --locked --all-targets --features ros2 -- -D warnings
 	cargo clippy --locked --lib --bins --tests --no-default-features --features ros2 -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --features ros2
@@ -175,6 +175,41 @@ $(DEPS)/peers/bin/python: benches/peers.txt
 	python3 -m venv $(DEPS)/peers
 	$(DEPS)/peers/bin/python -m pip install --quiet --only-binary=:all: -r benches/peers.txt
 	touch $@
+
+# A wheel that needs no Rust: program, extension and what ships with them, in target/wheels.
+PYTHON := $(DEPS)/python/bin/python
+PYTHON_HOME := python/palpate/home
+# MuJoCo's library is the one of its own package, so nothing is to be put into the wheel.
+MATURIN = $(DEPS)/python/bin/maturin build --quiet --locked --auditwheel skip -m python/Cargo.toml
+
+wheel: setup $(PYTHON) $(PYTHON_HOME)
+	$(MATURIN) --release --out target/wheels
+
+# Built as tests are: what is installed is otherwise the same.
+test-python: setup $(PYTHON) $(PYTHON_HOME)
+	cargo clippy --locked --package palpate-python -- -D warnings
+	rm -rf target/wheels-dev
+	$(MATURIN) --profile dev --out target/wheels-dev
+	$(PYTHON) -m pip install --quiet --no-deps --force-reinstall target/wheels-dev/*.whl
+	cd python && $(abspath $(PYTHON)) -m mypy
+	cd python/tests && $(abspath $(PYTHON)) -m mypy.stubtest --ignore-disjoint-bases palpate._palpate
+	# Not beside the sources, which are not what is installed.
+	cd python/tests && $(abspath $(DEPS)/python/bin/pytest)
+
+$(PYTHON): python/requirements.txt
+	python3 -m venv $(DEPS)/python
+	$(PYTHON) -m pip install --quiet --only-binary=:all: -r python/requirements.txt
+	touch $@
+
+# What the package brings along; all of it is read at run time.
+$(PYTHON_HOME): FORCE
+	rm -rf $@ && mkdir -p $@
+	cp -r experiments scenes models $@
+	mkdir $@/licences && cp LICENSE-* $@/licences
+	python3 .cargo/licences.py --package palpate-python > $@/licences/packages.txt
+	rm -r $@/models/*.rs $@/experiments/ci $@/experiments/slurm $@/experiments/kubernetes $@/experiments/baselines
+
+FORCE:
 
 # An archive that runs where it is unpacked: program, library, what ships with them, licences.
 dist: setup $(MUJOCO_LICENCES)

@@ -1,7 +1,9 @@
-"""Prints the licences of every package that is built into the program, with their texts."""
+"""Prints the licences of every package that is built into the program, or into what the arguments name
+(`--package NAME`), with their texts."""
 
 import json
 import subprocess
+import sys
 from pathlib import Path
 
 
@@ -11,7 +13,7 @@ def cargo(*arguments):
 
 
 TARGET = "x86_64-unknown-linux-gnu"
-tree = cargo("tree", "-e", "normal", "--target", TARGET, "--prefix", "none", "-f", "{p}")
+tree = cargo("tree", *sys.argv[1:], "-e", "normal", "--target", TARGET, "--prefix", "none", "-f", "{p}")
 # A line is "NAME vVERSION", and more for what is not from the registry or was printed before.
 built_in = {tuple(line.replace(" v", " ", 1).split()[:2]) for line in tree.splitlines() if line}
 

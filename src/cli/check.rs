@@ -112,7 +112,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         return bless(args, &simulation, (old.as_ref(), cost), (why, &rules), &stop, talk);
     }
     let old = old.context("no baseline")?;
-    let most = runner::jobs(simulation.experiment(), &[]).len() as u64;
+    let most = runner::jobs(&simulation, &[])?.len() as u64;
     let bar = progress_bar(talk, &name, "trials", most, 0);
     let tick = |_: &TrialRow| step(talk, &bar);
     let held = hold(&simulation, &old, &rules, args.threads.into(), &stop, &tick)?;
@@ -168,7 +168,7 @@ fn bless(
     talk: Talk,
 ) -> anyhow::Result<Ending> {
     args.force.claim(&args.baseline)?;
-    let jobs = runner::jobs(simulation.experiment(), &[]);
+    let jobs = runner::jobs(simulation, &[])?;
     let bar = progress_bar(talk, &simulation.experiment().name, "trials", jobs.len() as u64, 0);
     let tick = |_: &TrialRow| step(talk, &bar);
     let threads = args.threads.into();

@@ -9,8 +9,8 @@ pub(super) const EXPERIMENTS: &str = "experiments";
 /// Folder of the scenes.
 pub(super) const SCENES: &str = "scenes";
 
-/// The file that is meant by `name`: a path, or the name of a file in `folder`, here or beside the
-/// program.
+/// The file that is meant by `name`: a path, or the name of a file in `folder`, here, beside the
+/// program or in `PALPATE_HOME`.
 ///
 /// # Errors
 /// If there is none, with the name most like it.
@@ -30,7 +30,7 @@ pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
     bail!("{word}: no such file, and no {folder}/{}{meant}", file.display())
 }
 
-/// The names of the files in `folder`, here or beside the program, in order.
+/// The names of the files in `folder`, where [`find`] looks first, in order.
 pub(super) fn names(folder: &str) -> Vec<String> {
     let files = folders(folder).find_map(|folder| std::fs::read_dir(folder).ok());
     let stem = |path: PathBuf| -> Option<String> {
@@ -43,9 +43,14 @@ pub(super) fn names(folder: &str) -> Vec<String> {
     names
 }
 
+/// Names the folder that `experiments` and `scenes` lie in, if they lie neither here nor beside the
+/// program.
+const HOME: &str = "PALPATE_HOME";
+
 /// Where to look for `folder`.
 fn folders(folder: &str) -> impl Iterator<Item = PathBuf> {
     let program = std::env::current_exe().ok();
     let beside = program.and_then(|program| Some(program.parent()?.join(folder)));
-    std::iter::once(PathBuf::from(folder)).chain(beside)
+    let home = std::env::var_os(HOME).map(|home| Path::new(&home).join(folder));
+    std::iter::once(PathBuf::from(folder)).chain(beside).chain(home)
 }

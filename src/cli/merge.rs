@@ -1,8 +1,7 @@
 //! `palpate merge`.
 
-use super::run::manifest;
 use super::terminal::{Ending, print};
-use crate::experiment::store::Shards;
+use crate::experiment::store::{Manifest, Shards};
 use anyhow::Context;
 use std::path::PathBuf;
 
@@ -24,7 +23,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let shards = Shards::open(&args.shards)?.context("no shards")?;
-    let count = shards.merge(&args.out, &manifest(shards.experiment()))?;
+    let count = shards.merge(&args.out, &Manifest::of(shards.experiment()))?;
     print(&format!("{count} trials in {}", args.out.display()))?;
     Ok(Ending::Done)
 }

@@ -13,6 +13,7 @@ mod effects;
 mod export;
 mod fidelity;
 mod find;
+mod host;
 mod known_body;
 mod list;
 mod merge;
@@ -37,7 +38,10 @@ mod twin;
 mod watch;
 mod within;
 
+pub use host::Bring;
+
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::ffi::OsString;
 use std::process::ExitCode;
 use terminal::{Ending, Talk, print};
 
@@ -126,19 +130,26 @@ enum Command {
 
 /// Runs the program on the process's arguments.
 pub fn main() -> ExitCode {
+    ExitCode::from(main_with(std::env::args_os(), &|_| None))
+}
+
+/// Runs the program on `arguments`, of which the first is its name, with planners of a host's;
+/// returns its exit code.
+pub fn main_with(arguments: impl IntoIterator<Item = OsString>, bring: &Bring) -> u8 {
     let command = Cli::command().mut_subcommand("run", |run| {
         let planners = list::indented(&list::planners());
         run.after_help(format!("{}\n\nPlanners:\n{}", run::EXAMPLES, planners.trim_end()))
     });
-    let cli = Cli::from_arg_matches(&command.get_matches()).unwrap_or_else(|error| error.exit());
+    let cli = Cli::from_arg_matches(&command.get_matches_from(arguments))
+        .unwrap_or_else(|error| error.exit());
     let outcome = match cli.command {
         Command::New(args) => new::run(&args),
-        Command::Run(args) => run::run(&args, cli.talk),
+        Command::Run(args) => run::run(&args, cli.talk, bring),
         Command::Replay(args) => replay::run(&args, cli.talk),
         Command::Plan(args) => plan::run(&args, cli.talk),
         Command::Merge(args) => merge::run(&args),
         Command::Compare(args) => compare::run(&args),
-        Command::Suite(args) => suite::run(&args, cli.talk),
+        Command::Suite(args) => suite::run(&args, cli.talk, bring),
         Command::Report(args) => report::run(&args),
         Command::Show(args) => show::run(&args, cli.talk),
         Command::Scan(args) => scan::run(&args, cli.talk),
@@ -159,13 +170,13 @@ pub fn main() -> ExitCode {
         Command::Reference(_) => print(reference().trim_end()).map(|()| Ending::Done),
     };
     match outcome {
-        Ok(Ending::Done) => ExitCode::SUCCESS,
-        Ok(Ending::Failed) => ExitCode::FAILURE,
-        Ok(Ending::Undecided) => ExitCode::from(3),
-        Ok(Ending::Interrupted) => ExitCode::from(130),
+        Ok(Ending::Done) => 0,
+        Ok(Ending::Failed) => 1,
+        Ok(Ending::Undecided) => 3,
+        Ok(Ending::Interrupted) => 130,
         Err(error) => {
             terminal::error(format!("{error:#}"));
-            ExitCode::from(2)
+            2
         }
     }
 }

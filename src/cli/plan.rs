@@ -52,7 +52,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         0 => std::thread::available_parallelism().map_or(1, usize::from),
         threads => threads.into(),
     };
-    let all = runner::jobs(experiment, &[]);
+    let all = runner::jobs(&simulation, &[])?;
     let tried = (TRIED * threads * experiment.planners.len()).min(all.len());
     let jobs = all.iter().take(tried).copied().collect();
     let begun = Instant::now();

@@ -1,17 +1,20 @@
 //! `palpate run`.
 
 use super::find::{EXPERIMENTS, find};
+use super::host::Bring;
 use super::prepare::{bound_threads, ready, simulation};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, error, print};
+use crate::config::ConfigError;
 use crate::experiment::analysis::Analysis;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::lab_runner::{self, Halt, Outcome};
 use crate::experiment::row::{TrialId, TrialRow};
-use crate::experiment::runner;
+use crate::experiment::runner::{self, RunError};
 use crate::experiment::shard::Shard;
 use crate::experiment::store::{JOURNAL, Manifest, RECORDINGS, Run, RunFolder, Tally};
 use crate::experiment::sweep::cells;
+use crate::explore::planner;
 use crate::report;
 use anyhow::{Context, bail};
 use std::path::PathBuf;
@@ -41,6 +44,10 @@ pub(super) struct Args {
     /// Folder for the results [default: runs/NAME].
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
+    /// Run this planner too, built in or in Python, MODULE:CLASS; may be repeated. Python wants the
+    /// `palpate` of the Python package.
+    #[arg(long, value_name = "NAME")]
+    planner: Vec<String>,
     #[command(flatten)]
     how: How,
     /// Write rows and summary only, no figures.
@@ -72,26 +79,43 @@ pub(super) struct How {
     pub(super) clear_fault: bool,
 }
 
-pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Talk, bring: &Bring) -> anyhow::Result<Ending> {
     let path = find(&args.experiment, EXPERIMENTS)?;
     let cells = cells(&path)?;
     bound_threads(args.how.threads)?;
     let mut stop = None;
     if cells.is_empty() {
         let out = args.out.clone();
-        return run_one(args, Experiment::load(&path, &args.set)?, out, &mut stop, talk);
+        let experiment = with_planners(args, |sets| Experiment::load(&path, sets))?;
+        return run_one(args, experiment, out, &mut stop, (talk, bring));
     }
     // All of them are looked at before the first is run.
-    let load = |cell| Experiment::load_cell(&path, cell, &args.set);
+    let load = |cell| with_planners(args, |sets| Experiment::load_cell(&path, cell, sets));
     let experiments = cells.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     for experiment in experiments {
         let out = args.out.as_ref().map(|out| out.join(&experiment.name));
-        match run_one(args, experiment, out, &mut stop, talk)? {
+        match run_one(args, experiment, out, &mut stop, (talk, bring))? {
             Ending::Done => (),
             other => return Ok(other),
         }
     }
     Ok(Ending::Done)
+}
+
+/// What `load` reads with the settings asked for, and the planners that are to be run too.
+fn with_planners(
+    args: &Args,
+    load: impl Fn(&[String]) -> Result<Experiment, ConfigError>,
+) -> Result<Experiment, ConfigError> {
+    let experiment = load(&args.set)?;
+    if args.planner.is_empty() {
+        return Ok(experiment);
+    }
+    let listed = |name: &&String| experiment.planners.contains(name);
+    let too = args.planner.iter().filter(|name| !listed(name));
+    let names: Vec<String> =
+        experiment.planners.iter().chain(too).map(|name| format!("{name:?}")).collect();
+    load(&[&args.set[..], &[format!("planners=[{}]", names.join(","))]].concat())
 }
 
 /// What stands in a run's folder after it was run.
@@ -137,9 +161,13 @@ pub(super) fn make(
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
-    talk: Talk,
+    (talk, bring): (Talk, &Bring),
 ) -> anyhow::Result<Made> {
-    let mut simulation = simulation(experiment, talk)?;
+    let own = experiment.planners.iter().filter(|name| planner::is_own(name));
+    let (own, lacking): (Vec<_>, Vec<_>) =
+        own.filter_map(|name| bring(name)).partition(Result::is_ok);
+    let simulation = simulation(experiment, talk)?;
+    let mut simulation = simulation.with_planners(own.into_iter().flatten().collect());
     if let Some(lab) = simulation.connect()? {
         ready(&lab, how.clear_fault)?;
     }
@@ -159,7 +187,7 @@ pub(super) fn make(
         let part = how.shard.map(|it| format!("-{}-of-{}", it.index, it.count));
         PathBuf::from("runs").join(format!("{}{}", experiment.name, part.unwrap_or_default()))
     });
-    let manifest = manifest(experiment);
+    let manifest = Manifest::of(experiment);
     let (mut folder, done) =
         RunFolder::open(&path, experiment, simulation.truth(), &manifest, how.fresh)?;
     let recorded = how.record.then_some(path.as_path());
@@ -172,7 +200,9 @@ pub(super) fn make(
         None => stop.insert(stop_on_interrupt("trials")?),
     };
 
-    let mut jobs = runner::jobs(experiment, &done);
+    // One that cannot be brought is no harm where all its trials are there.
+    let why = |error: RunError| lacking.into_iter().find_map(Result::err).unwrap_or(error.into());
+    let mut jobs = runner::jobs(&simulation, &done).map_err(why)?;
     if let Some(shard) = how.shard {
         shard.keep(&mut jobs);
     }
@@ -207,9 +237,9 @@ fn run_one(
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
-    talk: Talk,
+    (talk, bring): (Talk, &Bring),
 ) -> anyhow::Result<Ending> {
-    let made = make(&args.how, experiment, out, stop, talk)?;
+    let made = make(&args.how, experiment, out, stop, (talk, bring))?;
     let Made { path, words, total, halt, .. } = &made;
     // A part of a run is not looked at: its rows need not fit into memory.
     if args.how.shard.is_some() {
@@ -250,34 +280,4 @@ fn run_one(
         talk.note(kept);
     }
     Ok(made.ending(talk))
-}
-
-pub(super) fn manifest(experiment: &Experiment) -> Manifest {
-    #[cfg(feature = "mujoco")]
-    let mujoco = Some(crate::sim::mujoco::version().to_owned());
-    #[cfg(not(feature = "mujoco"))]
-    let mujoco = None;
-    Manifest {
-        version: env!("CARGO_PKG_VERSION"),
-        commit: env!("PALPATE_COMMIT"),
-        mujoco,
-        platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
-        cpu_features: cpu_features(),
-        seed: experiment.seed,
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-fn cpu_features() -> Vec<&'static str> {
-    let features = [
-        ("avx2", is_x86_feature_detected!("avx2")),
-        ("fma", is_x86_feature_detected!("fma")),
-        ("avx512f", is_x86_feature_detected!("avx512f")),
-    ];
-    features.iter().filter(|(_, present)| *present).map(|(name, _)| *name).collect()
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-fn cpu_features() -> Vec<&'static str> {
-    Vec::new()
 }

@@ -252,10 +252,11 @@ impl Checked for Experiment {
             "1 to 100 letters, digits, - _ . that do not begin with - or . (it names a folder)"
                 .into()
         });
-        let known: Vec<&str> = planner::PLANNERS.iter().map(|entry| entry.name).collect();
-        rules.require("planners", "[]", !self.planners.is_empty(), || known.join(", "));
+        rules.require("planners", "[]", !self.planners.is_empty(), || {
+            planner::allowed("").join(", ")
+        });
         for (i, name) in self.planners.iter().enumerate() {
-            rules.one_of(&format!("planners[{i}]"), name, &known);
+            rules.one_of(&format!("planners[{i}]"), name, &planner::allowed(name));
             let first = !self.planners[..i].contains(name);
             rules.require(&format!("planners[{i}]"), name, first, || "each name once".into());
             let is_seen = name != planner::ORACLE || self.backend.kind == BackendKind::Simulated;

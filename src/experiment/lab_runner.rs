@@ -3,13 +3,13 @@
 use super::recorded_trial::{self, recording_path};
 use super::resumed::Resumed;
 use super::row::{TouchRow, TrialId, TrialRow};
-use super::runner::jobs;
+use super::runner::{RunError, jobs};
 use super::simulation::Simulation;
 use super::store::{Entry, Journal, RunFolder, StoreError};
 use super::witness::{Touched, Witness};
 use crate::backend::Fault;
 use crate::backend::ros::clock;
-use crate::explore::planner;
+use crate::explore::planner::Maker;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -26,7 +26,7 @@ pub struct Outcome {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Halt {
     /// Of which planner.
-    pub planner: &'static str,
+    pub planner: String,
     /// In which trial.
     pub trial: u32,
     /// Touches of the trial that are done and kept.
@@ -39,21 +39,21 @@ pub struct Halt {
 /// two touches.
 ///
 /// # Errors
-/// If a row or touch cannot be stored.
+/// If a row or touch cannot be stored, or a planner is not there.
 pub fn run(
     simulation: &Simulation,
     (folder, done): (&mut RunFolder, &[TrialId]),
     stop: &AtomicBool,
     recorded: Option<&Path>,
     progress: &(dyn Fn(&TrialRow) + Sync),
-) -> Result<Outcome, StoreError> {
+) -> Result<Outcome, RunError> {
     let mut journal = folder.journal()?;
     let mut outcome = Outcome::default();
-    for (trial, planner) in jobs(simulation.experiment(), done) {
+    for (trial, planner) in jobs(simulation, done)? {
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        let made = journal.touches(trial, planner.name);
+        let made = journal.touches(trial, planner.name());
         let mut keeper =
             Keeper { journal: &mut journal, made: &made, stop, trial, planner, error: None };
         let row = match recorded {
@@ -64,7 +64,7 @@ pub fn run(
             None => go_on(simulation, planner, trial, &made, &mut keeper),
         };
         if let Some(error) = keeper.error {
-            return Err(error);
+            return Err(error.into());
         }
         let Some(reason) = row.failure else {
             folder.append(&row)?;
@@ -75,25 +75,25 @@ pub fn run(
         journal.add(&Entry {
             time_unix_s: clock::now_s(),
             trial,
-            planner: planner.name.into(),
+            planner: planner.name().into(),
             touch: None,
             fault: Some(reason.clone()),
         })?;
-        let touches = journal.touches(trial, planner.name).len();
-        outcome.halt = Some(Halt { planner: planner.name, trial, touches, reason });
+        let touches = journal.touches(trial, planner.name()).len();
+        outcome.halt = Some(Halt { planner: planner.name().into(), trial, touches, reason });
         break;
     }
     Ok(outcome)
 }
 
 /// The file of a trial's recording; of a trial that goes on, one beside those of its parts before.
-fn part_path(run: &Path, planner: &planner::Entry, trial: u32) -> PathBuf {
+fn part_path(run: &Path, planner: &dyn Maker, trial: u32) -> PathBuf {
     let whole = recording_path(run, planner, trial);
     let mut path = whole.clone();
     let mut part = 1;
     while path.exists() {
         part += 1;
-        path = whole.with_file_name(format!("{}-{trial:04}-part-{part}.mcap", planner.name));
+        path = whole.with_file_name(format!("{}-{trial:04}-part-{part}.mcap", planner.name()));
     }
     path
 }
@@ -101,14 +101,14 @@ fn part_path(run: &Path, planner: &planner::Entry, trial: u32) -> PathBuf {
 /// Runs a trial from where its touches end.
 fn go_on(
     simulation: &Simulation,
-    planner: &planner::Entry,
+    planner: &dyn Maker,
     trial: u32,
     made: &[TouchRow],
     keeper: &mut Keeper,
 ) -> TrialRow {
     let mut probe = match simulation.probe(trial) {
         Ok(probe) => probe,
-        Err(fault) => return TrialRow::unstarted(trial, planner.name, &fault),
+        Err(fault) => return TrialRow::unstarted(trial, planner.name(), &fault),
     };
     let finger = simulation.environment().scene().finger.clone();
     let mut probe = Resumed::new(made.to_vec(), finger, &mut *probe);
@@ -121,7 +121,7 @@ struct Keeper<'a> {
     made: &'a [TouchRow],
     stop: &'a AtomicBool,
     trial: u32,
-    planner: &'static planner::Entry,
+    planner: &'a dyn Maker,
     error: Option<StoreError>,
 }
 
@@ -138,7 +138,7 @@ impl Witness for Keeper<'_> {
         let entry = Entry {
             time_unix_s: clock::now_s(),
             trial: self.trial,
-            planner: self.planner.name.into(),
+            planner: self.planner.name().into(),
             touch: Some(touched.row.clone()),
             fault: None,
         };

@@ -8,19 +8,19 @@ use super::store::{RECORDINGS, resolved_beside};
 use super::witness::{Touched, Witness};
 use crate::backend::Fault;
 use crate::backend::recording::{self, About, Ending, Recorder, Recording};
-use crate::explore::planner;
+use crate::explore::planner::Maker;
 use crate::explore::probe::{Probe, Touch};
 use crate::task::Zone;
 use std::path::{Path, PathBuf};
 
 /// The file of a trial's recording in a run's folder.
-pub fn recording_path(run: &Path, planner: &planner::Entry, trial: u32) -> PathBuf {
-    run.join(RECORDINGS).join(format!("{}-{trial:04}.mcap", planner.name))
+pub fn recording_path(run: &Path, planner: &dyn Maker, trial: u32) -> PathBuf {
+    run.join(RECORDINGS).join(format!("{}-{trial:04}.mcap", planner.name()))
 }
 
 /// As [`Simulation::trial`], recorded in the file `path`, which is replaced if it is there. What
 /// cannot be recorded fails the trial.
-pub fn run(simulation: &Simulation, planner: &planner::Entry, trial: u32, path: &Path) -> TrialRow {
+pub fn run(simulation: &Simulation, planner: &dyn Maker, trial: u32, path: &Path) -> TrialRow {
     go_on(simulation, planner, trial, path, &[], &mut ())
 }
 
@@ -28,21 +28,21 @@ pub fn run(simulation: &Simulation, planner: &planner::Entry, trial: u32, path: 
 /// touch.
 pub fn go_on(
     simulation: &Simulation,
-    planner: &planner::Entry,
+    planner: &dyn Maker,
     trial: u32,
     path: &Path,
     made: &[TouchRow],
     witness: &mut dyn Witness,
 ) -> TrialRow {
     run_faulty(simulation, planner, trial, path, made, witness)
-        .unwrap_or_else(|fault| TrialRow::unstarted(trial, planner.name, &fault))
+        .unwrap_or_else(|fault| TrialRow::unstarted(trial, planner.name(), &fault))
 }
 
 /// # Errors
 /// A fault before the first touch.
 fn run_faulty(
     simulation: &Simulation,
-    planner: &planner::Entry,
+    planner: &dyn Maker,
     trial: u32,
     path: &Path,
     made: &[TouchRow],
@@ -53,7 +53,7 @@ fn run_faulty(
     let about = About {
         version: env!("CARGO_PKG_VERSION").into(),
         experiment: resolved_beside(simulation.experiment(), path),
-        planner: planner.name.into(),
+        planner: planner.name().into(),
         trial,
         seed,
         capabilities: body.capabilities().clone(),

@@ -6,7 +6,6 @@ use super::witness::{Touched, Witness};
 use crate::backend::Fault;
 use crate::backend::recording::{Player, Recorded};
 use crate::config::ConfigError;
-use crate::explore::planner;
 use crate::explore::probe::servo::Servo;
 use crate::explore::probe::{Probe, Swept, Touch};
 use crate::task::Approach;
@@ -100,7 +99,7 @@ pub fn experiment(
 pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, ReplayError> {
     let about = &recorded.about;
     let unknown = || ReplayError::Planner { name: about.planner.clone() };
-    let planner = planner::by_name(&about.planner).ok_or_else(unknown)?;
+    let planner = simulation.planner(&about.planner).ok_or_else(unknown)?;
     let player = Box::new(Player::new(recorded.clone()));
     let servo = simulation.servo(player, simulation.body_seed(about.trial))?;
     let mut probe = Kept { servo, fault: None };

@@ -60,10 +60,9 @@ impl Checked for ReportSettings {
         for (i, &count) in self.touch_counts.iter().enumerate() {
             rules.number(&format!("touch_counts[{i}]"), count.into(), 1.0..=TOUCHES_MAX);
         }
-        let known: Vec<&str> = planner::PLANNERS.iter().map(|entry| entry.name).collect();
         for (key, names) in [("planners", &self.planners), ("baselines", &self.baselines)] {
             for (i, name) in names.iter().enumerate() {
-                rules.one_of(&format!("{key}[{i}]"), name, &known);
+                rules.one_of(&format!("{key}[{i}]"), name, &planner::allowed(name));
             }
         }
         if let Some(goal) = self.goal_touches {

@@ -1,11 +1,10 @@
 //! Trials × planners on all cores.
 
-use super::experiment::Experiment;
 use super::recorded_trial::{self, recording_path};
 use super::row::{TrialId, TrialRow};
 use super::simulation::Simulation;
 use super::store::{RunFolder, StoreError};
-use crate::explore::planner;
+use crate::explore::planner::Maker;
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, ParallelBridge, ParallelIterator,
 };
@@ -21,6 +20,15 @@ pub enum RunError {
     /// Its folder is unusable.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// It lists a planner that is not built in, and that nobody brought.
+    #[error(
+        "planner `{name}` is not built into this program: run it with the Python package's palpate, or \
+         from Rust by Simulation::with_planners"
+    )]
+    NoPlanner {
+        /// Its name.
+        name: String,
+    },
     /// Threads could not be started.
     #[error("cannot start {threads} threads: {message}")]
     Threads {
@@ -32,7 +40,7 @@ pub enum RunError {
 }
 
 /// One piece of work.
-pub type Job = (u32, &'static planner::Entry);
+pub type Job<'a> = (u32, &'a dyn Maker);
 
 /// Runs `jobs` and adds each row to `folder` as it finishes; returns how many trials it ran.
 ///
@@ -61,6 +69,10 @@ pub fn run(
                 return Ok(());
             }
             let row = run_caught(simulation, planner, trial, recorded);
+            if row.failure.is_some() && stop.load(Ordering::Relaxed) {
+                // What stopped the run may have failed it: it is run again.
+                return Ok(());
+            }
             let mut finished = finished.lock().unwrap_or_else(PoisonError::into_inner);
             finished.0.append(&row)?;
             finished.1 += 1;
@@ -111,7 +123,7 @@ pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, RunError> {
 /// in somebody's code does not lose the others' work.
 fn run_caught(
     simulation: &Simulation,
-    planner: &'static planner::Entry,
+    planner: &dyn Maker,
     trial: u32,
     recorded: Option<&Path>,
 ) -> TrialRow {
@@ -128,7 +140,7 @@ fn run_caught(
         let failure = Some(format!("panicked: {words}"));
         TrialRow {
             trial,
-            planner: planner.name.into(),
+            planner: planner.name().into(),
             failure,
             touches: Vec::new(),
             verification: Vec::new(),
@@ -137,7 +149,13 @@ fn run_caught(
 }
 
 /// Every trial of every planner that `done` lacks, trial by trial.
-pub fn jobs(experiment: &Experiment, done: &[TrialId]) -> Vec<Job> {
-    let lacking = experiment.lacks(done).into_iter();
-    lacking.filter_map(|(trial, name)| Some((trial, planner::by_name(name)?))).collect()
+///
+/// # Errors
+/// If the experiment lists a planner that is not there.
+pub fn jobs<'a>(simulation: &'a Simulation, done: &[TrialId]) -> Result<Vec<Job<'a>>, RunError> {
+    let known = |(trial, name): (u32, &str)| {
+        let planner = simulation.planner(name);
+        Ok((trial, planner.ok_or_else(|| RunError::NoPlanner { name: name.into() })?))
+    };
+    simulation.experiment().lacks(done).into_iter().map(known).collect()
 }

@@ -14,7 +14,7 @@ use crate::backend::ros::arm::Lab;
 use crate::backend::ros::fault::LinkFault;
 use crate::backend::ros::settings::BackendKind;
 use crate::backend::{Backend, Fault};
-use crate::explore::planner;
+use crate::explore::planner::{self, Maker};
 use crate::explore::probe::Probe;
 use crate::explore::probe::servo::Servo;
 use crate::math::seed;
@@ -36,6 +36,8 @@ pub struct Simulation {
     lab: Option<Arc<Lab>>,
     /// How far the truth may itself be off, if it was scanned.
     left_out: Option<LeftOut>,
+    /// Planners that are not built in.
+    own_planners: Vec<Box<dyn Maker>>,
 }
 
 /// An experiment that cannot be simulated.
@@ -111,7 +113,21 @@ impl Simulation {
             truth,
             lab: None,
             left_out: None,
+            own_planners: Vec::new(),
         })
+    }
+
+    /// With planners that are not built in, under the names that the experiment lists them by.
+    pub fn with_planners(mut self, planners: Vec<Box<dyn Maker>>) -> Self {
+        self.own_planners.extend(planners);
+        self
+    }
+
+    /// The planner of a name, built in or [own](Self::with_planners).
+    pub fn planner(&self, name: &str) -> Option<&dyn Maker> {
+        let own = self.own_planners.iter().map(|planner| &**planner);
+        let built_in = planner::by_name(name).map(|entry| -> &dyn Maker { entry });
+        built_in.or_else(|| own.into_iter().find(|planner| planner.name() == name))
     }
 
     /// What is run, with everything that it left to its object written out.
@@ -205,20 +221,15 @@ impl Simulation {
     }
 
     /// Runs one trial of `planner` from start to end; what goes wrong stands in its row.
-    pub fn trial(&self, planner: &planner::Entry, trial: u32) -> TrialRow {
+    pub fn trial(&self, planner: &dyn Maker, trial: u32) -> TrialRow {
         match self.probe(trial) {
             Ok(mut probe) => self.trial_with(&mut *probe, planner, trial),
-            Err(fault) => TrialRow::unstarted(trial, planner.name, &fault),
+            Err(fault) => TrialRow::unstarted(trial, planner.name(), &fault),
         }
     }
 
     /// As [`trial`](Self::trial), with the touches of any `probe`.
-    pub fn trial_with(
-        &self,
-        probe: &mut dyn Probe,
-        planner: &planner::Entry,
-        trial: u32,
-    ) -> TrialRow {
+    pub fn trial_with(&self, probe: &mut dyn Probe, planner: &dyn Maker, trial: u32) -> TrialRow {
         self.trial_before(probe, planner, trial, &mut ())
     }
 
@@ -226,7 +237,7 @@ impl Simulation {
     pub fn trial_before(
         &self,
         probe: &mut dyn Probe,
-        planner: &planner::Entry,
+        planner: &dyn Maker,
         trial: u32,
         witness: &mut dyn Witness,
     ) -> TrialRow {

@@ -19,13 +19,13 @@ pub fn run(
     experiment: &Experiment,
     sight: &Sight,
     probe: &mut dyn Probe,
-    planner: &planner::Entry,
+    planner: &dyn planner::Maker,
     trial: u32,
     witness: &mut dyn Witness,
 ) -> TrialRow {
     let mut row = TrialRow {
         trial,
-        planner: planner.name.into(),
+        planner: planner.name().into(),
         failure: None,
         touches: Vec::new(),
         verification: Vec::new(),
@@ -34,12 +34,18 @@ pub fn run(
     let task = sight.environment.task();
     let zone = task.zone();
     let mut start = stream("initial touches");
-    let mut planner = (planner.make)(zone, &experiment.planning, stream(planner.name));
+    let mut planner = planner.make(zone, &experiment.planning, stream(planner.name()));
     let mut belief = Belief::new(zone.clone(), experiment.gp.clone());
     for count in 1..=experiment.touches {
         let plan = match count <= experiment.initial_touches {
             true => Plan { target: uniform(zone, &mut start), sd_m: None, stall: None },
-            false => planner.plan_seeing(&belief, sight),
+            false => match planner.decide(&belief, sight) {
+                Ok(plan) => plan,
+                Err(undecided) => {
+                    row.failure = Some(format!("touch {count}: {undecided}"));
+                    break;
+                }
+            },
         };
         if !zone.contains(&plan.target) {
             let target = plan.target;

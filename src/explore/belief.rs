@@ -239,6 +239,11 @@ impl Belief {
         }
     }
 
+    /// What is explored.
+    pub fn zone(&self) -> &Zone {
+        &self.zone
+    }
+
     /// What the last [`refit`](Self::refit) found.
     pub fn fit(&self) -> Option<&Fit> {
         self.fit.as_ref()

@@ -1,5 +1,6 @@
 //! Beliefs as they were: a recorded trial's touches and hyperparameters, conditioned again.
 
+use crate::experiment::Experiment;
 use crate::experiment::metrics::Metrics;
 use crate::experiment::row::{TouchRow, TrialRow};
 use crate::experiment::store::Run;
@@ -33,13 +34,24 @@ impl<'a> Replay<'a> {
     /// # Errors
     /// If the recorded touches do not belong to the zone or cannot be conditioned on.
     pub fn new(run: &'a Run, planner: &str, count: u32) -> anyhow::Result<Option<Self>> {
-        let Some(row) = row(run, planner) else { return Ok(None) };
+        row(run, planner).map_or(Ok(None), |row| Self::of(&run.experiment, row, count))
+    }
+
+    /// The belief of the trial `row` after `count` touches; none if it ended before, or had no fit
+    /// then.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of(
+        experiment: &Experiment,
+        row: &'a TrialRow,
+        count: u32,
+    ) -> anyhow::Result<Option<Self>> {
         let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
         let Some(last) = touches.last() else { return Ok(None) };
         let Some(fit) = &last.fit else { return Ok(None) };
-        let experiment = &run.experiment;
         let zone = &experiment.scene.zone;
-        let place = || format!("trial {} of {planner}, touch {count}", row.trial);
+        let place = || format!("trial {} of {}, touch {count}", row.trial, row.planner);
         let mut belief = Belief::new(zone.clone(), experiment.gp.clone());
         for touch in touches {
             ensure!(

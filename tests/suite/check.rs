@@ -103,7 +103,7 @@ const SHORT: [&str; 4] =
 
 fn baseline(simulation: &Simulation) -> Baseline {
     let stop = AtomicBool::new(false);
-    let jobs = runner::jobs(simulation.experiment(), &[]);
+    let jobs = runner::jobs(simulation, &[]).unwrap();
     let rows = runner::rows(simulation, jobs, 0, &stop, &|_| ()).unwrap();
     Baseline::new(simulation, &rows, "a test")
 }

@@ -63,6 +63,7 @@ mod no_truth;
 mod notices;
 mod objects;
 mod optimizers;
+mod own_planners;
 mod page;
 mod planners;
 mod presence;

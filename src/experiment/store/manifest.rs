@@ -2,6 +2,7 @@
 
 use super::error::{StoreError, io_error};
 use super::file::write_whole;
+use crate::experiment::Experiment;
 use crate::files;
 use serde::Serialize;
 use std::io;
@@ -25,6 +26,39 @@ pub struct Manifest {
     pub cpu_features: Vec<&'static str>,
     /// Root of all randomness.
     pub seed: u64,
+}
+
+impl Manifest {
+    /// Of this program on this machine, which runs `experiment`.
+    pub fn of(experiment: &Experiment) -> Self {
+        #[cfg(feature = "mujoco")]
+        let mujoco = Some(crate::sim::mujoco::version().to_owned());
+        #[cfg(not(feature = "mujoco"))]
+        let mujoco = None;
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            commit: env!("PALPATE_COMMIT"),
+            mujoco,
+            platform: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
+            cpu_features: cpu_features(),
+            seed: experiment.seed,
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+fn cpu_features() -> Vec<&'static str> {
+    let features = [
+        ("avx2", is_x86_feature_detected!("avx2")),
+        ("fma", is_x86_feature_detected!("fma")),
+        ("avx512f", is_x86_feature_detected!("avx512f")),
+    ];
+    features.iter().filter(|(_, present)| *present).map(|(name, _)| *name).collect()
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn cpu_features() -> Vec<&'static str> {
+    Vec::new()
 }
 
 /// Adds `manifest` to the list of programs that wrote a run, unless the last one was the same.

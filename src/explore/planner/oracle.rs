@@ -1,7 +1,7 @@
 //! Touches where, if the truth is looked at, the belief comes nearest to it: a yardstick of how
 //! much any planner could gain with its next touch.
 
-use super::plan::{Entry, Plan, Planner, Sight};
+use super::plan::{Entry, Plan, Planner, Sight, Undecided};
 use super::search::Search;
 use crate::explore::belief::Belief;
 
@@ -18,7 +18,7 @@ impl Planner for Oracle {
         self.0.anywhere()
     }
 
-    fn plan_seeing(&mut self, belief: &Belief, sight: &dyn Sight) -> Plan {
+    fn decide(&mut self, belief: &Belief, sight: &dyn Sight) -> Result<Plan, Undecided> {
         let settings = self.0.settings.oracle.clone();
         let candidates = self.0.scattered(settings.candidates);
         let told = candidates.into_iter().filter_map(|target| {
@@ -29,9 +29,9 @@ impl Planner for Oracle {
             }
             Some((sight.rmse_m(after.surface()?)?, target))
         });
-        match told.min_by(|a, b| a.0.total_cmp(&b.0)) {
+        Ok(match told.min_by(|a, b| a.0.total_cmp(&b.0)) {
             Some((_, target)) => self.0.conclude(belief, target),
             None => self.0.anywhere(),
-        }
+        })
     }
 }

@@ -8,6 +8,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// A planner's choice.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,10 +38,22 @@ pub trait Planner: Send {
     /// The next target, inside the zone.
     fn plan(&mut self, belief: &Belief) -> Plan;
 
-    /// As [`plan`](Self::plan), for yardsticks, which look at the truth; others do not.
-    fn plan_seeing(&mut self, belief: &Belief, _: &dyn Sight) -> Plan {
-        self.plan(belief)
+    /// As [`plan`](Self::plan), with what few need: yardsticks look at the truth, and what runs
+    /// another's code can fail.
+    ///
+    /// # Errors
+    /// If it names no target, which ends the trial.
+    fn decide(&mut self, belief: &Belief, _: &dyn Sight) -> Result<Plan, Undecided> {
+        Ok(self.plan(belief))
     }
+}
+
+/// Why a planner named no target.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("the planner named no target: {reason}")]
+pub struct Undecided {
+    /// In its own words.
+    pub reason: String,
 }
 
 /// The truth, as a yardstick sees it.
@@ -61,6 +74,36 @@ pub struct Entry {
     pub about: &'static str,
     /// Makes one; the generator is its only randomness.
     pub make: fn(&Zone, &PlanningSettings, ChaCha8Rng) -> Box<dyn Planner>,
+}
+
+/// What makes the planners of one name: an [`Entry`], or what a program adds to its simulation.
+pub trait Maker: Send + Sync {
+    /// As in an experiment's list; if it is not that of an entry, it is an
+    /// [own](super::is_own) one's.
+    fn name(&self) -> &str;
+
+    /// Makes one for a trial; the generator is its only randomness.
+    fn make(
+        &self,
+        zone: &Zone,
+        settings: &PlanningSettings,
+        random: ChaCha8Rng,
+    ) -> Box<dyn Planner>;
+}
+
+impl Maker for Entry {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn make(
+        &self,
+        zone: &Zone,
+        settings: &PlanningSettings,
+        random: ChaCha8Rng,
+    ) -> Box<dyn Planner> {
+        (self.make)(zone, settings, random)
+    }
 }
 
 /// A uniformly random place of the zone.

@@ -6,7 +6,6 @@ use super::verdict::{Judgement, Rules, Verdict, of_planner};
 use crate::experiment::Simulation;
 use crate::experiment::row::TrialRow;
 use crate::experiment::runner::{self, Job, RunError};
-use crate::explore::planner;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What came of it.
@@ -67,7 +66,7 @@ pub fn hold(
     while first < last && !open.is_empty() && !stop.load(Ordering::Relaxed) {
         let (some, batch) = (rules.first as u32, rules.batch as u32);
         let until = last.min(if first < some { some } else { (first / batch + 1) * batch });
-        let planners: Vec<_> = open.iter().filter_map(|name| planner::by_name(name)).collect();
+        let planners: Vec<_> = open.iter().filter_map(|name| simulation.planner(name)).collect();
         let jobs: Vec<Job> = (first..until)
             .flat_map(|trial| planners.iter().map(move |&planner| (trial, planner)))
             .collect();

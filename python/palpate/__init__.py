@@ -1,0 +1,52 @@
+"""Palpate: a testbed for active touch.
+
+A robot finger explores an object it cannot see; a Gaussian process keeps a belief of its surface; a planner
+picks the next place to touch. Everything is in SI units, and names end with the unit.
+
+    >>> import palpate
+    >>> run = palpate.Experiment.load("toy").run(["active", "random"], trials=10)
+    >>> frame = run.summary()
+"""
+
+from ._library import load as _load
+
+_load()
+
+from typing import TYPE_CHECKING, Any
+
+from . import errors
+from ._experiment import Experiment
+from ._palpate import Belief, Scene, Touch, Zone, __version__
+from ._palpate import planners as _planners
+from ._run import Run
+from ._scene import read_mesh, write_mesh
+
+if TYPE_CHECKING:
+    from ._gaussian_process import GaussianProcess
+
+#: Names of the built-in planners.
+PLANNERS: tuple[str, ...] = tuple(_planners())
+
+__all__ = [
+    "PLANNERS",
+    "Belief",
+    "Experiment",
+    "GaussianProcess",
+    "Run",
+    "Scene",
+    "Touch",
+    "Zone",
+    "__version__",
+    "errors",
+    "read_mesh",
+    "write_mesh",
+]
+
+
+def __getattr__(name: str) -> Any:
+    # With the first use, since scikit-learn takes longer to import than all else here.
+    if name == "GaussianProcess":
+        from ._gaussian_process import GaussianProcess
+
+        return GaussianProcess
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

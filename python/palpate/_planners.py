@@ -1,0 +1,178 @@
+"""Planners written in Python: found by name, run beside a clock, and kept from harming the run.
+
+A planner runs on a thread of its own, one for each trial, so that one that does not return can be left
+behind; or, isolated, in a process of its own, which can be ended (`_isolated`).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import inspect
+import os
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from . import _palpate
+from .errors import PlannerError
+
+#: Seconds that a planner may take for one target, unless another limit is asked for; chosen.
+LIMIT_S = 60.0
+
+#: What makes a planner: its class, or any callable that is known by a module and a name.
+Factory = Callable[..., Any]
+
+
+def name_of(factory: Factory) -> str:
+    """`MODULE:NAME`, as tables and rows know it.
+
+    Raises:
+        PlannerError: of what has no name, as a partial or an object.
+    """
+    module = getattr(factory, "__module__", None)
+    name = getattr(factory, "__qualname__", None)
+    if not callable(factory) or module is None or name is None:
+        raise PlannerError(
+            f"{factory!r} is no planner: allowed are names, classes with plan(belief), and functions "
+            "that return an object with it"
+        )
+    return f"{module}:{name.replace('.<locals>', '')}"
+
+
+def by_name(name: str) -> Factory:
+    """The class or function `MODULE:NAME`; the working folder is looked in too, as `python -m` does.
+
+    Raises:
+        PlannerError: if there is none.
+    """
+    module_name, _, path = name.partition(":")
+    if "" not in sys.path and os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    try:
+        found: Any = importlib.import_module(module_name)
+        for part in path.split("."):
+            found = getattr(found, part)
+    except Exception as error:
+        raise PlannerError(f"planner {name}: {type(error).__name__}: {error}") from error
+    if not callable(found):
+        raise PlannerError(f"planner {name}: it is {found!r}, and no class")
+    factory: Factory = found
+    return factory
+
+
+def make(factory: Factory, zone: Any, seed: int) -> Any:
+    """A planner for one trial: what its constructor names of `zone`, `rng` and `seed` it is given."""
+    offered = {"zone": zone, "rng": np.random.default_rng(seed), "seed": seed}
+    try:
+        parameters = inspect.signature(factory).parameters
+    except ValueError:
+        parameters = {}  # type: ignore[assignment]
+    planner = factory(**{name: value for name, value in offered.items() if name in parameters})
+    if not callable(getattr(planner, "plan", None)):
+        raise PlannerError(f"{planner!r} has no method plan(belief)")
+    return planner
+
+
+def target_of(planned: Any) -> list[float]:
+    """What a planner returned, as numbers; a single one where the zone has one coordinate."""
+    return [float(at) for at in np.atleast_1d(np.asarray(planned, dtype=float)).ravel()]
+
+
+def told(error: BaseException) -> str:
+    """An exception with where it was raised, without the lines of this package."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if os.path.dirname(frame.filename) != os.path.dirname(__file__)]
+    head = "".join(traceback.format_exception_only(error)).strip()
+    if not own:
+        return head
+    return f"{head}\n" + "".join(traceback.format_list(own)).rstrip()
+
+
+class Workers:
+    """The planners of one name in one run, as the extension starts them."""
+
+    def __init__(self, factory: Factory, limit_s: float | None) -> None:
+        self._factory = factory
+        self._limit_s = limit_s
+        self._live: set[Worker] = set()
+
+    def __call__(self, zone: Any, seed: int) -> Worker | Trusted:
+        if self._limit_s is None:
+            return Trusted(self._factory, zone, seed)
+        worker = Worker(self, self._factory, zone, seed, self._limit_s)
+        self._live.add(worker)
+        return worker
+
+    def stop(self) -> None:
+        """Waits for no planner any more."""
+        for worker in list(self._live):
+            worker.interrupt()
+
+    def forget(self, worker: Worker) -> None:
+        """Of one that has ended."""
+        self._live.discard(worker)
+
+
+class Trusted:
+    """A planner of one trial that is called where the trial runs: nobody looks at the clock."""
+
+    def __init__(self, factory: Factory, zone: Any, seed: int) -> None:
+        self._make = (factory, zone, seed)
+        self._planner: Any = None
+
+    def plan(self, belief: Any) -> list[float]:
+        """As of a worker."""
+        try:
+            if self._planner is None:
+                self._planner = make(*self._make)
+            return target_of(self._planner.plan(belief))
+        except PlannerError:
+            raise
+        except BaseException as error:  # also of sys.exit in a planner
+            raise PlannerError(told(error)) from None
+
+    def close(self) -> None:
+        """The trial is over."""
+
+
+class Worker:
+    """A planner of one trial on a thread of its own, which the extension asks over a desk."""
+
+    def __init__(self, home: Workers, factory: Factory, zone: Any, seed: int, limit_s: float) -> None:
+        self._home = home
+        self.desk = _palpate.Desk(limit_s)
+        arguments = (factory, zone, seed, self.desk)
+        self._thread = threading.Thread(target=_serve, args=arguments, daemon=True)
+        self._thread.start()
+
+    def interrupt(self) -> None:
+        """Lets whoever waits for a target go."""
+        self.desk.fail("the run was stopped")
+        self.abandon()
+
+    def close(self) -> None:
+        """The trial is over."""
+        self._home.forget(self)
+
+    def abandon(self) -> None:
+        """Asks the thread to end. One that waits outside Python ends when it comes back."""
+        ident = ctypes.c_ulong(self._thread.ident or 0)
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ident, ctypes.py_object(SystemExit))
+
+
+def _serve(factory: Factory, zone: Any, seed: int, desk: _palpate.Desk) -> None:
+    try:
+        belief = desk.next()
+        planner: Any = make(factory, zone, seed) if belief is not None else None
+        while belief is not None:
+            desk.answer(target_of(planner.plan(belief)))
+            # Not kept while the next touch is made.
+            del belief
+            belief = desk.next()
+    except BaseException as error:  # also of sys.exit in a planner
+        desk.fail(str(error) if isinstance(error, PlannerError) else told(error))

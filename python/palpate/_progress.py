@@ -1,0 +1,24 @@
+"""How far a run is, on standard error."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+
+class Progress:
+    """Told now and then how many trials are done; a line that is written over."""
+
+    def __init__(self, name: str, is_shown: bool) -> None:
+        self._name = name
+        self._is_shown = is_shown
+        self._last: tuple[int, int] | None = None
+        self._begun_s = time.monotonic()
+
+    def __call__(self, done: int, total: int) -> None:
+        if not self._is_shown or self._last == (done, total):
+            return
+        self._last = (done, total)
+        gone_s = time.monotonic() - self._begun_s
+        end = "\n" if done == total else ""
+        print(f"\r{self._name}: {done} of {total} trials, {gone_s:.1f} s", end=end, file=sys.stderr, flush=True)

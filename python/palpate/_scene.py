@@ -1,0 +1,76 @@
+"""Scenes, from files and from meshes."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _palpate
+from ._home import found
+from ._settings import assignments, toml
+
+__all__ = ["read_mesh", "write_mesh"]
+
+
+def load(path: str | os.PathLike[str], seed: int, /, **settings: Any) -> _palpate.Scene:
+    """As `Scene.load`."""
+    return _palpate.Scene._load(os.fspath(found(path, "scenes")), assignments(settings), seed)
+
+
+def of_mesh(
+    vertices_m: npt.ArrayLike,
+    triangles: npt.ArrayLike,
+    x_m: list[float],
+    z_m: list[float],
+    body: str,
+    seed: int,
+    /,
+    **settings: Any,
+) -> _palpate.Scene:
+    """As `Scene.of_mesh`."""
+    zone = toml({"x_m": x_m, "z_m": z_m})
+    text = f'body = {toml(body)}\nzone = {zone}\nobject = {{ mesh = "mesh" }}\n'
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "scene.toml"
+        file.write_text(text)
+        return _palpate.Scene._of_mesh(
+            os.fspath(file),
+            assignments(settings),
+            seed,
+            np.ascontiguousarray(vertices_m, dtype=np.float64),
+            np.ascontiguousarray(triangles, dtype=np.int64),
+        )
+
+
+def read_mesh(
+    path: str | os.PathLike[str], metres_per_unit: float = 1.0
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
+    """Reads OBJ, glTF, GLB, STL or PLY and repairs it.
+
+    Returns:
+        Vertices (n, 3), metres, and triangles (m, 3), counter-clockwise from outside.
+
+    Raises:
+        SimulationError: if it is unusable.
+    """
+    return _palpate.read_mesh(os.fspath(path), metres_per_unit)[0]
+
+
+def write_mesh(
+    path: str | os.PathLike[str], vertices_m: npt.ArrayLike, triangles: npt.ArrayLike
+) -> None:
+    """Writes a mesh as binary STL, in metres, which `palpate new` takes."""
+    corners = np.asarray(vertices_m, dtype=float)[np.asarray(triangles, dtype=np.int64)]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    records = np.zeros(len(corners), dtype=record)
+    records["normal"] = across / np.where(length > 0, length, 1.0)
+    records["corners"] = corners
+    with open(path, "wb") as file:
+        file.write(b"palpate".ljust(80) + np.uint32(len(records)).tobytes() + records.tobytes())

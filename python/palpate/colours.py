@@ -1,0 +1,109 @@
+"""The colours of Palpate's figures, for figures of your own.
+
+The categorical ones are those of Okabe and Ito, which differ for every kind of colour vision. A touch, the truth
+and a planner have the colour that they have in reports.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+__all__ = [
+    "BAND_OPACITY",
+    "DEVIATION",
+    "ERROR",
+    "FAINT_INK",
+    "GRID",
+    "HEIGHT",
+    "INITIAL",
+    "INK",
+    "LATER",
+    "PAPER",
+    "TRUTH",
+    "map_of",
+    "planner",
+    "style",
+]
+
+#: Text and axes.
+INK = "#222222"
+#: Text that steps back.
+FAINT_INK = "#666666"
+#: Lines behind the data.
+GRID = "#e4e4e4"
+#: Paper.
+PAPER = "#ffffff"
+#: The true surface.
+TRUTH = "#009e73"
+#: Touches that every planner starts with.
+INITIAL = "#0046c8"
+#: Touches that a planner chose.
+LATER = "#d00000"
+#: How much of its colour a band has.
+BAND_OPACITY = 0.22
+
+#: Standard deviations, small to large: viridis.
+DEVIATION = (
+    "#440154",
+    "#472c7a",
+    "#3b518b",
+    "#2c718e",
+    "#21908d",
+    "#27ad81",
+    "#5cc863",
+    "#aadc32",
+    "#fde725",
+)
+#: Heights, low to high: slate to cream, on which touches stand out.
+HEIGHT = ("#68869e", "#96b2b8", "#c4d3c4", "#e6e4c1", "#fceebe")
+#: Errors, too low to too high: ColorBrewer's PuOr.
+ERROR = ("#542788", "#998ec3", "#d8daeb", "#f7f7f7", "#fee0b6", "#f1a340", "#b35806")
+
+_OWN = {"active": "#0072b2", "random": "#d55e00", "sobol": "#cc79a7"}
+_SPARE = (
+    "#e69f00",
+    "#56b4e9",
+    "#000000",
+    "#7a5195",
+    "#8c6d31",
+    "#667788",
+    "#2f8f8f",
+    "#b0305c",
+)
+
+
+def planner(name: str, planners: Sequence[str] = ()) -> str:
+    """The colour of a planner among those that it is drawn with (`run.planners`), as in the report."""
+    if name in _OWN:
+        return _OWN[name]
+    others = [other for other in planners if other not in _OWN]
+    return _SPARE[others.index(name) % len(_SPARE) if name in others else 0]
+
+
+def map_of(colours: Sequence[str]) -> Any:
+    """A colour map of matplotlib's through `DEVIATION`, `HEIGHT` or `ERROR`."""
+    # Here only is matplotlib needed.
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("palpate", list(colours))
+
+
+def style() -> dict[str, Any]:
+    """Settings of matplotlib: `matplotlib.rcParams.update(palpate.colours.style())`."""
+    return {
+        "axes.axisbelow": True,
+        "axes.edgecolor": FAINT_INK,
+        "axes.grid": True,
+        "axes.labelcolor": INK,
+        "axes.spines.right": False,
+        "axes.spines.top": False,
+        "axes.titlelocation": "left",
+        "axes.titlesize": "medium",
+        "figure.facecolor": PAPER,
+        "grid.color": GRID,
+        "legend.frameon": False,
+        "text.color": INK,
+        "xtick.color": FAINT_INK,
+        "ytick.color": FAINT_INK,
+    }

@@ -1,0 +1,108 @@
+//! Rows and curves as columns: what frames are made of.
+
+use numpy::PyArray1;
+use palpate::experiment::curve_table::{columns, curve_table};
+use palpate::experiment::measure::MEASURES;
+use palpate::experiment::row::{TouchRow, TrialRow};
+use palpate::experiment::store::Run;
+use palpate::explore::planner::Stall;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+fn numbers(
+    told: &Bound<'_, PyDict>,
+    name: &str,
+    values: impl Iterator<Item = Option<f64>>,
+) -> PyResult<()> {
+    let values = values.map(|value| value.unwrap_or(f64::NAN)).collect();
+    told.set_item(name, PyArray1::from_vec(told.py(), values))
+}
+
+fn counts(
+    told: &Bound<'_, PyDict>,
+    name: &str,
+    values: impl Iterator<Item = usize>,
+) -> PyResult<()> {
+    let values = values.map(|value| value as i64).collect();
+    told.set_item(name, PyArray1::from_vec(told.py(), values))
+}
+
+fn words<'a>(
+    told: &Bound<'_, PyDict>,
+    name: &str,
+    values: impl Iterator<Item = Option<&'a str>>,
+) -> PyResult<()> {
+    told.set_item(name, values.collect::<Vec<_>>())
+}
+
+/// A line for each trial.
+pub(crate) fn trials<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
+    let told = PyDict::new(py);
+    let rows = || run.rows.iter();
+    counts(&told, "trial", rows().map(|row| row.trial as usize))?;
+    words(&told, "planner", rows().map(|row| Some(row.planner.as_str())))?;
+    counts(&told, "touches", rows().map(|row| row.touches.len()))?;
+    words(&told, "failure", rows().map(|row| row.failure.as_deref()))?;
+    Ok(told)
+}
+
+/// A line for each touch: the row's part of it, and every measure after it.
+pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
+    let told = PyDict::new(py);
+    let all: Vec<(&TrialRow, usize, &TouchRow)> = (run.rows.iter())
+        .flat_map(|row| row.touches.iter().zip(1..).map(move |(touch, count)| (row, count, touch)))
+        .collect();
+    let touches = || all.iter().map(|(_, _, touch)| *touch);
+    counts(&told, "trial", all.iter().map(|(row, ..)| row.trial as usize))?;
+    words(&told, "planner", all.iter().map(|(row, ..)| Some(row.planner.as_str())))?;
+    counts(&told, "touch", all.iter().map(|(_, count, _)| *count))?;
+    words(&told, "outcome", touches().map(|touch| Some(outcome(touch))))?;
+    for (axis, name) in ["target_x_m", "target_z_m"].iter().enumerate() {
+        if axis < run.experiment.scene.zone.dimension() {
+            numbers(&told, name, touches().map(|touch| touch.target.get(axis).copied()))?;
+        }
+    }
+    for (axis, name) in ["contact_x_m", "contact_y_m", "contact_z_m"].iter().enumerate() {
+        numbers(&told, name, touches().map(|touch| Some(touch.contact?[axis])))?;
+    }
+    numbers(&told, "planned_sd_m", touches().map(|touch| touch.planned_sd_m))?;
+    words(&told, "stall", touches().map(|touch| touch.stall.map(stalled)))?;
+    let fit = |of: fn(&palpate::gp::Hyperparameters) -> f64| {
+        touches().map(move |touch| Some(of(&touch.fit.as_ref()?.hyperparameters)))
+    };
+    numbers(&told, "signal_sd_m", fit(|found| found.signal_sd))?;
+    numbers(&told, "noise_sd_m", fit(|found| found.noise_sd))?;
+    for measure in MEASURES {
+        let values = all.iter().map(|(row, count, _)| (measure.of)(row, *count as u32));
+        numbers(&told, measure.id, values)?;
+    }
+    Ok(told)
+}
+
+/// A line for each planner and number of touches, the columns of `summary.csv`.
+pub(crate) fn summary<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
+    let told = PyDict::new(py);
+    let records = py.detach(|| curve_table(&run.experiment, &run.rows, |_| true));
+    words(&told, "planner", records.iter().map(|record| Some(record.point.planner.as_str())))?;
+    counts(&told, "touches", records.iter().map(|record| record.point.touches as usize))?;
+    counts(&told, "trials", records.iter().map(|record| record.point.trials))?;
+    for (i, column) in columns(&run.experiment).iter().enumerate() {
+        numbers(&told, column, records.iter().map(|record| record.values[i]))?;
+    }
+    Ok(told)
+}
+
+fn outcome(touch: &TouchRow) -> &'static str {
+    match (touch.contact.is_some(), touch.overload) {
+        (true, _) => "contact",
+        (false, true) => "overload",
+        (false, false) => "miss",
+    }
+}
+
+fn stalled(stall: Stall) -> &'static str {
+    match stall {
+        Stall::Collapsed => "collapsed",
+        Stall::Repeated => "repeated",
+    }
+}

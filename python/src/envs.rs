@@ -1,0 +1,154 @@
+//! Many explorations side by side, stepped by actions: what the Gymnasium environments are made of.
+
+use crate::errors;
+use crate::exploration::{Exploration, How, Reward, World};
+use crate::zone::Zone;
+use numpy::ndarray::{ArrayView2, Axis};
+use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::iter::{
+    IndexedParallelIterator, IntoParallelIterator, IntoParallelRefMutIterator, ParallelIterator,
+};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Explorations of one or of several objects.
+#[pyclass(frozen, module = "palpate._palpate")]
+pub(crate) struct Envs {
+    worlds: Arc<[Arc<World>]>,
+    how: How,
+    each: Mutex<Vec<Exploration>>,
+    pool: rayon::ThreadPool,
+}
+
+#[pymethods]
+impl Envs {
+    /// `scenes` are files with their `--set` assignments; `touches` and `initial` are counts of an
+    /// episode; `grid` is what the belief is told on, places along each side, 0 for no belief.
+    #[new]
+    #[pyo3(signature = (scenes, count, touches, initial, grid, reward, threads))]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        py: Python<'_>,
+        scenes: Vec<(PathBuf, Vec<String>)>,
+        count: usize,
+        touches: usize,
+        initial: usize,
+        grid: usize,
+        reward: &str,
+        threads: usize,
+    ) -> PyResult<Self> {
+        let reward = match reward {
+            "rmse" => Reward::Rmse,
+            "information" => Reward::Information,
+            "none" => Reward::None,
+            other => {
+                let words = format!("reward {other:?}: allowed are rmse, information, none");
+                return Err(PyValueError::new_err(words));
+            }
+        };
+        let worlds = scenes.iter().map(|(path, sets)| World::load(py, path, sets, grid));
+        let worlds: Vec<Arc<World>> = worlds.collect::<PyResult<Vec<_>>>()?;
+        let dimension = worlds.first().map_or(0, |world| world.zone().dimension());
+        if worlds.iter().any(|world| world.zone().dimension() != dimension) || dimension == 0 {
+            return Err(PyValueError::new_err(
+                "scenes: allowed are one or more, all of curves or all of surfaces",
+            ));
+        }
+        if initial < 1 || initial > touches {
+            let words = format!("initial_touches = {initial}: allowed are 1 to {touches}");
+            return Err(PyValueError::new_err(words));
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let how = How { touches, initial, reward, believes: grid > 0 };
+        let each = (0..count)
+            .map(|_| Exploration::new(&worlds[0], how).map_err(errors::scene))
+            .collect::<PyResult<Vec<_>>>()?;
+        let pool = pool.map_err(errors::other)?;
+        Ok(Self { worlds: worlds.into(), how, each: Mutex::new(each), pool })
+    }
+
+    /// The zone of the first scene.
+    #[getter]
+    fn zone(&self) -> Zone {
+        Zone(self.worlds[0].zone().clone())
+    }
+
+    /// Begins all anew, each with the randomness of its seed.
+    fn reset<'py>(&self, py: Python<'py>, seeds: Vec<u64>) -> PyResult<Bound<'py, PyDict>> {
+        py.detach(|| {
+            let mut each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
+            let begin = |(env, seed): (&mut Exploration, u64)| {
+                env.seed(seed);
+                env.begin(&self.worlds);
+            };
+            let seeded: Vec<_> = each.iter_mut().zip(seeds).collect();
+            self.pool.install(|| seeded.into_par_iter().for_each(begin));
+        });
+        self.told(py)
+    }
+
+    /// Touches with each at its action, shape (count, d), fractions -1 to 1 of the zone's sides; one
+    /// whose episode was over begins anew instead.
+    fn step<'py>(
+        &self,
+        py: Python<'py>,
+        actions: PyReadonlyArray2<'_, f32>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let actions = actions.as_array();
+        self.check(&actions)?;
+        let actions: Vec<Vec<f32>> = actions.axis_iter(Axis(0)).map(|row| row.to_vec()).collect();
+        py.detach(|| {
+            let mut each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
+            let each = each.as_mut_slice();
+            let go = |(env, action): (&mut Exploration, &Vec<f32>)| match env.is_over {
+                true => env.begin(&self.worlds),
+                false => env.touch(action),
+            };
+            self.pool.install(|| each.par_iter_mut().zip(&actions).for_each(go));
+        });
+        self.told(py)
+    }
+}
+
+impl Envs {
+    fn check(&self, actions: &ArrayView2<'_, f32>) -> PyResult<()> {
+        let count = self.each.lock().unwrap_or_else(PoisonError::into_inner).len();
+        let wanted = [count, self.worlds[0].zone().dimension()];
+        if actions.shape() != wanted || actions.iter().any(|at| !at.is_finite()) {
+            let words =
+                format!("actions of shape {:?}: allowed are {wanted:?}, finite", actions.shape());
+            return Err(PyValueError::new_err(words));
+        }
+        Ok(())
+    }
+
+    /// What is seen now, with reward and measures of the last touch.
+    fn told<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
+        let count = each.len();
+        let told = PyDict::new(py);
+        let width = 2 * self.worlds[0].zone().dimension() + 2;
+        let touches: Vec<f32> = each.iter().flat_map(|env| env.told.iter().copied()).collect();
+        let touches = touches.into_pyarray(py).reshape([count, self.how.touches, width])?;
+        told.set_item("touches", touches)?;
+        let column = |of: fn(&Exploration) -> f64| PyArray1::from_iter(py, each.iter().map(of));
+        told.set_item("count", PyArray1::from_iter(py, each.iter().map(|env| env.count as i64)))?;
+        if self.how.believes {
+            let believed: Vec<f32> =
+                each.iter().flat_map(|env| env.believed.iter().copied()).collect();
+            let places = believed.len() / (2 * count.max(1));
+            told.set_item("belief", believed.into_pyarray(py).reshape([count, 2, places])?)?;
+        }
+        told.set_item("reward", column(|env| env.reward))?;
+        told.set_item("over", PyArray1::from_iter(py, each.iter().map(|env| env.is_over)))?;
+        for (i, name) in crate::exploration::MEASURED.iter().enumerate() {
+            told.set_item(*name, PyArray1::from_iter(py, each.iter().map(|env| env.measures[i])))?;
+        }
+        let failures: Vec<Option<&str>> = each.iter().map(|env| env.failure.as_deref()).collect();
+        told.set_item("failure", failures)?;
+        Ok(told)
+    }
+}

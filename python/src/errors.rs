@@ -1,0 +1,100 @@
+//! Palpate's errors as exceptions of `palpate.errors`, with what they carry as attributes.
+
+use palpate::config::{ConfigError, Origin};
+use palpate::experiment::runner::RunError;
+use palpate::experiment::simulation::SimulationError;
+use palpate::experiment::store::StoreError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::Path;
+
+/// An exception of `palpate.errors` with attributes; those that are none stay `None`.
+fn exception(class: &str, message: &str, fields: &[(&str, Option<String>)]) -> PyErr {
+    Python::attach(|py| {
+        let made = || -> PyResult<PyErr> {
+            let named = PyDict::new(py);
+            for (name, value) in fields {
+                named.set_item(name, value)?;
+            }
+            let class = py.import("palpate.errors")?.getattr(class)?;
+            Ok(PyErr::from_value(class.call((message,), Some(&named))?))
+        };
+        made().unwrap_or_else(|error| error)
+    })
+}
+
+fn shown(path: &Path) -> Option<String> {
+    Some(path.display().to_string())
+}
+
+/// Of settings: file, line, key, value, and what is allowed.
+pub(crate) fn config(error: ConfigError) -> PyErr {
+    let message = error.to_string();
+    let place = |origin: &Origin| match origin {
+        Origin::File { path, line } => (shown(path), line.map(|line| line.to_string())),
+        Origin::Set(_) => (None, None),
+    };
+    let ((file, line), key, value, allowed) = match error {
+        ConfigError::Unreadable { path, .. } => ((shown(&path), None), None, None, None),
+        ConfigError::Other { path, remedy, .. } => {
+            ((shown(&path), None), None, None, Some(remedy.to_owned()))
+        }
+        ConfigError::Syntax { origin, message } => (place(&origin), None, None, Some(message)),
+        ConfigError::UnknownKey { origin, key, allowed, .. } => {
+            (place(&origin), Some(key), None, Some(allowed.join(", ")))
+        }
+        ConfigError::Missing { origin, key } => (place(&origin), Some(key), None, None),
+        ConfigError::Invalid { origin, key, value, message } => {
+            (place(&origin), Some(key), value, Some(message))
+        }
+        ConfigError::NotAllowed { origin, key, value, allowed } => {
+            (place(&origin), Some(key), Some(value), Some(allowed))
+        }
+        ConfigError::Assignment { text } => ((None, None), None, Some(text), None),
+    };
+    let fields =
+        [("file", file), ("line", line), ("key", key), ("value", value), ("allowed", allowed)];
+    exception("ConfigError", &message, &fields)
+}
+
+/// Of a scene that cannot be built or simulated.
+pub(crate) fn simulation(error: impl Into<SimulationError>) -> PyErr {
+    scene(error.into())
+}
+
+/// The same in words only.
+pub(crate) fn scene(error: impl std::fmt::Display) -> PyErr {
+    exception("SimulationError", &error.to_string(), &[])
+}
+
+/// Of a run's folder.
+pub(crate) fn store(error: StoreError) -> PyErr {
+    let message = error.to_string();
+    let path = match &error {
+        StoreError::Io { path, .. }
+        | StoreError::Differs { path, .. }
+        | StoreError::Busy { path }
+        | StoreError::NotARun { path, .. }
+        | StoreError::Foreign { path }
+        | StoreError::BadRow { path, .. } => shown(path),
+        StoreError::DecidesRows { .. } => None,
+        StoreError::Config(_) => None,
+    };
+    match error {
+        StoreError::Config(error) => config(error),
+        _ => exception("RunFolderError", &message, &[("path", path)]),
+    }
+}
+
+/// Of a run.
+pub(crate) fn run(error: RunError) -> PyErr {
+    match error {
+        RunError::Store(error) => store(error),
+        error => exception("PalpateError", &error.to_string(), &[]),
+    }
+}
+
+/// Anything else that was asked for and is not there.
+pub(crate) fn other(error: impl std::fmt::Display) -> PyErr {
+    exception("PalpateError", &error.to_string(), &[])
+}

@@ -1,0 +1,205 @@
+//! An experiment, and its run with the interpreter let go.
+
+use crate::errors;
+use crate::planner::PythonMaker;
+use crate::run::Run;
+use crate::zone::Zone;
+use palpate::experiment::store::{self, Manifest, RunFolder, resolved};
+use palpate::experiment::{self, Simulation, runner};
+use palpate::explore::planner::Maker;
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+/// How often a run looks for Ctrl-C and tells how far it is; chosen.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// What is run: planners × trials on one scene.
+#[pyclass(frozen, module = "palpate._palpate")]
+pub(crate) struct Experiment(experiment::Experiment);
+
+#[pymethods]
+impl Experiment {
+    #[staticmethod]
+    fn load(path: PathBuf, sets: Vec<String>) -> PyResult<Self> {
+        experiment::Experiment::load(&path, &sets).map(Self).map_err(errors::config)
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    #[getter]
+    fn question(&self) -> &str {
+        &self.0.question
+    }
+
+    #[getter]
+    fn planners(&self) -> Vec<String> {
+        self.0.planners.clone()
+    }
+
+    #[getter]
+    fn trials(&self) -> u32 {
+        self.0.trials
+    }
+
+    #[getter]
+    fn touches(&self) -> u32 {
+        self.0.touches
+    }
+
+    #[getter]
+    fn initial_touches(&self) -> u32 {
+        self.0.initial_touches
+    }
+
+    #[getter]
+    fn seed(&self) -> u64 {
+        self.0.seed
+    }
+
+    #[getter]
+    fn zone(&self) -> Zone {
+        Zone(self.0.scene.zone.clone())
+    }
+
+    fn to_toml(&self) -> String {
+        resolved(&self.0)
+    }
+
+    /// Runs what is not there yet. `own` are names with what starts such a planner; `how` is the
+    /// folder, whether to begin it anew, and the number of threads; `(look, stop)` are called now
+    /// and then with how many trials are done and how many there are, and when the run is stopped.
+    fn run(
+        &self,
+        py: Python<'_>,
+        own: Vec<(String, Py<PyAny>)>,
+        how: (Option<PathBuf>, bool, usize),
+        told: (Py<PyAny>, Py<PyAny>),
+    ) -> PyResult<Run> {
+        let (out, fresh, threads) = how;
+        let (look, stop) = told;
+        let makers = own
+            .into_iter()
+            .map(|(name, start)| -> Box<dyn Maker> { Box::new(PythonMaker { name, start }) })
+            .collect();
+        let experiment = self.0.clone();
+        let simulation = py.detach(|| Simulation::new(experiment)).map_err(errors::simulation)?;
+        simulation.simulator().check_reach().map_err(errors::scene)?;
+        if simulation.is_real() {
+            return Err(errors::scene(
+                "backend.kind: a real arm is driven by the program (palpate run), with someone beside it; \
+                 allowed here is \"simulated\"",
+            ));
+        }
+        let simulation = simulation.with_planners(makers);
+        let told =
+            Told { look, stop, done: AtomicUsize::new(0), is_stopped: AtomicBool::new(false) };
+        let run = match &out {
+            Some(folder) => told.kept(py, &simulation, (folder, fresh), threads),
+            None => told.in_memory(py, &simulation, threads),
+        };
+        // What makes planners of Python lets go of it before the interpreter goes on.
+        drop(simulation);
+        run
+    }
+}
+
+/// A run with the one who waits for it.
+struct Told {
+    look: Py<PyAny>,
+    stop: Py<PyAny>,
+    done: AtomicUsize,
+    is_stopped: AtomicBool,
+}
+
+impl Told {
+    fn kept(
+        &self,
+        py: Python<'_>,
+        simulation: &Simulation,
+        (path, fresh): (&Path, bool),
+        threads: usize,
+    ) -> PyResult<Run> {
+        let experiment = simulation.experiment();
+        let (mut folder, done) =
+            RunFolder::open(path, experiment, simulation.truth(), &Manifest::of(experiment), fresh)
+                .map_err(errors::store)?;
+        let jobs = runner::jobs(simulation, &done).map_err(errors::run)?;
+        self.done.store(done.len(), Ordering::Relaxed);
+        let total = done.len() + jobs.len();
+        let outcome = self.watched(py, total, || {
+            let tick = |_: &_| {
+                self.done.fetch_add(1, Ordering::Relaxed);
+            };
+            runner::run(simulation, (&mut folder, jobs), threads, &self.is_stopped, None, &tick)
+        });
+        folder.sort(experiment).map_err(errors::store)?;
+        outcome?.map_err(errors::run)?;
+        store::Run::read(path).map(Run).map_err(errors::store)
+    }
+
+    fn in_memory(&self, py: Python<'_>, simulation: &Simulation, threads: usize) -> PyResult<Run> {
+        let jobs = runner::jobs(simulation, &[]).map_err(errors::run)?;
+        let rows = self.watched(py, jobs.len(), || {
+            let tick = |_: &_| {
+                self.done.fetch_add(1, Ordering::Relaxed);
+            };
+            runner::rows(simulation, jobs, threads, &self.is_stopped, &tick)
+        })?;
+        Ok(Run(store::Run {
+            experiment: simulation.experiment().clone(),
+            truth: simulation.truth().clone(),
+            rows: rows.map_err(errors::run)?,
+            unlisted: 0,
+        }))
+    }
+
+    /// What `work` returns, done on a thread of its own without the interpreter, while this one
+    /// looks for Ctrl-C; after it the trials in hand are given time to end.
+    ///
+    /// # Errors
+    /// `KeyboardInterrupt`, or what `look` raises.
+    fn watched<T: Send>(
+        &self,
+        py: Python<'_>,
+        total: usize,
+        work: impl FnOnce() -> T + Send,
+    ) -> PyResult<T> {
+        let mut raised = None;
+        let result = py.detach(|| {
+            std::thread::scope(|scope| {
+                let (ended, end) = channel::<()>();
+                let working = scope.spawn(move || {
+                    let result = work();
+                    drop(ended);
+                    result
+                });
+                while end.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+                    let looked = Python::attach(|py| {
+                        py.check_signals()?;
+                        self.look.call1(py, (self.done.load(Ordering::Relaxed), total)).map(|_| ())
+                    });
+                    if let Err(error) = looked
+                        && raised.is_none()
+                    {
+                        self.is_stopped.store(true, Ordering::Relaxed);
+                        Python::attach(|py| self.stop.call0(py).is_ok());
+                        raised = Some(error);
+                    }
+                }
+                working.join()
+            })
+        });
+        self.look.call1(py, (self.done.load(Ordering::Relaxed), total))?;
+        match (raised, result) {
+            (Some(error), _) => Err(error),
+            (None, Ok(result)) => Ok(result),
+            (None, Err(_)) => Err(errors::other("a thread of the run panicked")),
+        }
+    }
+}

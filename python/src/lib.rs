@@ -1,0 +1,40 @@
+//! Palpate as a Python extension: what the package `palpate` is made of.
+//!
+//! It hands over arrays and plain values. What is said in Python's own words (frames, progress,
+//! conventions of scikit-learn and Gymnasium) stands in the package's Python files.
+
+mod belief;
+mod columns;
+mod desk;
+mod envs;
+mod errors;
+mod experiment;
+mod exploration;
+mod gaussian_process;
+mod mesh;
+mod places;
+mod planner;
+mod program;
+mod run;
+mod scene;
+mod zone;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<belief::Belief>()?;
+    module.add_class::<desk::Desk>()?;
+    module.add_class::<envs::Envs>()?;
+    module.add_class::<experiment::Experiment>()?;
+    module.add_class::<gaussian_process::Fitted>()?;
+    module.add_class::<run::Run>()?;
+    module.add_class::<scene::Scene>()?;
+    module.add_class::<scene::Touch>()?;
+    module.add_class::<zone::Zone>()?;
+    module.add_function(wrap_pyfunction!(mesh::read_mesh, module)?)?;
+    module.add_function(wrap_pyfunction!(program::main, module)?)?;
+    module.add_function(wrap_pyfunction!(program::planners, module)?)?;
+    Ok(())
+}

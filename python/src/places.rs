@@ -1,0 +1,73 @@
+//! Places as arrays: of shape (…, d) in a zone of d coordinates, (n,) too where d is 1.
+
+use numpy::{AllowTypeChange, IntoPyArray, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// Places with the shape of what is told of each.
+pub(crate) struct Places {
+    /// The places.
+    pub(crate) each: Vec<Vec<f64>>,
+    shape: Vec<usize>,
+}
+
+impl Places {
+    /// Of an array of places of `dimension` coordinates.
+    ///
+    /// # Errors
+    /// `ValueError` of another shape.
+    pub(crate) fn of(points: &Bound<'_, PyAny>, dimension: usize) -> PyResult<Self> {
+        let array: PyArrayLikeDyn<f64, AllowTypeChange> = points.extract()?;
+        let array = array.as_array();
+        let given = array.shape();
+        let shape = match given.split_last() {
+            Some((_, [])) if dimension == 1 => given.to_vec(),
+            Some((&last, before)) if last == dimension => before.to_vec(),
+            _ => {
+                return Err(PyValueError::new_err(format!(
+                    "points have shape {given:?}; allowed is (..., {dimension})"
+                )));
+            }
+        };
+        let flat: Vec<f64> = array.iter().copied().collect();
+        Ok(Self { each: flat.chunks_exact(dimension).map(<[f64]>::to_vec).collect(), shape })
+    }
+
+    /// A number for each place, in their shape.
+    ///
+    /// # Errors
+    /// If there is no memory.
+    pub(crate) fn told<'py>(
+        &self,
+        py: Python<'py>,
+        values: Vec<f64>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        values.into_pyarray(py).reshape(self.shape.as_slice())
+    }
+
+    /// The same of vectors.
+    ///
+    /// # Errors
+    /// If there is no memory.
+    pub(crate) fn told_vectors<'py>(
+        &self,
+        py: Python<'py>,
+        values: &[Vec<f64>],
+        dimension: usize,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let shape: Vec<usize> = self.shape.iter().copied().chain([dimension]).collect();
+        values.concat().into_pyarray(py).reshape(shape.as_slice())
+    }
+}
+
+/// Rows of `width` numbers as an array of shape (n, width).
+///
+/// # Errors
+/// If there is no memory.
+pub(crate) fn rows<'py>(
+    py: Python<'py>,
+    rows: &[Vec<f64>],
+    width: usize,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    rows.concat().into_pyarray(py).reshape([rows.len(), width].as_slice())
+}

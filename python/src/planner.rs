@@ -1,0 +1,106 @@
+//! A planner written in Python, as an experiment runs it.
+
+use crate::belief::Belief;
+use crate::desk::{Desk, NoTarget, Trial};
+use crate::zone::Zone;
+use palpate::explore::belief;
+use palpate::explore::planner::{Maker, Plan, Planner, PlanningSettings, Sight, Undecided};
+use palpate::task;
+use pyo3::prelude::*;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+/// Makes a planner of Python for each trial.
+pub(crate) struct PythonMaker {
+    /// `MODULE:CLASS`.
+    pub(crate) name: String,
+    /// Called with zone and seed. Its result has `close()`, and `desk` with `abandon()`, or
+    /// `plan(belief) -> sequence of float`; what that raises is the reason why there is no target.
+    pub(crate) start: Py<PyAny>,
+}
+
+impl Maker for PythonMaker {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn make(
+        &self,
+        zone: &task::Zone,
+        _: &PlanningSettings,
+        mut random: ChaCha8Rng,
+    ) -> Box<dyn Planner> {
+        let seed: u64 = random.random();
+        let begun = Python::attach(|py| {
+            self.start.call1(py, (Zone(zone.clone()), seed)).map_err(|error| reason(py, &error))
+        });
+        let desk = begun.as_ref().ok().and_then(|begun| {
+            Python::attach(|py| {
+                let desk = begun.getattr(py, "desk").ok()?;
+                desk.cast_bound::<Desk>(py).ok()?.get().trial()
+            })
+        });
+        Box::new(PythonPlanner { begun, desk, dimension: zone.dimension() })
+    }
+}
+
+struct PythonPlanner {
+    begun: Result<Py<PyAny>, String>,
+    /// Where it is asked, if it sits on a thread of its own.
+    desk: Option<Trial>,
+    dimension: usize,
+}
+
+impl PythonPlanner {
+    fn target(&self, belief: &belief::Belief) -> Result<Vec<f64>, String> {
+        let begun = self.begun.as_ref().map_err(Clone::clone)?;
+        if let Some(desk) = &self.desk {
+            return desk.ask(belief.clone()).map_err(|no_target| match no_target {
+                NoTarget::Said(reason) => reason,
+                NoTarget::Late(limit) => {
+                    // Nobody is left to be told that it could not be left behind.
+                    Python::attach(|py| begun.call_method0(py, "abandon").is_ok());
+                    format!("it did not return within {} s", limit.as_secs_f64())
+                }
+            });
+        }
+        let belief = Belief(belief.clone());
+        Python::attach(|py| {
+            let planned = begun.call_method1(py, "plan", (belief,));
+            planned.and_then(|target| target.extract(py)).map_err(|error| reason(py, &error))
+        })
+    }
+}
+
+impl Planner for PythonPlanner {
+    fn plan(&mut self, belief: &belief::Belief) -> Plan {
+        let nowhere = vec![f64::NAN; self.dimension];
+        Plan { target: self.target(belief).unwrap_or(nowhere), sd_m: None, stall: None }
+    }
+
+    fn decide(&mut self, belief: &belief::Belief, _: &dyn Sight) -> Result<Plan, Undecided> {
+        let target = self.target(belief).map_err(|reason| Undecided { reason })?;
+        if target.len() != self.dimension {
+            let (found, wanted) = (target.len(), self.dimension);
+            let reason = format!("it has {found} coordinates, a target of this zone {wanted}");
+            return Err(Undecided { reason });
+        }
+        Ok(Plan { target, sd_m: None, stall: None })
+    }
+}
+
+impl Drop for PythonPlanner {
+    fn drop(&mut self) {
+        // So that its thread ends.
+        self.desk = None;
+        if let Ok(begun) = &self.begun {
+            // Nobody is left to be told that it could not be ended.
+            Python::try_attach(|py| begun.call_method0(py, "close").is_ok());
+        }
+    }
+}
+
+/// What an exception says.
+fn reason(py: Python<'_>, error: &PyErr) -> String {
+    error.value(py).to_string()
+}

@@ -1,0 +1,26 @@
+//! The command `palpate`: the same program, with planners of Python.
+
+use crate::planner::PythonMaker;
+use palpate::explore::planner::{Maker, PLANNERS};
+use pyo3::prelude::*;
+
+/// Runs the program on arguments, of which the first is its name; returns its exit code. `bring`
+/// gives what starts the planner of a name `MODULE:CLASS`.
+#[pyfunction]
+pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> u8 {
+    let brought = |name: &str| {
+        let start = Python::attach(|py| {
+            bring.call1(py, (name,)).map_err(|error| anyhow::anyhow!("{}", error.value(py)))
+        });
+        let made = start
+            .map(|start| -> Box<dyn Maker> { Box::new(PythonMaker { name: name.into(), start }) });
+        Some(made)
+    };
+    py.detach(|| palpate::cli::main_with(arguments.into_iter().map(Into::into), &brought))
+}
+
+/// The names of the built-in planners.
+#[pyfunction]
+pub(crate) fn planners() -> Vec<&'static str> {
+    PLANNERS.iter().map(|entry| entry.name).collect()
+}

@@ -1,0 +1,98 @@
+//! A run read back, or just made.
+
+use crate::belief::Belief;
+use crate::columns;
+use crate::errors;
+use crate::places::rows;
+use crate::zone::Zone;
+use numpy::{PyArray1, PyArrayDyn};
+use palpate::experiment::row::TrialRow;
+use palpate::experiment::store;
+use palpate::report::replay::Replay;
+use palpate::report::tables;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use std::path::PathBuf;
+
+/// The rows of a run, with what was run and the truth.
+#[pyclass(frozen, module = "palpate._palpate")]
+pub(crate) struct Run(pub(crate) store::Run);
+
+/// Places and heights.
+type Surface<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<f64>>);
+
+impl Run {
+    fn row(&self, trial: u32, planner: &str) -> PyResult<&TrialRow> {
+        let found = self.0.rows.iter().find(|row| row.trial == trial && row.planner == planner);
+        found.ok_or_else(|| errors::other(format!("no trial {trial} of {planner} in this run")))
+    }
+}
+
+#[pymethods]
+impl Run {
+    #[staticmethod]
+    fn open(py: Python<'_>, folder: PathBuf) -> PyResult<Self> {
+        py.detach(|| store::Run::read(&folder)).map(Self).map_err(errors::store)
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.0.experiment.name
+    }
+
+    #[getter]
+    fn planners(&self) -> Vec<String> {
+        self.0.experiment.planners.clone()
+    }
+
+    #[getter]
+    fn zone(&self) -> Zone {
+        Zone(self.0.experiment.scene.zone.clone())
+    }
+
+    /// Places (n, d) and heights (n,) of the true surface, NaN where there is none.
+    fn truth<'py>(&self, py: Python<'py>) -> PyResult<Surface<'py>> {
+        let truth = &self.0.truth;
+        let heights_m = truth.heights_m.iter().map(|height_m| height_m.unwrap_or(f64::NAN));
+        let places = rows(py, &truth.places, self.0.experiment.scene.zone.dimension())?;
+        Ok((places, PyArray1::from_iter(py, heights_m)))
+    }
+
+    /// The rows as they stand in `trials.jsonl`.
+    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let mut bytes = Vec::new();
+        for row in &self.0.rows {
+            serde_json::to_writer(&mut bytes, row).map_err(errors::other)?;
+            bytes.push(b'\n');
+        }
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    fn trials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        columns::trials(py, &self.0)
+    }
+
+    fn touches<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        columns::touches(py, &self.0)
+    }
+
+    fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        columns::summary(py, &self.0)
+    }
+
+    fn belief(&self, trial: u32, planner: &str, touch: u32) -> PyResult<Belief> {
+        let row = self.row(trial, planner)?;
+        let replay = Replay::of(&self.0.experiment, row, touch).map_err(errors::other)?;
+        let none = || {
+            let (made, first) = (row.touches.len(), self.0.experiment.initial_touches);
+            errors::other(format!(
+                "no belief after touch {touch} of trial {trial} of {planner}: allowed are {first} to {made}"
+            ))
+        };
+        Ok(Belief(replay.ok_or_else(none)?.belief))
+    }
+
+    fn __str__(&self) -> String {
+        tables::summary::text(&self.0)
+    }
+}

@@ -1,0 +1,81 @@
+//! The zone: what is explored.
+
+use crate::errors;
+use crate::places::{Places, rows};
+use numpy::{PyArray1, PyArrayDyn};
+use palpate::task;
+use pyo3::prelude::*;
+
+/// The rectangle, or the interval, that is explored: targets are its places (x) or (x, z), metres.
+#[pyclass(frozen, module = "palpate")]
+pub(crate) struct Zone(pub(crate) task::Zone);
+
+#[pymethods]
+impl Zone {
+    /// How many coordinates a target has: 1 or 2.
+    #[getter]
+    fn dimension(&self) -> usize {
+        self.0.dimension()
+    }
+
+    /// Smallest coordinates of a target, shape (d,), metres.
+    #[getter]
+    fn lower<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.0.sides().map(|[low, _]| low).collect())
+    }
+
+    /// Largest coordinates of a target, shape (d,), metres.
+    #[getter]
+    fn upper<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.0.sides().map(|[_, high]| high).collect())
+    }
+
+    /// Where heights are measured from, in the zone's frame, metres.
+    #[getter]
+    fn datum_y_m(&self) -> f64 {
+        self.0.datum_y_m()
+    }
+
+    /// Whether a target, shape (d,), lies in it.
+    fn contains(&self, target: Vec<f64>) -> bool {
+        target.len() == self.0.dimension() && self.0.contains(&target)
+    }
+
+    /// Places on an even grid, shape (per_side ** d, d), metres.
+    fn grid<'py>(&self, py: Python<'py>, per_side: usize) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        rows(py, &self.0.grid(per_side.max(1)), self.0.dimension())
+    }
+
+    /// Points in the world of places, shape (..., d), and their heights above the datum, as many:
+    /// shape (..., 3), metres.
+    fn to_world<'py>(
+        &self,
+        py: Python<'py>,
+        places: &Bound<'py, PyAny>,
+        heights_m: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let places = Places::of(places, self.0.dimension())?;
+        let heights_m = Places::of(heights_m, 1)?.each.concat();
+        let points: Vec<Vec<f64>> = (places.each.iter().zip(heights_m))
+            .map(|(place, height_m)| self.0.point(place, height_m).coords.as_slice().to_vec())
+            .collect();
+        places.told_vectors(py, &points, 3)
+    }
+
+    /// For pickles: the zone as JSON.
+    #[staticmethod]
+    fn _of(text: &str) -> PyResult<Self> {
+        serde_json::from_str(text).map(Self).map_err(errors::other)
+    }
+
+    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<(Py<PyAny>, (String,))> {
+        let text = serde_json::to_string(&slf.get().0).map_err(errors::other)?;
+        Ok((slf.get_type().getattr("_of")?.unbind(), (text,)))
+    }
+
+    fn __repr__(&self) -> String {
+        let sides: Vec<String> =
+            self.0.sides().map(|[low, high]| format!("[{low}, {high}]")).collect();
+        format!("Zone({} m)", sides.join(" x "))
+    }
+}

@@ -1,0 +1,82 @@
+"""Planners as a user writes them, and ones that fail."""
+
+import os
+import signal
+import time
+
+import numpy as np
+
+
+class Middle:
+    """Of a few random places the one of which the belief is least sure."""
+
+    def __init__(self, zone, rng):
+        self.zone, self.rng = zone, rng
+
+    def plan(self, belief):
+        places = self.rng.uniform(self.zone.lower, self.zone.upper, (64, self.zone.dimension))
+        return places[np.argmax(belief.variance(places))]
+
+
+class Raises:
+    def plan(self, belief):
+        raise ValueError("no idea")
+
+
+class RaisesLate(Middle):
+    def plan(self, belief):
+        if len(belief.targets) == 5:
+            raise ValueError("no idea any more")
+        return super().plan(belief)
+
+
+class NotANumber:
+    def plan(self, belief):
+        return np.full(belief.zone.dimension, np.nan)
+
+
+class Outside:
+    def plan(self, belief):
+        return belief.zone.upper + 1.0
+
+
+class Many:
+    def plan(self, belief):
+        return np.zeros(5)
+
+
+class Words:
+    def plan(self, belief):
+        return "somewhere"
+
+
+class Sleeps:
+    def plan(self, belief):
+        time.sleep(1e6)
+
+
+class Spins:
+    def plan(self, belief):
+        while True:
+            pass
+
+
+class Exits:
+    def plan(self, belief):
+        raise SystemExit(3)
+
+
+class Unmade:
+    def __init__(self):
+        raise RuntimeError("not today")
+
+    def plan(self, belief): ...
+
+
+class Killed:
+    def plan(self, belief):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Nothing:
+    """No planner."""

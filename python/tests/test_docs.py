@@ -1,0 +1,22 @@
+"""What the guides show runs as it stands there."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/python.md", "python/README.md"])
+def test_the_first_example_prints_a_table(page, tmp_path):
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL)
+    code = next(block for block in blocks if block.startswith("import palpate"))
+    program = tmp_path / "first.py"
+    program.write_text(code)
+    command = [sys.executable, program]
+    told = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told.stderr
+    assert "__main__:Widest" in told.stdout and "active" in told.stdout

@@ -1,0 +1,102 @@
+"""The environments keep to Gymnasium's rules, and say what the object is like."""
+
+import warnings
+
+import gymnasium
+import numpy as np
+import palpate
+import palpate.gym
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+ID = "Palpate/Touch-v0"
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"scene": "bird"}, {"scene": "toy"}, {"scene": "suite", "grid": 0, "reward": "none"}],
+)
+def test_the_environment_keeps_to_the_rules(settings):
+    env = gymnasium.make(ID, touches=8, **settings)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Places beyond any zone, and heights, are of the object.
+        warnings.filterwarnings("ignore", message=".*(infinity|-infinity).*")
+        check_env(env.unwrapped)
+
+
+def test_the_vector_environment_keeps_to_the_rules():
+    envs = gymnasium.make_vec(ID, num_envs=4, scene="suite", touches=8)
+    seen, _ = envs.reset(seed=3)
+    assert envs.observation_space.contains(seen) or all(
+        seen[name].shape == space.shape for name, space in envs.observation_space.items()
+    )
+    again, _ = envs.reset(seed=3)
+    assert all((seen[name] == again[name]).all() for name in seen)
+    each, _ = envs.reset(seed=[1, 2, 1, 2])
+    assert (each["touches"][0] == each["touches"][2]).all()
+    assert (each["touches"][0] != each["touches"][1]).any()
+    over = []
+    for _ in range(5):
+        seen, reward, terminated, truncated, info = envs.step(envs.action_space.sample())
+        over.append(terminated.all())
+        assert reward.shape == (4,) and not truncated.any()
+    assert over == [False, False, True, False, False]
+    assert (seen["count"] == 6).all()
+    assert info["rmse_m"].shape == (4,)
+
+
+def test_it_is_the_same_for_any_number_of_threads_and_alone():
+    told = []
+    for threads in (1, 2):
+        envs = palpate.gym.TouchVectorEnv(3, "bird", touches=9, threads=threads)
+        envs.reset(seed=[5, 6, 7])
+        told.append(envs.step(np.full((3, 2), 0.25, dtype=np.float32)))
+    assert all((told[0][0][name] == told[1][0][name]).all() for name in told[0][0])
+    assert (told[0][1] == told[1][1]).all()
+    env = palpate.gym.TouchEnv("bird", touches=9)
+    env.reset(seed=6)
+    seen, reward, *_ = env.step(np.full(2, 0.25, dtype=np.float32))
+    assert reward == told[0][1][1]
+    assert (seen["belief"] == told[0][0]["belief"][1]).all()
+
+
+@pytest.mark.parametrize("reward", ["rmse", "information"])
+def test_rewards_add_up_to_what_was_gained(reward):
+    env = gymnasium.make(ID, scene="bird", touches=12, reward=reward).unwrapped
+    seen, first = env.reset(seed=1)
+    gained, over = 0.0, False
+    begin = seen
+    while not over:
+        seen, step, over, _, info = env.step(env.action_space.sample())
+        gained += step
+    sds = [it["belief"][1].astype(float) for it in (begin, seen)]
+    expected = {
+        "rmse": np.log(first["rmse_m"] / info["rmse_m"]),
+        "information": np.mean(np.log(sds[0]) - np.log(sds[1])),
+    }[reward]
+    assert gained == pytest.approx(expected, abs=1e-4)
+    assert seen["count"] == 12 and info["failure"] is None
+
+
+def test_the_touch_is_where_the_action_says():
+    env = palpate.gym.TouchEnv("toy", touches=6, initial_touches=2)
+    env.reset(seed=0)
+    seen, *_ = env.step(np.array([0.5], dtype=np.float32))
+    target, place, height, met = seen["touches"][2]
+    scene = palpate.Scene.load("toy")
+    low, high = scene.zone.lower[0], scene.zone.upper[0]
+    truth_m = scene.true_height([low + 0.75 * (high - low)])[0]
+    assert (target, met) == (0.5, 1.0) and place == pytest.approx(0.5, abs=1e-6)
+    assert height == pytest.approx(truth_m / (0.5 * (high - low)), abs=1e-6)
+    assert (seen["touches"][3:] == 0).all()
+
+
+def test_what_is_wrong_is_said():
+    env = palpate.gym.TouchEnv("toy", touches=6)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="finite"):
+        env.step(np.array([np.nan], dtype=np.float32))
+    for wrong in ({"reward": "luck"}, {"initial_touches": 0}, {"scene": ["toy", "bird"]}, {"scene": []}):
+        with pytest.raises(ValueError):
+            palpate.gym.TouchEnv(**wrong)

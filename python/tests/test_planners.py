@@ -1,0 +1,139 @@
+"""Planners written in Python: they are run beside the built-in ones, and harm nobody."""
+
+import functools
+import os
+import signal
+import sys
+import threading
+
+import numpy as np
+import own
+import palpate
+import pytest
+from palpate.errors import PlannerError
+from scipy import optimize
+
+
+def failures(planner, **settings):
+    toy = palpate.Experiment.load("toy", touches=6)
+    run = toy.run([planner, "random"], trials=2, **settings)
+    told = run.trials()
+    assert told[told["planner"] == "random"]["failure"].isna().all()
+    return list(told[told["planner"] != "random"]["failure"])
+
+
+@pytest.mark.parametrize("isolate", [False, True])
+def test_an_own_planner_is_paired_and_the_same_each_time(isolate):
+    toy = palpate.Experiment.load("toy", touches=10)
+    run = toy.run([own.Middle, "random"], trials=3, isolate=isolate)
+    assert run.planners == ["own:Middle", "random"]
+    touches = run.touches()
+    first = touches[touches["touch"] <= toy.initial_touches].pivot(
+        index=["trial", "touch"], columns="planner", values="target_x_m"
+    )
+    assert (first["own:Middle"] == first["random"]).all()
+    assert run.trials()["failure"].isna().all()
+    assert run.rows() == toy.run(["own:Middle", "random"], trials=3, threads=1).rows()
+    assert "own:Middle" in str(run)
+    assert len(run.summary().query("planner == 'own:Middle'")) > 0
+
+
+@pytest.mark.parametrize("how", [{}, {"limit_s": None}, {"isolate": True}])
+@pytest.mark.parametrize(
+    ("planner", "words"),
+    [
+        (own.Raises, "ValueError: no idea"),
+        (own.NotANumber, "not in the zone"),
+        (own.Outside, "not in the zone"),
+        (own.Many, "5 coordinates"),
+        (own.Words, "could not convert"),
+        (own.Unmade, "not today"),
+        (own.Nothing, "no method plan"),
+    ],
+)
+def test_a_planner_that_fails_is_a_row_with_the_reason(planner, words, how):
+    told = failures(planner, **how)
+    assert len(told) == 2 and all(words in reason for reason in told)
+
+
+def test_the_row_keeps_the_touches_before_and_the_place_in_the_code():
+    run = palpate.Experiment.load("toy", touches=9).run([own.RaisesLate], trials=1)
+    row = run.trials().iloc[0]
+    assert row["touches"] == 5
+    assert row["failure"].startswith("touch 6: ") and "own.py" in row["failure"]
+
+
+@pytest.mark.parametrize("planner", [own.Sleeps, own.Spins])
+@pytest.mark.parametrize("isolate", [False, True])
+def test_a_planner_that_does_not_return_is_a_row(planner, isolate):
+    told = failures(planner, isolate=isolate, limit_s=0.2)
+    assert all("within 0.2 s" in reason for reason in told)
+
+
+def test_a_planner_that_leaves_is_a_row():
+    assert all("SystemExit" in reason for reason in failures(own.Exits))
+    assert all("SystemExit" in reason for reason in failures(own.Exits, limit_s=None))
+    assert all("exit code 3" in reason for reason in failures(own.Exits, isolate=True))
+
+
+def test_a_planner_that_is_killed_is_a_row():
+    assert all("SIGKILL" in reason for reason in failures(own.Killed, isolate=True))
+
+
+def test_an_interrupt_does_not_wait_for_a_planner():
+    toy = palpate.Experiment.load("toy", touches=6)
+    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        toy.run([own.Sleeps], trials=3)
+
+
+def test_what_is_no_planner_is_refused():
+    toy = palpate.Experiment.load("toy", touches=6)
+    for wrong in (own.Middle(toy.zone, None), functools.partial(own.Middle), 3):
+        with pytest.raises(PlannerError):
+            toy.run([wrong])
+    for wrong in ("own:Nobody", "nowhere:Nobody"):
+        with pytest.raises(PlannerError, match=wrong):
+            toy.run([wrong])
+
+
+def test_the_program_runs_planners_of_python(tmp_path, program):
+    here = os.path.dirname(__file__)
+    sets = ["--set", "trials=2", "--set", "touches=8", "--set", 'planners=["random"]']
+    told = program(
+        "run", "toy", "--planner", "own:Middle", *sets, "--out", tmp_path / "run", "--json", cwd=here
+    )
+    assert "own:Middle" in told
+    run = palpate.Run.open(tmp_path / "run")
+    experiment = palpate.Experiment.load("toy", touches=8)
+    assert run.rows() == experiment.run(["random", "own:Middle"], trials=2).rows()
+    assert (tmp_path / "run/report.html").is_file()
+
+
+class Least:
+    """`active` as scipy finds it: the largest variance, by DIRECT and then L-BFGS-B."""
+
+    def __init__(self, zone):
+        self.bounds = optimize.Bounds(zone.lower, zone.upper)
+
+    def plan(self, belief):
+        def score(place):
+            return -belief.explorable_variance(place).item()
+
+        found = optimize.direct(score, self.bounds, maxfun=500)
+        slope = lambda place: -belief.explorable_variance_gradient(place)  # noqa: E731
+        return optimize.minimize(score, found.x, jac=slope, bounds=self.bounds).x
+
+
+@pytest.mark.parametrize(("name", "touches"), [("toy", 30), ("container", 15)])
+def test_active_rewritten_in_python_finds_as_much(name, touches):
+    experiment = palpate.Experiment.load(name, touches=touches)
+    run = experiment.run(["active", Least], trials=10)
+    touches = run.touches()
+    last = touches[touches["touch"] == touches["touch"].max()]
+    errors = last.pivot(index="trial", columns="planner", values="rmse_m")
+    assert errors.notna().all().all()
+    difference = np.log(errors.iloc[:, 0]) - np.log(errors.iloc[:, 1])
+    standard_error = difference.std(ddof=1) / np.sqrt(len(difference))
+    assert abs(difference.mean()) <= 3 * standard_error

@@ -1,0 +1,130 @@
+//! Planners that are not built in: a program adds them to its simulation.
+
+use palpate::experiment::runner::{self, RunError};
+use palpate::experiment::store::{Manifest, Run, RunFolder};
+use palpate::experiment::{Experiment, Simulation};
+use palpate::explore::belief::Belief;
+use palpate::explore::planner::{
+    self, Maker, Plan, Planner, PlanningSettings, Sight, Undecided, is_own, uniform,
+};
+use palpate::task::Zone;
+use rand_chacha::ChaCha8Rng;
+use std::process::Command;
+use std::sync::atomic::AtomicBool;
+
+/// Random touches, or none after some.
+struct Mine {
+    touches: usize,
+}
+
+struct Random {
+    zone: Zone,
+    random: ChaCha8Rng,
+    touches: usize,
+}
+
+impl Maker for Mine {
+    fn name(&self) -> &str {
+        "mine:Random"
+    }
+
+    fn make(&self, zone: &Zone, _: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {
+        Box::new(Random { zone: zone.clone(), random, touches: self.touches })
+    }
+}
+
+impl Planner for Random {
+    fn plan(&mut self, _: &Belief) -> Plan {
+        Plan { target: uniform(&self.zone, &mut self.random), sd_m: None, stall: None }
+    }
+
+    fn decide(&mut self, belief: &Belief, _: &dyn Sight) -> Result<Plan, Undecided> {
+        match belief.targets().len() < self.touches {
+            true => Ok(self.plan(belief)),
+            false => Err(Undecided { reason: "enough".into() }),
+        }
+    }
+}
+
+fn simulation(touches: usize) -> Simulation {
+    let sets = ["planners=[\"mine:Random\", \"random\"]", "trials=2", "touches=8"];
+    let experiment = Experiment::load("experiments/toy.toml".as_ref(), &sets.map(String::from));
+    let simulation = Simulation::new(experiment.unwrap()).unwrap();
+    simulation.with_planners(vec![Box::new(Mine { touches })])
+}
+
+/// Its trials begin as those of the others do, stand in the same folder, and the folder is read
+/// without it.
+#[test]
+fn an_own_planner_is_one_of_the_experiments() {
+    let simulation = simulation(8);
+    let folder = tempfile::tempdir().unwrap();
+    let experiment = simulation.experiment();
+    let manifest = Manifest::of(experiment);
+    let (mut rows, done) =
+        RunFolder::open(folder.path(), experiment, simulation.truth(), &manifest, false).unwrap();
+    let jobs = runner::jobs(&simulation, &done).unwrap();
+    let stop = AtomicBool::new(false);
+    runner::run(&simulation, (&mut rows, jobs), 0, &stop, None, &|_| ()).unwrap();
+    rows.sort(experiment).unwrap();
+    let run = Run::read(folder.path()).unwrap();
+    let names: Vec<_> = run.rows.iter().map(|row| row.planner.as_str()).collect();
+    assert_eq!(names, ["mine:Random", "random", "mine:Random", "random"]);
+    let first = experiment.initial_touches as usize;
+    for pair in run.rows.chunks(2) {
+        assert_eq!(pair[0].failure, None);
+        assert_eq!(pair[0].touches[..first], pair[1].touches[..first]);
+        assert_ne!(pair[0].touches, pair[1].touches);
+    }
+}
+
+/// One that names no target ends its own trial, whose touches are kept.
+#[test]
+fn a_planner_that_names_no_target_fails_its_trial() {
+    let simulation = simulation(5);
+    let row = simulation.trial(simulation.planner("mine:Random").unwrap(), 0);
+    assert_eq!(row.failure.unwrap(), "touch 6: the planner named no target: enough");
+    assert_eq!(row.touches.len(), 5);
+}
+
+/// What nobody brought is said before anything is run.
+#[test]
+fn a_planner_that_is_not_there_is_an_error() {
+    let experiment = simulation(8).experiment().clone();
+    let bare = Simulation::new(experiment).unwrap();
+    let Err(RunError::NoPlanner { name }) = runner::jobs(&bare, &[]) else { panic!() };
+    assert_eq!(name, "mine:Random");
+    assert!(bare.planner("random").is_some());
+}
+
+#[test]
+fn names_of_own_planners_have_a_module() {
+    assert!(["a:b", "my.module:Class.Inner", "__main__:f"].into_iter().all(is_own));
+    assert!(!["active", ":b", "a:", "a:b:c", "a b:c", "a/b:c"].into_iter().any(is_own));
+    assert!(planner::PLANNERS.iter().all(|entry| !is_own(entry.name)));
+}
+
+/// Planners named on the command line are run beside the file's; one that the program does not have
+/// is refused before anything is run, and says where it would be.
+#[test]
+fn the_command_line_adds_planners() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |planner: &str| {
+        Command::new(env!("CARGO_BIN_EXE_palpate"))
+            .args(["--quiet", "run", "experiments/toy.toml", "--planner", planner, "--no-report"])
+            .args(["--set", "planners=[\"random\"]", "--set", "trials=2", "--set", "touches=8"])
+            .args(["--out".as_ref(), folder.path().join("run").as_os_str()])
+            .output()
+            .unwrap()
+    };
+    for (planner, words) in [("mine:Random", "Python"), ("activ", "active"), ("a b:c", "active")] {
+        let told = run(planner);
+        assert_eq!(told.status.code(), Some(2), "{planner}");
+        let error = String::from_utf8_lossy(&told.stderr).into_owned();
+        assert!(error.contains(planner) && error.contains(words), "{error}");
+    }
+    assert!(run("active").status.success());
+    let run = Run::read(&folder.path().join("run")).unwrap();
+    assert_eq!(run.experiment.planners, ["random", "active"]);
+    assert_eq!(run.rows.len(), 4);
+}
