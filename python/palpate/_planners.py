@@ -32,15 +32,17 @@ def name_of(factory: Factory) -> str:
     """`MODULE:NAME`, as tables and rows know it.
 
     Raises:
-        PlannerError: of what has no name, as a partial or an object.
+        PlannerError: of what has no name, as a partial or an object, and of a class without `plan`.
     """
     module = getattr(factory, "__module__", None)
     name = getattr(factory, "__qualname__", None)
     if not callable(factory) or module is None or name is None:
+        meant = f"; pass the class {type(factory).__name__}, not an object of it" if _plans(factory) else ""
         raise PlannerError(
             f"{factory!r} is no planner: allowed are names, classes with plan(belief), and functions "
-            "that return an object with it"
+            f"that return an object with it{meant}"
         )
+    _check(name, factory)
     return f"{module}:{name.replace('.<locals>', '')}"
 
 
@@ -61,8 +63,19 @@ def by_name(name: str) -> Factory:
         raise PlannerError(f"planner {name}: {type(error).__name__}: {error}") from error
     if not callable(found):
         raise PlannerError(f"planner {name}: it is {found!r}, and no class")
+    _check(name, found)
     factory: Factory = found
     return factory
+
+
+def _plans(planner: Any) -> bool:
+    return callable(getattr(planner, "plan", None))
+
+
+def _check(name: str, factory: Factory) -> None:
+    # What a function returns is seen with the first trial.
+    if isinstance(factory, type) and not _plans(factory):
+        raise PlannerError(f"planner {name}: the class has no method plan(belief)")
 
 
 def make(factory: Factory, zone: Any, seed: int) -> Any:
@@ -73,7 +86,7 @@ def make(factory: Factory, zone: Any, seed: int) -> Any:
     except ValueError:
         parameters = {}  # type: ignore[assignment]
     planner = factory(**{name: value for name, value in offered.items() if name in parameters})
-    if not callable(getattr(planner, "plan", None)):
+    if not _plans(planner):
         raise PlannerError(f"{planner!r} has no method plan(belief)")
     return planner
 
