@@ -87,6 +87,24 @@ def add_contents(app, docname, source):
         source[0] += CONTENTS
 
 
+# Docstrings of attributes as they are written, by name.
+WRITTEN = {}
+
+
+def keep_attribute(app, what, name, obj, options, lines):
+    """Notes what napoleon would read as `TYPE: TEXT` wherever it holds a colon."""
+    if what in ("attribute", "data", "property"):
+        WRITTEN[name] = list(lines)
+
+
+def restore_attribute(app, what, name, obj, options, lines):
+    """Puts it back."""
+    if what in ("attribute", "data", "property"):
+        lines[:] = WRITTEN[name]
+
+
 def setup(app):
     """Called by Sphinx."""
     app.connect("source-read", add_contents)
+    app.connect("autodoc-process-docstring", keep_attribute, priority=400)  # napoleon has 500
+    app.connect("autodoc-process-docstring", restore_attribute, priority=600)
