@@ -32,7 +32,7 @@ def name_of(factory: Factory) -> str:
     """`MODULE:NAME`, as tables and rows know it.
 
     Raises:
-        PlannerError: of what has no name, as a partial or an object, and of a class without `plan`.
+        PlannerError: of what has no name, as a partial or an object.
     """
     module = getattr(factory, "__module__", None)
     name = getattr(factory, "__qualname__", None)
@@ -42,7 +42,6 @@ def name_of(factory: Factory) -> str:
             f"{factory!r} is no planner: allowed are names, classes with plan(belief), and functions "
             f"that return an object with it{meant}"
         )
-    _check(name, factory)
     return f"{module}:{name.replace('.<locals>', '')}"
 
 
@@ -63,19 +62,12 @@ def by_name(name: str) -> Factory:
         raise PlannerError(f"planner {name}: {type(error).__name__}: {error}") from error
     if not callable(found):
         raise PlannerError(f"planner {name}: it is {found!r}, and no class")
-    _check(name, found)
     factory: Factory = found
     return factory
 
 
 def _plans(planner: Any) -> bool:
     return callable(getattr(planner, "plan", None))
-
-
-def _check(name: str, factory: Factory) -> None:
-    # What a function returns is seen with the first trial.
-    if isinstance(factory, type) and not _plans(factory):
-        raise PlannerError(f"planner {name}: the class has no method plan(belief)")
 
 
 def make(factory: Factory, zone: Any, seed: int) -> Any:
