@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers wheel test-python dist setup tools clean
+.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers wheel install-python test-python docs notebooks dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -185,16 +185,28 @@ MATURIN = $(DEPS)/python/bin/maturin build --quiet --locked --auditwheel skip -m
 wheel: setup $(PYTHON) $(PYTHON_HOME)
 	$(MATURIN) --release --out target/wheels
 
-# Built as tests are: what is installed is otherwise the same.
-test-python: setup $(PYTHON) $(PYTHON_HOME)
-	cargo clippy --locked --package palpate-python -- -D warnings
+# Into the environment that tests it, built as tests are: what is installed is otherwise the same.
+install-python: setup $(PYTHON) $(PYTHON_HOME)
 	rm -rf target/wheels-dev
 	$(MATURIN) --profile dev --out target/wheels-dev
 	$(PYTHON) -m pip install --quiet --no-deps --force-reinstall target/wheels-dev/*.whl
+
+test-python: install-python
+	cargo clippy --locked --package palpate-python -- -D warnings
 	cd python && $(abspath $(PYTHON)) -m mypy
 	cd python/tests && $(abspath $(PYTHON)) -m mypy.stubtest --ignore-disjoint-bases palpate._palpate
 	# Not beside the sources, which are not what is installed.
 	cd python/tests && $(abspath $(DEPS)/python/bin/pytest)
+
+# The guides and the reference of Python as a site, target/docs-site; a link to nothing ends it. All anew, since
+# a page that has not changed is not warned of again.
+docs: install-python
+	rm -rf target/docs-site
+	$(DEPS)/python/bin/sphinx-build --quiet --fail-on-warning --keep-going --fresh-env -c docs -d target/docs-tree . target/docs-site
+
+# Notebooks with what they show, to be committed.
+notebooks: install-python
+	$(PYTHON) python/notebooks/run.py
 
 $(PYTHON): python/requirements.txt
 	python3 -m venv $(DEPS)/python

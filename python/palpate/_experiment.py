@@ -116,11 +116,20 @@ class Experiment:
             isolate: run each planner of your own in a process of its own, which can be killed.
 
         Raises:
+            PlannerError: of a planner that is none; what else it does wrong fails its trials.
+            TypeError: if `planners` is not a list.
+            ValueError: if `limit_s` or `threads` is negative.
             KeyboardInterrupt: after Ctrl-C, when the trials in hand are done; with `out` they are kept, and
                 the same call goes on.
             SimulationError: if the scene cannot be simulated.
             RunFolderError: if the folder holds something else.
         """
+        if isinstance(planners, (str, type)):
+            raise TypeError(f"planners = {planners!r}: allowed is a list of them, [{planners!r}]")
+        if threads < 0:
+            raise ValueError(f"threads = {threads}: allowed is 0, all cores, or more")
+        if limit_s is not None and not 0 < limit_s < float("inf"):
+            raise ValueError(f"limit_s = {limit_s}: allowed is above 0, or None for ever")
         own: dict[str, Factory] = {}
         names = []
         for planner in self.planners if planners is None else planners:

@@ -71,6 +71,8 @@ class GaussianProcess(_Base):
         Raises:
             ValueError: of another shape, of what is not finite, of a range that is none.
         """
+        if y is None:
+            raise ValueError("fit requires y to be passed, but the target y is None")
         places, heights = self._checked(X, y)
         for name in ("length_scale", "noise", "signal"):
             low, high = getattr(self, name)

@@ -37,9 +37,10 @@ def name_of(factory: Factory) -> str:
     module = getattr(factory, "__module__", None)
     name = getattr(factory, "__qualname__", None)
     if not callable(factory) or module is None or name is None:
+        meant = f"; pass the class {type(factory).__name__}, not an object of it" if _plans(factory) else ""
         raise PlannerError(
             f"{factory!r} is no planner: allowed are names, classes with plan(belief), and functions "
-            "that return an object with it"
+            f"that return an object with it{meant}"
         )
     return f"{module}:{name.replace('.<locals>', '')}"
 
@@ -65,6 +66,10 @@ def by_name(name: str) -> Factory:
     return factory
 
 
+def _plans(planner: Any) -> bool:
+    return callable(getattr(planner, "plan", None))
+
+
 def make(factory: Factory, zone: Any, seed: int) -> Any:
     """A planner for one trial: what its constructor names of `zone`, `rng` and `seed` it is given."""
     offered = {"zone": zone, "rng": np.random.default_rng(seed), "seed": seed}
@@ -73,7 +78,7 @@ def make(factory: Factory, zone: Any, seed: int) -> Any:
     except ValueError:
         parameters = {}  # type: ignore[assignment]
     planner = factory(**{name: value for name, value in offered.items() if name in parameters})
-    if not callable(getattr(planner, "plan", None)):
+    if not _plans(planner):
         raise PlannerError(f"{planner!r} has no method plan(belief)")
     return planner
 

@@ -43,7 +43,7 @@ class ConfigError(PalpateError, ValueError):
         self.line = None if line is None else int(line)
         self.key = key
         self.value = value
-        self.allowed = allowed
+        self.allowed = None if allowed is None else allowed.removeprefix("allowed is ")
 
 
 class SimulationError(PalpateError, ValueError):

@@ -36,6 +36,10 @@ def test_it_is_scikit_learns_posterior(dimension):
     assert means == pytest.approx(their_means, abs=1e-8)
     assert sds**2 + ours.noise_sd_**2 == pytest.approx(their_sds**2, rel=1e-6)
     assert ours.log_marginal_likelihood_value_ == pytest.approx(theirs.log_marginal_likelihood(), abs=1e-6)
+    # Searched in the same ranges: a length scale without end is likelier still where an input hardly matters.
+    low, high = ours.length_scale
+    within = [(low * span, high * span) for span in np.ptp(places, axis=0)]
+    kernel.set_params(k1__k2__length_scale_bounds=within)
     searched = GaussianProcessRegressor(kernel, n_restarts_optimizer=5, alpha=0.0, random_state=0)
     best = searched.fit(places, heights).log_marginal_likelihood_value_
     assert ours.log_marginal_likelihood_value_ >= best - 1e-3

@@ -1,0 +1,110 @@
+"""The site of these pages, built by `make docs`.
+
+The source is the whole repository, so that a link means on the site what it means in the files: to another page, or
+to a file, which is then copied. Warnings are errors, so that a link to nothing ends the build.
+"""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+project = "Palpate"
+copyright = "Palpate's authors"
+version = re.search(r'^version = "(.*)"', (ROOT / "Cargo.toml").read_text(), re.MULTILINE)[1]
+html_title = f"Palpate {version}"
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+root_doc = "docs/README"
+include_patterns = ["*.md", "docs/*.md", "experiments/README.md", "models/SOURCE.md", "models/*/SOURCE.md"]
+# Not searched: what is built, fetched or run.
+exclude_patterns = [".*", "target", "runs", "python"]
+
+html_theme = "furo"
+html_copy_source = False
+html_show_sphinx = False
+# index.html, which leads to the guide.
+html_extra_path = ["site"]
+
+myst_heading_anchors = 4
+# Guides abbreviate: `key = […]` is no TOML.
+suppress_warnings = ["misc.highlighting_failure"]
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+# `like this` in a docstring.
+default_role = "code"
+
+# What the sidebar lists. The index is a page of its own that is read on a forge too.
+CONTENTS = """
+
+```{toctree}
+:hidden:
+:caption: Guide
+tutorial
+how-to
+python
+python-reference
+reference
+```
+
+```{toctree}
+:hidden:
+:caption: Background
+paper
+cost
+real-arm
+checks
+clusters
+interlocks
+registration
+finger
+dynamic
+recordings
+gaussian-process
+```
+
+```{toctree}
+:hidden:
+:caption: The project
+../README
+../experiments/README
+../models/SOURCE
+../models/pa10/SOURCE
+../ARCHITECTURE
+../CONTRIBUTING
+../CHANGELOG
+```
+"""
+
+
+def add_contents(app, docname, source):
+    """Appends the sidebar's list to the index."""
+    if docname == root_doc:
+        source[0] += CONTENTS
+
+
+# Docstrings of attributes as they are written, by name.
+WRITTEN = {}
+
+
+def keep_attribute(app, what, name, obj, options, lines):
+    """Notes what napoleon would read as `TYPE: TEXT` wherever it holds a colon."""
+    if what in ("attribute", "data", "property"):
+        WRITTEN[name] = list(lines)
+
+
+def restore_attribute(app, what, name, obj, options, lines):
+    """Puts it back."""
+    if what in ("attribute", "data", "property"):
+        lines[:] = WRITTEN[name]
+
+
+def setup(app):
+    """Called by Sphinx."""
+    app.connect("source-read", add_contents)
+    app.connect("autodoc-process-docstring", keep_attribute, priority=400)  # napoleon has 500
+    app.connect("autodoc-process-docstring", restore_attribute, priority=600)
