@@ -13,12 +13,13 @@ else
     ip route add 224.0.0.0/4 dev lo
 fi
 # A virtual processor that idles wakes late, up to tens of milliseconds: what nobody else wants of each is
-# spent, so that it does not.
+# spent, so that it does not. Who spends it looks whether this script still lives: a signal that comes while
+# a process begins can be lost.
 awake=()
 trap '[ ${#awake[@]} -eq 0 ] || kill "${awake[@]}"' EXIT
 if command -v chrt >/dev/null; then
     for _ in $(seq "$(nproc)"); do
-        chrt --idle 0 bash -c 'while :; do :; done' &
+        chrt --idle 0 bash -c 'while kill -0 "$1" 2>/dev/null; do :; done' spend "$$" &
         awake+=($!)
     done
 fi
