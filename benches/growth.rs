@@ -18,6 +18,7 @@ use palpate::report::axes::{Axis, Panel};
 use palpate::report::canvas::{Area, Canvas};
 use palpate::report::legend::{Legend, Swatch};
 use palpate::report::{png, style};
+use palpate::study::bench::product;
 use palpate::study::bench::sample::{KERNEL, hyperparameters, search_box, touches};
 use std::hint::black_box;
 use std::path::Path;
@@ -90,7 +91,8 @@ fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
             likelihood.values.push((n, value));
         });
         exact_mb.values.push((n, bytes as f64 / 1e6));
-        let induce = || Posterior::through(INDUCING, &KERNEL, at.clone(), &touches);
+        // A rough kernel, of which as many touches are kept as may be.
+        let induce = || Posterior::through(INDUCING, &Matern52, at.clone(), &touches);
         through.values.push((
             n,
             seconds(|| {
@@ -165,17 +167,6 @@ fn exponent(curve: &Curve) -> f64 {
     }
 }
 
-fn matmul_flops() -> f64 {
-    let n = 1000;
-    let a = faer::Mat::<f64>::from_fn(n, n, |i, j| ((i * 7 + j * 13) % 11) as f64);
-    let mut c = faer::Mat::<f64>::zeros(n, n);
-    let once = seconds(|| {
-        let (replace, sequential) = (faer::Accum::Replace, faer::Par::Seq);
-        faer::linalg::matmul::matmul(c.as_mut(), replace, &a, &a, 1.0, sequential);
-    });
-    2.0 * (n as f64).powi(3) / once
-}
-
 /// Two panels below each other.
 fn draw(panels: [(&str, &[Curve]); 2]) -> Option<String> {
     let stroke = |curve: &Curve| style::stroke(curve.colour, 2.0);
@@ -229,7 +220,8 @@ fn main() -> anyhow::Result<()> {
         "kernel                 touches    kept  left, of a noise  mean off, of a sd   sd, of the exact"
     );
     off.iter().for_each(|line| println!("{line}"));
-    let flops = matmul_flops();
+    let mut product = product();
+    let flops = product.flops / seconds(|| (product.run)());
     if let Some((n, seconds)) = curves[1].values.iter().find(|(n, _)| *n == 1000.0) {
         let share = n.powi(3) / seconds / flops;
         println!(

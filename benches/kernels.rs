@@ -8,6 +8,7 @@ use palpate::gp::{Mean, Posterior};
 use palpate::sim::environment::Shape;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
+use palpate::study::bench::product;
 use palpate::study::bench::sample::{KERNEL, hyperparameters, search_box, touches};
 use std::hint::black_box;
 use std::path::Path;
@@ -25,16 +26,9 @@ fn gaussian_process(c: &mut Criterion) {
             },
         );
     }
-    // What the likelihood's n³ operations are held against: twice as many of the same n.
-    let factor = faer::Mat::<f64>::from_fn(1000, 1000, |i, j| ((i * 7 + j * 13) % 11) as f64);
-    let mut product = faer::Mat::<f64>::zeros(1000, 1000);
-    group.bench_function("matrix product 1000", |b| {
-        let (replace, alone) = (faer::Accum::Replace, faer::Par::Seq);
-        b.iter(|| {
-            let into = product.as_mut();
-            faer::linalg::matmul::matmul(into, replace, &factor, &factor, 1.0, alone);
-        });
-    });
+    // What the likelihood's n³ operations are held against.
+    let mut product = product();
+    group.bench_function(product.name.clone(), |b| b.iter(|| (product.run)()));
     for count in [50, 100, 200, 1000] {
         let touches = touches(count);
         let mut likelihood = Likelihood::new(&KERNEL, Mean::Zero, &touches);

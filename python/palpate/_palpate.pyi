@@ -90,7 +90,8 @@ class Belief:
         """Every target asked for so far, shape (n, d), metres."""
     @property
     def places(self) -> _Array:
-        """Places of the contacts the belief holds, shape (m, d), metres: not the targets."""
+        """Places of the contacts the belief holds, shape (m, d), metres: not the targets. With
+        `gp.inducing_touches` those that are kept."""
     @property
     def heights_m(self) -> _Array:
         """Heights of these contacts above the datum, shape (m,), metres."""

@@ -1,6 +1,6 @@
 //! The belief as a planner or a reader of a run sees it.
 
-use crate::places::{Places, rows};
+use crate::places::{Places, rows, seen_at};
 use crate::zone::Zone;
 use numpy::{PyArray1, PyArrayDyn};
 use palpate::explore::belief;
@@ -117,13 +117,12 @@ impl Belief {
         rows(py, self.0.targets(), self.dimension())
     }
 
-    /// Places of the contacts the belief holds, shape (m, d), metres: not the targets.
+    /// Places of the contacts the belief holds, shape (m, d), metres: not the targets. With
+    /// `gp.inducing_touches` those that are kept.
     #[getter]
     fn places<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let seen = self.0.surface().map(Posterior::observations);
-        let places: Vec<Vec<f64>> = seen
-            .map_or(Vec::new(), |seen| (0..seen.len()).map(|i| seen.place(i).collect()).collect());
-        rows(py, &places, self.dimension())
+        rows(py, &seen.map_or(Vec::new(), seen_at), self.dimension())
     }
 
     /// Heights of these contacts above the datum, shape (m,), metres.

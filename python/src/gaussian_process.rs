@@ -1,7 +1,7 @@
 //! The Gaussian process alone: a fit, and what it predicts.
 
 use crate::errors;
-use crate::places::rows;
+use crate::places::{rows, seen_at};
 use numpy::{PyArray1, PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2};
 use palpate::gp::kernel::{KERNELS, by_name};
 use palpate::gp::{Fit, Kernel, Mean, Observations, Posterior, SearchBox, TouchNoise};
@@ -83,10 +83,9 @@ impl Fitted {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
         let (py, this) = (slf.py(), slf.get());
         let seen = this.posterior.observations();
-        let places: Vec<Vec<f64>> = (0..seen.len()).map(|i| seen.place(i).collect()).collect();
         let fit = serde_json::to_string(&this.fit).map_err(errors::other)?;
         let arguments = (
-            rows(py, &places, seen.dimension())?,
+            rows(py, &seen_at(seen), seen.dimension())?,
             PyArray1::from_slice(py, seen.heights()),
             this.kernel.clone(),
             fit,
@@ -100,8 +99,7 @@ impl Fitted {
         py: Python<'py>,
         places: PyReadonlyArray2<'_, f64>,
     ) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
-        let places: Vec<Vec<f64>> =
-            places.as_array().rows().into_iter().map(|place| place.to_vec()).collect();
+        let places = each(&places);
         let told = py.detach(|| self.posterior.predict(places.iter().map(Vec::as_slice)));
         let (means, variances) = told.iter().map(|told| (told.mean, told.variance)).unzip();
         (PyArray1::from_vec(py, means), PyArray1::from_vec(py, variances))
@@ -113,8 +111,7 @@ impl Fitted {
         py: Python<'py>,
         places: PyReadonlyArray2<'_, f64>,
     ) -> Bound<'py, PyArray1<f64>> {
-        let places: Vec<Vec<f64>> =
-            places.as_array().rows().into_iter().map(|place| place.to_vec()).collect();
+        let places = each(&places);
         let means = py.detach(|| self.posterior.means(places.iter().map(Vec::as_slice)));
         PyArray1::from_vec(py, means)
     }
@@ -158,8 +155,13 @@ fn observed(
     dimension: usize,
 ) -> Observations {
     let mut observations = Observations::new(dimension);
-    for (place, height) in places.as_array().rows().into_iter().zip(heights.as_array()) {
-        observations.push(&place.to_vec(), *height);
+    for (place, height) in each(places).iter().zip(heights.as_array()) {
+        observations.push(place, *height);
     }
     observations
+}
+
+/// The rows.
+fn each(places: &PyReadonlyArray2<'_, f64>) -> Vec<Vec<f64>> {
+    places.as_array().rows().into_iter().map(|place| place.to_vec()).collect()
 }

@@ -1,6 +1,7 @@
 //! Places as arrays: of shape (…, d) in a zone of d coordinates, (n,) too where d is 1.
 
 use numpy::{AllowTypeChange, IntoPyArray, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods};
+use palpate::gp::Observations;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -58,6 +59,11 @@ impl Places {
         let shape: Vec<usize> = self.shape.iter().copied().chain([dimension]).collect();
         values.concat().into_pyarray(py).reshape(shape.as_slice())
     }
+}
+
+/// Where something was observed.
+pub(crate) fn seen_at(seen: &Observations) -> Vec<Vec<f64>> {
+    (0..seen.len()).map(|i| seen.place(i).collect()).collect()
 }
 
 /// Rows of `width` numbers as an array of shape (n, width).

@@ -59,22 +59,18 @@ impl Ranked {
         counts.resize(self.sorted.len(), 0);
         sample.iter().for_each(|&index| counts[self.ranks[index]] += 1);
         // The values are seen in order, each as often as it was drawn.
-        let mut ranks = counts.iter().zip(&self.sorted);
-        let mut seen = 0;
-        let mut nth = |n: usize, last: f64| {
-            while seen <= n {
-                let (count, value) = ranks.next()?;
+        let nth = |n: usize| {
+            let mut seen = 0;
+            let mut ranks = counts.iter().zip(&self.sorted);
+            ranks.find_map(|(count, value)| {
                 seen += *count as usize;
-                if seen > n {
-                    return Some(*value);
-                }
-            }
-            Some(last)
+                (seen > n).then_some(*value)
+            })
         };
         let half = sample.len() / 2;
-        let lower = nth(half.checked_sub(1).unwrap_or(half), f64::NAN)?;
-        let upper = nth(half, lower)?;
-        Some(if sample.len().is_multiple_of(2) { 0.5 * (lower + upper) } else { upper })
+        let upper = nth(half)?;
+        let lower = if sample.len().is_multiple_of(2) { nth(half - 1)? } else { upper };
+        Some(0.5 * (lower + upper))
     }
 }
 

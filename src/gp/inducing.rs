@@ -59,11 +59,7 @@ impl Posterior {
         let count = indices.len();
         let kept = observations.places(&indices);
         let told = Told::by(kernel, &hyperparameters, observations, (&kept, factor.as_ref()))?;
-        let mut dense = Dense::new(count);
-        for j in 0..count {
-            let column = told.covariance.col_as_slice(j);
-            dense.column_mut(j).copy_from_slice(&column[j..]);
-        }
+        let mut dense = dense(told.covariance.as_ref());
         let largest = 1.0 + hyperparameters.noise_ratio().height.powi(2);
         dense.factor(largest).map_err(|cause| indefinite(count, cause))?;
         let heights = told.residuals.iter().map(|height| hyperparameters.mean + height);
@@ -72,6 +68,22 @@ impl Posterior {
         let posterior = Self::factored(kernel, hyperparameters, kept, &dense);
         Ok(Induced { posterior, left_sd })
     }
+}
+
+/// Of the lower triangle.
+fn dense(matrix: MatRef<f64>) -> Dense {
+    let mut dense = Dense::new(matrix.nrows());
+    for (j, column) in matrix.col_iter().enumerate() {
+        let below = column.iter().skip(j);
+        dense.column_mut(j).iter_mut().zip(below).for_each(|(to, entry)| *to = *entry);
+    }
+    dense
+}
+
+/// Adds the lower triangle of a·b.
+fn add_product(sum: &mut Mat<f64>, a: MatRef<f64>, b: MatRef<f64>) {
+    let (lower, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+    triangular::matmul(sum.as_mut(), lower, Accum::Add, a, whole, b, whole, 1.0, Par::Seq);
 }
 
 fn indefinite(count: usize, cause: NotPositiveDefinite) -> CovarianceError {
@@ -123,14 +135,8 @@ impl Kept {
             chosen.push(next);
             rows.push(row);
         }
-        let factor =
-            Mat::from_fn(
-                chosen.len(),
-                chosen.len(),
-                |i, j| {
-                    if j <= i { rows[j][chosen[i]] } else { 0.0 }
-                },
-            );
+        let entry = |i: usize, j: usize| if j <= i { rows[j][chosen[i]] } else { 0.0 };
+        let factor = Mat::from_fn(chosen.len(), chosen.len(), entry);
         Self { indices: chosen.iter().map(|&i| candidates[i]).collect(), factor }
     }
 }
@@ -196,24 +202,11 @@ impl Told {
                 }
             }
             let solved = solved.as_ref();
-            triangular::matmul(
-                precision.as_mut(),
-                BlockStructure::TriangularLower,
-                Accum::Add,
-                solved,
-                BlockStructure::Rectangular,
-                solved.transpose(),
-                BlockStructure::Rectangular,
-                1.0,
-                Par::Seq,
-            );
+            add_product(&mut precision, solved, solved.transpose());
         }
         let trace: f64 = (0..count).map(|i| precision[(i, i)]).sum();
-        let mut root = Dense::new(count);
-        for j in 0..count {
-            root.column_mut(j).copy_from_slice(&precision.col_as_slice(j)[j..]);
-            root.column_mut(j)[0] += JITTER * trace;
-        }
+        (0..count).for_each(|i| precision[(i, i)] += JITTER * trace);
+        let mut root = dense(precision.as_ref());
         root.factor(0.0).map_err(|cause| indefinite(count, cause))?;
         let root =
             Mat::from_fn(count, count, |i, j| if j <= i { root.column(j)[i - j] } else { 0.0 });
@@ -222,21 +215,8 @@ impl Told {
         solve_lower(root.as_ref(), sums.as_mut(), Par::Seq);
         let residuals = transposed.transpose() * &sums;
         let mut covariance = Mat::<f64>::zeros(count, count);
-        for (left, right) in
-            [(transposed.transpose(), transposed.as_ref()), (factor, factor.transpose())]
-        {
-            triangular::matmul(
-                covariance.as_mut(),
-                BlockStructure::TriangularLower,
-                Accum::Add,
-                left,
-                BlockStructure::Rectangular,
-                right,
-                BlockStructure::Rectangular,
-                1.0,
-                Par::Seq,
-            );
-        }
+        add_product(&mut covariance, transposed.transpose(), transposed.as_ref());
+        add_product(&mut covariance, factor, factor.transpose());
         Ok(Self { covariance, residuals: residuals.col_as_slice(0).to_vec(), left_variance })
     }
 }

@@ -12,6 +12,7 @@ pub mod sample;
 mod timing;
 mod touch;
 
+pub use machine::product;
 pub use piece::Piece;
 pub use timing::{Timed, time};
 
