@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers wheel install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers growth-around wheel install-python test-python docs notebooks dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -165,6 +165,10 @@ detection: setup
 # How the cost grows with the number of touches; draws docs/growth.svg.
 growth: setup
 	cargo bench --locked --bench growth
+
+# The same around a whole object; draws docs/growth-around.svg.
+growth-around: setup
+	cargo bench --locked --bench around
 
 # Palpate beside scikit-learn and egobox, in an environment of its own.
 bench-peers: setup $(DEPS)/peers/bin/python

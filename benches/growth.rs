@@ -7,55 +7,26 @@
 #[path = "../tests/suite/common/counting.rs"]
 #[allow(dead_code)]
 mod counting;
+#[path = "common/curves.rs"]
+mod curves;
 
 use counting::peak_bytes;
+use curves::{Curve, draw, print, seconds};
 use palpate::gp::inducing::Induced;
 use palpate::gp::kernel::{Kernel, Matern52};
 use palpate::gp::likelihood::Likelihood;
 use palpate::gp::posterior::Scratch;
 use palpate::gp::{Mean, Posterior};
-use palpate::report::axes::{Axis, Panel};
-use palpate::report::canvas::{Area, Canvas};
-use palpate::report::legend::{Legend, Swatch};
-use palpate::report::{png, style};
+use palpate::report::style;
 use palpate::study::bench::product;
 use palpate::study::bench::sample::{KERNEL, hyperparameters, search_box, touches};
 use std::hint::black_box;
-use std::path::Path;
-use std::time::Instant;
 
 const COUNTS: [usize; 11] = [10, 25, 50, 100, 200, 400, 1000, 2000, 4000, 7000, 10_000];
 /// A cold fit of more takes minutes.
 const FITTED_MAX: usize = 4000;
 /// Touches that the approximation goes through.
 const INDUCING: usize = 500;
-
-/// One measured quantity over the counts.
-struct Curve {
-    name: &'static str,
-    colour: &'static str,
-    /// The power of n that its operations or its numbers grow with.
-    expected: f64,
-    values: Vec<(f64, f64)>,
-}
-
-/// Seconds of one call: the least of three rounds that last some ten milliseconds each, or of one
-/// call that lasts longer than a second.
-fn seconds(mut work: impl FnMut()) -> f64 {
-    let begun = Instant::now();
-    work();
-    let once = begun.elapsed().as_secs_f64();
-    if once > 1.0 {
-        return once;
-    }
-    let repeats = (0.01 / once).clamp(1.0, 1e5) as u32;
-    let round = |_| {
-        let begun = Instant::now();
-        (0..repeats).for_each(|_| work());
-        begun.elapsed().as_secs_f64() / f64::from(repeats)
-    };
-    (0..3).map(round).fold(once, f64::min)
-}
 
 /// Curves of seconds, of megabytes, and how far the approximation is off.
 fn measure() -> (Vec<Curve>, Vec<Curve>, Vec<String>) {
@@ -159,55 +130,6 @@ fn distance(exact: &Posterior, induced: &Induced, places: &[[f64; 2]]) -> String
     )
 }
 
-/// Exponent between the last two counts.
-fn exponent(curve: &Curve) -> f64 {
-    match curve.values.as_slice() {
-        [.., (n, before), (m, after)] => (after / before).ln() / (m / n).ln(),
-        _ => f64::NAN,
-    }
-}
-
-/// Two panels below each other.
-fn draw(panels: [(&str, &[Curve]); 2]) -> Option<String> {
-    let stroke = |curve: &Curve| style::stroke(curve.colour, 2.0);
-    // Both panels use the same colours, and the first has them all.
-    let entries = panels[0].1.iter().map(|curve| (Swatch::Line(stroke(curve)), curve.name));
-    let legend = Legend::new(640.0, entries);
-    let first = Area { left: 80.0, top: 50.0 + legend.more_px(), width: 640.0, height: 340.0 };
-    let second = Area { top: first.bottom() + 70.0, height: 220.0, ..first };
-    let mut canvas = Canvas::new(760.0, second.bottom() + 60.0);
-    legend.draw(&mut canvas, [80.0, 24.0]);
-    for ((unit, curves), area) in panels.into_iter().zip([first, second]) {
-        let points = || curves.iter().flat_map(|curve| &curve.values);
-        let x = Axis::log(points().map(|(n, _)| *n))?;
-        let y = Axis::log(points().map(|(_, value)| *value))?;
-        let panel = Panel { area, x, y };
-        panel.frame(&mut canvas);
-        panel.label(&mut canvas, "", "touches n", unit);
-        for curve in curves {
-            panel.curve(&mut canvas, &curve.values, &stroke(curve));
-            if let Some((last, value)) = curve.values.last() {
-                let law = |(n, _): &(f64, f64)| (*n, value * (n / last).powf(curve.expected));
-                let upper = curve.values.iter().filter(|(n, _)| *n >= last / 10.0);
-                let law: Vec<(f64, f64)> = upper.map(law).collect();
-                panel.curve(&mut canvas, &law, &style::dashed(style::FAINT_INK, 1.0, "4 4"));
-            }
-        }
-    }
-    Some(canvas.finish())
-}
-
-fn print(unit: &str, curves: &[Curve]) {
-    let counts = COUNTS.map(|n| format!("{n:>10}")).concat();
-    println!("{:<34}{counts}", format!("{unit} at n ="));
-    for curve in curves {
-        let cells: String =
-            curve.values.iter().map(|(_, value)| format!("{value:>10.2e}")).collect();
-        let (measured, expected) = (exponent(curve), curve.expected);
-        println!("{:<34}{cells}   n^{measured:.2}, expected n^{expected}", curve.name);
-    }
-}
-
 fn main() -> anyhow::Result<()> {
     if std::env::args().any(|argument| argument == "--test") {
         return Ok(());
@@ -231,10 +153,5 @@ fn main() -> anyhow::Result<()> {
             flops / 1e9
         );
     }
-    if let Some(svg) = draw([("seconds", &curves), ("MB held at once", &megabytes)]) {
-        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
-        std::fs::write(docs.join("growth.png"), png::render(&svg)?)?;
-        std::fs::write(docs.join("growth.svg"), svg)?;
-    }
-    Ok(())
+    draw("growth", &[("seconds", &curves), ("MB held at once", &megabytes)])
 }

@@ -65,6 +65,7 @@ finger
 dynamic
 recordings
 gaussian-process
+around
 ```
 
 ```{toctree}

@@ -38,6 +38,7 @@ pub static ENTRY: Entry = Entry {
     name: "best_of_some",
     about: "the least sure of thirty random places",
     make: |zone, _, rng| Box::new(BestOfSome { zone: zone.clone(), rng }),
+    make_around: None,
 };
 
 /// Mean RMSE after the last touch of a few trials on the toy.

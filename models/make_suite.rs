@@ -1,5 +1,5 @@
 //! Makes the objects of the suite: `models/suite/NAME.glb` and the scenes that show them,
-//! `scenes/suite/NAME.toml`.
+//! `scenes/suite/NAME.toml` from one side and `scenes/suite/around/NAME.toml` from all.
 //!
 //! `cargo run --release --example make_suite` writes the same bytes each time. All lengths are
 //! chosen, so that the objects differ: full faces and silhouettes over a third of their zone, holes,
@@ -63,13 +63,15 @@ const SHAPES: &[Shape] = &[
 fn main() -> Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let [models, scenes] = ["models/suite", "scenes/suite"].map(|folder| root.join(folder));
-    [&models, &scenes].into_iter().try_for_each(fs::create_dir_all)?;
+    [&models, &scenes.join("around")].into_iter().try_for_each(fs::create_dir_all)?;
     for shape in SHAPES {
         let longest_m = shape.half_m.into_iter().fold(0.0, f64::max);
         let mesh = nets(shape, 2.0 * longest_m / CELLS).with_context(|| shape.name)?;
         let bytes = glb(&mesh, shape.name, CLAY)?;
         fs::write(models.join(format!("{}.glb", shape.name)), &bytes)?;
         fs::write(scenes.join(format!("{}.toml", shape.name)), scene(shape))?;
+        let around = scenes.join("around").join(format!("{}.toml", shape.name));
+        fs::write(around, scene_around(shape))?;
         println!("{}: {} triangles, {} bytes", shape.name, mesh.triangles.len(), bytes.len());
     }
     Ok(())
@@ -87,6 +89,16 @@ fn scene(shape: &Shape) -> String {
         x,
         0.5 - z,
         0.5 + z
+    )
+}
+
+/// The same from all sides, with a finger that touches with its apex.
+fn scene_around(shape: &Shape) -> String {
+    format!(
+        "# Of the suite, from all sides; made by models/make_suite.rs.\nbody = \"cast\"\n\n[object]\n\
+         mesh = \"../../../models/suite/{}.glb\"\nposition_m = [0, -0.65, 0.5]\n\n[around]\n\n\
+         [finger]\npitch_deg = 0\n",
+        shape.name
     )
 }
 

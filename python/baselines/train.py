@@ -29,7 +29,7 @@ class Explorations(VecEnv):
     def __init__(self):
         self.envs = gymnasium.make_vec(
             "Palpate/Touch-v0", num_envs=ENVS, scene="toy", touches=TOUCHES, initial_touches=INITIAL,
-            grid=PLACES, reward="rmse", threads=1,
+            grid=PLACES, reward="error", threads=1,
         )
         seen = spaces.Box(-np.inf, np.inf, (2, PLACES), np.float32)
         super().__init__(ENVS, seen, spaces.Discrete(PLACES))

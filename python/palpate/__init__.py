@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import errors
 from ._experiment import Experiment
-from ._palpate import Belief, Scene, Touch, Zone, __version__
+from ._palpate import Ball, Belief, Exploration, Scene, Touch, Zone, __version__
 from ._palpate import planners as _planners
 from ._run import Run
 from ._scene import read_mesh, write_mesh
@@ -29,8 +29,10 @@ PLANNERS: tuple[str, ...] = tuple(_planners())
 
 __all__ = [
     "PLANNERS",
+    "Ball",
     "Belief",
     "Experiment",
+    "Exploration",
     "GaussianProcess",
     "Run",
     "Scene",

@@ -77,7 +77,7 @@ class Experiment:
 
     @property
     def zone(self) -> Zone:
-        """What is explored."""
+        """What is explored; an AttributeError around an object."""
         return self._core.zone
 
     def to_toml(self) -> str:
@@ -100,7 +100,7 @@ class Experiment:
 
         A planner of your own is a class with `plan(belief) -> target`; it runs in the same trials as the
         built-in ones, under the name `MODULE:CLASS`. What its constructor names of `zone`, `rng` (a seeded
-        numpy generator) and `seed` it is given. If it raises, returns what is no target in the zone or does
+        numpy generator) and `seed` it is given, around an object no zone. If it raises, returns what is no target in the zone or does
         not return in time, its trial fails with the reason, and the run goes on.
 
         Args:

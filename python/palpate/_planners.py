@@ -71,12 +71,18 @@ def _plans(planner: Any) -> bool:
 
 
 def make(factory: Factory, zone: Any, seed: int) -> Any:
-    """A planner for one trial: what its constructor names of `zone`, `rng` and `seed` it is given."""
+    """A planner for one trial: what its constructor names of `zone`, `rng` and `seed` it is given; around an
+    object there is no zone."""
     offered = {"zone": zone, "rng": np.random.default_rng(seed), "seed": seed}
     try:
         parameters = inspect.signature(factory).parameters
     except ValueError:
         parameters = {}  # type: ignore[assignment]
+    wanted = parameters.get("zone")
+    if zone is None and wanted is not None and wanted.default is inspect.Parameter.empty:
+        raise PlannerError(f"{factory!r} asks for a zone, and around an object there is none: belief.ball is there")
+    if zone is None:
+        del offered["zone"]
     planner = factory(**{name: value for name, value in offered.items() if name in parameters})
     if not _plans(planner):
         raise PlannerError(f"{planner!r} has no method plan(belief)")

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _palpate
-from ._palpate import Belief, Zone
+from ._palpate import Ball, Belief, Zone
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,8 +47,13 @@ class Run:
 
     @property
     def zone(self) -> Zone:
-        """What was explored."""
+        """What was explored; an AttributeError of a run around an object, which has a `ball`."""
         return self._core.zone
+
+    @property
+    def ball(self) -> Ball:
+        """Where the object is that was explored as a whole; an AttributeError of a run over a zone."""
+        return self._core.ball
 
     def trials(self) -> pd.DataFrame:
         """A line for each trial: trial, planner, touches, failure (None, or why it ended early)."""
@@ -71,7 +76,11 @@ class Run:
         return self._core.belief(trial, planner, touch)
 
     def truth(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """The test places (n, d) and the true heights there (n,), metres; NaN where is no surface."""
+        """The test places (n, d) and the true heights there (n,), metres; NaN where is no surface.
+
+        Raises:
+            AttributeError: of a run around an object, whose truth is a mesh: `Scene.mesh`.
+        """
         return self._core.truth()
 
     def rows(self) -> bytes:

@@ -7,6 +7,8 @@
 An episode begins with random touches and ends after a fixed number of them. Many are stepped side by side on
 threads that need no Python (`make_vec`).
 
+Over a zone:
+
 Action: where to touch, shape (d,), -1 to 1 along each side of the zone.
 
 Observation, a dict of arrays in which heights are in units of half the zone's widest side:
@@ -17,11 +19,26 @@ Observation, a dict of arrays in which heights are in units of half the zone's w
 * "belief": shape (2, grid, ..., grid), mean and standard deviation of the height on an even grid, the last axis
   along x; left out with `grid=0`.
 
-Reward: "rmse", by how much the logarithm of the belief's RMSE fell; "information", by how much the mean logarithm
-of its standard deviation fell on the grid; "none", 0, which with `grid=0` fits no belief at all.
-
 Info: "rmse_m", "centred_r", "max_error_m" of the belief against the truth, left out where no belief is fitted, and
 "failure", why an episode ended early, or None.
+
+Around an object (a scene with `[around]`), in units of the ball's radius, from its centre:
+
+Action: shape (6,), -1 to 1: a vector of any length to the side from which the finger comes, and the point that it
+aims at, drawn back into the ball. Both are vectors of space: unlike angles they have no seam and no pole, so that
+what is near in the action is near in the world; zeros for the point are the plain aim at the centre. It is one
+number more than is needed, for along the way the point changes nothing. An aim that the finger cannot be brought to
+is a touch that met nothing.
+
+Observation: "touches" with rows of 13: side (3), point aimed at (3), contact (3), its normal (3), and 1 if there was
+one; "count"; "belief": shape (2, grid, grid, grid), mean and standard deviation of the field on the cube about the
+ball, negative inside, the last axis along x, the first along z.
+
+Info: "chamfer_m", "f_1", "iou" and "failure".
+
+Reward: "error", by how much the logarithm of the belief's error fell, over a zone its RMSE, around an object its
+Chamfer distance, the ball's radius where no surface is believed; "information", by how much the mean logarithm of its
+standard deviation fell on the grid; "none", 0, which with `grid=0` fits no belief at all.
 """
 
 from __future__ import annotations
@@ -43,10 +60,9 @@ from ._settings import assignments
 
 __all__ = ["TouchEnv", "TouchVectorEnv"]
 
-_MEASURES = ("rmse_m", "centred_r", "max_error_m")
 _Observation = dict[str, Any]
 
-#: A scene by name or path, "suite" for those of the suite, or several.
+#: A scene by name or path, "suite" for those of the suite, "suite/around" for the same objects as wholes, or several.
 Scenes = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 
 
@@ -64,8 +80,8 @@ class _Explorations:
         threads: int,
         settings: dict[str, Any],
     ) -> None:
-        if scene == "suite":
-            files = sorted((HOME / "scenes" / "suite").glob("*.toml"))
+        if scene in ("suite", "suite/around"):
+            files = sorted((HOME / "scenes" / str(scene)).glob("*.toml"))
         elif isinstance(scene, (str, os.PathLike)):
             files = [found(scene, "scenes")]
         else:
@@ -73,18 +89,17 @@ class _Explorations:
         sets = assignments(settings)
         scenes = [(os.fspath(file), sets) for file in files]
         self.core = _palpate.Envs(scenes, count, touches, initial_touches, grid, reward, threads)
-        dimension = self.core.zone.dimension
-        self.action = spaces.Box(-1.0, 1.0, (dimension,), np.float32)
-        rows = (touches, 2 * dimension + 2)
+        action, row, axes = self.core.sizes
+        self.action = spaces.Box(-1.0, 1.0, (action,), np.float32)
         seen: dict[str, spaces.Space[Any]] = {
-            "touches": spaces.Box(-np.inf, np.inf, rows, np.float32),
+            "touches": spaces.Box(-np.inf, np.inf, (touches, row), np.float32),
             "count": spaces.Discrete(touches + 1),
         }
         if grid:
-            shape = (2,) + (grid,) * dimension
+            shape = (2,) + (grid,) * axes
             seen["belief"] = spaces.Box(-np.inf, np.inf, shape, np.float32)
         self.observation = spaces.Dict(seen)
-        self.measures = _MEASURES if grid or reward != "none" else ()
+        self.measures = self.core.measures if grid or reward != "none" else []
 
     def seen(self, told: dict[str, Any]) -> _Observation:
         """The observations of all."""
@@ -96,11 +111,12 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
     """One exploration.
 
     Args:
-        scene: as `palpate.Scene.load` takes it; "suite" or a list for a random one in each episode.
+        scene: as `palpate.Scene.load` takes it; "suite", "suite/around" or a list for a random one in each episode.
         touches: of an episode, the initial ones among them.
         initial_touches: random touches it begins with.
-        grid: places along each side of the zone that the belief is told on; 0 for none.
-        reward: "rmse", "information" or "none".
+        grid: places along each side of the zone, or of the cube about the ball, that the belief is told on; 0 for
+            none. Around an object 8 are 512 places and cheap, 16 are 4096.
+        reward: "error", "information" or "none".
         settings: any setting of a scene.
     """
 
@@ -113,7 +129,7 @@ class TouchEnv(gymnasium.Env[_Observation, npt.NDArray[np.float32]]):
         touches: int = 30,
         initial_touches: int = 5,
         grid: int = 16,
-        reward: str = "rmse",
+        reward: str = "error",
         render_mode: None = None,
         **settings: Any,
     ) -> None:
@@ -166,7 +182,7 @@ class TouchVectorEnv(VectorEnv[_Observation, npt.NDArray[np.float32], npt.NDArra
         touches: int = 30,
         initial_touches: int = 5,
         grid: int = 16,
-        reward: str = "rmse",
+        reward: str = "error",
         threads: int = 0,
         render_mode: None = None,
         **settings: Any,

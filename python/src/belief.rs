@@ -1,32 +1,58 @@
 //! The belief as a planner or a reader of a run sees it.
 
+use crate::ball::Ball;
+use crate::errors;
+use crate::known::Known;
+use crate::mesh::triangles_of;
 use crate::places::{Places, rows, seen_at};
 use crate::zone::Zone;
-use numpy::{PyArray1, PyArrayDyn};
-use palpate::explore::belief;
+use nalgebra::Point3;
+use numpy::{PyArray1, PyArray2, PyArrayDyn};
+use palpate::explore::{around, belief};
 use palpate::gp::Posterior;
+use palpate::task::Aim;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// What is known after some touches: a Gaussian process of the surface's height over the zone.
+/// What is known after some touches: a Gaussian process, of the surface's height over a zone, or
+/// around an object of a field over space whose zero set is the surface, negative inside.
 ///
 /// It never changes. Points have shape (..., d), metres, (n,) too where d is 1; what is told of
-/// them has shape (...). Before the first fit every number is NaN.
+/// them has shape (...). Before the first fit every number is NaN. Around an object d is 3, and
+/// what is of zones only is an AttributeError, as over a zone what is of objects only.
 #[pyclass(frozen, module = "palpate")]
-pub(crate) struct Belief(pub(crate) belief::Belief);
+pub(crate) struct Belief(pub(crate) Known);
+
+/// Vertices (n, 3), triangles (m, 3) and deviations (n,).
+type Solid<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<f64>>);
+
+/// Means and deviations, in the shape of the points.
+type Field<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>);
 
 impl Belief {
-    fn dimension(&self) -> usize {
-        self.0.zone().dimension()
+    fn over_zone(&self, name: &str) -> PyResult<&belief::Belief> {
+        match &self.0 {
+            Known::Zone(belief) => Ok(belief),
+            Known::Around(_) => Err(errors::not_around(name, "mesh(cells), field(points), ball")),
+        }
+    }
+
+    fn around(&self, name: &str) -> PyResult<&around::Belief> {
+        match &self.0 {
+            Known::Around(belief) => Ok(belief),
+            Known::Zone(_) => {
+                Err(errors::not_over_zone(name, "mean(points), variance(points), zone"))
+            }
+        }
     }
 
     fn told<'py>(
         &self,
         points: &Bound<'py, PyAny>,
+        (belief, posterior): (&belief::Belief, Option<&Posterior>),
         of: impl FnOnce(&Posterior, &[Vec<f64>]) -> Vec<f64> + Send,
-        posterior: Option<&Posterior>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let places = Places::of(points, self.dimension())?;
+        let places = Places::of(points, belief.zone().dimension())?;
         let values = match posterior {
             Some(posterior) => of(posterior, &places.each),
             None => vec![f64::NAN; places.each.len()],
@@ -37,14 +63,15 @@ impl Belief {
     fn gradients<'py>(
         &self,
         points: &Bound<'py, PyAny>,
-        posterior: Option<&Posterior>,
+        (belief, posterior): (&belief::Belief, Option<&Posterior>),
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let places = Places::of(points, self.dimension())?;
-        let mut gradients = vec![vec![f64::NAN; self.dimension()]; places.each.len()];
+        let dimension = belief.zone().dimension();
+        let places = Places::of(points, dimension)?;
+        let mut gradients = vec![vec![f64::NAN; dimension]; places.each.len()];
         if let Some(posterior) = posterior {
             posterior.variances(&places.each, &mut gradients);
         }
-        places.told_vectors(points.py(), &gradients, self.dimension())
+        places.told_vectors(points.py(), &gradients, dimension)
     }
 }
 
@@ -56,21 +83,23 @@ fn variances(posterior: &Posterior, places: &[Vec<f64>]) -> Vec<f64> {
 impl Belief {
     /// The zone.
     #[getter]
-    fn zone(&self) -> Zone {
-        Zone(self.0.zone().clone())
+    fn zone(&self) -> PyResult<Zone> {
+        Ok(Zone(self.over_zone("zone")?.zone().clone()))
     }
 
     /// Mean height above the datum, metres.
     fn mean<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let belief = self.over_zone("mean")?;
         let means = |posterior: &Posterior, places: &[Vec<f64>]| {
             posterior.means(places.iter().map(Vec::as_slice))
         };
-        self.told(points, means, self.0.surface())
+        self.told(points, (belief, belief.surface()), means)
     }
 
     /// Variance of the height, without the noise of a touch, square metres.
     fn variance<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        self.told(points, variances, self.0.surface())
+        let belief = self.over_zone("variance")?;
+        self.told(points, (belief, belief.surface()), variances)
     }
 
     /// Gradient of `variance`, shape (..., d), metres.
@@ -78,7 +107,8 @@ impl Belief {
         &self,
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        self.gradients(points, self.0.surface())
+        let belief = self.over_zone("variance_gradient")?;
+        self.gradients(points, (belief, belief.surface()))
     }
 
     /// What a touch asked for there could still remove of the variance, square metres: as
@@ -88,7 +118,8 @@ impl Belief {
         &self,
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        self.told(points, variances, self.0.explorable())
+        let belief = self.over_zone("explorable_variance")?;
+        self.told(points, (belief, belief.explorable()), variances)
     }
 
     /// Gradient of `explorable_variance`, shape (..., d), metres.
@@ -96,7 +127,8 @@ impl Belief {
         &self,
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        self.gradients(points, self.0.explorable())
+        let belief = self.over_zone("explorable_variance_gradient")?;
+        self.gradients(points, (belief, belief.explorable()))
     }
 
     /// Whether there probably is a surface at each point: 1 or 0.
@@ -104,39 +136,43 @@ impl Belief {
         &self,
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let places = Places::of(points, self.dimension())?;
-        let silhouette = self.0.presence().silhouette();
+        let belief = self.over_zone("has_surface")?;
+        let places = Places::of(points, belief.zone().dimension())?;
+        let silhouette = belief.presence().silhouette();
         let likely = silhouette.is_likely(places.each.iter().map(Vec::as_slice));
         let values = likely.iter().map(|&is_likely| f64::from(u8::from(is_likely))).collect();
         places.told(points.py(), values)
     }
 
-    /// Every target asked for so far, shape (n, d), metres.
+    /// Every target asked for so far, shape (n, d), metres; around an object (n, 6).
     #[getter]
     fn targets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        rows(py, self.0.targets(), self.dimension())
+        let (targets, width) = self.0.targets();
+        rows(py, &targets, width)
     }
 
     /// Places of the contacts the belief holds, shape (m, d), metres: not the targets. With
     /// `gp.inducing_touches` those that are kept.
     #[getter]
     fn places<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let seen = self.0.surface().map(Posterior::observations);
-        rows(py, &seen.map_or(Vec::new(), seen_at), self.dimension())
+        let belief = self.over_zone("places")?;
+        let seen = belief.surface().map(Posterior::observations);
+        rows(py, &seen.map_or(Vec::new(), seen_at), belief.zone().dimension())
     }
 
     /// Heights of these contacts above the datum, shape (m,), metres.
     #[getter]
-    fn heights_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let heights_m = self.0.surface().map(|surface| surface.observations().heights());
-        PyArray1::from_slice(py, heights_m.unwrap_or_default())
+    fn heights_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let surface = self.over_zone("heights_m")?.surface();
+        let heights_m = surface.map(|surface| surface.observations().heights());
+        Ok(PyArray1::from_slice(py, heights_m.unwrap_or_default()))
     }
 
     /// What the last fit found: signal_sd_m, length_scales_m, noise_sd_m, mean_m; None before it.
     #[getter]
     fn hyperparameters<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(surface) = self.0.surface() else { return Ok(None) };
-        let found = surface.hyperparameters();
+        let Some(posterior) = self.0.posterior() else { return Ok(None) };
+        let found = posterior.hyperparameters();
         let told = PyDict::new(py);
         told.set_item("signal_sd_m", found.signal_sd)?;
         told.set_item("length_scales_m", found.length_scales.clone())?;
@@ -145,7 +181,67 @@ impl Belief {
         Ok(Some(told))
     }
 
+    /// Around an object: the ball in which it is.
+    #[getter]
+    fn ball(&self) -> PyResult<Ball> {
+        Ok(Ball(self.around("ball")?.scope().ball.clone()))
+    }
+
+    /// Around an object: whether the finger can be brought to what a target, shape (6,), aims at.
+    fn reaches(&self, target: Vec<f64>) -> PyResult<bool> {
+        let scope = self.around("reaches")?.scope();
+        Ok(Aim::of(&target).is_some_and(|aim| scope.ball.contains(&aim) && scope.reaches(&aim)))
+    }
+
+    /// Around an object: points of contact in the world, shape (m, 3), metres.
+    #[getter]
+    fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let contacts = self.around("contacts")?.contacts();
+        let contacts: Vec<Vec<f64>> = contacts.map(|p_w| p_w.coords.as_slice().into()).collect();
+        rows(py, &contacts, 3)
+    }
+
+    /// Around an object: mean of the field, negative inside and near the surface about the distance
+    /// from it, and its standard deviation, metres.
+    fn field<'py>(&self, points: &Bound<'py, PyAny>) -> PyResult<Field<'py>> {
+        let surface = self.around("field")?.surface();
+        let places = Places::of(points, 3)?;
+        let points_w: Vec<Point3<f64>> =
+            places.each.iter().map(|place| Point3::from_slice(place)).collect();
+        let (means_m, sds_m) = points.py().detach(|| match surface {
+            Some(surface) => {
+                let mut field = surface.field();
+                (points_w.iter().map(|p_w| field.value(p_w)).collect(), surface.sds_m(&points_w))
+            }
+            None => (vec![f64::NAN; points_w.len()], vec![f64::NAN; points_w.len()]),
+        });
+        Ok((places.told(points.py(), means_m)?, places.told(points.py(), sds_m)?))
+    }
+
+    /// Around an object: the believed surface, from a grid of `cells` along its longest side:
+    /// vertices (n, 3), metres, triangles (m, 3), counter-clockwise from outside, and how far the
+    /// surface may lie from each vertex along its normal, shape (n,), metres. All are empty where
+    /// no surface is believed.
+    #[pyo3(signature = (cells = 64))]
+    fn mesh<'py>(&self, py: Python<'py>, cells: u32) -> PyResult<Solid<'py>> {
+        let surface = self.around("mesh")?.surface();
+        errors::within("cells", cells, CELLS)?;
+        let (vertices, triangles, sds_m) = py.detach(|| {
+            let found = surface.and_then(|surface| Some((surface, surface.mesh(cells)?)));
+            found.map_or_else(Default::default, |(surface, mesh)| {
+                let sds_m = surface.offsets_m(mesh.vertices());
+                (mesh.vertices().to_vec(), mesh.triangles().to_vec(), sds_m)
+            })
+        });
+        let (vertices, triangles) = triangles_of(py, &vertices, &triangles)?;
+        Ok((vertices, triangles, PyArray1::from_vec(py, sds_m)))
+    }
+
     fn __repr__(&self) -> String {
-        format!("Belief({} touches)", self.0.targets().len())
+        let (targets, _) = self.0.targets();
+        format!("Belief({} touches)", targets.len())
     }
 }
+
+/// Cells that a believed surface may be made of, as `space.cells`.
+const CELLS: [u32; 2] = [8, 256];

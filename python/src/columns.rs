@@ -2,12 +2,16 @@
 
 use numpy::PyArray1;
 use palpate::experiment::curve_table::{columns, curve_table};
-use palpate::experiment::measure::MEASURES;
+use palpate::experiment::measure::in_files;
 use palpate::experiment::row::{TouchRow, TrialRow};
 use palpate::experiment::store::Run;
 use palpate::explore::planner::Stall;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+
+/// Names of a target's numbers, in a zone and around an object.
+const PLACE: [&str; 2] = ["target_x_m", "target_z_m"];
+const AIM: [&str; 6] = ["target_x_m", "target_y_m", "target_z_m", "ahead_x", "ahead_y", "ahead_z"];
 
 fn numbers(
     told: &Bound<'_, PyDict>,
@@ -57,10 +61,13 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     words(&told, "planner", all.iter().map(|(row, ..)| Some(row.planner.as_str())))?;
     counts(&told, "touch", all.iter().map(|(_, count, _)| *count))?;
     words(&told, "outcome", touches().map(|touch| Some(outcome(touch))))?;
-    for (axis, name) in ["target_x_m", "target_z_m"].iter().enumerate() {
-        if axis < run.experiment.scene.zone.dimension() {
-            numbers(&told, name, touches().map(|touch| touch.target.get(axis).copied()))?;
-        }
+    let scene = &run.experiment.scene;
+    let coordinates = match &scene.around {
+        Some(_) => &AIM[..],
+        None => &PLACE[..scene.zone.dimension()],
+    };
+    for (axis, name) in coordinates.iter().enumerate() {
+        numbers(&told, name, touches().map(|touch| touch.target.get(axis).copied()))?;
     }
     for (axis, name) in ["contact_x_m", "contact_y_m", "contact_z_m"].iter().enumerate() {
         numbers(&told, name, touches().map(|touch| Some(touch.contact?[axis])))?;
@@ -72,7 +79,7 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     };
     numbers(&told, "signal_sd_m", fit(|found| found.signal_sd))?;
     numbers(&told, "noise_sd_m", fit(|found| found.noise_sd))?;
-    for measure in MEASURES {
+    for measure in in_files(&run.rows) {
         let values = all.iter().map(|(row, count, _)| (measure.of)(row, *count as u32));
         numbers(&told, measure.id, values)?;
     }
@@ -86,7 +93,7 @@ pub(crate) fn summary<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     words(&told, "planner", records.iter().map(|record| Some(record.point.planner.as_str())))?;
     counts(&told, "touches", records.iter().map(|record| record.point.touches as usize))?;
     counts(&told, "trials", records.iter().map(|record| record.point.trials))?;
-    for (i, column) in columns(&run.experiment).iter().enumerate() {
+    for (i, column) in columns(&run.experiment, &run.rows).iter().enumerate() {
         numbers(&told, column, records.iter().map(|record| record.values[i]))?;
     }
     Ok(told)
@@ -104,5 +111,6 @@ fn stalled(stall: Stall) -> &'static str {
     match stall {
         Stall::Collapsed => "collapsed",
         Stall::Repeated => "repeated",
+        Stall::Blocked => "blocked",
     }
 }

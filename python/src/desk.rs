@@ -2,7 +2,7 @@
 //! the interpreter while it waits.
 
 use crate::belief::Belief;
-use palpate::explore::belief;
+use crate::known::Known;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -17,7 +17,7 @@ type Reply = Result<Vec<f64>, String>;
 /// The planner's side of the desk.
 #[pyclass(frozen, module = "palpate._palpate")]
 pub(crate) struct Desk {
-    requests: Mutex<Receiver<belief::Belief>>,
+    requests: Mutex<Receiver<Known>>,
     replies: Sender<Reply>,
     /// Taken when the trial sits down.
     other: Mutex<Option<Trial>>,
@@ -25,7 +25,7 @@ pub(crate) struct Desk {
 
 /// The trial's side.
 pub(crate) struct Trial {
-    requests: Sender<belief::Belief>,
+    requests: Sender<Known>,
     replies: Receiver<Reply>,
     limit: Duration,
 }
@@ -81,7 +81,7 @@ impl Trial {
     ///
     /// # Errors
     /// If there is none.
-    pub(crate) fn ask(&self, belief: belief::Belief) -> Result<Vec<f64>, NoTarget> {
+    pub(crate) fn ask(&self, belief: Known) -> Result<Vec<f64>, NoTarget> {
         let gone = || NoTarget::Said("its thread has ended".into());
         self.requests.send(belief).map_err(|_| gone())?;
         let begun = Instant::now();

@@ -2,7 +2,6 @@
 
 use crate::errors;
 use crate::exploration::{Exploration, How, Reward, World};
-use crate::zone::Zone;
 use numpy::ndarray::{ArrayView2, Axis};
 use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -41,20 +40,20 @@ impl Envs {
         threads: usize,
     ) -> PyResult<Self> {
         let reward = match reward {
-            "rmse" => Reward::Rmse,
+            "error" | "rmse" => Reward::Error,
             "information" => Reward::Information,
             "none" => Reward::None,
             other => {
-                let words = format!("reward {other:?}: allowed are rmse, information, none");
+                let words = format!("reward {other:?}: allowed are error, information, none");
                 return Err(PyValueError::new_err(words));
             }
         };
         let worlds = scenes.iter().map(|(path, sets)| World::load(py, path, sets, grid));
         let worlds: Vec<Arc<World>> = worlds.collect::<PyResult<Vec<_>>>()?;
-        let dimension = worlds.first().map_or(0, |world| world.zone().dimension());
-        if worlds.iter().any(|world| world.zone().dimension() != dimension) || dimension == 0 {
+        let action = worlds.first().map_or(0, |world| world.action());
+        if worlds.iter().any(|world| world.action() != action) || action == 0 {
             return Err(PyValueError::new_err(
-                "scenes: allowed are one or more, all of curves or all of surfaces",
+                "scenes: allowed are one or more, all of curves, all of surfaces or all around objects",
             ));
         }
         if initial < 1 || initial > touches {
@@ -70,10 +69,17 @@ impl Envs {
         Ok(Self { worlds: worlds.into(), how, each: Mutex::new(each), pool })
     }
 
-    /// The zone of the first scene.
+    /// Numbers of an action, numbers told of a touch, and axes of the belief's grid.
     #[getter]
-    fn zone(&self) -> Zone {
-        Zone(self.worlds[0].zone().clone())
+    fn sizes(&self) -> (usize, usize, usize) {
+        let world = &self.worlds[0];
+        (world.action(), world.row(), world.axes())
+    }
+
+    /// Names of the measures.
+    #[getter]
+    fn measures(&self) -> Vec<&'static str> {
+        self.worlds[0].measured().to_vec()
     }
 
     /// Begins all anew, each with the randomness of its seed.
@@ -90,8 +96,8 @@ impl Envs {
         self.told(py)
     }
 
-    /// Touches with each at its action, shape (count, d), fractions -1 to 1 of the zone's sides; one
-    /// whose episode was over begins anew instead.
+    /// Touches with each at its action, shape (count, d), fractions -1 to 1 of the zone's sides, or
+    /// side and offset around an object; one whose episode was over begins anew instead.
     fn step<'py>(
         &self,
         py: Python<'py>,
@@ -116,7 +122,7 @@ impl Envs {
 impl Envs {
     fn check(&self, actions: &ArrayView2<'_, f32>) -> PyResult<()> {
         let count = self.each.lock().unwrap_or_else(PoisonError::into_inner).len();
-        let wanted = [count, self.worlds[0].zone().dimension()];
+        let wanted = [count, self.worlds[0].action()];
         if actions.shape() != wanted || actions.iter().any(|at| !at.is_finite()) {
             let words =
                 format!("actions of shape {:?}: allowed are {wanted:?}, finite", actions.shape());
@@ -130,7 +136,7 @@ impl Envs {
         let each = self.each.lock().unwrap_or_else(PoisonError::into_inner);
         let count = each.len();
         let told = PyDict::new(py);
-        let width = 2 * self.worlds[0].zone().dimension() + 2;
+        let width = self.worlds[0].row();
         let touches: Vec<f32> = each.iter().flat_map(|env| env.told.iter().copied()).collect();
         let touches = touches.into_pyarray(py).reshape([count, self.how.touches, width])?;
         told.set_item("touches", touches)?;
@@ -144,7 +150,7 @@ impl Envs {
         }
         told.set_item("reward", column(|env| env.reward))?;
         told.set_item("over", PyArray1::from_iter(py, each.iter().map(|env| env.is_over)))?;
-        for (i, name) in crate::exploration::MEASURED.iter().enumerate() {
+        for (i, name) in self.worlds[0].measured().iter().enumerate() {
             told.set_item(*name, PyArray1::from_iter(py, each.iter().map(|env| env.measures[i])))?;
         }
         let failures: Vec<Option<&str>> = each.iter().map(|env| env.failure.as_deref()).collect();

@@ -4,6 +4,7 @@ use palpate::config::{ConfigError, Origin};
 use palpate::experiment::runner::RunError;
 use palpate::experiment::simulation::SimulationError;
 use palpate::experiment::store::StoreError;
+use pyo3::exceptions::{PyAttributeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::Path;
@@ -97,4 +98,31 @@ pub(crate) fn run(error: RunError) -> PyErr {
 /// Anything else that was asked for and is not there.
 pub(crate) fn other(error: impl std::fmt::Display) -> PyErr {
     exception("PalpateError", &error.to_string(), &[])
+}
+
+/// Of what is asked around an object and is of zones only; `there` is what there is.
+pub(crate) fn not_around(name: &str, there: &str) -> PyErr {
+    PyAttributeError::new_err(format!(
+        "`{name}` is of the exploration of a zone, and this is around an object: there is {there}"
+    ))
+}
+
+/// The other way round.
+pub(crate) fn not_over_zone(name: &str, there: &str) -> PyErr {
+    PyAttributeError::new_err(format!(
+        "`{name}` is of the exploration around an object, and this is over a zone: there is {there}"
+    ))
+}
+
+/// A number must be in its range.
+///
+/// # Errors
+/// `ValueError`.
+pub(crate) fn within(name: &str, value: u32, [least, most]: [u32; 2]) -> PyResult<()> {
+    match (least..=most).contains(&value) {
+        true => Ok(()),
+        false => {
+            Err(PyValueError::new_err(format!("{name} = {value}: allowed are {least} to {most}")))
+        }
+    }
 }

@@ -63,8 +63,11 @@ impl Experiment {
     }
 
     #[getter]
-    fn zone(&self) -> Zone {
-        Zone(self.0.scene.zone.clone())
+    fn zone(&self) -> PyResult<Zone> {
+        match self.0.scene.around {
+            None => Ok(Zone(self.0.scene.zone.clone())),
+            Some(_) => Err(errors::not_around("zone", "ball, of its run")),
+        }
     }
 
     fn to_toml(&self) -> String {

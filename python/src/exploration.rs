@@ -1,33 +1,37 @@
 //! One exploration: an episode of touches, what is seen of it, and what it is worth.
 
 use crate::errors;
+use crate::known::{AIM, Known, Measured, True};
+use nalgebra::{Point3, Vector3};
 use palpate::backend::Fault;
-use palpate::experiment::truth::Truth;
-use palpate::explore::belief::Belief;
-use palpate::explore::gp_settings::GpSettings;
+use palpate::explore::around::planner::{Planner, Random};
 use palpate::explore::planner::uniform;
-use palpate::explore::probe::{Probe, Touch};
-use palpate::gp::Posterior;
+use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::math::seed;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
-use palpate::task::Zone;
+use palpate::task::{Aim, Ball, Task, Zone};
 use pyo3::prelude::*;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Measures of the belief against the truth, by their names.
-pub(crate) const MEASURED: [&str; 3] = ["rmse_m", "centred_r", "max_error_m"];
+/// Measures of the belief against the truth, by their names: over a zone, and around an object.
+pub(crate) const OVER_ZONE: [&str; 3] = ["rmse_m", "centred_r", "max_error_m"];
+pub(crate) const AROUND: [&str; 3] = ["chamfer_m", "f_1", "iou"];
 
 /// Test places along each side of the zone, as where nobody says how many; chosen.
-const TRUTH_PER_SIDE: usize = 31;
+pub(crate) const TRUTH_PER_SIDE: usize = 31;
 
-/// An object in its zone, with the truth.
+/// Cells along the longest side of a believed surface that is measured after every touch; chosen,
+/// half of what runs take.
+const CELLS: u32 = 32;
+
+/// An object in its zone or its ball, with the truth.
 pub(crate) struct World {
     simulator: Simulator,
-    truth: Truth,
+    truth: True,
     /// What the belief is told on.
     grid: Vec<Vec<f64>>,
 }
@@ -46,10 +50,11 @@ impl World {
         let scene = Scene::load(path, sets).map_err(errors::config)?;
         py.detach(|| {
             let environment = Arc::new(Environment::build(scene).map_err(errors::scene)?);
-            let truth = Truth::sample(&environment, TRUTH_PER_SIDE);
-            let grid = match grid {
-                0 => Vec::new(),
-                grid => environment.scene().zone.grid(grid),
+            let truth = True::of(&environment, TRUTH_PER_SIDE);
+            let grid = match (grid, environment.task().ball()) {
+                (0, _) => Vec::new(),
+                (grid, None) => environment.task().zone().grid(grid),
+                (grid, Some(ball)) => cube(ball, grid),
             };
             let simulator = Simulator::new(environment).map_err(errors::scene)?;
             simulator.check_reach().map_err(errors::scene)?;
@@ -57,15 +62,103 @@ impl World {
         })
     }
 
-    /// What is explored.
-    pub(crate) fn zone(&self) -> &Zone {
-        &self.simulator.environment().scene().zone
+    fn task(&self) -> &Task {
+        self.simulator.environment().task()
     }
 
-    /// What heights are told in units of.
-    fn unit_m(&self) -> f64 {
-        0.5 * self.zone().widest_m()
+    fn zone(&self) -> &Zone {
+        self.task().zone()
     }
+
+    /// Whether a whole object is explored.
+    pub(crate) fn is_around(&self) -> bool {
+        self.task().ball().is_some()
+    }
+
+    /// Axes of the grid.
+    pub(crate) fn axes(&self) -> usize {
+        if self.is_around() { 3 } else { self.zone().dimension() }
+    }
+
+    /// Numbers of an action.
+    pub(crate) fn action(&self) -> usize {
+        if self.is_around() { AIM } else { self.zone().dimension() }
+    }
+
+    /// Numbers that are told of a touch.
+    pub(crate) fn row(&self) -> usize {
+        if self.is_around() { AIM + 7 } else { 2 * self.zone().dimension() + 2 }
+    }
+
+    /// The names of its measures.
+    pub(crate) fn measured(&self) -> [&'static str; 3] {
+        if self.is_around() { AROUND } else { OVER_ZONE }
+    }
+
+    /// What lengths are told in units of.
+    fn unit_m(&self) -> f64 {
+        self.task().ball().map_or_else(|| 0.5 * self.zone().widest_m(), |ball| ball.radius_m)
+    }
+
+    /// What an action means: a place of the zone; around an object the side from which the finger
+    /// comes, and what it aims at as an offset from the centre, drawn back into the ball.
+    fn target(&self, action: &[f32]) -> Vec<f64> {
+        let clamped = action.iter().map(|at| f64::from(at.clamp(-1.0, 1.0)));
+        match self.task().ball() {
+            None => {
+                let fractions: Vec<f64> = clamped.map(|at| 0.5 * (at + 1.0)).collect();
+                self.zone().at(&fractions)
+            }
+            Some(ball) => {
+                let six: Vec<f64> = clamped.collect();
+                let offset = Vector3::from_column_slice(&six[3..]).cap_magnitude(1.0);
+                let p_w = ball.centre_w + offset * ball.radius_m;
+                Aim::against(p_w, &Vector3::from_column_slice(&six[..3])).target()
+            }
+        }
+    }
+
+    /// What is told of a touch: its target, where it met and 1, or zeros.
+    fn told(&self, target: &[f64], met: Option<&Contact>) -> Vec<f64> {
+        let mut row = match self.task().ball() {
+            None => self.told_over_zone(target, met),
+            Some(ball) => {
+                let within = |p_w: Point3<f64>| (p_w - ball.centre_w) / ball.radius_m;
+                let mut row: Vec<f64> = target[3..].iter().map(|ahead| -ahead).collect();
+                row.extend(within(Point3::from_slice(&target[..3])).iter());
+                if let Some(contact) = met {
+                    row.extend(within(contact.p_wc).iter().chain(contact.normal_w.iter()));
+                    row.push(1.0);
+                }
+                row
+            }
+        };
+        row.resize(self.row(), 0.0);
+        row
+    }
+
+    fn told_over_zone(&self, target: &[f64], met: Option<&Contact>) -> Vec<f64> {
+        let zone = self.zone();
+        let fraction = |(at, [low, high]): (&f64, [f64; 2])| 2.0 * (at - low) / (high - low) - 1.0;
+        let mut row: Vec<f64> = target.iter().zip(zone.sides()).map(fraction).collect();
+        if let Some(contact) = met {
+            row.extend(zone.place(&contact.p_wc).iter().zip(zone.sides()).map(fraction));
+            row.extend([zone.height_m(&contact.p_wc) / self.unit_m(), 1.0]);
+        }
+        row
+    }
+}
+
+/// Points on an even grid over the cube about a ball, x fastest, then y, then z.
+fn cube(ball: &Ball, per_side: usize) -> Vec<Vec<f64>> {
+    let step = 2.0 / (per_side.max(2) - 1) as f64;
+    let at = |i: usize| if per_side > 1 { step * i as f64 - 1.0 } else { 0.0 };
+    let all = (0..per_side.pow(3)).map(|i| [i, i / per_side, i / per_side.pow(2)]);
+    all.map(|each| {
+        let offset = Vector3::from(each.map(|i| at(i % per_side)));
+        (ball.centre_w + offset * ball.radius_m).coords.as_slice().to_vec()
+    })
+    .collect()
 }
 
 /// What an episode is.
@@ -84,8 +177,9 @@ pub(crate) struct How {
 /// What a touch is worth.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Reward {
-    /// By how much the logarithm of the RMSE fell.
-    Rmse,
+    /// By how much the logarithm of the error fell: over a zone of the RMSE, around an object of the
+    /// Chamfer distance.
+    Error,
     /// By how much the mean logarithm of the belief's standard deviation fell, on the grid.
     Information,
     /// Nothing.
@@ -97,16 +191,16 @@ pub(crate) struct Exploration {
     how: How,
     world: Arc<World>,
     probe: Box<dyn Probe>,
-    belief: Belief,
+    known: Known,
     random: ChaCha8Rng,
     score: f64,
     /// Touches made.
     pub(crate) count: usize,
-    /// Of each touch: its target and its place as fractions -1 to 1, its height, and 1 if it met.
+    /// Of each touch, as `World::told`.
     pub(crate) told: Vec<f32>,
     /// Means, then standard deviations on the grid, in the same unit as heights.
     pub(crate) believed: Vec<f32>,
-    /// As [`MEASURED`], NaN without a belief.
+    /// As [`OVER_ZONE`] or [`AROUND`], NaN without a belief.
     pub(crate) measures: [f64; 3],
     /// Of the last touch.
     pub(crate) reward: f64,
@@ -126,7 +220,7 @@ impl Exploration {
             how,
             world: Arc::clone(world),
             probe: world.simulator.probe(0)?,
-            belief: Belief::new(world.zone().clone(), GpSettings::default()),
+            known: Known::nothing(world.simulator.environment()),
             random: seed::stream(0, 0, "exploration"),
             score: 0.0,
             count: 0,
@@ -149,14 +243,14 @@ impl Exploration {
         let world = &worlds[self.random.random_range(0..worlds.len())];
         let probe = world.simulator.probe(self.random.random());
         self.world = Arc::clone(world);
-        self.belief = Belief::new(world.zone().clone(), GpSettings::default());
-        self.told = vec![0.0; self.how.touches * (2 * world.zone().dimension() + 2)];
+        self.known = Known::nothing(world.simulator.environment());
+        self.told = vec![0.0; self.how.touches * world.row()];
         self.believed = vec![0.0; 2 * world.grid.len()];
         (self.count, self.is_over, self.failure) = (0, false, None);
         let made = probe.and_then(|probe| {
             self.probe = probe;
             (0..self.how.initial).try_for_each(|_| {
-                let target = uniform(self.world.zone(), &mut self.random);
+                let target = self.anywhere();
                 self.touch_at(&target)
             })
         });
@@ -166,42 +260,42 @@ impl Exploration {
 
     /// Touches at an action.
     pub(crate) fn touch(&mut self, action: &[f32]) {
-        let fractions: Vec<f64> =
-            action.iter().map(|at| 0.5 * (f64::from(at.clamp(-1.0, 1.0)) + 1.0)).collect();
-        let target = self.world.zone().at(&fractions);
+        let target = self.world.target(action);
         let before = self.score;
         let made = self.touch_at(&target);
         self.conclude(made);
         self.reward = if self.failure.is_none() { before - self.score } else { 0.0 };
     }
 
-    fn touch_at(&mut self, target: &[f64]) -> Result<(), Fault> {
-        let task = self.world.simulator.environment().task();
-        let touch = self.probe.touch(&task.approach(target))?;
-        let (zone, unit_m) = (self.world.zone(), self.world.unit_m());
-        let met = match &touch {
-            Touch::Contact(contact) => {
-                Some((zone.place(&contact.p_wc), zone.height_m(&contact.p_wc)))
+    fn anywhere(&mut self) -> Vec<f64> {
+        match &self.known {
+            Known::Zone(belief) => uniform(belief.zone(), &mut self.random),
+            Known::Around(belief) => {
+                let random = seed::stream(self.random.random(), 0, "side");
+                Random::new(random).plan(belief).target
             }
-            Touch::Miss | Touch::Overload => None,
-        };
-        let fraction =
-            |(at, [low, high]): (&f64, [f64; 2])| (2.0 * (at - low) / (high - low) - 1.0) as f32;
-        let width = 2 * zone.dimension() + 2;
-        let row = &mut self.told[self.count * width..][..width];
-        let nowhere = vec![0.0; zone.dimension()];
-        let (place, height_m) = met.as_ref().map_or((&nowhere, 0.0), |(place, y_m)| (place, *y_m));
-        let places = target.iter().zip(zone.sides()).chain(place.iter().zip(zone.sides()));
-        row.iter_mut().zip(places.map(fraction)).for_each(|(to, from)| *to = from);
-        if met.is_none() {
-            row[zone.dimension()..].fill(0.0);
-        } else {
-            row[width - 2] = (height_m / unit_m) as f32;
-            row[width - 1] = 1.0;
         }
-        if self.how.believes || self.how.reward != Reward::None {
-            self.belief.observe(target, &touch);
+    }
+
+    /// An aim that the finger cannot be brought to is a touch that met nothing.
+    fn touch_at(&mut self, target: &[f64]) -> Result<(), Fault> {
+        let task = self.world.task();
+        let mut met = None;
+        if !self.world.is_around() || task.contains(target) {
+            let approach = task.approach(target);
+            let touch = self.probe.touch(&approach)?;
+            if self.how.believes || self.how.reward != Reward::None {
+                let swept = self.probe.swept();
+                self.known.observe(target, &approach, (&touch, swept.as_ref()));
+            }
+            met = match touch {
+                Touch::Contact(contact) => Some(contact),
+                Touch::Miss | Touch::Overload => None,
+            };
         }
+        let told = self.world.told(target, met.as_ref());
+        let row = self.told[self.count * told.len()..].iter_mut();
+        row.zip(told).for_each(|(to, from)| *to = from as f32);
         self.count += 1;
         Ok(())
     }
@@ -217,15 +311,23 @@ impl Exploration {
         if !self.how.believes && self.how.reward == Reward::None {
             return Ok(());
         }
-        let (_, surface) = self.belief.refit().map_err(|error| error.to_string())?;
-        let world = &self.world;
-        if let Some(metrics) = world.truth.compare(surface) {
-            self.measures = [metrics.rmse_m, metrics.centred_r, metrics.max_error_m];
-        }
-        let told = believed(surface, &world.grid);
+        self.known.refit().map_err(|error| error.to_string())?;
+        let (world, known) = (&self.world, &self.known);
         let unit_m = world.unit_m();
+        match world.truth.measure(known, CELLS) {
+            Some(Measured::Zone(metrics)) => {
+                self.measures = [metrics.rmse_m, metrics.centred_r, metrics.max_error_m];
+            }
+            Some(Measured::Around(metrics)) => {
+                // Where no surface is believed, the true one is as far away as can be.
+                let chamfer_m = metrics.chamfer_m.unwrap_or(unit_m);
+                self.measures = [chamfer_m, metrics.f_1, metrics.iou.unwrap_or(f64::NAN)];
+            }
+            None => {}
+        }
+        let told = believed(known, &world.grid);
         self.score = match self.how.reward {
-            Reward::Rmse => self.measures[0].ln(),
+            Reward::Error => self.measures[0].ln(),
             Reward::Information => {
                 let least = f64::MIN_POSITIVE;
                 let logs = told.iter().map(|(_, variance)| 0.5 * variance.max(least).ln());
@@ -242,7 +344,21 @@ impl Exploration {
     }
 }
 
-fn believed(surface: &Posterior, grid: &[Vec<f64>]) -> Vec<(f64, f64)> {
-    let told = surface.predict(grid.iter().map(Vec::as_slice));
-    told.into_iter().map(|told| (told.mean, told.variance)).collect()
+/// Means and variances on the grid: of heights, or of the field.
+fn believed(known: &Known, grid: &[Vec<f64>]) -> Vec<(f64, f64)> {
+    match known {
+        Known::Zone(belief) => {
+            let told = belief.surface().map(|it| it.predict(grid.iter().map(Vec::as_slice)));
+            let told = told.into_iter().flatten();
+            told.map(|told| (told.mean, told.variance)).collect()
+        }
+        Known::Around(belief) => {
+            let Some(surface) = belief.surface() else { return Vec::new() };
+            let points_w: Vec<Point3<f64>> = grid.iter().map(|at| Point3::from_slice(at)).collect();
+            let mut field = surface.field();
+            let sds_m = surface.sds_m(&points_w);
+            let means_m = points_w.iter().map(|p_w| field.value(p_w));
+            means_m.zip(sds_m).map(|(mean_m, sd_m)| (mean_m, sd_m * sd_m)).collect()
+        }
+    }
 }

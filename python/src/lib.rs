@@ -3,6 +3,7 @@
 //! It hands over arrays and plain values. What is said in Python's own words (frames, progress,
 //! conventions of scikit-learn and Gymnasium) stands in the package's Python files.
 
+mod ball;
 mod belief;
 mod columns;
 mod desk;
@@ -10,7 +11,9 @@ mod envs;
 mod errors;
 mod experiment;
 mod exploration;
+mod explorer;
 mod gaussian_process;
+mod known;
 mod mesh;
 mod places;
 mod planner;
@@ -24,10 +27,12 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _palpate(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<ball::Ball>()?;
     module.add_class::<belief::Belief>()?;
     module.add_class::<desk::Desk>()?;
     module.add_class::<envs::Envs>()?;
     module.add_class::<experiment::Experiment>()?;
+    module.add_class::<explorer::Exploration>()?;
     module.add_class::<gaussian_process::Fitted>()?;
     module.add_class::<run::Run>()?;
     module.add_class::<scene::Scene>()?;

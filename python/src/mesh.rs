@@ -18,9 +18,21 @@ pub(crate) type Arrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u3
 /// # Errors
 /// If there is no memory.
 pub(crate) fn arrays<'py>(py: Python<'py>, mesh: &Mesh) -> PyResult<Arrays<'py>> {
+    triangles_of(py, mesh.vertices(), mesh.triangles())
+}
+
+/// Vertices and triangles as arrays.
+///
+/// # Errors
+/// If there is no memory.
+pub(crate) fn triangles_of<'py>(
+    py: Python<'py>,
+    vertices: &[Point3<f64>],
+    triangles: &[[u32; 3]],
+) -> PyResult<Arrays<'py>> {
     let vertices: Vec<f64> =
-        mesh.vertices().iter().flat_map(|vertex| vertex.coords.iter().copied()).collect();
-    let triangles = mesh.triangles().concat();
+        vertices.iter().flat_map(|vertex| vertex.coords.iter().copied()).collect();
+    let triangles = triangles.concat();
     let count = (vertices.len() / 3, triangles.len() / 3);
     Ok((
         vertices.into_pyarray(py).reshape([count.0, 3])?,

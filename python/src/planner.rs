@@ -2,9 +2,10 @@
 
 use crate::belief::Belief;
 use crate::desk::{Desk, NoTarget, Trial};
+use crate::known::{AIM, Known};
 use crate::zone::Zone;
-use palpate::explore::belief;
 use palpate::explore::planner::{Maker, Plan, Planner, PlanningSettings, Sight, Undecided};
+use palpate::explore::{around, belief};
 use palpate::task;
 use pyo3::prelude::*;
 use rand::RngExt;
@@ -14,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 pub(crate) struct PythonMaker {
     /// `MODULE:CLASS`.
     pub(crate) name: String,
-    /// Called with zone and seed. Its result has `close()`, and `desk` with `abandon()`, or
+    /// Called with zone, None around an object, and seed. Its result has `close()`, and `desk` with `abandon()`, or
     /// `plan(belief) -> sequence of float`; what that raises is the reason why there is no target.
     pub(crate) start: Py<PyAny>,
 }
@@ -28,11 +29,26 @@ impl Maker for PythonMaker {
         &self,
         zone: &task::Zone,
         _: &PlanningSettings,
-        mut random: ChaCha8Rng,
+        random: ChaCha8Rng,
     ) -> Box<dyn Planner> {
+        Box::new(self.begin(Some(zone), random))
+    }
+
+    fn make_around(
+        &self,
+        _: &PlanningSettings,
+        random: ChaCha8Rng,
+    ) -> Option<Box<dyn around::planner::Planner>> {
+        Some(Box::new(self.begin(None, random)))
+    }
+}
+
+impl PythonMaker {
+    fn begin(&self, zone: Option<&task::Zone>, mut random: ChaCha8Rng) -> PythonPlanner {
         let seed: u64 = random.random();
         let begun = Python::attach(|py| {
-            self.start.call1(py, (Zone(zone.clone()), seed)).map_err(|error| reason(py, &error))
+            let zone = zone.map(|zone| Zone(zone.clone()));
+            self.start.call1(py, (zone, seed)).map_err(|error| reason(py, &error))
         });
         let desk = begun.as_ref().ok().and_then(|begun| {
             Python::attach(|py| {
@@ -40,7 +56,7 @@ impl Maker for PythonMaker {
                 desk.cast_bound::<Desk>(py).ok()?.get().trial()
             })
         });
-        Box::new(PythonPlanner { begun, desk, dimension: zone.dimension() })
+        PythonPlanner { begun, desk, dimension: zone.map_or(AIM, task::Zone::dimension) }
     }
 }
 
@@ -52,10 +68,10 @@ struct PythonPlanner {
 }
 
 impl PythonPlanner {
-    fn target(&self, belief: &belief::Belief) -> Result<Vec<f64>, String> {
+    fn target(&self, belief: Known) -> Result<Vec<f64>, String> {
         let begun = self.begun.as_ref().map_err(Clone::clone)?;
         if let Some(desk) = &self.desk {
-            return desk.ask(belief.clone()).map_err(|no_target| match no_target {
+            return desk.ask(belief).map_err(|no_target| match no_target {
                 NoTarget::Said(reason) => reason,
                 NoTarget::Late(limit) => {
                     // Nobody is left to be told that it could not be left behind.
@@ -64,7 +80,7 @@ impl PythonPlanner {
                 }
             });
         }
-        let belief = Belief(belief.clone());
+        let belief = Belief(belief);
         Python::attach(|py| {
             let planned = begun.call_method1(py, "plan", (belief,));
             planned.and_then(|target| target.extract(py)).map_err(|error| reason(py, &error))
@@ -72,20 +88,46 @@ impl PythonPlanner {
     }
 }
 
-impl Planner for PythonPlanner {
-    fn plan(&mut self, belief: &belief::Belief) -> Plan {
-        let nowhere = vec![f64::NAN; self.dimension];
-        Plan { target: self.target(belief).unwrap_or(nowhere), sd_m: None, stall: None }
-    }
-
-    fn decide(&mut self, belief: &belief::Belief, _: &dyn Sight) -> Result<Plan, Undecided> {
+impl PythonPlanner {
+    fn decided(&self, belief: Known) -> Result<Plan, Undecided> {
+        let of = if matches!(belief, Known::Zone(_)) { "of this zone" } else { "around an object" };
         let target = self.target(belief).map_err(|reason| Undecided { reason })?;
         if target.len() != self.dimension {
             let (found, wanted) = (target.len(), self.dimension);
-            let reason = format!("it has {found} coordinates, a target of this zone {wanted}");
+            let reason = format!("it has {found} coordinates, a target {of} {wanted}");
             return Err(Undecided { reason });
         }
         Ok(Plan { target, sd_m: None, stall: None })
+    }
+
+    /// For who cannot be told that there is no target.
+    fn anywhere(&self, belief: Known) -> Plan {
+        let nowhere = vec![f64::NAN; self.dimension];
+        Plan { target: self.target(belief).unwrap_or(nowhere), sd_m: None, stall: None }
+    }
+}
+
+impl Planner for PythonPlanner {
+    fn plan(&mut self, belief: &belief::Belief) -> Plan {
+        self.anywhere(Known::Zone(belief.clone()))
+    }
+
+    fn decide(&mut self, belief: &belief::Belief, _: &dyn Sight) -> Result<Plan, Undecided> {
+        self.decided(Known::Zone(belief.clone()))
+    }
+}
+
+impl around::planner::Planner for PythonPlanner {
+    fn plan(&mut self, belief: &around::Belief) -> Plan {
+        self.anywhere(Known::Around(belief.clone()))
+    }
+
+    fn decide(
+        &mut self,
+        belief: &around::Belief,
+        _: &dyn around::planner::Sight,
+    ) -> Result<Plan, Undecided> {
+        self.decided(Known::Around(belief.clone()))
     }
 }
 

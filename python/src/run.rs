@@ -1,15 +1,18 @@
 //! A run read back, or just made.
 
+use crate::ball::Ball;
 use crate::belief::Belief;
 use crate::columns;
 use crate::errors;
+use crate::known::Known;
 use crate::places::rows;
 use crate::zone::Zone;
 use numpy::{PyArray1, PyArrayDyn};
 use palpate::experiment::row::TrialRow;
 use palpate::experiment::store;
 use palpate::report::replay::Replay;
-use palpate::report::tables;
+use palpate::report::{tables, whole};
+use palpate::task;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
@@ -22,6 +25,14 @@ pub(crate) struct Run(pub(crate) store::Run);
 type Surface<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<f64>>);
 
 impl Run {
+    fn over_zone(&self, name: &str) -> PyResult<&task::Zone> {
+        let scene = &self.0.experiment.scene;
+        match scene.around {
+            None => Ok(&scene.zone),
+            Some(_) => Err(errors::not_around(name, "ball, and palpate.Scene's mesh()")),
+        }
+    }
+
     fn row(&self, trial: u32, planner: &str) -> PyResult<&TrialRow> {
         let found = self.0.rows.iter().find(|row| row.trial == trial && row.planner == planner);
         found.ok_or_else(|| errors::other(format!("no trial {trial} of {planner} in this run")))
@@ -46,15 +57,25 @@ impl Run {
     }
 
     #[getter]
-    fn zone(&self) -> Zone {
-        Zone(self.0.experiment.scene.zone.clone())
+    fn zone(&self) -> PyResult<Zone> {
+        Ok(Zone(self.over_zone("zone")?.clone()))
+    }
+
+    #[getter]
+    fn ball(&self) -> PyResult<Ball> {
+        let Some(around) = &self.0.experiment.scene.around else {
+            return Err(errors::not_over_zone("ball", "zone, truth()"));
+        };
+        let ball = around.ball().ok_or_else(|| errors::other("[around] is not written out"))?;
+        Ok(Ball(ball))
     }
 
     /// Places (n, d) and heights (n,) of the true surface, NaN where there is none.
     fn truth<'py>(&self, py: Python<'py>) -> PyResult<Surface<'py>> {
+        let zone = self.over_zone("truth")?;
         let truth = &self.0.truth;
         let heights_m = truth.heights_m.iter().map(|height_m| height_m.unwrap_or(f64::NAN));
-        let places = rows(py, &truth.places, self.0.experiment.scene.zone.dimension())?;
+        let places = rows(py, &truth.places, zone.dimension())?;
         Ok((places, PyArray1::from_iter(py, heights_m)))
     }
 
@@ -82,14 +103,21 @@ impl Run {
 
     fn belief(&self, trial: u32, planner: &str, touch: u32) -> PyResult<Belief> {
         let row = self.row(trial, planner)?;
-        let replay = Replay::of(&self.0.experiment, row, touch).map_err(errors::other)?;
+        let experiment = &self.0.experiment;
+        let known = if experiment.scene.around.is_some() {
+            let touches = row.touches.get(..touch as usize).unwrap_or_default();
+            whole::belief(experiment, touches).map_err(errors::other)?.map(Known::Around)
+        } else {
+            let replay = Replay::of(experiment, row, touch).map_err(errors::other)?;
+            replay.map(|replay| Known::Zone(replay.belief))
+        };
         let none = || {
-            let (made, first) = (row.touches.len(), self.0.experiment.initial_touches);
+            let (made, first) = (row.touches.len(), experiment.initial_touches);
             errors::other(format!(
                 "no belief after touch {touch} of trial {trial} of {planner}: allowed are {first} to {made}"
             ))
         };
-        Ok(Belief(replay.ok_or_else(none)?.belief))
+        known.map(Belief).ok_or_else(none)
     }
 
     fn __str__(&self) -> String {

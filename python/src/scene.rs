@@ -1,23 +1,27 @@
 //! A scene, touched where one says.
 
+use crate::ball::Ball;
 use crate::errors;
 use crate::mesh::{Arrays, arrays, mesh_of};
 use crate::places::Places;
 use crate::zone::Zone;
 use numpy::{PyArray1, PyArrayDyn, PyReadonlyArray2};
+use palpate::backend::Fault;
 use palpate::explore::probe;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::sim;
 use palpate::sim::Environment;
 use palpate::sim::environment::Shape;
 use palpate::sim::simulator::Simulator;
+use palpate::task::{self, Approach};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// An object in its zone with the finger that touches it: from a scene's file, or of a mesh.
+/// An object in its zone, or as a whole, with the finger that touches it: from a scene's file, or
+/// of a mesh.
 #[pyclass(frozen, module = "palpate")]
 pub(crate) struct Scene {
     simulator: Simulator,
@@ -40,9 +44,64 @@ impl Scene {
         Ok(Self { simulator, probe: Mutex::new(None), seed })
     }
 
-    fn environment(&self) -> &Environment {
+    pub(crate) fn environment(&self) -> &Environment {
         self.simulator.environment()
     }
+
+    fn over_zone(&self, name: &str) -> PyResult<&task::Zone> {
+        let task = self.environment().task();
+        match task.ball() {
+            None => Ok(task.zone()),
+            Some(_) => Err(errors::not_around(name, "ball, mesh()")),
+        }
+    }
+
+    /// Touches at a target; with the way and what was swept.
+    ///
+    /// # Errors
+    /// `ValueError` if it is none, `SimulationError` if the body cannot.
+    pub(crate) fn touched(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<(Touch, Told)> {
+        let task = self.environment().task();
+        if !task.contains(&target) {
+            let words = match task.ball() {
+                None => "is not in the zone",
+                Some(_) => "is not six numbers that aim into the ball, to where the finger can go",
+            };
+            return Err(PyValueError::new_err(format!("{target:?} {words}")));
+        }
+        let approach = task.approach(&target);
+        let touched = py.detach(|| {
+            let mut probe = self.probe.lock().unwrap_or_else(PoisonError::into_inner);
+            let probe = match &mut *probe {
+                Some(probe) => probe,
+                none => none.insert(self.simulator.probe(self.seed)?),
+            };
+            let touch = probe.touch(&approach)?;
+            Ok::<_, Fault>((touch, probe.swept(), probe.time_s()))
+        });
+        let (touch, swept, time_s) = touched.map_err(errors::scene)?;
+        let (outcome, contact) = match &touch {
+            probe::Touch::Contact(contact) => ("contact", Some(contact.clone())),
+            probe::Touch::Miss => ("miss", None),
+            probe::Touch::Overload => ("overload", None),
+        };
+        let zone = task.ball().is_none().then(|| task.zone());
+        let place = zone
+            .zip(contact.as_ref())
+            .map(|(zone, contact)| (zone.place(&contact.p_wc), zone.height_m(&contact.p_wc)));
+        let told = Told { approach, touch, swept };
+        Ok((Touch { target, outcome, contact, place, time_s }, told))
+    }
+}
+
+/// What a belief is told of a touch.
+pub(crate) struct Told {
+    /// The way.
+    pub(crate) approach: Approach,
+    /// How it ended.
+    pub(crate) touch: probe::Touch,
+    /// What it found free, if that is known.
+    pub(crate) swept: Option<probe::Swept>,
 }
 
 #[pymethods]
@@ -104,10 +163,17 @@ impl Scene {
         })
     }
 
-    /// What can be touched.
+    /// What can be touched of one side.
     #[getter]
-    fn zone(&self) -> Zone {
-        Zone(self.environment().scene().zone.clone())
+    fn zone(&self) -> PyResult<Zone> {
+        Ok(Zone(self.over_zone("zone")?.clone()))
+    }
+
+    /// Around an object: the ball in which it is.
+    #[getter]
+    fn ball(&self) -> PyResult<Ball> {
+        let ball = self.environment().task().ball().cloned();
+        ball.map(Ball).ok_or_else(|| errors::not_over_zone("ball", "zone"))
     }
 
     /// What of the scene may not be meant, in words.
@@ -116,31 +182,9 @@ impl Scene {
         self.simulator.notices().iter().map(ToString::to_string).collect()
     }
 
-    /// Touches at a target, shape (d,), metres.
+    /// Touches at a target, shape (d,), metres; around an object six numbers, as of `Ball`.
     fn touch(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<Touch> {
-        let zone = &self.environment().scene().zone;
-        if !zone.contains(&target) {
-            return Err(PyValueError::new_err(format!("{target:?} is not in the zone")));
-        }
-        let approach = self.environment().task().approach(&target);
-        let touched = py.detach(|| {
-            let mut probe = self.probe.lock().unwrap_or_else(PoisonError::into_inner);
-            let probe = match &mut *probe {
-                Some(probe) => probe,
-                none => none.insert(self.simulator.probe(self.seed)?),
-            };
-            probe.touch(&approach).map(|touch| (touch, probe.time_s()))
-        });
-        let (touch, time_s) = touched.map_err(errors::scene)?;
-        let (outcome, contact) = match touch {
-            probe::Touch::Contact(contact) => ("contact", Some(contact)),
-            probe::Touch::Miss => ("miss", None),
-            probe::Touch::Overload => ("overload", None),
-        };
-        let place = contact
-            .as_ref()
-            .map(|contact| (zone.place(&contact.p_wc), zone.height_m(&contact.p_wc)));
-        Ok(Touch { target, outcome, contact, place, time_s })
+        Ok(self.touched(py, target)?.0)
     }
 
     /// True height above the datum, metres, of places of shape (..., d); NaN where there is no
@@ -150,7 +194,7 @@ impl Scene {
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let environment = self.environment();
-        let places = Places::of(points, environment.scene().zone.dimension())?;
+        let places = Places::of(points, self.over_zone("true_height")?.dimension())?;
         let height_m = |place: &Vec<f64>| environment.true_height_m(place).unwrap_or(f64::NAN);
         let heights_m = points.py().detach(|| places.each.iter().map(height_m).collect());
         places.told(points.py(), heights_m)
@@ -164,7 +208,11 @@ impl Scene {
 
     fn __repr__(&self) -> String {
         let scene = self.environment().scene();
-        format!("Scene(body {}, {})", scene.body.name(), scene.zone.dimension())
+        let explored = match scene.around {
+            Some(_) => "around an object".into(),
+            None => scene.zone.dimension().to_string(),
+        };
+        format!("Scene(body {}, {explored})", scene.body.name())
     }
 }
 
@@ -201,13 +249,14 @@ impl Touch {
         Some(PyArray1::from_slice(py, contact.normal_w.as_slice()))
     }
 
-    /// Place of the contact in the zone, shape (d,), metres: not the target; None without contact.
+    /// Place of the contact in the zone, shape (d,), metres: not the target; None without contact,
+    /// and around an object.
     #[getter]
     fn place(&self) -> Option<Vec<f64>> {
         Some(self.place.as_ref()?.0.clone())
     }
 
-    /// Its height above the datum, metres; None without contact.
+    /// Its height above the datum, metres; None without contact, and around an object.
     #[getter]
     fn height_m(&self) -> Option<f64> {
         Some(self.place.as_ref()?.1)

@@ -55,7 +55,7 @@ def border():
 
 
 def stepping():
-    for grid, reward in ((16, "rmse"), (0, "rmse"), (0, "none")):
+    for grid, reward in ((16, "error"), (0, "error"), (0, "none")):
         for touches in (30, 60):
             envs = palpate.gym.TouchVectorEnv(64, "bird", touches=touches, grid=grid, reward=reward, threads=1)
             envs.reset(seed=1)

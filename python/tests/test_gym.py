@@ -61,7 +61,7 @@ def test_it_is_the_same_for_any_number_of_threads_and_alone():
     assert (seen["belief"] == told[0][0]["belief"][1]).all()
 
 
-@pytest.mark.parametrize("reward", ["rmse", "information"])
+@pytest.mark.parametrize("reward", ["error", "information"])
 def test_rewards_add_up_to_what_was_gained(reward):
     env = gymnasium.make(ID, scene="bird", touches=12, reward=reward).unwrapped
     seen, first = env.reset(seed=1)
@@ -72,7 +72,7 @@ def test_rewards_add_up_to_what_was_gained(reward):
         gained += step
     sds = [it["belief"][1].astype(float) for it in (begin, seen)]
     expected = {
-        "rmse": np.log(first["rmse_m"] / info["rmse_m"]),
+        "error": np.log(first["rmse_m"] / info["rmse_m"]),
         "information": np.mean(np.log(sds[0]) - np.log(sds[1])),
     }[reward]
     assert gained == pytest.approx(expected, abs=1e-4)

@@ -4,6 +4,7 @@ use super::columns::{aligned, cell};
 use super::find::{SCENES, find};
 use super::needs;
 use super::needs::{Effort, NeedsArgs, ONE_BUILD};
+use super::prepare::needs_zone;
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::statistics::Paired;
@@ -79,6 +80,7 @@ const TRIALS: u16 = 10;
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
+    needs_zone(&scene, &args.scene)?;
     if matches!(scene.body, Body::Function | Body::Cast) {
         let (path, body) = (args.scene.display(), scene.body.name());
         bail!("{path}: body = \"{body}\" has no effects; effects need body = \"kinematic\"");

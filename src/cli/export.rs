@@ -7,8 +7,8 @@ use crate::experiment::store::{Run, write_whole};
 use crate::gp::posterior::Scratch;
 use crate::report::known;
 use crate::report::points::Points;
-use crate::report::replay::Replay;
-use crate::report::{figures, files, style};
+use crate::report::replay::{self, Replay};
+use crate::report::{figures, files, style, whole};
 use crate::task::zone::grid_triangles;
 use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
@@ -19,11 +19,14 @@ use std::path::PathBuf;
 Examples:
   palpate export runs/bird --planner active --out bird.ply
   palpate export runs/bird --planner random --trial 3 --touches 60 --out bird.obj
+  palpate export runs/mug --planner active --grid 128 --out mug.ply
 
 Beside FILE.ply or FILE.obj stand FILE.svg, FILE.png and FILE.pdf, the belief beside the true \
 surface. In a PLY the standard deviation is the property `sigma_m`; in an OBJ it stands in a \
 comment below its vertex. Both are coloured by it, viridis from 0 to the largest. What the touches make \
-likelier to be no surface than one is left out.")]
+likelier to be no surface than one is left out. Of a run around an object it is the closed surface that is \
+believed; sigma_m is how far it may lie from there along its normal, and error_m stands beside it: how far it lies \
+from the true surface, negative inside.")]
 pub(super) struct Args {
     /// A run's folder.
     run: PathBuf,
@@ -39,12 +42,16 @@ pub(super) struct Args {
     /// Where to: a .ply or .obj file.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Vertices along each side of the zone [default: the experiment's grid].
+    /// Vertices along each side of the zone [default: the experiment's grid]; around an object,
+    /// cells along the surface's longest side [default: the experiment's space.cells].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=2001))]
     grid: Option<u16>,
     #[command(flatten)]
     force: Force,
 }
+
+/// Cells that a belief around an object may be made of, as `space.cells`.
+const CELLS: std::ops::RangeInclusive<u16> = 8..=256;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let write: fn(&Points) -> String =
@@ -55,8 +62,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         };
     args.force.claim_all(&args.out, &files::FORMATS)?;
     let mut run = Run::read(&args.run)?;
+    let is_around = run.experiment.scene.around.is_some();
     ensure!(
-        run.experiment.scene.zone.dimension() == 2,
+        is_around || run.experiment.scene.zone.dimension() == 2,
         "{} explored a curve, which has no mesh; its figures show it",
         args.run.display()
     );
@@ -68,25 +76,74 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
         planners: vec![args.planner.clone()],
         ..ReportSettings::default()
     };
-    let replay = Replay::new(&run, &args.planner, touches)?
-        .with_context(|| format!("{} had no fit after {touches} touches", args.planner))?;
-    let grid = args.grid.map_or(run.experiment.grid as usize, usize::from);
-    let mesh = mesh(&run, args, &replay, grid);
+    let (mesh, score) =
+        if is_around { closed(&mut run, args, touches)? } else { over_zone(&run, args, touches)? };
     write_whole(&args.out, &write(&mesh))?;
-    if let Some(svg) = (figures::SURFACES.draw)(&run)? {
+    let figure = if is_around { figures::SOLIDS } else { figures::SURFACES };
+    if let Some(svg) = (figure.draw)(&run)? {
         files::write(&args.out, &svg)?;
     }
+    let score = if score.is_empty() { score } else { format!("; {score}") };
     let largest_m = mesh.deviations.iter().map(|(sd_m, _)| *sd_m).fold(0.0, f64::max);
     print(&format!(
-        "{}: {} vertices, {} triangles, sigma up to {:.3} mm; {}\npicture: {}",
+        "{}: {} vertices, {} triangles, sigma up to {:.3} mm{score}\npicture: {}",
         args.out.display(),
         mesh.points.len(),
         mesh.triangles.len(),
         1e3 * largest_m,
-        replay.score(),
         args.out.with_extension("png").display()
     ))?;
     Ok(Ending::Done)
+}
+
+/// The closed surface believed of an object, and how near it is to the truth.
+fn closed(run: &mut Run, args: &Args, touches: u32) -> anyhow::Result<(Points, String)> {
+    if let Some(cells) = args.grid {
+        ensure!(
+            CELLS.contains(&cells),
+            "--grid {cells}: around an object allowed are {} to {} cells",
+            CELLS.start(),
+            CELLS.end()
+        );
+        run.experiment.space.cells = cells.into();
+    }
+    let of = || format!("{} had no fit after {touches} touches", args.planner);
+    let row = replay::row(run, &args.planner).with_context(of)?;
+    let truth = whole::truth(&run.experiment.scene);
+    let frame = whole::frame(&run.experiment, row, touches, truth.as_ref(), usize::MAX)?;
+    let frame = frame.with_context(of)?;
+    ensure!(
+        !frame.mesh.1.is_empty(),
+        "{} believed in no surface after {touches} touches",
+        args.planner
+    );
+    let mut comments = vec![
+        whose(run, args, touches),
+        "sigma_m: how far the surface may lie from there, along its normal".into(),
+    ];
+    if !frame.error_m.is_empty() {
+        comments.push("error_m: distance from the true surface, negative inside".into());
+    }
+    Ok((frame.points(comments)?, frame.score))
+}
+
+/// The belief over a zone, and how near it is to the truth.
+fn over_zone(run: &Run, args: &Args, touches: u32) -> anyhow::Result<(Points, String)> {
+    let replay = Replay::new(run, &args.planner, touches)?
+        .with_context(|| format!("{} had no fit after {touches} touches", args.planner))?;
+    let grid = args.grid.map_or(run.experiment.grid as usize, usize::from);
+    Ok((mesh(run, args, &replay, grid), replay.score()))
+}
+
+/// What a file says of itself first.
+fn whose(run: &Run, args: &Args, touches: u32) -> String {
+    format!(
+        "Palpate {}: belief of {} in trial {} of {} after {touches} touches",
+        env!("CARGO_PKG_VERSION"),
+        args.planner,
+        args.trial,
+        run.experiment.name,
+    )
 }
 
 /// The touch count asked for, if the run has what is asked for.
@@ -144,19 +201,13 @@ fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
         .filter_map(|[a, b, c]| Some([vertices[a]?, vertices[b]?, vertices[c]?]));
     Points {
         comments: vec![
-            format!(
-                "Palpate {}: belief of {} in trial {} of {} after {} touches",
-                env!("CARGO_PKG_VERSION"),
-                args.planner,
-                args.trial,
-                run.experiment.name,
-                replay.touches.len()
-            ),
+            whose(run, args, replay.touches.len() as u32),
             zone.frame_words(),
             "sigma_m: standard deviation of the height along the approach".into(),
         ],
         points,
         deviations: deviations_m.iter().map(|&sd_m| (sd_m, colour(sd_m))).collect(),
         triangles: joined.collect(),
+        ..Points::default()
     }
 }

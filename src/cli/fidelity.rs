@@ -3,6 +3,7 @@
 use super::columns::{aligned, cell, duration};
 use super::find::{SCENES, find};
 use super::output::{Force, make_folder};
+use super::prepare::needs_zone;
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::store::write_whole;
@@ -71,6 +72,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         bail!("--from truth: nobody knows the true forces; a tolerance in mm or um is allowed");
     }
     let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
+    needs_zone(&scene, &args.scene)?;
     if scene.object.is_none() {
         bail!("{}: a ladder needs a scene with an object to touch", args.scene.display());
     }

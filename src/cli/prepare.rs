@@ -7,7 +7,8 @@ use crate::backend::ros::arm::Lab;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
-use anyhow::Context;
+use anyhow::{Context, ensure};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Bounds the threads of all that follows; 0 means all cores.
@@ -27,6 +28,17 @@ pub(super) fn simulation(experiment: Experiment, talk: Talk) -> anyhow::Result<S
 /// Loads what a scene names.
 pub(super) fn environment(scene: Scene, talk: Talk) -> anyhow::Result<Arc<Environment>> {
     Ok(Arc::new(with_patience(talk, |tell| Environment::build_telling(scene, tell))?))
+}
+
+/// Refuses a scene of a whole object where a command goes over a zone.
+pub(super) fn needs_zone(scene: &Scene, path: &Path) -> anyhow::Result<()> {
+    ensure!(
+        scene.around.is_none(),
+        "{}: [around] explores a whole object; this command goes over one side of it, allowed is a \
+         scene with [zone]",
+        path.display()
+    );
+    Ok(())
 }
 
 /// Makes an environment ready for bodies.

@@ -2,7 +2,7 @@
 
 use super::find::{SCENES, find};
 use super::output::{Force, make_folder};
-use super::prepare::{environment, simulator};
+use super::prepare::{environment, needs_zone, simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::scan;
@@ -55,6 +55,7 @@ fn grid(text: &str) -> Result<[usize; 2], String> {
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
+    needs_zone(&scene, &args.scene)?;
     let environment = environment(scene, talk)?;
     let mesh = environment.mesh().with_context(|| {
         format!("{} has no object, so there is no surface to scan", args.scene.display())

@@ -6,6 +6,7 @@ use super::prepare::{environment, simulator};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::notice;
+use crate::experiment::shape::TrueShape;
 use crate::experiment::store;
 use crate::experiment::store::Run;
 use crate::experiment::truth::Truth;
@@ -15,8 +16,9 @@ use crate::report;
 use crate::report::png;
 use crate::sim::environment::Shape;
 use crate::sim::scene::Unit;
-use crate::sim::{Scene, mjcf};
-use anyhow::{Context, bail};
+use crate::sim::{Environment, Scene, mjcf};
+use crate::task::Ball;
+use anyhow::{Context, bail, ensure};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -129,23 +131,16 @@ fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
     let mut text = toml::to_string(&scene).context("cannot write the scene")?;
     let environment = environment(scene, talk)?;
     simulator(&environment, talk)?;
-    let truth = with_patience(talk, |tell| {
-        tell("looking where the finger can touch the surface");
-        Truth::sample(&environment, GRID)
-    });
-    notice::of_truth(environment.task().zone(), &truth).iter().for_each(|notice| talk.note(notice));
-    text +=
-        &format!("\nsurface in the zone: {} of {} test places", truth.count(), truth.places.len());
-    if let Some([low, high]) = truth.span_m() {
-        text += &format!(", heights {:.2} to {:.2} mm above the datum", low * 1e3, high * 1e3);
-    }
-    text += &format!("; the finger can touch {} of them\n", truth.reachable_count());
+    text += &match environment.task().ball() {
+        Some(ball) => whole(ball, &environment, talk),
+        None => one_side(&environment, talk),
+    };
     if let Shape::Mesh { report, .. } = environment.shape() {
         text += &format!("{report}\n");
     }
     if let Some(path) = &args.png {
         let svg = report::zone::picture(&environment)
-            .context("this scene has no object with a zone on it to draw")?;
+            .context("--png: this scene has no object with a zone on it to draw")?;
         std::fs::write(path, png::render(&svg)?).with_context(|| path.display().to_string())?;
         text += &format!("picture: {}\n", path.display());
     }
@@ -163,9 +158,45 @@ fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
             text += &format!("\npicture: {}", path.display());
         }
     } else if args.mjcf.is_some() || args.render.is_some() {
+        ensure!(
+            environment.task().ball().is_none(),
+            "a stage that turns the finger around an object has no model in MuJoCo; allowed is a scene \
+             with [arm]"
+        );
         bail!("this scene has no mesh, so there is nothing to write as MJCF or to draw");
     }
     Ok(text)
+}
+
+/// What of one side of the object the finger can touch.
+fn one_side(environment: &Environment, talk: Talk) -> String {
+    let truth = with_patience(talk, |tell| {
+        tell("looking where the finger can touch the surface");
+        Truth::sample(environment, GRID)
+    });
+    notice::of_truth(environment.task().zone(), &truth).iter().for_each(|notice| talk.note(notice));
+    let (count, places) = (truth.count(), truth.places.len());
+    let mut text = format!("\nsurface in the zone: {count} of {places} test places");
+    if let Some([low, high]) = truth.span_m() {
+        text += &format!(", heights {:.2} to {:.2} mm above the datum", low * 1e3, high * 1e3);
+    }
+    text + &format!("; the finger can touch {} of them\n", truth.reachable_count())
+}
+
+/// The same of a whole object.
+fn whole(ball: &Ball, environment: &Environment, talk: Talk) -> String {
+    let shape = with_patience(talk, |tell| {
+        tell("looking where the finger can touch the surface");
+        TrueShape::of(environment)
+    });
+    let [x, y, z]: [f64; 3] = ball.centre_w.into();
+    let radius_mm = 1e3 * ball.radius_m;
+    let mut text = format!("\nball: {radius_mm:.2} mm about [{x:.4}, {y:.4}, {z:.4}] m");
+    if let Some(share) = shape.as_ref().and_then(TrueShape::reachable_share) {
+        text += &format!("; the finger can touch {:.1} % of the surface", 100.0 * share);
+    }
+    shape.as_ref().and_then(notice::of_shape).iter().for_each(|notice| talk.note(notice));
+    text + "\n"
 }
 
 #[cfg(feature = "mujoco")]

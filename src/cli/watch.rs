@@ -7,6 +7,7 @@ use super::terminal::{Ending, Talk, print};
 use crate::backend::Fault;
 use crate::backend::watched::{Sight, Watched};
 use crate::experiment::experiment::Experiment;
+use crate::experiment::measure::{CHAMFER, Measure, RMSE};
 use crate::experiment::row::TrialRow;
 use crate::explore::planner;
 use crate::explore::planner::PLANNERS;
@@ -144,8 +145,9 @@ impl Probe for Told {
 }
 
 fn ending(row: &TrialRow) -> String {
-    let error = row.touches.last().and_then(|touch| touch.metrics).map(|metrics| metrics.rmse_m);
-    let error = error.map_or(String::new(), |m| format!(", RMSE {:.2} mm", 1e3 * m));
+    let of = |measure: Measure| Some((measure.title, (measure.of)(row, row.touches.len() as u32)?));
+    let error = of(RMSE).or_else(|| of(CHAMFER));
+    let error = error.map_or(String::new(), |(name, m)| format!(", {name} {:.2} mm", 1e3 * m));
     match &row.failure {
         Some(failure) => format!("{} touches{error}; {failure}", row.touches.len()),
         None => format!("{} touches{error}; close the window to end", row.touches.len()),

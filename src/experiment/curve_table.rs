@@ -2,7 +2,7 @@
 
 use super::comparison::paired;
 use super::experiment::Experiment;
-use super::measure::{MEASURES, Measure};
+use super::measure::{Measure, in_files};
 use super::row::TrialRow;
 use super::statistics::Samples;
 use super::summary;
@@ -21,7 +21,7 @@ pub struct CurveRecord {
 /// The columns of a run's records: of each measure its mean with the standard error, or its median
 /// with the 95 % bootstrap interval; of an error also how it differs from each baseline's in the
 /// same trial (mean, 95 % bootstrap interval, share of trials in which it is less).
-pub fn columns(experiment: &Experiment) -> Vec<String> {
+pub fn columns(experiment: &Experiment, rows: &[TrialRow]) -> Vec<String> {
     let of_measure = |measure: &'static Measure| {
         let baselines = experiment.baselines().into_iter().filter(|_| measure.is_error);
         let differences = baselines.flat_map(|baseline| {
@@ -31,7 +31,7 @@ pub fn columns(experiment: &Experiment) -> Vec<String> {
         });
         measure.columns().into_iter().chain(differences.collect::<Vec<_>>())
     };
-    MEASURES.iter().flat_map(of_measure).collect()
+    in_files(rows).flat_map(of_measure).collect()
 }
 
 /// A record for each planner and each of its touch counts that `is_wanted`.
@@ -44,14 +44,19 @@ pub fn curve_table(
         .flat_map(|planner| summary::curve(experiment, rows, planner))
         .filter(|point| is_wanted(point.touches))
         .collect();
-    points.par_iter().map(|point| record(experiment, rows, point)).collect()
+    let measures: Vec<&Measure> = in_files(rows).collect();
+    points.par_iter().map(|point| record((experiment, &measures), rows, point)).collect()
 }
 
-fn record(experiment: &Experiment, rows: &[TrialRow], point: &CurvePoint) -> CurveRecord {
+fn record(
+    (experiment, measures): (&Experiment, &[&Measure]),
+    rows: &[TrialRow],
+    point: &CurvePoint,
+) -> CurveRecord {
     let mut values = Vec::new();
     // Of all trials; measures that fewer of them have draw their own.
     let samples = Samples::new(point.trials, experiment.seed);
-    for measure in MEASURES {
+    for &measure in measures {
         values.extend(aggregates((experiment, &samples), rows, point, measure));
         for baseline in experiment.baselines().into_iter().filter(|_| measure.is_error) {
             values.extend(differences(experiment, rows, (point, baseline), measure));

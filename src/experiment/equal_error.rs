@@ -72,7 +72,9 @@ pub fn equal_error<'a>(
     let [ours, theirs] = [planner, baseline].map(|name| curves(experiment, rows, name, measure));
     let pairs: Vec<[&Curve; 2]> =
         ours.iter().filter_map(|(trial, curve)| Some([curve, theirs.get(trial)?])).collect();
-    let goal_index = (experiment.goal_touches() - experiment.initial_touches) as usize;
+    let compared = compared(experiment);
+    let goal_touches = experiment.goal_touches();
+    let goal_index = compared.partition_point(|&count| count <= goal_touches).checked_sub(1)?;
     let medians = [0, 1].map(|which| Medians::new(pairs.iter().map(|pair| pair[which])));
     let mut counts = Vec::new();
     let everyone: Vec<usize> = (0..pairs.len()).collect();
@@ -80,7 +82,9 @@ pub fn equal_error<'a>(
     let found = meet(&medians, &everyone, goal_index, &mut counts);
     let samples = Samples::new(pairs.len(), experiment.seed)
         .each(|sample| meet(&medians, sample, goal_index, &mut counts));
-    let first = f64::from(experiment.initial_touches);
+    // Of a goal that is not met there is no comparison.
+    let touches =
+        |met: &Met| compared.get(met.after as usize).map_or(f64::INFINITY, |n| f64::from(*n));
     let estimate = |of: &dyn Fn(&[Met; 2]) -> f64| Estimate {
         value: of(&found),
         interval: (!samples.is_empty()).then(|| percentiles_95(samples.iter().map(of).collect())),
@@ -91,14 +95,20 @@ pub fn equal_error<'a>(
         measure,
         trials: pairs.len(),
         goal,
-        touches: estimate(&|[ours, _]| first + ours.after),
-        baseline_touches: first + found[1].after,
-        ratio: estimate(&|[ours, theirs]| (first + ours.after) / (first + theirs.after)),
+        touches: estimate(&|[ours, _]| touches(ours)),
+        baseline_touches: touches(&found[1]),
+        ratio: estimate(&|[ours, theirs]| touches(ours) / touches(theirs)),
         path_ratio: estimate(&|[ours, theirs]| ours.path_m / theirs.path_m),
     })
 }
 
-/// One trial after every count of touches from the last initial one on.
+/// Touch counts from the last initial one on after which beliefs are compared.
+fn compared(experiment: &Experiment) -> Vec<u32> {
+    let counts = experiment.initial_touches..=experiment.touches;
+    counts.filter(|&count| experiment.is_compared(count)).collect()
+}
+
+/// One trial after every count of touches after which its belief is compared.
 struct Curve {
     errors: Vec<f64>,
     /// Lateral way since the last initial touch.
@@ -128,26 +138,26 @@ impl Medians {
 /// When the goal was met.
 #[derive(Clone, Copy)]
 struct Met {
-    /// Touches after the initial ones.
+    /// Comparisons after the first one: over a zone touches after the initial ones.
     after: f64,
     /// Median way over them.
     path_m: f64,
 }
 
-/// The trials that have the error after every count.
+/// The trials that have the error after every count that is compared.
 fn curves(
     experiment: &Experiment,
     rows: &[TrialRow],
     planner: &str,
     measure: &Measure,
 ) -> BTreeMap<u32, Curve> {
-    let counts = experiment.initial_touches..=experiment.touches;
+    let counts = compared(experiment);
     let curve = |row: &TrialRow| -> Option<Curve> {
         let errors: Option<Vec<f64>> =
-            counts.clone().map(|count| (measure.of)(row, count)).collect();
+            counts.iter().map(|&count| (measure.of)(row, count)).collect();
         let start_m = row.path_m(experiment.initial_touches)?;
         let paths_m: Option<Vec<f64>> =
-            counts.clone().map(|count| Some(row.path_m(count)? - start_m)).collect();
+            counts.iter().map(|&count| Some(row.path_m(count)? - start_m)).collect();
         Some(Curve { errors: errors?, paths_m: paths_m? })
     };
     of_planner(rows, planner).filter_map(|row| Some((row.trial, curve(row)?))).collect()

@@ -4,11 +4,13 @@
 //! may change on a finished run. More trials and other planners are run beside the rows that are
 //! there; rows of trials or planners that are no longer listed are kept, but not shown.
 
+use super::measure::{CHAMFER, Measure, RMSE};
 use super::report_settings::{ReportSettings, TOUCHES_MAX};
 use super::row::TrialId;
 use super::scan_truth::ScanTruth;
 use crate::backend::ros::settings::{BackendKind, BackendSettings};
 use crate::config::{Checked, ConfigError, Loader, Rules, is_default};
+use crate::explore::around::SpaceSettings;
 use crate::explore::gp_settings::GpSettings;
 use crate::explore::planner;
 use crate::explore::planner::PlanningSettings;
@@ -34,7 +36,8 @@ pub struct Experiment {
     /// Root of all randomness.
     #[serde(default)]
     pub seed: u64,
-    /// Uniformly random touches that every planner starts with, the same in one trial.
+    /// Touches that every planner starts with, the same in one trial: uniformly random places of a
+    /// zone, evenly spread directions around an object.
     pub initial_touches: u32,
     /// Touches of a trial in all.
     pub touches: u32,
@@ -46,10 +49,15 @@ pub struct Experiment {
     #[serde(default, skip_serializing_if = "is_zero")]
     pub repeat_touches: u32,
     /// Test places along each side of the zone, on which the metrics are taken.
+    #[serde(default = "grid")]
     pub grid: u32,
     /// How the belief is fitted; or the path of a file that says it.
     #[serde(default)]
     pub gp: GpSettings,
+    /// How the belief over space is fitted, around a whole object; or the path of a file that says
+    /// it.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub space: SpaceSettings,
     /// How planners search.
     #[serde(default)]
     pub planning: PlanningSettings,
@@ -71,7 +79,7 @@ pub struct Experiment {
 pub(super) const SWEEP: &str = "sweep";
 
 /// Tables that may stand in a file of their own.
-const INCLUDED: [&str; 3] = ["scene", "backend", "gp"];
+const INCLUDED: [&str; 4] = ["scene", "backend", "gp", "space"];
 
 /// Planners that the others are held against, if nobody says which: the paper's two.
 const BASELINES: [&str; 2] = ["random", "active"];
@@ -98,6 +106,7 @@ impl Experiment {
             repeat_touches: 0,
             grid: GRID,
             gp: GpSettings::default(),
+            space: SpaceSettings::default(),
             planning: PlanningSettings::default(),
             report: ReportSettings::default(),
             backend: BackendSettings::default(),
@@ -199,6 +208,14 @@ impl Experiment {
         names.into_iter().filter(is_listed).collect()
     }
 
+    /// The error that planners are judged by.
+    pub fn error(&self) -> &'static Measure {
+        match self.scene.around {
+            None => &RMSE,
+            Some(_) => &CHAMFER,
+        }
+    }
+
     /// Touches of a baseline whose error the others are asked to reach.
     pub fn goal_touches(&self) -> u32 {
         let goal = self.report.goal_touches.unwrap_or(self.touches);
@@ -214,6 +231,13 @@ impl Experiment {
         counts
     }
 
+    /// Whether the belief after `count` touches is compared with the truth; around a whole object,
+    /// where that takes longer than a touch, after some touches and the last only.
+    pub fn is_compared(&self, count: u32) -> bool {
+        let every = self.scene.around.as_ref().map_or(1, |_| self.space.compared_every);
+        count >= self.initial_touches && (count == self.touches || count.is_multiple_of(every))
+    }
+
     /// Touch counts after which beliefs are drawn.
     pub fn drawn_touch_counts(&self) -> Vec<u32> {
         let possible = self.initial_touches..=self.touches;
@@ -226,11 +250,17 @@ impl Experiment {
             return chosen;
         }
         let planned = self.touches - self.initial_touches;
+        let third = |third: u32| self.initial_touches + planned * third / 3;
+        let compared = |count: u32| (count..self.touches).find(|&count| self.is_compared(count));
         let mut counts: Vec<u32> =
-            (1..=3).map(|third| self.initial_touches + planned * third / 3).collect();
+            (1..=3).map(|i| compared(third(i)).unwrap_or(self.touches)).collect();
         counts.dedup();
         counts
     }
+}
+
+fn grid() -> u32 {
+    GRID
 }
 
 fn is_zero(count: &u32) -> bool {
@@ -241,6 +271,39 @@ fn is_zero(count: &u32) -> bool {
 pub fn is_plain(c: char) -> bool {
     c.is_ascii_alphanumeric() || "-_.".contains(c)
 }
+
+impl Experiment {
+    /// What cannot be asked for around a whole object.
+    fn check_around(&self, rules: &mut Rules) {
+        if self.scene.around.is_none() {
+            return;
+        }
+        for (i, name) in self.planners.iter().enumerate() {
+            let key = format!("planners[{i}]");
+            let goes = planner::by_name(name).is_none_or(|entry| entry.make_around.is_some());
+            rules.require(&key, name, goes, || {
+                let around = planner::PLANNERS.iter().filter(|entry| entry.make_around.is_some());
+                let names: Vec<&str> = around.map(|entry| entry.name).collect();
+                format!("a planner that goes around an object: {}", names.join(", "))
+            });
+        }
+        for (key, count) in [
+            ("verification_touches", self.verification_touches),
+            ("repeat_touches", self.repeat_touches),
+        ] {
+            rules.require(key, count, count == 0, || "0 around a whole object".into());
+        }
+        rules.require("truth", "(given)", self.truth.is_none(), || {
+            "no truth: around a whole object it is the object's own surface".into()
+        });
+        rules.require("touches", self.touches, self.touches <= AROUND_TOUCHES_MAX, || {
+            format!("1 to {AROUND_TOUCHES_MAX} around a whole object")
+        });
+    }
+}
+
+/// Most touches around an object: each is seven numbers of the Gaussian process.
+const AROUND_TOUCHES_MAX: u32 = 500;
 
 impl Checked for Experiment {
     fn check(&self, rules: &mut Rules) {
@@ -278,6 +341,8 @@ impl Checked for Experiment {
             format!("0 to {}", i64::MAX)
         });
         rules.table("gp", &self.gp);
+        rules.table("space", &self.space);
+        self.check_around(rules);
         rules.table("planning", &self.planning);
         rules.table("report", &self.report);
         rules.table("backend", &self.backend);

@@ -6,6 +6,7 @@
 
 use super::metrics::Metrics;
 use super::row::{TouchRow, TrialRow};
+use super::shape::ShapeMetrics;
 use super::verified;
 use std::fmt;
 
@@ -29,6 +30,8 @@ pub struct Measure {
     /// Whether it is an error, so that planners are compared in it after every touch, and in the
     /// touches that they need to bring it down.
     pub is_error: bool,
+    /// Whether it is of whole objects: it has no columns in files of runs that explore a zone.
+    pub is_of_shapes: bool,
     /// Its value after some touches; none where the trial has none.
     pub of: fn(&TrialRow, u32) -> Option<f64>,
 }
@@ -97,6 +100,7 @@ pub enum Scale {
 
 const CORRELATION: Unit = Unit { suffix: "", symbol: "", per_si: 1.0, decimals: 4 };
 const PLAIN: Unit = Unit { decimals: 3, ..CORRELATION };
+const PERCENT: Unit = Unit { symbol: "%", per_si: 100.0, ..PLAIN };
 const MM: Unit = Unit { suffix: "_m", symbol: "mm", per_si: 1e3, decimals: 3 };
 const METRES: Unit = Unit { suffix: "_m", symbol: "m", per_si: 1.0, decimals: 3 };
 const SECONDS: Unit = Unit { suffix: "_s", symbol: "s", per_si: 1.0, decimals: 1 };
@@ -130,6 +134,13 @@ const UNREACHABLE_RMSE: Measure =
     .told(Aggregate::Median)
     .drawn(Scale::Undrawn)
     .untabled();
+/// Chamfer distance between the believed and the true surface of a whole object.
+pub const CHAMFER: Measure =
+    less("chamfer_m", "Chamfer distance", MM, |row, n| shape(row, n)?.chamfer_m)
+        .told(Aggregate::Both)
+        .drawn(Scale::Log)
+        .error()
+        .of_shapes();
 /// Share of the truth inside the 95 % band.
 pub const COVERAGE: Measure =
     fact("coverage", "share in the 95 % band", PLAIN, |row, n| metrics(row, n)?.coverage)
@@ -196,6 +207,46 @@ pub static MEASURES: &[Measure] = &[
     )
     .drawn(Scale::Undrawn)
     .untabled(),
+    CHAMFER,
+    less("chamfer_share", "Chamfer distance, of the diagonal", PERCENT, |row, n| {
+        shape(row, n)?.chamfer_share
+    })
+    .drawn(Scale::Undrawn)
+    .of_shapes(),
+    less("reachable_chamfer_m", "distance of what the finger reaches", MM, |row, n| {
+        shape(row, n)?.reachable_chamfer_m
+    })
+    .told(Aggregate::Median)
+    .drawn(Scale::Undrawn)
+    .untabled()
+    .of_shapes(),
+    more("f_1", "F-score at 1 % of the diagonal", PLAIN, |row, n| Some(shape(row, n)?.f_1))
+        .drawn(Scale::UpToOne)
+        .of_shapes(),
+    more("f_3", "F-score at 3 % of the diagonal", PLAIN, |row, n| Some(shape(row, n)?.f_3))
+        .drawn(Scale::Undrawn)
+        .of_shapes(),
+    fact("volume_error", "believed volume, too much", PERCENT, |row, n| {
+        shape(row, n)?.volume_error
+    })
+    .drawn(Scale::Undrawn)
+    .of_shapes(),
+    fact("area_error", "believed area, too much", PERCENT, |row, n| {
+        Some(shape(row, n)?.area_error)
+    })
+    .drawn(Scale::Undrawn)
+    .of_shapes(),
+    more("iou", "insides, intersection over union", PLAIN, |row, n| shape(row, n)?.iou)
+        .drawn(Scale::UpToOne)
+        .of_shapes(),
+    fact(
+        "shape_coverage",
+        "share of the surface within two standard deviations",
+        PLAIN,
+        |row, n| shape(row, n)?.coverage,
+    )
+    .drawn(Scale::UpToOne)
+    .of_shapes(),
     less("path_m", "lateral travel", METRES, TrialRow::path_m),
     less("time_s", "time of the body", SECONDS, |row, n| touch(row, n)?.time_s)
         .drawn(Scale::Undrawn),
@@ -213,6 +264,12 @@ pub static MEASURES: &[Measure] = &[
     length_scale("length_scale_x_m", "length scale along x", |row, n| length_along(row, n, 0)),
     length_scale("length_scale_z_m", "length scale along z", |row, n| length_along(row, n, 1)),
 ];
+
+/// The measures that have columns in files about `rows`.
+pub fn in_files(rows: &[TrialRow]) -> impl Iterator<Item = &'static Measure> {
+    let has_shape = rows.iter().flat_map(|row| &row.touches).any(|touch| touch.shape.is_some());
+    MEASURES.iter().filter(move |measure| has_shape || !measure.is_of_shapes)
+}
 
 /// The measure of a name in files.
 pub fn by_id(id: &str) -> Option<&'static Measure> {
@@ -258,6 +315,11 @@ impl Measure {
         Self { is_tabled: false, ..self }
     }
 
+    /// Of whole objects.
+    const fn of_shapes(self) -> Self {
+        Self { is_of_shapes: true, ..self }
+    }
+
     /// As an error.
     const fn error(self) -> Self {
         Self { is_error: true, ..self }
@@ -283,6 +345,7 @@ const fn less(id: &'static str, title: &'static str, unit: Unit, of: Value) -> M
         scale: Scale::Linear,
         is_tabled: true,
         is_error: false,
+        is_of_shapes: false,
         of,
     }
 }
@@ -307,6 +370,10 @@ fn touch(row: &TrialRow, count: u32) -> Option<&TouchRow> {
 
 fn metrics(row: &TrialRow, count: u32) -> Option<&Metrics> {
     touch(row, count)?.metrics.as_ref()
+}
+
+fn shape(row: &TrialRow, count: u32) -> Option<&ShapeMetrics> {
+    touch(row, count)?.shape.as_ref()
 }
 
 fn length_along(row: &TrialRow, count: u32, axis: usize) -> Option<f64> {

@@ -21,6 +21,7 @@
 //! ```
 
 pub mod analysis;
+mod around;
 mod belief_shape;
 pub mod cloud;
 pub mod comparison;
@@ -28,11 +29,13 @@ pub mod curve_table;
 pub mod equal_error;
 #[allow(clippy::module_inception)]
 pub mod experiment;
+pub mod exploration;
 pub mod lab_runner;
 pub mod measure;
 pub mod metrics;
 pub mod notice;
 pub mod outline;
+mod over_zone;
 pub mod recorded_trial;
 pub mod replay;
 pub mod report_settings;
@@ -41,6 +44,7 @@ pub mod row;
 pub mod runner;
 pub mod scan;
 pub mod scan_truth;
+pub mod shape;
 pub mod shard;
 mod sight;
 pub mod simulation;

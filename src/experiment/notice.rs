@@ -4,6 +4,7 @@ use super::experiment::Experiment;
 use super::measure::{CENTRED_R, Measure, R};
 use super::row::{TrialRow, of_planner};
 use super::scan_truth::LeftOut;
+use super::shape::TrueShape;
 use super::store::Run;
 use super::summary;
 use super::truth::Truth;
@@ -43,6 +44,11 @@ pub enum Notice {
         /// Widest side of the zone.
         zone_m: f64,
     },
+    /// Some of a whole object cannot be touched.
+    OutOfReach {
+        /// Share of its area that can be.
+        reachable: f64,
+    },
     /// A planner's touches mostly met nothing.
     FewContacts {
         /// Whose.
@@ -73,6 +79,9 @@ const LOW_CENTRED_R: f64 = 0.9;
 /// What `truth` says of an experiment in `zone` before it is run.
 pub fn of_truth(zone: &Zone, truth: &Truth) -> Vec<Notice> {
     let count = truth.count();
+    if zone.is_nothing() {
+        return Vec::new();
+    }
     if count == 0 {
         return vec![Notice::NoTruth];
     }
@@ -83,6 +92,15 @@ pub fn of_truth(zone: &Zone, truth: &Truth) -> Vec<Notice> {
     let reached = few(reachable, count).then_some(Notice::FewReachable { reachable, of: count });
     places.into_iter().chain(reached).chain(far_datum(zone, truth)).collect()
 }
+
+/// What the true surface of a whole object says.
+pub fn of_shape(shape: &TrueShape) -> Option<Notice> {
+    let reachable = shape.reachable_share()?;
+    (reachable < ALMOST_ALL).then_some(Notice::OutOfReach { reachable })
+}
+
+/// Share of a surface that counts as all of it; chosen.
+const ALMOST_ALL: f64 = 0.99;
 
 /// The same and what its rows say.
 pub fn of_run(run: &Run) -> Vec<Notice> {
@@ -140,6 +158,12 @@ impl fmt::Display for Notice {
                 f,
                 "nobody knows this surface: only the measures that need no truth are told \
                  (verification_touches, repeat_touches)"
+            ),
+            Self::OutOfReach { reachable } => write!(
+                f,
+                "the finger can touch {:.0} % of the object's surface by straight ways from all \
+                 sides; the rest is believed from what is around it",
+                100.0 * reachable
             ),
             Self::FromScan(LeftOut { contacts, rmse_m }) => {
                 write!(f, "the truth is a scan of {contacts} contacts")?;

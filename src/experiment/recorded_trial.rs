@@ -1,6 +1,7 @@
 //! A trial that is recorded while it runs.
 
 use super::belief_shape::shapes;
+use super::exploration::Known;
 use super::resumed::Resumed;
 use super::row::{TouchRow, TrialRow};
 use super::simulation::Simulation;
@@ -106,6 +107,10 @@ impl Witness for Scribe<'_> {
             normal: contact.map_or(&[][..], |contact| contact.normal_w.as_slice()).into(),
             row: serde_json::to_string(touched.row).map_err(unrecorded)?.into(),
         };
-        self.recording.touched(&touch, shapes(self.zone, touched.belief))
+        let shapes = match touched.known {
+            Known::Zone(belief) => shapes(self.zone, belief),
+            Known::Around(_) => Default::default(),
+        };
+        self.recording.touched(&touch, shapes)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::metrics::Metrics;
 use super::outline::Outline;
+use super::shape::ShapeMetrics;
 use super::verification_row::VerificationRow;
 use crate::backend::Fault;
 use crate::explore::planner::Stall;
@@ -38,7 +39,8 @@ pub struct TrialRow {
 /// One touch and the belief after it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TouchRow {
-    /// Where the finger was sent: (x) or (x, z) in `W`.
+    /// Where the finger was sent: (x) or (x, z) of a zone; around an object the point aimed at and
+    /// the unit vector along which the finger went, x, y and z of each in `W`.
     pub target: Vec<f64>,
     /// The point of contact (x, y, z) in `W`; none for a miss or a touch broken off.
     pub contact: Option<[f64; 3]>,
@@ -75,6 +77,9 @@ pub struct TouchRow {
     /// zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outline: Option<Outline>,
+    /// The believed closed surface against the true one; left out where a zone is explored.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<ShapeMetrics>,
 }
 
 impl TrialRow {
@@ -94,11 +99,12 @@ impl TrialRow {
         }
     }
 
-    /// Lateral travel of the finger over its first `touches` targets, in straight lines; none of a
-    /// trial with fewer.
+    /// Travel of the finger over its first `touches` touches, in straight lines: from place to
+    /// place of a zone; around an object from contact to contact, or the point aimed at where
+    /// nothing was met. None of a trial with fewer.
     pub fn path_m(&self, touches: u32) -> Option<f64> {
-        let targets = self.touches.get(..touches as usize)?.iter().map(|touch| &touch.target);
-        let steps = targets.clone().zip(targets.skip(1));
+        let places = self.touches.get(..touches as usize)?.iter().map(TouchRow::place);
+        let steps = places.clone().zip(places.skip(1));
         let lengths = steps.map(|(from, to)| {
             let squares = from.iter().zip(to).map(|(from, to)| (to - from).powi(2));
             squares.sum::<f64>().sqrt()
@@ -106,6 +112,21 @@ impl TrialRow {
         Some(lengths.sum())
     }
 }
+
+impl TouchRow {
+    /// Where the finger was, as far as [travel](TrialRow::path_m) is concerned.
+    fn place(&self) -> &[f64] {
+        match (self.target.get(..3), &self.contact) {
+            (Some(_), Some(contact)) => contact,
+            (Some(aimed_at), None) => aimed_at,
+            // A zone has two coordinates at most.
+            (None, _) => &self.target,
+        }
+    }
+}
+
+/// What was made of verification touches, and why there are no more, if a fault ended them.
+pub type VerificationRows = (Vec<VerificationRow>, Option<String>);
 
 /// The rows of one planner.
 pub fn of_planner<'a>(

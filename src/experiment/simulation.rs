@@ -6,6 +6,7 @@ use super::notice;
 use super::notice::Notice;
 use super::row::TrialRow;
 use super::scan_truth::LeftOut;
+use super::shape::TrueShape;
 use super::sight::Sight;
 use super::trial;
 use super::truth::Truth;
@@ -32,6 +33,8 @@ pub struct Simulation {
     experiment: Experiment,
     simulator: Simulator,
     truth: Truth,
+    /// The true surface of a whole object, where that is explored.
+    shape: Option<TrueShape>,
     /// The arm that touches in place of the simulated body, once it is connected.
     lab: Option<Arc<Lab>>,
     /// How far the truth may itself be off, if it was scanned.
@@ -78,9 +81,10 @@ impl Simulation {
         let environment = Environment::build_telling(experiment.scene.clone(), tell)?;
         tell("looking where the finger can touch the surface");
         let (truth, left_out) = sampled(&experiment, &environment)?;
+        let shape = TrueShape::of(&environment);
         tell("compiling the model");
         let simulation = Self::against(experiment, Arc::new(environment), truth)?;
-        Ok(Self { left_out, ..simulation })
+        Ok(Self { left_out, shape, ..simulation })
     }
 
     /// As [`new`](Self::new), in an environment that is there already; its scene takes the place of
@@ -93,7 +97,8 @@ impl Simulation {
         environment: Arc<Environment>,
     ) -> Result<Self, SimulationError> {
         let (truth, left_out) = sampled(&experiment, &environment)?;
-        Ok(Self { left_out, ..Self::against(experiment, environment, truth)? })
+        let shape = TrueShape::of(&environment);
+        Ok(Self { left_out, shape, ..Self::against(experiment, environment, truth)? })
     }
 
     /// As [`within`](Self::within), held against a `truth` that was sampled before; an unknown one
@@ -111,6 +116,7 @@ impl Simulation {
             experiment,
             simulator: Simulator::new(environment)?,
             truth,
+            shape: None,
             lab: None,
             left_out: None,
             own_planners: Vec::new(),
@@ -150,13 +156,19 @@ impl Simulation {
         let scene = self.simulator.notices().into_iter().map(|notice| notice.to_string());
         let truth = notice::of_truth(self.task().zone(), &self.truth).into_iter();
         let left_out = self.left_out.map(Notice::FromScan).into_iter();
-        let told = truth.chain(left_out).map(|notice| notice.to_string());
+        let shape = self.shape.as_ref().and_then(notice::of_shape);
+        let told = truth.chain(left_out).chain(shape).map(|notice| notice.to_string());
         scene.chain(told).collect()
     }
 
     /// The truth on the test grid.
     pub fn truth(&self) -> &Truth {
         &self.truth
+    }
+
+    /// The true surface of a whole object; none where one side is explored.
+    pub fn shape(&self) -> Option<&TrueShape> {
+        self.shape.as_ref()
     }
 
     /// What the robot is told.
@@ -241,7 +253,11 @@ impl Simulation {
         trial: u32,
         witness: &mut dyn Witness,
     ) -> TrialRow {
-        let sight = Sight { environment: self.environment(), truth: &self.truth };
+        let sight = Sight {
+            environment: self.environment(),
+            truth: &self.truth,
+            shape: self.shape.as_ref(),
+        };
         trial::run(&self.experiment, &sight, probe, planner, trial, witness)
     }
 }
@@ -252,6 +268,9 @@ fn sampled(
     environment: &Environment,
 ) -> Result<(Truth, Option<LeftOut>), SimulationError> {
     let per_side = experiment.grid as usize;
+    if environment.task().ball().is_some() {
+        return Ok((Truth::nothing(), None));
+    }
     let (truth, left_out) = match &experiment.truth {
         Some(scan) => {
             let (truth, left_out) = scan.sample(&environment.scene().zone, per_side)?;

@@ -1,16 +1,15 @@
 //! Algorithm 1 of Yi et al. 2016: touch, fit, plan, again.
 
+use super::around::AroundObject;
 use super::experiment::Experiment;
-use super::outline::Outline;
+use super::exploration::Exploration;
+use super::over_zone::OverZone;
 use super::row::{TouchRow, TrialRow};
 use super::sight::Sight;
-use super::verification::verify;
 use super::witness::{Touched, Witness};
-use crate::explore::belief::Belief;
 use crate::explore::planner;
-use crate::explore::planner::{Plan, uniform};
 use crate::explore::probe::{Probe, Touch};
-use crate::math::seed;
+use crate::task::Task;
 
 /// Runs one trial of `planner` from start to end with the touches of `probe`, before `witness`.
 ///
@@ -30,16 +29,22 @@ pub fn run(
         touches: Vec::new(),
         verification: Vec::new(),
     };
-    let stream = |purpose| seed::stream(experiment.seed, trial.into(), purpose);
     let task = sight.environment.task();
-    let zone = task.zone();
-    let mut start = stream("initial touches");
-    let mut planner = planner.make(zone, &experiment.planning, stream(planner.name()));
-    let mut belief = Belief::new(zone.clone(), experiment.gp.clone());
+    let mut exploration: Box<dyn Exploration> = match task.ball() {
+        None => Box::new(OverZone::new(experiment, sight, planner, trial)),
+        Some(_) => match AroundObject::new(experiment, sight, planner, trial) {
+            Some(around) => Box::new(around),
+            None => {
+                let name = planner.name();
+                row.failure = Some(format!("planner `{name}` does not go around an object"));
+                return row;
+            }
+        },
+    };
     for count in 1..=experiment.touches {
         let plan = match count <= experiment.initial_touches {
-            true => Plan { target: uniform(zone, &mut start), sd_m: None, stall: None },
-            false => match planner.decide(&belief, sight) {
+            true => exploration.start(),
+            false => match exploration.decide() {
                 Ok(plan) => plan,
                 Err(undecided) => {
                     row.failure = Some(format!("touch {count}: {undecided}"));
@@ -47,22 +52,22 @@ pub fn run(
                 }
             },
         };
-        if !zone.contains(&plan.target) {
-            let target = plan.target;
-            row.failure = Some(format!("touch {count}: planned at {target:?}, not in the zone"));
+        if !task.contains(&plan.target) {
+            let (target, beyond) = (plan.target, beyond(task));
+            row.failure = Some(format!("touch {count}: planned at {target:?}, {beyond}"));
             break;
         }
-        let touch = match probe.touch(&task.approach(&plan.target)) {
+        let approach = task.approach(&plan.target);
+        let touch = match probe.touch(&approach) {
             Ok(touch) => touch,
             Err(fault) => {
                 row.failure = Some(format!("touch {count}: {fault}"));
                 break;
             }
         };
-        belief.observe(&plan.target, &touch);
         let swept = probe.swept();
-        swept.iter().for_each(|swept| belief.observe_swept(swept));
-        let swept = swept.filter(|_| experiment.gp.free_space || touch == Touch::Miss);
+        exploration.observe(&plan.target, &approach, &touch, swept.as_ref());
+        let swept = swept.filter(|_| exploration.writes_tips() || touch == Touch::Miss);
         let contact = match &touch {
             Touch::Contact(contact) => Some(contact),
             Touch::Miss | Touch::Overload => None,
@@ -72,7 +77,7 @@ pub fn run(
             contact: contact.map(|contact| contact.p_wc.coords.into()),
             overload: touch == Touch::Overload,
             normal: contact
-                .filter(|_| experiment.gp.normals)
+                .filter(|_| exploration.writes_normals())
                 .map(|contact| contact.normal_w.into()),
             tip: swept.map(|swept| swept.p_wt.coords.into()),
             time_s: probe.time_s(),
@@ -82,19 +87,14 @@ pub fn run(
             jitter: 0.0,
             metrics: None,
             outline: None,
+            shape: None,
         };
-        if count >= experiment.initial_touches {
-            match belief.refit() {
-                Ok((fit, surface)) => {
-                    touch_row.metrics = sight.truth.compare(surface);
-                    touch_row.fit = Some(fit.clone());
-                    touch_row.jitter = belief.jitter();
-                }
-                Err(error) => row.failure = Some(format!("fit after touch {count}: {error}")),
-            }
-            touch_row.outline = outline(&belief, sight, count == experiment.touches);
+        if count >= experiment.initial_touches
+            && let Err(error) = exploration.conclude(&mut touch_row, count == experiment.touches)
+        {
+            row.failure = Some(format!("fit after touch {count}: {error}"));
         }
-        let touched = Touched { count, touch: &touch, row: &touch_row, belief: &belief };
+        let touched = Touched { count, touch: &touch, row: &touch_row, known: exploration.known() };
         if let Err(fault) = witness.touched(&touched) {
             row.failure.get_or_insert_with(|| format!("touch {count}: {fault}"));
         }
@@ -104,15 +104,15 @@ pub fn run(
         }
     }
     if row.failure.is_none() {
-        let made = (row.touches.as_slice(), trial);
-        (row.verification, row.failure) = verify(experiment, task, &belief, probe, made);
+        (row.verification, row.failure) = exploration.verify(probe, &row.touches);
     }
     row
 }
 
-/// How near the believed silhouette is to the true one; its reliability only of the last.
-fn outline(belief: &Belief, sight: &Sight, is_last: bool) -> Option<Outline> {
-    let outline = Outline::of(belief.presence(), sight.truth)?;
-    let reliability = outline.reliability.filter(|_| is_last);
-    Some(Outline { reliability, ..outline })
+/// Where a target is that is none of `task`, in words.
+fn beyond(task: &Task) -> &'static str {
+    match task.ball() {
+        None => "not in the zone",
+        Some(_) => "not in the ball, or out of the finger's reach",
+    }
 }

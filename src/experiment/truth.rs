@@ -44,6 +44,11 @@ impl Truth {
         Self::new(zone, places, vec![None; count], vec![false; count])
     }
 
+    /// Without a test place: what stands where a whole object is explored.
+    pub fn nothing() -> Self {
+        Self::new(&Zone::nothing(), Vec::new(), Vec::new(), Vec::new())
+    }
+
     /// Whether any height is known.
     pub fn is_known(&self) -> bool {
         self.heights_m.iter().any(Option::is_some)

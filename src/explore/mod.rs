@@ -33,13 +33,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod around;
 pub mod belief;
 pub mod control;
 mod free_space;
 pub mod gp_settings;
+pub mod plan;
 pub mod planner;
 pub mod presence;
 pub mod probe;
 pub mod registration;
 pub mod silhouette;
 mod stadium;
+mod tour;

@@ -311,6 +311,11 @@ impl MeshBvh {
         SweepHit { travel_m, point, normal, triangle }
     }
 
+    /// `p` from the middle of the boxes.
+    pub(super) fn local(&self, p: &Point3<f64>) -> Point3<f64> {
+        p - self.centre
+    }
+
     #[inline]
     fn corners(&self, triangle: u32) -> [Point3<f64>; 3] {
         self.mesh.corners(triangle as usize)
@@ -319,7 +324,7 @@ impl MeshBvh {
     /// Shows `ask` the triangles of some parts whose boxes have a lower bound under the limit, in
     /// each part near ones first. `ask` returns the new limit.
     #[inline]
-    fn visit(
+    pub(super) fn visit(
         &self,
         parts: &Nearby,
         mut limit: f64,

@@ -1,5 +1,6 @@
 //! The triangle mesh that can be trusted.
 
+use super::extent::extent;
 use nalgebra::{Isometry3, Point3};
 
 /// A triangle mesh, in metres.
@@ -18,9 +19,7 @@ pub struct Mesh {
 impl Mesh {
     /// The caller promises what the type promises.
     pub(super) fn from_sound_parts(vertices: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Self {
-        let first = vertices[0];
-        let bounds = (vertices.iter())
-            .fold((first, first), |(low, high), vertex| (low.inf(vertex), high.sup(vertex)));
+        let bounds = extent(&vertices).map_or_else(Default::default, |[low, high]| (low, high));
         Self { vertices, triangles, bounds }
     }
 

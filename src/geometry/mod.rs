@@ -39,11 +39,14 @@
 
 mod bounds;
 pub mod bvh;
+pub mod coarse;
 pub mod distance;
 pub mod element;
 pub mod error;
+pub mod extent;
 pub mod implicit;
 pub mod import;
+pub mod inside;
 pub mod mesh;
 pub(crate) mod nearby;
 pub mod primitives;
@@ -52,6 +55,7 @@ pub mod repair;
 pub mod report;
 mod single;
 pub mod solids;
+pub mod spread;
 pub mod surfaces;
 pub mod sweep;
 mod topology;

@@ -20,6 +20,20 @@ const BOX: [[u32; 3]; 12] = [
     [3, 7, 5],
 ];
 
+/// Normals of vertices: the mean of the triangles around each, by their areas, of length 1; zero
+/// where they cancel. Every triangle must name vertices that there are.
+pub fn normals(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<Vector3<f64>> {
+    let mut sums = vec![Vector3::zeros(); vertices.len()];
+    for corners in triangles {
+        let [a, b, c] = corners.map(|vertex| vertices[vertex as usize]);
+        let twice_area = (b - a).cross(&(c - a));
+        for vertex in corners {
+            sums[*vertex as usize] += twice_area;
+        }
+    }
+    sums.iter().map(|sum| sum.try_normalize(0.0).unwrap_or_default()).collect()
+}
+
 /// A box between two corners.
 pub fn block(low: [f64; 3], high: [f64; 3]) -> Triangles {
     let corner = |i: usize| {

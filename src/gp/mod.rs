@@ -52,6 +52,7 @@
 //! | [`observations`] | places, heights, and slopes if they are observed too |
 //! | [`posterior`] | mean, variance and their gradients at a place (Eq. 3 of Yi et al. 2016) |
 //! | [`batch`] | mean and variance at many places |
+//! | [`field`] | the mean of heights and slopes at very many places |
 //! | [`means`] | means at many places while observations are added |
 //! | [`inducing`] | the posterior of very many touches through a few of them |
 //! | [`likelihood`] | how well hyperparameters explain the observations |
@@ -68,6 +69,7 @@ mod correlations;
 pub mod covariance;
 pub mod dense;
 mod derivative_covariance;
+pub mod field;
 pub mod fit;
 pub mod indefinite;
 pub mod inducing;

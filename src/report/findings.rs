@@ -1,9 +1,10 @@
 //! What a run found, in words and numbers taken from its rows.
 
 use super::number::{digits, with_error};
+use crate::experiment::measure;
 use crate::experiment::measure::{
-    CENTRED_R, COVERAGE, EDGE_RMSE, Measure, R, REPEATABILITY, RMSE, VERIFICATION_COVERAGE,
-    VERIFICATION_RMSE,
+    CENTRED_R, CHAMFER, COVERAGE, EDGE_RMSE, Measure, R, REPEATABILITY, RMSE,
+    VERIFICATION_COVERAGE, VERIFICATION_RMSE,
 };
 use crate::experiment::metrics::constant_r;
 use crate::experiment::notice;
@@ -38,6 +39,11 @@ pub fn sentences(run: &Run) -> Vec<String> {
         return sentences;
     }
     sentences.extend(verified(run, &curves));
+    if run.experiment.scene.around.is_some() {
+        sentences.extend(shapes(run, &curves));
+        sentences.extend(against_baseline(run, &curves));
+        return sentences;
+    }
     if !run.truth.is_known() {
         return sentences;
     }
@@ -101,7 +107,29 @@ fn scores(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<String> {
             Some(format!("{name} {r} (centred {centred}, median RMSE {rmse} mm{edge})"))
         })
         .collect();
-    Some(format!("After {count} touches the mean R (Eq. 5) is: {}.", told.join("; ")))
+    (!told.is_empty())
+        .then(|| format!("After {count} touches the mean R (Eq. 5) is: {}.", told.join("; ")))
+}
+
+/// How near the believed shapes of whole objects are after the last touch that is drawn.
+fn shapes(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<String> {
+    let count = run.experiment.drawn_touch_counts().into_iter().next_back()?;
+    let told: Vec<String> = curves
+        .iter()
+        .filter_map(|(name, points)| {
+            let point = points.iter().find(|point| point.touches == count)?;
+            let of = |id: &str| Some(point.of(measure::by_id(id)?)?.mean);
+            let share = digits(100.0 * of("chamfer_share")?);
+            let chamfer = median(point, &CHAMFER)?;
+            let (f_1, f_3) = (100.0 * of("f_1")?, 100.0 * of("f_3")?);
+            Some(format!(
+                "{name} {share} % of the diagonal (median {chamfer} mm; F {f_1:.0} at 1 %, {f_3:.0} at 3 %)"
+            ))
+        })
+        .collect();
+    (!told.is_empty()).then(|| {
+        format!("After {count} touches the mean Chamfer distance is: {}.", told.join("; "))
+    })
 }
 
 /// The median of an error, in the unit it is shown in.
@@ -129,16 +157,21 @@ fn needed(
 /// How soon the others are as near the truth as the first baseline is at its end.
 fn against_baseline(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<String> {
     let name = *run.experiment.baselines().first()?;
-    let (baseline, others): (Vec<_>, Vec<_>) =
-        curves.iter().cloned().partition(|(planner, _)| *planner == name);
+    let error = run.experiment.error();
+    let compared = curves.iter().map(|(planner, points)| {
+        let points = points.iter().filter(|point| point.of(error).is_some());
+        (*planner, points.cloned().collect::<Vec<_>>())
+    });
+    let (baseline, others): (Vec<_>, Vec<_>) = compared.partition(|(planner, _)| *planner == name);
     let last = baseline.first()?.1.last()?;
-    let error_m = last.of(&RMSE)?.median;
+    let error_m = last.of(error)?.median;
     let goal = format!(
-        "the median RMSE that {name} has after {} touches ({} mm)",
+        "the median {} that {name} has after {} touches ({} mm)",
+        error.title,
         last.touches,
-        median(last, &RMSE)?
+        median(last, error)?
     );
-    let is_met = |point: &CurvePoint| point.of(&RMSE).is_some_and(|rmse| rmse.median <= error_m);
+    let is_met = |point: &CurvePoint| point.of(error).is_some_and(|it| it.median <= error_m);
     (!others.is_empty()).then(|| needed(run, &others, &goal, is_met))
 }
 

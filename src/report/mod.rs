@@ -1,6 +1,7 @@
 //! Tables, figures and the page of a run, drawn from its rows: nothing is run again.
 
 pub mod axes;
+pub mod camera;
 pub mod canvas;
 pub mod check;
 pub mod compare;
@@ -26,11 +27,13 @@ pub mod relief_panel;
 pub mod replay;
 pub mod scan;
 pub mod severity;
+pub mod solid;
 pub mod style;
 pub mod suite;
 pub mod tables;
 pub mod tree;
 pub mod verdict;
+pub mod whole;
 pub mod zone;
 
 pub use figures::{Drawing, FIGURES, Figure};
@@ -72,7 +75,10 @@ pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()
     }
     let text = |name| crate::files::text(&folder.join(name), crate::files::TEXT_MAX).ok();
     let (settings, manifest) = (text(RESOLVED), text(MANIFEST));
-    let explorer = explorer::section(run)?;
+    let explorer = match run.experiment.scene.around {
+        None => explorer::section(run)?,
+        Some(_) => whole::section(run)?,
+    };
     let files = [settings.as_deref(), manifest.as_deref()];
     let html = page::html(run, analysis, &drawings, &explorer, files);
     Ok(write_whole(&folder.join("report.html"), &html)?)

@@ -13,12 +13,14 @@ pub struct Points {
     /// How sure each is: its standard deviation in m, and a colour that shows it. As many as
     /// points, or none.
     pub deviations: Vec<(f64, [u8; 3])>,
+    /// How far each lies from the true surface, in m. As many as points, or none.
+    pub errors_m: Vec<f64>,
     /// Triangles, counter-clockwise seen from outside.
     pub triangles: Vec<[usize; 3]>,
 }
 
 impl Points {
-    /// As PLY: `x y z nx ny nz`, and with deviations `red green blue sigma_m`.
+    /// As PLY: `x y z nx ny nz`, with deviations `red green blue sigma_m`, with errors `error_m`.
     pub fn ply(&self) -> String {
         let mut text = String::from("ply\nformat ascii 1.0\n");
         for comment in &self.comments {
@@ -32,6 +34,9 @@ impl Points {
             text += "property uchar red\nproperty uchar green\nproperty uchar blue\n\
                      property float sigma_m\n";
         }
+        if !self.errors_m.is_empty() {
+            text += "property float error_m\n";
+        }
         if !self.triangles.is_empty() {
             let count = self.triangles.len();
             let _ = writeln!(text, "element face {count}\nproperty list uchar int vertex_indices");
@@ -42,6 +47,9 @@ impl Points {
             if let Some((deviation_m, [red, green, blue])) = self.deviations.get(i) {
                 let _ = write!(text, " {red} {green} {blue} {deviation_m:.3e}");
             }
+            if let Some(error_m) = self.errors_m.get(i) {
+                let _ = write!(text, " {error_m:.3e}");
+            }
             text.push('\n');
         }
         for [a, b, c] in &self.triangles {
@@ -51,20 +59,25 @@ impl Points {
     }
 
     /// As OBJ, which knows no properties: the colour follows the coordinates, as most programs
-    /// read it, and the deviation stands in a comment.
+    /// read it, and deviation and error stand in a comment.
     pub fn obj(&self) -> String {
         let mut text = String::new();
         for comment in &self.comments {
             let _ = writeln!(text, "# {comment}");
         }
         if !self.deviations.is_empty() {
-            text += "# v: x y z red green blue; the comment below it is sigma_m\n";
+            let error = if self.errors_m.is_empty() { "" } else { " error_m" };
+            let _ =
+                writeln!(text, "# v: x y z red green blue; the comment below it is sigma_m{error}");
         }
         for (i, (point, _)) in self.points.iter().enumerate() {
             let _ = write!(text, "v {}", numbers(&point.coords));
             if let Some((deviation_m, colour)) = self.deviations.get(i) {
                 let [red, green, blue] = colour.map(|channel| f64::from(channel) / 255.0);
                 let _ = write!(text, " {red:.3} {green:.3} {blue:.3}\n# {deviation_m:.3e}");
+                if let Some(error_m) = self.errors_m.get(i) {
+                    let _ = write!(text, " {error_m:.3e}");
+                }
             }
             text.push('\n');
         }

@@ -218,13 +218,15 @@ pub fn fields<T: JsonSchema>() -> String {
     text
 }
 
-/// The fields of a line of `trials.jsonl`, and of each of its touches.
+/// The fields of a line of `trials.jsonl`, of each of its touches and of their parts.
 pub fn rows() -> String {
     let touch = fields::<crate::experiment::row::TouchRow>();
     let metrics = fields::<crate::experiment::metrics::Metrics>();
+    let shape = fields::<crate::experiment::shape::ShapeMetrics>();
     let fit = fields::<crate::gp::fit::Fit>();
     format!(
-        "{}\nEach of `touches`:\n\n{touch}\nIts `metrics`:\n\n{metrics}\nIts `fit`:\n\n{fit}",
+        "{}\nEach of `touches`:\n\n{touch}\nIts `metrics`:\n\n{metrics}\nIts `shape`:\n\n{shape}\n\
+         Its `fit`:\n\n{fit}",
         fields::<TrialRow>()
     )
 }

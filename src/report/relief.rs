@@ -1,15 +1,12 @@
 //! A height field or a mesh as a shaded relief: orthographic view, painter's algorithm.
 
 use super::axes::Axis;
+use super::camera::{AZIMUTH_DEG, Camera};
 use super::canvas::{Area, Canvas, PointPx, pair};
 use super::style;
 use crate::geometry::mesh::Mesh;
 use nalgebra::Vector3;
 
-/// From where every relief is seen, chosen so that neither side of a bulge hides much: turned
-/// about z from the direction of touch, and raised.
-const AZIMUTH_DEG: f64 = 38.0;
-const ELEVATION_DEG: f64 = 24.0;
 /// Whence light falls: from the front, so that no relief is dark, and from the viewer's side.
 const LIGHT: Vector3<f64> = Vector3::new(0.45, 0.7, 0.55);
 /// Share of light that comes from everywhere.
@@ -44,47 +41,25 @@ impl Space {
 /// How the space lies on the sheet.
 pub struct View {
     space: Space,
-    right: Vector3<f64>,
-    up: Vector3<f64>,
-    toward: Vector3<f64>,
-    scale: f64,
-    shift: PointPx,
+    camera: Camera,
 }
 
 impl View {
     /// Fits the space into `area`.
     pub fn new(space: Space, area: Area) -> Self {
-        let (sin_a, cos_a) = AZIMUTH_DEG.to_radians().sin_cos();
-        let (sin_e, cos_e) = ELEVATION_DEG.to_radians().sin_cos();
-        let toward = Vector3::new(sin_a * cos_e, cos_a * cos_e, sin_e);
-        let right = Vector3::new(-cos_a, sin_a, 0.0);
-        let up = toward.cross(&right);
-        let mut view = Self { space, right, up, toward, scale: 1.0, shift: [0.0, 0.0] };
-        let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
-        for at in space.corners().map(|corner| view.at(corner)) {
-            for i in 0..2 {
-                low[i] = low[i].min(at[i]);
-                high[i] = high[i].max(at[i]);
-            }
-        }
-        view.scale = (area.width / (high[0] - low[0])).min(area.height / (high[1] - low[1]));
-        let centre = area.centre();
-        view.shift = std::array::from_fn(|i| centre[i] - view.scale * 0.5 * (low[i] + high[i]));
-        view
+        let view = Self { space, camera: Camera::toward(AZIMUTH_DEG) };
+        let corners: Vec<_> = space.corners().map(|corner| view.stretched(corner)).collect();
+        Self { space, camera: view.camera.fitted(corners.iter().copied(), area) }
     }
 
     /// Where the point (x, height, z) in metres lies on the sheet.
     pub fn at(&self, point: [f64; 3]) -> PointPx {
-        let p = self.stretched(point);
-        [
-            self.shift[0] + self.scale * p.dot(&self.right),
-            self.shift[1] - self.scale * p.dot(&self.up),
-        ]
+        self.camera.at(&self.stretched(point))
     }
 
     /// How near the viewer a point is, in pixels.
     pub fn nearness(&self, point: [f64; 3]) -> f64 {
-        self.scale * self.stretched(point).dot(&self.toward)
+        self.camera.nearness(&self.stretched(point))
     }
 
     fn stretched(&self, [x, height, z]: [f64; 3]) -> Vector3<f64> {
@@ -92,14 +67,17 @@ impl View {
     }
 }
 
-/// A part of the relief.
-struct Face {
-    outline: Vec<PointPx>,
-    nearness: f64,
-    colour: String,
+/// A part of a surface, as it is drawn.
+pub struct Face {
+    /// Its corners on the sheet.
+    pub outline: Vec<PointPx>,
+    /// How near the viewer its middle is, in pixels.
+    pub nearness: f64,
+    /// Its colour.
+    pub colour: String,
 }
 
-/// A height field over a grid, ready to be drawn.
+/// A surface as faces, ready to be drawn.
 pub struct Relief {
     faces: Vec<Face>,
 }
@@ -140,13 +118,13 @@ impl Relief {
             let [a, b, c] = corners.map(|p_w| [p_w.x, p_w.y - datum_y_m, p_w.z]);
             let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
             // A sound mesh has no triangle without an area.
-            (normal.dot(&view.toward) > 0.0)
-                .then(|| face(view, &[a, b, c], normal.normalize(), axis))
+            (view.camera.sees(&normal)).then(|| face(view, &[a, b, c], normal.normalize(), axis))
         });
         Self::sorted(seen.collect())
     }
 
-    fn sorted(mut faces: Vec<Face>) -> Self {
+    /// Puts far faces first.
+    pub fn sorted(mut faces: Vec<Face>) -> Self {
         faces.sort_by(|a, b| a.nearness.total_cmp(&b.nearness));
         Self { faces }
     }
@@ -164,12 +142,11 @@ impl Relief {
         });
     }
 
-    /// Whether the relief hides a point that lies on it or behind it.
-    pub fn hides(&self, view: &View, point: [f64; 3]) -> bool {
+    /// Whether it hides a point of the sheet that is as near as this, on the surface or behind it.
+    pub fn hides(&self, at: PointPx, nearness: f64) -> bool {
         // A contact on the surface is not hidden by the faces around it.
         const ON_SURFACE_PX: f64 = 8.0;
-        let at = view.at(point);
-        let nearness = view.nearness(point) + ON_SURFACE_PX;
+        let nearness = nearness + ON_SURFACE_PX;
         (self.faces.iter()).any(|face| face.nearness > nearness && contains(&face.outline, at))
     }
 }

@@ -101,6 +101,16 @@ pub fn fill(colour: &str, opacity: f64) -> String {
     format!(r#"fill="{colour}" fill-opacity="{opacity}""#)
 }
 
+/// Attributes of a touch that is seen.
+pub fn visible(colour: &str) -> String {
+    format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".9""#)
+}
+
+/// Attributes of a touch that a surface hides.
+pub fn hidden(colour: &str) -> String {
+    format!(r#"fill="{PAPER}" fill-opacity=".35" stroke="{colour}" stroke-width="1.1""#)
+}
+
 /// Viridis, dark to light.
 pub const DEVIATION: [[f64; 3]; 9] = [
     [68.0, 1.0, 84.0],
@@ -136,7 +146,7 @@ pub const ERROR: [[f64; 3]; 7] = [
 
 /// Colour of a standard deviation, 0..1 of the largest.
 pub fn deviation(fraction: f64) -> String {
-    hex(between(&DEVIATION, fraction))
+    lit(&DEVIATION, fraction, 1.0)
 }
 
 /// The same as red, green and blue.
@@ -144,9 +154,14 @@ pub fn deviation_rgb(fraction: f64) -> [u8; 3] {
     between(&DEVIATION, fraction).map(|channel| channel.round() as u8)
 }
 
+/// Colour of what is `map` at a fraction of it, under light of strength 0..1.
+pub fn lit(map: &[[f64; 3]], fraction: f64, light: f64) -> String {
+    hex(between(map, fraction).map(|channel| channel * light))
+}
+
 /// Colour of a height, 0..1 of the range, under light of strength 0..1.
 pub fn height(fraction: f64, light: f64) -> String {
-    hex(between(&HEIGHT, fraction).map(|channel| channel * light))
+    lit(&HEIGHT, fraction, light)
 }
 
 fn between(map: &[[f64; 3]], fraction: f64) -> [f64; 3] {

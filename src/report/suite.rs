@@ -83,7 +83,7 @@ pub fn each(compared: &Compared, standings: &[Standing]) -> Table {
 /// What the numbers are.
 pub fn note(against: &str) -> String {
     format!(
-        "Errors are exp(mean log RMSE over the touches after the initial ones) in units of {against}'s \
+        "Errors are exp(mean log error over the touches after the initial ones) in units of {against}'s \
          in the same trial: the geometric mean over trials and objects, with the 95 % interval of a \
          bootstrap over trials. Less is better; better and worse: the interval excludes 1. The gap is \
          that from {FLOOR} to {ORACLE}, which looks at the truth, in mean log error. Missed: touches \

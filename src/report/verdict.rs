@@ -3,7 +3,6 @@
 use super::findings::{HONEST, share_in_band};
 use super::tables::{Verdict, comparison, equal_error};
 use crate::experiment::analysis::Analysis;
-use crate::experiment::measure::RMSE;
 use crate::experiment::store::Run;
 use crate::experiment::summary;
 
@@ -13,7 +12,7 @@ pub fn sentences(run: &Run, analysis: &Analysis) -> Vec<String> {
     let baseline = baselines.first().copied().unwrap_or_default();
     nearness(run, analysis, baseline)
         .into_iter()
-        .chain(effort(analysis, baseline))
+        .chain(effort(run, analysis, baseline))
         .chain(trust(run))
         .collect()
 }
@@ -22,7 +21,7 @@ pub fn sentences(run: &Run, analysis: &Analysis) -> Vec<String> {
 fn nearness(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
     let found = analysis.comparisons.iter();
     let told: Vec<(&str, Option<Verdict>)> = found
-        .filter(|it| it.baseline == baseline && it.measure.id == RMSE.id)
+        .filter(|it| it.baseline == baseline && it.measure.id == run.experiment.error().id)
         .map(|it| (it.planner, comparison::verdict(it)))
         .collect();
     let which = sorted(&told)?;
@@ -36,10 +35,10 @@ fn nearness(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
 }
 
 /// Who needs fewer touches than the first baseline for the error that it ends with.
-fn effort(analysis: &Analysis, baseline: &str) -> Option<String> {
+fn effort(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
     let found = analysis.equal_errors.iter();
     let told: Vec<(&str, Option<Verdict>)> = found
-        .filter(|it| it.baseline == baseline && it.measure.id == RMSE.id)
+        .filter(|it| it.baseline == baseline && it.measure.id == run.experiment.error().id)
         .map(|it| (it.planner, equal_error::verdict(it)))
         .collect();
     let which = sorted(&told)?;

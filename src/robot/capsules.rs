@@ -36,7 +36,10 @@ impl LinkCapsule {
 }
 
 /// What the last joint carries beyond its flange.
-pub const CARRIED: [&str; 2] = ["tool", "finger"];
+pub const CARRIED: [&str; 2] = [TOOL, "finger"];
+
+/// What is between flange and finger.
+pub const TOOL: &str = "tool";
 
 /// The wide part of the forearm behind its fork.
 const BARREL: &str = "E2 barrel";
@@ -53,7 +56,7 @@ pub fn capsules(robot: &Robot) -> Vec<LinkCapsule> {
     let heel_m = (mount_m - finger.length_m).max(0.0);
     let on_flange = |z_m: f64| chain.flange * Point3::new(0.0, 0.0, z_m);
     let link = chain.joints.len();
-    let parts = [("tool", 0.0, heel_m, 2.0), ("finger", heel_m, mount_m, 1.0)];
+    let parts = [(TOOL, 0.0, heel_m, 2.0), ("finger", heel_m, mount_m, 1.0)];
     all.extend(parts.map(|(name, from_m, to_m, times)| LinkCapsule {
         name,
         link,

@@ -1,5 +1,6 @@
 //! What never changes during a trial, shared by all threads.
 
+use super::around::{self, AroundError};
 use super::function::Function;
 use super::notice::{Notice, SizeMismatch};
 use super::scene::{Body, Object, Scene, Unit};
@@ -12,10 +13,10 @@ use crate::geometry::report::MeshReport;
 use crate::geometry::surfaces;
 use crate::robot::Robot;
 use crate::robot::arm::Chain;
-use crate::robot::arm::stage::stage;
+use crate::robot::arm::stage::{stage, stage_with_wrist};
 use crate::sim::finger::Fingertip;
 use crate::task::{Task, TaskError, Zone};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use std::borrow::Cow;
 use thiserror::Error;
 
@@ -81,6 +82,9 @@ pub enum EnvironmentError {
         /// Where the object is first met.
         front_m: f64,
     },
+    /// The object cannot be gone around.
+    #[error(transparent)]
+    Around(#[from] AroundError),
     /// The zone is not complete.
     #[error(transparent)]
     Task(#[from] TaskError),
@@ -124,6 +128,11 @@ impl Environment {
             scene.effects = effects;
             notices.push(Notice::DefaultFinger);
         }
+        if let (Some(around), Shape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
+            let ball = around::ball(around, bvh.mesh());
+            let task = around::task(&scene, ball, bvh.mesh())?;
+            return Ok(Self::of(scene, shape, task, notices));
+        }
         let extent = extent(&scene.zone, &shape);
         let depth_m = *scene.zone.depth_m.get_or_insert([-extent.high.y, -extent.low.y]);
         if let Shape::Mesh { bvh, .. } = &shape {
@@ -138,9 +147,13 @@ impl Environment {
         }
         scene.zone.datum_y_m.get_or_insert(0.0);
         let task = Task::new(scene.zone.clone(), scene.touch.clone(), &scene.finger)?;
+        Ok(Self::of(scene, shape, task, notices))
+    }
+
+    fn of(scene: Scene, shape: Shape, task: Task, notices: Vec<Notice>) -> Self {
         let fingertip =
             (scene.effects.is_soft()).then(|| Fingertip::new(&scene.finger, &scene.effects));
-        Ok(Self { scene, shape, task, fingertip, notices })
+        Self { scene, shape, task, fingertip, notices }
     }
 
     /// What may not be meant.
@@ -189,6 +202,13 @@ impl Environment {
         let Scene { arm, finger, zone, .. } = &self.scene;
         Some(arm.as_ref().map_or_else(
             || {
+                if let Some(ball) = self.task.ball() {
+                    let standoff_m = self.task.touch().standoff_m;
+                    let around_m = ball.keep_out(finger, standoff_m).radius_m + CLEARANCE_M;
+                    let home_w = ball.centre_w + Vector3::y() * around_m;
+                    let room = (ball.centre_w, around_m);
+                    return stage_with_wrist(room, home_w, finger.r_at());
+                }
                 let [near_m, _] = self.task.depth_m();
                 let home_y_m = -near_m + CLEARANCE_M + finger.radius_m;
                 let x_wz = zone.x_wz();

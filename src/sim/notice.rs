@@ -1,9 +1,10 @@
 //! What a user should know of a scene before it is run: it can be built, and may not be meant.
 
 use super::scene::Unit;
-use crate::task::Zone;
+use crate::geometry::spread::directions;
+use crate::task::{DIRECTIONS, Task, Zone};
 use clap::ValueEnum;
-use nalgebra::Point3;
+use nalgebra::{Point3, UnitVector3, Vector2};
 use std::fmt;
 
 /// Something about a scene that a user may not mean; its `Display` says so and how to change it.
@@ -13,6 +14,8 @@ pub enum Notice {
     Size(SizeMismatch),
     /// A soft finger without tables was given those of a BioTac.
     DefaultFinger,
+    /// The finger cannot be brought to a whole object from some sides.
+    Sides(OutOfSides),
     /// A limit of the physics engine asks for other steps than the scene.
     Steps(String),
 }
@@ -25,8 +28,61 @@ impl fmt::Display for Notice {
                 "the scene names no effects: its finger has the default [effects.skin], \
                  [effects.fluid] and [effects.electrodes]",
             ),
+            Self::Sides(sides) => sides.fmt(f),
             Self::Steps(text) => f.write_str(text),
         }
+    }
+}
+
+/// From where a finger cannot be brought to the middle of a whole object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OutOfSides {
+    /// Directions that were tried.
+    pub of: usize,
+    /// Side, directions out of reach, directions that were tried; none that all are in reach of.
+    pub sides: Vec<(&'static str, usize, usize)>,
+}
+
+/// The sides of an object, named as from the middle of the robot's foot, or of the home of a stage.
+const SIDES: [&str; 6] = ["behind", "the robot's side", "the left", "the right", "above", "below"];
+
+impl OutOfSides {
+    /// What `task` says of a robot that stands at `foot_w`; none if it reaches everything.
+    pub fn of(task: &Task, foot_w: &Point3<f64>) -> Option<Self> {
+        let away_w = (task.ball()?.centre_w - foot_w).xy().try_normalize(1e-6);
+        let away_w = away_w.unwrap_or_else(Vector2::x);
+        // Seen from the foot, the left is a quarter of a turn counter-clockwise.
+        let side = |outward_w: &UnitVector3<f64>| {
+            let flat = outward_w.xy();
+            let along = [flat.dot(&away_w), away_w.perp(&flat), outward_w.z];
+            let parts = along.into_iter().flat_map(|part| [part, -part]).enumerate();
+            parts.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(side, _)| side)
+        };
+        let mut counts = [[0; 2]; SIDES.len()];
+        directions(DIRECTIONS).for_each(|outward_w| counts[side(&outward_w)][1] += 1);
+        task.unreached(DIRECTIONS).iter().for_each(|outward_w| counts[side(outward_w)][0] += 1);
+        let sides = SIDES.into_iter().zip(counts).filter(|(_, [missed, _])| *missed > 0);
+        let sides: Vec<_> = sides.map(|(side, [missed, of])| (side, missed, of)).collect();
+        (!sides.is_empty()).then_some(Self { of: DIRECTIONS, sides })
+    }
+}
+
+impl fmt::Display for OutOfSides {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let missed: usize = self.sides.iter().map(|(_, missed, _)| missed).sum();
+        write!(
+            f,
+            "from {missed} of {} directions the finger cannot be brought to the object: ",
+            self.of
+        )?;
+        for (i, (side, missed, of)) in self.sides.iter().enumerate() {
+            let comma = if i > 0 { ", " } else { "" };
+            match missed == of {
+                true => write!(f, "{comma}all {of} from {side}")?,
+                false => write!(f, "{comma}{missed} of {of} from {side}")?,
+            }
+        }
+        Ok(())
     }
 }
 

@@ -10,6 +10,7 @@ use crate::robot::arm::ArmSettings;
 use crate::robot::finger::Finger;
 use crate::robot::finger::profile::Profile;
 use crate::sim::finger::Effects;
+use crate::task::around::Around;
 use crate::task::touch::TouchSettings;
 use crate::task::zone::Zone;
 use nalgebra::Isometry3;
@@ -28,15 +29,20 @@ pub struct Scene {
     /// The surface, if the body is `function`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub function: Option<Function>,
-    /// The rectangle explored.
+    /// The rectangle explored, of one side of an object.
+    #[serde(default = "Zone::nothing", skip_serializing_if = "Zone::is_nothing")]
     pub zone: Zone,
+    /// The ball explored, of a whole object from all sides; in place of a zone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub around: Option<Around>,
     /// The object, if the body is not `function`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<Object>,
     /// The finger; a `function` is touched without one.
     #[serde(default)]
     pub finger: Finger,
-    /// The arm that carries the finger; without one, a stage of three slides does.
+    /// The arm that carries the finger; without one, a stage of three slides does, around a whole
+    /// object with a wrist.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<ArmSettings>,
     /// Optional physics of a body that feels, each a table of its own; the others leave it alone.
@@ -195,7 +201,21 @@ impl Checked for Object {
 
 impl Checked for Scene {
     fn check(&self, rules: &mut Rules) {
-        rules.table("zone", &self.zone);
+        match &self.around {
+            None => {
+                let given = !self.zone.is_nothing();
+                rules.require("zone", "(none)", given, || {
+                    "a table [zone] with x_m and z_m, or [around] for a whole object".into()
+                });
+                rules.table("zone", &self.zone);
+            }
+            Some(around) => {
+                rules.require("zone", "(given)", self.zone.is_nothing(), || {
+                    "no zone: [around] explores the object from all sides".into()
+                });
+                rules.table("around", around);
+            }
+        }
         rules.table("finger", &self.finger);
         match self.body {
             Body::Function => {
@@ -204,6 +224,9 @@ impl Checked for Scene {
                 });
                 rules.require("object", "(given)", self.object.is_none(), || {
                     "no object: body = \"function\" touches a curve".into()
+                });
+                rules.require("around", "(given)", self.around.is_none(), || {
+                    "no around: body = \"function\" touches a curve".into()
                 });
                 let flat = self.zone.z_m.is_none();
                 rules.require("arm", "(given)", self.arm.is_none(), || {
@@ -223,6 +246,12 @@ impl Checked for Scene {
                 });
             }
         }
+        let turns = self.around.is_none() || self.arm.is_some() || self.body != Body::Dynamic;
+        rules.require("body", "\"dynamic\"", turns, || {
+            "\"cast\" or \"kinematic\", or an [arm]: around an object the finger must be turned, and \
+             the stage of body = \"dynamic\" has slides alone"
+                .into()
+        });
         rules.table("effects", &self.effects);
         rules.table("touch", &self.touch);
         rules.table("solver", &self.solver);

@@ -4,7 +4,7 @@
 use super::kinematic::Kinematic;
 #[cfg(feature = "mujoco")]
 use super::mujoco;
-use super::notice::Notice;
+use super::notice::{Notice, OutOfSides};
 use super::probe::exact;
 use super::simulated_finger::Shell;
 use crate::backend::delay::Delayed;
@@ -68,8 +68,13 @@ impl Simulator {
 
     /// What of the scene may not be meant, and what is simulated otherwise than it asks.
     pub fn notices(&self) -> Vec<Notice> {
-        #[allow(unused_mut)] // Only the physics engine changes what a scene asks.
         let mut notices = self.environment.notices().to_vec();
+        let foot_w = self.environment.chain().map(|chain| match self.environment.scene().arm {
+            Some(_) => chain.base.translation.vector.into(),
+            None => chain.forward(&chain.home).translation.vector.into(),
+        });
+        let sides = foot_w.and_then(|foot_w| OutOfSides::of(self.environment.task(), &foot_w));
+        notices.extend(sides.map(Notice::Sides));
         #[cfg(feature = "mujoco")]
         if let Some(substeps) = self.models.as_ref().and_then(|models| models.substeps.as_ref()) {
             notices.push(Notice::Steps(substeps.to_string()));

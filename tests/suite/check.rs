@@ -266,6 +266,7 @@ static WORSE: Entry = Entry {
         let own = (planner::by_name("active").unwrap().make)(zone, settings, rng);
         Box::new(Shy { own, zone: zone.clone(), margin: margin() })
     },
+    make_around: None,
 };
 
 static RESEEDED: Entry = Entry {
@@ -275,6 +276,7 @@ static RESEEDED: Entry = Entry {
         rng.random::<u64>();
         (planner::by_name("random").unwrap().make)(zone, settings, rng)
     },
+    make_around: None,
 };
 
 /// A check of `new` against the planner `old` with a fresh seed: its verdict, its trials, and the

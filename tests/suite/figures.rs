@@ -61,28 +61,33 @@ fn texts(svg: &str) -> Vec<(String, Rect)> {
     found
 }
 
-/// By the metrics of the font that pictures are drawn with.
+/// By the metrics of the font that pictures are drawn with: nothing written is cut off or printed
+/// over.
+pub fn reads_well(name: &str, svg: &str) {
+    let size = tree::read(svg).unwrap().size();
+    let texts = texts(svg);
+    assert!(texts.len() > 5, "{name}");
+    for (i, (words, one)) in texts.iter().enumerate() {
+        let is_inside = one.left() >= 0.0
+            && one.top() >= 0.0
+            && one.right() <= size.width()
+            && one.bottom() <= size.height();
+        assert!(is_inside, "{name}: {words} at {one:?} of {size:?}");
+        for (others, other) in &texts[..i] {
+            let is_apart = one.left() >= other.right()
+                || other.left() >= one.right()
+                || one.top() >= other.bottom()
+                || other.top() >= one.bottom();
+            assert!(is_apart, "{name}: {words} on {others}: {one:?}, {other:?}");
+        }
+    }
+}
+
 #[test]
 fn nothing_written_is_cut_off_or_printed_over() {
     for run in runs() {
         for (name, svg) in figures(&run) {
-            let size = tree::read(&svg).unwrap().size();
-            let texts = texts(&svg);
-            assert!(texts.len() > 5, "{name}");
-            for (i, (words, one)) in texts.iter().enumerate() {
-                let is_inside = one.left() >= 0.0
-                    && one.top() >= 0.0
-                    && one.right() <= size.width()
-                    && one.bottom() <= size.height();
-                assert!(is_inside, "{name}: {words} at {one:?} of {size:?}");
-                for (others, other) in &texts[..i] {
-                    let is_apart = one.left() >= other.right()
-                        || other.left() >= one.right()
-                        || one.top() >= other.bottom()
-                        || other.top() >= one.bottom();
-                    assert!(is_apart, "{name}: {words} on {others}: {one:?}, {other:?}");
-                }
-            }
+            reads_well(name, &svg);
         }
     }
 }

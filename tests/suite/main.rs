@@ -2,10 +2,12 @@
 
 mod common;
 
+mod all_around;
 mod allocation;
 mod approach;
 mod arm;
 mod arm_pc;
+mod around_commands;
 mod backend;
 mod bench;
 mod broken;
@@ -79,6 +81,8 @@ mod rigid;
 mod scenes;
 mod sensors;
 mod servo;
+mod shape;
+mod shape_reach;
 mod shards;
 mod shear;
 mod shell;
@@ -86,6 +90,8 @@ mod shell_accuracy;
 mod shell_elements;
 mod shell_reference;
 mod slopes;
+mod solid;
 mod stress;
 mod sweeps;
 mod twin;
+mod whole;

@@ -115,7 +115,7 @@ fn a_damaged_row_is_faulted_at_its_line() {
         (
             format!("\"target\":[{coordinate},"),
             "\"target\":[".into(),
-            "touch 1: a target of 1 coordinates in a zone of 2",
+            "touch 1: a target of 1 coordinates where 2 are needed",
         ),
         (
             format!("\"target\":[{coordinate}"),

@@ -16,7 +16,7 @@ const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "c
 
 /// Acts on the page and leaves a fingerprint of the picture, and the words below it, after each
 /// act.
-const DRIVER: &str = r#"
+pub const DRIVER: &str = r#"
 const explorer = document.getElementById("explorer");
 const log = document.createElement("pre");
 log.id = "log";
@@ -56,7 +56,8 @@ const key = (key) => () => explorer.querySelector("canvas").dispatchEvent(new Ke
 "#;
 
 /// A browser without a screen runs its clock ahead of its frames, so drawing waits for the clock.
-const CLOCK: &str = "<script>window.requestAnimationFrame = (draw) => setTimeout(draw);</script>";
+pub const CLOCK: &str =
+    "<script>window.requestAnimationFrame = (draw) => setTimeout(draw);</script>";
 
 fn browser() -> Option<PathBuf> {
     let folders = std::env::var_os("PATH")?;
@@ -153,7 +154,7 @@ fn page(folder: &Path, run: &Run, script: &str) -> PathBuf {
 }
 
 /// The lines of the log of a page in a browser, each of as many parts.
-fn log<const N: usize>(browser: &Path, path: &Path, options: &[&str]) -> Vec<[String; N]> {
+pub fn log<const N: usize>(browser: &Path, path: &Path, options: &[&str]) -> Vec<[String; N]> {
     let profile = tempfile::tempdir().unwrap();
     let output = Command::new(browser)
         .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=20000"])
@@ -177,7 +178,7 @@ fn log<const N: usize>(browser: &Path, path: &Path, options: &[&str]) -> Vec<[St
 }
 
 /// The browser, if there is one; where it must be there, it is.
-fn browser_or_note() -> Option<PathBuf> {
+pub fn browser_or_note() -> Option<PathBuf> {
     let browser = browser();
     if browser.is_none() {
         assert!(std::env::var_os("PALPATE_PAGE_TEST").is_none(), "no Chromium in PATH");

@@ -151,29 +151,35 @@ fn a_trial_goes_on_where_it_was_broken_off() {
 /// Defaults and constants are chosen with one half of the suite and held against the other.
 #[test]
 fn every_object_stands_in_one_half() {
-    let of = |half: &str| {
-        let cells = cells(Path::new(&format!("experiments/suite/{half}.toml"))).unwrap();
-        cells.into_iter().map(|cell| cell.label).collect::<Vec<_>>()
-    };
-    let [choosing, reporting] = ["choosing", "reporting"].map(of);
-    assert_eq!((choosing.len(), reporting.len()), (12, 12));
-    let mut all: Vec<String> = [choosing, reporting].concat();
-    all.sort();
-    let mut scenes: Vec<String> = std::fs::read_dir("scenes/suite")
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .map(|path| format!("-scene-{}", path.file_stem().unwrap().to_str().unwrap()))
-        .collect();
-    scenes.sort();
-    assert_eq!(all, scenes);
+    for (kind, folder) in [("", "scenes/suite"), ("around-", "scenes/suite/around")] {
+        let of = |half: &str| {
+            let cells = cells(Path::new(&format!("experiments/suite/{kind}{half}.toml"))).unwrap();
+            cells.into_iter().map(|cell| cell.label).collect::<Vec<_>>()
+        };
+        let [choosing, reporting] = ["choosing", "reporting"].map(of);
+        assert_eq!((choosing.len(), reporting.len()), (12, 12));
+        let mut all: Vec<String> = [choosing, reporting].concat();
+        all.sort();
+        let mut scenes: Vec<String> = scenes(folder)
+            .iter()
+            .map(|path| format!("-scene-{}", path.file_stem().unwrap().to_str().unwrap()))
+            .collect();
+        scenes.sort();
+        assert_eq!(all, scenes);
+    }
+}
+
+/// The scenes of a folder.
+fn scenes(folder: &str) -> Vec<PathBuf> {
+    let paths = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    paths.filter(|path| path.is_file()).collect()
 }
 
 /// Every object of the suite is closed, in front of the finger, and has the part of its zone that
 /// makes it differ.
 #[test]
 fn the_suite_is_whole() {
-    let scenes: Vec<PathBuf> =
-        std::fs::read_dir("scenes/suite").unwrap().map(|entry| entry.unwrap().path()).collect();
+    let scenes = scenes("scenes/suite");
     assert_eq!(scenes.len(), 24);
     let mut shares = Vec::new();
     for path in &scenes {

@@ -5,6 +5,7 @@ use palpate::experiment::analysis::Analysis;
 use palpate::experiment::measure::{Direction, MEASURES, Scale};
 use palpate::experiment::outline::Outline;
 use palpate::experiment::report_settings::Claim;
+use palpate::experiment::shape::ShapeMetrics;
 use palpate::experiment::store::Run;
 use palpate::report;
 use palpate::report::axes::Axis;
@@ -200,6 +201,37 @@ fn claims_stand_beside_what_came_out() {
     assert!(!page.contains("it is nowhere"));
 }
 
+/// A belief in a whole object.
+const SHAPE: ShapeMetrics = ShapeMetrics {
+    chamfer_m: Some(0.002),
+    chamfer_share: Some(0.01),
+    reachable_chamfer_m: Some(0.001),
+    f_1: 0.6,
+    f_3: 0.9,
+    volume_error: Some(-0.02),
+    area_error: 0.01,
+    iou: Some(0.8),
+    coverage: Some(0.9),
+};
+
+/// Measures of whole objects stand nowhere in what is told of a zone.
+#[test]
+fn a_zone_has_no_measures_of_whole_objects() {
+    let run = run(SURFACE);
+    let (folder, analysis) = (tempfile::tempdir().unwrap(), Analysis::of(&run));
+    report::write_tables(&run, &analysis, folder.path()).unwrap();
+    let mut told = text(&drawn(&run), "report.html").to_owned();
+    for name in ["summary.csv", "comparison.csv", "equal_error.csv"] {
+        told += &fs::read_to_string(folder.path().join(name)).unwrap();
+    }
+    for measure in MEASURES.iter().filter(|measure| measure.is_of_shapes) {
+        assert!(!told.contains(measure.title), "{measure:?}");
+        for name in measure.columns().into_iter().chain([measure.id.into()]) {
+            assert!(!told.contains(&format!(",{name},")), "{name}");
+        }
+    }
+}
+
 /// What follows from the table of measures does so for each of them: columns, comparison, panel,
 /// column of the page, claim.
 #[test]
@@ -209,6 +241,7 @@ fn a_measure_is_told_wherever_measures_are() {
         touch.time_s = Some(1.0);
         touch.outline = Some(Outline { brier: 0.1, iou: 0.8, wrong_share: 0.1, reliability: None });
         touch.metrics.iter_mut().for_each(|metrics| metrics.unreachable_rmse_m = Some(0.1));
+        touch.shape = Some(SHAPE);
     }
     run.experiment.report.claims = vec![Claim {
         place: "here".into(),

@@ -1,5 +1,6 @@
 //! Scene and experiment files: all that ship load, all that are saved mean the same.
 
+use nalgebra::Point3;
 use palpate::experiment::experiment::Experiment;
 use palpate::experiment::store;
 use palpate::sim::{Environment, Scene, mjcf};
@@ -20,6 +21,11 @@ fn every_shipped_scene_can_be_built() {
     assert!(scenes.len() >= 3);
     for path in scenes {
         let environment = Environment::build(Scene::load(&path, &[]).unwrap()).unwrap();
+        if let (Some(ball), Some(mesh)) = (environment.task().ball(), environment.mesh()) {
+            let inside = |p_w: &Point3<f64>| (p_w - ball.centre_w).norm() < ball.radius_m;
+            assert!(mesh.vertices().iter().all(inside), "{}", path.display());
+            continue;
+        }
         let middle = environment.scene().zone.at(&[0.5, 0.5]);
         assert!(environment.true_height_m(&middle).is_some(), "{}", path.display());
     }

@@ -88,24 +88,28 @@ fn belongs(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
     if found > wanted {
         return Err(format!("{found} touches of {wanted}"));
     }
-    let dimension = experiment.scene.zone.dimension();
+    // A target, and the lengths of a fit.
+    let dimensions = match experiment.scene.around {
+        None => [experiment.scene.zone.dimension(); 2],
+        Some(_) => [6, 3],
+    };
     row.touches.iter().zip(1..).try_for_each(|(touch, count)| {
-        fits(touch, dimension).map_err(|message| format!("touch {count}: {message}"))
+        fits(touch, dimensions).map_err(|message| format!("touch {count}: {message}"))
     })
 }
 
-/// Whether a touch is one in a zone of `dimension`, with a fit that a belief can be made of; if
-/// not, why.
-fn fits(touch: &TouchRow, dimension: usize) -> Result<(), String> {
+/// Whether a touch has a target of as many coordinates, with a fit of as many lengths that a belief
+/// can be made of; if not, why.
+fn fits(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), String> {
     let target = touch.target.len();
-    if target != dimension {
-        return Err(format!("a target of {target} coordinates in a zone of {dimension}"));
+    if target != coordinates {
+        return Err(format!("a target of {target} coordinates where {coordinates} are needed"));
     }
     let Some(fit) = &touch.fit else { return Ok(()) };
     let found = &fit.hyperparameters;
     let lengths = found.length_scales.len();
     if lengths != dimension {
-        return Err(format!("a fit of {lengths} length scales in a zone of {dimension}"));
+        return Err(format!("a fit of {lengths} length scales where {dimension} are needed"));
     }
     let positive = found.length_scales.iter().chain([&found.signal_sd]).all(|&size| size > 0.0);
     if !positive || found.noise_sd < 0.0 || found.slope_noise_sd < 0.0 {

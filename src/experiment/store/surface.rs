@@ -43,6 +43,9 @@ fn text(experiment: &Experiment, truth: &Truth) -> String {
 /// Reads back what [`write_or_compare`] wrote for `experiment`.
 pub(super) fn read(path: &Path, experiment: &Experiment) -> Result<Truth, StoreError> {
     let zone = &experiment.scene.zone;
+    if experiment.scene.around.is_some() {
+        return Ok(Truth::nothing());
+    }
     let bad =
         |line: usize, message: String| StoreError::BadRow { path: path.into(), line, message };
     let text = files::text(path, u64::MAX).map_err(io_error(path))?;

@@ -1,13 +1,16 @@
 //! Algorithm 1 of Yi et al. 2016: touch where the belief's standard deviation is largest.
 
-use super::plan::{Entry, Plan, Planner};
+use super::plan::{Entry, Planner};
 use super::search::Search;
+use crate::explore::around;
 use crate::explore::belief::Belief;
+use crate::explore::plan::Plan;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "active",
     about: "largest posterior standard deviation, by DIRECT then BFGS (the paper's)",
     make: |zone, settings, rng| Box::new(Active { search: Search::new(zone, settings, rng) }),
+    make_around: Some(|_, rng| Box::new(around::planner::Active::new(rng))),
 };
 
 struct Active {

@@ -1,14 +1,16 @@
 //! Seek the highest point by the expected improvement (Mockus et al. 1978).
 
 use super::improvement;
-use super::plan::{Entry, Plan, Planner};
+use super::plan::{Entry, Planner};
 use super::search::Search;
 use crate::explore::belief::Belief;
+use crate::explore::plan::Plan;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "ei",
     about: "seeks the highest point: expected improvement",
     make: |zone, settings, rng| Box::new(Ei { search: Search::new(zone, settings, rng) }),
+    make_around: None,
 };
 
 struct Ei {

@@ -5,14 +5,16 @@
 //! a trial may end at any touch. Each axis sees few distinct coordinates: a surface whose period
 //! the lattice shares is not seen until a finer level.
 
-use super::plan::{Entry, Plan, Planner};
+use super::plan::{Entry, Planner};
 use crate::explore::belief::Belief;
+use crate::explore::plan::Plan;
 use crate::task::Zone;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "grid",
     about: "a lattice from coarse to fine, no model",
     make: |zone, _, _| Box::new(Grid { zone: zone.clone(), level: 0, rest: lattice(zone, 0) }),
+    make_around: None,
 };
 
 struct Grid {

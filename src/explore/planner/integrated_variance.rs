@@ -1,10 +1,12 @@
 //! Touch where the variance of the whole surface falls most: the active learning of Cohn (1996),
 //! also called integrated variance reduction.
 
-use super::plan::{Entry, Plan, Planner};
+use super::plan::{Entry, Planner};
 use super::search::Search;
 use super::sobol;
+use crate::explore::around;
 use crate::explore::belief::Belief;
+use crate::explore::plan::Plan;
 use crate::gp::posterior::Scratch;
 use crate::gp::reduction::Reduction;
 use rand::RngExt;
@@ -18,6 +20,7 @@ pub(super) const ENTRY: Entry = Entry {
         let places = sobol::places(zone, count, rng.random());
         Box::new(IntegratedVariance { places, search: Search::new(zone, settings, rng) })
     },
+    make_around: Some(|_, rng| Box::new(around::planner::IntegratedVariance::new(rng))),
 };
 
 struct IntegratedVariance {

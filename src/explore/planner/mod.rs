@@ -19,7 +19,8 @@ mod sobol;
 mod travel;
 mod ucb;
 
-pub use plan::{Entry, Maker, Plan, Planner, Sight, Stall, Undecided, uniform};
+pub use crate::explore::plan::{Plan, Stall, Undecided};
+pub use plan::{Entry, MakeAround, Maker, Planner, Sight, uniform};
 pub use settings::PlanningSettings;
 
 /// Every planner; one line to add one.

@@ -1,14 +1,19 @@
 //! Touches where, if the truth is looked at, the belief comes nearest to it: a yardstick of how
 //! much any planner could gain with its next touch.
 
-use super::plan::{Entry, Plan, Planner, Sight, Undecided};
+use super::plan::{Entry, Planner, Sight};
 use super::search::Search;
+use crate::explore::around;
 use crate::explore::belief::Belief;
+use crate::explore::plan::{Plan, Undecided};
 
 pub(super) const ENTRY: Entry = Entry {
     name: "oracle",
     about: "what lowers the true error most (looks at the truth: only to measure others by)",
     make: |zone, settings, rng| Box::new(Oracle(Search::new(zone, settings, rng))),
+    make_around: Some(|settings, rng| {
+        Box::new(around::planner::Oracle::new(settings.oracle.candidates, rng))
+    }),
 };
 
 struct Oracle(Search);

@@ -4,14 +4,16 @@
 //! 0 in floating point; so z is maximised.
 
 use super::improvement;
-use super::plan::{Entry, Plan, Planner};
+use super::plan::{Entry, Planner};
 use super::search::Search;
 use crate::explore::belief::Belief;
+use crate::explore::plan::Plan;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "pi",
     about: "seeks the highest point: probability of improvement",
     make: |zone, settings, rng| Box::new(Pi { search: Search::new(zone, settings, rng) }),
+    make_around: None,
 };
 
 struct Pi {

@@ -1,37 +1,13 @@
 //! What a planner is: it sees the belief and the zone, and says where to touch.
 
 use super::settings::PlanningSettings;
+use crate::explore::around;
 use crate::explore::belief::Belief;
+use crate::explore::plan::{Plan, Undecided};
 use crate::gp::Posterior;
 use crate::task::Zone;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use thiserror::Error;
-
-/// A planner's choice.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Plan {
-    /// The place to touch.
-    pub target: Vec<f64>,
-    /// Standard deviation there, if the planner looked at it: the root of
-    /// [`Belief::explorable_variance`].
-    pub sd_m: Option<f64>,
-    /// Why the planner's own rule could not decide, if it could not.
-    pub stall: Option<Stall>,
-}
-
-/// Why a planner's own rule could not decide; the target is then random, because any fixed
-/// pattern may be just the one the surface hides behind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Stall {
-    /// The belief is sure of the best place: that it is the best one is rounding.
-    Collapsed,
-    /// The same target as before would have been asked for again.
-    Repeated,
-}
 
 /// Chooses targets.
 pub trait Planner: Send {
@@ -46,14 +22,6 @@ pub trait Planner: Send {
     fn decide(&mut self, belief: &Belief, _: &dyn Sight) -> Result<Plan, Undecided> {
         Ok(self.plan(belief))
     }
-}
-
-/// Why a planner named no target.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("the planner named no target: {reason}")]
-pub struct Undecided {
-    /// In its own words.
-    pub reason: String,
 }
 
 /// The truth, as a yardstick sees it.
@@ -74,7 +42,12 @@ pub struct Entry {
     pub about: &'static str,
     /// Makes one; the generator is its only randomness.
     pub make: fn(&Zone, &PlanningSettings, ChaCha8Rng) -> Box<dyn Planner>,
+    /// Makes one that goes around a whole object, where its rule makes sense there.
+    pub make_around: Option<MakeAround>,
 }
+
+/// Makes a planner that goes around a whole object; the generator is its only randomness.
+pub type MakeAround = fn(&PlanningSettings, ChaCha8Rng) -> Box<dyn around::planner::Planner>;
 
 /// What makes the planners of one name: an [`Entry`], or what a program adds to its simulation.
 pub trait Maker: Send + Sync {
@@ -89,6 +62,15 @@ pub trait Maker: Send + Sync {
         settings: &PlanningSettings,
         random: ChaCha8Rng,
     ) -> Box<dyn Planner>;
+
+    /// Makes one that goes around a whole object; none if it cannot.
+    fn make_around(
+        &self,
+        _settings: &PlanningSettings,
+        _random: ChaCha8Rng,
+    ) -> Option<Box<dyn around::planner::Planner>> {
+        None
+    }
 }
 
 impl Maker for Entry {
@@ -104,15 +86,18 @@ impl Maker for Entry {
     ) -> Box<dyn Planner> {
         (self.make)(zone, settings, random)
     }
+
+    fn make_around(
+        &self,
+        settings: &PlanningSettings,
+        random: ChaCha8Rng,
+    ) -> Option<Box<dyn around::planner::Planner>> {
+        self.make_around.map(|make| make(settings, random))
+    }
 }
 
 /// A uniformly random place of the zone.
 pub fn uniform(zone: &Zone, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let fractions: Vec<f64> = (0..zone.dimension()).map(|_| rng.random()).collect();
     zone.at(&fractions)
-}
-
-/// Straight way along the zone from one place to another.
-pub(super) fn distance_m(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }

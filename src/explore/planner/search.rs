@@ -2,10 +2,11 @@
 //!
 //! The function is asked for whole lists of places: values of many cost less than many values.
 
-use super::plan::{Plan, Stall, uniform};
+use super::plan::uniform;
 use super::settings::PlanningSettings;
 use super::sobol;
 use crate::explore::belief::Belief;
+use crate::explore::plan::{Plan, Stall};
 use crate::gp::posterior::Scratch;
 use crate::math::climb::{Climb, Manner};
 use crate::math::direct::direct;

@@ -11,10 +11,12 @@
 //! How far touches speak for their surroundings is what a few touches tell least: the variance is
 //! that of a committee of beliefs, whose length scales differ from the fitted ones.
 
-use super::plan::{Entry, Plan, Planner, distance_m};
+use super::plan::{Entry, Planner};
 use super::search::Search;
 use super::sobol;
 use crate::explore::belief::Belief;
+use crate::explore::plan::Plan;
+use crate::explore::tour::distance_m;
 use crate::gp::posterior::{Posterior, Scratch};
 use crate::gp::reduction::Reduction;
 use rand::RngExt;
@@ -28,6 +30,7 @@ pub(super) const ENTRY: Entry = Entry {
         let places = sobol::places(zone, count, rng.random());
         Box::new(Silhouette { places, search: Search::new(zone, settings, rng) })
     },
+    make_around: None,
 };
 
 /// Length scales of the committee in units of the fitted ones. Chosen on the suite's objects for

@@ -2,10 +2,11 @@
 //!
 //! α(x) = σ(x)·(1 + w·|∇μ(x)| / mean|∇μ|), the mean taken over the zone.
 
-use super::plan::{Entry, Plan, Planner};
+use super::plan::{Entry, Planner};
 use super::search::Search;
 use super::sobol;
 use crate::explore::belief::Belief;
+use crate::explore::plan::Plan;
 use crate::gp::Posterior;
 use crate::gp::posterior::Scratch;
 
@@ -16,6 +17,7 @@ pub(super) const ENTRY: Entry = Entry {
         let places = sobol::places(zone, MEAN_PLACES, 0);
         Box::new(Slope { places, search: Search::new(zone, settings, rng) })
     },
+    make_around: None,
 };
 
 /// Places over which the slope is averaged; chosen.

@@ -1,8 +1,10 @@
 //! A scrambled Sobol sequence: evenly spread targets without any model.
 
-use super::plan::{Entry, Plan, Planner};
+use super::plan::{Entry, Planner};
 use super::settings::PlanningSettings;
+use crate::explore::around;
 use crate::explore::belief::Belief;
+use crate::explore::plan::Plan;
 use crate::task::Zone;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -13,6 +15,7 @@ pub(super) const ENTRY: Entry = Entry {
     make: |zone, _: &PlanningSettings, mut rng: ChaCha8Rng| {
         Box::new(Sobol { zone: zone.clone(), seed: rng.random(), index: 0 })
     },
+    make_around: Some(|_, rng| Box::new(around::planner::Sobol::new(rng))),
 };
 
 struct Sobol {

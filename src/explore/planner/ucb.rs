@@ -1,13 +1,15 @@
 //! Seek the highest point by its upper confidence bound (Srinivas et al. 2010): μ + κ·σ.
 
-use super::plan::{Entry, Plan, Planner};
+use super::plan::{Entry, Planner};
 use super::search::Search;
 use crate::explore::belief::Belief;
+use crate::explore::plan::Plan;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "ucb",
     about: "seeks the highest point: upper confidence bound",
     make: |zone, settings, rng| Box::new(Ucb { search: Search::new(zone, settings, rng) }),
+    make_around: None,
 };
 
 struct Ucb {

@@ -331,7 +331,7 @@ fn approach(x_wt: &Isometry3<f64>, side_w: &UnitVector3<f64>, finger: &Finger) -
     // The servo keeps the hull's bulge and radius off what an approach names.
     let ahead_m = [finger.bulge_m() - MARGIN_M, MARGIN_M - finger.radius_m];
     let [p_near_w, p_far_w] = ahead_m.map(|ahead_m| p_wt - side_w.scale(ahead_m));
-    Approach { p_near_w, p_far_w, r_wa, r_at: r_wa.inverse() * x_wt.rotation }
+    Approach { p_near_w, p_far_w, r_wa, r_at: r_wa.inverse() * x_wt.rotation, around: None }
 }
 
 /// Whether `robot` has a posture at the ends of the way.

@@ -27,7 +27,7 @@ impl Code {
 }
 
 /// Numbers from 0 to 1; the highest code stands for none.
-fn encode(shares: impl Iterator<Item = f64>) -> String {
+pub fn encode(shares: impl Iterator<Item = f64>) -> String {
     let code = |share: f64| match share.is_nan() {
         true => u16::MAX,
         false => (65534.0 * share.clamp(0.0, 1.0)).round() as u16,

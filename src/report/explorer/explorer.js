@@ -3,41 +3,27 @@
 
 const explorer = document.getElementById("explorer");
 const data = JSON.parse(document.getElementById("explorer-data").textContent);
-const state = { planner: 0, frame: 0, colour: "height", truth: false };
+const state = { planner: 0, frame: 0, colour: null, truth: false };
 
-// Heights are sixteen bits between the ends of their range; the highest number is none.
-function heights(text) {
-  const [low, high] = data.height_range;
+const bytes = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+const codes = (text) => new Uint16Array(bytes(text).buffer);
+
+// Numbers of sixteen bits between two ends; the highest is none.
+function numbers(text, [low, high]) {
   return Float32Array.from(codes(text), (code) => (code === 65535 ? NaN : low + (high - low) * code / 65534));
 }
 
-// Deviations are sixteen bits between the ends of the logarithm of their range.
+// The same between the ends of the logarithm of their range.
 function deviations(text) {
   const [low, high] = data.deviation_range;
-  return Float32Array.from(codes(text), (code) => low * Math.pow(high / low, code / 65534));
+  return Float32Array.from(codes(text), (code) => (code === 65535 ? NaN : low * Math.pow(high / low, code / 65534)));
 }
-
-function codes(text) {
-  const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-  return new Uint16Array(bytes.buffer);
-}
-
-data.truth = heights(data.truth);
 
 // The page's own colours, for light or for dark paper; data has a pair of each of its colours.
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
 const paint = (name) => getComputedStyle(explorer).getPropertyValue(`--${name}`).trim();
 const onPaper = (pair) => pair[dark.matches ? 1 : 0];
 dark.addEventListener("change", () => draw());
-
-function frameOf(state) {
-  const frame = data.planners[state.planner].frames[state.frame];
-  if (typeof frame.mean === "string") {
-    frame.mean = heights(frame.mean);
-    frame.deviation = deviations(frame.deviation);
-  }
-  return frame;
-}
 
 // About `aim` round numbers between two ends.
 function roundNumbers(low, high, aim) {
@@ -70,7 +56,7 @@ function pen(canvas) {
 
 const canvas = explorer.querySelector("canvas");
 const slider = explorer.querySelector("input[type=range]");
-const view = data.z ? reliefView(canvas) : curveView(canvas);
+const view = viewOf(canvas);
 
 let isDue = false;
 function draw() {

@@ -1,6 +1,7 @@
 //! What the explorer shows: beliefs on a grid after many touch counts, in few bytes.
 
 use super::code::Code;
+use super::shell;
 use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
 use crate::gp::batch::Prediction;
@@ -19,8 +20,6 @@ use serde::Serialize;
 /// Most places along the side of a curve and of a surface; chosen as what shows at the size of the
 /// page.
 const PLACES_MAX: [usize; 2] = [301, 41];
-/// Most bytes that all frames may take; chosen to keep a page below three megabytes.
-const BYTES_MAX: usize = 1_600_000;
 /// Bytes of one place in one frame: two for the mean, two for the deviation, in base 64.
 const BYTES_OF_PLACE: usize = 6;
 /// Room above and below the heights of a curve, for its bands, and of a surface; chosen.
@@ -110,7 +109,8 @@ pub(super) fn data(run: &Run) -> anyhow::Result<Option<Data>> {
     let grid = Grid::new(run, PLACES_MAX[kind])?;
     let places: Vec<&[f64]> =
         grid.indices.iter().map(|&index| run.truth.places[index].as_slice()).collect();
-    let counts = counts(run, names.len() * places.len());
+    let (first, last) = (experiment.initial_touches, experiment.touches);
+    let counts = shell::counts(first, last, BYTES_OF_PLACE * names.len() * places.len());
     let mut beliefs = Vec::new();
     for &name in &names {
         let read = counts.par_iter().map(|&count| belief(run, name, count, &places));
@@ -202,16 +202,6 @@ impl Grid {
         let indices = rows.iter().flat_map(|j| picked.iter().map(move |i| j * side + i)).collect();
         Ok(Self { picked, indices })
     }
-}
-
-/// Touch counts with a frame: as many as there is room for, the first and the last among them.
-fn counts(run: &Run, places_of_all: usize) -> Vec<u32> {
-    let (first, last) = (run.experiment.initial_touches, run.experiment.touches);
-    let room = (BYTES_MAX / (BYTES_OF_PLACE * places_of_all.max(1))).max(2) as u32;
-    let step = (last - first + 1).div_ceil(room).max(1);
-    let mut counts: Vec<u32> = (first..last).step_by(step as usize).collect();
-    counts.push(last);
-    counts
 }
 
 fn belief(

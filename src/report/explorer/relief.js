@@ -15,41 +15,17 @@ function reliefView(canvas) {
   const sides = ends.map(([a, b]) => b - a);
   const contours = roundNumbers(low, high, 10);
   const contourStep = contours[1] - contours[0];
-  const scales = { height: heightScale(), deviation: deviationScale(), error: errorScale() };
+  const heightScale = { stops: data.colours.height, at: (value) => (value - low) / (high - low), ticks: roundNumbers(low, high, 6), words: "height" };
+  const scales = {
+    height: heightScale,
+    deviation: deviationScale(data.deviation_range),
+    error: errorScale(0.5 * (high - low), "error: belief too low | too high"),
+  };
   const size = Math.hypot(sides[0], sides[1] * stretch, sides[2]);
 
   function unit(v) {
     const length = Math.hypot(...v);
     return v.map((part) => part / length);
-  }
-
-  // Each colour scale: its stops, where a value lies from 0 to 1, values to label, words.
-  function heightScale() {
-    const at = (value) => (value - low) / (high - low);
-    return { stops: data.colours.height, at, ticks: roundNumbers(low, high, 6), words: "height" };
-  }
-  function deviationScale() {
-    const [least, most] = data.deviation_range;
-    const at = (value) => Math.log(value / least) / Math.log(most / least);
-    const ticks = [];
-    for (let power = -6; power < 7; power++) ticks.push(...[1, 3].map((digit) => digit * 10 ** power));
-    return { stops: data.colours.deviation, at, ticks, words: "standard deviation σ" };
-  }
-  // Finer towards zero, so that early and late errors are told apart on one scale.
-  function errorScale() {
-    const limit = 0.5 * (high - low);
-    const fine = (value) => Math.asinh(value / (0.03 * limit));
-    const at = (value) => 0.5 + 0.5 * fine(value) / fine(limit);
-    const powers = [0.01, 0.1, 1, 10, 100].filter((power) => power > 0.02 * limit && power <= limit);
-    const ticks = [...powers.flatMap((power) => [-3 * power, -power, power, 3 * power]), 0];
-    return { stops: data.colours.error, at, ticks, words: "error: belief too low | too high" };
-  }
-
-  function colour({ stops }, fraction) {
-    if (Number.isNaN(fraction)) return [205, 205, 205];
-    const place = Math.min(Math.max(fraction, 0), 1) * (stops.length - 1);
-    const below = Math.min(Math.floor(place), stops.length - 2);
-    return stops[below].map((from, i) => from + (place - below) * (stops[below + 1][i] - from));
   }
 
   // How space lies on the canvas now: orthographic, of one size from wherever it is seen.
@@ -168,48 +144,14 @@ function reliefView(canvas) {
     write(`z (${data.unit})`, project(x1, h0, z1), -8, -14, "right");
   }
 
-  function drawColours(context, width, height, scale) {
-    // Where there is no room for the words beside the bar, they stand above it.
-    const length = Math.min(320, width - 40);
-    const isNarrow = width < 720;
-    const [left, top] = [(width - length) / 2, height - 44];
-    for (let i = 0; i < length; i++) {
-      context.fillStyle = `rgb(${colour(scale, i / (length - 1)).map(Math.round)})`;
-      context.fillRect(left + i, top, 1.5, 12);
-    }
-    context.fillStyle = paint("ink");
-    context.textAlign = isNarrow ? "center" : "right";
-    const [wordsX, wordsY] = isNarrow ? [width / 2, top - 8] : [left - 12, top + 11];
-    context.fillText(`${scale.words} (${data.unit})`, wordsX, wordsY);
-    context.textAlign = "center";
-    for (const tick of scale.ticks) {
-      const fraction = scale.at(tick);
-      if (fraction < -1e-9 || fraction > 1 + 1e-9) continue;
-      context.fillRect(left + fraction * length - 0.5, top + 12, 1, 4);
-      context.fillText(label(tick), left + fraction * length, top + 29);
-    }
-  }
-
   // Touches so far: full in front of the surface, hollow behind it, a diamond for a miss.
   function drawTouches(context, project, frame, planner, isHidden) {
     const shown = data.planners[planner].contacts.slice(0, frame.touches);
     shown.forEach(([x, h, z], i) => {
       const pair = i < data.initial_touches ? data.colours.initial : data.colours.later;
-      // Points lie on the surface, which is as pale on dark paper.
-      const ink = h === null ? onPaper(pair) : pair[0];
       const point = project(x, h === null ? low : Math.min(Math.max(h, low), high), z);
-      const isFull = h !== null && !isHidden(point);
-      context.beginPath();
-      if (h === null) {
-        [[-5, 0], [0, -5], [5, 0], [0, 5], [-5, 0]].forEach(([dx, dy]) => context.lineTo(point[0] + dx, point[1] + dy));
-      } else {
-        context.arc(point[0], point[1], i === shown.length - 1 ? 6 : 4, 0, 7);
-      }
-      context.fillStyle = isFull ? ink : "rgba(255, 255, 255, .35)";
-      context.strokeStyle = isFull ? "#fff" : ink;
-      context.lineWidth = 1.3;
-      if (h !== null) context.fill();
-      context.stroke();
+      const kind = h === null ? "miss" : isHidden(point) ? "hidden" : "seen";
+      drawTouch(context, point, pair, kind, i === shown.length - 1);
     });
   }
 
@@ -249,22 +191,6 @@ function reliefView(canvas) {
     turn.elevation = Math.min(Math.max(turn.elevation + up, -30), 85);
     window.draw();
   }
-  canvas.addEventListener("pointerdown", (event) => {
-    turn.isDragged = true;
-    canvas.setPointerCapture(event.pointerId);
-  });
-  canvas.addEventListener("pointermove", (event) => {
-    if (turn.isDragged) turnBy(-0.4 * event.movementX, 0.4 * event.movementY);
-  });
-  canvas.addEventListener("lostpointercapture", () => {
-    turn.isDragged = false;
-    turnBy(0, 0);
-  });
-  canvas.addEventListener("keydown", (event) => {
-    const by = { ArrowLeft: [5, 0], ArrowRight: [-5, 0], ArrowUp: [0, 5], ArrowDown: [0, -5] }[event.key];
-    if (!by) return;
-    event.preventDefault();
-    turnBy(...by);
-  });
+  turnable(canvas, turn, turnBy);
   return draw;
 }

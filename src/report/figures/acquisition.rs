@@ -36,6 +36,9 @@ fn planner(run: &Run) -> Option<&str> {
 }
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
+    if run.experiment.scene.around.is_some() {
+        return Ok(None);
+    }
     let (Some(planner), Some(&count)) = (planner(run), run.experiment.drawn_touch_counts().first())
     else {
         return Ok(None);

@@ -37,6 +37,9 @@ const EQUAL_HEIGHT_PX: f64 = 340.0;
 const GAP: (f64, f64) = (22.0, 68.0);
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
+    if run.experiment.scene.around.is_some() {
+        return Ok(None);
+    }
     let zone = &run.experiment.scene.zone;
     let (planners, counts) = (run.experiment.drawn_planners(), run.experiment.drawn_touch_counts());
     if zone.dimension() != 1 || !planners.iter().any(|name| replay::row(run, name).is_some()) {

@@ -13,7 +13,7 @@ use crate::report::relief_panel::ReliefPanel;
 use crate::report::replay;
 use crate::report::replay::Replay;
 use crate::report::style;
-use crate::report::style::{INITIAL, LATER, PAPER};
+use crate::report::style::{INITIAL, LATER};
 use anyhow::ensure;
 
 /// Beliefs beside the true surface.
@@ -45,6 +45,9 @@ const FOOT_PX: f64 = 62.0;
 const BAR_LEFT_MIN_PX: f64 = 215.0;
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
+    if run.experiment.scene.around.is_some() {
+        return Ok(None);
+    }
     let (planners, counts) = (run.experiment.drawn_planners(), run.experiment.drawn_touch_counts());
     let Some(space) = space(run) else { return Ok(None) };
     if !planners.iter().any(|planner| replay::row(run, planner).is_some()) {
@@ -158,11 +161,12 @@ fn mark(
     match replay::contact(&run.experiment.scene.zone, touch) {
         Some((place, height)) => {
             let point = [place[0], height, place[1]];
-            let attributes = match relief.hides(&panel.view, point) {
-                true => hidden(colour),
-                false => visible(colour),
+            let at = panel.view.at(point);
+            let attributes = match relief.hides(at, panel.view.nearness(point)) {
+                true => style::hidden(colour),
+                false => style::visible(colour),
             };
-            canvas.circle(panel.view.at(point), 3.1, &attributes);
+            canvas.circle(at, 3.1, &attributes);
         }
         None => {
             let at = [touch.target[0], panel.space.height_m[0], touch.target[1]];
@@ -171,19 +175,11 @@ fn mark(
     }
 }
 
-fn visible(colour: &str) -> String {
-    format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".9""#)
-}
-
-fn hidden(colour: &str) -> String {
-    format!(r#"fill="{PAPER}" fill-opacity=".35" stroke="{colour}" stroke-width="1.1""#)
-}
-
 fn entries(run: &Run) -> Vec<(Swatch, &'static str)> {
     let mut entries = vec![
-        (Swatch::Circle(visible(INITIAL)), "initial touch"),
-        (Swatch::Circle(visible(LATER)), "later touch"),
-        (Swatch::Circle(hidden(LATER)), "behind the surface"),
+        (Swatch::Circle(style::visible(INITIAL)), "initial touch"),
+        (Swatch::Circle(style::visible(LATER)), "later touch"),
+        (Swatch::Circle(style::hidden(LATER)), "behind the surface"),
     ];
     entries.extend(miss_entry(run));
     entries

@@ -38,6 +38,9 @@ const WIDTH_MIN_PX: f64 = 420.0;
 const MARGIN: f64 = 0.12;
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
+    if run.experiment.scene.around.is_some() {
+        return Ok(None);
+    }
     let zone = &run.experiment.scene.zone;
     let Some(z_m) = zone.z_m else { return Ok(None) };
     let rows: Vec<_> = (run.experiment.drawn_planners().into_iter())

@@ -2,7 +2,7 @@
 
 use super::{Cell, Table, Verdict, titled, write_csv};
 use crate::experiment::comparison::Comparison;
-use crate::experiment::measure::{Direction, MEASURES, Measure};
+use crate::experiment::measure::{Direction, MEASURES, Measure, in_files};
 use crate::experiment::store::Run;
 use crate::report::number::{digits, with_interval};
 use schemars::JsonSchema;
@@ -45,7 +45,7 @@ pub fn tables(run: &Run, found: &[Comparison]) -> Vec<Table> {
 
 /// What the columns are.
 pub fn note(run: &Run) -> String {
-    let more: Vec<&str> = (MEASURES.iter())
+    let more: Vec<&str> = in_files(&run.rows)
         .filter(|measure| measure.direction == Direction::More)
         .map(|measure| measure.title)
         .collect();

@@ -105,7 +105,7 @@ pub fn text(run: &Run) -> String {
 /// and what a reader should know.
 pub fn json(run: &Run) -> Value {
     let counts = run.experiment.tabled_touch_counts();
-    let columns = columns(&run.experiment);
+    let columns = columns(&run.experiment, &run.rows);
     let lines = curve_table(&run.experiment, &run.rows, |count| counts.contains(&count));
     let lines = lines.into_iter().map(|CurveRecord { point, values }| {
         let values: Map<String, Value> =
@@ -148,7 +148,7 @@ pub fn write(run: &Run, folder: &Path) -> anyhow::Result<()> {
     let mut writer =
         csv::WriterBuilder::new().has_headers(false).from_path(&path).with_context(place)?;
     let header = ["planner", "touches", "trials"].map(String::from).into_iter();
-    writer.write_record(header.chain(columns(&run.experiment))).with_context(place)?;
+    writer.write_record(header.chain(columns(&run.experiment, &run.rows))).with_context(place)?;
     for CurveRecord { point, values } in curve_table(&run.experiment, &run.rows, |_| true) {
         let record = (&point.planner, point.touches, point.trials, values);
         writer.serialize(record).with_context(place)?;

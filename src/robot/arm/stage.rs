@@ -1,8 +1,9 @@
-//! A stage of three slides: the finger keeps its attitude and q is the position of `T` in `W`.
+//! A stage of three slides, with or without a wrist: the first three of q are the position of `T`
+//! in `W`.
 
 use super::chain::{Chain, Joint, Joints, Kind};
 use super::settings::tool;
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 
 /// Distance from the stage's mount to the origin of `T`; chosen, that of the arm.
 pub const MOUNT_M: f64 = 0.12;
@@ -16,25 +17,65 @@ const SPEED_M_S: f64 = 0.25;
 /// Largest acceleration; chosen.
 const ACCELERATION_M_S2: f64 = 1.0;
 
+/// Hinges about `T`, from the slides outwards: one more than attitudes need, so that the others
+/// turn the finger on where two of them fall into line. They turn without end.
+const WRIST: [(&str, [f64; 3]); 4] = [
+    ("A", [0.0, 0.0, 1.0]),
+    ("B", [1.0, 0.0, 0.0]),
+    ("C", [0.0, 1.0, 0.0]),
+    ("D", [1.0, 0.0, 0.0]),
+];
+
+/// So far that a hinge never comes to its end in a trial.
+const ENDLESS_RAD: f64 = 1e4;
+
+/// Largest speed and acceleration of a hinge; chosen, a finger's length from `T` somewhat more than
+/// those of the slides.
+const TURN_RAD_S: f64 = 3.0;
+const TURN_RAD_S2: f64 = 10.0;
+
 /// The stage with the middle of its travel, which is its home, at `p_wt` and the finger's
-/// attitude `r_wt`.
+/// attitude `r_wt`, which it keeps.
 pub fn stage(p_wt: Point3<f64>, r_wt: UnitQuaternion<f64>) -> Chain {
-    let axes = [("X", Vector3::x_axis()), ("Y", Vector3::y_axis()), ("Z", Vector3::z_axis())];
-    let joints = axes.iter().zip(p_wt.iter()).map(|(&(name, axis), middle)| Joint {
-        name,
-        kind: Kind::Prismatic,
-        origin_m: Vector3::zeros(),
-        axis,
-        q_limits: [middle - TRAVEL_M, middle + TRAVEL_M],
-        qdot_limit: SPEED_M_S,
-        qddot_limit: ACCELERATION_M_S2,
-    });
     let tool = tool(MOUNT_M);
     Chain {
         base: Isometry3::identity(),
-        joints: joints.collect(),
+        joints: slides(p_wt, TRAVEL_M).collect(),
         flange: Isometry3::from_parts(Default::default(), r_wt) * tool.inverse(),
         tool,
         home: Joints::from_fn(|i, _| p_wt.coords.get(i).copied().unwrap_or(0.0)),
     }
+}
+
+/// The stage with a wrist, which goes all around `middle_w` at distances up to `around_m`. Its home
+/// is at `p_wt` with the finger's attitude `r_wt`.
+pub fn stage_with_wrist(
+    (middle_w, around_m): (Point3<f64>, f64),
+    p_wt: Point3<f64>,
+    r_wt: UnitQuaternion<f64>,
+) -> Chain {
+    let hinges = WRIST.iter().map(|&(name, axis)| Joint {
+        name,
+        kind: Kind::Revolute,
+        origin_m: Vector3::zeros(),
+        axis: UnitVector3::new_unchecked(axis.into()),
+        q_limits: [-ENDLESS_RAD, ENDLESS_RAD],
+        qdot_limit: TURN_RAD_S,
+        qddot_limit: TURN_RAD_S2,
+    });
+    let joints = slides(middle_w, around_m + TRAVEL_M).chain(hinges).collect();
+    Chain { joints, ..stage(p_wt, r_wt) }
+}
+
+fn slides(middle_w: Point3<f64>, travel_m: f64) -> impl Iterator<Item = Joint> {
+    let axes = [("X", Vector3::x_axis()), ("Y", Vector3::y_axis()), ("Z", Vector3::z_axis())];
+    axes.into_iter().enumerate().map(move |(i, (name, axis))| Joint {
+        name,
+        kind: Kind::Prismatic,
+        origin_m: Vector3::zeros(),
+        axis,
+        q_limits: [middle_w[i] - travel_m, middle_w[i] + travel_m],
+        qdot_limit: SPEED_M_S,
+        qddot_limit: ACCELERATION_M_S2,
+    })
 }

@@ -54,6 +54,12 @@ impl Finger {
         8.75 / 7.0 * self.radius_m
     }
 
+    /// How far the hull reaches below the hemisphere's centre in `W`, when a frame `A` along whose
+    /// −y the finger approaches stands at `r_wa`; the soft skin's bulge is taken for its radius.
+    pub fn drop_m(&self, r_wa: &UnitQuaternion<f64>) -> f64 {
+        self.bulge_m() - (r_wa * self.axis_a()).z.min(0.0)
+    }
+
     /// Attitude of `T` in a frame `A` along whose −y the finger approaches: +x distal, towards −y
     /// and up by the pitch; the pad, −z, towards the object.
     pub fn r_at(&self) -> UnitQuaternion<f64> {

@@ -46,15 +46,18 @@ const SENSOR: &str = r#"  <sensor>
 /// The scene as MJCF: the arm or stage at its home (keyframe `home`) with the finger on it, the
 /// site `mount`, with a force/torque sensor if the scene has one, and `T` at the site `tip`; in a
 /// picture also the object at its pose on a vertical board, the floor, a camera and lights. None
-/// for a scene without a mesh.
+/// for a scene without a mesh, and for a stage that turns the finger, of which there is no model.
 pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     let mesh = environment.mesh()?;
     let chain = environment.chain()?;
+    if environment.scene().arm.is_none() && chain.turns() {
+        return None;
+    }
     let shown = mode == Mode::Picture;
     let collides = !shown && environment.scene().collides();
     let bumps = !shown && environment.scene().effects.collision.is_some();
     let scenery = match shown {
-        true => scenery::scenery(mesh, environment.task().zone(), &chain),
+        true => scenery::scenery(mesh, environment.task(), &chain),
         false if bumps => obstacle(environment)? + &surroundings::surroundings(environment.scene()),
         false if collides => obstacle(environment)?,
         false => String::new(),

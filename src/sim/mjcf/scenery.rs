@@ -4,7 +4,7 @@ use super::mesh::asset;
 use super::text::{list, pose};
 use crate::geometry::mesh::Mesh;
 use crate::robot::arm::Chain;
-use crate::task::Zone;
+use crate::task::Task;
 use nalgebra::{Point3, Translation3, Vector3};
 
 /// Thickness of the board that the object is fixed to, and how far it reaches beyond it.
@@ -17,9 +17,9 @@ const BESIDE: Vector3<f64> = Vector3::new(1.08, 0.45, 0.36);
 
 /// Two cameras: `front` sees the object from in front and above, `whole` from beside the finger
 /// all there is.
-pub(super) fn scenery(mesh: &Mesh, zone: &Zone, chain: &Chain) -> String {
+pub(super) fn scenery(mesh: &Mesh, task: &Task, chain: &Chain) -> String {
     // The board stands behind the object as the finger sees it.
-    let x_wz = zone.x_wz();
+    let x_wz = task.zone().x_wz();
     let (low, high) = mesh.transformed(&x_wz.inverse()).bounds();
     let middle_z = nalgebra::center(&low, &high);
     let half = (high - low) / 2.0;
@@ -28,6 +28,23 @@ pub(super) fn scenery(mesh: &Mesh, zone: &Zone, chain: &Chain) -> String {
     let floor_z = if is_upright { -x_wz.translation.z } else { f64::INFINITY };
     let (foot_z, top_z) = ((low.z - RIM_M).min(floor_z), high.z + RIM_M);
     let board = Translation3::new(middle_z.x, low.y - BOARD_M / 2.0, (foot_z + top_z) / 2.0);
+    let board_half_m = [half.x + RIM_M, BOARD_M / 2.0, (top_z - foot_z) / 2.0];
+    // Around a whole object stands what it stands on, from the floor up, or nothing.
+    let (board, board_half_m) = match task.ball().map(|ball| ball.lowest_m) {
+        None => (Some(board), board_half_m),
+        Some(lowest_m) => {
+            let height_m = lowest_m.filter(|lowest_m| *lowest_m > 0.0);
+            let stand = height_m.map(|z_m| Translation3::new(middle_z.x, middle_z.y, z_m / 2.0));
+            (stand, [half.x / 2.0, half.y / 2.0, height_m.unwrap_or(0.0) / 2.0])
+        }
+    };
+    let board = board.map_or_else(String::new, |board| {
+        format!(
+            r#"<geom name="board" type="box" {} size="{}" material="wood"/>"#,
+            pose(&(x_wz * board)),
+            list(board_half_m)
+        )
+    });
     let middle = x_wz * middle_z;
     let front = middle + x_wz.rotation * Vector3::new(0.9, 2.2, 0.7) * (4.0 * half.norm());
     // From the robot's foot to the object, or the object alone if the stage carries the finger.
@@ -63,13 +80,11 @@ pub(super) fn scenery(mesh: &Mesh, zone: &Zone, chain: &Chain) -> String {
     <body name="object">
       <geom name="object" type="mesh" mesh="object" material="porcelain"/>
     </body>
-    <geom name="board" type="box" {board} size="{board_size}" material="wood"/>
+    {board}
   </worldbody>
 "#,
         front = list(front.iter()),
         between = list(between.iter()),
         whole = list(whole.iter()),
-        board = pose(&(x_wz * board)),
-        board_size = list([half.x + RIM_M, BOARD_M / 2.0, (top_z - foot_z) / 2.0]),
     )
 }

@@ -7,6 +7,7 @@ use crate::geometry::sweep::Capsule;
 use crate::sim::Environment;
 use crate::sim::environment::{CLEARANCE_M, Shape};
 use crate::task::Approach;
+use crate::task::approach::BEYOND_M;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;
 
@@ -28,8 +29,9 @@ impl Probe for Cast {
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         refuse_unless_finite(approach)?;
         let found = rest(&self.environment, approach);
-        let turned_w =
-            || approach.p_far_w + approach.direction_w().scale(reach_m(&self.environment));
+        let turned_w = || {
+            approach.p_far_w + approach.direction_w().scale(beyond_m(&self.environment, approach))
+        };
         let p_wt = found.as_ref().map_or_else(turned_w, |rest| rest.p_wt);
         self.swept = Some(Swept { finger: self.environment.scene().finger.clone(), p_wt });
         self.tip = found
@@ -71,9 +73,18 @@ pub fn rest(environment: &Environment, approach: &Approach) -> Option<Rest> {
         false => approach.r_wt() * Vector3::x() * -finger.length_m,
     };
     let hull = Capsule { p0_w: start_w, p1_w: start_w + axis_w, radius_m: finger.radius_m };
-    let way_m = (approach.p_far_w - start_w).dot(&ahead_w) + reach_m;
+    let way_m = (approach.p_far_w - start_w).dot(&ahead_w) + beyond_m(environment, approach);
     let hit = bvh.sweep(&hull, &ahead_w, way_m)?;
     Some(Rest { p_wt: start_w + ahead_w.scale(hit.travel_m), hit })
+}
+
+/// How far behind all that may be touched the centre of the fingertip's hemisphere turns back:
+/// around an object as near as every body does, for there may be something below.
+fn beyond_m(environment: &Environment, approach: &Approach) -> f64 {
+    match approach.around {
+        Some(_) => environment.scene().finger.radius_m + BEYOND_M,
+        None => reach_m(environment),
+    }
 }
 
 /// How far in front of all that may be touched and behind it the centre of the fingertip's

@@ -1,6 +1,6 @@
 //! What a planner is judged by when it is held against what it was: one line to add one.
 
-use crate::experiment::measure::{CENTRED_R, RMSE};
+use crate::experiment::measure::{CENTRED_R, CHAMFER, RMSE};
 use crate::experiment::row::{TouchRow, TrialRow};
 
 /// A number of a trial, less of which is better.
@@ -41,6 +41,12 @@ fn log(value: f64) -> f64 {
     value.max(LEAST).ln()
 }
 
+/// The error that trials are judged by, in metres: over a zone the RMSE, around a whole object the
+/// Chamfer distance; none where it was not taken.
+fn error_m(row: &TrialRow, touches: u32) -> Option<f64> {
+    (RMSE.of)(row, touches).or_else(|| (CHAMFER.of)(row, touches))
+}
+
 fn share(row: &TrialRow, span: Span, is_it: fn(&TouchRow) -> bool) -> Option<f64> {
     let planned = row.touches.get(span.initial as usize..span.touches as usize)?;
     let count = planned.iter().filter(|touch| is_it(touch)).count();
@@ -52,20 +58,21 @@ fn share(row: &TrialRow, span: Span, is_it: fn(&TouchRow) -> bool) -> Option<f64
 pub static JUDGED: &[Judged] = &[
     Judged {
         id: "mean_log_rmse",
-        title: "mean log RMSE over the touches",
+        title: "mean log error over the touches",
         scale: Scale::Log,
         of: |row, span| {
             let after = span.initial.max(1)..=span.touches;
-            let logs = after.map(|n| (RMSE.of)(row, n).map(log));
-            let logs: Option<Vec<f64>> = logs.collect();
-            logs.map(|logs| logs.iter().sum::<f64>() / logs.len() as f64)
+            let whole = row.touches.len() >= span.touches as usize;
+            let logs = after.filter_map(|n| error_m(row, n).map(log));
+            let (count, sum) = logs.fold((0.0, 0.0), |(count, sum), log| (count + 1.0, sum + log));
+            (whole && count > 0.0).then(|| sum / count)
         },
     },
     Judged {
         id: "log_rmse",
-        title: "RMSE after the last touch",
+        title: "error after the last touch",
         scale: Scale::Log,
-        of: |row, span| (RMSE.of)(row, span.touches).map(log),
+        of: |row, span| error_m(row, span.touches).map(log),
     },
     Judged {
         id: "log_1_minus_centred_r",

@@ -134,6 +134,7 @@ pub(super) fn scene(period_s: f64) -> Scene {
     Scene {
         body: Body::Kinematic,
         function: None,
+        around: None,
         zone: Zone::new([-0.05, 0.05], Some([-0.05, 0.05])),
         object: None,
         finger: Finger::default(),

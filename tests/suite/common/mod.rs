@@ -12,3 +12,4 @@ pub mod quiet;
 pub mod runs;
 pub mod shapes;
 pub mod shipped;
+pub mod solids;

@@ -1,7 +1,11 @@
 //! One touch by a body that moves and feels: travel, tare, approach, settle, read, retract.
 
+mod arm_reach;
 mod contact_monitor;
+mod pace;
+mod round;
 mod trajectory;
+mod tryout;
 mod way;
 
 use super::{Contact, Probe, Swept, Touch, refuse_unless_finite};
@@ -10,13 +14,17 @@ use crate::explore::control::{Controller, Goal, posture};
 use crate::robot::Robot;
 use crate::robot::arm::ArmError;
 use crate::robot::finger::frame::FRAME_S;
-use crate::task::Approach;
 use crate::task::touch::TouchSettings;
+use crate::task::{Approach, KeepOut};
 use contact_monitor::{ApproachEnd, ContactMonitor};
-use nalgebra::Isometry3;
-use trajectory::StraightPath;
+use nalgebra::{Isometry3, UnitVector3, Vector3};
+use round::rounds;
+use trajectory::Path;
 
-pub use way::{BEYOND_M, OutOfReach, check_reach};
+pub use crate::task::approach::BEYOND_M;
+pub use arm_reach::ArmReach;
+use arm_reach::SETTLE_S;
+pub use way::{OutOfReach, check_reach};
 pub(super) use way::{standoff, turning_point};
 
 /// A movement has arrived when the tip is this near to its end; chosen: below what a touch
@@ -40,6 +48,8 @@ pub struct Servo {
     swept: Option<Swept>,
     /// Where the last contact was read.
     tip: Option<Isometry3<f64>>,
+    /// Of an arm, which tries a way around an object out before it goes.
+    reach: Option<ArmReach>,
 }
 
 /// What is kept of the last reading.
@@ -65,6 +75,7 @@ impl Servo {
             .map_err(|cause| Fault::NoCommand { time_s: 0.0, cause })?;
         let mut state = State::default();
         state.take(body.reset(seed)?)?;
+        let reach = ArmReach::new(&robot, &settings);
         Ok(Self {
             monitor: ContactMonitor::new(&settings, &robot.finger),
             command: Command { qdot: vec![0.0; robot.chain.joints.len()] },
@@ -75,6 +86,7 @@ impl Servo {
             state,
             swept: None,
             tip: None,
+            reach,
         })
     }
 
@@ -113,7 +125,18 @@ impl Servo {
         speed_m_s: f64,
         alert: bool,
     ) -> Result<Option<ApproachEnd>, Fault> {
-        let mut path = StraightPath::new(self.x_wt().translation.vector, to, speed_m_s);
+        let from = self.x_wt().translation.vector;
+        self.follow(phase, Path::straight(from, to, speed_m_s), alert)
+    }
+
+    /// Moves along `path`, until at its end or, if `alert`, until something is felt.
+    fn follow(
+        &mut self,
+        phase: &'static str,
+        mut path: Path,
+        alert: bool,
+    ) -> Result<Option<ApproachEnd>, Fault> {
+        let to = path.to();
         // From the first reading on: the clock of a real arm goes on while the next touch is
         // thought about.
         let mut deadline_s = None;
@@ -126,8 +149,9 @@ impl Servo {
             if let Some(end) = self.monitor.approach_end().filter(|_| alert) {
                 return Ok(Some(end));
             }
-            let away = self.x_wt().translation.vector - to.translation.vector;
-            if path.is_done() && away.norm() < ARRIVED_M {
+            let here = self.x_wt();
+            let away = here.translation.vector - to.translation.vector;
+            if path.is_done() && away.norm() < ARRIVED_M && path.has_turned(&here) {
                 return Ok(None);
             }
             if time_s > deadline_s {
@@ -147,6 +171,57 @@ impl Servo {
         }
         let back = Isometry3::from_parts(back_w.into(), here.rotation);
         self.go("the way back", back, self.settings.approach_m_s, false).map(|_| ())
+    }
+
+    /// Goes around what lies between two approaches to the stand-off `above`.
+    fn travel_around(
+        &mut self,
+        around: &KeepOut,
+        approach: &Approach,
+        above: Isometry3<f64>,
+    ) -> Result<(), Fault> {
+        let ahead_t = approach.r_at.inverse() * -Vector3::y_axis();
+        self.leave(around, &ahead_t)?;
+        let q = self.robot.chain.joints_from(&self.state.q);
+        let planned = self.reach.as_ref().zip(q).and_then(|(reach, q)| reach.plan(&q, approach));
+        for to in planned.unwrap_or_else(|| vec![above]) {
+            let here = self.x_wt();
+            for round in rounds(around, here, to, &self.robot.finger, &approach.r_at) {
+                let path = Path::round(round, self.settings.travel_m_s);
+                self.follow("the stand-off", path, false)?;
+            }
+            if self.reach.as_ref().is_some_and(|reach| reach.home() == to) {
+                self.settle_at_home(to)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Stands with the tip at home until the joints are home too, from where an arm comes to all
+    /// that it reaches.
+    fn settle_at_home(&mut self, home: Isometry3<f64>) -> Result<(), Fault> {
+        let until_s = self.state.time_s + SETTLE_S;
+        while self.state.time_s < until_s {
+            let q = self.robot.chain.joints_from(&self.state.q);
+            if self.reach.as_ref().zip(q).is_none_or(|(reach, q)| reach.is_home(&q)) {
+                break;
+            }
+            self.tick(&Goal::still(home))?;
+        }
+        Ok(())
+    }
+
+    /// Goes straight back out of the sphere the way the finger points, where the tip is in it:
+    /// after a touch that was broken off there may be something beside it.
+    fn leave(&mut self, around: &KeepOut, ahead_t: &UnitVector3<f64>) -> Result<(), Fault> {
+        let here = self.x_wt();
+        let p_wt = here.translation.vector.into();
+        if around.depth_m(&p_wt) < DEEPER_M {
+            return Ok(());
+        }
+        let out_w = around.entrance_w(&p_wt, &(here.rotation * ahead_t));
+        let out = Isometry3::from_parts(out_w.coords.into(), here.rotation);
+        self.go("the way back", out, self.settings.approach_m_s, false).map(|_| ())
     }
 
     /// Why a movement to `to` has not ended in its time.
@@ -217,8 +292,13 @@ impl Probe for Servo {
         refuse_unless_finite(approach)?;
         let TouchSettings { travel_m_s, approach_m_s, .. } = self.settings;
         let above = standoff(&self.robot, self.settings.standoff_m, approach);
-        self.withdraw(approach, &above)?;
-        self.go("the stand-off", above, travel_m_s, false)?;
+        match &approach.around {
+            Some(around) => self.travel_around(around, approach, above)?,
+            None => {
+                self.withdraw(approach, &above)?;
+                self.go("the stand-off", above, travel_m_s, false)?;
+            }
+        }
         self.rest(above, self.monitor.frames_of_tare())?;
         self.monitor.tare();
         let below = turning_point(&self.robot, approach);

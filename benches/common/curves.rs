@@ -1,0 +1,100 @@
+//! Curves over the number of touches that benches measure: timed, printed with their exponents, and
+//! drawn with the laws that are expected.
+
+use palpate::report::axes::{Axis, Panel};
+use palpate::report::canvas::{Area, Canvas};
+use palpate::report::legend::{Legend, Swatch};
+use palpate::report::{png, style};
+use std::path::Path;
+use std::time::Instant;
+
+/// One measured quantity over the counts.
+pub struct Curve {
+    pub name: &'static str,
+    pub colour: &'static str,
+    /// The power of n that its operations or its numbers grow with.
+    pub expected: f64,
+    pub values: Vec<(f64, f64)>,
+}
+
+/// Seconds of one call: the least of three rounds that last some ten milliseconds each, or of one
+/// call that lasts longer than a second.
+pub fn seconds(mut work: impl FnMut()) -> f64 {
+    let begun = Instant::now();
+    work();
+    let once = begun.elapsed().as_secs_f64();
+    if once > 1.0 {
+        return once;
+    }
+    let repeats = (0.01 / once).clamp(1.0, 1e5) as u32;
+    let round = |_| {
+        let begun = Instant::now();
+        (0..repeats).for_each(|_| work());
+        begun.elapsed().as_secs_f64() / f64::from(repeats)
+    };
+    (0..3).map(round).fold(once, f64::min)
+}
+
+/// Exponent between the last two counts.
+fn exponent(curve: &Curve) -> f64 {
+    match curve.values.as_slice() {
+        [.., (n, before), (m, after)] => (after / before).ln() / (m / n).ln(),
+        _ => f64::NAN,
+    }
+}
+
+/// Panels below each other.
+fn drawn(panels: &[(&str, &[Curve])]) -> Option<String> {
+    let stroke = |curve: &Curve| style::stroke(curve.colour, 2.0);
+    // All panels use the same colours, and the first has them all.
+    let entries = panels[0].1.iter().map(|curve| (Swatch::Line(stroke(curve)), curve.name));
+    let legend = Legend::new(640.0, entries);
+    let first = Area { left: 80.0, top: 50.0 + legend.more_px(), width: 640.0, height: 340.0 };
+    let second = Area { top: first.bottom() + 70.0, height: 220.0, ..first };
+    let areas = [first, second];
+    let last = areas.get(panels.len().checked_sub(1)?)?;
+    let mut canvas = Canvas::new(760.0, last.bottom() + 60.0);
+    legend.draw(&mut canvas, [80.0, 24.0]);
+    for ((unit, curves), area) in panels.iter().zip(areas) {
+        let points = || curves.iter().flat_map(|curve| &curve.values);
+        let x = Axis::log(points().map(|(n, _)| *n))?;
+        let y = Axis::log(points().map(|(_, value)| *value))?;
+        let panel = Panel { area, x, y };
+        panel.frame(&mut canvas);
+        panel.label(&mut canvas, "", "touches n", unit);
+        for curve in *curves {
+            panel.curve(&mut canvas, &curve.values, &stroke(curve));
+            if let Some((last, value)) = curve.values.last() {
+                let law = |(n, _): &(f64, f64)| (*n, value * (n / last).powf(curve.expected));
+                let upper = curve.values.iter().filter(|(n, _)| *n >= last / 10.0);
+                let law: Vec<(f64, f64)> = upper.map(law).collect();
+                panel.curve(&mut canvas, &law, &style::dashed(style::FAINT_INK, 1.0, "4 4"));
+            }
+        }
+    }
+    Some(canvas.finish())
+}
+
+pub fn print(unit: &str, curves: &[Curve]) {
+    let counts: String =
+        (curves.iter()).max_by_key(|curve| curve.values.len()).map_or(String::new(), |curve| {
+            curve.values.iter().map(|(n, _)| format!("{n:>10}")).collect()
+        });
+    println!("{:<34}{counts}", format!("{unit} at n ="));
+    for curve in curves {
+        let cells: String =
+            curve.values.iter().map(|(_, value)| format!("{value:>10.2e}")).collect();
+        let (measured, expected) = (exponent(curve), curve.expected);
+        println!("{:<34}{cells}   n^{measured:.2}, expected n^{expected}", curve.name);
+    }
+}
+
+/// Draws up to two panels as `docs/NAME.svg` and `.png`.
+pub fn draw(name: &str, panels: &[(&str, &[Curve])]) -> anyhow::Result<()> {
+    if let Some(svg) = drawn(panels) {
+        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+        std::fs::write(docs.join(name).with_extension("png"), png::render(&svg)?)?;
+        std::fs::write(docs.join(name).with_extension("svg"), svg)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,76 @@
+//! An exploration in the hands of whoever asks: touch by touch, with the belief after each.
+
+use crate::belief::Belief;
+use crate::known::{Known, Measured, True};
+use crate::scene::{Scene, Touch};
+use crate::{errors, exploration};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::{Mutex, PoisonError};
+
+/// A scene that is explored touch by touch: each is taken into a belief, which is fitted and can be
+/// held against the truth.
+#[pyclass(frozen, module = "palpate")]
+pub(crate) struct Exploration {
+    scene: Py<Scene>,
+    known: Mutex<Known>,
+    truth: True,
+}
+
+/// Cells along the longest side of a believed surface that is measured, as where nobody says how
+/// many.
+const CELLS: u32 = 64;
+
+#[pymethods]
+impl Exploration {
+    #[new]
+    fn new(py: Python<'_>, scene: Py<Scene>) -> Self {
+        let environment = scene.get().environment();
+        let (known, truth) = py.detach(|| {
+            (Known::nothing(environment), True::of(environment, exploration::TRUTH_PER_SIDE))
+        });
+        Self { known: Mutex::new(known), truth, scene }
+    }
+
+    /// Touches at a target, and fits the belief.
+    fn touch(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<Touch> {
+        let (touch, told) = self.scene.get().touched(py, target.clone())?;
+        let fitted = py.detach(|| {
+            let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+            known.observe(&target, &told.approach, (&told.touch, told.swept.as_ref()));
+            known.refit()
+        });
+        fitted.map_err(errors::other)?;
+        Ok(touch)
+    }
+
+    /// What is known now.
+    #[getter]
+    fn belief(&self) -> Belief {
+        Belief(self.known.lock().unwrap_or_else(PoisonError::into_inner).clone())
+    }
+
+    /// How near the belief is to the truth, by the names of rows; None before the first touch.
+    #[getter]
+    fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let measured = py.detach(|| {
+            let known = self.known.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            self.truth.measure(&known, CELLS)
+        });
+        let json = match measured {
+            Some(Measured::Zone(metrics)) => serde_json::to_value(metrics),
+            Some(Measured::Around(metrics)) => serde_json::to_value(metrics),
+            None => return Ok(None),
+        };
+        let told = PyDict::new(py);
+        for (name, value) in json.map_err(errors::other)?.as_object().into_iter().flatten() {
+            told.set_item(name, value.as_f64())?;
+        }
+        Ok(Some(told))
+    }
+
+    fn __repr__(&self) -> String {
+        let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        format!("Exploration({} touches)", known.targets().0.len())
+    }
+}

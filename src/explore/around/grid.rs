@@ -1,0 +1,146 @@
+//! The zero set of a field as triangles: surface nets (Gibson 1998) on a grid that is fine only
+//! near the surface.
+
+use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
+use nalgebra::{Point3, Vector3};
+use ndshape::{RuntimeShape, Shape};
+
+/// Cells along a block of the coarsest grid.
+const COARSEST: usize = 4;
+
+/// A block is looked into while a corner's value may reach zero within it: of a field whose
+/// gradient is no longer than this times a distance's. Chosen.
+const STEEPEST: f64 = 1.2;
+
+/// Values at the corners of cells; NaN where nobody asked.
+struct Grid<F> {
+    value: F,
+    low: Point3<f64>,
+    cell_m: f64,
+    /// Corners along each axis.
+    count: [usize; 3],
+    values: Vec<f32>,
+}
+
+/// Vertices and triangles of the zeros of `value`, metres, in a box with cells of `cell_m`; closed,
+/// because what reaches the box is cut off there.
+pub fn zero_set(
+    [low, high]: [Point3<f64>; 2],
+    cell_m: f64,
+    value: impl FnMut(&Point3<f64>) -> f64,
+) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+    // A cell of air on every side, and whole blocks.
+    let low = low.map(|x| x - cell_m);
+    let blocks = (high - low).map(|x| (x / cell_m).ceil() as usize + 1);
+    let count = <[usize; 3]>::from(blocks).map(|cells| cells.div_ceil(COARSEST) * COARSEST + 1);
+    let values = vec![f32::NAN; count.iter().product()];
+    let mut grid = Grid { value, low, cell_m, count, values };
+    let mut blocks = grid.coarsest();
+    let mut side = COARSEST;
+    while side > 1 {
+        blocks.retain(|block| grid.may_cross(*block, side));
+        side /= 2;
+        blocks = blocks.iter().flat_map(|block| corners(*block, side)).collect();
+    }
+    for block in &blocks {
+        grid.corner_values(*block, 1);
+    }
+    let shape = RuntimeShape::<u32, 3>::new(count.map(|n| n as u32));
+    debug_assert_eq!(shape.size() as usize, grid.values.len());
+    let mut buffer = SurfaceNetsBuffer::default();
+    surface_nets(&grid.values, &shape, [0; 3], count.map(|n| n as u32 - 1), &mut buffer);
+    let at = |p: &[f32; 3]| low + Vector3::from(p.map(f64::from)) * cell_m;
+    (buffer.positions.iter().map(at).collect(), buffer.indices.as_chunks().0.to_vec())
+}
+
+/// The eight corners of a block of `side` cells, or the blocks of that side in one of twice that.
+fn corners([i, j, k]: [usize; 3], side: usize) -> impl Iterator<Item = [usize; 3]> {
+    (0..8).map(move |c| [i + side * (c & 1), j + side * (c >> 1 & 1), k + side * (c >> 2)])
+}
+
+impl<F: FnMut(&Point3<f64>) -> f64> Grid<F> {
+    fn coarsest(&self) -> Vec<[usize; 3]> {
+        let [x, y, z] = self.count.map(|n| (0..n - 1).step_by(COARSEST));
+        let rows = z.flat_map(|k| y.clone().map(move |j| (j, k)));
+        rows.flat_map(|(j, k)| x.clone().map(move |i| [i, j, k])).collect()
+    }
+
+    fn index(&self, [i, j, k]: [usize; 3]) -> usize {
+        (k * self.count[1] + j) * self.count[0] + i
+    }
+
+    /// The value at a corner; on the rim of the box never inside.
+    fn ask(&mut self, corner: [usize; 3]) -> f32 {
+        let index = self.index(corner);
+        if self.values[index].is_nan() {
+            let steps = Vector3::from(corner.map(|i| i as f64));
+            let value = (self.value)(&(self.low + steps * self.cell_m)) as f32;
+            let is_rim = corner.iter().zip(self.count).any(|(&i, n)| i == 0 || i + 1 == n);
+            let least = if is_rim { 1e-3 * self.cell_m as f32 } else { f32::NEG_INFINITY };
+            self.values[index] = value.max(least);
+        }
+        self.values[index]
+    }
+
+    /// Least and greatest value at the corners of a block.
+    fn corner_values(&mut self, block: [usize; 3], side: usize) -> [f32; 2] {
+        corners(block, side).fold(
+            [f32::INFINITY, f32::NEG_INFINITY],
+            |[least, greatest], corner| {
+                let value = self.ask(corner);
+                [least.min(value), greatest.max(value)]
+            },
+        )
+    }
+
+    /// Whether the surface may cross a block; if not, its corners' sign is written all over it.
+    fn may_cross(&mut self, block @ [i, j, k]: [usize; 3], side: usize) -> bool {
+        let [least, greatest] = self.corner_values(block, side);
+        let reach = (STEEPEST * side as f64 * self.cell_m) as f32;
+        if least < reach && greatest > -reach {
+            return true;
+        }
+        let far = if least > 0.0 { least } else { greatest };
+        for c in k..=k + side {
+            for b in j..=j + side {
+                for a in i..=i + side {
+                    let index = self.index([a, b, c]);
+                    if self.values[index].is_nan() {
+                        self.values[index] = far;
+                    }
+                }
+            }
+        }
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::zero_set;
+    use nalgebra::Point3;
+    use std::collections::HashMap;
+
+    /// Every edge has a triangle on either side, also where the box cuts the surface off, on
+    /// whichever side; and what is not cut off is where it should be.
+    #[test]
+    fn surfaces_are_closed() {
+        for centre in [[0.0; 3], [0.05, 0.0, 0.0], [-0.05, 0.02, 0.05], [0.0, 0.05, -0.05]] {
+            let centre = Point3::from(centre);
+            let corners = [Point3::from([-0.06; 3]), Point3::from([0.06; 3])];
+            let (vertices, triangles) = zero_set(corners, 0.004, |p| (p - centre).norm() - 0.04);
+            assert!(triangles.len() > 100);
+            let mut edges: HashMap<[u32; 2], i32> = HashMap::new();
+            for [a, b, c] in triangles {
+                for [from, to] in [[a, b], [b, c], [c, a]] {
+                    *edges.entry([from.min(to), from.max(to)]).or_default() +=
+                        if from < to { 1 } else { -1 };
+                }
+            }
+            assert!(edges.values().all(|&turns| turns == 0), "{centre}");
+            let off_m = |p: &Point3<f64>| ((p - centre).norm() - 0.04).abs();
+            let inside = vertices.iter().filter(|p| p.coords.amax() < 0.055);
+            assert!(inside.map(off_m).fold(0.0, f64::max) < 0.002, "{centre}");
+        }
+    }
+}

@@ -1,0 +1,16 @@
+// Beliefs of heights over a zone, decoded when they are first shown.
+"use strict";
+
+function frameOf(state) {
+  const frame = data.planners[state.planner].frames[state.frame];
+  if (typeof frame.mean === "string") {
+    frame.mean = numbers(frame.mean, data.height_range);
+    frame.deviation = deviations(frame.deviation);
+  }
+  return frame;
+}
+
+function viewOf(canvas) {
+  data.truth = numbers(data.truth, data.height_range);
+  return data.z ? reliefView(canvas) : curveView(canvas);
+}

@@ -1,0 +1,95 @@
+//! Beliefs of whole objects, as closed surfaces: to turn on the page, as a figure, as files.
+//!
+//! What is drawn is given as plain triangles with numbers at their vertices, in `W` and metres.
+//! Where they are from is not known here.
+
+mod codes;
+mod data;
+mod export;
+mod figure;
+mod section;
+
+pub use figure::{Colour, Side, figure};
+pub use section::{counts, section};
+
+use crate::geometry::solids::Triangles;
+use anyhow::{Context, bail, ensure};
+use nalgebra::{Point3, Vector3};
+
+/// What a planner's touches made of an object.
+#[derive(Clone, Debug, Default)]
+pub struct Sequence {
+    /// Whose.
+    pub planner: String,
+    /// Every touch, in order.
+    pub touches: Vec<Touch>,
+    /// What was believed, by rising touch counts.
+    pub frames: Vec<Frame>,
+}
+
+/// A touch.
+#[derive(Clone, Copy, Debug)]
+pub struct Touch {
+    /// The point aimed at.
+    pub aim_w: Point3<f64>,
+    /// The unit vector along which the finger went.
+    pub along_w: Vector3<f64>,
+    /// Where it met the object; none for a miss or a touch broken off.
+    pub contact_w: Option<Point3<f64>>,
+    /// Whether it is one that every planner begins with.
+    pub is_initial: bool,
+}
+
+/// A believed surface.
+#[derive(Clone, Debug, Default)]
+pub struct Frame {
+    /// After how many touches.
+    pub touches: u32,
+    /// Vertices in `W`, in metres, and triangles of them, counter-clockwise seen from outside;
+    /// empty if there is no surface.
+    pub mesh: Triangles,
+    /// Standard deviation of the surface along its normal at each vertex, in metres; one that is
+    /// not finite is not known.
+    pub sd_m: Vec<f64>,
+    /// Distance of each vertex from the true surface in metres, negative inside the true object;
+    /// empty if the truth is not known.
+    pub error_m: Vec<f64>,
+    /// How well it agrees with the truth, in words; may be empty.
+    pub score: String,
+}
+
+impl Sequence {
+    /// # Errors
+    /// If a frame has more touches than there are, or its numbers are not those of its mesh.
+    fn check(&self) -> anyhow::Result<()> {
+        for frame in &self.frames {
+            let place = || format!("{} after {} touches", self.planner, frame.touches);
+            let known = self.touches.len();
+            ensure!(frame.touches as usize <= known, "{}: {known} touches are known", place());
+            frame.check().with_context(place)?;
+        }
+        Ok(())
+    }
+
+    /// The touches before a frame.
+    fn touches(&self, frame: &Frame) -> &[Touch] {
+        self.touches.get(..frame.touches as usize).unwrap_or(&self.touches)
+    }
+}
+
+impl Frame {
+    /// # Errors
+    /// If its numbers are not those of its mesh.
+    fn check(&self) -> anyhow::Result<()> {
+        let (vertices, triangles) = &self.mesh;
+        let (count, sds, errors) = (vertices.len(), self.sd_m.len(), self.error_m.len());
+        ensure!(sds == count, "{sds} standard deviations of {count} vertices");
+        ensure!(errors == count || errors == 0, "{errors} errors of {count} vertices");
+        let is_finite = vertices.iter().all(|p_w| p_w.coords.iter().all(|x_m| x_m.is_finite()));
+        ensure!(is_finite, "a vertex that is not finite");
+        match triangles.as_flattened().iter().find(|&&vertex| vertex as usize >= count) {
+            Some(vertex) => bail!("vertex {vertex} of {count}, counted from 0"),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! Beliefs of whole objects as they were: recorded touches and hyperparameters, conditioned again
+//! and made to surfaces.
+
+use super::number::digits;
+use super::replay;
+use super::solid::{Frame, Sequence, Touch as Mark, counts, section as solid_section};
+use crate::experiment::Experiment;
+use crate::experiment::row::{TouchRow, TrialRow};
+use crate::experiment::shape::ShapeMetrics;
+use crate::experiment::store::Run;
+use crate::explore::around::{Belief, Scope};
+use crate::explore::probe::{Contact, Swept, Touch};
+use crate::geometry::bvh::MeshBvh;
+use crate::geometry::coarse::coarse;
+use crate::sim::environment::Shape;
+use crate::sim::{Environment, Scene};
+use crate::task::{Aim, Task};
+use anyhow::{Context, ensure};
+use nalgebra::{Point3, Vector3};
+
+/// Triangles of a surface that is drawn; chosen, so that a page stays a few megabytes.
+const TRIANGLES: usize = 3000;
+
+/// The true surface, if the object's file is still there.
+pub fn truth(scene: &Scene) -> Option<MeshBvh> {
+    match Environment::build(scene.clone()).ok()?.shape() {
+        Shape::Mesh { bvh, .. } => Some(bvh.clone()),
+        Shape::Function(_) => None,
+    }
+}
+
+/// The part of the page that moves; empty of a run over a zone.
+///
+/// # Errors
+/// If the recorded touches do not belong to the object or cannot be conditioned on.
+pub fn section(run: &Run) -> anyhow::Result<String> {
+    let experiment = &run.experiment;
+    if experiment.scene.around.is_none() {
+        return Ok(String::new());
+    }
+    let truth = truth(&experiment.scene);
+    let planners = experiment.drawn_planners();
+    let counts = counts(experiment.initial_touches, experiment.touches, planners.len(), TRIANGLES);
+    let sequences = sequences(run, &planners, &counts, truth.as_ref())?;
+    let mesh = truth.as_ref().map(|bvh| &**bvh.mesh());
+    solid_section(&sequences, mesh, experiment.report.trial)
+}
+
+/// What `planners` made of the object in the trial that the report draws, after `counts` touches;
+/// `truth` gives the errors.
+///
+/// # Errors
+/// If the recorded touches do not belong to the object or cannot be conditioned on.
+pub fn sequences(
+    run: &Run,
+    planners: &[&str],
+    counts: &[u32],
+    truth: Option<&MeshBvh>,
+) -> anyhow::Result<Vec<Sequence>> {
+    let rows = planners.iter().filter_map(|planner| replay::row(run, planner));
+    rows.map(|row| sequence(&run.experiment, row, counts, truth)).collect()
+}
+
+fn sequence(
+    experiment: &Experiment,
+    row: &TrialRow,
+    counts: &[u32],
+    truth: Option<&MeshBvh>,
+) -> anyhow::Result<Sequence> {
+    let place = |count: usize| format!("trial {} of {}, touch {count}", row.trial, row.planner);
+    let mut sequence = Sequence { planner: row.planner.clone(), ..Sequence::default() };
+    for (i, touch) in row.touches.iter().enumerate() {
+        let aim = Aim::of(&touch.target)
+            .with_context(|| format!("{}: a target that aims at nothing", place(i + 1)))?;
+        sequence.touches.push(Mark {
+            aim_w: aim.p_w,
+            along_w: *aim.ahead_w,
+            contact_w: touch.contact.map(Point3::from),
+            is_initial: i < experiment.initial_touches as usize,
+        });
+    }
+    for &count in counts {
+        let of = || format!("{} cannot be drawn", place(count as usize));
+        sequence.frames.extend(frame(experiment, row, count, truth, TRIANGLES).with_context(of)?);
+    }
+    Ok(sequence)
+}
+
+/// The belief after `count` touches, made coarser if it has more than `most` triangles; none if the
+/// trial ended before, or had no fit then.
+///
+/// # Errors
+/// If its touches cannot be conditioned on.
+pub fn frame(
+    experiment: &Experiment,
+    row: &TrialRow,
+    count: u32,
+    truth: Option<&MeshBvh>,
+    most: usize,
+) -> anyhow::Result<Option<Frame>> {
+    let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
+    let Some(belief) = belief(experiment, touches)? else { return Ok(None) };
+    let Some(surface) = belief.surface() else { return Ok(None) };
+    let mesh = surface.mesh(experiment.space.cells).map(|mesh| coarse(&mesh, most));
+    let mesh = mesh.unwrap_or_default();
+    let error = |bvh: &MeshBvh, p_w: &Point3<f64>| {
+        let distance_m = bvh.closest_point(p_w).distance_m;
+        if bvh.surrounds(p_w) { -distance_m } else { distance_m }
+    };
+    Ok(Some(Frame {
+        touches: count,
+        sd_m: surface.offsets_m(&mesh.0),
+        error_m: truth.map_or(Vec::new(), |bvh| mesh.0.iter().map(|p_w| error(bvh, p_w)).collect()),
+        score: touches
+            .last()
+            .and_then(|touch| Some(score(touch.shape.as_ref()?)))
+            .unwrap_or_default(),
+        mesh,
+    }))
+}
+
+/// What was believed after `touches`; none without a fit then.
+///
+/// # Errors
+/// If they do not belong to the object or cannot be conditioned on.
+pub fn belief(experiment: &Experiment, touches: &[TouchRow]) -> anyhow::Result<Option<Belief>> {
+    let Some(fit) = touches.last().and_then(|touch| touch.fit.as_ref()) else { return Ok(None) };
+    let before = touches.len().checked_sub(2).and_then(|i| touches[i].fit.as_ref());
+    let scene = &experiment.scene;
+    let ball = scene.around.as_ref().and_then(|around| around.ball());
+    let ball = ball.context("the ball of [around] is not written out")?;
+    let task = Task::around(ball, scene.touch.clone(), &scene.finger);
+    let scope = Scope::of(&task, &scene.finger).context("a task without a ball")?;
+    let ball = scope.ball.clone();
+    let mut belief = Belief::new(scope, experiment.space.clone());
+    for touch in touches {
+        let aim = Aim::of(&touch.target).context("a target that aims at nothing")?;
+        // However the finger was rolled, it went the same way.
+        let approach = ball.approach(&aim, &scene.finger, scene.touch.standoff_m, 0.0);
+        let swept =
+            touch.tip.map(|tip| Swept { finger: scene.finger.clone(), p_wt: Point3::from(tip) });
+        belief.observe(&aim, &approach, (&met(touch)?, swept.as_ref()));
+    }
+    belief.condition(before, fit)?;
+    Ok(Some(belief))
+}
+
+fn met(touch: &TouchRow) -> anyhow::Result<Touch> {
+    Ok(match (touch.contact, touch.normal) {
+        (Some(p_wc), normal) => {
+            ensure!(normal.is_some(), "a contact without its normal");
+            let normal_w = normal.map_or_else(Vector3::zeros, Vector3::from);
+            Touch::Contact(Contact { p_wc: Point3::from(p_wc), normal_w })
+        }
+        (None, _) if touch.overload => Touch::Overload,
+        (None, _) => Touch::Miss,
+    })
+}
+
+/// How near a belief is to the truth, in words.
+pub fn score(shape: &ShapeMetrics) -> String {
+    let chamfer = shape
+        .chamfer_m
+        .map_or("no surface".into(), |chamfer_m| format!("Chamfer {} mm", digits(1e3 * chamfer_m)));
+    format!("{chamfer}, F {:.2} at 1 %", shape.f_1)
+}

@@ -1,0 +1,213 @@
+//! A whole object inside a ball, touched from any side.
+
+use super::approach::{Approach, BEYOND_M, KeepOut, chord_m};
+use crate::config::{Checked, Rules};
+use crate::robot::Finger;
+use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Table `[around]`: the ball in which there is something to touch. Stands in place of a zone.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Around {
+    /// Centre of the ball in `W`. Left out, a simulation takes the middle of the box that its
+    /// object spans; a real robot must be told.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub centre_m: Option<[f64; 3]>,
+    /// Radius of the ball. Left out, a simulation takes a tenth more than half the diagonal of
+    /// that box; a real robot must be told.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_m: Option<f64>,
+    /// Lowest z in `W` to which the finger's hull may come, above what the object stands on. Left
+    /// out, nothing is below the object.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lowest_m: Option<f64>,
+}
+
+/// Farthest centre of a ball; far beyond any arm's reach.
+const REACH_M: f64 = 1e3;
+
+impl Checked for Around {
+    fn check(&self, rules: &mut Rules) {
+        if let Some(centre_m) = self.centre_m {
+            rules.numbers("centre_m", &centre_m, -REACH_M..=REACH_M);
+        }
+        if let Some(radius_m) = self.radius_m {
+            rules.number("radius_m", radius_m, 1e-4..=10.0);
+        }
+        if let Some(lowest_m) = self.lowest_m {
+            rules.number("lowest_m", lowest_m, -REACH_M..=REACH_M);
+        }
+    }
+}
+
+impl Around {
+    /// The ball it says, if it does.
+    pub fn ball(&self) -> Option<Ball> {
+        let centre_w = self.centre_m?.into();
+        Some(Ball { centre_w, radius_m: self.radius_m?, lowest_m: self.lowest_m })
+    }
+}
+
+/// Where there is something to touch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ball {
+    /// Its centre in `W`.
+    pub centre_w: Point3<f64>,
+    /// Its radius.
+    pub radius_m: f64,
+    /// Lowest z in `W` to which the finger's hull may come; none where nothing is below.
+    pub lowest_m: Option<f64>,
+}
+
+/// What a planner asks for around an object: to go straight at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    /// The point, in `W`.
+    pub p_w: Point3<f64>,
+    /// Which way the finger goes, in `W`.
+    pub ahead_w: UnitVector3<f64>,
+}
+
+impl Aim {
+    /// At `p_w` against the outward direction `outward_w`; along −z where that has no length.
+    pub fn against(p_w: Point3<f64>, outward_w: &Vector3<f64>) -> Self {
+        let down_w = -Vector3::z_axis();
+        Self { p_w, ahead_w: UnitVector3::try_new(-outward_w, 1e-12).unwrap_or(down_w) }
+    }
+
+    /// As a row writes it: the point's x, y, z, then the direction's.
+    pub fn target(&self) -> Vec<f64> {
+        self.p_w.coords.iter().chain(self.ahead_w.iter()).copied().collect()
+    }
+
+    /// From what a row writes; none unless it is six finite numbers with a direction among them.
+    pub fn of(target: &[f64]) -> Option<Self> {
+        let &[x, y, z, u, v, w] = target else { return None };
+        let p_w = Point3::new(x, y, z);
+        let ahead_w = UnitVector3::try_new(Vector3::new(u, v, w), 1e-6)?;
+        let is_finite = p_w.iter().chain(ahead_w.iter()).all(|number| number.is_finite());
+        is_finite.then_some(Self { p_w, ahead_w })
+    }
+}
+
+impl Ball {
+    /// Whether it aims at a point of the ball.
+    pub fn contains(&self, aim: &Aim) -> bool {
+        // A little more than rounding beside the surface, from where planners may aim.
+        (aim.p_w - self.centre_w).norm() <= self.radius_m * (1.0 + 1e-9)
+    }
+
+    /// Where the line of an aim enters the ball and leaves it, counted from the point that is aimed
+    /// at along its direction.
+    pub fn chord_m(&self, aim: &Aim) -> [f64; 2] {
+        chord_m((&self.centre_w, self.radius_m), (&aim.p_w, &aim.ahead_w))
+    }
+
+    /// The way of `finger` straight over the point, from where the line enters the ball to where it
+    /// leaves it, or to where the hull would come too low. It sets out `standoff_m` before the
+    /// ball, and goes around it to come there.
+    ///
+    /// The finger lies behind and below its tip, as far as the direction lets it: z of `A` points
+    /// up in `W`, or towards +y where the approach itself is vertical; then `A` is rolled by
+    /// `roll_rad` about the approach's direction backwards, its y.
+    pub fn approach(&self, aim: &Aim, finger: &Finger, standoff_m: f64, roll_rad: f64) -> Approach {
+        let roll = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), roll_rad);
+        let r_wa = attitude(&aim.ahead_w) * roll;
+        let ahead_w = aim.ahead_w.into_inner();
+        let [near_m, mut far_m] = self.chord_m(aim);
+        if let Some(room_m) = self.room_m(&aim.p_w, finger, &r_wa).filter(|_| ahead_w.z < 0.0) {
+            let turns_m = room_m / -ahead_w.z;
+            far_m = far_m.min(turns_m - finger.radius_m - BEYOND_M);
+        }
+        let [p_near_w, p_far_w] = [near_m, far_m].map(|way_m| aim.p_w + ahead_w * way_m);
+        let around = Some(self.keep_out(finger, standoff_m));
+        Approach { p_near_w, p_far_w, r_wa, r_at: finger.r_at(), around }
+    }
+
+    /// Where a fingertip stays outside between approaches, to keep its stand-off from the ball.
+    pub fn keep_out(&self, finger: &Finger, standoff_m: f64) -> KeepOut {
+        let radius_m = self.radius_m + finger.bulge_m() + standoff_m;
+        KeepOut { centre_w: self.centre_w, radius_m, lowest_m: self.lowest_m }
+    }
+
+    /// How far the hull is above the lowest z when its tip is at `p_wt`; none where nothing is
+    /// below.
+    fn room_m(
+        &self,
+        p_wt: &Point3<f64>,
+        finger: &Finger,
+        r_wa: &UnitQuaternion<f64>,
+    ) -> Option<f64> {
+        Some(p_wt.z - finger.drop_m(r_wa) - self.lowest_m?)
+    }
+
+    /// Whether the hull stays above the lowest z on an `approach` of [`Self::approach`], and comes
+    /// to the point that is aimed at.
+    pub fn is_free(&self, aim: &Aim, approach: &Approach, finger: &Finger) -> bool {
+        let ahead_w = approach.direction_w();
+        let keep_out = approach.around.as_ref();
+        let start_w = keep_out.map_or(approach.p_near_w, |out| out.entrance_w(&aim.p_w, &ahead_w));
+        let sets_out =
+            self.room_m(&start_w, finger, &approach.r_wa).is_none_or(|room_m| room_m >= 0.0);
+        // The hull's front, when the finger turns back, is beyond the far end by this much.
+        let arrives = (approach.p_far_w - aim.p_w).dot(&ahead_w) + BEYOND_M >= 0.0;
+        sets_out && (arrives || self.lowest_m.is_none())
+    }
+}
+
+/// Attitude in `W` of a frame whose −y is `ahead_w`.
+pub fn attitude(ahead_w: &UnitVector3<f64>) -> UnitQuaternion<f64> {
+    let y_w = -ahead_w.into_inner();
+    let above = |up_w: Vector3<f64>| UnitVector3::try_new(up_w - y_w * y_w.dot(&up_w), 1e-3);
+    let z_w = above(Vector3::z()).or_else(|| above(Vector3::y())).unwrap_or(Vector3::z_axis());
+    let axes = [y_w.cross(&z_w), y_w, z_w.into_inner()];
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
+    UnitQuaternion::from_rotation_matrix(&rotation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// The way of an aim goes over its point along its direction, from the ball's surface to
+        /// its surface, and its target is the same aim again.
+        #[test]
+        fn an_approach_goes_over_its_point(
+            at in prop::array::uniform3(-0.5f64..0.5),
+            ahead in prop::array::uniform3(-1f64..1.0),
+        ) {
+            let ahead_w = Vector3::from(ahead);
+            prop_assume!(ahead_w.norm() > 0.01);
+            let centre_w = Point3::new(0.1, -0.6, 0.4);
+            let ball = Ball { centre_w, radius_m: 0.9, lowest_m: None };
+            let aim = Aim::against(centre_w + Vector3::from(at), &-ahead_w);
+            let approach = ball.approach(&aim, &Finger::default(), 0.01, 0.0);
+            prop_assert!((approach.direction_w().into_inner() - *aim.ahead_w).norm() < 1e-9);
+            let way = approach.p_far_w - approach.p_near_w;
+            prop_assert!((way.normalize() - *aim.ahead_w).norm() < 1e-9);
+            let beside = (aim.p_w - approach.p_near_w).cross(&aim.ahead_w);
+            prop_assert!(beside.norm() < 1e-12);
+            for end in [approach.p_near_w, approach.p_far_w] {
+                prop_assert!(((end - centre_w).norm() - 0.9).abs() < 1e-9);
+            }
+            let again = Aim::of(&aim.target()).unwrap();
+            prop_assert!((again.p_w - aim.p_w).norm() < 1e-12);
+            prop_assert!((*again.ahead_w - *aim.ahead_w).norm() < 1e-12);
+            let up_w = approach.r_wa * Vector3::z();
+            prop_assert!(up_w.z >= -1e-12);
+        }
+    }
+
+    #[test]
+    fn a_target_is_six_numbers_with_a_direction() {
+        assert!(Aim::of(&[0.0; 6]).is_none());
+        assert!(Aim::of(&[0.0, 0.0, 0.0, 0.0, 0.0, f64::NAN]).is_none());
+        assert!(Aim::of(&[0.0, 0.0, 1.0]).is_none());
+        let aim = Aim::of(&[0.0, 0.0, 0.0, 0.0, 0.0, -2.0]).unwrap();
+        assert_eq!(*aim.ahead_w, -Vector3::z());
+    }
+}

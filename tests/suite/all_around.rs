@@ -1,0 +1,158 @@
+//! Bodies that touch a whole object from all sides: what they feel, how they roll the finger, what
+//! they do not reach, and that they come there.
+
+use crate::common::shapes::sphere_mesh;
+use crate::common::shipped::{contact, scene};
+use nalgebra::{Point3, Vector3};
+use palpate::backend::Fault;
+use palpate::explore::probe::Touch;
+use palpate::geometry::bvh::MeshBvh;
+use palpate::geometry::report::MeshReport;
+use palpate::geometry::spread::direction;
+use palpate::sim::environment::{EnvironmentError, Shape};
+use palpate::sim::simulator::Simulator;
+use palpate::sim::{Environment, Scene};
+use palpate::task::{Aim, Zone};
+use std::sync::Arc;
+
+const MIDDLE_W: [f64; 3] = [0.0, -0.65, 0.5];
+const RADIUS_M: f64 = 0.05;
+
+/// A sphere in place of the object of `scene`.
+fn with_sphere(scene: Scene) -> Result<Arc<Environment>, EnvironmentError> {
+    let bvh = MeshBvh::new(sphere_mesh(MIDDLE_W.into(), RADIUS_M, 60));
+    let report = Box::<MeshReport>::default();
+    Environment::around(scene, Shape::Mesh { bvh, report }).map(Arc::new)
+}
+
+fn around(name: &str, sets: &[&str]) -> Arc<Environment> {
+    with_sphere(scene(name, sets)).unwrap()
+}
+
+/// Faces, edges and corners of a cube.
+fn outwards() -> impl Iterator<Item = Vector3<f64>> {
+    let steps = || [-1.0, 0.0, 1.0].into_iter();
+    let all = steps().flat_map(move |x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])));
+    all.map(Vector3::from).filter(|outward| outward.norm() > 0.5)
+}
+
+/// The finger is the same on every side, so it errs on none by more than on the one side that a
+/// zone looks at: here the zone in front, over which the sphere leans to all sides.
+#[test]
+fn a_soft_finger_feels_a_sphere_from_all_sides_as_well_as_from_one() {
+    let off_m = |p_w: &Point3<f64>| ((p_w - Point3::from(MIDDLE_W)).norm() - RADIUS_M).abs();
+    let mut one = scene("container_around_finger.toml", &[]);
+    (one.around, one.zone) = (None, Zone::new([-0.03, 0.03], Some([0.47, 0.53])));
+    let one = with_sphere(one).unwrap();
+    let mut probe = Simulator::new(Arc::clone(&one)).unwrap().probe(1).unwrap();
+    let touches = one
+        .scene()
+        .zone
+        .grid(4)
+        .into_iter()
+        .map(|place| off_m(&contact(probe.touch(&one.task().approach(&place)).unwrap()).p_wc));
+    let worst_m = touches.fold(0.0, f64::max);
+    let all = around("container_around_finger.toml", &[]);
+    let mut probe = Simulator::new(Arc::clone(&all)).unwrap().probe(1).unwrap();
+    for outward_w in outwards() {
+        let aim = Aim::against(MIDDLE_W.into(), &outward_w);
+        let found = contact(probe.touch(&all.task().approach(&aim.target())).unwrap());
+        let found_m = off_m(&found.p_wc);
+        assert!(found_m < worst_m, "{outward_w:?}: {found_m}, of a zone {worst_m}");
+        assert!((found.p_wc - Point3::from(MIDDLE_W)).dot(&outward_w) > 0.0, "{outward_w:?}");
+    }
+}
+
+#[test]
+fn the_finger_is_rolled_only_where_it_must_be_and_always_the_same() {
+    let free = around("container_around.toml", &[]);
+    let low = around("container_around.toml", &["around.lowest_m=0.45"]);
+    let mut rolled = 0;
+    for i in 0..200 {
+        let outward_w = direction(i, 200);
+        let aim = Aim::against(MIDDLE_W.into(), &outward_w);
+        assert!(free.task().reaches(&aim) && free.task().may_reach(&aim));
+        let unrolled = free.task().approach(&aim.target());
+        assert!((unrolled.r_wa * Vector3::z()).z > -1e-12);
+        let approach = low.task().approach(&aim.target());
+        assert_eq!(low.task().reaches(&aim), approach.is_finite());
+        if approach.is_finite() {
+            assert_eq!(approach, low.task().approach(&aim.target()));
+            let angle_rad = approach.r_wa.angle_to(&unrolled.r_wa);
+            rolled += usize::from(angle_rad > 1e-9);
+            let steps = angle_rad.to_degrees() / 45.0;
+            assert!((steps - steps.round()).abs() < 1e-6, "{steps}");
+        }
+    }
+    assert!(rolled > 0);
+}
+
+/// What is below: neither comes the hull there, nor does a touch from there begin.
+#[test]
+fn nothing_goes_below_what_the_object_stands_on() {
+    for name in ["container_around.toml", "container_around_finger.toml"] {
+        let environment = around(name, &["around.lowest_m=0.45"]);
+        let (task, finger) = (environment.task(), &environment.scene().finger);
+        let below = Aim::against(MIDDLE_W.into(), &-Vector3::z());
+        assert!(!task.reaches(&below) && !task.may_reach(&below));
+        assert!(!task.contains(&below.target()));
+        let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
+        let refused = probe.touch(&task.approach(&below.target()));
+        assert!(matches!(refused, Err(Fault::Refused { .. })), "{refused:?}");
+        let mut touched = 0;
+        for i in (0..60).step_by(3) {
+            let aim = Aim::against(MIDDLE_W.into(), &direction(i, 60));
+            if task.reaches(&aim) {
+                let approach = task.approach(&aim.target());
+                let end = probe.touch(&approach).unwrap();
+                touched += usize::from(matches!(end, Touch::Contact(_)));
+                let lowest_m =
+                    probe.swept().map_or(1.0, |swept| swept.p_wt.z) - finger.drop_m(&approach.r_wa);
+                assert!(lowest_m > 0.45 - 1e-9, "{i}: {lowest_m}");
+            }
+        }
+        assert!(touched > 5);
+        let notice = Simulator::new(environment).unwrap().notices();
+        assert!(notice.iter().any(|notice| notice.to_string().contains("below")), "{notice:?}");
+    }
+}
+
+/// What an arm says it reaches it does reach, one after the other in any order.
+#[test]
+fn an_arm_comes_to_all_that_it_reaches() {
+    let sets = ["body=\"kinematic\""];
+    let environment =
+        Arc::new(Environment::build(scene("container_around_pa10.toml", &sets)).unwrap());
+    let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
+    assert!(simulator.check_reach().is_ok());
+    let task = environment.task();
+    let middle_w = task.ball().unwrap().centre_w;
+    let mut probe = simulator.probe(1).unwrap();
+    let mut reached = 0;
+    for i in 0..40 {
+        let aim = Aim::against(middle_w, &direction((i * 17) % 40, 40));
+        if task.reaches(&aim) {
+            reached += 1;
+            let touch = probe.touch(&task.approach(&aim.target()));
+            assert!(matches!(touch, Ok(Touch::Contact(_))), "{aim:?}: {touch:?}");
+        }
+    }
+    assert!((10..40).contains(&reached), "{reached}");
+}
+
+#[test]
+fn a_body_that_cannot_go_around_is_refused() {
+    let path =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_around.toml");
+    let error = Scene::load(&path, &["body=dynamic".into()]).unwrap_err().to_string();
+    assert!(error.contains("[arm]"), "{error}");
+    let small = scene("container_around_finger.toml", &["around.radius_m=0.04"]);
+    let Err(small) = with_sphere(small) else { panic!("a ball smaller than the object") };
+    assert!(small.to_string().contains("reaches 0.05"), "{small}");
+    let near = scene("container_around_pa10.toml", &["object.position_m=[0, -0.5, 0.7]"]);
+    let Err(near) = Environment::build(near) else { panic!("a tip that begins in the object") };
+    assert!(near.to_string().contains("arm.home_deg"), "{near}");
+    let far = scene("container_around_pa10.toml", &["object.position_m=[0, -3, 0.5]"]);
+    let far = Simulator::new(Arc::new(Environment::build(far).unwrap())).unwrap();
+    assert!(far.check_reach().unwrap_err().to_string().contains("64 directions"));
+}

@@ -1,0 +1,93 @@
+//! Commands on whole objects: what they write is read back, and what goes over a zone refuses.
+
+use crate::common::program::{fails, folder, palpate, said, succeeds};
+use crate::common::shipped::scene;
+use nalgebra::Point3;
+use palpate::explore::registration::KnownBody;
+use palpate::geometry::import::import;
+use palpate::sim::known_body;
+use std::fs;
+use tempfile::TempDir;
+
+/// The tetrahedron of [`folder`] as a whole, and an experiment that a second is enough for.
+fn around() -> TempDir {
+    let folder = folder();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("scene.toml", "body = \"cast\"\n\n[object]\nmesh = \"mesh.obj\"\n\n[around]\n");
+    write(
+        "small.toml",
+        "name = \"small\"\nscene = \"scene.toml\"\nplanners = [\"active\", \"random\"]\ntrials = 2\n\
+         initial_touches = 4\ntouches = 8\n\n[space]\ncells = 16\ncompared_every = 4\n\n\
+         [report]\ntouch_counts = [8]\n",
+    );
+    folder
+}
+
+#[test]
+fn a_whole_belief_is_exported_and_read_back() {
+    let folder = around();
+    succeeds(folder.path(), &["run", "small.toml", "--no-report"]);
+    let mut counts = Vec::new();
+    for (name, grid) in [("it.ply", "16"), ("it.obj", "16"), ("fine.ply", "48")] {
+        let export =
+            ["export", "runs/small", "--planner", "active", "--trial", "1", "--touches", "7"];
+        let told =
+            succeeds(folder.path(), &[&export[..], &["--grid", grid, "--out", name]].concat());
+        assert!(told.contains("sigma up to"), "{told}");
+        let (mesh, _) = import(&folder.path().join(name), 1.0).unwrap();
+        let (low, high) = mesh.bounds();
+        assert!((high - low).max() > 0.2 && (high - low).max() < 2.0, "{name}: {low} {high}");
+        counts.push(mesh.triangles().len());
+        let words =
+            format!("{} vertices, {} triangles", mesh.vertices().len(), mesh.triangles().len());
+        assert!(told.contains(&words), "{words} in {told}");
+    }
+    assert!(counts[0] == counts[1] && counts[2] > 4 * counts[0], "{counts:?}");
+    let text = fs::read_to_string(folder.path().join("it.ply")).unwrap();
+    assert!(text.contains("property float sigma_m\nproperty float error_m\n"));
+    for extension in ["svg", "png", "pdf"] {
+        assert!(folder.path().join(format!("it.{extension}")).is_file(), "{extension}");
+    }
+    let export = ["export", "runs/small", "--planner", "active", "--out", "no.ply", "--grid", "4"];
+    fails(folder.path(), &export, &["--grid 4", "8 to 256 cells"]);
+    assert!(!folder.path().join("no.ply").exists());
+}
+
+#[test]
+fn planners_around_an_object_are_held_against_what_they_were() {
+    let folder = around();
+    let check = ["check", "small.toml", "--baseline", "it.jsonl", "--max-trials", "2"];
+    succeeds(folder.path(), &[&check[..], &["--bless", "so it is"]].concat());
+    let same = succeeds(folder.path(), &check);
+    assert!(same.trim_end().ends_with("identical"), "{same}");
+    // Touches are the same, and what is made of them is not.
+    let other = palpate(folder.path(), &[&check[..], &["--set", "space.cells=24"]].concat());
+    let told = String::from_utf8_lossy(&other.stdout).into_owned();
+    assert!(matches!(other.status.code(), Some(0 | 1 | 3)), "{told} {}", said(&other));
+    assert!(told.contains("error after the last touch") && !told.contains("RMSE"), "{told}");
+}
+
+#[test]
+fn what_goes_over_a_zone_refuses_a_whole_object() {
+    let folder = around();
+    for command in ["scan", "fidelity", "effects"] {
+        fails(folder.path(), &[command, "scene.toml"], &["scene.toml: [around]", "[zone]"]);
+    }
+    let shown = succeeds(folder.path(), &["show", "scene.toml"]);
+    assert!(shown.contains("ball: 9") && shown.contains("% of the surface"), "{shown}");
+    assert!(!shown.contains("zone") && !shown.contains("refuses"), "{shown}");
+    let mjcf = ["show", "scene.toml", "--mjcf", "it.xml"];
+    fails(folder.path(), &mjcf, &["no model in MuJoCo", "[arm]"]);
+    fails(folder.path(), &["show", "scene.toml", "--png", "it.png"], &["--png", "zone"]);
+    fails(folder.path(), &["watch", "scene.toml"], &["touches without moving"]);
+}
+
+/// A robot that goes around objects registers itself at one side of a body.
+#[test]
+fn a_known_body_takes_the_place_of_a_whole_object() {
+    let body = KnownBody::Ball { centre_w: Point3::new(0.0, -0.65, 0.5), radius_m: 0.02 };
+    let scene = scene("container_around_pa10.toml", &[]);
+    let environment = known_body::environment(&scene, &body).unwrap();
+    assert!(environment.task().ball().is_none());
+    assert!(environment.task().zone().dimension() == 2);
+}

@@ -1,0 +1,147 @@
+//! Where a finger that goes straight at a whole object can touch it.
+
+use crate::common::shapes::{box_corners, box_mesh, point, sphere_mesh};
+use nalgebra::{UnitVector3, Vector3};
+use palpate::experiment::shape::{Reach, TrueShape};
+use palpate::geometry::bvh::MeshBvh;
+use palpate::geometry::import::import;
+use palpate::geometry::mesh::Mesh;
+use palpate::geometry::spread::{Spot, over_surface};
+use palpate::robot::finger::Finger;
+use std::path::Path;
+
+/// The axis of a finger that comes tip first, its cylinder straight behind its hemisphere.
+fn tip_first(finger: &Finger) -> impl Fn(&UnitVector3<f64>) -> Vector3<f64> + Sync + use<> {
+    let length_m = finger.length_m;
+    move |ahead| ahead.scale(-length_m)
+}
+
+/// Tip first, from anywhere.
+fn touched(mesh: &MeshBvh, spots: &[Spot], radius_m: f64) -> Vec<bool> {
+    let axis_w = tip_first(&Finger::default());
+    Reach { radius_m, axis_w: &axis_w, lowest_m: None }.touches(mesh, spots)
+}
+
+fn spread(mesh: Mesh, count: usize) -> (MeshBvh, Vec<Spot>) {
+    let spots = over_surface(&mesh, count);
+    (MeshBvh::new(mesh), spots)
+}
+
+/// Boxes between two corners each, as one mesh.
+fn boxes(corners: &[[[f64; 3]; 2]]) -> Mesh {
+    let mut vertices = Vec::new();
+    let mut triangles = Vec::new();
+    for [low, high] in corners {
+        let base = vertices.len() as u32;
+        vertices.extend(box_corners((*low).into(), (*high).into()));
+        let faces = crate::common::shapes::BOX;
+        triangles.extend(faces.map(|face| face.map(|corner| base + corner)));
+    }
+    Mesh::new(&vertices, &triangles).unwrap().0
+}
+
+#[test]
+fn all_of_a_convex_object_is_reached() {
+    let ball = sphere_mesh(point(0.3, 0.2, 0.1), 0.03, 24);
+    let cuboid = box_mesh(point(0.0, 0.0, 0.0), point(0.02, 0.1, 0.3));
+    for mesh in [ball, cuboid] {
+        let (mesh, spots) = spread(mesh, 500);
+        for radius_m in [0.001, 0.007, 0.1] {
+            assert!(touched(&mesh, &spots, radius_m).into_iter().all(|is| is), "{radius_m}");
+        }
+    }
+}
+
+/// Two plates with a gap between them: a finger thinner than the gap by enough to come in askew
+/// reaches the faces within, a thicker one neither.
+#[test]
+fn a_gap_is_reached_into_by_a_finger_that_fits() {
+    for (gap_m, fits) in [(0.013, false), (0.05, true)] {
+        let far_m = 0.01 + gap_m;
+        let plates = boxes(&[
+            [[0.0, 0.0, 0.0], [0.01, 0.03, 0.03]],
+            [[far_m, 0.0, 0.0], [far_m + 0.01, 0.03, 0.03]],
+        ]);
+        let (mesh, spots) = spread(plates, 1000);
+        for (spot, is_touched) in spots.iter().zip(touched(&mesh, &spots, 0.007)) {
+            let x = spot.point.x;
+            let is_within = (x - 0.01).abs() < 1e-9 || (x - far_m).abs() < 1e-9;
+            assert_eq!(is_touched, fits || !is_within, "{spot:?}");
+        }
+    }
+}
+
+/// The wall of a cavity is surface too, and out of reach.
+#[test]
+fn nothing_reaches_into_a_closed_cavity() {
+    let (out, within) = ([[0.0; 3], [0.1; 3]], [[0.02; 3], [0.08; 3]]);
+    let (mesh, _) = spread(boxes(&[out, within]), 1);
+    let axis_w = tip_first(&Finger::default());
+    let reach = Reach { radius_m: 0.007, axis_w: &axis_w, lowest_m: None };
+    let truth = TrueShape::new(mesh, true).with_reach(&reach);
+    let share = truth.reachable_share().unwrap();
+    let law = 0.1_f64.powi(2) / (0.1_f64.powi(2) + 0.06_f64.powi(2));
+    assert!((share - law).abs() < 2e-3, "{share} {law}");
+    // A belief without the cavity is right wherever it can be.
+    let metrics = truth.compare(&boxes(&[out]));
+    assert!(metrics.reachable_chamfer_m.unwrap() < 1e-12);
+    assert!(metrics.chamfer_m.unwrap() > 1e-3, "{metrics:?}");
+}
+
+/// Where a finger fits, a thinner one fits within it.
+#[test]
+fn a_thinner_finger_reaches_more() {
+    for name in ["gear", "vase", "mug"] {
+        let path = format!("{}/models/suite/{name}.glb", env!("CARGO_MANIFEST_DIR"));
+        let (mesh, spots) = spread(import(Path::new(&path), 1.0).unwrap().0, 400);
+        let [thin, thick] = [0.0035, 0.007].map(|radius_m| touched(&mesh, &spots, radius_m));
+        let count = |is_touched: &[bool]| is_touched.iter().filter(|&&is| is).count();
+        assert!(count(&thin) > count(&thick) && count(&thin) < 400, "{name}");
+        let lost = thick.iter().zip(&thin).filter(|(thick, thin)| **thick && !**thin).count();
+        assert_eq!(lost, 0, "{name}");
+    }
+}
+
+/// A ball of radius R on a table: a finger of radius r that touches it where the normal is n has
+/// its lowest point at (R + r) n_z - r above the ball's centre, and the table is at -R.
+#[test]
+fn what_the_object_stands_on_is_in_the_way() {
+    let (ball_m, radius_m) = (0.05, 0.007);
+    let (mesh, spots) = spread(sphere_mesh(point(0.0, 0.0, 0.2), ball_m, 40), 2000);
+    let axis_w = tip_first(&Finger::default());
+    let reach = Reach { radius_m, axis_w: &axis_w, lowest_m: Some(0.2 - ball_m) };
+    let limit = (radius_m - ball_m) / (radius_m + ball_m);
+    for (spot, is_touched) in spots.iter().zip(reach.touches(&mesh, &spots)) {
+        let up = (spot.point.z - 0.2) / ball_m;
+        // A face leans by up to half of what one of its 40 rings does.
+        if (up - limit).abs() > 0.05 {
+            assert_eq!(is_touched, up > limit, "{up}");
+        }
+    }
+}
+
+/// The ground of a well 30 mm wide and 60 mm deep is reached by a finger that comes tip first, not
+/// by one that lies across its way.
+#[test]
+fn the_finger_behind_the_tip_must_fit_too() {
+    let well = boxes(&[
+        [[0.0, 0.0, 0.0], [0.05, 0.05, 0.01]],
+        [[0.0, 0.0, 0.01], [0.01, 0.05, 0.07]],
+        [[0.04, 0.0, 0.01], [0.05, 0.05, 0.07]],
+        [[0.01, 0.0, 0.01], [0.04, 0.01, 0.07]],
+        [[0.01, 0.04, 0.01], [0.04, 0.05, 0.07]],
+    ]);
+    let mesh = MeshBvh::new(well);
+    let corners = |i| mesh.mesh().corners(i);
+    let ground = (0..mesh.mesh().triangles().len())
+        .find(|&i| corners(i).iter().all(|corner| corner.z == 0.01))
+        .unwrap();
+    let spot = [Spot { point: point(0.025, 0.025, 0.01), triangle: ground as u32 }];
+    let first = tip_first(&Finger::default());
+    let across = |ahead: &UnitVector3<f64>| {
+        ahead.cross(&Vector3::new(0.3, 0.5, 0.8)).normalize() * Finger::default().length_m
+    };
+    let reach = Reach { radius_m: 0.007, axis_w: &first, lowest_m: None };
+    assert_eq!(reach.touches(&mesh, &spot), [true]);
+    assert_eq!(Reach { axis_w: &across, ..reach }.touches(&mesh, &spot), [false]);
+}

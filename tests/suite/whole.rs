@@ -1,0 +1,375 @@
+//! Whole objects, touched from all sides: laws that a belief over space obeys, hard cases, and what
+//! a trial makes of them.
+
+use nalgebra::{Point3, Vector3};
+use palpate::experiment::Experiment;
+use palpate::experiment::equal_error::equal_errors;
+use palpate::experiment::row::TrialRow;
+use palpate::experiment::shape::TrueShape;
+use palpate::experiment::simulation::Simulation;
+use palpate::experiment::store::Run;
+use palpate::experiment::truth::Truth;
+use palpate::explore::around::planner::{Planner, Sobol};
+use palpate::explore::around::{Belief, Scope, SpaceSettings, Surface};
+use palpate::explore::planner;
+use palpate::explore::probe::{Contact, Swept, Touch};
+use palpate::geometry::bvh::MeshBvh;
+use palpate::geometry::mesh::Mesh;
+use palpate::math::seed::stream;
+use palpate::report::{findings, whole};
+use palpate::robot::Finger;
+use palpate::sim::environment::Shape;
+use palpate::sim::{Environment, Scene};
+use palpate::task::touch::TouchSettings;
+use palpate::task::{Aim, Approach, Ball, Task};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use crate::common::solids::nets_within;
+
+/// A field of one number per point, negative inside, metres.
+type Field = fn(Vector3<f64>) -> f64;
+
+fn sphere(p: Vector3<f64>) -> f64 {
+    p.norm() - 0.04
+}
+
+fn torus(p: Vector3<f64>) -> f64 {
+    (p.x.hypot(p.z) - 0.045).hypot(p.y) - 0.016
+}
+
+/// 100 mm wide and 5 mm thick, its rim rounded.
+fn plate(p: Vector3<f64>) -> f64 {
+    let q = Vector3::new(p.x.abs() - 0.0475, p.y.abs(), p.z.abs() - 0.0475);
+    q.map(|x| x.max(0.0)).norm() - 0.0025
+}
+
+/// Two balls that touch in a point, joined where they are nearer than a millimetre.
+fn touching(p: Vector3<f64>) -> f64 {
+    let one = |x: f64| (p - Vector3::x() * x).norm() - 0.03;
+    one(-0.0295).min(one(0.0295))
+}
+
+fn mesh(field: Field) -> Mesh {
+    nets_within(field, 0.07, 0.0015)
+}
+
+/// An experiment on a solid in place of the scene's object; the settings are TOML.
+fn simulation(field: Field, settings: &str) -> Simulation {
+    let text = format!(
+        "name = \"whole\"\ninitial_touches = 5\ntrials = 1\n{settings}\n[scene]\nbody = \"cast\"\n\
+         object = {{ mesh = \"none.obj\" }}\naround = {{}}\nfinger = {{ pitch_deg = 0 }}\n"
+    );
+    let experiment: Experiment = toml::from_str(&text).unwrap();
+    let vertices_of = mesh(field);
+    let (_, report) = Mesh::new(vertices_of.vertices(), vertices_of.triangles()).unwrap();
+    let shape = Shape::Mesh { bvh: MeshBvh::new(vertices_of), report: report.into() };
+    let environment = Environment::around(experiment.scene.clone(), shape).unwrap();
+    Simulation::within(experiment, Arc::new(environment)).unwrap()
+}
+
+fn trial(simulation: &Simulation, name: &str) -> TrialRow {
+    let row = simulation.trial(planner::by_name(name).unwrap(), 0);
+    assert_eq!(row.failure, None);
+    row
+}
+
+fn last_share(row: &TrialRow) -> f64 {
+    row.touches.last().unwrap().shape.unwrap().chamfer_share.unwrap()
+}
+
+/// The surface after the touches of a row.
+fn surface(simulation: &Simulation, row: &TrialRow) -> Surface {
+    let belief = whole::belief(simulation.experiment(), &row.touches).unwrap().unwrap();
+    belief.surface().unwrap().clone()
+}
+
+/// A ball is found to a thousandth of its diagonal by twenty touches of anybody, with its volume,
+/// its area and its outside.
+#[test]
+fn a_sphere_is_found() {
+    let simulation = simulation(sphere, "planners = [\"active\", \"sobol\"]\ntouches = 20");
+    for name in ["active", "sobol"] {
+        let row = trial(&simulation, name);
+        let shape = row.touches.last().unwrap().shape.unwrap();
+        assert!(shape.chamfer_share.unwrap() < 3e-3, "{name}: {shape:?}");
+        assert!(shape.volume_error.unwrap().abs() < 0.02, "{name}: {shape:?}");
+        assert!(shape.area_error.abs() < 0.02, "{name}: {shape:?}");
+        let surface = surface(&simulation, &row);
+        let mesh = surface.mesh(64).unwrap();
+        let (_, report) = Mesh::new(mesh.vertices(), mesh.triangles()).unwrap();
+        assert!(report.is_closed());
+        let mut field = surface.field();
+        assert!(field.value(&Point3::origin()) < -0.01);
+        // On its surface the field grows as a distance does.
+        for away in [Vector3::x(), Vector3::new(1.0, -1.0, 1.0).normalize()] {
+            let gradient = field.at(&Point3::from(away * 0.04)).gradient;
+            assert!((gradient - away).norm() < 0.1, "{name}: {gradient}");
+        }
+    }
+}
+
+/// A ring stays a ring: it is touched from inside its hole, and the hole is left open.
+#[test]
+fn a_torus_keeps_its_hole() {
+    let simulation = simulation(torus, "planners = [\"active\"]\ntouches = 45");
+    let row = trial(&simulation, "active");
+    let inside = row.touches.iter().filter_map(|touch| touch.contact);
+    let inside = inside.filter(|[x, _, z]| x.hypot(*z) < 0.038).count();
+    assert!(inside >= 3, "{inside} contacts inside the hole");
+    let mesh = surface(&simulation, &row).mesh(64).unwrap();
+    // Along its axis nothing is met, and twice the ring across it.
+    let bvh = MeshBvh::new(mesh);
+    let at = |x: f64| Point3::new(x, 0.1, 0.0);
+    assert!(bvh.ray(&at(0.0), &-Vector3::y_axis(), 1.0).is_none());
+    assert!([-0.045, 0.045].iter().all(|x| bvh.ray(&at(*x), &-Vector3::y_axis(), 1.0).is_some()));
+    assert!(last_share(&row) < 7.5e-3, "{}", last_share(&row));
+}
+
+/// The two sides of a plate are thinner apart than the finger is wide, and stay two.
+#[test]
+fn a_thin_plate_keeps_both_sides() {
+    let simulation = simulation(plate, "planners = [\"active\"]\ntouches = 45");
+    let row = trial(&simulation, "active");
+    let shape = row.touches.last().unwrap().shape.unwrap();
+    assert!(shape.chamfer_share.unwrap() < 0.015, "{shape:?}");
+    let mesh = surface(&simulation, &row).mesh(64).unwrap();
+    for (x, z) in [(0.0, 0.0), (0.02, 0.015), (-0.025, 0.01)] {
+        let bvh = MeshBvh::new(mesh.clone());
+        let ahead = -Vector3::y_axis();
+        let front = bvh.ray(&Point3::new(x, 0.1, z), &ahead, 1.0).unwrap();
+        let back = bvh.ray(&Point3::new(x, -0.1, z), &-ahead, 1.0).unwrap();
+        let thick_m = front.point.y - back.point.y;
+        assert!((0.001..0.012).contains(&thick_m), "{thick_m} at ({x}, {z})");
+    }
+}
+
+/// Two balls that touch are found, with the waist between them that no finger reaches.
+#[test]
+fn two_touching_bodies_are_found() {
+    let simulation = simulation(touching, "planners = [\"active\"]\ntouches = 40");
+    let reachable = simulation.shape().unwrap().reachable_share().unwrap();
+    assert!((0.5..0.999).contains(&reachable), "{reachable}");
+    let row = trial(&simulation, "active");
+    assert!(last_share(&row) < 0.01, "{}", last_share(&row));
+    assert!(surface(&simulation, &row).mesh(64).unwrap().volume_m3() > 0.0);
+}
+
+/// In another size everything is the same but for rounding.
+#[test]
+fn size_does_not_matter() {
+    let touched = |scale: f64| {
+        let mut belief = belief(0.1 * scale, 0.007 * scale);
+        let mut sobol = Sobol::new(stream(1, 0, "aims"));
+        for _ in 0..25 {
+            let aim = Aim::of(&sobol.plan(&belief).target).unwrap();
+            let outward = -aim.ahead_w.into_inner();
+            // An ellipsoid, met where the way through its middle leaves it.
+            let radii = Vector3::new(0.06, 0.035, 0.045) * scale;
+            let reach = 1.0 / outward.component_div(&radii).norm();
+            let p_wc = Point3::from(outward * reach);
+            let normal_w = p_wc.coords.component_div(&radii).component_div(&radii).normalize();
+            let tip = p_wc + normal_w * 0.007 * scale;
+            meet(&mut belief, &aim, Some((p_wc, normal_w)), tip);
+            belief.refit().unwrap();
+        }
+        let surface = belief.surface().unwrap().clone();
+        let mesh = surface.mesh(48).unwrap();
+        (mesh.volume_m3() / scale.powi(3), mesh.area_m2() / scale.powi(2))
+    };
+    let (volume, area) = touched(1.0);
+    let truly = 4.0 / 3.0 * PI * 0.06 * 0.035 * 0.045;
+    assert!((volume / truly - 1.0).abs() < 0.03, "{volume} {truly}");
+    for scale in [0.01, 30.0] {
+        let (scaled, scaled_area) = touched(scale);
+        assert!((scaled / volume - 1.0).abs() < 1e-3, "{scale}: {scaled} {volume}");
+        assert!((scaled_area / area - 1.0).abs() < 1e-3, "{scale}: {scaled_area} {area}");
+    }
+}
+
+fn belief(ball_m: f64, radius_m: f64) -> Belief {
+    let ball = Ball { centre_w: Point3::origin(), radius_m: ball_m, lowest_m: None };
+    let finger = Finger { radius_m, pitch_deg: 0.0, ..Finger::default() };
+    let task = Task::around(ball, TouchSettings::default(), &finger);
+    Belief::new(Scope::of(&task, &finger).unwrap(), SpaceSettings::default())
+}
+
+fn approach(belief: &Belief, aim: &Aim) -> Approach {
+    belief.scope().ball.approach(aim, &Finger::default(), 0.01, 0.0)
+}
+
+fn meet(
+    belief: &mut Belief,
+    aim: &Aim,
+    met: Option<(Point3<f64>, Vector3<f64>)>,
+    p_wt: Point3<f64>,
+) {
+    let touch =
+        met.map_or(Touch::Miss, |(p_wc, normal_w)| Touch::Contact(Contact { p_wc, normal_w }));
+    let radius_m = belief.scope().radius_m;
+    let swept = Swept { finger: Finger { radius_m, ..Finger::default() }, p_wt };
+    let approach = approach(belief, aim);
+    belief.observe(aim, &approach, (&touch, Some(&swept)));
+}
+
+/// Where there is nothing at all there is no surface, every fit succeeds, and planners go on.
+#[test]
+fn an_object_that_is_not_there_is_not_found() {
+    let mut belief = belief(0.1, 0.007);
+    for name in ["active", "random", "sobol", "integrated_variance", "travel"] {
+        let make = planner::by_name(name).unwrap().make_around.unwrap();
+        let mut planner = make(&Default::default(), stream(2, 0, name));
+        for _ in 0..6 {
+            let aim = Aim::of(&planner.plan(&belief).target).unwrap();
+            let far = approach(&belief, &aim).p_far_w;
+            meet(&mut belief, &aim, None, far);
+            let (fit, surface) = belief.refit().unwrap();
+            assert!(fit.hyperparameters.signal_sd.is_finite());
+            assert!(surface.mesh(32).is_none());
+        }
+    }
+}
+
+/// Touches on one side leave the other unsure: the deviation on the back is many times that on the
+/// front.
+#[test]
+fn a_back_that_nobody_touches_is_unsure() {
+    let mut belief = belief(0.1, 0.007);
+    for i in 0..30 {
+        let t = f64::from(i);
+        let out = Vector3::new((2.4 * t).cos() * t.sqrt(), 6.0, (2.4 * t).sin() * t.sqrt());
+        let out = out.normalize();
+        let aim = Aim::against(Point3::origin(), &out);
+        let p_wc = Point3::from(out * 0.04);
+        meet(&mut belief, &aim, Some((p_wc, out)), Point3::from(out * 0.047));
+    }
+    belief.refit().unwrap();
+    let at = |y: f64| Point3::new(0.0, y, 0.0);
+    let sds_m = belief.surface().unwrap().sds_m(&[at(0.04), at(-0.04)]);
+    assert!(sds_m[1] > 5.0 * sds_m[0], "{sds_m:?}");
+}
+
+/// Every planner's targets can be reached, a trial is the same twice, and a belief drawn again from
+/// a row is the one that the row was written of.
+#[test]
+fn rows_are_reproducible() {
+    let names = ["active", "random", "sobol", "integrated_variance", "travel", "oracle"];
+    let listed = names.map(|name| format!("\"{name}\"")).join(", ");
+    let simulation = simulation(
+        touching,
+        &format!(
+            "planners = [{listed}]\ntouches = 12\nplanning = {{ oracle = {{ candidates = 4 }} }}"
+        ),
+    );
+    for name in names {
+        let row = trial(&simulation, name);
+        assert_eq!(row, trial(&simulation, name), "{name}");
+        assert!(row.touches.iter().all(|touch| simulation.task().contains(&touch.target)));
+        let json = serde_json::to_string(&row).unwrap();
+        let read: TrialRow = serde_json::from_str(&json).unwrap();
+        let mesh = surface(&simulation, &read).mesh(64).unwrap();
+        let truth: &TrueShape = simulation.shape().unwrap();
+        let again = truth.compare(&mesh);
+        let then = row.touches.last().unwrap().shape.unwrap();
+        let difference = again.chamfer_m.unwrap() - then.chamfer_m.unwrap();
+        assert!(difference.abs() < 1e-9, "{name}: {again:?} {then:?}");
+    }
+}
+
+/// Initial touches are the same of all planners of a trial and others of another trial.
+#[test]
+fn planners_begin_alike() {
+    let simulation = simulation(sphere, "planners = [\"active\", \"random\"]\ntouches = 6");
+    let targets = |name: &str, trial: u32| -> Vec<Vec<f64>> {
+        let row = simulation.trial(planner::by_name(name).unwrap(), trial);
+        row.touches.into_iter().take(5).map(|touch| touch.target).collect()
+    };
+    assert_eq!(targets("active", 0), targets("random", 0));
+    assert_ne!(targets("active", 0), targets("active", 1));
+}
+
+#[test]
+fn what_cannot_be_asked_for_is_refused() {
+    let refused = |settings: &str, scene: &str, words: &str| {
+        let text = format!(
+            "name = \"whole\"\ninitial_touches = 5\ntrials = 1\ntouches = 9\n{settings}\n[scene]\n\
+             body = \"cast\"\nobject = {{ mesh = \"none.obj\" }}\n{scene}\n"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("whole.toml");
+        std::fs::write(&path, text).unwrap();
+        let error = Experiment::load(&path, &[]).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    let active = "planners = [\"active\"]";
+    refused("planners = [\"active\", \"grid\"]", "around = {}", "planners[1]");
+    refused("planners = [\"silhouette\"]", "around = {}", "goes around an object");
+    refused(active, "around = {}\nzone = { x_m = [0, 1] }", "scene.zone");
+    refused(active, "", "[around] for a whole object");
+    refused(active, "around = { radius_m = -1 }", "scene.around.radius_m");
+    refused(active, "around = { centre_m = [0, 0, 1e9] }", "scene.around.centre_m");
+    refused(&format!("{active}\nverification_touches = 3"), "around = {}", "verification_touches");
+    refused(
+        &format!("{active}\nspace = {{ kernel = \"squared_exponential\" }}"),
+        "around = {}",
+        "space.kernel",
+    );
+    refused(&format!("{active}\nspace = {{ cells = 4 }}"), "around = {}", "space.cells");
+}
+
+/// A ball that the object is nowhere in is refused by name before anything is touched.
+#[test]
+fn a_ball_beside_the_object_is_refused() {
+    let text = "body = \"cast\"\nobject = { mesh = \"none.obj\" }\n\
+                around = { centre_m = [1, 0, 0], radius_m = 0.1 }";
+    let scene: Scene = toml::from_str(text).unwrap();
+    let mesh = mesh(sphere);
+    let (_, report) = Mesh::new(mesh.vertices(), mesh.triangles()).unwrap();
+    let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: report.into() };
+    let error = Environment::around(scene, shape).err().unwrap().to_string();
+    assert!(error.contains("around.centre_m"), "{error}");
+}
+
+/// With a kernel without slopes normals are left out, as over a zone, and a ball is found from its
+/// contacts and what was swept.
+#[test]
+fn a_kernel_without_slopes_does_without_normals() {
+    let simulation = simulation(
+        sphere,
+        "planners = [\"sobol\"]\ntouches = 30\nspace = { kernel = \"matern_32\" }",
+    );
+    let row = trial(&simulation, "sobol");
+    assert!(last_share(&row) < 0.03, "{}", last_share(&row));
+    let fit = row.touches.last().unwrap().fit.as_ref().unwrap();
+    assert_eq!(fit.hyperparameters.slope_noise_sd, 0.0);
+}
+
+/// What a run found is told in the error that it was measured by, after the touches after which it
+/// was.
+#[test]
+fn a_run_says_what_it_found() {
+    let simulation = simulation(
+        touching,
+        "planners = [\"active\", \"random\"]\ntouches = 32\nspace = { compared_every = 4 }",
+    );
+    let planners = ["active", "random"].map(|name| planner::by_name(name).unwrap());
+    let trials = (0..2).flat_map(|trial| planners.map(|planner| (trial, planner)));
+    let rows: Vec<TrialRow> =
+        trials.map(|(trial, planner)| simulation.trial(planner, trial)).collect();
+    let mut experiment = simulation.experiment().clone();
+    experiment.trials = 2;
+    assert_eq!(experiment.drawn_touch_counts(), [16, 24, 32]);
+    for touch in &rows[0].touches {
+        let count = rows[0].touches.iter().position(|other| other == touch).unwrap() + 1;
+        assert_eq!(touch.shape.is_some(), count >= 5 && count % 4 == 0, "touch {count}");
+    }
+    let equal = equal_errors(&experiment, &rows);
+    let active = equal.iter().find(|it| it.planner == "active").unwrap();
+    assert_eq!(active.measure.id, "chamfer_m");
+    let touches = active.touches.value;
+    assert!(touches % 4.0 == 0.0 && (8.0..=32.0).contains(&touches), "{touches}");
+    let run = Run { experiment, truth: Truth::nothing(), rows, unlisted: 0 };
+    let found = findings::sentences(&run).join(" ");
+    assert!(found.contains("After 32 touches the mean Chamfer distance is: active"), "{found}");
+    assert!(found.contains(&format!(": active {touches}.")), "{found}");
+}
