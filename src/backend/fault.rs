@@ -82,6 +82,17 @@ pub enum Fault {
         /// Joint positions.
         q: Vec<f64>,
     },
+    /// No way to an approach around an object is known that was tried out.
+    #[error(
+        "at {time_s:.3} s no way is known from joints at {q:.3?} to this approach, nor home: bring the arm to \
+         arm.home_deg by hand, or leave this approach out"
+    )]
+    NoWay {
+        /// When.
+        time_s: f64,
+        /// Joint positions.
+        q: Vec<f64>,
+    },
     /// A recording cannot be written: what cannot be kept is not done.
     #[error("the recording fails at {time_s:.3} s: {message}")]
     Unrecorded {

@@ -2,17 +2,19 @@
 //! they do not reach, and that they come there.
 
 use crate::common::shapes::sphere_mesh;
-use crate::common::shipped::{contact, scene};
+use crate::common::shipped::{contact, environment, scene};
 use nalgebra::{Point3, Vector3};
-use palpate::backend::Fault;
-use palpate::explore::probe::Touch;
+use palpate::backend::{Backend, Fault};
+use palpate::explore::probe::servo::ArmReach;
+use palpate::explore::probe::{Probe, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::report::MeshReport;
 use palpate::geometry::spread::direction;
 use palpate::sim::environment::{EnvironmentError, Shape};
+use palpate::sim::kinematic::Kinematic;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
-use palpate::task::{Aim, Zone};
+use palpate::task::{Aim, Reach, Zone};
 use std::sync::Arc;
 
 const MIDDLE_W: [f64; 3] = [0.0, -0.65, 0.5];
@@ -138,6 +140,69 @@ fn an_arm_comes_to_all_that_it_reaches() {
         }
     }
     assert!((10..40).contains(&reached), "{reached}");
+}
+
+/// The arm of `scenes/container_around_pa10.toml`, which stands at these joints, in rad, and meets
+/// nothing.
+fn standing_at(q: [f64; 7]) -> Box<dyn Backend> {
+    let home = format!("arm.home_deg={:?}", q.map(f64::to_degrees));
+    let sets = ["body=\"kinematic\"", "object.position_m=[0, -3, 0.5]", &home];
+    let far = Environment::build(scene("container_around_pa10.toml", &sets)).unwrap();
+    Box::new(Kinematic::new(&Arc::new(far)).unwrap())
+}
+
+/// Where touches from all sides once left the arm, and along which of 420 directions it was to go
+/// next: elbow on the other side, wrist wound up, shoulder nearly at its limit, behind the object.
+const LEFT_AT: [([f64; 7], usize); 6] = [
+    ([1.3223, -0.7235, -1.4155, 1.8936, -1.6301, -0.7120, 1.7469], 154),
+    ([-1.3248, 1.5450, 1.9588, 1.6553, 3.8247, -0.9869, 1.5909], 196),
+    ([1.7677, -1.5965, -1.1097, 1.7269, 3.4990, -1.0048, 0.9062], 202),
+    ([-0.9365, 1.0205, 1.1342, 1.1531, 1.2611, 2.1454, 3.9704], 217),
+    ([0.2245, 0.1130, 0.3678, 1.8997, -1.5401, 1.8387, 3.6251], 224),
+    ([0.4303, 0.4438, 0.0858, 1.6614, -1.9527, 2.3476, 2.7834], 229),
+];
+
+/// It comes there, or does not set out; the latter only from where nothing but a way that was not
+/// tried out had brought it.
+#[test]
+fn from_where_a_touch_left_it_an_arm_comes_to_what_it_reaches_or_does_not_move() {
+    let environment = environment("container_around_pa10.toml", &["body=\"kinematic\""]);
+    let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
+    let task = environment.task();
+    let mut arrived = Vec::new();
+    for (q, i) in LEFT_AT {
+        let aim = Aim::against(task.ball().unwrap().centre_w, &direction(i, 420));
+        assert!(task.reaches(&aim), "{i}");
+        let mut servo = simulator.servo(standing_at(q), 1).unwrap();
+        match servo.touch(&task.approach(&aim.target())) {
+            Ok(Touch::Miss) => arrived.push(i),
+            Err(Fault::NoWay { time_s, .. }) => assert_eq!(time_s, 0.0),
+            end => panic!("{i}: {end:?}"),
+        }
+    }
+    assert!(arrived.len() >= 4, "{arrived:?}");
+}
+
+/// No movement is made that was not tried out.
+#[test]
+fn an_arm_that_knows_no_way_does_not_move() {
+    let environment = environment("container_around_pa10.toml", &["body=\"kinematic\""]);
+    let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
+    let task = environment.task();
+    let ball = task.ball().unwrap();
+    let Scene { finger, touch, .. } = environment.scene();
+    let mut servo = simulator.servo(simulator.body().unwrap().unwrap(), 1).unwrap();
+    let (before_s, mut refused) = (servo.time_s(), 0);
+    let reach = ArmReach::new(&environment.robot().unwrap(), touch).unwrap();
+    let aims = task.unreached(64).into_iter().map(|side_w| Aim::against(ball.centre_w, &side_w));
+    let approaches = aims.map(|aim| ball.approach(&aim, finger, touch.standoff_m, 0.0));
+    for approach in approaches.filter(|approach| !reach.reaches(approach)) {
+        let end = servo.touch(&approach);
+        assert!(matches!(end, Err(Fault::NoWay { .. })), "{end:?}");
+        assert_eq!(servo.time_s(), before_s);
+        refused += 1;
+    }
+    assert!(refused > 5, "{refused}");
 }
 
 #[test]

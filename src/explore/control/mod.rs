@@ -113,6 +113,21 @@ impl Controller {
         self.qdot = limits::limited(&self.chain, &q, &self.qdot, &wanted, self.period_s);
         Ok(JointMotion { qdot: self.qdot, damping, followed: task.followed(&self.qdot) })
     }
+
+    /// The command for the next period, after which the joints shall be and move as `posture` says.
+    ///
+    /// # Errors
+    /// If a number is not finite or missing; what was commanded last still holds.
+    pub fn along(&mut self, q: &[f64], posture: &[Joints; 2]) -> Result<Joints, ArmError> {
+        let q = positions(&self.chain, q)?;
+        let [to, qdot] = posture;
+        let wanted = qdot + (to - q) * GAIN_PER_S;
+        if !wanted.iter().all(|wanted| wanted.is_finite()) {
+            return Err(ArmError::NotFinite);
+        }
+        self.qdot = limits::limited(&self.chain, &q, &self.qdot, &wanted, self.period_s);
+        Ok(self.qdot)
+    }
 }
 
 fn positions(chain: &Chain, q: &[f64]) -> Result<Joints, ArmError> {

@@ -2,9 +2,11 @@
 
 mod arm_reach;
 mod contact_monitor;
+mod line;
 mod pace;
 mod round;
 mod trajectory;
+mod travel;
 mod tryout;
 mod way;
 
@@ -12,18 +14,16 @@ use super::{Contact, Probe, Swept, Touch, refuse_unless_finite};
 use crate::backend::{Backend, Command, Fault, Reading};
 use crate::explore::control::{Controller, Goal, posture};
 use crate::robot::Robot;
-use crate::robot::arm::ArmError;
+use crate::robot::arm::{ArmError, Joints};
 use crate::robot::finger::frame::FRAME_S;
+use crate::task::Approach;
 use crate::task::touch::TouchSettings;
-use crate::task::{Approach, KeepOut};
 use contact_monitor::{ApproachEnd, ContactMonitor};
-use nalgebra::{Isometry3, UnitVector3, Vector3};
-use round::rounds;
+use nalgebra::Isometry3;
 use trajectory::Path;
 
 pub use crate::task::approach::BEYOND_M;
 pub use arm_reach::ArmReach;
-use arm_reach::SETTLE_S;
 pub use way::{OutOfReach, check_reach};
 pub(super) use way::{standoff, turning_point};
 
@@ -105,7 +105,12 @@ impl Servo {
         let State { time_s, q } = &self.state;
         let no_command = |cause| Fault::NoCommand { time_s: *time_s, cause };
         let motion = self.control.step(q, goal).map_err(no_command)?;
-        self.command.qdot.iter_mut().zip(motion.qdot.iter()).for_each(|(to, from)| *to = *from);
+        self.carry_out(&motion.qdot)
+    }
+
+    /// One tick in which the joints move at `qdot`.
+    fn carry_out(&mut self, qdot: &Joints) -> Result<(), Fault> {
+        self.command.qdot.iter_mut().zip(qdot.iter()).for_each(|(to, from)| *to = *from);
         let reading = self.body.step(&self.command)?;
         self.state.take(reading)?;
         self.monitor.take(reading);
@@ -171,57 +176,6 @@ impl Servo {
         }
         let back = Isometry3::from_parts(back_w.into(), here.rotation);
         self.go("the way back", back, self.settings.approach_m_s, false).map(|_| ())
-    }
-
-    /// Goes around what lies between two approaches to the stand-off `above`.
-    fn travel_around(
-        &mut self,
-        around: &KeepOut,
-        approach: &Approach,
-        above: Isometry3<f64>,
-    ) -> Result<(), Fault> {
-        let ahead_t = approach.r_at.inverse() * -Vector3::y_axis();
-        self.leave(around, &ahead_t)?;
-        let q = self.robot.chain.joints_from(&self.state.q);
-        let planned = self.reach.as_ref().zip(q).and_then(|(reach, q)| reach.plan(&q, approach));
-        for to in planned.unwrap_or_else(|| vec![above]) {
-            let here = self.x_wt();
-            for round in rounds(around, here, to, &self.robot.finger, &approach.r_at) {
-                let path = Path::round(round, self.settings.travel_m_s);
-                self.follow("the stand-off", path, false)?;
-            }
-            if self.reach.as_ref().is_some_and(|reach| reach.home() == to) {
-                self.settle_at_home(to)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Stands with the tip at home until the joints are home too, from where an arm comes to all
-    /// that it reaches.
-    fn settle_at_home(&mut self, home: Isometry3<f64>) -> Result<(), Fault> {
-        let until_s = self.state.time_s + SETTLE_S;
-        while self.state.time_s < until_s {
-            let q = self.robot.chain.joints_from(&self.state.q);
-            if self.reach.as_ref().zip(q).is_none_or(|(reach, q)| reach.is_home(&q)) {
-                break;
-            }
-            self.tick(&Goal::still(home))?;
-        }
-        Ok(())
-    }
-
-    /// Goes straight back out of the sphere the way the finger points, where the tip is in it:
-    /// after a touch that was broken off there may be something beside it.
-    fn leave(&mut self, around: &KeepOut, ahead_t: &UnitVector3<f64>) -> Result<(), Fault> {
-        let here = self.x_wt();
-        let p_wt = here.translation.vector.into();
-        if around.depth_m(&p_wt) < DEEPER_M {
-            return Ok(());
-        }
-        let out_w = around.entrance_w(&p_wt, &(here.rotation * ahead_t));
-        let out = Isometry3::from_parts(out_w.coords.into(), here.rotation);
-        self.go("the way back", out, self.settings.approach_m_s, false).map(|_| ())
     }
 
     /// Why a movement to `to` has not ended in its time.

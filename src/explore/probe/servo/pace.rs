@@ -40,9 +40,10 @@ impl Pace {
         Some([self.travelled_m, self.now_m_s])
     }
 
-    /// About the time that it takes.
-    pub(super) fn least_s(&self) -> f64 {
-        self.length_m / self.speed_m_s + self.speed_m_s / ACCELERATION_M_S2
+    /// Longest time it may take before something is wrong; chosen: four times what it should.
+    pub(super) fn patience_s(&self) -> f64 {
+        let least_s = self.length_m / self.speed_m_s + self.speed_m_s / ACCELERATION_M_S2;
+        4.0 * least_s + 2.0
     }
 
     /// Its length.

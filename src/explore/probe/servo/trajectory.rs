@@ -42,9 +42,9 @@ impl Path {
         }
     }
 
-    /// Longest time it may take before something is wrong; chosen: four times what it should.
+    /// Longest time it may take before something is wrong.
     pub(super) fn patience_s(&self) -> f64 {
-        4.0 * self.pace().least_s() + 2.0
+        self.pace().patience_s()
     }
 
     /// Whether the point has arrived.

@@ -1,14 +1,16 @@
 //! Movements tried out on an arm's kinematics before they are made: whether its controller brings
 //! the tip along them within the joints' limits, clear of the arm itself and of the object.
 
+use super::line::Line;
 use super::trajectory::Path;
-use crate::explore::control::{Controller, Goal};
+use crate::explore::control::Controller;
 use crate::geometry::sweep::Capsule;
 use crate::robot::Robot;
+use crate::robot::arm::chain::MAX_JOINTS;
 use crate::robot::arm::{Chain, Joints, Kind};
-use crate::robot::capsules::{LinkCapsule, TOOL, capsules};
+use crate::robot::capsules::{CARRIED, LinkCapsule, TOOL, capsules};
 use crate::task::KeepOut;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Its tick; chosen: coarse, for the controller's gain of 5 per second.
 const PERIOD_S: f64 = 0.05;
@@ -23,10 +25,21 @@ const NEAR_M: f64 = 1e-3;
 const NEAR_RAD: f64 = 0.01;
 const TICKS_TO_END: usize = 40;
 
-/// How far joints keep from their limits, and links from each other, a little more than interlocks
-/// ask, because nothing moves exactly as it is tried out; chosen.
+/// Distance that links keep from each other, as interlocks ask unless they are told otherwise.
+const CLEARANCE_M: f64 = 0.02;
+
+/// How far joints keep from their limits, and links from each other beyond that distance, because
+/// nothing moves exactly as it is tried out; chosen.
 const SLACK_RAD: f64 = 0.1;
-const CLEARANCE_M: f64 = 0.025;
+const SLACK_M: f64 = 5e-3;
+
+/// How far the tip may be from the box around home and ball; chosen: three quarters of what
+/// interlocks allow unless they are told otherwise.
+const TIP_MARGIN_M: f64 = 0.15;
+
+/// How far anything moves from one posture that is looked at to the next, straight in the space of
+/// the joints; chosen: no more than is asked beyond the interlocks' clearance.
+const GRAIN_M: f64 = 2e-3;
 
 /// From a command until the joints begin to brake, as interlocks take it; chosen.
 const REACTION_S: f64 = 0.02;
@@ -50,13 +63,30 @@ pub(super) struct Clear {
     pub(super) ball: (Point3<f64>, f64),
     /// Lowest z of what carries the finger; the finger's own ways keep above it.
     pub(super) lowest_m: Option<f64>,
+    /// Box that the tip stays in.
+    pub(super) tip_w: [Point3<f64>; 2],
+    /// Share of the slack that is asked.
+    pub(super) slack: f64,
 }
 
+/// Of a way home from where the arm stands; chosen: it was promised from a little beside, and must
+/// be found again.
+pub(super) const NOW: f64 = 0.4;
+
+/// Of everything else.
+pub(super) const LATER: f64 = 1.0;
+
 impl Clear {
-    /// Of the ball that a finger of `robot` goes `around`, at `standoff_m` from it.
-    pub(super) fn of(around: &KeepOut, robot: &Robot, standoff_m: f64) -> Self {
+    /// Of the ball that a finger of `robot` goes `around`, at `standoff_m` from it, with
+    /// this share of the slack.
+    pub(super) fn of(around: &KeepOut, robot: &Robot, standoff_m: f64, slack: f64) -> Self {
         let radius_m = around.radius_m - standoff_m - robot.finger.bulge_m();
-        Self { ball: (around.centre_w, radius_m), lowest_m: around.lowest_m }
+        let home_w = Point3::from(robot.chain.forward(&robot.chain.home).translation.vector);
+        let [beyond, margin] = [around.radius_m, TIP_MARGIN_M].map(Vector3::repeat);
+        let low = home_w.inf(&(around.centre_w - beyond)) - margin;
+        let high = home_w.sup(&(around.centre_w + beyond)) + margin;
+        let ball = (around.centre_w, radius_m);
+        Self { ball, lowest_m: around.lowest_m, tip_w: [low, high], slack }
     }
 }
 
@@ -99,7 +129,7 @@ impl Tryout {
             let (away_m, away_rad) = apart(&x_wt, &goal.x_wt);
             let is_stuck = away_m > LAG_M || away_rad > LAG_RAD;
             let stops = self.stops(&q, &motion.qdot);
-            if is_stuck || !self.is_clear(&q, clear, is_approach) || !self.is_apart(&stops) {
+            if is_stuck || !self.is_clear(&q, clear, is_approach) || !self.is_apart(&stops, clear) {
                 return None;
             }
             if path.is_done() {
@@ -114,28 +144,13 @@ impl Tryout {
         }
     }
 
-    /// Where the joints are when `is_there`, the tip standing at `x_wt` for at most `longest_s`;
-    /// none if they do not come there.
-    pub(super) fn stand(
-        &self,
-        mut q: Joints,
-        x_wt: Isometry3<f64>,
-        longest_s: f64,
-        is_there: impl Fn(&Joints) -> bool,
-    ) -> Option<Joints> {
-        let mut control = Controller::new(self.chain.clone(), PERIOD_S).ok()?;
-        let (count, goal) = (self.chain.joints.len(), Goal::still(x_wt));
-        for _ in 0..(longest_s / PERIOD_S) as usize {
-            if is_there(&q) {
-                return Some(q);
-            }
-            let motion = control.step(&q.as_slice()[..count], &goal).ok()?;
-            q = self.chain.clamp(&(q + motion.qdot * PERIOD_S));
-            if !self.is_apart(&self.stops(&q, &motion.qdot)) {
-                return None;
-            }
-        }
-        None
+    /// Whether all of `line` is clear; joints that brake on it stay on it.
+    pub(super) fn allows(&self, line: &Line, clear: &Clear) -> bool {
+        line.postures(GRAIN_M).all(|q| {
+            self.is_clear(&q, clear, false)
+                && self.is_apart(&q, clear)
+                && self.is_above(&self.chain.frames(&q), clear, &CARRIED)
+        })
     }
 
     /// Where joints stop that brake together from `qdot`.
@@ -147,34 +162,44 @@ impl Tryout {
     }
 
     /// Whether links keep from each other.
-    fn is_apart(&self, q: &Joints) -> bool {
+    fn is_apart(&self, q: &Joints, clear: &Clear) -> bool {
         let frames = self.chain.frames(q);
+        let least_m = CLEARANCE_M + clear.slack * SLACK_M;
         let placed = |i: usize| self.links[i].at(&frames[self.links[i].link]);
-        self.pairs.iter().all(|&[k, i]| placed(k).to_capsule_m(&placed(i)) > CLEARANCE_M)
+        self.pairs.iter().all(|&[k, i]| placed(k).to_capsule_m(&placed(i)) > least_m)
     }
 
-    /// Whether joints keep from their limits, links from the ball, and what carries the finger
-    /// above the lowest z; on an approach hand and finger go into the ball.
+    /// Whether joints keep from their limits, the tip in its box, links from the ball, and what
+    /// carries the finger above the lowest z; on an approach hand and finger go into the ball.
     fn is_clear(&self, q: &Joints, clear: &Clear, is_approach: bool) -> bool {
+        let slack_rad = clear.slack * SLACK_RAD;
         let within = self.chain.joints.iter().zip(q.iter()).all(|(joint, q)| {
             let [low, high] = joint.q_limits;
-            (low + SLACK_RAD..=high - SLACK_RAD).contains(q)
+            (low + slack_rad..=high - slack_rad).contains(q)
         });
         if !within {
             return false;
         }
         let frames = self.chain.frames(q);
-        let placed = |i: usize| self.links[i].at(&frames[self.links[i].link]);
+        let x_wt = frames[MAX_JOINTS] * self.chain.flange * self.chain.tool;
+        let (p_wt, [low, high]) = (Point3::from(x_wt.translation.vector), clear.tip_w);
         let (centre_w, radius_m) = clear.ball;
         let ball = Capsule { p0_w: centre_w, p1_w: centre_w, radius_m };
-        let far = || self.links.iter().enumerate().filter(|(_, link)| link.link >= FIRST_FAR);
-        let is_outside = |i: usize| placed(i).to_capsule_m(&ball) > 0.0;
-        let is_above = |i: usize| {
-            let Capsule { p0_w, p1_w, radius_m } = placed(i);
-            clear.lowest_m.is_none_or(|lowest_m| p0_w.z.min(p1_w.z) - radius_m >= lowest_m)
-        };
-        far().all(|(i, link)| link.name != TOOL || is_above(i))
-            && (is_approach || far().all(|(i, _)| is_outside(i)))
+        let mut far = self.links.iter().filter(|link| link.link >= FIRST_FAR);
+        (p_wt - low).inf(&(high - p_wt)).min() >= 0.0
+            && self.is_above(&frames, clear, &[TOOL])
+            && (is_approach
+                || far.all(|link| link.at(&frames[link.link]).to_capsule_m(&ball) > 0.0))
+    }
+
+    /// Whether the links of these names are above the lowest z.
+    fn is_above(&self, frames: &[Isometry3<f64>], clear: &Clear, names: &[&str]) -> bool {
+        let Some(lowest_m) = clear.lowest_m else { return true };
+        let mut links = self.links.iter().filter(|link| names.contains(&link.name));
+        links.all(|link| {
+            let Capsule { p0_w, p1_w, radius_m } = link.at(&frames[link.link]);
+            p0_w.z.min(p1_w.z) - radius_m >= lowest_m
+        })
     }
 }
 
