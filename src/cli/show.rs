@@ -12,13 +12,16 @@ use crate::experiment::store::Run;
 use crate::experiment::truth::Truth;
 use crate::files;
 use crate::geometry::import::{Buffers, import_with};
+use crate::geometry::spread::directions;
 use crate::report;
 use crate::report::png;
+use crate::report::solid::{self, Reached};
 use crate::sim::environment::Shape;
 use crate::sim::scene::Unit;
 use crate::sim::{Environment, Scene, mjcf};
-use crate::task::Ball;
+use crate::task::{Ball, DIRECTIONS};
 use anyhow::{Context, bail, ensure};
+use nalgebra::{Point3, UnitVector3};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -28,6 +31,7 @@ Examples:
   palpate show my-part.obj --unit mm
   palpate show scenes/container.toml --mjcf container.xml    for MuJoCo's own viewer
   palpate show scenes/container.toml --png container.png     a picture of the zone on the object
+  palpate show scenes/bird_around_pa10.toml --png bird.png   what of a whole object can be touched
   palpate show scenes/bird_pa10.toml --render bird.png       the whole scene with its robot
   palpate show experiments/toy.toml --set seed=1             every setting, defaults included
   palpate show runs/toy")]
@@ -46,7 +50,7 @@ pub(super) struct Args {
     /// Write a scene as MJCF, the format of MuJoCo.
     #[arg(long, value_name = "FILE")]
     mjcf: Option<PathBuf>,
-    /// Draw a scene's object with the zone on it.
+    /// Draw a scene's object with the zone on it; around an object, what of it can be touched.
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
     /// Draw a scene with its robot by MuJoCo (needs a build with `--features render`).
@@ -131,16 +135,20 @@ fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
     let mut text = toml::to_string(&scene).context("cannot write the scene")?;
     let environment = environment(scene, talk)?;
     simulator(&environment, talk)?;
-    text += &match environment.task().ball() {
-        Some(ball) => whole(ball, &environment, talk),
+    let whole_object = environment.task().ball().map(|ball| (ball, shape(&environment, talk)));
+    text += &match &whole_object {
+        Some((ball, shape)) => whole(ball, shape.as_ref(), talk),
         None => one_side(&environment, talk),
     };
     if let Shape::Mesh { report, .. } = environment.shape() {
         text += &format!("{report}\n");
     }
     if let Some(path) = &args.png {
-        let svg = report::zone::picture(&environment)
-            .context("--png: this scene has no object with a zone on it to draw")?;
+        let svg = match &whole_object {
+            Some((ball, shape)) => what_is_reached(ball, shape.as_ref(), &environment),
+            None => report::zone::picture(&environment),
+        };
+        let svg = svg.context("--png: this scene has no object to draw")?;
         std::fs::write(path, png::render(&svg)?).with_context(|| path.display().to_string())?;
         text += &format!("picture: {}\n", path.display());
     }
@@ -183,20 +191,39 @@ fn one_side(environment: &Environment, talk: Talk) -> String {
     text + &format!("; the finger can touch {} of them\n", truth.reachable_count())
 }
 
-/// The same of a whole object.
-fn whole(ball: &Ball, environment: &Environment, talk: Talk) -> String {
-    let shape = with_patience(talk, |tell| {
+/// The true surface of a whole object, with what of it the finger can touch.
+fn shape(environment: &Environment, talk: Talk) -> Option<TrueShape> {
+    with_patience(talk, |tell| {
         tell("looking where the finger can touch the surface");
         TrueShape::of(environment)
-    });
+    })
+}
+
+/// What of a whole object the finger can touch.
+fn whole(ball: &Ball, shape: Option<&TrueShape>, talk: Talk) -> String {
     let [x, y, z]: [f64; 3] = ball.centre_w.into();
     let radius_mm = 1e3 * ball.radius_m;
     let mut text = format!("\nball: {radius_mm:.2} mm about [{x:.4}, {y:.4}, {z:.4}] m");
-    if let Some(share) = shape.as_ref().and_then(TrueShape::reachable_share) {
+    if let Some(share) = shape.and_then(TrueShape::reachable_share) {
         text += &format!("; the finger can touch {:.1} % of the surface", 100.0 * share);
     }
-    shape.as_ref().and_then(notice::of_shape).iter().for_each(|notice| talk.note(notice));
+    shape.and_then(notice::of_shape).iter().for_each(|notice| talk.note(notice));
     text + "\n"
+}
+
+/// A picture of a whole object with what of it can be touched; none of an environment without one.
+fn what_is_reached(
+    ball: &Ball,
+    shape: Option<&TrueShape>,
+    environment: &Environment,
+) -> Option<String> {
+    let missed = environment.task().unreached(DIRECTIONS);
+    let side = |outward_w: UnitVector3<f64>| {
+        (ball.centre_w + outward_w.scale(ball.radius_m), !missed.contains(&outward_w))
+    };
+    let sides: Vec<(Point3<f64>, bool)> = directions(DIRECTIONS).map(side).collect();
+    let spots = shape?.reached();
+    Some(solid::picture(&Reached { mesh: environment.mesh()?, spots: &spots, sides: &sides }))
 }
 
 #[cfg(feature = "mujoco")]

@@ -34,6 +34,11 @@ impl Area {
         self.top + self.height
     }
 
+    /// Whether a point lies in it.
+    pub fn contains(&self, [x, y]: PointPx) -> bool {
+        (self.left..=self.right()).contains(&x) && (self.top..=self.bottom()).contains(&y)
+    }
+
     /// Its middle.
     pub fn centre(&self) -> PointPx {
         [self.left + 0.5 * self.width, self.top + 0.5 * self.height]

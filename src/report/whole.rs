@@ -130,7 +130,8 @@ pub fn belief(experiment: &Experiment, touches: &[TouchRow]) -> anyhow::Result<O
     let ball = scene.around.as_ref().and_then(|around| around.ball());
     let ball = ball.context("the ball of [around] is not written out")?;
     let task = Task::around(ball, scene.touch.clone(), &scene.finger);
-    let scope = Scope::of(&task, &scene.finger).context("a task without a ball")?;
+    let scope = Scope::of(&task, &scene.finger, scene.effects.is_soft());
+    let scope = scope.context("a task without a ball")?;
     let ball = scope.ball.clone();
     let mut belief = Belief::new(scope, experiment.space.clone());
     for touch in touches {

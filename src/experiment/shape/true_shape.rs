@@ -82,6 +82,13 @@ impl TrueShape {
         Some(count as f64 / is_reachable.len() as f64)
     }
 
+    /// Points spread evenly over it, and whether the finger can touch each; none if that was not
+    /// asked.
+    pub fn reached(&self) -> Vec<(Point3<f64>, bool)> {
+        let is_reachable = self.is_reachable.iter().flatten();
+        self.samples.iter().map(|spot| spot.point).zip(is_reachable.copied()).collect()
+    }
+
     /// Points spread evenly over it.
     pub fn samples(&self) -> &[Spot] {
         &self.samples

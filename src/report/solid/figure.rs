@@ -1,17 +1,17 @@
 //! The same surfaces as a figure: a row of touch counts for each planner and each side.
 
 use super::data::{deviation_range, error_range};
+use super::panel::{ON_SURFACE, Side, View, draw_scale, inner};
 use super::section::TRUTH_TRIANGLES;
 use super::{Frame, Sequence, Touch};
 use crate::geometry::coarse::coarse;
 use crate::geometry::mesh::Mesh;
-use crate::geometry::solids::{Triangles, normals};
+use crate::geometry::solids::Triangles;
 use crate::report::axes::{Axis, MM, colour_bar};
-use crate::report::camera::{AZIMUTH_DEG, Camera};
-use crate::report::canvas::{Anchor, Area, Canvas, PointPx};
+use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{Legend, Swatch};
-use crate::report::relief::{Face, Relief, brightness};
-use crate::report::style::{self, FAINT_INK, INITIAL, INK, LATER, SMALL_PX};
+use crate::report::relief::Relief;
+use crate::report::style::{self, INITIAL, LATER};
 use nalgebra::Vector3;
 
 /// What a surface is coloured by.
@@ -23,51 +23,17 @@ pub enum Colour {
     Error,
 }
 
-/// From where objects are seen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// From the side that a finger touches along −y.
-    Front,
-    /// From the other one.
-    Behind,
-}
-
-impl Side {
-    fn azimuth_deg(self) -> f64 {
-        match self {
-            Self::Front => AZIMUTH_DEG,
-            Self::Behind => AZIMUTH_DEG + 180.0,
-        }
-    }
-
-    /// How bright a face of this unit normal is under a light that goes with the viewer.
-    fn brightness(self, normal: Vector3<f64>) -> f64 {
-        match self {
-            Self::Front => brightness(normal),
-            Self::Behind => brightness(Vector3::new(-normal.x, -normal.y, normal.z)),
-        }
-    }
-}
-
 const PANEL: (f64, f64) = (236.0, 258.0);
 const MARGIN: (f64, f64) = (20.0, 40.0);
-/// Room for the title above a surface, and on every side of it.
-const TITLE_PX: f64 = 38.0;
-const GAP_PX: f64 = 8.0;
 const FOOT_PX: f64 = 56.0;
 /// The bar of colours: where it begins at least, behind its words, and its length.
 const BAR_LEFT_MIN_PX: f64 = 380.0;
 const BAR_PX: f64 = 300.0;
 const WIDTH_MIN_PX: f64 = BAR_LEFT_MIN_PX + BAR_PX;
-/// The most that the bar of the scale is long.
-const SCALE_PX: f64 = 60.0;
 /// A touch, and the last one.
 const RADII_PX: [f64; 2] = [3.1, 4.6];
-/// Where of its colours a surface lies that has no numbers, and its colour where one is not known.
-const PLAIN: f64 = 0.6;
+/// The colour of a surface where its number is not known.
 const UNKNOWN: [[f64; 3]; 2] = [[205.0; 3]; 2];
-/// Marks whose colours do not change with the paper's, for the surface's do not.
-const ON_SURFACE: &str = r#"class="relief""#;
 
 /// Surfaces after some touch counts, with the touches on them and the true one on the right, as
 /// SVG; none if there is nothing to be drawn, or no number to colour it by. Everything is of one
@@ -171,7 +137,7 @@ fn draw(
     canvas.grouped(ON_SURFACE, |canvas| legend.draw(canvas, [MARGIN.0, 20.0]));
     let points = || points.iter().copied();
     let room = inner(Area { left: 0.0, top: 0.0, width: PANEL.0, height: PANEL.1 });
-    let scales = sides.iter().map(|side| Camera::toward(side.azimuth_deg()).scale(points(), room));
+    let scales = sides.iter().map(|side| side.camera().scale(points(), room));
     let px_per_m = scales.fold(f64::MAX, f64::min);
     let rows = sequences.iter().flat_map(|it| sides.iter().map(move |side| (it, *side)));
     for (row, (sequence, side)) in rows.enumerate() {
@@ -182,7 +148,7 @@ fn draw(
                 width: PANEL.0,
                 height: PANEL.1,
             };
-            let camera = Camera::toward(side.azimuth_deg());
+            let camera = side.camera();
             let camera = camera.scaled(px_per_m, points(), inner(area));
             let view = View { area, side, camera };
             match (counts.get(column), truth) {
@@ -205,38 +171,14 @@ fn draw(
     canvas.finish()
 }
 
-/// Where on a panel its surface is drawn.
-fn inner(area: Area) -> Area {
-    Area {
-        left: area.left + GAP_PX,
-        top: area.top + TITLE_PX,
-        width: area.width - 2.0 * GAP_PX,
-        height: area.height - TITLE_PX - GAP_PX,
-    }
-}
-
-/// A panel and how space lies on it.
-struct View {
-    area: Area,
-    side: Side,
-    camera: Camera,
-}
-
 impl View {
-    fn title(&self, canvas: &mut Canvas, words: &str, score: &str) {
-        let behind = if self.side == Side::Behind { ", from behind" } else { "" };
-        let [middle, top] = [self.area.centre()[0], self.area.top];
-        canvas.title([middle, top + 14.0], &format!("{words}{behind}"));
-        canvas.coloured_text([middle, top + 31.0], score, SMALL_PX, Anchor::Middle, FAINT_INK);
-    }
-
     fn belief(&self, canvas: &mut Canvas, sequence: &Sequence, count: u32, tint: &Tint) {
         let title = format!("{}, {count} touches", sequence.planner);
         let Some(frame) = sequence.frames.iter().find(|frame| frame.touches == count) else {
             return self.title(canvas, &title, "no belief after so many");
         };
         self.title(canvas, &title, &frame.score);
-        let relief = self.relief(&frame.mesh, |corners, light| tint.of(frame, corners, light));
+        let relief = self.relief(&frame.mesh, |i, light| tint.of(frame, frame.mesh.1[i], light));
         relief.draw(canvas);
         let touches = sequence.touches(frame);
         canvas.grouped(ON_SURFACE, |canvas| {
@@ -246,38 +188,16 @@ impl View {
         });
     }
 
-    fn truth(&self, canvas: &mut Canvas, truth: &Triangles) {
-        self.title(canvas, "true object", "");
-        self.relief(truth, |_, light| style::height(PLAIN, light)).draw(canvas);
-    }
-
-    /// The triangles that face the viewer, each as bright as its corners are.
-    fn relief(&self, mesh: &Triangles, colour: impl Fn([u32; 3], f64) -> String) -> Relief {
-        let (vertices, triangles) = mesh;
-        let outward = normals(vertices, triangles);
-        let face = |&corners: &[u32; 3]| {
-            let [a, b, c] = corners.map(|vertex| vertices[vertex as usize].coords);
-            let normal = (b - a).cross(&(c - a)).try_normalize(0.0)?;
-            let smooth: Vector3<f64> = corners.iter().map(|&vertex| outward[vertex as usize]).sum();
-            self.camera.sees(&normal).then(|| Face {
-                outline: [a, b, c].map(|corner| self.camera.at(&corner)).to_vec(),
-                nearness: self.camera.nearness(&((a + b + c) / 3.0)),
-                colour: colour(
-                    corners,
-                    self.side.brightness(smooth.try_normalize(0.0).unwrap_or(normal)),
-                ),
-            })
-        };
-        Relief::sorted(triangles.iter().filter_map(face).collect())
-    }
-
     /// A touch: a point where it met the object, hollow if that is hidden; a diamond where it was
-    /// sent if it met nothing.
+    /// sent if it met nothing, which may be beside all that is drawn.
     fn mark(&self, canvas: &mut Canvas, touch: &Touch, relief: &Relief, is_last: bool) {
         let colour = if touch.is_initial { INITIAL } else { LATER };
         let Some(p_w) = touch.contact_w else {
             let at = self.camera.at(&touch.aim_w.coords);
-            return canvas.diamond(at, &style::stroke(colour, 1.3));
+            if inner(self.area).contains(at) {
+                canvas.diamond(at, &style::stroke(colour, 1.3));
+            }
+            return;
         };
         let at = self.camera.at(&p_w.coords);
         let attributes = match relief.hides(at, self.camera.nearness(&p_w.coords)) {
@@ -294,17 +214,4 @@ fn entries() -> [(Swatch, &'static str); 3] {
         (Swatch::Circle(style::visible(LATER)), "later touch"),
         (Swatch::Circle(style::hidden(LATER)), "behind the surface"),
     ]
-}
-
-/// How long a round number of millimetres is.
-fn draw_scale(canvas: &mut Canvas, px_per_m: f64, [left, top]: PointPx) {
-    let most_mm = SCALE_PX / px_per_m * MM.per_m;
-    let ticks = Axis::linear(0.0, most_mm, 3.0).ticks();
-    let Some((length_mm, label)) = ticks.into_iter().rev().find(|(mm, _)| *mm > 0.0) else {
-        return;
-    };
-    let right = left + length_mm / MM.per_m * px_per_m;
-    let ends = [[left, top + 2.0], [left, top + 8.0], [right, top + 8.0], [right, top + 2.0]];
-    canvas.line(ends, &style::stroke(INK, 1.2));
-    canvas.text([left, top + 24.0], &format!("{label} mm"), SMALL_PX, Anchor::Start);
 }

@@ -7,9 +7,13 @@ mod codes;
 mod data;
 mod export;
 mod figure;
+mod panel;
+mod reach;
 mod section;
 
-pub use figure::{Colour, Side, figure};
+pub use figure::{Colour, figure};
+pub use panel::Side;
+pub use reach::{Reached, picture};
 pub use section::{counts, section};
 
 use crate::geometry::solids::Triangles;

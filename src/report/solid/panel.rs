@@ -1,0 +1,111 @@
+//! One view of a solid on a sheet: from the front or from behind, lit by the viewer.
+
+use crate::geometry::solids::{Triangles, normals};
+use crate::report::axes::{Axis, MM};
+use crate::report::camera::{AZIMUTH_DEG, Camera};
+use crate::report::canvas::{Anchor, Area, Canvas, PointPx};
+use crate::report::relief::{Face, Relief, brightness};
+use crate::report::style::{self, FAINT_INK, INK, SMALL_PX};
+use nalgebra::Vector3;
+
+/// Room for the title above a surface, and on every side of it.
+const TITLE_PX: f64 = 38.0;
+const GAP_PX: f64 = 8.0;
+/// The most that the bar of the scale is long.
+const SCALE_PX: f64 = 60.0;
+/// Where of its colours a surface lies that has no numbers.
+const PLAIN: f64 = 0.6;
+/// Marks whose colours do not change with the paper's, for the surface's do not.
+pub(super) const ON_SURFACE: &str = r#"class="relief""#;
+
+/// From where objects are seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// From the side that a finger touches along −y.
+    Front,
+    /// From the other one.
+    Behind,
+}
+
+impl Side {
+    /// Who looks from there.
+    pub(super) fn camera(self) -> Camera {
+        Camera::toward(match self {
+            Self::Front => AZIMUTH_DEG,
+            Self::Behind => AZIMUTH_DEG + 180.0,
+        })
+    }
+
+    /// How bright a face of this unit normal is under a light that goes with the viewer.
+    fn brightness(self, normal: Vector3<f64>) -> f64 {
+        match self {
+            Self::Front => brightness(normal),
+            Self::Behind => brightness(Vector3::new(-normal.x, -normal.y, normal.z)),
+        }
+    }
+}
+
+/// Where on a panel its surface is drawn.
+pub(super) fn inner(area: Area) -> Area {
+    Area {
+        left: area.left + GAP_PX,
+        top: area.top + TITLE_PX,
+        width: area.width - 2.0 * GAP_PX,
+        height: area.height - TITLE_PX - GAP_PX,
+    }
+}
+
+/// A panel and how space lies on it.
+pub(super) struct View {
+    pub(super) area: Area,
+    pub(super) side: Side,
+    pub(super) camera: Camera,
+}
+
+impl View {
+    pub(super) fn title(&self, canvas: &mut Canvas, words: &str, score: &str) {
+        let behind = if self.side == Side::Behind { ", from behind" } else { "" };
+        let [middle, top] = [self.area.centre()[0], self.area.top];
+        canvas.title([middle, top + 14.0], &format!("{words}{behind}"));
+        canvas.coloured_text([middle, top + 31.0], score, SMALL_PX, Anchor::Middle, FAINT_INK);
+    }
+
+    pub(super) fn truth(&self, canvas: &mut Canvas, truth: &Triangles) {
+        self.title(canvas, "true object", "");
+        self.relief(truth, |_, light| style::height(PLAIN, light)).draw(canvas);
+    }
+
+    /// The triangles that face the viewer, each as bright as its corners are and in the colour that
+    /// its place in the list and its light have.
+    pub(super) fn relief(&self, mesh: &Triangles, colour: impl Fn(usize, f64) -> String) -> Relief {
+        let (vertices, triangles) = mesh;
+        let outward = normals(vertices, triangles);
+        let face = |(triangle, &corners): (usize, &[u32; 3])| {
+            let [a, b, c] = corners.map(|vertex| vertices[vertex as usize].coords);
+            let normal = (b - a).cross(&(c - a)).try_normalize(0.0)?;
+            let smooth: Vector3<f64> = corners.iter().map(|&vertex| outward[vertex as usize]).sum();
+            self.camera.sees(&normal).then(|| Face {
+                outline: [a, b, c].map(|corner| self.camera.at(&corner)).to_vec(),
+                nearness: self.camera.nearness(&((a + b + c) / 3.0)),
+                colour: colour(
+                    triangle,
+                    self.side.brightness(smooth.try_normalize(0.0).unwrap_or(normal)),
+                ),
+            })
+        };
+        Relief::sorted(triangles.iter().enumerate().filter_map(face).collect())
+    }
+}
+
+/// How long a round number of millimetres is.
+pub(super) fn draw_scale(canvas: &mut Canvas, px_per_m: f64, [left, top]: PointPx) {
+    let most_mm = SCALE_PX / px_per_m * MM.per_m;
+    let ticks = Axis::linear(0.0, most_mm, 3.0).ticks();
+    let Some((length_mm, label)) = ticks.into_iter().rev().find(|(mm, _)| *mm > 0.0) else {
+        return;
+    };
+    let right = left + length_mm / MM.per_m * px_per_m;
+    let ends = [[left, top + 2.0], [left, top + 8.0], [right, top + 8.0], [right, top + 2.0]];
+    canvas.line(ends, &style::stroke(INK, 1.2));
+    canvas.text([left, top + 24.0], &format!("{label} mm"), SMALL_PX, Anchor::Start);
+}

@@ -1,0 +1,137 @@
+//! What of a whole object can be touched: its surface, and the sides from which the finger comes.
+
+use super::panel::{ON_SURFACE, Side, View, draw_scale, inner};
+use super::section::TRUTH_TRIANGLES;
+use crate::geometry::coarse::coarse;
+use crate::geometry::mesh::Mesh;
+use crate::geometry::solids::Triangles;
+use crate::report::canvas::{Area, Canvas};
+use crate::report::legend::{Legend, Swatch};
+use crate::report::style;
+use nalgebra::{Point3, Vector3};
+
+/// What is drawn, in `W` and metres.
+#[derive(Clone, Copy, Debug)]
+pub struct Reached<'a> {
+    /// The object.
+    pub mesh: &'a Mesh,
+    /// Points spread over it, and whether the finger can touch each; empty if that is not known.
+    pub spots: &'a [(Point3<f64>, bool)],
+    /// Where the finger sets out on its way to the middle, and whether it can be brought there.
+    pub sides: &'a [(Point3<f64>, bool)],
+}
+
+const PANEL: (f64, f64) = (430.0, 430.0);
+const MARGIN: (f64, f64) = (20.0, 40.0);
+const FOOT_PX: f64 = 40.0;
+const RADIUS_PX: f64 = 4.0;
+
+/// Colours of what is reached and of what is not, of surfaces and of marks; chosen, so that they
+/// differ in print and for the colour-blind.
+const SURFACE: [[[f64; 3]; 2]; 2] = [[[178.0, 190.0, 205.0]; 2], [[213.0, 94.0, 0.0]; 2]];
+const MARKS: [&str; 2] = ["#0072b2", "#d55e00"];
+const LEGEND: [&str; 2] = ["#b2becd", "#d55e00"];
+
+/// The object from the front and from behind, as SVG.
+pub fn picture(reached: &Reached) -> String {
+    let drawn = coarse(reached.mesh, TRUTH_TRIANGLES);
+    let is_reached = triangles_reached(&drawn, reached.spots);
+    let marks = reached.sides.iter().map(|(p_w, _)| p_w.coords);
+    let points: Vec<Vector3<f64>> = drawn.0.iter().map(|p_w| p_w.coords).chain(marks).collect();
+    let width = 2.0 * PANEL.0;
+    let legend = Legend::new(width, entries(reached));
+    let top = MARGIN.1 + legend.more_px();
+    let height = top + PANEL.1 + FOOT_PX;
+    let mut canvas = Canvas::new(width + 2.0 * MARGIN.0, height);
+    legend.draw(&mut canvas, [MARGIN.0, 20.0]);
+    let areas = [0.0, 1.0].map(|column| Area {
+        left: MARGIN.0 + column * PANEL.0,
+        top,
+        width: PANEL.0,
+        height: PANEL.1,
+    });
+    let all = || points.iter().copied();
+    let sides = [Side::Front, Side::Behind];
+    let scales = sides.map(|side| side.camera().scale(all(), inner(areas[0])));
+    let px_per_m = scales[0].min(scales[1]);
+    for (area, side) in areas.into_iter().zip(sides) {
+        let camera = side.camera().scaled(px_per_m, all(), inner(area));
+        let view = View { area, side, camera };
+        view.title(&mut canvas, "what can be touched", "");
+        let relief = view.relief(&drawn, |triangle, light| {
+            style::lit(&SURFACE[usize::from(!is_reached[triangle])], 0.0, light)
+        });
+        relief.draw(&mut canvas);
+        canvas.grouped(ON_SURFACE, |canvas| {
+            for (p_w, is_reached) in reached.sides {
+                let at = view.camera.at(&p_w.coords);
+                let colour = MARKS[usize::from(!is_reached)];
+                match relief.hides(at, view.camera.nearness(&p_w.coords)) {
+                    true => {}
+                    false if *is_reached => canvas.circle(at, RADIUS_PX, &style::visible(colour)),
+                    false => canvas.cross(at, colour),
+                }
+            }
+        });
+    }
+    draw_scale(&mut canvas, px_per_m, [MARGIN.0, height - FOOT_PX + 8.0]);
+    canvas.finish()
+}
+
+/// Of each triangle, whether the finger can touch the spot that is nearest to its middle.
+fn triangles_reached(
+    (vertices, triangles): &Triangles,
+    spots: &[(Point3<f64>, bool)],
+) -> Vec<bool> {
+    let nearest = |corners: &[u32; 3]| {
+        let corners = corners.map(|vertex| vertices[vertex as usize].coords);
+        let middle = Point3::from(corners.iter().sum::<Vector3<f64>>() / 3.0);
+        let away = |spot: &&(Point3<f64>, bool)| (spot.0 - middle).norm_squared();
+        let spot = spots.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+        spot.is_none_or(|(_, is_reached)| *is_reached)
+    };
+    triangles.iter().map(nearest).collect()
+}
+
+fn entries(reached: &Reached) -> Vec<(Swatch, &'static str)> {
+    let mut entries = Vec::new();
+    if !reached.spots.is_empty() {
+        entries.push((Swatch::Box(LEGEND[0]), "the finger can touch it"));
+        entries.push((Swatch::Box(LEGEND[1]), "no straight way leads there"));
+    }
+    if !reached.sides.is_empty() {
+        let circle = Swatch::Circle(style::visible(MARKS[0]));
+        entries.push((circle, "side it comes from"));
+        entries.push((Swatch::Cross(MARKS[1]), "side it cannot come from"));
+    }
+    entries
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tetrahedron of which one side is reached: each triangle has the colour of the spot that is
+    /// nearest to its middle, and what is not asked has no legend.
+    #[test]
+    fn surfaces_take_the_colour_of_the_nearest_spot() {
+        let corner = |x, y, z| Point3::new(x, y, z);
+        let vertices = vec![
+            corner(0.0, 0.0, 0.0),
+            corner(1.0, 0.0, 0.0),
+            corner(0.0, 1.0, 0.0),
+            corner(0.0, 0.0, 1.0),
+        ];
+        let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let spots = [(corner(0.4, 0.4, 0.4), true), (corner(0.2, 0.2, 0.0), false)];
+        let is_reached = triangles_reached(&(vertices.clone(), triangles.clone()), &spots);
+        assert_eq!(is_reached, [false, false, false, true]);
+        assert_eq!(triangles_reached(&(vertices.clone(), triangles.clone()), &[]), [true; 4]);
+        let mesh = Mesh::new(&vertices, &triangles).unwrap().0;
+        let sides = [(corner(2.0, 0.0, 0.0), true), (corner(-2.0, 0.0, 0.0), false)];
+        let svg = picture(&Reached { mesh: &mesh, spots: &spots, sides: &sides });
+        assert!(svg.contains("side it cannot come from") && svg.contains("no straight way"));
+        let svg = picture(&Reached { mesh: &mesh, spots: &[], sides: &[] });
+        assert!(!svg.contains("side it") && !svg.contains("straight way"));
+    }
+}
