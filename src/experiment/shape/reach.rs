@@ -7,9 +7,9 @@ use crate::geometry::sweep::Capsule;
 use nalgebra::{UnitVector3, Vector3};
 use rayon::prelude::*;
 
-/// Distance between surface and resting finger that still counts as touching; chosen, a tenth of
-/// the smallest errors that a belief reaches.
-const TOLERANCE_M: f64 = 1e-4;
+/// Distance between surface and resting finger that still counts as touching, as a share of the
+/// diagonal of the object's box; chosen, a tenth of the errors that a belief reaches.
+const TOLERANCE: f64 = 6e-4;
 
 /// Directions all around from which the finger comes, beside the surface's own normal. Chosen: of
 /// twelve objects of the suite, each with a finger of 7 mm and of 3.5 mm, the reachable share is
@@ -38,16 +38,24 @@ impl Reach<'_> {
     /// The mesh is closed; what it takes for its outside is what may be touched.
     pub fn touches(&self, mesh: &MeshBvh, spots: &[Spot]) -> Vec<bool> {
         let spread: Vec<UnitVector3<f64>> = directions(DIRECTIONS).collect();
-        spots.par_iter().map(|spot| self.touches_one(mesh, spot, &spread)).collect()
+        let (low, high) = mesh.mesh().bounds();
+        let tolerance_m = TOLERANCE * (high - low).norm();
+        let touches = |spot: &Spot| self.touches_one((mesh, tolerance_m), spot, &spread);
+        spots.par_iter().map(touches).collect()
     }
 
-    fn touches_one(&self, mesh: &MeshBvh, spot: &Spot, spread: &[UnitVector3<f64>]) -> bool {
+    fn touches_one(
+        &self,
+        (mesh, tolerance_m): (&MeshBvh, f64),
+        spot: &Spot,
+        spread: &[UnitVector3<f64>],
+    ) -> bool {
         let corners = mesh.mesh().corners(spot.triangle as usize);
         let outward = UnitVector3::new_unchecked(normal(&corners));
         let tip_w = spot.point + outward.scale(self.radius_m);
         // A tip no farther than this from there is within the tolerance of the spot, along the
         // tangent; so this much of it is free wherever it may rest, and the way beyond too.
-        let aside_m = (TOLERANCE_M * (2.0 * self.radius_m + TOLERANCE_M)).sqrt();
+        let aside_m = (tolerance_m * (2.0 * self.radius_m + tolerance_m)).sqrt();
         if mesh.touches(&tip_w, self.radius_m - aside_m) {
             return false;
         }
@@ -59,14 +67,14 @@ impl Reach<'_> {
         ways.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
         ways.iter().any(|(_, back)| {
             mesh.ray(&(tip_w + back.scale(aside_m)), back, f64::MAX).is_none()
-                && self.rests_at(mesh, spot, &tip_w.coords, back)
+                && self.rests_at((mesh, tolerance_m), spot, &tip_w.coords, back)
         })
     }
 
     /// Whether it comes to rest at `spot` if its tip goes to `tip_w` from `back` there.
     fn rests_at(
         &self,
-        mesh: &MeshBvh,
+        (mesh, tolerance_m): (&MeshBvh, f64),
         spot: &Spot,
         tip_w: &Vector3<f64>,
         back: &UnitVector3<f64>,
@@ -76,21 +84,21 @@ impl Reach<'_> {
         let (low, high) = mesh.mesh().bounds();
         let middle_w = (low.coords + high.coords) / 2.0;
         // All of it is beyond a plane that the ball around the mesh does not reach.
-        let clear_m = (high - low).norm() / 2.0 + self.radius_m + axis_w.norm() + TOLERANCE_M;
+        let clear_m = (high - low).norm() / 2.0 + self.radius_m + axis_w.norm() + tolerance_m;
         let way_m = clear_m - (tip_w - middle_w).dot(back);
         let at = |way_m: f64| {
             let p0_w = (tip_w + back.scale(way_m)).into();
             Capsule { p0_w, p1_w: p0_w + axis_w, radius_m: self.radius_m }
         };
         let start = at(way_m);
-        let Some(hit) = mesh.sweep(&start, &ahead, way_m + TOLERANCE_M) else { return false };
+        let Some(hit) = mesh.sweep(&start, &ahead, way_m + tolerance_m) else { return false };
         let rest = at(way_m - hit.travel_m);
         let on_axis = nearest_on_segment(&spot.point, &rest.p0_w, &rest.p1_w);
         let is_above = |capsule: &Capsule| {
             let lowest_m = capsule.p0_w.z.min(capsule.p1_w.z) - capsule.radius_m;
             self.lowest_m.is_none_or(|limit_m| lowest_m >= limit_m)
         };
-        (on_axis - spot.point).norm() - self.radius_m <= TOLERANCE_M
+        (on_axis - spot.point).norm() - self.radius_m <= tolerance_m
             && is_above(&start)
             && is_above(&rest)
     }
