@@ -30,7 +30,7 @@ fn main() -> anyhow::Result<()> {
     let scene = Scene::load(&root.join("scenes/suite/around/mug.toml"), &[])?;
     let environment = Arc::new(Environment::build(scene)?);
     let (task, finger) = (environment.task(), &environment.scene().finger);
-    let scope = Scope::of(task, finger).ok_or(anyhow::anyhow!("no ball"))?;
+    let scope = Scope::of(task, finger, false).ok_or(anyhow::anyhow!("no ball"))?;
     let mut belief = Belief::new(scope, SpaceSettings::default());
     let make = |name| planner::by_name(name).and_then(|entry| entry.make_around);
     let make = |name| make(name).ok_or(anyhow::anyhow!("{name} does not go around"));

@@ -25,7 +25,8 @@ pub(crate) enum Known {
 impl Known {
     /// Nothing yet of what is explored in `environment`, fitted as where nobody says how.
     pub(crate) fn nothing(environment: &Environment) -> Self {
-        match Scope::of(environment.task(), &environment.scene().finger) {
+        let scene = environment.scene();
+        match Scope::of(environment.task(), &scene.finger, scene.effects.is_soft()) {
             Some(scope) => Self::Around(around::Belief::new(scope, SpaceSettings::default())),
             None => {
                 let zone = environment.task().zone().clone();

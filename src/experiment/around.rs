@@ -32,7 +32,9 @@ impl<'a> AroundObject<'a> {
         trial: u32,
     ) -> Option<Self> {
         let stream = |purpose| seed::stream(experiment.seed, trial.into(), purpose);
-        let scope = Scope::of(sight.environment.task(), &sight.environment.scene().finger)?;
+        let scene = sight.environment.scene();
+        let is_soft = scene.effects.is_soft();
+        let scope = Scope::of(sight.environment.task(), &scene.finger, is_soft)?;
         let planner = maker.make_around(&experiment.planning, stream(maker.name()))?;
         let belief = Belief::new(scope, experiment.space.clone());
         let start = Sobol::new(stream("initial touches"));

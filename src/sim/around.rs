@@ -37,18 +37,12 @@ pub enum AroundError {
     },
 }
 
-/// How much larger than the ball around an object's box one is that nobody gave; chosen, so that
-/// approaches begin beside the object.
-const ROOMIER: f64 = 1.1;
-
 /// The ball of `around`; what it leaves out is written into it from what the object spans.
 pub(super) fn ball(around: &mut Around, mesh: &Mesh) -> Ball {
-    let (low, high) = mesh.bounds();
-    let middle = nalgebra::center(&low, &high);
-    let half_m = (high - low).norm() / 2.0;
-    let centre_m = *around.centre_m.get_or_insert(middle.coords.into());
-    let radius_m = *around.radius_m.get_or_insert(ROOMIER * half_m);
-    Ball { centre_w: centre_m.into(), radius_m, lowest_m: around.lowest_m }
+    let own = Ball::about(mesh.bounds().into(), around.lowest_m);
+    let centre_m = *around.centre_m.get_or_insert(own.centre_w.coords.into());
+    let radius_m = *around.radius_m.get_or_insert(own.radius_m);
+    Ball { centre_w: centre_m.into(), radius_m, ..own }
 }
 
 /// The task of a body in `ball`, with what its arm reaches.

@@ -92,7 +92,17 @@ impl Aim {
     }
 }
 
+/// How much larger than the ball around an object's box one is that nobody gave; chosen, so that
+/// approaches begin beside the object.
+const ROOMIER: f64 = 1.1;
+
 impl Ball {
+    /// About a box from its least to its greatest corner, with some room.
+    pub fn about([low, high]: [Point3<f64>; 2], lowest_m: Option<f64>) -> Self {
+        let radius_m = ROOMIER * (high - low).norm() / 2.0;
+        Self { centre_w: nalgebra::center(&low, &high), radius_m, lowest_m }
+    }
+
     /// Whether it aims at a point of the ball.
     pub fn contains(&self, aim: &Aim) -> bool {
         // A little more than rounding beside the surface, from where planners may aim.

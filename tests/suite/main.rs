@@ -79,6 +79,7 @@ mod reproducible;
 #[cfg(feature = "mujoco")]
 mod rigid;
 mod scenes;
+mod seeking;
 mod sensors;
 mod servo;
 mod shape;

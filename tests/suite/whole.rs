@@ -9,26 +9,19 @@ use palpate::experiment::shape::TrueShape;
 use palpate::experiment::simulation::Simulation;
 use palpate::experiment::store::Run;
 use palpate::experiment::truth::Truth;
+use palpate::explore::around::Surface;
 use palpate::explore::around::planner::{Planner, Sobol};
-use palpate::explore::around::{Belief, Scope, SpaceSettings, Surface};
 use palpate::explore::planner;
-use palpate::explore::probe::{Contact, Swept, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::seed::stream;
 use palpate::report::{findings, whole};
-use palpate::robot::Finger;
 use palpate::sim::environment::Shape;
 use palpate::sim::{Environment, Scene};
-use palpate::task::touch::TouchSettings;
-use palpate::task::{Aim, Approach, Ball, Task};
+use palpate::task::Aim;
 use std::f64::consts::PI;
-use std::sync::Arc;
 
-use crate::common::solids::nets_within;
-
-/// A field of one number per point, negative inside, metres.
-type Field = fn(Vector3<f64>) -> f64;
+use crate::common::around::{approach, belief, meet, mesh, simulation, trial};
 
 fn sphere(p: Vector3<f64>) -> f64 {
     p.norm() - 0.04
@@ -48,30 +41,6 @@ fn plate(p: Vector3<f64>) -> f64 {
 fn touching(p: Vector3<f64>) -> f64 {
     let one = |x: f64| (p - Vector3::x() * x).norm() - 0.03;
     one(-0.0295).min(one(0.0295))
-}
-
-fn mesh(field: Field) -> Mesh {
-    nets_within(field, 0.07, 0.0015)
-}
-
-/// An experiment on a solid in place of the scene's object; the settings are TOML.
-fn simulation(field: Field, settings: &str) -> Simulation {
-    let text = format!(
-        "name = \"whole\"\ninitial_touches = 5\ntrials = 1\n{settings}\n[scene]\nbody = \"cast\"\n\
-         object = {{ mesh = \"none.obj\" }}\naround = {{}}\nfinger = {{ pitch_deg = 0 }}\n"
-    );
-    let experiment: Experiment = toml::from_str(&text).unwrap();
-    let vertices_of = mesh(field);
-    let (_, report) = Mesh::new(vertices_of.vertices(), vertices_of.triangles()).unwrap();
-    let shape = Shape::Mesh { bvh: MeshBvh::new(vertices_of), report: report.into() };
-    let environment = Environment::around(experiment.scene.clone(), shape).unwrap();
-    Simulation::within(experiment, Arc::new(environment)).unwrap()
-}
-
-fn trial(simulation: &Simulation, name: &str) -> TrialRow {
-    let row = simulation.trial(planner::by_name(name).unwrap(), 0);
-    assert_eq!(row.failure, None);
-    row
 }
 
 fn last_share(row: &TrialRow) -> f64 {
@@ -185,31 +154,6 @@ fn size_does_not_matter() {
         assert!((scaled / volume - 1.0).abs() < 1e-3, "{scale}: {scaled} {volume}");
         assert!((scaled_area / area - 1.0).abs() < 1e-3, "{scale}: {scaled_area} {area}");
     }
-}
-
-fn belief(ball_m: f64, radius_m: f64) -> Belief {
-    let ball = Ball { centre_w: Point3::origin(), radius_m: ball_m, lowest_m: None };
-    let finger = Finger { radius_m, pitch_deg: 0.0, ..Finger::default() };
-    let task = Task::around(ball, TouchSettings::default(), &finger);
-    Belief::new(Scope::of(&task, &finger).unwrap(), SpaceSettings::default())
-}
-
-fn approach(belief: &Belief, aim: &Aim) -> Approach {
-    belief.scope().ball.approach(aim, &Finger::default(), 0.01, 0.0)
-}
-
-fn meet(
-    belief: &mut Belief,
-    aim: &Aim,
-    met: Option<(Point3<f64>, Vector3<f64>)>,
-    p_wt: Point3<f64>,
-) {
-    let touch =
-        met.map_or(Touch::Miss, |(p_wc, normal_w)| Touch::Contact(Contact { p_wc, normal_w }));
-    let radius_m = belief.scope().radius_m;
-    let swept = Swept { finger: Finger { radius_m, ..Finger::default() }, p_wt };
-    let approach = approach(belief, aim);
-    belief.observe(aim, &approach, (&touch, Some(&swept)));
 }
 
 /// Where there is nothing at all there is no surface, every fit succeeds, and planners go on.

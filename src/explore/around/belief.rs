@@ -29,8 +29,9 @@ pub struct Belief {
     surface: Option<Surface>,
 }
 
-/// Signal's deviation before the first fit, as a share of the ball's radius, and the range in which
-/// it is sought; chosen, the field is a distance and the object fills a part of the ball.
+/// Signal's deviation before the first fit, as a share of the radius of the ball about the
+/// contacts, and the range in which it is sought; chosen, the field is a distance and the object
+/// fills a part of the ball.
 const SIGNAL: f64 = 0.5;
 const SIGNAL_RANGE: [f64; 2] = [1e-2, 1e2];
 
@@ -100,16 +101,19 @@ impl Belief {
     ) -> Result<(&Fit, &Surface), CovarianceError> {
         let mut posterior = Posterior::new(self.kernel, fit.hyperparameters.clone(), observations)?;
         posterior.widen(self.settings.widening);
-        let surface = Surface::new(&self.scope.ball, prior, posterior, self.contacts());
+        let offset_m = self.settings.offset_m.unwrap_or(self.scope.offset_m);
+        let met = (self.contacts(), offset_m);
+        let surface = Surface::new(&self.scope, prior, posterior, met);
         Ok((self.fit.insert(fit), self.surface.insert(surface)))
     }
 
     /// What the touches say, in units of the noise of `last`.
     fn observations(&self, last: Option<&Hyperparameters>) -> (Prior, Observations) {
-        let prior = Prior::about(self.settings.prior, &self.scope.ball, self.contacts());
-        let unknown_m = SIGNAL * self.scope.ball.radius_m * self.settings.noise[0];
+        let ball = self.scope.met(self.contacts());
+        let prior = Prior::about(self.settings.prior, &ball, self.contacts());
+        let unknown_m = SIGNAL * ball.radius_m * self.settings.noise[0];
         let noise_m = last.map_or(unknown_m, |last| last.noise_sd);
-        let observations = self.evidence.observations(&prior, self.normals(), noise_m);
+        let observations = self.evidence.observations((&prior, &ball), self.normals(), noise_m);
         (prior, observations)
     }
 
@@ -123,7 +127,7 @@ impl Belief {
         start: Option<&Hyperparameters>,
         observations: &Observations,
     ) -> Result<Fit, CovarianceError> {
-        let radius_m = self.scope.ball.radius_m;
+        let radius_m = self.scope.met(self.contacts()).radius_m;
         let SpaceSettings { length_scale, noise, slope_noise, .. } = &self.settings;
         let lengths_m = length_scale.map(|share| share * radius_m);
         let mut ranges = vec![lengths_m, *noise];
@@ -138,6 +142,8 @@ impl Belief {
             None => ranges.iter().copied().map(middle).collect(),
         };
         begin.truncate(ranges.len());
+        // The object may have grown since.
+        begin.iter_mut().zip(&ranges).for_each(|(at, [low, high])| *at = at.clamp(*low, *high));
         let signal_sd =
             Scale::Best(Range::from((SIGNAL_RANGE[0] * radius_m, SIGNAL_RANGE[1] * radius_m)));
         let mut likelihood = Likelihood::new(self.kernel, Mean::Zero, observations);
@@ -173,6 +179,11 @@ impl Belief {
     /// Points of contact in `W`, in order.
     pub fn contacts(&self) -> impl ExactSizeIterator<Item = &Point3<f64>> + Clone {
         self.evidence.contacts()
+    }
+
+    /// How far `p_w` is from all that was met and swept.
+    pub fn hole_m(&self, p_w: &Point3<f64>) -> f64 {
+        self.evidence.hole_m(p_w)
     }
 
     /// Every aim asked for so far.

@@ -2,15 +2,16 @@
 
 use super::prior::Prior;
 use crate::explore::probe::{Swept, Touch};
+use crate::geometry::primitives::nearest_on_segment;
 use crate::gp::{Observation, Observations, Slope};
-use crate::task::Approach;
+use crate::task::{Aim, Approach, Ball};
 use nalgebra::{Point3, Vector3};
 
 /// All that was met and swept.
 #[derive(Clone, Debug, Default)]
 pub struct Evidence {
     contacts: Vec<Met>,
-    free: Vec<Free>,
+    ways: Vec<Way>,
 }
 
 /// A contact.
@@ -20,11 +21,41 @@ struct Met {
     normal_w: Vector3<f64>,
 }
 
-/// The centre of a ball that the finger swept.
+/// The way of a fingertip that met nothing before its end.
 #[derive(Clone, Debug)]
-struct Free {
-    p_w: Point3<f64>,
+struct Way {
+    /// Its end, and which way it went.
+    end: Aim,
+    length_m: f64,
     radius_m: f64,
+    /// Balls along it that are observed.
+    places: u32,
+    /// Whether something was met at its end.
+    is_met: bool,
+}
+
+impl Way {
+    /// How far `p_w` is from its hull.
+    fn away_m(&self, p_w: &Point3<f64>) -> f64 {
+        let start_w = self.end.p_w - self.end.ahead_w.scale(self.length_m);
+        (nearest_on_segment(p_w, &start_w, &self.end.p_w) - p_w).norm() - self.radius_m
+    }
+
+    /// Middles of its balls, from its end backwards: where it runs through `ball`, and at least the
+    /// one that something was met with.
+    fn places_w(&self, ball: &Ball) -> impl Iterator<Item = Point3<f64>> {
+        let [near_m, far_m] = ball.chord_m(&self.end);
+        let first_m = if self.is_met { 0.0 } else { (-far_m).max(0.0) };
+        let last_m =
+            (-near_m).min(self.length_m).max(if self.is_met { self.radius_m } else { 0.0 });
+        let is_in = self.is_met || (near_m < far_m && first_m < last_m);
+        let count = if is_in { self.places } else { 0 };
+        (0..count).map(move |i| {
+            let share = f64::from(i) / f64::from(count);
+            let back_m = first_m + share * (last_m - first_m);
+            self.end.p_w - self.end.ahead_w.scale(back_m)
+        })
+    }
 }
 
 /// Least deviation of a free place's field, as a share of its distance from what was met: the field
@@ -51,13 +82,13 @@ impl Evidence {
         };
         let Some(Swept { finger, p_wt }) = swept else { return };
         let ahead_w = approach.direction_w();
-        let way_m = (p_wt - approach.p_near_w).dot(&ahead_w);
-        let ball = |share: f64| Free {
-            p_w: p_wt - ahead_w.scale(share * way_m),
+        self.ways.push(Way {
+            end: Aim { p_w: *p_wt, ahead_w },
+            length_m: (p_wt - approach.p_near_w).dot(&ahead_w),
             radius_m: finger.radius_m,
-        };
-        // From the tip's own place outwards.
-        self.free.extend((0..places).map(|i| ball(f64::from(i) / f64::from(places))));
+            places,
+            is_met: matches!(touch, Touch::Contact(_)),
+        });
     }
 
     /// Points of contact in `W`, in order.
@@ -65,11 +96,27 @@ impl Evidence {
         self.contacts.iter().map(|met| &met.p_w)
     }
 
+    /// How far `p_w` is from all contacts and from the hull of the fingertip on all its ways.
+    pub fn hole_m(&self, p_w: &Point3<f64>) -> f64 {
+        let met = self.contacts().map(|contact| (contact - p_w).norm());
+        met.chain(self.ways.iter().map(|way| way.away_m(p_w))).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Middles and radii of the balls that were swept inside `ball`.
+    fn free<'a>(&'a self, ball: &'a Ball) -> impl Iterator<Item = (Point3<f64>, f64)> {
+        self.ways.iter().flat_map(|way| way.places_w(ball).map(|p_w| (p_w, way.radius_m)))
+    }
+
     /// What the field is above `prior`: 0 at each contact, with the normal as its gradient if
-    /// `normals`; and at the middle of each swept ball the distance to the nearest contact. That is
+    /// `normals`; and at the middle of each ball swept inside `ball` the distance to the nearest contact. That is
     /// the most that a distance can be there as the ball's radius is the least: the deviation is
     /// that of a uniform distribution between them. `noise_m` is the deviation that counts as one.
-    pub fn observations(&self, prior: &Prior, normals: bool, noise_m: f64) -> Observations {
+    pub fn observations(
+        &self,
+        (prior, ball): (&Prior, &Ball),
+        normals: bool,
+        noise_m: f64,
+    ) -> Observations {
         let mut all = Observations::new(3);
         for Met { p_w, normal_w } in &self.contacts {
             let field = prior.field(p_w);
@@ -78,14 +125,14 @@ impl Evidence {
             let place = p_w.coords.as_slice();
             all.take_in(&Observation { place, height: -field.value, noise: 1.0, slope });
         }
-        for Free { p_w, radius_m } in &self.free {
+        for (p_w, radius_m) in self.free(ball) {
             let distances_m = self.contacts().map(|contact| (contact - p_w).norm());
             let Some(nearest_m) = distances_m.reduce(f64::min) else { continue };
             let least_m = radius_m.min(nearest_m);
             let sd_m = ((nearest_m - least_m) / 12f64.sqrt()).max(SURE * nearest_m);
             all.take_in(&Observation {
                 place: p_w.coords.as_slice(),
-                height: nearest_m - prior.field(p_w).value,
+                height: nearest_m - prior.field(&p_w).value,
                 noise: (sd_m / noise_m).max(1.0),
                 slope: None,
             });

@@ -21,7 +21,7 @@ const THINNEST: f64 = 0.1;
 const UNKNOWN: f64 = 0.5;
 
 impl Prior {
-    /// About `contacts`, inside `ball`.
+    /// About `contacts`, in the `ball` about them.
     pub fn about<'a>(
         shape: PriorShape,
         ball: &Ball,

@@ -12,7 +12,7 @@ pub struct SpaceSettings {
     pub kernel: String,
     /// What is believed where nothing is known.
     pub prior: PriorShape,
-    /// Range of the length scale, as a share of the ball's radius.
+    /// Range of the length scale, as a share of the radius of the ball about the contacts.
     pub length_scale: [f64; 2],
     /// Range of the contacts' error, as a share of the field's standard deviation.
     pub noise: [f64; 2],
@@ -26,6 +26,11 @@ pub struct SpaceSettings {
     pub free_places: u32,
     /// What the standard deviations are multiplied by.
     pub widening: f64,
+    /// Standard deviation, in metres, of an error that all contacts have in common, by which the
+    /// whole surface may be larger or smaller. Left out, 0 of a rigid finger and 0.0003 of a soft
+    /// one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset_m: Option<f64>,
     /// Cells along the longest side of the box in which the surface is sought.
     pub cells: u32,
     /// Beliefs are compared with the truth after every so many touches, and after the last.
@@ -59,7 +64,8 @@ impl Default for SpaceSettings {
             slope_noise: [0.01, 1.0],
             normals: true,
             free_places: 3,
-            widening: 1.5,
+            widening: 1.6,
+            offset_m: None,
             cells: 64,
             compared_every: 5,
         }
@@ -74,6 +80,9 @@ impl Checked for SpaceSettings {
         rules.interval("slope_noise", self.slope_noise, 1e-6..=100.0);
         rules.number("free_places", self.free_places.into(), 0.0..=16.0);
         rules.number("widening", self.widening, 0.1..=10.0);
+        if let Some(offset_m) = self.offset_m {
+            rules.number("offset_m", offset_m, 0.0..=0.1);
+        }
         rules.number("compared_every", self.compared_every.into(), 1.0..=1e6);
         rules.number("cells", self.cells.into(), 8.0..=256.0);
     }

@@ -3,6 +3,7 @@
 use super::grid::zero_set;
 use super::pieces::touched;
 use super::prior::Prior;
+use super::scope::Scope;
 use crate::geometry::extent::extent;
 use crate::geometry::implicit::Field;
 use crate::geometry::mesh::Mesh;
@@ -18,12 +19,15 @@ pub struct Surface {
     prior: Prior,
     posterior: Posterior,
     contacts: Vec<Point3<f64>>,
+    /// Standard deviation of what all contacts are off by.
+    offset_m: f64,
     /// Corners of the box in which the surface is sought.
     bounds: [Point3<f64>; 2],
 }
 
-/// How far the box of a surface goes beyond its contacts, as a share of their diagonal; chosen.
-const BEYOND: f64 = 0.08;
+/// How far the box of a surface goes beyond its contacts, as a share of the radius of the ball about
+/// them; chosen.
+const BEYOND: f64 = 0.15;
 
 /// A gradient below this is not a distance's; chosen.
 const FLAT: f64 = 0.3;
@@ -39,25 +43,25 @@ const STEPS: usize = 2;
 
 impl Surface {
     pub(super) fn new<'a>(
-        ball: &Ball,
+        scope: &Scope,
         prior: Prior,
         posterior: Posterior,
-        contacts: impl Iterator<Item = &'a Point3<f64>>,
+        (contacts, offset_m): (impl Iterator<Item = &'a Point3<f64>>, f64),
     ) -> Self {
         let contacts: Vec<Point3<f64>> = contacts.copied().collect();
-        let around = ball.radius_m;
-        let [ball_low, ball_high] = [-around, around].map(|r| ball.centre_w.map(|x| x + r));
+        let Ball { centre_w, radius_m, .. } = &scope.ball;
+        let [ball_low, ball_high] = [-radius_m, *radius_m].map(|r| centre_w.map(|x| x + r));
         let bounds = match extent(&contacts) {
             None => [ball_low, ball_high],
             Some([low, high]) => {
-                let beyond_m = BEYOND * (high - low).norm().max(around);
+                let beyond_m = BEYOND * scope.met(contacts.iter()).radius_m;
                 [
                     low.map(|x| x - beyond_m).sup(&ball_low),
                     high.map(|x| x + beyond_m).inf(&ball_high),
                 ]
             }
         };
-        Self { prior, posterior, contacts, bounds }
+        Self { prior, posterior, contacts, offset_m, bounds }
     }
 
     /// To ask for its mean at many points.
@@ -70,7 +74,8 @@ impl Surface {
         let places: Vec<Vec<f64>> =
             points_w.iter().map(|p_w| p_w.coords.as_slice().into()).collect();
         let variances = self.posterior.variances(&places, &mut []);
-        variances.into_iter().map(|variance| variance.max(0.0).sqrt()).collect()
+        let offset2 = self.offset_m * self.offset_m;
+        variances.into_iter().map(|variance| (variance.max(0.0) + offset2).sqrt()).collect()
     }
 
     /// How far the surface may lie from where it is believed at each of `points_w` of it: σ / |∇f|.

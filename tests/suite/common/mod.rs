@@ -1,5 +1,6 @@
 //! What several tests need.
 
+pub mod around;
 pub mod counting;
 pub mod fake;
 #[cfg(feature = "mujoco")]

@@ -2,6 +2,7 @@
 
 use super::plan::{blocked, decided};
 use super::random::anywhere;
+use super::unseen::unseen;
 use super::way::free_aim;
 use crate::explore::around::belief::Belief;
 use crate::explore::around::surface::{Surface, steepness};
@@ -55,13 +56,16 @@ impl<'a> Candidates<'a> {
         Some(Self { belief, surface, all: all.collect() })
     }
 
-    /// To go where the scores that `score` gives the candidates are highest and the way is free;
-    /// anywhere where no surface is believed.
+    /// To go where the scores that `score` gives the candidates are highest and the way is free, or
+    /// now and then where nothing is known; anywhere where no surface is believed.
     pub fn choose(
         belief: &Belief,
         rng: &mut ChaCha8Rng,
         score: impl FnOnce(&Candidates) -> Vec<f64>,
     ) -> Plan {
+        if let Some(aim) = unseen(belief, rng) {
+            return decided(&aim, None);
+        }
         let aside = anywhere(belief.scope(), rng);
         match Candidates::of(belief, rng) {
             Some(candidates) => candidates.best(score(&candidates).into_iter(), &aside),

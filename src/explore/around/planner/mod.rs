@@ -11,6 +11,7 @@ mod plan;
 mod random;
 mod sobol;
 mod travel;
+mod unseen;
 mod way;
 
 pub use active::Active;

@@ -3,6 +3,7 @@
 use super::candidates::Candidates;
 use super::plan::{Planner, decided};
 use super::random::anywhere;
+use super::unseen::unseen;
 use crate::explore::around::belief::Belief;
 use crate::explore::plan::Plan;
 use crate::explore::tour::shorten;
@@ -65,6 +66,9 @@ fn way_m(ball: &Ball, a: &[f64], b: &[f64]) -> f64 {
 
 impl Planner for Travel {
     fn plan(&mut self, belief: &Belief) -> Plan {
+        if let Some(aim) = unseen(belief, &mut self.rng) {
+            return decided(&aim, None);
+        }
         if let Some(plan) = self.tour.pop() {
             return plan;
         }

@@ -67,7 +67,8 @@ fn is_new(belief: &Belief, aim: &Aim) -> bool {
     })
 }
 
-fn has_room(belief: &Belief, surface: &mut SurfaceField, aim: &Aim) -> bool {
+/// Whether the belief leaves the fingertip room along the way of `aim` outside the object.
+pub(super) fn has_room(belief: &Belief, surface: &mut SurfaceField, aim: &Aim) -> bool {
     let (ball, radius_m) = (&belief.scope().ball, belief.scope().radius_m);
     let back = |radii: f64| aim.p_w - aim.ahead_w.scale(radii * radius_m);
     let mut radii = FIRST;

@@ -1,0 +1,74 @@
+//! Trials around made-up solids, and beliefs that are told of touches.
+
+use super::solids::nets_within;
+use nalgebra::{Point3, Vector3};
+use palpate::experiment::Experiment;
+use palpate::experiment::row::TrialRow;
+use palpate::experiment::simulation::Simulation;
+use palpate::explore::around::{Belief, Scope, SpaceSettings};
+use palpate::explore::planner;
+use palpate::explore::probe::{Contact, Swept, Touch};
+use palpate::geometry::bvh::MeshBvh;
+use palpate::geometry::mesh::Mesh;
+use palpate::robot::Finger;
+use palpate::sim::Environment;
+use palpate::sim::environment::Shape;
+use palpate::task::touch::TouchSettings;
+use palpate::task::{Aim, Approach, Ball, Task};
+use std::sync::Arc;
+
+/// A field of one number per point, negative inside, metres.
+pub type Field = fn(Vector3<f64>) -> f64;
+
+pub fn mesh(field: Field) -> Mesh {
+    nets_within(field, 0.07, 0.0015)
+}
+
+/// An experiment on a solid in place of the scene's object; the settings are TOML.
+pub fn simulation(field: Field, settings: &str) -> Simulation {
+    let text = format!(
+        "name = \"whole\"\ninitial_touches = 5\ntrials = 1\n{settings}\n[scene]\nbody = \"cast\"\n\
+         object = {{ mesh = \"none.obj\" }}\naround = {{}}\nfinger = {{ pitch_deg = 0 }}\n"
+    );
+    let experiment: Experiment = toml::from_str(&text).unwrap();
+    let vertices_of = mesh(field);
+    let (_, report) = Mesh::new(vertices_of.vertices(), vertices_of.triangles()).unwrap();
+    let shape = Shape::Mesh { bvh: MeshBvh::new(vertices_of), report: report.into() };
+    let environment = Environment::around(experiment.scene.clone(), shape).unwrap();
+    Simulation::within(experiment, Arc::new(environment)).unwrap()
+}
+
+pub fn trial(simulation: &Simulation, name: &str) -> TrialRow {
+    let row = simulation.trial(planner::by_name(name).unwrap(), 0);
+    assert_eq!(row.failure, None);
+    row
+}
+
+pub fn belief(ball_m: f64, radius_m: f64) -> Belief {
+    belief_with(SpaceSettings::default(), ball_m, radius_m)
+}
+
+pub fn belief_with(settings: SpaceSettings, ball_m: f64, radius_m: f64) -> Belief {
+    let ball = Ball { centre_w: Point3::origin(), radius_m: ball_m, lowest_m: None };
+    let finger = Finger { radius_m, pitch_deg: 0.0, ..Finger::default() };
+    let task = Task::around(ball, TouchSettings::default(), &finger);
+    Belief::new(Scope::of(&task, &finger, false).unwrap(), settings)
+}
+
+pub fn approach(belief: &Belief, aim: &Aim) -> Approach {
+    belief.scope().ball.approach(aim, &Finger::default(), 0.01, 0.0)
+}
+
+pub fn meet(
+    belief: &mut Belief,
+    aim: &Aim,
+    met: Option<(Point3<f64>, Vector3<f64>)>,
+    p_wt: Point3<f64>,
+) {
+    let touch =
+        met.map_or(Touch::Miss, |(p_wc, normal_w)| Touch::Contact(Contact { p_wc, normal_w }));
+    let radius_m = belief.scope().radius_m;
+    let swept = Swept { finger: Finger { radius_m, ..Finger::default() }, p_wt };
+    let approach = approach(belief, aim);
+    belief.observe(aim, &approach, (&touch, Some(&swept)));
+}
