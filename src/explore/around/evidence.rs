@@ -108,9 +108,10 @@ impl Evidence {
     }
 
     /// What the field is above `prior`: 0 at each contact, with the normal as its gradient if
-    /// `normals`; and at the middle of each ball swept inside `ball` the distance to the nearest contact. That is
-    /// the most that a distance can be there as the ball's radius is the least: the deviation is
-    /// that of a uniform distribution between them. `noise_m` is the deviation that counts as one.
+    /// `normals`; and at the middle of each ball swept inside `ball` the distance to the nearest
+    /// contact. That is the most that a distance can be there as the swept radius is the least: the
+    /// deviation is that of a uniform distribution between them. `noise_m` is the deviation that
+    /// counts as one.
     pub fn observations(
         &self,
         (prior, ball): (&Prior, &Ball),

@@ -25,8 +25,8 @@ pub struct Surface {
     bounds: [Point3<f64>; 2],
 }
 
-/// How far the box of a surface goes beyond its contacts, as a share of the radius of the ball about
-/// them; chosen.
+/// How far the box of a surface goes beyond its contacts, as a share of the radius of the ball
+/// about them; chosen.
 const BEYOND: f64 = 0.15;
 
 /// A gradient below this is not a distance's; chosen.
