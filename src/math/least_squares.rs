@@ -87,7 +87,7 @@ pub const NARROWER: f64 = 3.0;
 const DIFFERENCE: f64 = 1e-4;
 
 /// Rounds of steps, and of leaving out; chosen, several times what is usual.
-const STEPS: usize = 60;
+const STEPS: usize = 250;
 const ROUNDS: usize = 12;
 
 /// A step shorter than this part of a unit is the last; chosen.
