@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers growth-around wheel install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers growth-around wheel install-python test-python docs notebooks dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -46,7 +46,13 @@ test: setup
 	cargo test --locked --features ros2
 	for example in $(EXAMPLES); do cargo run --quiet --locked --features ros2 --example $$example || exit; done
 	tests/clusters/test.sh target/debug/palpate
-	$(MAKE) test-ros2 TOUCHES=6 OVER_TOPICS='lab::a_peer lab::the_container lab::the_loop'
+	$(MAKE) test-faults
+	$(MAKE) test-ros2 TOUCHES=6 OVER_TOPICS='lab::a_peer lab::an_arm lab::only_the_named lab::the_container lab::the_loop'
+
+# How far the tip still moves after each failure between explorer and arm: the table of docs/real-arm.md.
+# In real time, so with the machine for itself.
+test-faults: setup
+	cargo test --locked --features ros2 --test suite -- --ignored --test-threads 1 --nocapture twin_faults
 
 # Planners are what experiments/baselines says: whoever changes one writes why (palpate check --bless).
 CHECKED := toy container bird

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from ._planners import Factory, make, target_of, told
+from ._planners import Factory, make, source_of, target_of, told
 from .errors import PlannerError
 
 #: Seconds that a process may take to start and to make a planner, at least; chosen.
@@ -25,6 +25,7 @@ class Isolated:
 
     def __init__(self, factory: Factory, limit_s: float | None) -> None:
         self.factory = factory
+        self.source = source_of(factory)
         self.limit_s = limit_s
         self._lock = threading.Lock()
         self._idle: list[Child] = []

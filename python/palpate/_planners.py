@@ -13,7 +13,9 @@ import os
 import sys
 import threading
 import traceback
+import uuid
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -66,6 +68,39 @@ def by_name(name: str) -> Factory:
     return factory
 
 
+def source_of(factory: Factory) -> str:
+    """The source that decides what a planner computes, so that a run can tell an edited planner.
+
+    It is that of the planner's module and of the modules in its folder that it uses, directly or through one
+    another; what is installed does not count. A planner of a script or a notebook (`__main__`) is known by its own
+    definition and those of its bases there. One without any source is another one each time.
+    """
+    module = sys.modules.get(factory.__module__)
+    if module is None or module.__name__ == "__main__" or not getattr(module, "__file__", None):
+        known = [it for it in getattr(factory, "__mro__", (factory,)) if it.__module__ == factory.__module__]
+        try:
+            return "".join(inspect.getsource(it) for it in known)
+        except (OSError, TypeError):
+            return f"unknown {uuid.uuid4()}"
+    folder = Path(str(module.__file__)).parent
+    sources: dict[str, str] = {}
+    waiting = [module]
+    while waiting:
+        used = waiting.pop()
+        file = Path(str(getattr(used, "__file__", None)))
+        name = file.relative_to(folder).as_posix() if file.is_relative_to(folder) else None
+        is_installed = "site-packages" in file.parts or "dist-packages" in file.parts
+        if name is None or name in sources or (is_installed and used is not module):
+            continue
+        sources[name] = file.read_bytes().decode(errors="replace") if file.is_file() else ""
+        for value in list(vars(used).values()):
+            origin = getattr(value, "__module__", None)
+            other = value if inspect.ismodule(value) else sys.modules.get(origin if isinstance(origin, str) else "")
+            if other is not None:
+                waiting.append(other)
+    return "\n".join(f"# {name}\n{sources[name]}" for name in sorted(sources))
+
+
 def _plans(planner: Any) -> bool:
     return callable(getattr(planner, "plan", None))
 
@@ -108,6 +143,7 @@ class Workers:
     """The planners of one name in one run, as the extension starts them."""
 
     def __init__(self, factory: Factory, limit_s: float | None) -> None:
+        self.source = source_of(factory)
         self._factory = factory
         self._limit_s = limit_s
         self._live: set[Worker] = set()

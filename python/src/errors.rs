@@ -74,6 +74,7 @@ pub(crate) fn store(error: StoreError) -> PyErr {
     let path = match &error {
         StoreError::Io { path, .. }
         | StoreError::Differs { path, .. }
+        | StoreError::Changed { path, .. }
         | StoreError::Busy { path }
         | StoreError::NotARun { path, .. }
         | StoreError::Foreign { path }

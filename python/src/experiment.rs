@@ -4,8 +4,9 @@ use crate::errors;
 use crate::planner::PythonMaker;
 use crate::run::Run;
 use crate::zone::Zone;
-use palpate::experiment::store::{self, Manifest, RunFolder, resolved};
-use palpate::experiment::{self, Simulation, runner};
+use palpate::experiment::runner::{self, Progress};
+use palpate::experiment::store::{self, Content, RunFolder, resolved};
+use palpate::experiment::{self, Simulation};
 use palpate::explore::planner::Maker;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
@@ -88,8 +89,10 @@ impl Experiment {
         let (look, stop) = told;
         let makers = own
             .into_iter()
-            .map(|(name, start)| -> Box<dyn Maker> { Box::new(PythonMaker { name, start }) })
-            .collect();
+            .map(|(name, start)| -> PyResult<Box<dyn Maker>> {
+                Ok(Box::new(PythonMaker::new(py, name, start)?))
+            })
+            .collect::<PyResult<_>>()?;
         let experiment = self.0.clone();
         let simulation = py.detach(|| Simulation::new(experiment)).map_err(errors::simulation)?;
         simulation.simulator().check_reach().map_err(errors::scene)?;
@@ -129,15 +132,17 @@ impl Told {
         threads: usize,
     ) -> PyResult<Run> {
         let experiment = simulation.experiment();
+        let content = Content::of(simulation).map_err(errors::store)?;
         let (mut folder, done) =
-            RunFolder::open(path, experiment, simulation.truth(), &Manifest::of(experiment), fresh)
+            RunFolder::open(path, experiment, simulation.truth(), &content, fresh)
                 .map_err(errors::store)?;
         let jobs = runner::jobs(simulation, &done).map_err(errors::run)?;
         self.done.store(done.len(), Ordering::Relaxed);
         let total = done.len() + jobs.len();
         let outcome = self.watched(py, total, || {
-            let tick = |_: &_| {
-                self.done.fetch_add(1, Ordering::Relaxed);
+            let tick = |progress: Progress| {
+                let trials = usize::from(matches!(progress, Progress::Trial(_)));
+                self.done.fetch_add(trials, Ordering::Relaxed);
             };
             runner::run(simulation, (&mut folder, jobs), threads, &self.is_stopped, None, &tick)
         });
@@ -149,8 +154,9 @@ impl Told {
     fn in_memory(&self, py: Python<'_>, simulation: &Simulation, threads: usize) -> PyResult<Run> {
         let jobs = runner::jobs(simulation, &[]).map_err(errors::run)?;
         let rows = self.watched(py, jobs.len(), || {
-            let tick = |_: &_| {
-                self.done.fetch_add(1, Ordering::Relaxed);
+            let tick = |progress: Progress| {
+                let trials = usize::from(matches!(progress, Progress::Trial(_)));
+                self.done.fetch_add(trials, Ordering::Relaxed);
             };
             runner::rows(simulation, jobs, threads, &self.is_stopped, &tick)
         })?;

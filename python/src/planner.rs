@@ -18,11 +18,17 @@ pub(crate) struct PythonMaker {
     /// Called with zone, None around an object, and seed. Its result has `close()`, and `desk` with `abandon()`, or
     /// `plan(belief) -> sequence of float`; what that raises is the reason why there is no target.
     pub(crate) start: Py<PyAny>,
+    /// The source that decides its plans.
+    pub(crate) source: String,
 }
 
 impl Maker for PythonMaker {
     fn name(&self) -> &str {
         &self.name
+    }
+
+    fn source(&self) -> Option<String> {
+        Some(self.source.clone())
     }
 
     fn make(
@@ -44,6 +50,15 @@ impl Maker for PythonMaker {
 }
 
 impl PythonMaker {
+    /// Makes the planners of `name` by `start`, which says the source as `source`.
+    ///
+    /// # Errors
+    /// If `start` has no source.
+    pub(crate) fn new(py: Python<'_>, name: String, start: Py<PyAny>) -> PyResult<Self> {
+        let source = start.getattr(py, "source")?.extract(py)?;
+        Ok(Self { name, start, source })
+    }
+
     fn begin(&self, zone: Option<&task::Zone>, mut random: ChaCha8Rng) -> PythonPlanner {
         let seed: u64 = random.random();
         let begun = Python::attach(|py| {

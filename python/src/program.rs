@@ -10,11 +10,11 @@ use pyo3::prelude::*;
 pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> u8 {
     let brought = |name: &str| {
         let start = Python::attach(|py| {
-            bring.call1(py, (name,)).map_err(|error| anyhow::anyhow!("{}", error.value(py)))
+            let start = bring.call1(py, (name,));
+            let made = start.and_then(|start| PythonMaker::new(py, name.into(), start));
+            made.map_err(|error| anyhow::anyhow!("{}", error.value(py)))
         });
-        let made = start
-            .map(|start| -> Box<dyn Maker> { Box::new(PythonMaker { name: name.into(), start }) });
-        Some(made)
+        Some(start.map(|made| -> Box<dyn Maker> { Box::new(made) }))
     };
     py.detach(|| palpate::cli::main_with(arguments.into_iter().map(Into::into), &brought))
 }

@@ -3,6 +3,7 @@
 import functools
 import os
 import signal
+import subprocess
 import sys
 import threading
 
@@ -10,6 +11,7 @@ import numpy as np
 import own
 import palpate
 import pytest
+from palpate._planners import source_of
 from palpate.errors import PlannerError
 from scipy import optimize
 
@@ -137,3 +139,43 @@ def test_active_rewritten_in_python_finds_as_much(name, touches):
     difference = np.log(errors.iloc[:, 0]) - np.log(errors.iloc[:, 1])
     standard_error = difference.std(ddof=1) / np.sqrt(len(difference))
     assert abs(difference.mean()) <= 3 * standard_error
+
+
+def test_an_edited_planner_does_not_keep_its_rows(tmp_path):
+    helper = tmp_path / "helper.py"
+    helper.write_text("SHARE = 0.5\n")
+    planner = tmp_path / "mine.py"
+    planner.write_text(
+        "import numpy\nfrom helper import SHARE\n\n\nclass Fixed:\n    def __init__(self, zone):\n"
+        "        self.zone = zone\n\n    def plan(self, belief):\n"
+        "        return self.zone.lower + SHARE * (self.zone.upper - self.zone.lower)\n"
+    )
+
+    def run(*more):
+        command = [sys.executable, "-m", "palpate", "run", "toy", "--planner", "mine:Fixed", "--no-report", "--out", "run"]
+        sets = ["--set", "touches=6", "--set", "trials=1", "--set", "grid=11"]
+        return subprocess.run([*command, *sets, *more], cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    rows = tmp_path / "run" / "trials.jsonl"
+    assert run().returncode == 0, run().stderr
+    first = rows.read_bytes()
+    assert run().returncode == 0
+    assert rows.read_bytes() == first
+    # A module that the planner uses counts, one that lies beside it does not.
+    (tmp_path / "other.py").write_text("SHARE = 1\n")
+    assert run().returncode == 0
+    helper.write_text("SHARE = 0.25\n")
+    edited = run()
+    assert edited.returncode == 2
+    assert "planner mine:Fixed has changed" in edited.stderr and "--fresh" in edited.stderr
+    assert rows.read_bytes() == first
+    assert run("--fresh").returncode == 0
+    assert rows.read_bytes() != first
+
+
+def test_the_source_of_a_planner_is_that_of_its_module():
+    assert source_of(own.Middle) == source_of(own.Raises)
+    assert source_of(own.Middle).startswith("# own.py\n")
+    # Without a source none is the same as another.
+    built = type("Built", (), {"plan": lambda self, belief: 0.0, "__module__": "__main__"})
+    assert source_of(built) != source_of(built)

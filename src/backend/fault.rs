@@ -161,6 +161,22 @@ pub enum Fault {
         /// By which, and why.
         trip: Trip,
     },
+    /// The body must not be moved from where it stands: outside the workspace, too deep, or too near
+    /// to something.
+    #[error(
+        "the arm is not moved from where it stands, its tip at [{:.3}, {:.3}, {:.3}] m: {trip}; bring \
+         it near its home posture by hand: {}", p_wt[0], p_wt[1], p_wt[2], posture(home)
+    )]
+    Astray {
+        /// When.
+        time_s: f64,
+        /// What is violated.
+        trip: Box<Trip>,
+        /// The tip in `W`.
+        p_wt: [f64; 3],
+        /// Joints with their positions at home, rad or m.
+        home: Vec<(&'static str, f64)>,
+    },
     /// The body stopped answering.
     #[error("no answer since {time_s:.3} s")]
     Lost {
@@ -192,6 +208,11 @@ pub enum Fault {
         /// The missing feature.
         feature: &'static str,
     },
+}
+
+fn posture(joints: &[(&str, f64)]) -> String {
+    let words: Vec<String> = joints.iter().map(|(name, q)| format!("{name} {q:.3}")).collect();
+    words.join(", ")
 }
 
 /// What is read from a body.

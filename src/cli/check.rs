@@ -5,11 +5,11 @@ use super::columns::aligned;
 use super::find::{EXPERIMENTS, find};
 use super::output::Force;
 use super::prepare::{bound_threads, simulation};
-use super::progress::{progress_bar, step, stop_on_interrupt};
+use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::terminal::{Ending, Talk, print};
-use crate::experiment::row::TrialRow;
+use crate::experiment::runner::{self, Progress};
 use crate::experiment::store::write_whole;
-use crate::experiment::{Experiment, Simulation, runner};
+use crate::experiment::{Experiment, Simulation};
 use crate::report::check::{figure, junit, lines};
 use crate::study::check::cost::Cost;
 use crate::study::check::{Baseline, Held, Rules, Verdict, differs, hold};
@@ -112,9 +112,9 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         return bless(args, &simulation, (old.as_ref(), cost), (why, &rules), &stop, talk);
     }
     let old = old.context("no baseline")?;
-    let most = runner::jobs(&simulation, &[])?.len() as u64;
-    let bar = progress_bar(talk, &name, "trials", most, 0);
-    let tick = |_: &TrialRow| step(talk, &bar);
+    let most = runner::jobs(&simulation, &[])?.len();
+    let bar = touches_bar(talk, simulation.experiment(), [most, 0]);
+    let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
     let held = hold(&simulation, &old, &rules, args.threads.into(), &stop, &tick)?;
     bar.finish_and_clear();
     tell(args, &name, &old, &held, &rules)?;
@@ -169,8 +169,8 @@ fn bless(
 ) -> anyhow::Result<Ending> {
     args.force.claim(&args.baseline)?;
     let jobs = runner::jobs(simulation, &[])?;
-    let bar = progress_bar(talk, &simulation.experiment().name, "trials", jobs.len() as u64, 0);
-    let tick = |_: &TrialRow| step(talk, &bar);
+    let bar = touches_bar(talk, simulation.experiment(), [jobs.len(), 0]);
+    let tick = |progress: Progress| touch_step(talk, &bar, simulation.experiment(), progress);
     let threads = args.threads.into();
     let rows = runner::rows(simulation, jobs, threads, stop, &tick)?;
     bar.finish_and_clear();

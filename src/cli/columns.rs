@@ -28,9 +28,22 @@ pub(super) fn aligned_rows(lines: &[impl AsRef<[String]>]) -> String {
     text
 }
 
+/// `lines`, the first of them the head, without the columns that have no value in any line.
+pub(super) fn without_empty(mut lines: Vec<Vec<String>>) -> Vec<Vec<String>> {
+    for column in (0..lines.first().map_or(0, Vec::len)).rev() {
+        if lines.len() > 1 && lines.iter().skip(1).all(|line| line[column] == NONE) {
+            lines.iter_mut().for_each(|line| drop(line.remove(column)));
+        }
+    }
+    lines
+}
+
+/// A cell without a value.
+pub(super) const NONE: &str = "-";
+
 /// A number, or a dash where there is none.
 pub(super) fn cell(value: Option<f64>, decimals: usize) -> String {
-    value.map_or("-".into(), |value| format!("{value:.decimals$}"))
+    value.map_or(NONE.into(), |value| format!("{value:.decimals$}"))
 }
 
 /// A duration in the unit that suits it.
@@ -39,5 +52,21 @@ pub(super) fn duration(s: f64) -> String {
         s if s < 1e-3 => format!("{:.1} us", 1e6 * s),
         s if s < 1.0 => format!("{:.2} ms", 1e3 * s),
         s => format!("{s:.2} s"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_without_a_value_is_left_out() {
+        let lines = |lines: &[&[&str]]| -> Vec<Vec<String>> {
+            lines.iter().map(|line| line.iter().map(|&cell| cell.into()).collect()).collect()
+        };
+        let all = lines(&[&["effect", "runs", "time"], &["skin", "-", "-"], &["fluid", "-", "1"]]);
+        let kept = lines(&[&["effect", "time"], &["skin", "-"], &["fluid", "1"]]);
+        assert_eq!(without_empty(all), kept);
+        assert_eq!(without_empty(lines(&[&["effect", "runs"]])), lines(&[&["effect", "runs"]]));
     }
 }

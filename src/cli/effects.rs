@@ -1,6 +1,6 @@
 //! `palpate effects`.
 
-use super::columns::{aligned, cell};
+use super::columns::{NONE, aligned_rows, cell, without_empty};
 use super::find::{SCENES, find};
 use super::needs;
 use super::needs::{Effort, NeedsArgs, ONE_BUILD};
@@ -107,17 +107,18 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let Some(baseline) = Baseline::new(&scene, targets, budget, &mut go_on)? else {
         return Ok(Ending::Interrupted);
     };
-    let mut lines = vec![HEADER.map(String::from)];
+    let mut lines = vec![HEADER.map(String::from).to_vec()];
     let mut finished = true;
     for switch in &switches {
-        lines.push(cells(&baseline.change(switch, budget)?));
+        lines.push(cells(&baseline.change(switch, budget)?).into());
         if !go_on() {
             finished = false;
             break;
         }
     }
     bar.finish_and_clear();
-    let mut text = aligned(&lines);
+    // Runs, for one, are counted in development builds only.
+    let mut text = aligned_rows(&without_empty(lines));
     if let Some(ratios) = overheads(&scene, &baseline.poses(), args.pairs.into())? {
         text += "\ntime of a finger with every effect off, against a twin without code for them:\n";
         for (kept, (ratio, interval)) in ["but its skin", "but skin and fluid"].iter().zip(ratios) {
@@ -152,14 +153,14 @@ fn cells(change: &Change) -> [String; 10] {
         cell(change.shift_m.map(|spread| 1e3 * spread.p95), 3),
         cell(mean(change.force_n), 4),
         cell(mean(change.electrode_counts), 1),
-        change.time_ratio.map_or("-".into(), |ratio| format!("{:+.1} %", 100.0 * (ratio - 1.0))),
+        change.time_ratio.map_or(NONE.into(), |ratio| format!("{:+.1} %", 100.0 * (ratio - 1.0))),
         format!("{:+}", change.state_bytes),
-        change.runs.map_or("-".into(), |[off, on]| format!("{off}, {on}")),
+        change.runs.map_or(NONE.into(), |[off, on]| format!("{off}, {on}")),
         verdicts.join("; "),
     ]
 }
 
 fn verdict(paired: Option<Paired>) -> String {
-    let Some(paired) = paired else { return "-".into() };
+    let Some(paired) = paired else { return NONE.into() };
     with_interval(paired.mean, paired.interval, &|m| format!("{:.2}", 1e3 * m))
 }

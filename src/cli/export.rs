@@ -78,7 +78,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     };
     let (mesh, score) =
         if is_around { closed(&mut run, args, touches)? } else { over_zone(&run, args, touches)? };
-    write_whole(&args.out, &write(&mesh))?;
+    write_whole(&args.out, write(&mesh))?;
     let figure = if is_around { figures::SOLIDS } else { figures::SURFACES };
     if let Some(svg) = (figure.draw)(&run)? {
         files::write(&args.out, &svg)?;

@@ -1,7 +1,7 @@
 //! `palpate merge`.
 
 use super::terminal::{Ending, print};
-use crate::experiment::store::{Manifest, Shards};
+use crate::experiment::store::Shards;
 use anyhow::Context;
 use std::path::PathBuf;
 
@@ -23,7 +23,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let shards = Shards::open(&args.shards)?.context("no shards")?;
-    let count = shards.merge(&args.out, &Manifest::of(shards.experiment()))?;
+    let count = shards.merge(&args.out)?;
     print(&format!("{count} trials in {}", args.out.display()))?;
     Ok(Ending::Done)
 }

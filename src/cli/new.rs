@@ -143,7 +143,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let kit = args.finger.kit();
     write_whole(&scene, &guess.scene(args, &kit)?)?;
     let scene_name = format!("{name}-scene.toml");
-    write_whole(&experiment, &experiment_text(&name, &scene_name, kit.gp))?;
+    write_whole(&experiment, experiment_text(&name, &scene_name, kit.gp))?;
     print(&format!(
         "{}\nwrote {} and {}\n\nnext\n  palpate show {} --png {name}.png    to see the zone on it\n  \
          palpate run {}    {}",

@@ -2,7 +2,7 @@
 
 use super::terminal::{Talk, tell};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How long a step may take before its name is shown; chosen.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -30,18 +30,28 @@ fn showing_slow<T>(
     })
 }
 
-/// Shows each of the `begun` steps that no other follows in time.
+/// Shows each of the `begun` steps that no other follows in time, and one now and then of many that
+/// are shorter.
 fn show_slow(patience: Duration, show: impl Fn(&str), begun: &Receiver<String>) {
+    let mut shown = Instant::now();
     while let Ok(mut step) = begun.recv() {
         loop {
             match begun.recv_timeout(patience) {
                 Ok(next) => step = next,
-                Err(RecvTimeoutError::Timeout) => break show(&step),
+                Err(RecvTimeoutError::Timeout) => break,
                 Err(RecvTimeoutError::Disconnected) => return,
             }
+            if shown.elapsed() > SEVERAL * patience {
+                break;
+            }
         }
+        show(&step);
+        shown = Instant::now();
     }
 }
+
+/// Of steps that are each too short to be shown, one is after as many times the patience.
+const SEVERAL: u32 = 3;
 
 #[cfg(test)]
 mod tests {

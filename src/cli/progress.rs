@@ -1,6 +1,8 @@
 //! How far a long command has come, and how it is stopped.
 
 use super::terminal::{Talk, tell};
+use crate::experiment::Experiment;
+use crate::experiment::runner::Progress;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{self, IsTerminal};
@@ -46,6 +48,32 @@ pub(super) fn progress_bar(
     bar.set_position(done);
     bar.reset_eta();
     bar
+}
+
+/// A bar over the touches of so many trials of `experiment`, to be run and done before.
+pub(super) fn touches_bar(
+    talk: Talk,
+    experiment: &Experiment,
+    [trials, done]: [usize; 2],
+) -> ProgressBar {
+    let each = u64::from(experiment.touches);
+    let [trials, done] = [trials, done].map(|count| count as u64);
+    progress_bar(talk, &experiment.name, "touches", (trials + done) * each, done * each)
+}
+
+/// Moves the bar by a touch, or by those that a trial leaves out that ended early.
+pub(super) fn touch_step(
+    talk: Talk,
+    bar: &ProgressBar,
+    experiment: &Experiment,
+    progress: Progress,
+) {
+    match progress {
+        Progress::Touch => step(talk, bar),
+        Progress::Trial(row) => {
+            bar.inc(u64::from(experiment.touches).saturating_sub(row.touches.len() as u64));
+        }
+    }
 }
 
 /// Work that is done sooner needs no lines of progress; chosen.

@@ -9,8 +9,8 @@ use super::show::is_experiment;
 use super::terminal::{Ending, Talk, print};
 use crate::backend::ros::arm::Lab;
 use crate::backend::ros::settings::{BackendKind, BackendSettings};
-use crate::experiment::Experiment;
 use crate::experiment::store::write_whole;
+use crate::experiment::{Experiment, real_robot};
 use crate::explore::probe::Touch;
 use crate::explore::registration::{Design, Found, register};
 use crate::math::seed;
@@ -59,8 +59,9 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let path = find(&args.file, SCENES)?;
     let (scene, settings) = match is_experiment(&path) {
         true => {
-            let Experiment { scene, backend, .. } = Experiment::load(&path, &args.set)?;
-            (scene, backend)
+            let experiment = Experiment::load(&path, &args.set)?;
+            real_robot::check_cell(&experiment)?;
+            (experiment.scene, experiment.backend)
         }
         false => (Scene::load(&path, &args.set)?, BackendSettings::default()),
     };

@@ -3,6 +3,7 @@
 use super::prepare::simulation;
 use super::terminal::{Ending, Talk, print};
 use crate::backend::recording::Recorded;
+use crate::experiment::recorded_trial::parts;
 use crate::experiment::replay::{self, Difference, Replay};
 use crate::words::brief;
 use anyhow::Context;
@@ -17,7 +18,9 @@ Examples:
   palpate replay FILE --set scene.touch.press_m=0.001    where would that have been another trial?
 
 Plays what was read in the trial to today's servo, belief and planner, and compares every command and \
-every touch's row with the recorded ones. Exit codes: 0 the same, 1 something differs, 2 could not.")]
+every touch's row with the recorded ones. A trial of a real arm that was interrupted and continued is \
+recorded in parts (active-0000.mcap, active-0000-part-2.mcap, …): given the first, all are replayed. \
+Exit codes: 0 the same, 1 something differs, 2 could not.")]
 pub(super) struct Args {
     /// A recording, as `palpate run --record` writes them.
     file: PathBuf,
@@ -30,27 +33,57 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
-    let name = || args.file.display().to_string();
-    let recorded = Recorded::read(&args.file).with_context(name)?;
-    let experiment = replay::experiment(&recorded, &args.file, &args.set)?;
-    let simulation = simulation(experiment, talk)?;
-    let replay = replay::replay(&simulation, &recorded).with_context(name)?;
+    let parts = parts(&args.file).into_iter().map(|file| Part::of(file, args, talk));
+    let parts = parts.collect::<Result<Vec<_>, _>>()?;
     match args.json {
         true => {
-            let about = &recorded.about;
-            let found = json!({
-                "file": name(),
-                "version": about.version,
-                "planner": about.planner,
-                "trial": about.trial,
-                "ticks": recorded.tick_count,
-                "replay": replay,
-            });
+            let mut parts = parts.iter().map(Part::json);
+            let mut found = parts.next().unwrap_or_default();
+            let parts: Vec<_> = parts.collect();
+            if !parts.is_empty() {
+                found["parts"] = parts.into();
+            }
             print(&format!("{found:#}"))?;
         }
-        false => print(&format!("{}: {}", name(), text(&recorded, &replay)))?,
+        false => print(&parts.iter().map(Part::text).collect::<Vec<_>>().join("\n"))?,
     }
-    Ok(if replay.difference.is_none() { Ending::Done } else { Ending::Failed })
+    let is_same = parts.iter().all(|part| part.replay.difference.is_none());
+    Ok(if is_same { Ending::Done } else { Ending::Failed })
+}
+
+/// A file of a recorded trial with its replay.
+struct Part {
+    file: PathBuf,
+    recorded: Recorded,
+    replay: Replay,
+}
+
+impl Part {
+    fn of(file: PathBuf, args: &Args, talk: Talk) -> anyhow::Result<Self> {
+        let name = || file.display().to_string();
+        let recorded = Recorded::read(&file).with_context(name)?;
+        let experiment = replay::experiment(&recorded, &file, &args.set)?;
+        let simulation = simulation(experiment, talk)?;
+        let replay = replay::replay(&simulation, &recorded).with_context(name)?;
+        Ok(Self { file, recorded, replay })
+    }
+
+    fn json(&self) -> serde_json::Value {
+        let about = &self.recorded.about;
+        json!({
+            "file": self.file.display().to_string(),
+            "version": about.version,
+            "planner": about.planner,
+            "trial": about.trial,
+            "made_before": self.recorded.made,
+            "ticks": self.recorded.tick_count,
+            "replay": self.replay,
+        })
+    }
+
+    fn text(&self) -> String {
+        format!("{}: {}", self.file.display(), text(&self.recorded, &self.replay))
+    }
 }
 
 fn text(recorded: &Recorded, replay: &Replay) -> String {
@@ -59,7 +92,11 @@ fn text(recorded: &Recorded, replay: &Replay) -> String {
     let head =
         format!("{}, trial {}, recorded by palpate {}", about.planner, about.trial, about.version);
     let cut = if *is_cut { "; the recording ends before its trial" } else { "" };
-    let same = format!("{touches} touches the same, decisions and belief");
+    let before = match recorded.made {
+        0 => String::new(),
+        made => format!(", {made} of them made before this part"),
+    };
+    let same = format!("{touches} touches the same, decisions and belief{before}");
     match difference {
         None => format!("{head}\n{same}, over {} ticks{cut}", recorded.tick_count),
         Some(difference) => format!("{head}\n{same}{cut}\n{}", words(difference)),

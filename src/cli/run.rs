@@ -3,18 +3,19 @@
 use super::find::{EXPERIMENTS, find};
 use super::host::Bring;
 use super::prepare::{bound_threads, ready, simulation};
-use super::progress::{progress_bar, step, stop_on_interrupt};
+use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::terminal::{Ending, Talk, error, print};
 use crate::config::ConfigError;
 use crate::experiment::analysis::Analysis;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::lab_runner::{self, Halt, Outcome};
-use crate::experiment::row::{TrialId, TrialRow};
-use crate::experiment::runner::{self, RunError};
+use crate::experiment::row::TrialId;
+use crate::experiment::runner::{self, Progress, RunError};
 use crate::experiment::shard::Shard;
-use crate::experiment::store::{JOURNAL, Manifest, RECORDINGS, Run, RunFolder, Tally};
+use crate::experiment::store::{Content, JOURNAL, RECORDINGS, Run, RunFolder, Tally};
 use crate::experiment::sweep::cells;
 use crate::explore::planner;
+use crate::files;
 use crate::report;
 use anyhow::{Context, bail};
 use std::path::PathBuf;
@@ -168,10 +169,6 @@ pub(super) fn make(
         own.filter_map(|name| bring(name)).partition(Result::is_ok);
     let simulation = simulation(experiment, talk)?;
     let mut simulation = simulation.with_planners(own.into_iter().flatten().collect());
-    if let Some(lab) = simulation.connect()? {
-        ready(&lab, how.clear_fault)?;
-    }
-    let simulation = simulation;
     let experiment = simulation.experiment();
     if how.record && !experiment.scene.body.moves() && !simulation.is_real() {
         let body = experiment.scene.body.name();
@@ -187,13 +184,29 @@ pub(super) fn make(
         let part = how.shard.map(|it| format!("-{}-of-{}", it.index, it.count));
         PathBuf::from("runs").join(format!("{}{}", experiment.name, part.unwrap_or_default()))
     });
-    let manifest = Manifest::of(experiment);
+    let content = Content::of(&simulation)?;
     let (mut folder, done) =
-        RunFolder::open(&path, experiment, simulation.truth(), &manifest, how.fresh)?;
+        RunFolder::open(&path, experiment, simulation.truth(), &content, how.fresh)?;
+    // Before an arm is looked for: another program may hold the folder, or a fault may want an
+    // operator.
+    if simulation.is_real() {
+        if let Some(reason) = folder.journal()?.halted().filter(|_| !how.clear_fault) {
+            bail!(
+                "{}: the run was halted by a fault: {reason}\nlook at the arm, then go on with \
+                 --clear-fault, or use --fresh to start again",
+                path.display()
+            );
+        }
+        if let Some(lab) = simulation.connect()? {
+            ready(&lab, how.clear_fault)?;
+        }
+    }
+    let simulation = simulation;
+    let experiment = simulation.experiment();
     let recorded = how.record.then_some(path.as_path());
     if recorded.is_some() {
         let folder = path.join(RECORDINGS);
-        std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+        files::make_folder(&folder).with_context(|| folder.display().to_string())?;
     }
     let stop = match stop {
         Some(stop) => stop,
@@ -207,10 +220,10 @@ pub(super) fn make(
         shard.keep(&mut jobs);
     }
     let total = (done.len() + jobs.len()) as u64;
-    let bar = progress_bar(talk, &experiment.name, "trials", total, done.len() as u64);
+    let bar = touches_bar(talk, experiment, [jobs.len(), done.len()]);
     let begun = Instant::now();
     let threads = how.threads.into();
-    let tick = |_: &TrialRow| step(talk, &bar);
+    let tick = |progress: Progress| touch_step(talk, &bar, experiment, progress);
     let outcome = match simulation.is_real() {
         true => {
             let rows = (&mut folder, done.as_slice());

@@ -88,8 +88,8 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         ..Points::default()
     };
     make_folder(&folder)?;
-    write_whole(&folder.join("cloud.ply"), &cloud.ply())?;
-    write_whole(&folder.join("cloud.csv"), &csv(&touches))?;
+    write_whole(&folder.join("cloud.ply"), cloud.ply())?;
+    write_whole(&folder.join("cloud.csv"), csv(&touches))?;
     if let Some(svg) = drawing::picture(&environment, mesh, &cloud.points) {
         files::write(&folder.join("scan.svg"), &svg)?;
     }

@@ -149,7 +149,7 @@ fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
             None => report::zone::picture(&environment),
         };
         let svg = svg.context("--png: this scene has no object to draw")?;
-        std::fs::write(path, png::render(&svg)?).with_context(|| path.display().to_string())?;
+        store::write_whole(path, png::render(&svg)?)?;
         text += &format!("picture: {}\n", path.display());
     }
     if let Some(model) = mjcf::scene(&environment, mjcf::Mode::Picture) {

@@ -12,15 +12,14 @@ use crate::backend::ros::topics::Side;
 use crate::experiment::Experiment;
 use crate::sim::finger::effects::wrench::WrenchEffect;
 use crate::sim::{Scene, known_body};
-use crate::twin::failure::{FAILURES, by_name};
+use crate::twin::failure::{FAILURES, Failure, by_name};
 use crate::twin::serve::{Injection, Twin, services};
 use anyhow::{Context, bail};
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-#[derive(clap::Args)]
-#[command(after_help = "\
+const HELP: &str = "\
 Examples:
   palpate twin experiments/container_pa10.toml
   palpate twin scenes/container_pa10.toml --domain 7 --seed 3
@@ -31,7 +30,16 @@ In another terminal: palpate run container_pa10 --set backend.kind='\"ros2\"'
 
 Serves the simulated arm over the topics of the experiment's [backend] in real time, with what an arm's own \
 computer does: a command that is late, garbled or of a second publisher stops the arm. Events are printed as \
-JSON lines. Ctrl-C ends it. A failure is begun by --inject, or by the service /twin/NAME.")]
+JSON lines. Ctrl-C ends it. A failure is begun by --inject, or by the service /twin/NAME.";
+
+/// A line for each failure.
+fn failures() -> String {
+    let line = |failure: &Failure| format!("  {:<14} {}", failure.name, failure.about);
+    FAILURES.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+#[derive(clap::Args)]
+#[command(after_help = format!("{HELP}\n\nFailures:\n{}", failures()))]
 pub(super) struct Args {
     /// A scene or an experiment (.toml) with a body that moves and a soft finger.
     path: PathBuf,
@@ -41,7 +49,7 @@ pub(super) struct Args {
     /// Transport [default: the experiment's, or ros2].
     #[arg(long, value_name = "ros2|ros1", value_parser = kind)]
     kind: Option<BackendKind>,
-    /// Domain of ROS 2 [default: the experiment's, or 0].
+    /// Domain of ROS 2 [default: the experiment's, ROS_DOMAIN_ID, or 0].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=232))]
     domain: Option<u16>,
     /// Begin a failure some seconds after the first movement, and end it: NAME@SECONDS[+SECONDS].
@@ -129,7 +137,7 @@ fn experiment(args: &Args) -> anyhow::Result<Experiment> {
         false => Experiment::on(&Scene::load(&path, &args.set)?, &["active"], 1, TOUCHES),
     };
     let backend = &mut experiment.backend;
-    backend.domain = args.domain.unwrap_or(backend.domain);
+    backend.domain = args.domain.or(backend.domain);
     let usual = || Some(backend.kind).filter(|kind| *kind != BackendKind::Simulated);
     backend.kind = args.kind.or_else(usual).unwrap_or(BackendKind::Ros2);
     Ok(experiment)

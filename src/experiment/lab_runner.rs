@@ -1,16 +1,16 @@
 //! Trials of a real arm: one after another, every touch kept, and none after a fault.
 
-use super::recorded_trial::{self, recording_path};
+use super::recorded_trial::{self, next_part, recording_path};
 use super::resumed::Resumed;
 use super::row::{TouchRow, TrialId, TrialRow};
-use super::runner::{RunError, jobs};
+use super::runner::{OnProgress, Progress, RunError, jobs};
 use super::simulation::Simulation;
 use super::store::{Entry, Journal, RunFolder, StoreError};
 use super::witness::{Touched, Witness};
 use crate::backend::Fault;
 use crate::backend::ros::clock;
 use crate::explore::planner::Maker;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What came of it.
@@ -45,7 +45,7 @@ pub fn run(
     (folder, done): (&mut RunFolder, &[TrialId]),
     stop: &AtomicBool,
     recorded: Option<&Path>,
-    progress: &(dyn Fn(&TrialRow) + Sync),
+    progress: OnProgress,
 ) -> Result<Outcome, RunError> {
     let mut journal = folder.journal()?;
     let mut outcome = Outcome::default();
@@ -54,48 +54,46 @@ pub fn run(
             break;
         }
         let made = journal.touches(trial, planner.name());
-        let mut keeper =
-            Keeper { journal: &mut journal, made: &made, stop, trial, planner, error: None };
+        let mut keeper = Keeper {
+            journal: &mut journal,
+            made: &made,
+            stop,
+            progress,
+            trial,
+            planner,
+            end: End::default(),
+        };
         let row = match recorded {
             Some(run) => {
-                let path = part_path(run, planner, trial);
+                let path = next_part(&recording_path(run, planner, trial));
                 recorded_trial::go_on(simulation, planner, trial, &path, &made, &mut keeper)
             }
             None => go_on(simulation, planner, trial, &made, &mut keeper),
         };
-        if let Some(error) = keeper.error {
-            return Err(error.into());
-        }
+        let is_asked = match keeper.end {
+            End::Unstored(error) => return Err(error.into()),
+            end => matches!(end, End::Asked),
+        };
         let Some(reason) = row.failure else {
             folder.append(&row)?;
             outcome.finished += 1;
-            progress(&row);
+            progress(Progress::Trial(&row));
             continue;
         };
-        journal.add(&Entry {
-            time_unix_s: clock::now_s(),
-            trial,
-            planner: planner.name().into(),
-            touch: None,
-            fault: Some(reason.clone()),
-        })?;
+        if !is_asked {
+            journal.add(Entry {
+                time_unix_s: clock::now_s(),
+                trial,
+                planner: planner.name().into(),
+                touch: None,
+                fault: Some(reason.clone()),
+            })?;
+        }
         let touches = journal.touches(trial, planner.name()).len();
         outcome.halt = Some(Halt { planner: planner.name().into(), trial, touches, reason });
         break;
     }
     Ok(outcome)
-}
-
-/// The file of a trial's recording; of a trial that goes on, one beside those of its parts before.
-fn part_path(run: &Path, planner: &dyn Maker, trial: u32) -> PathBuf {
-    let whole = recording_path(run, planner, trial);
-    let mut path = whole.clone();
-    let mut part = 1;
-    while path.exists() {
-        part += 1;
-        path = whole.with_file_name(format!("{}-{trial:04}-part-{part}.mcap", planner.name()));
-    }
-    path
 }
 
 /// Runs a trial from where its touches end.
@@ -120,14 +118,28 @@ struct Keeper<'a> {
     journal: &'a mut Journal,
     made: &'a [TouchRow],
     stop: &'a AtomicBool,
+    progress: OnProgress<'a>,
     trial: u32,
     planner: &'a dyn Maker,
-    error: Option<StoreError>,
+    end: End,
+}
+
+/// Why a trial was ended from here.
+#[derive(Default)]
+enum End {
+    /// It was not.
+    #[default]
+    Not,
+    /// It was asked for.
+    Asked,
+    /// A touch cannot be stored.
+    Unstored(StoreError),
 }
 
 impl Witness for Keeper<'_> {
     fn touched(&mut self, touched: &Touched) -> Result<(), Fault> {
         let time_s = touched.row.time_s.unwrap_or_default();
+        (self.progress)(Progress::Touch);
         if let Some(made) = self.made.get(touched.count as usize - 1) {
             let is_same = made.target == touched.row.target;
             return is_same.then_some(()).ok_or(Fault::PlannedOtherwise {
@@ -142,13 +154,16 @@ impl Witness for Keeper<'_> {
             touch: Some(touched.row.clone()),
             fault: None,
         };
-        if let Err(error) = self.journal.add(&entry) {
+        if let Err(error) = self.journal.add(entry) {
             let message = error.to_string();
-            self.error = Some(error);
+            self.end = End::Unstored(error);
             return Err(Fault::Unrecorded { time_s, message });
         }
         match self.stop.load(Ordering::Relaxed) {
-            true => Err(Fault::Stopped { time_s }),
+            true => {
+                self.end = End::Asked;
+                Err(Fault::Stopped { time_s })
+            }
             false => Ok(()),
         }
     }

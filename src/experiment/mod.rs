@@ -36,6 +36,7 @@ pub mod metrics;
 pub mod notice;
 pub mod outline;
 mod over_zone;
+pub mod real_robot;
 pub mod recorded_trial;
 pub mod replay;
 pub mod report_settings;

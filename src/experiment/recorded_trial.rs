@@ -12,11 +12,32 @@ use crate::backend::recording::{self, About, Ending, Recorder, Recording};
 use crate::explore::planner::Maker;
 use crate::explore::probe::{Probe, Touch};
 use crate::task::Zone;
+use std::iter;
 use std::path::{Path, PathBuf};
 
 /// The file of a trial's recording in a run's folder.
 pub fn recording_path(run: &Path, planner: &dyn Maker, trial: u32) -> PathBuf {
     run.join(RECORDINGS).join(format!("{}-{trial:04}.mcap", planner.name()))
+}
+
+/// Files of a trial that was recorded in parts, because it was interrupted and continued: `path`,
+/// the recording of its beginning, and those beside it that continue it, in order.
+pub fn parts(path: &Path) -> Vec<PathBuf> {
+    let later = (2..).map(|number| part(path, number)).take_while(|path| path.exists());
+    iter::once(path.to_owned()).chain(later).collect()
+}
+
+/// The file that records what comes next of the trial whose recording begins with `path`.
+pub fn next_part(path: &Path) -> PathBuf {
+    match path.exists() {
+        true => part(path, parts(path).len() + 1),
+        false => path.to_owned(),
+    }
+}
+
+fn part(path: &Path, number: usize) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}-part-{number}.mcap"))
 }
 
 /// As [`Simulation::trial`], recorded in the file `path`, which is replaced if it is there. What
@@ -25,8 +46,8 @@ pub fn run(simulation: &Simulation, planner: &dyn Maker, trial: u32, path: &Path
     go_on(simulation, planner, trial, path, &[], &mut ())
 }
 
-/// As [`run`], after the touches `made`, which are not recorded, with `witness` told of every
-/// touch.
+/// As [`run`], continued after the touches `made`: the recording begins with them, so that it can
+/// be replayed by itself. `witness` sees every touch.
 pub fn go_on(
     simulation: &Simulation,
     planner: &dyn Maker,
@@ -60,15 +81,23 @@ fn run_faulty(
         capabilities: body.capabilities().clone(),
     };
     let recording = Recording::create(path, &about)?;
+    for (row, count) in made.iter().zip(1..) {
+        recording.touched(&recorded(row, count)?, Default::default())?;
+    }
     let recorder = Recorder::new(body, recording.clone());
     let mut servo = simulation.servo(Box::new(recorder), seed)?;
     let zone = simulation.task().zone();
-    let mut scribe =
-        Scribe { recording: recording.clone(), zone, made: made.len() as u32, witness };
+    let mut scribe = Scribe {
+        recording: recording.clone(),
+        zone,
+        made: made.len() as u32,
+        witness,
+        is_interrupted: false,
+    };
     let finger = simulation.environment().scene().finger.clone();
     let mut probe = Resumed::new(made.to_vec(), finger, &mut servo);
     let mut row = simulation.trial_before(&mut probe, planner, trial, &mut scribe);
-    let ending = Ending { failure: row.failure.clone() };
+    let ending = Ending { failure: row.failure.clone(), is_interrupted: scribe.is_interrupted };
     if let Err(fault) = recording.end(servo.time_s().unwrap_or_default(), &ending) {
         row.failure.get_or_insert_with(|| format!("after the last touch: {fault}"));
     }
@@ -82,35 +111,51 @@ struct Scribe<'a> {
     /// Touches that were made before.
     made: u32,
     witness: &'a mut dyn Witness,
+    /// Whether `witness` has ended the trial.
+    is_interrupted: bool,
 }
 
 impl Witness for Scribe<'_> {
     fn touched(&mut self, touched: &Touched) -> Result<(), Fault> {
-        self.witness.touched(touched)?;
+        // A touch that the trial ends after is recorded all the same.
+        let seen = self.witness.touched(touched);
+        self.is_interrupted |= seen.is_err();
         if touched.count <= self.made {
-            return Ok(());
+            return seen;
         }
-        let time_s = touched.row.time_s.unwrap_or_default();
-        let unrecorded =
-            |error: serde_json::Error| Fault::Unrecorded { time_s, message: error.to_string() };
-        let (outcome, contact) = match touched.touch {
-            Touch::Contact(contact) => ("contact", Some(contact)),
-            Touch::Miss => ("miss", None),
-            Touch::Overload => ("overload", None),
-        };
-        let touch = recording::Touch {
-            touch: touched.count,
-            time_s,
-            target: (&touched.row.target).into(),
-            outcome: outcome.into(),
-            contact: contact.map_or(&[][..], |contact| contact.p_wc.coords.as_slice()).into(),
-            normal: contact.map_or(&[][..], |contact| contact.normal_w.as_slice()).into(),
-            row: serde_json::to_string(touched.row).map_err(unrecorded)?.into(),
-        };
+        let mut touch = recorded(touched.row, touched.count)?;
+        if let Touch::Contact(contact) = touched.touch {
+            touch.normal = contact.normal_w.as_slice().into();
+        }
         let shapes = match touched.known {
             Known::Zone(belief) => shapes(self.zone, belief),
             Known::Around(_) => Default::default(),
         };
-        self.recording.touched(&touch, shapes)
+        self.recording.touched(&touch, shapes)?;
+        seen
     }
+}
+
+/// The message that a touch is recorded as.
+///
+/// # Errors
+/// If its row has no JSON.
+fn recorded(row: &TouchRow, touch: u32) -> Result<recording::Touch<'_>, Fault> {
+    let time_s = row.time_s.unwrap_or_default();
+    let outcome = match (row.contact, row.overload) {
+        (Some(_), _) => "contact",
+        (None, true) => "overload",
+        (None, false) => "miss",
+    };
+    let json = serde_json::to_string(row);
+    let json = json.map_err(|error| Fault::Unrecorded { time_s, message: error.to_string() })?;
+    Ok(recording::Touch {
+        touch,
+        time_s,
+        target: (&row.target).into(),
+        outcome: outcome.into(),
+        contact: row.contact.as_ref().map_or(&[][..], |contact| contact).into(),
+        normal: row.normal.as_ref().map_or(&[][..], |normal| normal).into(),
+        row: json.into(),
+    })
 }

@@ -1,10 +1,12 @@
 //! A recorded trial run again by today's code, on what was read then.
 
 use super::experiment::Experiment;
+use super::resumed::Resumed;
+use super::row::TouchRow;
 use super::simulation::Simulation;
 use super::witness::{Touched, Witness};
 use crate::backend::Fault;
-use crate::backend::recording::{Player, Recorded};
+use crate::backend::recording::{self, Player, Recorded};
 use crate::config::ConfigError;
 use crate::explore::probe::servo::Servo;
 use crate::explore::probe::{Probe, Swept, Touch};
@@ -74,6 +76,16 @@ pub enum ReplayError {
         /// The planner.
         name: String,
     },
+    /// A touch that was made before the recording began cannot be read.
+    #[error(
+        "touch {touch} was made before the recording began, and its row cannot be read: {message}"
+    )]
+    Made {
+        /// Which, counted from 1.
+        touch: u32,
+        /// What the parser says.
+        message: String,
+    },
     /// The robot cannot be brought to the recording's start.
     #[error(transparent)]
     Start(#[from] Fault),
@@ -104,9 +116,13 @@ pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, Re
     let servo = simulation.servo(player, simulation.body_seed(about.trial))?;
     let mut probe = Kept { servo, fault: None };
     let mut reader = Reader { recorded, same: 0, difference: None };
-    let row = simulation.trial_before(&mut probe, planner, about.trial, &mut reader);
+    let made = made(recorded)?;
+    let finger = simulation.environment().scene().finger.clone();
+    let mut resumed = Resumed::new(made, finger, &mut probe);
+    let row = simulation.trial_before(&mut resumed, planner, about.trial, &mut reader);
     let (touches, now) = (reader.same, row.failure);
     let is_cut = recorded.ending.is_none();
+    let is_interrupted = recorded.ending.as_ref().is_some_and(|ending| ending.is_interrupted);
     let difference = match (reader.difference, probe.fault) {
         (Some(difference), _) => Some(difference),
         (_, Some(Fault::Differs { tick, time_s, joint, recorded: then, now })) => {
@@ -120,17 +136,28 @@ pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, Re
                 now: number(now),
             })
         }
-        (_, Some(Fault::RecordingEnds { .. })) if is_cut => None,
+        (_, Some(Fault::RecordingEnds { .. })) if is_cut || is_interrupted => None,
         _ => {
             let recorded_touches = recorded.touches.len() as u32;
             let then = recorded.ending.as_ref().and_then(|ending| ending.failure.clone());
-            let is_same = recorded_touches == touches && (is_cut || then == now);
+            let is_end = is_cut || is_interrupted || then == now;
+            let is_same = recorded_touches == touches && is_end;
             let end =
                 Difference::End { recorded_touches, recorded: then, now_touches: touches, now };
             (!is_same).then_some(end)
         }
     };
     Ok(Replay { touches, is_cut, difference })
+}
+
+/// The rows of the touches that were made before the recording began.
+fn made(recorded: &Recorded) -> Result<Vec<TouchRow>, ReplayError> {
+    let made = recorded.touches.iter().take(recorded.made);
+    let read = |touch: &recording::Touch| {
+        serde_json::from_str(&touch.row)
+            .map_err(|error| ReplayError::Made { touch: touch.touch, message: error.to_string() })
+    };
+    made.map(read).collect()
 }
 
 /// A servo whose fault is kept as it is.

@@ -4,6 +4,8 @@ use super::recorded_trial::{self, recording_path};
 use super::row::{TrialId, TrialRow};
 use super::simulation::Simulation;
 use super::store::{RunFolder, StoreError};
+use super::witness::{Touched, Witness};
+use crate::backend::Fault;
 use crate::explore::planner::Maker;
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, ParallelBridge, ParallelIterator,
@@ -39,6 +41,28 @@ pub enum RunError {
     },
 }
 
+/// How far a run has come.
+#[derive(Clone, Copy, Debug)]
+pub enum Progress<'a> {
+    /// A touch of a running trial is done.
+    Touch,
+    /// A trial is done.
+    Trial(&'a TrialRow),
+}
+
+/// Takes what has come of a run, from any thread.
+pub type OnProgress<'a> = &'a (dyn Fn(Progress) + Sync);
+
+/// Counts the touches of a trial.
+struct Counted<'a>(OnProgress<'a>);
+
+impl Witness for Counted<'_> {
+    fn touched(&mut self, _: &Touched) -> Result<(), Fault> {
+        (self.0)(Progress::Touch);
+        Ok(())
+    }
+}
+
 /// One piece of work.
 pub type Job<'a> = (u32, &'a dyn Maker);
 
@@ -46,7 +70,7 @@ pub type Job<'a> = (u32, &'a dyn Maker);
 ///
 /// A trial is recorded if `recorded` says in which run's folder.
 ///
-/// `progress` is called after each trial, from any thread. When `stop` becomes true, running
+/// `progress` is called after each touch and each trial. When `stop` becomes true, running
 /// trials are finished and no others begun. `threads` 0 means all cores.
 ///
 /// # Errors
@@ -57,7 +81,7 @@ pub fn run(
     threads: usize,
     stop: &AtomicBool,
     recorded: Option<&Path>,
-    progress: &(dyn Fn(&TrialRow) + Sync),
+    progress: OnProgress,
 ) -> Result<usize, RunError> {
     let pool = pool(threads)?;
     let finished = Mutex::new((folder, 0));
@@ -68,7 +92,7 @@ pub fn run(
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let row = run_caught(simulation, planner, trial, recorded);
+            let row = run_caught(simulation, (planner, trial), recorded, progress);
             if row.failure.is_some() && stop.load(Ordering::Relaxed) {
                 // What stopped the run may have failed it: it is run again.
                 return Ok(());
@@ -76,7 +100,7 @@ pub fn run(
             let mut finished = finished.lock().unwrap_or_else(PoisonError::into_inner);
             finished.0.append(&row)?;
             finished.1 += 1;
-            progress(&row);
+            progress(Progress::Trial(&row));
             Ok(())
         })
     })
@@ -95,12 +119,12 @@ pub fn rows(
     jobs: Vec<Job>,
     threads: usize,
     stop: &AtomicBool,
-    progress: &(dyn Fn(&TrialRow) + Sync),
+    progress: OnProgress,
 ) -> Result<Vec<TrialRow>, RunError> {
     let run = |(trial, planner): Job| {
         let row = (!stop.load(Ordering::Relaxed))
-            .then(|| run_caught(simulation, planner, trial, None))?;
-        progress(&row);
+            .then(|| run_caught(simulation, (planner, trial), None, progress))?;
+        progress(Progress::Trial(&row));
         Some(row)
     };
     let found: Vec<Option<TrialRow>> =
@@ -123,15 +147,16 @@ pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, RunError> {
 /// in somebody's code does not lose the others' work.
 fn run_caught(
     simulation: &Simulation,
-    planner: &dyn Maker,
-    trial: u32,
+    (planner, trial): (&dyn Maker, u32),
     recorded: Option<&Path>,
+    progress: OnProgress,
 ) -> TrialRow {
+    let mut counted = Counted(progress);
     let run = || match recorded {
-        None => simulation.trial(planner, trial),
+        None => simulation.trial_seen(planner, trial, &mut counted),
         Some(folder) => {
             let path = recording_path(folder, planner, trial);
-            recorded_trial::run(simulation, planner, trial, &path)
+            recorded_trial::go_on(simulation, planner, trial, &path, &[], &mut counted)
         }
     };
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {

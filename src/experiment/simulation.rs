@@ -4,6 +4,7 @@ use super::cloud::CloudError;
 use super::experiment::Experiment;
 use super::notice;
 use super::notice::Notice;
+use super::real_robot::{self, MissingForRobot};
 use super::row::TrialRow;
 use super::scan_truth::LeftOut;
 use super::shape::TrueShape;
@@ -46,6 +47,9 @@ pub struct Simulation {
 /// An experiment that cannot be simulated.
 #[derive(Debug, Error)]
 pub enum SimulationError {
+    /// It moves a real robot and lacks settings that protect it.
+    #[error(transparent)]
+    MissingForRobot(#[from] MissingForRobot),
     /// Its scene cannot be built.
     #[error(transparent)]
     Environment(#[from] EnvironmentError),
@@ -75,12 +79,16 @@ impl Simulation {
     /// # Errors
     /// As [`new`](Self::new).
     pub fn new_telling(
-        experiment: Experiment,
+        mut experiment: Experiment,
         tell: &dyn Fn(&str),
     ) -> Result<Self, SimulationError> {
+        real_robot::check(&experiment)?;
+        if experiment.backend.kind != BackendKind::Simulated {
+            // Otherwise taken from the mesh.
+            experiment.scene.zone.datum_y_m.get_or_insert(0.0);
+        }
         let environment = Environment::build_telling(experiment.scene.clone(), tell)?;
-        tell("looking where the finger can touch the surface");
-        let (truth, left_out) = sampled(&experiment, &environment)?;
+        let (truth, left_out) = sampled(&experiment, &environment, tell)?;
         let shape = TrueShape::of(&environment);
         tell("compiling the model");
         let simulation = Self::against(experiment, Arc::new(environment), truth)?;
@@ -96,7 +104,7 @@ impl Simulation {
         experiment: Experiment,
         environment: Arc<Environment>,
     ) -> Result<Self, SimulationError> {
-        let (truth, left_out) = sampled(&experiment, &environment)?;
+        let (truth, left_out) = sampled(&experiment, &environment, &|_| ())?;
         let shape = TrueShape::of(&environment);
         Ok(Self { left_out, shape, ..Self::against(experiment, environment, truth)? })
     }
@@ -234,8 +242,18 @@ impl Simulation {
 
     /// Runs one trial of `planner` from start to end; what goes wrong stands in its row.
     pub fn trial(&self, planner: &dyn Maker, trial: u32) -> TrialRow {
+        self.trial_seen(planner, trial, &mut ())
+    }
+
+    /// As [`trial`](Self::trial), with `witness` told of every touch.
+    pub fn trial_seen(
+        &self,
+        planner: &dyn Maker,
+        trial: u32,
+        witness: &mut dyn Witness,
+    ) -> TrialRow {
         match self.probe(trial) {
-            Ok(mut probe) => self.trial_with(&mut *probe, planner, trial),
+            Ok(mut probe) => self.trial_before(&mut *probe, planner, trial, witness),
             Err(fault) => TrialRow::unstarted(trial, planner.name(), &fault),
         }
     }
@@ -266,6 +284,7 @@ impl Simulation {
 fn sampled(
     experiment: &Experiment,
     environment: &Environment,
+    tell: &dyn Fn(&str),
 ) -> Result<(Truth, Option<LeftOut>), SimulationError> {
     let per_side = experiment.grid as usize;
     if environment.task().ball().is_some() {
@@ -276,7 +295,7 @@ fn sampled(
             let (truth, left_out) = scan.sample(&environment.scene().zone, per_side)?;
             (truth, Some(left_out))
         }
-        None => (Truth::sample(environment, per_side), None),
+        None => (Truth::sample_telling(environment, per_side, tell), None),
     };
     match truth.is_known() {
         true => Ok((truth, left_out)),

@@ -29,10 +29,16 @@ const CALIBRATED: usize = 4;
 impl Truth {
     /// Reads the environment's surface on a grid of `per_side` places along each side of the zone.
     pub fn sample(environment: &Environment, per_side: usize) -> Self {
+        Self::sample_telling(environment, per_side, &|_| ())
+    }
+
+    /// As [`sample`](Self::sample); `tell` is called with the name of each step, as it begins.
+    pub fn sample_telling(environment: &Environment, per_side: usize, tell: &dyn Fn(&str)) -> Self {
+        tell("looking where the surface is");
         let places = environment.scene().zone.grid(per_side);
         let heights_m: Vec<_> =
             places.iter().map(|place| environment.true_height_m(place)).collect();
-        let is_reachable = reach::is_reachable(environment, &places, &heights_m);
+        let is_reachable = reach::is_reachable(environment, &places, &heights_m, tell);
         let zone = &environment.scene().zone;
         Self { is_whole: true, ..Self::new(zone, places, heights_m, is_reachable) }
     }

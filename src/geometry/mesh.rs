@@ -2,6 +2,7 @@
 
 use super::extent::extent;
 use nalgebra::{Isometry3, Point3};
+use sha2::{Digest, Sha256};
 
 /// A triangle mesh, in metres.
 ///
@@ -51,6 +52,19 @@ impl Mesh {
     /// beforehand, however many vertices there are.
     pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
         self.bounds
+    }
+
+    /// SHA-256 of the vertices, then of the triangles, as [`MeshReport`](super::report::MeshReport)
+    /// has it.
+    pub fn sha256(&self) -> String {
+        let mut hash = Sha256::new();
+        for vertex in &self.vertices {
+            vertex.iter().for_each(|coordinate| hash.update(coordinate.to_le_bytes()));
+        }
+        for triangle in &self.triangles {
+            triangle.iter().for_each(|corner| hash.update(corner.to_le_bytes()));
+        }
+        hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
     /// Surface area, in m²: half the sum of ‖(b − a) × (c − a)‖.

@@ -34,8 +34,11 @@ impl fmt::Display for Finding {
 
 /// What [`repair`](super::repair::repair) found in a mesh and did to it. Its `Display` is the
 /// summary for a person.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshReport {
+    /// SHA-256 of the mesh: of its vertices, 24 bytes each, then of its triangles, 12 bytes each, all
+    /// little-endian; in hexadecimal.
+    pub sha256: String,
     /// Vertices as imported.
     pub vertices_before: usize,
     /// Triangles as imported.
@@ -68,29 +71,6 @@ pub struct MeshReport {
     pub components: usize,
     /// Components that are one-sided, like a Möbius strip.
     pub unorientable: usize,
-}
-
-impl Default for MeshReport {
-    fn default() -> Self {
-        Self {
-            vertices_before: 0,
-            triangles_before: 0,
-            vertices: 0,
-            triangles: 0,
-            bounds_m: (Point3::origin(), Point3::origin()),
-            area_m2: 0.0,
-            volume_m3: None,
-            skipped_primitives: 0,
-            welded: 0,
-            degenerate_removed: Finding::default(),
-            duplicates_removed: Finding::default(),
-            flipped: Finding::default(),
-            border_edges: Finding::default(),
-            non_manifold_edges: Finding::default(),
-            components: 0,
-            unorientable: 0,
-        }
-    }
 }
 
 impl MeshReport {

@@ -2,8 +2,8 @@
 
 use super::{pdf, png};
 use crate::experiment::store::write_whole;
+use crate::files;
 use anyhow::Context;
-use std::fs;
 use std::io;
 use std::path::Path;
 
@@ -19,7 +19,7 @@ pub fn write(path: &Path, svg: &str) -> anyhow::Result<()> {
     for (extension, bytes) in [("png", png::render(svg)), ("pdf", pdf::render(svg))] {
         let path = path.with_extension(extension);
         let place = || path.display().to_string();
-        fs::write(&path, bytes.with_context(place)?).with_context(place)?;
+        write_whole(&path, bytes.with_context(place)?)?;
     }
     Ok(())
 }
@@ -29,8 +29,5 @@ pub fn write(path: &Path, svg: &str) -> anyhow::Result<()> {
 /// # Errors
 /// If a file is there and cannot be removed.
 pub fn remove(path: &Path) -> io::Result<()> {
-    FORMATS.iter().try_for_each(|extension| match fs::remove_file(path.with_extension(extension)) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
-    })
+    FORMATS.iter().try_for_each(|extension| files::remove(&path.with_extension(extension)))
 }

@@ -41,7 +41,6 @@ pub use figures::{Drawing, FIGURES, Figure};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
 use anyhow::Context;
-use std::fs;
 use std::path::Path;
 
 /// Writes the run's tables into its folder: `summary.csv`, `comparison.csv`, `equal_error.csv`.
@@ -61,7 +60,7 @@ pub fn write_tables(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Re
 /// If the rows do not belong to the experiment, or a file cannot be written.
 pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()> {
     let figures = folder.join(FIGURES_FOLDER);
-    fs::create_dir_all(&figures).with_context(|| figures.display().to_string())?;
+    crate::files::make_folder(&figures).with_context(|| figures.display().to_string())?;
     let mut drawings = Vec::new();
     for figure in FIGURES {
         let path = figures.join(figure.name);

@@ -4,7 +4,7 @@ use super::scene::Scene;
 use crate::explore::probe::servo::ArmReach;
 use crate::geometry::mesh::Mesh;
 use crate::robot::Robot;
-use crate::task::{Around, Ball, Task};
+use crate::task::{Around, Ball, RADIUS_M, Task};
 use nalgebra::Point3;
 use std::sync::Arc;
 use thiserror::Error;
@@ -12,6 +12,17 @@ use thiserror::Error;
 /// An object that a body cannot go around.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum AroundError {
+    /// The object is smaller or larger than anything that can be explored.
+    #[error(
+        "the object is {size_m:.3e} m large, and a ball around it has a radius of {radius_m:.3e} m; allowed is \
+         {} to {} m: are object.unit and object.scale right?", RADIUS_M.start(), RADIUS_M.end()
+    )]
+    Size {
+        /// Diagonal of the box that it spans.
+        size_m: f64,
+        /// Radius of the ball around it.
+        radius_m: f64,
+    },
     /// The object reaches out of the ball, from outside which the finger comes.
     #[error(
         "around.radius_m is {radius_m} m, but the object reaches {farthest_m:.4} m from around.centre_m: \
@@ -38,11 +49,18 @@ pub enum AroundError {
 }
 
 /// The ball of `around`; what it leaves out is written into it from what the object spans.
-pub(super) fn ball(around: &mut Around, mesh: &Mesh) -> Ball {
-    let own = Ball::about(mesh.bounds().into(), around.lowest_m);
+///
+/// # Errors
+/// If it leaves out the radius, and the object's size gives none that is allowed.
+pub(super) fn ball(around: &mut Around, mesh: &Mesh) -> Result<Ball, AroundError> {
+    let (low, high) = mesh.bounds();
+    let own = Ball::about([low, high], around.lowest_m);
     let centre_m = *around.centre_m.get_or_insert(own.centre_w.coords.into());
     let radius_m = *around.radius_m.get_or_insert(own.radius_m);
-    Ball { centre_w: centre_m.into(), radius_m, ..own }
+    match RADIUS_M.contains(&radius_m) {
+        true => Ok(Ball { centre_w: centre_m.into(), radius_m, ..own }),
+        false => Err(AroundError::Size { size_m: (high - low).norm(), radius_m }),
+    }
 }
 
 /// The task of a body in `ball`, with what its arm reaches.

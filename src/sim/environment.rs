@@ -14,6 +14,7 @@ use crate::geometry::surfaces;
 use crate::robot::Robot;
 use crate::robot::arm::Chain;
 use crate::robot::arm::stage::{stage, stage_with_wrist};
+use crate::robot::finger::shape::BIOTAC_RADIUS_M;
 use crate::sim::finger::Fingertip;
 use crate::task::{Task, TaskError, Zone};
 use nalgebra::{Point3, Vector3};
@@ -128,8 +129,12 @@ impl Environment {
             scene.effects = effects;
             notices.push(Notice::DefaultFinger);
         }
+        let is_biotac = scene.finger.radius_m == BIOTAC_RADIUS_M;
+        if scene.body.moves() && scene.effects.is_soft() && !is_biotac {
+            notices.push(Notice::ScaledFinger(scene.finger.radius_m));
+        }
         if let (Some(around), Shape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
-            let ball = around::ball(around, bvh.mesh());
+            let ball = around::ball(around, bvh.mesh())?;
             let task = around::task(&scene, ball, bvh.mesh())?;
             return Ok(Self::of(scene, shape, task, notices));
         }

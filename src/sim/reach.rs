@@ -24,21 +24,33 @@ const PER_SIDE_MAX: f64 = 128.0;
 const ROUNDING_M: f64 = 1e-9;
 
 /// Whether the finger, sent to some target in the zone, can touch the surface at each of `places`
-/// with the true height above the datum in `heights_m`; a place without a surface is none.
+/// with the true height above the datum in `heights_m`; a place without a surface is none. `tell` is
+/// called with how far the work has come.
 pub fn is_reachable(
     environment: &Environment,
     places: &[Vec<f64>],
     heights_m: &[Option<f64>],
+    tell: &dyn Fn(&str),
 ) -> Vec<bool> {
     if environment.scene().body == Body::Function {
         return heights_m.iter().map(Option::is_some).collect();
     }
     let fingers = Fingers::new(environment);
     let lowest_y_m = fingers.lowest_y_m();
-    (places.par_iter().zip(heights_m))
-        .map(|(place, height_m)| height_m.is_some_and(|m| fingers.touch(place, m, &lowest_y_m)))
-        .collect()
+    let part = places.len().div_ceil(PARTS).max(1);
+    let mut is_reachable = Vec::with_capacity(places.len());
+    for (places, heights_m) in places.chunks(part).zip(heights_m.chunks(part)) {
+        let percent = 100 * is_reachable.len() / (PARTS * part);
+        tell(&format!("looking where the finger can touch the surface: {percent} %"));
+        is_reachable.par_extend(places.par_iter().zip(heights_m).map(|(place, height_m)| {
+            height_m.is_some_and(|height_m| fingers.touch(place, height_m, &lowest_y_m))
+        }));
+    }
+    is_reachable
 }
+
+/// Parts of the work between which it is said how far it has come.
+const PARTS: usize = 20;
 
 /// Fingers all over the zone, each let down onto the object when first asked for.
 struct Fingers<'a> {

@@ -6,6 +6,7 @@ use crate::robot::Finger;
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// Table `[around]`: the ball in which there is something to touch. Stands in place of a zone.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,6 +26,10 @@ pub struct Around {
     pub lowest_m: Option<f64>,
 }
 
+/// Radii that a ball may have, m.
+// heuristic: from a hundredth of a fingertip to an object that no arm reaches around.
+pub const RADIUS_M: RangeInclusive<f64> = 1e-4..=10.0;
+
 /// Farthest centre of a ball; far beyond any arm's reach.
 const REACH_M: f64 = 1e3;
 
@@ -34,7 +39,7 @@ impl Checked for Around {
             rules.numbers("centre_m", &centre_m, -REACH_M..=REACH_M);
         }
         if let Some(radius_m) = self.radius_m {
-            rules.number("radius_m", radius_m, 1e-4..=10.0);
+            rules.number("radius_m", radius_m, RADIUS_M);
         }
         if let Some(lowest_m) = self.lowest_m {
             rules.number("lowest_m", lowest_m, -REACH_M..=REACH_M);

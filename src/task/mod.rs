@@ -9,7 +9,7 @@ mod ways;
 pub mod zone;
 
 pub use approach::{Approach, KeepOut};
-pub use around::{Aim, Around, Ball};
+pub use around::{Aim, Around, Ball, RADIUS_M};
 pub use task::{Task, TaskError};
 pub use ways::{DIRECTIONS, Reach};
 pub use zone::Zone;

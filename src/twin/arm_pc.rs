@@ -16,12 +16,17 @@ const RAMP_S: f64 = 0.01;
 /// How far a stamp may be ahead of this clock.
 const AHEAD_S: f64 = 0.005;
 
+/// Share of a limit that rounding may exceed it by.
+const ROUNDING: f64 = 1e-6;
+
 /// Two that command within this time are two at once.
 const TOGETHER_S: f64 = 0.5;
 
 /// The state between network and servos. Times are seconds of a monotonic clock.
 pub struct ArmPc {
     names: JointNames,
+    /// Largest speed of each joint, rad/s or m/s.
+    qdot_limits: Vec<f64>,
     /// Silence after which the arm is stopped.
     silence_s: f64,
     status: ArmStatus,
@@ -39,12 +44,14 @@ pub struct ArmPc {
 }
 
 impl ArmPc {
-    /// At rest with closed brakes; commands are valid for `valid_s`.
-    pub fn new(names: JointNames, valid_s: f64) -> Self {
+    /// Returns one at rest with closed brakes. Commands are valid for `valid_s`; one beyond
+    /// `qdot_limits`, the largest speeds of the joints, is refused and stops the arm.
+    pub fn new(names: JointNames, qdot_limits: Vec<f64>, valid_s: f64) -> Self {
         let count = names.names().len();
         let status = ArmStatus { brake: true, deadman: true, ..ArmStatus::default() };
         Self {
             names,
+            qdot_limits,
             silence_s: valid_s + GRACE_S,
             status,
             wanted: vec![0.0; count],
@@ -121,6 +128,10 @@ impl ArmPc {
                 return self.alarm(&words, now_s);
             }
         };
+        if let Some(words) = self.beyond_limits() {
+            self.refuse(words.clone());
+            return self.alarm(&words, now_s);
+        }
         if let Some([stamp_s, valid_s]) = stamp {
             let age_s = wall_s - stamp_s;
             if age_s > valid_s || age_s < -AHEAD_S {
@@ -177,6 +188,16 @@ impl ArmPc {
             None => self.applied.fill(0.0),
         }
         &self.applied
+    }
+
+    /// Which velocity of the incoming command exceeds its joint's limit, in words.
+    fn beyond_limits(&self) -> Option<String> {
+        let joints = self.names.names().iter().zip(&self.qdot_limits);
+        let fast = |qdot: f64, limit: f64| qdot.abs() > limit * (1.0 + ROUNDING);
+        let found = joints.zip(&self.incoming).find(|((_, limit), qdot)| fast(**qdot, **limit));
+        found.map(|((name, limit), qdot)| {
+            format!("command refused: velocity of \"{name}\" is {qdot}, its limit {limit}")
+        })
     }
 
     fn refuse(&mut self, words: String) {

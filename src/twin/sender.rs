@@ -19,7 +19,7 @@ impl Sender {
     pub fn new(seed: u64) -> Self {
         Self {
             is_on: vec![false; FAILURES.len()],
-            memory: Memory { rng: seed::stream(seed, 0, "twin"), frozen: None },
+            memory: Memory { rng: seed::stream(seed, 0, "twin"), kept: Default::default() },
             delayed: VecDeque::new(),
         }
     }
@@ -29,7 +29,7 @@ impl Sender {
         if let Some(slot) = self.is_on.get_mut(failure) {
             *slot = is_on;
         }
-        self.memory.frozen = None;
+        self.memory.kept = Default::default();
     }
 
     /// Whether a failure is on.

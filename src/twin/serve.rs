@@ -121,7 +121,8 @@ impl Twin {
         let inbox = Inbox::default();
         // The loop looks at its own pace; the link only has to hand on.
         let link = Link::open(connect, Duration::from_millis(20), Box::new(inbox.clone()))?;
-        let pc = ArmPc::new(names.clone(), settings.topics.command.age_s);
+        let limits = chain.joints.iter().map(|joint| joint.qdot_limit).collect();
+        let pc = ArmPc::new(names.clone(), limits, settings.topics.command.age_s);
         Ok(Self {
             body,
             settings: settings.clone(),

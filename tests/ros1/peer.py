@@ -61,7 +61,6 @@ KINDS = {
     "/biotac_pub": BIOTAC_HAND,
     "/biotac_pub as BiotacAll": BIOTAC_ALL,
     "/pa10/joint_velocity_cmd": JointTrajectory,
-    "/palpate/heartbeat": Header,
 }
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, byte, float64, int16, int32, sequence, uint16, uint32
+from cyclonedds.idl.types import array, byte, float64, int16, int32, int64, sequence, uint8, uint16, uint32, uint64
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -143,11 +143,34 @@ class BiotacAll(IdlStruct, typename="sr_robot_msgs::msg::dds_::BiotacAll_"):
     header: Header
     tactiles: array[Biotac, 5]
 
+# A service of std_srvs/Trigger as Cyclone's rmw carries it: the identity of a request in front of its data.
+@dataclass
+class TriggerRequest(IdlStruct, typename="std_srvs::srv::dds_::Trigger_Request_"):
+    guid: uint64
+    sequence: int64
+    structure_needs_at_least_one_member: uint8
+
+
+@dataclass
+class TriggerResponse(IdlStruct, typename="std_srvs::srv::dds_::Trigger_Response_"):
+    guid: uint64
+    sequence: int64
+    success: bool
+    message: str
+
+
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 from peer import VALID_NS, main
 
 RELIABLE = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.Volatile,
                Policy.History.KeepLast(50))
+
+LATCHED = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.Durability.TransientLocal,
+              Policy.History.KeepLast(1))
+
+JOINTS = ["S1", "S2", "S3", "E1", "E2", "W1", "W2"]
+FLAGS = {"servo_on": "True", "brake": "False", "estop": "False", "deadman": "True", "hold": "False"}
+SERVICES = ["/pa10/hold", "/pa10/unhold", "/pa10/stop", "/pa10/clear_fault", "/ft_sensor/bias"]
 
 KINDS = {
     "/joint_states": JointState,
@@ -156,7 +179,6 @@ KINDS = {
     "/biotac_pub": BioTacHand,
     "/biotac_pub as BiotacAll": BiotacAll,
     "/pa10/joint_velocity_cmd": JointTrajectory,
-    "/palpate/heartbeat": Header,
 }
 
 
@@ -172,7 +194,8 @@ class Inbox:
 
 class Link:
     def __init__(self, domain):
-        self.participant = DomainParticipant(int(domain))
+        self.domain = int(domain)
+        self.participant = DomainParticipant(self.domain)
         self.command = None
 
     def topic(self, name):
@@ -210,6 +233,44 @@ class Link:
                 count += 1
             time.sleep(0.0002)
         return count
+
+    def arm(self, span):
+        """An arm that stands still: its status once, before anybody listens; its services in another participant,
+        two seconds later. Returns the services that were called."""
+        def now():
+            at = time.time()
+            return Header(Time(int(at), int((at % 1) * 1e9)), "")
+
+        status = DataWriter(self.participant, self.topic("/pa10/status"), qos=LATCHED)
+        flags = [KeyValue(key, value) for key, value in FLAGS.items()]
+        status.write(DiagnosticArray(now(), [DiagnosticStatus(bytes([0])[0], "pa10", "", "pa10", flags)]))
+        joints, wrench = self.writer("/joint_states"), self.writer("/ft_sensor/wrench")
+        tactile = self.writer("/biotac_pub")
+        zeros, servers, calls = [0.0] * 7, [], []
+        count, begun = 0, time.time()
+        while time.time() - begun < span:
+            joints.write(JointState(now(), JOINTS, zeros, zeros, []))
+            wrench.write(WrenchStamped(now(), Wrench(Vector3(1e-6 * count, 0.0, 0.0), Vector3(0.0, 0.0, 0.0))))
+            if count % 2 == 0:
+                data = BioTacData("", 1, 2000, 2000, 2000, [2000] * 22, [2000 + count % 7] * 19)
+                stamp = now().stamp
+                times = BioTacTime(stamp, stamp, 0, 0, 0, [0] * 22, [0] * 19)
+                tactile.write(BioTacHand(now(), "", [data], times))
+            if not servers and time.time() - begun > 2.0:
+                elsewhere = DomainParticipant(self.domain)
+                for name in SERVICES:
+                    request = Topic(elsewhere, f"rq{name}Request", TriggerRequest, qos=RELIABLE)
+                    reply = Topic(elsewhere, f"rr{name}Reply", TriggerResponse, qos=RELIABLE)
+                    servers.append((name, DataReader(elsewhere, request, qos=RELIABLE),
+                                    DataWriter(elsewhere, reply, qos=RELIABLE)))
+            for name, reader, writer in servers:
+                for request in reader.take(N=10):
+                    if isinstance(request, TriggerRequest):
+                        calls.append(name)
+                        writer.write(TriggerResponse(request.guid, request.sequence, True, "done"))
+            count += 1
+            time.sleep(0.005)
+        return calls
 
 
 if __name__ == "__main__":

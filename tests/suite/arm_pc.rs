@@ -13,9 +13,16 @@ fn names() -> JointNames {
     JointNames::new(["S1", "S2", "S3"].map(String::from).to_vec())
 }
 
+/// Faster than any of these commands.
+const LIMIT: f64 = 2.0;
+
+fn arm_pc() -> ArmPc {
+    ArmPc::new(names(), vec![LIMIT; 3], VALID_S)
+}
+
 /// An arm's computer that has been told to stand still and then to move, 4 ms apart, until 0.1 s.
 fn moving() -> ArmPc {
-    let mut pc = ArmPc::new(names(), VALID_S);
+    let mut pc = arm_pc();
     pc.take(&names().command(0.0, VALID_S, &[0.0; 3], false), 1, 0.0, 0.0);
     for i in 1..=25 {
         let now_s = f64::from(i) * 0.004;
@@ -35,7 +42,7 @@ fn speeds(pc: &mut ArmPc, ticks: u32) -> Vec<f64> {
 
 #[test]
 fn it_moves_after_a_command_to_stand_still_only() {
-    let mut pc = ArmPc::new(names(), VALID_S);
+    let mut pc = arm_pc();
     pc.take(&names().command(1.0, VALID_S, &[0.1; 3], false), 1, 1.0, 1.0);
     assert_eq!(pc.advance(1.0), [0.0; 3]);
     assert!(!pc.status().servo_on && pc.status().brake);
@@ -103,9 +110,8 @@ fn emergency_stop_and_dead_man_switch_stop_at_once_and_hold_softly() {
     let mut pc = moving();
     pc.set_hold(true, 0.1);
     let speeds = speeds(&mut pc, 40);
-    assert!(
-        speeds[0] > 0.0 && speeds[39] == 0.0 && pc.status().refusal() == Some("servos off".into())
-    );
+    assert!(speeds[0] > 0.0 && speeds[39] == 0.0);
+    assert_eq!(pc.status().refusal(), Some("hold".into()));
 }
 
 fn command(joint_names: &[&str], velocities: &[f64]) -> Packet {
@@ -141,6 +147,23 @@ fn what_is_no_command_of_this_arm_stops_it() {
     }
 }
 
+/// None is clamped: who commands it cannot mean it.
+#[test]
+fn a_velocity_beyond_a_joints_limit_stops_the_arm() {
+    for fast in [1e9, LIMIT * 1.001, -LIMIT * 1.001] {
+        let mut pc = moving();
+        pc.take(&command(&["S1", "S2", "S3"], &[0.1, fast, 0.1]), 1, 0.102, 0.102);
+        let refusal = pc.status().refusal().unwrap();
+        let says = format!("velocity of \"S2\" is {fast}, its limit 2");
+        assert!(refusal.contains(&says), "{refusal}");
+        let speeds = speeds(&mut pc, 50);
+        assert!(speeds.iter().all(|&speed| speed <= 0.3) && speeds[49] == 0.0, "{speeds:?}");
+    }
+    let mut pc = moving();
+    pc.take(&command(&["S1", "S2", "S3"], &[0.1, LIMIT, 0.1]), 1, 0.102, 0.102);
+    assert_eq!(pc.advance(0.102), [0.1, LIMIT, 0.1]);
+}
+
 /// Names decide, not their order.
 #[test]
 fn swapped_names_move_the_joints_that_they_name() {
@@ -156,7 +179,7 @@ proptest! {
     fn it_stands_after_every_silence(
         sent in prop::collection::vec((0.0..0.05f64, -0.03..0.03f64, -1.0..1.0f64), 1..60),
     ) {
-        let mut pc = ArmPc::new(names(), VALID_S);
+        let mut pc = arm_pc();
         let (mut now_s, mut fastest) = (1.0, 0.0f64);
         for (after_s, age_s, qdot) in sent {
             now_s += after_s;

@@ -92,3 +92,34 @@ fn a_known_body_takes_the_place_of_a_whole_object() {
     assert!(environment.task().ball().is_none());
     assert!(environment.task().zone().dimension() == 2);
 }
+
+/// Centre and radius say nothing of the mesh, whose hash does.
+#[test]
+fn a_run_does_not_resume_on_another_mesh() {
+    let folder = around();
+    let ball = ["scene.around.centre_m=[0.4,0.4,0.4]", "scene.around.radius_m=1.0"];
+    let run = ["run", "small.toml", "--no-report", "--set", ball[0], "--set", ball[1]];
+    let run = |more: &[&'static str]| [&run[..], more].concat();
+    succeeds(folder.path(), &run(&[]));
+    let mesh = folder.path().join("mesh.obj");
+    let text = fs::read_to_string(&mesh).unwrap();
+    // What is not geometry does not count.
+    fs::write(&mesh, format!("# the same\n{text}")).unwrap();
+    succeeds(folder.path(), &run(&["--set", "trials=3"]));
+    fs::write(&mesh, text.replace("v 0 0 1\n", "v 0 0 0.9\n")).unwrap();
+    let says = ["scene.object.mesh", "mesh.obj", "has changed", "--fresh", "--out"];
+    fails(folder.path(), &run(&["--set", "trials=4"]), &says);
+    succeeds(folder.path(), &run(&["--fresh"]));
+}
+
+/// The ball that follows from the object's size is checked before anything runs.
+#[test]
+fn an_object_too_small_to_go_around_is_refused_at_once() {
+    let folder = around();
+    for scale in ["0.00001", "1000"] {
+        let set = format!("scene.object.scale={scale}");
+        let says = ["the object is", "m large", "allowed is", "object.scale"];
+        fails(folder.path(), &["run", "small.toml", "--set", &set], &says);
+    }
+    assert!(!folder.path().join("runs").exists());
+}

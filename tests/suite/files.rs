@@ -180,3 +180,99 @@ fn gltf_buffers_outside_the_folder_are_read_by_leave_only() {
     fails(folder.path(), &show, &["/etc/passwd lies outside the mesh's folder"]);
     fails(folder.path(), &["show", "scene.toml", "--outside-buffers"], &["goes with a mesh"]);
 }
+
+/// A link in a run's folder cannot make the program change a file outside of it.
+#[test]
+fn nothing_is_written_through_a_symbolic_link() {
+    let folder = folder();
+    let run = folder.path().join("run");
+    let again = ["run", "small.toml", "--out", "run"];
+    let more = ["run", "small.toml", "--out", "run", "--set", "trials=2"];
+    let report = ["report", "run"];
+    succeeds(folder.path(), &again);
+    let replaced = [
+        "summary.csv",
+        "comparison.csv",
+        "equal_error.csv",
+        "report.html",
+        "resolved.toml",
+        "manifest.json",
+        "content.json",
+        "figures/belief.svg",
+        "figures/belief.png",
+        "figures/belief.pdf",
+    ];
+    for name in replaced {
+        let file = run.join(name);
+        let outside = folder.path().join(name.replace('/', "-"));
+        let text = fs::read(&file).unwrap_or_default();
+        fs::write(&outside, &text).unwrap();
+        let _ = fs::remove_file(&file);
+        symlink(&outside, &file).unwrap();
+        // Also where it is written.
+        symlink(&outside, format!("{}.part", file.display())).unwrap();
+        for arguments in [&report[..], &more, &again] {
+            succeeds(folder.path(), arguments);
+            assert!(fs::read(&outside).unwrap() == text, "{name}: {arguments:?}");
+        }
+    }
+    let outside = folder.path().join("outside");
+    fs::write(&outside, "").unwrap();
+    for name in ["trials.jsonl", "touches.jsonl"] {
+        let file = run.join(name);
+        let rows = fs::read(&file).unwrap_or_default();
+        let _ = fs::remove_file(&file);
+        symlink(&outside, &file).unwrap();
+        let arguments = match name {
+            "trials.jsonl" => [&again[..], &["--fresh"]].concat(),
+            _ => vec!["run", "small.toml", "--out", "run", "--set", "backend.kind=\"ros2\""],
+        };
+        let output = palpate(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(2), "{name}: {}", said(&output));
+        assert!(fs::read(&outside).unwrap().is_empty(), "{name}");
+        fs::remove_file(&file).unwrap();
+        fs::write(&file, rows).unwrap();
+    }
+    fs::remove_file(run.join("touches.jsonl")).unwrap();
+    let elsewhere = folder.path().join("elsewhere");
+    fs::create_dir(&elsewhere).unwrap();
+    fs::remove_dir_all(run.join("figures")).unwrap();
+    symlink(&elsewhere, run.join("figures")).unwrap();
+    fails(folder.path(), &report, &["figures", "a symbolic link", "remove it"]);
+    assert_eq!(fs::read_dir(&elsewhere).unwrap().count(), 0);
+}
+
+/// Numbers that no trial comes to are refused, with the row that has them.
+#[test]
+fn a_row_with_an_impossible_number_is_refused() {
+    let folder = folder();
+    succeeds(folder.path(), &["run", "small.toml", "--out", "run", "--no-report"]);
+    let file = folder.path().join("run/trials.jsonl");
+    let text = fs::read_to_string(&file).unwrap();
+    let row: serde_json::Value = serde_json::from_str(&text).unwrap();
+    for (key, value) in [
+        ("r", 0.97e308),
+        ("r", -1.5),
+        ("centred_r", 2.0),
+        ("rmse_m", 1e300),
+        ("rmse_m", -1.0),
+        ("max_error_m", 1e9),
+        ("coverage", 1.5),
+    ] {
+        let mut row = row.clone();
+        row["touches"][2]["metrics"][key] = value.into();
+        fs::write(&file, format!("{row}\n")).unwrap();
+        let says = ["trials.jsonl:1", "touch 3", key, "allowed is"];
+        fails(folder.path(), &["report", "run"], &says);
+    }
+    let mut far = row.clone();
+    far["touches"][0]["target"][0] = 1e200.into();
+    fs::write(&file, format!("{far}\n")).unwrap();
+    fails(
+        folder.path(),
+        &["report", "run"],
+        &["trials.jsonl:1", "touch 1", "a coordinate is 1e200"],
+    );
+    fs::write(&file, text).unwrap();
+    succeeds(folder.path(), &["report", "run"]);
+}

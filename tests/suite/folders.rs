@@ -12,6 +12,8 @@ use rand_chacha::ChaCha8Rng;
 use tempfile::TempDir;
 
 use crate::common::program::{command, fails, folder, said, succeeds};
+use palpate::experiment::row::TouchRow;
+use palpate::experiment::store::{Entry, Journal};
 
 /// Kills of one test; `PALPATE_FUZZ` asks for more.
 const KILLS: u64 = 100;
@@ -156,4 +158,32 @@ fn what_others_put_into_a_folder_is_not_touched() {
     fs::write(folder.path().join("runs/small/notes.txt"), "mine").unwrap();
     succeeds(folder.path(), &["run", "small.toml", "--no-report", "--fresh", "--set", "seed=3"]);
     assert_eq!(fs::read_to_string(folder.path().join("runs/small/notes.txt")).unwrap(), "mine");
+}
+
+/// A finished touch counts as soon as it is in the journal, and is there when it is opened again.
+#[test]
+fn a_journal_has_the_touches_that_were_added() {
+    let folder = TempDir::new().unwrap();
+    let touch: TouchRow = serde_json::from_str("{\"target\":[0.1,0.2],\"contact\":null}").unwrap();
+    let entry = |trial| Entry {
+        time_unix_s: 1.0,
+        trial,
+        planner: "active".into(),
+        touch: Some(touch.clone()),
+        fault: None,
+    };
+    let mut journal = Journal::open(folder.path()).unwrap();
+    for trial in [0, 0, 1] {
+        journal.add(entry(trial)).unwrap();
+    }
+    assert_eq!(journal.touches(0, "active").len(), 2);
+    let fault = Entry { touch: None, fault: Some("no".into()), ..entry(0) };
+    journal.add(fault).unwrap();
+    let again = Journal::open(folder.path()).unwrap();
+    for journal in [journal, again] {
+        assert_eq!(journal.touches(0, "active").len(), 2);
+        assert_eq!(journal.touches(1, "active").len(), 1);
+        assert!(journal.touches(0, "random").is_empty());
+        assert_eq!(journal.halted(), Some("no"));
+    }
 }

@@ -1,11 +1,14 @@
 //! What must hold before a body is moved.
 
 use crate::common::fake::{World, body_of};
+use crate::common::program::{palpate, said};
 use crate::common::shipped;
 use palpate::backend::Reading;
 use palpate::backend::interlock::{Expected, GateError, GateSettings, check_start};
 use palpate::robot::arm::ArmSettings;
 use palpate::sim::simulator::Simulator;
+use std::fs;
+use std::path::Path;
 
 fn checked(breaks: fn(u64, &mut Reading)) -> Result<(), GateError> {
     let chain = ArmSettings::default().chain();
@@ -82,4 +85,70 @@ fn what_is_not_in_order_is_said_with_its_numbers() {
 
 fn counts(reading: &mut Reading, change: fn(&mut [f64; 19])) {
     reading.frames.iter_mut().for_each(|frame| change(frame.electrode_counts.as_mut().unwrap()));
+}
+
+/// A real robot needs its cell and depths from a person; a simulation takes them from the mesh.
+#[test]
+fn what_protects_a_real_robot_is_asked_for_before_anything_moves() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let out = out.to_str().unwrap();
+    let needed = [
+        "scene.zone.depth_m=[0.59, 0.71]",
+        "backend.interlocks.lowest_m=0.0",
+        "backend.interlocks.workspace_m=[[-1.0, 1.0], [-1.2, 0.6], [0.0, 1.8]]",
+    ];
+    let run = |experiment: &'static str, sets: &[&str]| {
+        let kind = "backend.kind=\"ros2\"";
+        let sets = [kind].into_iter().chain(sets.iter().copied()).flat_map(|set| ["--set", set]);
+        let arguments: Vec<&str> =
+            ["run", experiment, "--out", out].into_iter().chain(sets).collect();
+        let output = palpate(Path::new(env!("CARGO_MANIFEST_DIR")), &arguments);
+        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+        said(&output)
+    };
+    for missing in 0..needed.len() {
+        let sets: Vec<_> = (0..needed.len()).filter(|&i| i != missing).map(|i| needed[i]).collect();
+        let told = run("container_pa10", &sets);
+        let (key, _) = needed[missing].split_once('=').unwrap();
+        assert!(told.contains("moves a real robot, which needs") && told.contains(key), "{told}");
+        assert!(
+            told.contains(&format!("{key} = [")) || told.contains(&format!("{key} = 0")),
+            "{told}"
+        );
+    }
+    let told = run("around", &needed[1..]);
+    for key in ["scene.around.centre_m", "scene.around.radius_m"] {
+        assert!(told.contains(key), "{told}");
+    }
+    assert!(!Path::new(out).exists());
+}
+
+/// Another program that holds the folder, and a fault that nobody cleared, are found before the
+/// arm is looked for.
+#[test]
+fn a_folder_that_may_not_be_used_is_refused_before_the_arm_is_looked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let experiment = "experiments/container_pa10.toml";
+    let sets = crate::common::lab::CELL.iter().flat_map(|&set| ["--set", set]);
+    let arguments: Vec<&str> = ["run", experiment, "--out", out.to_str().unwrap()]
+        .into_iter()
+        .chain([
+            "--set",
+            "backend.kind=\"ros2\"",
+            "--set",
+            "touches=5",
+            "--set",
+            "initial_touches=5",
+        ])
+        .chain(sets)
+        .collect();
+    let run = || said(&palpate(Path::new(env!("CARGO_MANIFEST_DIR")), &arguments));
+    fs::create_dir(&out).unwrap();
+    let trials = fs::File::create(out.join("trials.jsonl")).unwrap();
+    trials.lock().unwrap();
+    let told = run();
+    assert!(told.contains("another run is writing this folder"), "{told}");
+    drop(trials);
 }

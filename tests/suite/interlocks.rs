@@ -49,7 +49,7 @@ const CAUSES: [(&str, Breaks); 13] = [
     ("value of E3", |_, reading| electrode(reading, 2, 4095.0)),
     ("value of E4", |_, reading| electrode(reading, 3, 0.0)),
     ("standstill of E19", |_, reading| electrode(reading, 18, 2000.0)),
-    ("error of speed of S1", |_, reading| reading.qdot[0] = 0.4),
+    ("velocity tracking error of S1", |_, reading| reading.qdot[0] = 0.4),
     ("joint position of S2", |_, reading| reading.q[1] = 2.0),
     ("tip speed", |_, reading| reading.qdot[0] = 2.0),
 ];
@@ -92,6 +92,83 @@ fn each_trips_on_its_cause_soon_and_stays_tripped_until_an_operator_clears_it() 
         body.reset(2).unwrap();
         body.step(&command(7, 0)).unwrap();
     }
+}
+
+/// How far the tip of a stage goes on after its joints froze, and what stopped it.
+fn frozen(speed_m_s: f64, noise: f64) -> (f64, String) {
+    let site = site(stage(Point3::origin(), Finger::default().r_at()));
+    let world = World { freezes: Some((400, noise)), ..World::real() };
+    let (mut body, fake) = interlocks(&site, &InterlockSettings::default(), world);
+    let ahead = Command { qdot: vec![0.0, -speed_m_s, 0.0] };
+    let fault = (0..40_000).find_map(|_| body.step(&ahead).err()).unwrap();
+    (fake.places()[400][1] - fake.last()[1], fault.to_string())
+}
+
+/// Positions repeated to the bit, and positions that only tremble.
+#[test]
+fn joints_that_freeze_are_found_within_ten_millimetres_at_any_speed() {
+    for speed_m_s in [0.0001, 0.001, 0.003, 0.005, 0.015, 0.04, 0.1] {
+        let (went_m, said) = frozen(speed_m_s, 0.0);
+        println!("{speed_m_s} m/s: {:.2} mm, {said}", 1e3 * went_m);
+        assert!(said.contains("joint standstill of Y"), "{said}");
+        // 0.1 s and one tick, or what shows; and the way to rest.
+        assert!(went_m < 0.01 && went_m < (speed_m_s * 0.13).max(4e-4), "{speed_m_s}: {went_m}");
+        let (went_m, said) = frozen(speed_m_s, 1e-6);
+        println!("{speed_m_s} m/s: {:.2} mm, {said}", 1e3 * went_m);
+        assert!(said.contains("position tracking error of Y"), "{said}");
+        assert!(went_m < 0.01, "{speed_m_s}: {went_m}");
+    }
+}
+
+/// A servo that lags, and one that smooths, do not count as frozen.
+#[test]
+fn joints_that_lag_by_less_than_is_allowed_trip_nothing() {
+    for lag in [5, 40] {
+        let site = site(stage(Point3::origin(), Finger::default().r_at()));
+        let world = World { lag, ..World::real() };
+        let (mut body, _) = interlocks(&site, &InterlockSettings::default(), world);
+        for tick in 0..5000 {
+            let speed_m_s = 0.1 * (f64::from(tick) * 0.004).sin();
+            let command = Command { qdot: vec![speed_m_s, -speed_m_s, 0.0] };
+            body.step(&command).unwrap_or_else(|fault| panic!("{lag}: {fault}"));
+        }
+    }
+}
+
+/// What bounds the tip looks at where it may be, not only at where it was last seen.
+#[test]
+fn a_box_bounds_also_a_tip_that_is_not_seen_to_move() {
+    let mut site = site(stage(Point3::origin(), Finger::default().r_at()));
+    site.tip_w = Some([Point3::origin(); 2]);
+    // Nothing else stops it.
+    let settings = InterlockSettings {
+        tip_margin_m: 0.05,
+        frozen_s: 100.0,
+        joint_silence_s: 10.0,
+        tracking_lag_s: 1.0,
+        ..InterlockSettings::default()
+    };
+    let world = World { freezes: Some((100, 0.0)), ..World::real() };
+    let (mut body, fake) = interlocks(&site, &settings, world);
+    let ahead = Command { qdot: vec![0.0, -0.1, 0.0] };
+    let fault = (0..4000).find_map(|_| body.step(&ahead).err()).unwrap();
+    assert!(fault.to_string().contains("workspace of the tip"), "{fault}");
+    assert!((-0.0501..-0.04).contains(&fake.last()[1]), "{:?}", fake.last());
+}
+
+/// Not "-0.0451 m inside": where it stands, and where to bring it.
+#[test]
+fn an_arm_away_from_home_is_told_where_to_go_and_not_moved() {
+    let mut site = arm();
+    site.tip_w = Some([Point3::new(3.0, 0.0, 0.0); 2]);
+    let (mut body, fake) = interlocks(&site, &InterlockSettings::default(), World::real());
+    let fault = body.step(&command(7, 100)).unwrap_err();
+    let said = fault.to_string();
+    for word in ["its tip at [", "workspace of the tip", "bring it near its home", "S1 -1.571"] {
+        assert!(said.contains(word), "{said}");
+    }
+    assert!(fake.commands().is_empty());
+    assert_eq!(body.step(&command(7, 101)).unwrap_err(), fault);
 }
 
 /// One reading alone is no force.

@@ -1,16 +1,20 @@
 //! An arm behind topics: run in a network namespace by `make test-ros2` and `make test-ros1`, and
 //! ignored without one, because DDS sends to whoever is near.
 
-use crate::common::lab::{EXPERIMENT, Network, TwinProcess, row};
+use crate::common::lab::{CELL, EXPERIMENT, Network, TwinProcess, row};
+use palpate::backend::ros::arm::Lab;
 use palpate::backend::ros::clock;
 use palpate::backend::ros::connect::connect;
 use palpate::backend::ros::joints::JointNames;
 use palpate::backend::ros::link::{Link, Sink};
 use palpate::backend::ros::packet::Packet;
+use palpate::backend::ros::service::Service;
+use palpate::backend::ros::settings::{BackendKind, BackendSettings, MappingKind};
 use palpate::backend::ros::topics::Side;
 use palpate::backend::ros::transport::Delivery;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::probe::Touch;
+use palpate::robot::arm::ArmSettings;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -74,7 +78,7 @@ fn the_container_is_explored_over_topics_as_in_the_simulator() {
     println!("a peer of another implementation heard of the explorer: {}", heard.trim());
 
     let sets = ["trials=1", "planners=[\"active\",\"random\"]"].map(String::from);
-    let sets = [&sets[..], &[format!("touches={}", touches())]].concat();
+    let sets = [&sets[..], &[format!("touches={}", touches()), CELL[0].into()]].concat();
     let experiment = Experiment::load(Path::new(EXPERIMENT), &sets).unwrap();
     let simulation = Simulation::new(experiment).unwrap();
     let mut far = Vec::new();
@@ -215,7 +219,7 @@ fn a_run_that_was_halted_goes_on() {
     let out = folder.path().join("run");
     let network = Network::new(20);
     let twin = TwinProcess::new(&network, EXPERIMENT, &["--inject", "estop@9+1"]);
-    let first = network.run("random", 6, &out).output().unwrap();
+    let first = network.run("random", 6, &out).arg("--record").output().unwrap();
     let said = String::from_utf8_lossy(&first.stderr).into_owned();
     assert_eq!(first.status.code(), Some(2), "{said}");
     assert!(said.contains("emergency stop") && said.contains("touches of it are kept"), "{said}");
@@ -223,12 +227,111 @@ fn a_run_that_was_halted_goes_on() {
     let journal = fs::read_to_string(out.join("touches.jsonl")).unwrap();
     let kept = lines(&journal);
     assert!((1..6).contains(&kept), "{journal}");
+    assert!(said.contains(&format!("{kept} touches of it are kept")), "{said}");
     sleep(Duration::from_millis(1500));
-    let second = network.run("random", 6, &out).arg("--clear-fault").output().unwrap();
+    let unseen = network.run("random", 6, &out).output().unwrap();
+    let said = String::from_utf8_lossy(&unseen.stderr).into_owned();
+    assert!(said.contains("halted by a fault") && said.contains("--clear-fault"), "{said}");
+    let mut second = network.run("random", 6, &out);
+    let second = second.args(["--clear-fault", "--record"]).output().unwrap();
     assert!(second.status.success(), "{}", String::from_utf8_lossy(&second.stderr));
     let row = row(&out);
     assert_eq!((row.failure, row.touches.len()), (None, 6));
     let after = fs::read_to_string(out.join("touches.jsonl")).unwrap();
     assert!(after.starts_with(&journal) && lines(&after) == 6);
+    // Both parts of the recording replay, on any machine.
+    let whole = out.join("recordings/random-0000.mcap");
+    let replay = network.palpate(&["replay", whole.to_str().unwrap()]).output().unwrap();
+    let told = String::from_utf8_lossy(&replay.stdout).into_owned();
+    assert!(replay.status.success(), "{told}{}", String::from_utf8_lossy(&replay.stderr));
+    assert!(
+        told.contains("random-0000-part-2.mcap") && told.contains("6 touches the same"),
+        "{told}"
+    );
     twin.end();
+}
+
+/// Status published once and latched; services in another participant than the topics, found two
+/// seconds later, whose requests carry their identity in the payload.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn an_arm_of_another_implementation_is_heard_and_answers() {
+    let network = Network::new(16);
+    if network.settings.kind != BackendKind::Ros2 {
+        return;
+    }
+    let arm = network.peer("arm", &["14"]).stdout(Stdio::piped()).spawn().unwrap();
+    // The status was published before anybody was there to hear it.
+    sleep(Duration::from_millis(1500));
+    let chain = ArmSettings::default().chain();
+    let on_change = BackendSettings { status_on_change: true, ..network.settings.clone() };
+    let lab = Lab::join(&on_change, &chain).unwrap();
+    for service in Service::COMMON {
+        lab.call(&service).unwrap_or_else(|fault| panic!("{}: {fault}", service.name()));
+    }
+    drop(lab);
+    // The wrong mapping never gets an answer, and the message names the setting.
+    let other =
+        BackendSettings { service_mapping: MappingKind::Enhanced, patience_s: 2.0, ..on_change };
+    let lab = Lab::join(&other, &chain).unwrap();
+    let fault = lab.call(&Service::Hold).unwrap_err().to_string();
+    assert!(fault.contains("no answer in 2 s") && fault.contains("service_mapping"), "{fault}");
+    drop(lab);
+    let told = String::from_utf8(arm.wait_with_output().unwrap().stdout).unwrap();
+    let called: Value = serde_json::from_str(&told).unwrap();
+    for service in Service::COMMON {
+        let name = Value::from(service.name());
+        assert!(called["called"].as_array().unwrap().contains(&name), "{name}: {told}");
+    }
+}
+
+/// How often each network interface of this namespace has joined the multicast group of DDS.
+fn multicast_members(device: &str) -> u32 {
+    let text = fs::read_to_string("/proc/net/igmp").unwrap();
+    let mut is_device = false;
+    let mut members = 0;
+    for line in text.lines().skip(1) {
+        let mut words = line.split_whitespace();
+        if line.starts_with('\t') {
+            // 239.255.0.1, little-endian.
+            if is_device && words.next() == Some("0100FFEF") {
+                members += words.next().unwrap().parse::<u32>().unwrap();
+            }
+        } else {
+            is_device = words.nth(1) == Some(device);
+        }
+    }
+    members
+}
+
+/// What the settings name is used, and nothing else.
+#[test]
+#[ignore = "needs a network namespace: make test-ros2"]
+fn only_the_named_interfaces_are_used() {
+    let network = Network::new(17);
+    if network.settings.kind != BackendKind::Ros2 {
+        return;
+    }
+    let set = ["--set", "backend.interfaces=[\"lo\"]"];
+    let counts = || ["lo", "dds0"].map(multicast_members);
+    let before = counts();
+    let twin = TwinProcess::new(&network, EXPERIMENT, &set);
+    let with_lo = counts();
+    assert!(with_lo[0] > before[0] && with_lo[1] == before[1], "{before:?} {with_lo:?}");
+    let settings = BackendSettings { interfaces: vec!["lo".into()], ..network.settings.clone() };
+    let lab = Lab::join(&settings, &ArmSettings::default().chain()).unwrap();
+    assert_eq!(counts()[1], before[1]);
+    drop((lab, twin));
+    if Path::new("/sys/class/net/dds0").exists() {
+        let twin = TwinProcess::new(&network, EXPERIMENT, &[]);
+        assert!(counts()[1] > before[1], "without a setting all are used");
+        drop(twin);
+        let unknown =
+            BackendSettings { interfaces: vec!["wlan7".into()], ..network.settings.clone() };
+        let fault = Lab::join(&unknown, &ArmSettings::default().chain()).err().unwrap();
+        assert!(
+            fault.to_string().contains("wlan7") && fault.to_string().contains("dds0"),
+            "{fault}"
+        );
+    }
 }

@@ -95,4 +95,5 @@ mod solid;
 mod stress;
 mod sweeps;
 mod twin;
+mod twin_faults;
 mod whole;

@@ -177,3 +177,17 @@ fn a_soft_finger_without_tables_is_a_biotac_and_says_so() {
     let quiet = palpate(folder.path(), &["-q", "show", "scene.toml"]);
     assert_eq!(said(&quiet), "");
 }
+
+/// The radius is set in a scene, and what it costs is said there.
+#[test]
+fn a_soft_finger_of_another_size_is_told_what_it_costs() {
+    let folder = folder("container_finger.toml", &[]);
+    let show = |radius_m: &str| {
+        let set = format!("finger.radius_m={radius_m}");
+        palpate(folder.path(), &["show", "scene.toml", "--set", &set])
+    };
+    let told = said(&show("0.01"));
+    assert!(told.contains("finger.radius_m = 0.01") && told.contains("0.79 at 0.010"), "{told}");
+    let told = said(&show("0.007"));
+    assert!(!told.contains("finger.radius_m"), "{told}");
+}

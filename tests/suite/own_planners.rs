@@ -1,7 +1,8 @@
 //! Planners that are not built in: a program adds them to its simulation.
 
+use palpate::experiment::row::TrialId;
 use palpate::experiment::runner::{self, RunError};
-use palpate::experiment::store::{Manifest, Run, RunFolder};
+use palpate::experiment::store::{Content, Run, RunFolder, StoreError};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::planner::{
@@ -9,6 +10,7 @@ use palpate::explore::planner::{
 };
 use palpate::task::Zone;
 use rand_chacha::ChaCha8Rng;
+use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::AtomicBool;
 
@@ -26,6 +28,10 @@ struct Random {
 impl Maker for Mine {
     fn name(&self) -> &str {
         "mine:Random"
+    }
+
+    fn source(&self) -> Option<String> {
+        Some(format!("random, {} touches", self.touches))
     }
 
     fn make(&self, zone: &Zone, _: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {
@@ -53,6 +59,15 @@ fn simulation(touches: usize) -> Simulation {
     simulation.with_planners(vec![Box::new(Mine { touches })])
 }
 
+fn rows_of(
+    simulation: &Simulation,
+    path: &Path,
+    fresh: bool,
+) -> Result<(RunFolder, Vec<TrialId>), StoreError> {
+    let content = Content::of(simulation).unwrap();
+    RunFolder::open(path, simulation.experiment(), simulation.truth(), &content, fresh)
+}
+
 /// Its trials begin as those of the others do, stand in the same folder, and the folder is read
 /// without it.
 #[test]
@@ -60,9 +75,7 @@ fn an_own_planner_is_one_of_the_experiments() {
     let simulation = simulation(8);
     let folder = tempfile::tempdir().unwrap();
     let experiment = simulation.experiment();
-    let manifest = Manifest::of(experiment);
-    let (mut rows, done) =
-        RunFolder::open(folder.path(), experiment, simulation.truth(), &manifest, false).unwrap();
+    let (mut rows, done) = rows_of(&simulation, folder.path(), false).unwrap();
     let jobs = runner::jobs(&simulation, &done).unwrap();
     let stop = AtomicBool::new(false);
     runner::run(&simulation, (&mut rows, jobs), 0, &stop, None, &|_| ()).unwrap();
@@ -70,6 +83,12 @@ fn an_own_planner_is_one_of_the_experiments() {
     let run = Run::read(folder.path()).unwrap();
     let names: Vec<_> = run.rows.iter().map(|row| row.planner.as_str()).collect();
     assert_eq!(names, ["mine:Random", "random", "mine:Random", "random"]);
+    drop(rows_of(&simulation, folder.path(), false).unwrap());
+    // An edited planner is another one.
+    let edited = self::simulation(5);
+    let error = rows_of(&edited, folder.path(), false).err().unwrap();
+    assert!(error.to_string().contains("planner mine:Random has changed"), "{error}");
+    assert!(rows_of(&edited, folder.path(), true).unwrap().1.is_empty());
     let first = experiment.initial_touches as usize;
     for pair in run.rows.chunks(2) {
         assert_eq!(pair[0].failure, None);

@@ -39,7 +39,7 @@ const SPHERE: &str = "radius_m = 0.007\nlength_m = 0";
 fn across(environment: &Environment) -> Vec<(f64, bool)> {
     let places: Vec<Vec<f64>> = (-190..=190).map(|i| vec![1e-4 * f64::from(i), 0.0]).collect();
     let heights: Vec<_> = places.iter().map(|place| environment.true_height_m(place)).collect();
-    let reachable = reach::is_reachable(environment, &places, &heights);
+    let reachable = reach::is_reachable(environment, &places, &heights, &|_| ());
     places.iter().map(|place| place[0]).zip(reachable).collect()
 }
 
@@ -162,7 +162,7 @@ fn reach_is_what_letting_every_finger_down_finds() {
             let places = environment.scene().zone.grid(15);
             let heights: Vec<_> =
                 places.iter().map(|place| environment.true_height_m(place)).collect();
-            let fast = reach::is_reachable(&environment, &places, &heights);
+            let fast = reach::is_reachable(&environment, &places, &heights, &|_| ());
             assert_eq!(fast, by_brute_force(&environment, &places), "{finger} {rough_m}");
             fast.iter().for_each(|&is_reachable| counts[usize::from(is_reachable)] += 1);
         }

@@ -12,8 +12,10 @@ use palpate::backend::recording::{
 };
 use palpate::backend::ros::message::{BioTacHand, JointState, JointTrajectory, WrenchStamped};
 use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading, Wrench};
-use palpate::experiment::recorded_trial::{self, recording_path};
+use palpate::experiment::recorded_trial::{self, next_part, parts, recording_path};
 use palpate::experiment::replay::{self, Difference, ReplayError};
+use palpate::experiment::row::TouchRow;
+use palpate::experiment::witness::{Touched, Witness};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::robot::finger::Frame;
@@ -209,7 +211,7 @@ proptest! {
             recorder.step(&command).unwrap();
         }
         prop_assert_eq!(recorder.step(&Command::default()).unwrap_err(), lost.clone());
-        recording.end(1.0, &Ending { failure: Some("it was lost".into()) }).unwrap();
+        recording.end(1.0, &Ending { failure: Some("it was lost".into()), is_interrupted: false }).unwrap();
 
         let recorded = Recorded::of(paper.0.lock().unwrap().clone()).unwrap();
         prop_assert_eq!(&recorded.about, &about);
@@ -280,7 +282,7 @@ fn short(ticks: u32) -> (Vec<u8>, Vec<Reading>) {
         let done = Touch { touch, time_s: readings[readings.len() - 1].time_s, ..Touch::default() };
         recording.touched(&done, [shape.clone(), shape]).unwrap();
     }
-    recording.end(1.0, &Ending { failure: None }).unwrap();
+    recording.end(1.0, &Ending::default()).unwrap();
     let bytes = paper.0.lock().unwrap().clone();
     (bytes, readings)
 }
@@ -462,7 +464,7 @@ fn a_disk_that_is_full_is_a_fault() {
         assert!(matches!(fault, Fault::Unrecorded { time_s: 2.5, .. }), "{fault}");
         // And it stays so.
         assert!(recorder.step(&Command { qdot: vec![0.0; 3] }).is_err());
-        assert!(recording.end(2.5, &Ending { failure: None }).is_err());
+        assert!(recording.end(2.5, &Ending::default()).is_err());
     }
     assert!((1..=2).contains(&begun));
     let nowhere = Recording::create(Path::new("/nowhere/at/all.mcap"), &about);
@@ -609,4 +611,65 @@ fn the_program_records_and_replays() {
     // A new start takes the recordings of the old one with it.
     succeeds(path, &["run", "small.toml", "--out", "run", "--no-report", "--fresh"]);
     assert_eq!(fs::read_dir(path.join("run/recordings")).unwrap().count(), 0);
+}
+
+/// Keeps the touches of a trial and interrupts it after some of them.
+struct Interrupts {
+    made: Vec<TouchRow>,
+    after: u32,
+}
+
+impl Witness for Interrupts {
+    fn touched(&mut self, touched: &Touched) -> Result<(), Fault> {
+        if touched.count as usize > self.made.len() {
+            self.made.push(touched.row.clone());
+        }
+        match touched.count == self.after {
+            true => Err(Fault::Stopped { time_s: touched.row.time_s.unwrap() }),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Each part replays by itself, and the program replays them as one.
+#[test]
+fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
+    let folder = TempDir::new().unwrap();
+    let simulation = Simulation::new(experiment(&[])).unwrap();
+    let active = planner::by_name("active").unwrap();
+    let path = recording_path(folder.path(), active, 0);
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let mut interrupts = Interrupts { made: Vec::new(), after: 0 };
+    let touched = [2, 4, 5];
+    for after in touched {
+        interrupts.after = after;
+        let (part, made) = (next_part(&path), interrupts.made.clone());
+        let row = recorded_trial::go_on(&simulation, active, 0, &part, &made, &mut interrupts);
+        assert_eq!(row.touches, interrupts.made);
+        assert_eq!(row.touches.len(), after as usize);
+    }
+    let parts = parts(&path);
+    let names: Vec<_> = parts.iter().map(|part| part.file_name().unwrap()).collect();
+    assert_eq!(names, ["active-0000.mcap", "active-0000-part-2.mcap", "active-0000-part-3.mcap"]);
+    for (part, (made, touches)) in parts.iter().zip([0, 2, 4].into_iter().zip(touched)) {
+        assert_eq!(Recorded::read(part).unwrap().made, made);
+        let replay = replayed(part, &[]).unwrap();
+        assert_eq!((replay.touches, replay.is_cut, replay.difference), (touches, false, None));
+    }
+    let file = path.to_str().unwrap();
+    let said = succeeds(folder.path(), &["replay", file]);
+    assert_eq!(said.matches("touches the same").count(), 3, "{said}");
+    assert!(said.contains("5 touches the same, decisions and belief, 4 of them made before"));
+    let json = succeeds(folder.path(), &["replay", file, "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["parts"][1]["made_before"], 4);
+    // A difference in a later part alone is one of the whole.
+    let other = replayed(&parts[2], &["scene.touch.travel_m_s=0.03"]).unwrap();
+    assert!(matches!(other.difference, Some(Difference::Command { touch: 5, .. })), "{other:?}");
+    fs::copy(&parts[1], folder.path().join("other.mcap")).unwrap();
+    let mut bytes = fs::read(&parts[2]).unwrap();
+    bytes.truncate(bytes.len() / 2);
+    fs::write(&parts[2], bytes).unwrap();
+    let cut = succeeds(folder.path(), &["replay", file]);
+    assert!(cut.contains("ends before its trial"), "{cut}");
 }

@@ -3,7 +3,7 @@
 use crate::common::counting::peak_bytes;
 use crate::common::program::palpate;
 use palpate::experiment::shard::{NoShard, Shard};
-use palpate::experiment::store::{Manifest, Shards};
+use palpate::experiment::store::Shards;
 use std::fs;
 use std::path::Path;
 
@@ -90,15 +90,7 @@ fn rows_are_merged_without_being_kept() {
     let mut count = 0;
     let peak = peak_bytes(|| {
         let shards = Shards::open(&[at("1")]).unwrap().unwrap();
-        let manifest = Manifest {
-            version: "",
-            commit: "",
-            mujoco: None,
-            platform: String::new(),
-            cpu_features: Vec::new(),
-            seed: shards.experiment().seed,
-        };
-        count = shards.merge(&at("whole"), &manifest).unwrap();
+        count = shards.merge(&at("whole")).unwrap();
     });
     assert_eq!(count, 600);
     assert!((peak as u64) < size / 4, "{peak} bytes of {size}");

@@ -18,10 +18,11 @@ pub const GRAIN_M: f64 = 1e-3;
 const LOOKS: usize = 32;
 
 impl<'a> Ahead<'a> {
-    /// If `qdot` is commanded for one tick, heard `reaction_s` later, and then braked.
+    /// If `qdot` is commanded for one tick, takes effect `reaction_s` later, and is then braked; and
+    /// if the body has moved as commanded since its position was last seen to change.
     pub fn of(now: &'a Now, qdot: &Joints, reaction_s: f64) -> Self {
         let time_s = now.period_s + reaction_s + 0.5 * stopping_s(now, qdot);
-        Self { now, from: now.q, by: qdot * time_s }
+        Self { now, from: now.q, by: now.unseen + qdot * time_s }
     }
 
     /// What any point of the robot moves by at most, until the end, from where it would stand at

@@ -74,6 +74,7 @@ impl Interlocked {
                 q,
                 qdot: Joints::zeros(),
                 sent: Joints::zeros(),
+                unseen: Joints::zeros(),
                 x_wt,
                 jacobian: Jacobian::zeros(),
                 load: None,
@@ -118,8 +119,14 @@ impl Interlocked {
             let (expected, found) = (now.chain.joints.len(), values.len());
             now.chain.joints_from(values).ok_or(Fault::Joints { expected, found })
         };
+        let (before, passed_s) = (now.q, reading.time_s - now.time_s);
         (now.q, now.qdot) = (joints(&reading.q)?, joints(&reading.qdot)?);
         now.time_s = reading.time_s;
+        // A pause between two ticks is spent at rest.
+        let moved_s = passed_s.clamp(0.0, HELD_TICKS * now.period_s);
+        let unseen = (now.unseen + now.sent * moved_s)
+            .zip_map(&(now.q - before), |unseen, by| if by == 0.0 { unseen } else { 0.0 });
+        now.unseen = unseen;
         (now.x_wt, now.jacobian) = now.chain.jacobian(&now.q);
         now.load = reading.wrench.map(|Wrench { force_n, torque_nm }| {
             let rest = *self.rest.get_or_insert(Wrench { force_n, torque_nm });
@@ -131,6 +138,23 @@ impl Interlocked {
     /// Shortens `qdot`, or says why it must not be.
     fn shorten(&mut self, qdot: &mut Joints) -> Result<(), Trip> {
         self.interlocks.iter_mut().try_for_each(|one| one.command(&self.now, qdot))
+    }
+
+    /// Why a body at rest must not even stand where it does.
+    fn stands_badly(&mut self) -> Option<Trip> {
+        let is_at_rest = self.now.sent == Joints::zeros();
+        is_at_rest.then(|| self.shorten(&mut Joints::zeros()).err()).flatten()
+    }
+
+    /// The fault of a body that must be brought elsewhere by hand.
+    fn astray(&self, trip: Trip) -> Fault {
+        let joints = self.now.chain.joints.iter().zip(self.now.chain.home.iter());
+        Fault::Astray {
+            time_s: self.now.time_s,
+            trip: Box::new(trip),
+            p_wt: self.now.x_wt.translation.vector.into(),
+            home: joints.map(|(joint, &q)| (joint.name, q)).collect(),
+        }
     }
 
     /// What is wrong with the last reading: the first thing, but too much force only where nothing
@@ -208,6 +232,11 @@ impl Interlocked {
     }
 }
 
+/// Ticks for which a command moves the body at most if no other follows: the arm's side takes a
+/// stale one for a stop.
+// heuristic: 30 ms at 250 Hz.
+const HELD_TICKS: f64 = 8.0;
+
 /// Ticks beyond twice those of a way back at full speed: to start and to stop.
 const PATIENCE_TICKS: usize = 100;
 
@@ -229,6 +258,7 @@ impl Backend for Interlocked {
         self.way_back.forget();
         (self.fault, self.rest) = (None, None);
         (self.now.tick, self.now.sent) = (0, Joints::zeros());
+        (self.now.unseen, self.now.time_s) = (Joints::zeros(), self.reading.time_s);
         self.take().map_err(|fault| self.latch(fault))?;
         Ok(&self.reading)
     }
@@ -245,7 +275,10 @@ impl Backend for Interlocked {
             }
         };
         if let Err(trip) = self.shorten(&mut qdot) {
-            return Err(self.trip(trip));
+            return Err(match self.stands_badly() {
+                Some(trip) => self.latch(self.astray(trip)),
+                None => self.trip(trip),
+            });
         }
         self.way_back.push(&self.now.q);
         if let Err(fault) = self.advance(&qdot) {

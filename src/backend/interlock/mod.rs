@@ -8,7 +8,6 @@ mod ahead;
 mod collision;
 mod depth;
 mod electrodes;
-mod following;
 mod force;
 pub mod gates;
 #[allow(clippy::module_inception)]
@@ -18,9 +17,12 @@ mod joints;
 mod settings;
 mod silence;
 mod site;
+mod standstill;
 mod table;
 mod tip_speed;
+mod tracking;
 mod trip;
+mod velocity;
 mod way_back;
 mod workspace;
 

@@ -45,12 +45,18 @@ pub struct InterlockSettings {
     pub wrench_silence_s: f64,
     /// Longest without a tactile frame.
     pub frame_silence_s: f64,
-    /// Longest that an electrode of a real body may show one and the same number: ten frames.
+    /// Stop a real body if an electrode, or a joint that is commanded to move, has read the same
+    /// value for this long: ten tactile frames.
     pub frozen_s: f64,
-    /// Share of its largest speed by which a joint may move otherwise than it is told.
-    pub follow_share: f64,
-    /// For how long it may move otherwise by more.
-    pub follow_s: f64,
+    /// Largest velocity tracking error of a joint, as a share of its largest velocity.
+    #[serde(alias = "follow_share")]
+    pub tracking_error_ratio: f64,
+    /// Stop if the velocity tracking error has been larger for this long.
+    #[serde(alias = "follow_s")]
+    pub tracking_error_s: f64,
+    /// Longest delay with which the joints of a real body may follow their commands: what they move
+    /// within a second is compared with what was commanded up to this much earlier.
+    pub tracking_lag_s: f64,
     /// How far the finger goes back, the way it came, when too much force has stopped it; 0 for not
     /// at all.
     pub retract_m: f64,
@@ -82,8 +88,9 @@ impl Default for InterlockSettings {
             wrench_silence_s: 0.1,
             frame_silence_s: 0.2,
             frozen_s: 0.1,
-            follow_share: 0.3,
-            follow_s: 0.2,
+            tracking_error_ratio: 0.3,
+            tracking_error_s: 0.2,
+            tracking_lag_s: 0.1,
             retract_m: 0.01,
             retract_m_s: 0.02,
             retract_rise_n: 2.0,
@@ -134,8 +141,9 @@ impl Checked for InterlockSettings {
         rules.number("wrench_silence_s", self.wrench_silence_s, 1e-3..=10.0);
         rules.number("frame_silence_s", self.frame_silence_s, 1e-2..=10.0);
         rules.number("frozen_s", self.frozen_s, 0.05..=100.0);
-        rules.number("follow_share", self.follow_share, 0.01..=10.0);
-        rules.number("follow_s", self.follow_s, 0.0..=10.0);
+        rules.number("tracking_error_ratio", self.tracking_error_ratio, 0.01..=10.0);
+        rules.number("tracking_error_s", self.tracking_error_s, 0.0..=10.0);
+        rules.number("tracking_lag_s", self.tracking_lag_s, 0.0..=1.0);
         rules.number("retract_m", self.retract_m, 0.0..=0.1);
         rules.number("retract_m_s", self.retract_m_s, 1e-3..=0.25);
         rules.number("retract_rise_n", self.retract_rise_n, 0.1..=100.0);

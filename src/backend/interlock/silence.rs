@@ -2,7 +2,8 @@
 
 use super::interlock::{Entry, Interlock, Now};
 use super::trip::Trip;
-use crate::backend::{Reading, Wrench};
+use crate::backend::Reading;
+use nalgebra::Vector3;
 
 /// Stops a body whose joints, force/torque sensor or tactile sensor fall silent.
 pub const ENTRY: Entry = Entry {
@@ -11,7 +12,7 @@ pub const ENTRY: Entry = Entry {
         let limits_s =
             [settings.joint_silence_s, settings.wrench_silence_s, settings.frame_silence_s];
         let repeats = capabilities.real_time;
-        Some(Box::new(Silence { limits_s, repeats, heard: [None; 3], time_s: 0.0, wrench: None }))
+        Some(Box::new(Silence { limits_s, repeats, heard: [None; 3], time_s: 0.0, force_n: None }))
     },
 };
 
@@ -19,24 +20,25 @@ const NAMES: [&str; 3] = ["silence of the joints", "silence of the force", "sile
 
 struct Silence {
     limits_s: [f64; 3],
-    /// Whether a wrench that is the same to the last bit counts as none: a simulated one may be
-    /// free of noise.
+    /// Whether a force that is the same to the last bit counts as none: a simulated one may be free
+    /// of noise.
     repeats: bool,
     /// The tick at which each was heard last; none before it first is.
     heard: [Option<u64>; 3],
     time_s: f64,
-    wrench: Option<Wrench>,
+    force_n: Option<Vector3<f64>>,
 }
 
 impl Interlock for Silence {
     fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
-        let is_new = reading.wrench != self.wrench || !self.repeats;
+        let force_n = reading.wrench.map(|wrench| wrench.force_n);
+        let is_new = force_n != self.force_n || !self.repeats;
         let news = [
             reading.time_s > self.time_s || self.heard[0].is_none(),
             reading.wrench.is_some() && is_new,
             !reading.frames.is_empty(),
         ];
-        (self.time_s, self.wrench) = (reading.time_s, reading.wrench);
+        (self.time_s, self.force_n) = (reading.time_s, force_n);
         for (i, (heard, is_news)) in self.heard.iter_mut().zip(news).enumerate() {
             if is_news {
                 *heard = Some(now.tick);
@@ -53,6 +55,6 @@ impl Interlock for Silence {
     }
 
     fn reset(&mut self) {
-        (self.heard, self.time_s, self.wrench) = ([None; 3], 0.0, None);
+        (self.heard, self.time_s, self.force_n) = ([None; 3], 0.0, None);
     }
 }

@@ -2,7 +2,8 @@
 
 use super::interlock::Entry;
 use super::{
-    collision, depth, electrodes, following, force, joints, silence, tip_speed, workspace,
+    collision, depth, electrodes, force, joints, silence, standstill, tip_speed, tracking,
+    velocity, workspace,
 };
 
 /// In the order in which they act: those that shorten a command come before those that judge what
@@ -16,5 +17,7 @@ pub const INTERLOCKS: &[Entry] = &[
     force::ENTRY,
     silence::ENTRY,
     electrodes::ENTRY,
-    following::ENTRY,
+    standstill::ENTRY,
+    velocity::ENTRY,
+    tracking::ENTRY,
 ];

@@ -23,10 +23,12 @@ pub struct About {
 }
 
 /// How what was recorded ended.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ending {
     /// Why it ended before its last touch, if it did.
     pub failure: Option<String>,
+    /// Whether it was interrupted from outside after a touch, so that it can be continued.
+    pub is_interrupted: bool,
 }
 
 /// Texts by name, as metadata holds them.
@@ -39,6 +41,7 @@ pub(super) const ABOUT: &str = "palpate";
 pub(super) const ENDING: &str = "palpate_ending";
 
 const FAILURE: &str = "failure";
+const INTERRUPTED: &str = "interrupted";
 
 impl About {
     pub(super) fn texts(&self) -> Texts {
@@ -70,11 +73,14 @@ impl About {
 
 impl Ending {
     pub(super) fn texts(&self) -> Texts {
-        self.failure.iter().map(|failure| (FAILURE.to_owned(), failure.clone())).collect()
+        let failure = self.failure.iter().map(|failure| (FAILURE, failure.clone()));
+        let interrupted = self.is_interrupted.then(|| (INTERRUPTED, true.to_string()));
+        failure.chain(interrupted).map(|(name, text)| (name.to_owned(), text)).collect()
     }
 
     pub(super) fn of(texts: &Texts) -> Self {
-        Self { failure: texts.get(FAILURE).cloned() }
+        let is_interrupted = texts.contains_key(INTERRUPTED);
+        Self { failure: texts.get(FAILURE).cloned(), is_interrupted }
     }
 }
 

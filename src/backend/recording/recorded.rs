@@ -19,6 +19,9 @@ pub struct Recorded {
     pub about: About,
     /// Its touches.
     pub touches: Vec<Touch<'static>>,
+    /// How many of the touches were made before the recording began: those of a trial that was
+    /// continued.
+    pub made: usize,
     /// How many ticks it has, resets among them.
     pub tick_count: usize,
     /// How the trial ended; none of a file that was cut short.
@@ -44,17 +47,20 @@ impl Recorded {
     pub fn of(bytes: Vec<u8>) -> Result<Self, RecordingError> {
         let bytes: Arc<[u8]> = bytes.into();
         let (mut about, mut ending) = (None, None);
-        let (mut touches, mut tick_count) = (Vec::new(), 0);
+        let (mut touches, mut made, mut tick_count) = (Vec::new(), 0, 0);
         for entry in Entries::new(Arc::clone(&bytes)) {
             match entry? {
                 Entry::About(texts) => about = Some(About::of(&texts)?),
                 Entry::Tick(_) => tick_count += 1,
-                Entry::Touch(touch) => touches.push(touch),
+                Entry::Touch(touch) => {
+                    touches.push(touch);
+                    made += usize::from(tick_count == 0);
+                }
                 Entry::Ending(texts) => ending = Some(Ending::of(&texts)),
             }
         }
         let about = about.ok_or(RecordingError::Headless)?;
-        Ok(Self { about, touches, tick_count, ending, bytes })
+        Ok(Self { about, touches, made, tick_count, ending, bytes })
     }
 
     /// Its ticks, from the first.

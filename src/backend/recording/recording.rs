@@ -7,12 +7,12 @@ use super::topic::{TOPICS, Topic};
 use super::touch::Touch;
 use crate::backend::Fault;
 use crate::backend::ros::message::Time;
+use crate::files;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Compression, McapResult, WriteOptions, Writer};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -58,7 +58,7 @@ impl Recording {
     /// # Errors
     /// [`Fault::Unrecorded`] if it cannot be written.
     pub fn create(path: &Path, about: &About) -> Result<Self, Fault> {
-        let file = File::create(path)
+        let file = files::create(path)
             .map_err(|error| unrecorded(0.0, &format!("{}: {error}", path.display())))?;
         Self::new(Box::new(BufWriter::new(file)), about, wall_clock)
     }

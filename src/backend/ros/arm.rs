@@ -10,6 +10,7 @@ use super::mailbox::{Heard, Mailboxes, Postman};
 use super::net_ft::{NetFt, NetFtSettings, Record};
 use super::service::Service;
 use super::settings::BackendSettings;
+use super::status::ArmStatus;
 use super::topics::{Side, Topic};
 use super::transport::{Connect, TransportError};
 use crate::backend::interlock::gates::{Expected, GateError, check_start};
@@ -36,8 +37,9 @@ pub struct Lab {
 /// How often is looked whether something has come; chosen, well below a control tick.
 const LOOK: Duration = Duration::from_millis(1);
 
-/// How long an answer is waited for; chosen.
-const ANSWER_S: f64 = 0.5;
+/// After how long a call without an answer is repeated, where repeating it is harmless.
+// heuristic: ten times what discovery and an answer take on a local network.
+const REPEAT_S: f64 = 0.5;
 
 /// Topics that an arm must be heard on.
 const HEARD: [Topic; 4] = [Topic::Joints, Topic::Wrench, Topic::Tactile, Topic::Status];
@@ -111,14 +113,20 @@ impl Lab {
         check_start(&mut self.body(), &self.chain, expected, gates, 0).map(|_| ())
     }
 
-    /// Calls a service and waits for its answer.
+    /// Calls a service as soon as its server is found, and waits for the answer for at most the
+    /// connection timeout; what is idempotent is repeated meanwhile.
     ///
     /// # Errors
-    /// If it does not answer in time, or refuses.
+    /// If there is no server or no answer in time, or the answer is a refusal.
     pub fn call(&self, service: &Service) -> Result<(), LinkFault> {
+        self.call_within(service, self.settings.patience_s)
+    }
+
+    fn call_within(&self, service: &Service, timeout_s: f64) -> Result<(), LinkFault> {
         self.boxes.heard().answers.retain(|(other, _)| other != service);
         self.link.call(service.clone());
         let begun = Instant::now();
+        let mut called = Instant::now();
         let words = loop {
             let mut heard = self.boxes.heard();
             let found = heard.answers.iter().position(|(other, _)| other == service);
@@ -129,8 +137,19 @@ impl Lab {
                 }
             }
             drop(heard);
-            if begun.elapsed().as_secs_f64() > ANSWER_S {
-                break format!("no answer in {ANSWER_S} s");
+            let is_sent = !self.link.awaits_server(service);
+            if begun.elapsed().as_secs_f64() > timeout_s {
+                break match is_sent {
+                    false => format!("no server (std_srvs/srv/Trigger) found in {timeout_s} s"),
+                    true => format!(
+                        "a server was found, but gave no answer in {timeout_s} s; does \
+                         backend.service_mapping fit its DDS implementation?"
+                    ),
+                };
+            }
+            if service.is_idempotent() && is_sent && called.elapsed().as_secs_f64() > REPEAT_S {
+                self.link.call(service.clone());
+                called = Instant::now();
             }
             sleep(LOOK);
         };
@@ -143,7 +162,10 @@ impl Lab {
     /// If the arm's side does not.
     pub fn clear_fault(&self) -> Result<(), LinkFault> {
         self.call(&Service::ClearFault)?;
-        self.boxes.heard().refused = None;
+        let mut heard = self.boxes.heard();
+        heard.refused = None;
+        heard.topics.iter_mut().for_each(|state| state.stamp_s = 0.0);
+        drop(heard);
         *self.latch() = None;
         Ok(())
     }
@@ -160,7 +182,8 @@ impl Lab {
                 if let Some(refused) = &heard.refused {
                     return Err(refused.clone());
                 }
-                HEARD.into_iter().filter(|&topic| heard.at[topic as usize].is_none()).collect()
+                let is_missing = |topic: &Topic| heard.topics[*topic as usize].at.is_none();
+                HEARD.into_iter().filter(is_missing).collect()
             };
             let missing: Vec<Topic> = missing;
             if missing.is_empty() {
@@ -172,8 +195,11 @@ impl Lab {
                     let line = self.settings.topics.line(topic);
                     format!("{} ({})", line.name, line.type_name)
                 };
+                let heard = self.boxes.heard();
+                let skipped = |topic: &Topic| heard.topics[*topic as usize].skipped.clone();
+                let skipped = missing.iter().filter_map(skipped).collect();
                 let missing = missing.into_iter().map(words).collect();
-                return Err(LinkFault::NotThere { missing, patience_s });
+                return Err(LinkFault::NotThere { missing, patience_s, skipped });
             }
             sleep(LOOK);
         }
@@ -203,10 +229,17 @@ impl Lab {
         }
         for topic in HEARD {
             let line = self.settings.topics.line(topic);
-            let age_s = heard.at[topic as usize].map_or(f64::MAX, |at| at.elapsed().as_secs_f64());
+            let state = &heard.topics[topic as usize];
+            if self.settings.is_on_change(topic) {
+                if self.link.publisher_count(topic) == 0 {
+                    return Err(LinkFault::Gone { topic: line.name.into() });
+                }
+                continue;
+            }
+            let age_s = state.at.map_or(f64::MAX, |at| at.elapsed().as_secs_f64());
             if age_s > line.age_s {
-                let (topic, late_s) = (line.name.into(), heard.late_s[topic as usize]);
-                return Err(LinkFault::Silent { topic, age_s, late_s });
+                let (topic, late_s, backward) = (line.name.into(), state.late_s, state.backward);
+                return Err(LinkFault::Silent { topic, age_s, late_s, backward });
             }
         }
         match self.link.broken() {
@@ -221,7 +254,7 @@ fn listen(settings: &NetFtSettings, boxes: &Mailboxes) -> Result<NetFt, LinkFaul
     let (boxes, address) = (boxes.clone(), settings.address.clone());
     let take = move |record: Record| {
         let mut heard = boxes.heard();
-        heard.at[Topic::Wrench as usize] = Some(Instant::now());
+        heard.topics[Topic::Wrench as usize].at = Some(Instant::now());
         heard.wrench = Some(record.wrench);
         if record.status != 0 {
             let words = format!("status {:#010x}", record.status);
@@ -238,9 +271,13 @@ fn listen(settings: &NetFtSettings, boxes: &Mailboxes) -> Result<NetFt, LinkFaul
 impl Drop for Lab {
     /// Nobody commands any more, and the arm's side is told, so that it is no alarm.
     fn drop(&mut self) {
-        let was_engaged = std::mem::take(&mut self.boxes.heard().is_engaged);
+        let was_engaged = {
+            let mut heard = self.boxes.heard();
+            heard.is_ready = false;
+            std::mem::take(&mut heard.is_engaged)
+        };
         if was_engaged {
-            let _ = self.call(&Service::Hold);
+            let _ = self.call_within(&Service::Hold, REPEAT_S);
         }
     }
 }
@@ -262,9 +299,13 @@ impl LabArm {
 
     /// Latches a fault.
     fn fault(&self, cause: LinkFault) -> Fault {
-        // An arm that was stopped by hand hears nothing more until somebody starts anew.
+        // The last command would otherwise hold until it expires.
+        self.lab.command(&self.still.qdot);
+        // No command goes to an arm that was stopped by hand: one to stand still could open its
+        // brakes again.
         if matches!(cause, LinkFault::Arm { .. }) {
-            self.lab.boxes.heard().is_engaged = false;
+            let mut heard = self.lab.boxes.heard();
+            (heard.is_engaged, heard.is_ready) = (false, false);
         }
         let cause = self.lab.latch().get_or_insert(cause).clone();
         Fault::Link { time_s: self.time_s(), cause }
@@ -326,7 +367,7 @@ impl Backend for LabArm {
             let mut heard = lab.boxes.heard();
             heard.since = Some(self.since);
             heard.frames.clear();
-            heard.is_engaged = true;
+            (heard.is_engaged, heard.is_ready) = (true, false);
         }
         if let Err(fault) = lab.call(&Service::Unhold) {
             return Err(self.fault(fault));
@@ -335,9 +376,13 @@ impl Backend for LabArm {
         let begun = Instant::now();
         loop {
             sleep(LOOK);
-            let is_on = lab.boxes.heard().status.as_ref().is_some_and(|status| status.servo_on);
+            let mut heard = lab.boxes.heard();
+            let status = heard.status.as_ref();
+            let is_ready = status.is_some_and(|status| status.refusal().is_none());
+            let is_final = status.is_some_and(ArmStatus::needs_operator);
             let waited_s = begun.elapsed().as_secs_f64();
-            let is_done = is_on && waited_s > HANDSHAKE_S;
+            heard.is_ready = is_ready && waited_s > HANDSHAKE_S;
+            let is_done = heard.is_ready || is_final && waited_s > HANDSHAKE_S;
             if is_done || waited_s > lab.settings.patience_s {
                 break;
             }

@@ -13,16 +13,18 @@ pub enum LinkFault {
     /// Nothing was heard on some topics since the link was opened.
     #[error(
         "nothing heard for {patience_s} s on {}; is the arm's side running, with the same domain, and are \
-         names and types those of [backend.topics]?", missing.join(", ")
+         names and types those of [backend.topics]?{}", missing.join(", "), skipped_words(skipped)
     )]
     NotThere {
         /// Topics with their types.
         missing: Vec<String>,
         /// How long was waited.
         patience_s: f64,
+        /// Messages of other devices that were skipped, in words.
+        skipped: Vec<String>,
     },
     /// A topic fell silent.
-    #[error("nothing new on {topic} for {:.0} ms{}", 1e3 * age_s, late_words(*late_s))]
+    #[error("nothing new on {topic} for {:.0} ms{}", 1e3 * age_s, silent_words(*late_s, *backward))]
     Silent {
         /// Its name.
         topic: String,
@@ -30,6 +32,23 @@ pub enum LinkFault {
         age_s: f64,
         /// If messages come, but too old by their stamps: how old.
         late_s: Option<f64>,
+        /// Messages dropped because their stamps ran backwards.
+        backward: u64,
+    },
+    /// A status topic whose publisher is gone; its messages come on change only.
+    #[error("no publisher on {topic} any more")]
+    Gone {
+        /// Its name.
+        topic: String,
+    },
+    /// A message without a stamp.
+    #[error(
+        "message on {topic} refused: its stamp is zero, so its age is unknown; stamp it, or set \
+         backend.accept_unstamped = true to count its age from receipt"
+    )]
+    Unstamped {
+        /// The topic's name.
+        topic: String,
     },
     /// A message about joints is of no use.
     #[error("message on {topic} refused: {cause}")]
@@ -94,11 +113,18 @@ pub enum LinkFault {
     },
 }
 
-fn late_words(late_s: Option<f64>) -> String {
-    late_s.map_or(String::new(), |late_s| {
+fn silent_words(late_s: Option<f64>, backward: u64) -> String {
+    let late = late_s.map(|late_s| {
         format!(
             "; messages come, but their stamps are {:.0} ms old: are the clocks synchronised?",
             1e3 * late_s
         )
-    })
+    });
+    let dropped = (backward > 0)
+        .then(|| format!("; {backward} messages were dropped because their stamps ran backwards"));
+    [late, dropped].into_iter().flatten().collect()
+}
+
+fn skipped_words(skipped: &[String]) -> String {
+    skipped.iter().map(|words| format!(" Skipped a message: {words}.")).collect()
 }

@@ -73,6 +73,11 @@ impl JointNames {
         &self.0
     }
 
+    /// Whether any of `names` is one of the arm's joints.
+    pub fn are_among(&self, names: &[String]) -> bool {
+        self.0.iter().any(|name| names.contains(name))
+    }
+
     /// Puts `values`, one for each of `names`, into `into`, in the arm's order.
     ///
     /// # Errors

@@ -18,7 +18,6 @@ const COUNTED_S: f64 = 0.1;
 /// What is to be done by the thread.
 enum Errand {
     Send(Packet),
-    Call(Service),
     Answer(Service, u64, Answer),
 }
 
@@ -32,6 +31,8 @@ struct Shared {
     /// Known publishers by topic.
     publishers: [AtomicUsize; Topic::ALL.len()],
     broken: Mutex<Option<TransportError>>,
+    /// Calls whose server has not been found yet.
+    waiting: Mutex<Vec<Service>>,
 }
 
 /// What a side does with what arrives, in the link's thread.
@@ -83,9 +84,20 @@ impl Link {
         self.errand(Errand::Send(packet));
     }
 
-    /// Calls a service of the other side; the answer comes to the sink.
+    /// Calls a service of the other side as soon as its server is found; the answer comes to the
+    /// sink.
     pub fn call(&self, service: Service) {
-        self.errand(Errand::Call(service));
+        let mut waiting = lock(&self.shared.waiting);
+        if !waiting.contains(&service) {
+            waiting.push(service);
+        }
+        drop(waiting);
+        (self.waker)();
+    }
+
+    /// Whether a call of `service` still waits for its server.
+    pub fn awaits_server(&self, service: &Service) -> bool {
+        lock(&self.shared.waiting).contains(service)
     }
 
     /// Answers a call.
@@ -145,10 +157,16 @@ fn serve(
             let Some(errand) = lock(&shared.errands).pop_front() else { break };
             result = result.and(match errand {
                 Errand::Send(packet) => transport.send(&packet),
-                Errand::Call(service) => transport.call(&service),
                 Errand::Answer(service, call, answer) => transport.answer(&service, call, &answer),
             });
         }
+        lock(&shared.waiting).retain(|service| {
+            let is_found = transport.is_served(service);
+            if is_found {
+                result = result.clone().and(transport.call(service));
+            }
+            !is_found
+        });
         let now = Instant::now();
         if now >= next {
             sink.tick(&mut |packet| result = result.clone().and(transport.send(&packet)));

@@ -1,5 +1,5 @@
-//! What was heard last of each topic, stamped on receipt by the monotonic clock, and what the arm
-//! is told while nobody else speaks.
+//! The newest message of each topic, stamped on receipt by the monotonic clock; and the commands
+//! that hold the arm still while the explorer computes.
 
 use super::clock;
 use super::fault::LinkFault;
@@ -9,7 +9,7 @@ use super::message::Header;
 use super::packet::Packet;
 use super::service::{Answer, Service};
 use super::settings::BackendSettings;
-use super::status::ArmStatus;
+use super::status::{ArmStatus, StatusError};
 use super::tactile;
 use super::topics::Topic;
 use super::transport::Delivery;
@@ -19,49 +19,64 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Frames that are kept until somebody reads them; chosen, two and a half batches of five each
-/// tenth of a second.
+/// Tactile frames kept until they are read.
+// heuristic: two and a half batches of five each tenth of a second.
 const FRAMES_MAX: usize = 64;
 
-/// After as many silent periods the arm is told to stand still.
+/// After as many silent periods the arm is commanded to stand still.
 const SILENT_PERIODS: f64 = 1.5;
 
-/// What was heard last.
+/// What was received last.
 #[derive(Default)]
 pub struct Heard {
     /// Joint positions, rad.
     pub q: Vec<f64>,
     /// Joint velocities, rad/s.
     pub qdot: Vec<f64>,
-    /// What the force/torque sensor says, in its own frame.
+    /// Reading of the force/torque sensor, in its own frame.
     pub wrench: Option<Wrench>,
-    /// Tactile frames that nobody has read, oldest first; their time is that of receipt, since
-    /// `since`.
+    /// Tactile frames not read yet, oldest first; their time is that of receipt, since `since`.
     pub frames: VecDeque<Frame>,
-    /// What the arm's computer says.
+    /// State of the arm.
     pub status: Option<ArmStatus>,
-    /// When each topic was last heard.
-    pub at: [Option<Instant>; Topic::ALL.len()],
-    /// Ages by their stamps of messages that came too late, by topic.
-    pub late_s: [Option<f64>; Topic::ALL.len()],
-    /// The first message that could not be used.
+    /// What was received on each topic.
+    pub topics: [TopicState; Topic::ALL.len()],
+    /// The first message that ends the run.
     pub refused: Option<LinkFault>,
     /// Answers of services.
     pub answers: Vec<(Service, Answer)>,
     /// When a command was last given, if any was.
     pub commanded: Option<Instant>,
-    /// Whether the arm is told to stand still while no command is given.
+    /// Whether the arm is commanded to stand still while no other command is given.
     pub is_engaged: bool,
+    /// Whether the arm has been ready to move since it was engaged: from then on a status that
+    /// refuses movement is a fault, however short it lasts.
+    pub is_ready: bool,
     /// From when on times count.
     pub since: Option<Instant>,
 }
 
-/// Mailboxes, shared between the link's thread and the control loop.
+/// What was received on a topic.
+#[derive(Clone, Debug, Default)]
+pub struct TopicState {
+    /// When the last message was received.
+    pub at: Option<Instant>,
+    /// Age by its stamp of a last message that was too old.
+    pub late_s: Option<f64>,
+    /// Largest stamp so far.
+    pub stamp_s: f64,
+    /// Messages dropped because their stamp was smaller than one before.
+    pub backward: u64,
+    /// Why the last message of another device was skipped.
+    pub skipped: Option<String>,
+}
+
+/// The newest messages, shared between the link's thread and the control loop.
 #[derive(Clone, Default)]
 pub struct Mailboxes(Arc<Mutex<Heard>>);
 
 impl Mailboxes {
-    /// Looks in; the link's thread waits meanwhile.
+    /// Locks the messages; the link's thread waits meanwhile.
     pub fn heard(&self) -> MutexGuard<'_, Heard> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -72,95 +87,147 @@ pub struct Postman {
     boxes: Mailboxes,
     names: JointNames,
     settings: BackendSettings,
-    last_heartbeat: Option<Instant>,
 }
 
 impl Postman {
     /// For an arm of these joints.
     pub fn new(boxes: Mailboxes, names: JointNames, settings: BackendSettings) -> Self {
-        Self { boxes, names, settings, last_heartbeat: None }
+        Self { boxes, names, settings }
     }
 
-    /// Whether a message of `topic` with this stamp may be used; one without stamp may.
-    fn is_timely(&self, heard: &mut Heard, topic: Topic, header: &Header) -> bool {
+    /// Whether a message of `topic` with this stamp may be used, by its age and order.
+    ///
+    /// # Errors
+    /// If it has no stamp, or one from the future.
+    fn is_timely(
+        &self,
+        state: &mut TopicState,
+        topic: Topic,
+        header: &Header,
+    ) -> Result<bool, LinkFault> {
         let line = self.settings.topics.line(topic);
         let stamp_s = header.stamp.s();
         if stamp_s == 0.0 {
-            return true;
+            let topic = line.name.into();
+            return match self.settings.accept_unstamped {
+                true => Ok(true),
+                false => Err(LinkFault::Unstamped { topic }),
+            };
         }
         let age_s = clock::now_s() - stamp_s;
         if age_s < -self.settings.clock_ahead_s {
-            let fault = LinkFault::Future { topic: line.name.into(), ahead_s: -age_s };
-            heard.refused.get_or_insert(fault);
-            return false;
+            return Err(LinkFault::Future { topic: line.name.into(), ahead_s: -age_s });
         }
-        heard.late_s[topic as usize] = (age_s > line.age_s).then_some(age_s);
-        age_s <= line.age_s
+        if stamp_s < state.stamp_s {
+            state.backward += 1;
+            return Ok(false);
+        }
+        state.stamp_s = stamp_s;
+        if self.settings.is_on_change(topic) {
+            return Ok(true);
+        }
+        state.late_s = (age_s > line.age_s).then_some(age_s);
+        Ok(age_s <= line.age_s)
     }
 
     fn take_packet(&mut self, packet: &Packet, received: Instant) {
-        let boxes = self.boxes.clone();
-        let heard = &mut *boxes.heard();
         let topic = packet.topic();
-        let header = match packet {
-            Packet::Joints(message) => &message.header,
-            Packet::Wrench(message) => &message.header,
-            Packet::Hand(message) => &message.header,
-            Packet::Fingers(message) => &message.header,
-            Packet::Status(message) => &message.header,
-            Packet::Command(_) | Packet::Velocities(_) | Packet::Heartbeat(_) => return,
-        };
-        let is_read_elsewhere = topic == Topic::Wrench && self.settings.net_ft.is_some();
-        if is_read_elsewhere || !self.is_timely(heard, topic, header) {
+        if topic == Topic::Wrench && self.settings.net_ft.is_some() {
             return;
         }
+        let boxes = self.boxes.clone();
+        let heard = &mut *boxes.heard();
+        if let Err(fault) = self.read(heard, topic, packet, received) {
+            if matches!(fault, LinkFault::Arm { .. }) {
+                (heard.is_engaged, heard.is_ready) = (false, false);
+            }
+            heard.refused.get_or_insert(fault);
+        }
+    }
+
+    /// Reads a message into `heard`, if it is the arm's and in time.
+    fn read(
+        &self,
+        heard: &mut Heard,
+        topic: Topic,
+        packet: &Packet,
+        received: Instant,
+    ) -> Result<(), LinkFault> {
         let name = || self.settings.topics.line(topic).name.to_owned();
-        let refusal = match packet {
+        let refuse = |words| Err(LinkFault::Message { topic: name(), words });
+        let state = &mut heard.topics[topic as usize];
+        match packet {
             Packet::Joints(message) => {
-                let read = self.names.read(message, &mut heard.q, &mut heard.qdot);
-                read.err().map(|cause| LinkFault::Joints { topic: name(), cause })
+                // Another driver, such as a hand's, may publish on the same topic.
+                if !self.names.are_among(&message.name) {
+                    let words = format!(
+                        "joints {:?} are none of the arm's {:?}",
+                        message.name,
+                        self.names.names()
+                    );
+                    state.skipped = Some(words);
+                    return Ok(());
+                }
+                if !self.is_timely(state, topic, &message.header)? {
+                    return Ok(());
+                }
+                self.names
+                    .read(message, &mut heard.q, &mut heard.qdot)
+                    .map_err(|cause| LinkFault::Joints { topic: name(), cause })?;
             }
             Packet::Wrench(message) => {
+                if !self.is_timely(state, topic, &message.header)? {
+                    return Ok(());
+                }
                 let wrench = message.wrench;
                 let (force_n, torque_nm) = (wrench.force.into(), wrench.torque.into());
-                heard.wrench = Some(Wrench { force_n, torque_nm });
-                let is_finite = force_n.iter().chain(&torque_nm).all(|part: &f64| part.is_finite());
-                let words = || format!("{:?} and {:?}", force_n.as_slice(), torque_nm.as_slice());
-                (!is_finite).then(|| LinkFault::Message { topic: name(), words: words() })
+                let wrench = Wrench { force_n, torque_nm };
+                let (force, torque) = (wrench.force_n.as_slice(), wrench.torque_nm.as_slice());
+                if !force.iter().chain(torque).all(|part| part.is_finite()) {
+                    return refuse(format!("{force:?} and {torque:?}"));
+                }
+                heard.wrench = Some(wrench);
             }
             Packet::Status(message) => {
-                let status = ArmStatus::of(message);
-                let words = || "it does not tell of the arm \"pa10\"".into();
-                let refusal =
-                    status.is_none().then(|| LinkFault::Message { topic: name(), words: words() });
-                heard.status = status.or(heard.status.take());
-                refusal
+                let status = match ArmStatus::read(message) {
+                    Ok(status) => status,
+                    Err(error @ StatusError::OtherDevice { .. }) => {
+                        state.skipped = Some(error.to_string());
+                        return Ok(());
+                    }
+                    Err(error) => return refuse(error.to_string()),
+                };
+                // What only an operator can clear counts whatever its stamp says.
+                let is_timely = self.is_timely(state, topic, &message.header);
+                let is_read = status.needs_operator() || is_timely.clone()?;
+                if let Some(words) = status.refusal().filter(|_| heard.is_ready && is_read) {
+                    return Err(LinkFault::Arm { words });
+                }
+                if !is_timely? {
+                    return Ok(());
+                }
+                heard.status = Some(status);
             }
-            tactile => {
+            Packet::Hand(_) | Packet::Fingers(_) => {
+                let Some(header) = packet.header() else { return Ok(()) };
+                if !self.is_timely(state, topic, header)? {
+                    return Ok(());
+                }
                 let since_s = |since| received.saturating_duration_since(since).as_secs_f64();
                 let time_s = heard.since.map_or(0.0, since_s);
-                match tactile::frame(tactile, self.settings.finger.into(), time_s) {
-                    Some(frame) => {
-                        if heard.frames.len() == FRAMES_MAX {
-                            heard.frames.pop_front();
-                        }
-                        heard.frames.push_back(frame);
-                        None
-                    }
-                    None => {
-                        let finger = self.settings.finger;
-                        let words = format!("it has no finger {finger} with 19 electrodes");
-                        Some(LinkFault::Message { topic: name(), words })
-                    }
+                let finger = self.settings.finger;
+                let Some(frame) = tactile::frame(packet, finger.into(), time_s) else {
+                    return refuse(format!("it has no finger {finger} with 19 electrodes"));
+                };
+                if heard.frames.len() == FRAMES_MAX {
+                    heard.frames.pop_front();
                 }
+                heard.frames.push_back(frame);
             }
-        };
-        match refusal {
-            Some(refusal) => {
-                heard.refused.get_or_insert(refusal);
-            }
-            None => heard.at[topic as usize] = Some(received),
+            Packet::Command(_) | Packet::Velocities(_) => return Ok(()),
         }
+        heard.topics[topic as usize].at = Some(received);
+        Ok(())
     }
 }
 
@@ -181,21 +248,14 @@ impl Sink for Postman {
     }
 
     fn tick(&mut self, send: &mut dyn FnMut(Packet)) {
-        let topics = &self.settings.topics;
-        let due = |last: Option<Instant>, period_s: f64| {
-            last.is_none_or(|last| last.elapsed().as_secs_f64() >= period_s)
-        };
-        if due(self.last_heartbeat, 1.0 / topics.heartbeat.rate_hz) {
-            self.last_heartbeat = Some(Instant::now());
-            send(Packet::Heartbeat(Header::new(clock::now_s(), "")));
-        }
         let heard = self.boxes.heard();
-        let is_silent = due(heard.commanded, SILENT_PERIODS / self.settings.rate_hz);
+        let silent_s = SILENT_PERIODS / self.settings.rate_hz;
+        let is_silent = heard.commanded.is_none_or(|last| last.elapsed().as_secs_f64() >= silent_s);
         if heard.is_engaged && is_silent {
+            let command = &self.settings.topics.command;
             let still = vec![0.0; self.names.names().len()];
-            let is_bare = topics.command.is_bare();
-            let (now_s, valid_s) = (clock::now_s(), topics.command.age_s);
-            send(self.names.command(now_s, valid_s, &still, is_bare));
+            let (now_s, valid_s) = (clock::now_s(), command.age_s);
+            send(self.names.command(now_s, valid_s, &still, command.is_bare()));
         }
     }
 }

@@ -88,6 +88,11 @@ impl Transport for Memory {
         self.hub.lock().iter().filter(|end| end.side == topic.publisher()).count()
     }
 
+    fn is_served(&mut self, _: &Service) -> bool {
+        let is_other = self.others();
+        self.hub.lock().iter().any(is_other)
+    }
+
     fn call(&mut self, service: &Service) -> Result<(), TransportError> {
         let delivery = Delivery::Call { service: service.clone(), call: self.id };
         self.to(self.others(), &delivery);

@@ -13,6 +13,7 @@ pub mod mailbox;
 pub mod memory;
 pub mod message;
 pub mod net_ft;
+pub mod network;
 pub mod packet;
 mod queue;
 #[cfg(feature = "ros1")]

@@ -23,11 +23,35 @@ pub enum Packet {
     Command(JointTrajectory),
     /// Joint velocities as `ros_control` takes them.
     Velocities(Float64MultiArray),
-    /// A sign of life.
-    Heartbeat(Header),
 }
 
 impl Packet {
+    /// Its header, where the message type has one.
+    pub fn header(&self) -> Option<&Header> {
+        match self {
+            Self::Joints(message) => Some(&message.header),
+            Self::Wrench(message) => Some(&message.header),
+            Self::Hand(message) => Some(&message.header),
+            Self::Fingers(message) => Some(&message.header),
+            Self::Status(message) => Some(&message.header),
+            Self::Command(message) => Some(&message.header),
+            Self::Velocities(_) => None,
+        }
+    }
+
+    /// The same, to be changed.
+    pub fn header_mut(&mut self) -> Option<&mut Header> {
+        match self {
+            Self::Joints(message) => Some(&mut message.header),
+            Self::Wrench(message) => Some(&mut message.header),
+            Self::Hand(message) => Some(&mut message.header),
+            Self::Fingers(message) => Some(&mut message.header),
+            Self::Status(message) => Some(&mut message.header),
+            Self::Command(message) => Some(&mut message.header),
+            Self::Velocities(_) => None,
+        }
+    }
+
     /// Over which topic it goes.
     pub fn topic(&self) -> Topic {
         match self {
@@ -36,7 +60,6 @@ impl Packet {
             Self::Hand(_) | Self::Fingers(_) => Topic::Tactile,
             Self::Status(_) => Topic::Status,
             Self::Command(_) | Self::Velocities(_) => Topic::Command,
-            Self::Heartbeat(_) => Topic::Heartbeat,
         }
     }
 }

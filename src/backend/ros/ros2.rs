@@ -1,17 +1,19 @@
 //! ROS 2, by RustDDS: no installation of ROS, no master.
 
 use super::message::{Described, TriggerRequest, TriggerResponse};
+use super::network::{Interface, Network};
 use super::packet::Packet;
 use super::service::{Answer, Service};
-use super::settings::BackendSettings;
+use super::settings::{BackendSettings, MappingKind};
 use super::topics::{Side, Topic, Topics};
 use super::transport::{Delivery, Transport, TransportError, Waker};
 use ros2_client::qos::{Durability, History, WhenFull};
 use ros2_client::request_id::RmwRequestId;
 use ros2_client::{
-    Client, Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions,
-    QosProfile, Server, ServiceMapping, ServiceTypeName,
+    Client, Context, MessageTypeName, Name, Node, NodeName, NodeOptions, QosProfile, Server,
+    ServiceMapping, ServiceTypeName,
 };
+use rustdds::DomainParticipantBuilder;
 use rustdds::mio1;
 use rustdds::mio1::{Events, Interest, Poll, Token};
 use serde::Serialize;
@@ -36,6 +38,7 @@ type Writer = Box<dyn Fn(&Packet) -> Option<Result<(), String>>>;
 
 /// One side's end in a ROS 2 network.
 pub struct Ros2 {
+    context: Context,
     node: Node,
     topics: Topics,
     side: Side,
@@ -44,7 +47,10 @@ pub struct Ros2 {
     waker: Arc<mio1::Waker>,
     readers: Vec<Reader>,
     writers: Vec<Writer>,
-    clients: Vec<(Service, Client<TriggerRequest, TriggerResponse>)>,
+    mapping: MappingKind,
+    clients: Vec<ServiceClient>,
+    /// When servers were looked for last.
+    looked: Instant,
     servers: Vec<(Service, Server<TriggerRequest, TriggerResponse>)>,
     calls: HashMap<u64, RmwRequestId>,
     call_count: u64,
@@ -54,6 +60,24 @@ fn open<E: std::fmt::Display>(what: &str) -> impl Fn(E) -> TransportError {
     let what = what.to_owned();
     move |error| TransportError::Open { what: what.clone(), words: error.to_string() }
 }
+
+/// Calls a service, once its server is found.
+struct ServiceClient {
+    service: Service,
+    /// With the time at which it was made.
+    open: Option<(Client<TriggerRequest, TriggerResponse>, Instant)>,
+}
+
+/// How often servers are looked for.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// From when a client is made until its server knows of it, so that a request is not lost.
+// heuristic: several exchanges of endpoint discovery on a local network.
+const SETTLE: Duration = Duration::from_millis(200);
+
+/// Vendor of Eclipse Cyclone DDS in the first two bytes of a GUID (RTPS 2.5, section 9.3.1.3; list
+/// of vendors of the DDS Foundation).
+const CYCLONE: [u8; 2] = [0x01, 0x10];
 
 /// What a writer promises: nobody has to ask for less, and it never waits.
 fn reliable() -> QosProfile {
@@ -68,6 +92,21 @@ fn best_effort() -> QosProfile {
     QosProfile::subscription_default().history(History::KeepLast { depth: DEPTH })
 }
 
+/// What a reader asks for to be sent the last message that was published before it came.
+fn latched() -> QosProfile {
+    reliable().durability(Durability::TransientLocal)
+}
+
+/// The network interfaces of this machine.
+fn interfaces() -> Vec<Interface> {
+    let all = netdev::get_interfaces().into_iter();
+    let interface = |one: netdev::Interface| Interface {
+        addresses: one.ipv4.iter().map(|net| net.addr().into()).collect(),
+        name: one.name,
+    };
+    all.map(interface).collect()
+}
+
 impl Ros2 {
     /// An end on one side of the arm of `settings`; `services` are those that are called or served.
     ///
@@ -78,8 +117,15 @@ impl Ros2 {
         side: Side,
         services: Vec<Service>,
     ) -> Result<Self, TransportError> {
-        let options = ContextOptions::new().domain_id(settings.domain);
-        let context = Context::with_options(options).map_err(open("a DDS participant"))?;
+        let network = Network::of(settings, |name| std::env::var(name).ok(), &interfaces());
+        let network = network.map_err(open("the network"))?;
+        let mut participant = DomainParticipantBuilder::new(network.domain);
+        if let Some(addresses) = network.addresses {
+            participant = participant.with_only_networks(addresses);
+        }
+        let participant = participant.build().map_err(open("a DDS participant"))?;
+        let context =
+            Context::from_domain_participant(participant).map_err(open("a DDS participant"))?;
         let name = match side {
             Side::Explorer => "explorer",
             Side::Arm => "arm",
@@ -90,6 +136,7 @@ impl Ros2 {
         let poll = Poll::new().map_err(open("a poll"))?;
         let waker = mio1::Waker::new(poll.registry(), WAKE).map_err(open("a waker"))?;
         let mut end = Self {
+            context,
             node,
             topics: settings.topics.clone(),
             side,
@@ -98,13 +145,21 @@ impl Ros2 {
             waker: Arc::new(waker),
             readers: Vec::new(),
             writers: Vec::new(),
+            mapping: settings.service_mapping,
             clients: Vec::new(),
+            looked: Instant::now(),
             servers: Vec::new(),
             calls: HashMap::new(),
             call_count: 0,
         };
         end.topics()?;
-        services.into_iter().try_for_each(|service| end.service(service))?;
+        match side {
+            Side::Explorer => {
+                let client = |service| ServiceClient { service, open: None };
+                end.clients = services.into_iter().map(client).collect();
+            }
+            Side::Arm => services.into_iter().try_for_each(|service| end.serve(service))?,
+        }
         Ok(end)
     }
 
@@ -121,10 +176,10 @@ impl Ros2 {
             Packet::Status(message) => Some(message),
             _ => None,
         })?;
-        self.topic(Topic::Heartbeat, Packet::Heartbeat, |packet| match packet {
-            Packet::Heartbeat(message) => Some(message),
-            _ => None,
-        })?;
+        if self.side == Side::Explorer {
+            // One that is published on change was so before this side came.
+            self.subscribe(Topic::Status, Packet::Status, latched())?;
+        }
         match self.topics.tactile.is_shadow() {
             true => self.topic(
                 Topic::Tactile,
@@ -166,24 +221,46 @@ impl Ros2 {
     where
         M: Described + Serialize + DeserializeOwned + Clone + 'static,
     {
+        if topic.publisher() != self.side {
+            return self.subscribe(topic, wrap, best_effort());
+        }
+        let (name, dds) = self.dds_topic::<M>(topic, &reliable())?;
+        let publisher =
+            self.node.create_publisher::<M>(&dds, Some(reliable())).map_err(open(&name))?;
+        self.writers.push(Box::new(move |packet| {
+            let message = pick(packet)?;
+            Some(match publisher.publish(message.clone()) {
+                Ok(()) | Err(ros2_client::error::WriteError::WouldBlock { .. }) => Ok(()),
+                Err(error) => Err(error.to_string()),
+            })
+        }));
+        Ok(())
+    }
+
+    /// The name of a topic, and what DDS has for it.
+    fn dds_topic<M: Described>(
+        &mut self,
+        topic: Topic,
+        qos: &QosProfile,
+    ) -> Result<(String, rustdds::Topic), TransportError> {
         let name = self.topics.line(topic).name.to_owned();
         let type_name = MessageTypeName::new(M::DEFINITION.package(), M::DEFINITION.short_name());
-        let is_ours = topic.publisher() == self.side;
-        let qos = if is_ours { reliable() } else { best_effort() };
         let path = Name::parse(&name).map_err(open(&name))?;
-        let dds = self.node.create_topic(&path, type_name, &qos).map_err(open(&name))?;
-        if is_ours {
-            let publisher =
-                self.node.create_publisher::<M>(&dds, Some(qos)).map_err(open(&name))?;
-            self.writers.push(Box::new(move |packet| {
-                let message = pick(packet)?;
-                Some(match publisher.publish(message.clone()) {
-                    Ok(()) | Err(ros2_client::error::WriteError::WouldBlock { .. }) => Ok(()),
-                    Err(error) => Err(error.to_string()),
-                })
-            }));
-            return Ok(());
-        }
+        let dds = self.node.create_topic(&path, type_name, qos).map_err(open(&name))?;
+        Ok((name, dds))
+    }
+
+    /// A reader of messages of type `M`.
+    fn subscribe<M>(
+        &mut self,
+        topic: Topic,
+        wrap: fn(M) -> Packet,
+        qos: QosProfile,
+    ) -> Result<(), TransportError>
+    where
+        M: Described + DeserializeOwned + 'static,
+    {
+        let (name, dds) = self.dds_topic::<M>(topic, &qos)?;
         let mut subscription =
             self.node.create_subscription::<M>(&dds, Some(qos)).map_err(open(&name))?;
         self.watch(&mut subscription, &name)?;
@@ -206,30 +283,47 @@ impl Ros2 {
         Ok(())
     }
 
-    fn service(&mut self, service: Service) -> Result<(), TransportError> {
+    fn serve(&mut self, service: Service) -> Result<(), TransportError> {
         let name = service.name();
         let path = Name::parse(&name).map_err(open(&name))?;
-        let type_name = ServiceTypeName::new("std_srvs", "Trigger");
-        let mapping = ServiceMapping::Enhanced;
-        match self.side {
-            Side::Explorer => {
-                let mut client = self
-                    .node
-                    .create_client(mapping, &path, &type_name, reliable(), reliable())
-                    .map_err(open(&name))?;
-                self.watch(&mut client, &name)?;
-                self.clients.push((service, client));
-            }
-            Side::Arm => {
-                let mut server = self
-                    .node
-                    .create_server(mapping, &path, &type_name, reliable(), reliable())
-                    .map_err(open(&name))?;
-                self.watch(&mut server, &name)?;
-                self.servers.push((service, server));
+        // Who calls cannot be known before: the usual one, unless it is said.
+        let mapping = mapping(self.mapping, [0, 0]);
+        let mut server = self
+            .node
+            .create_server(mapping, &path, &trigger(), reliable(), reliable())
+            .map_err(open(&name))?;
+        self.watch(&mut server, &name)?;
+        self.servers.push((service, server));
+        Ok(())
+    }
+
+    /// Makes clients for the servers that were found since.
+    fn look_for_servers(&mut self) {
+        let is_open = self.clients.iter().all(|client| client.open.is_some());
+        if is_open || self.looked.elapsed() < LOOK {
+            return;
+        }
+        self.looked = Instant::now();
+        let readers = self.context.domain_participant().discovered_readers();
+        for i in 0..self.clients.len() {
+            let ServiceClient { service, open: None } = &self.clients[i] else { continue };
+            let name = service.name();
+            // As rmw names the topic of a service's requests.
+            let requests = format!("rq{name}Request");
+            let is_server = |topic: &str| topic == requests;
+            let server =
+                readers.iter().find(|one| is_server(&one.subscription_topic_data.topic_name));
+            let Some(server) = server else { continue };
+            let guid = server.reader_proxy.remote_reader_guid.to_bytes();
+            let mapping = mapping(self.mapping, [guid[0], guid[1]]);
+            let Ok(path) = Name::parse(&name) else { continue };
+            let made = self.node.create_client(mapping, &path, &trigger(), reliable(), reliable());
+            // One that cannot be made stays unfound, and the caller's timeout says so.
+            let Ok(mut client) = made else { continue };
+            if self.watch(&mut client, &name).is_ok() {
+                self.clients[i].open = Some((client, Instant::now()));
             }
         }
-        Ok(())
     }
 
     /// Has the poll woken by what arrives at `source`.
@@ -240,6 +334,20 @@ impl Ros2 {
     ) -> Result<(), TransportError> {
         let token = Token(WAKE.0 + 1);
         self.poll.registry().register(source, token, Interest::READABLE).map_err(open(name))
+    }
+}
+
+fn trigger() -> ServiceTypeName {
+    ServiceTypeName::new("std_srvs", "Trigger")
+}
+
+/// How a service is carried whose server is of this vendor.
+fn mapping(kind: MappingKind, vendor: [u8; 2]) -> ServiceMapping {
+    match kind {
+        MappingKind::Cyclone => ServiceMapping::Cyclone,
+        MappingKind::Auto if vendor == CYCLONE => ServiceMapping::Cyclone,
+        MappingKind::Basic => ServiceMapping::Basic,
+        MappingKind::Enhanced | MappingKind::Auto => ServiceMapping::Enhanced,
     }
 }
 
@@ -273,7 +381,9 @@ impl Transport for Ros2 {
                 take(Delivery::Call { service: service.clone(), call: self.call_count });
             }
         }
-        for (service, client) in &self.clients {
+        self.look_for_servers();
+        for ServiceClient { service, open } in &self.clients {
+            let Some((client, _)) = open else { continue };
             while let Ok(Some((_, response))) = client.receive_response() {
                 let TriggerResponse { success, message } = response;
                 let answer = Answer { is_done: success, words: message };
@@ -286,9 +396,16 @@ impl Transport for Ros2 {
         self.node.publisher_count(self.topics.line(topic).name)
     }
 
+    fn is_served(&mut self, service: &Service) -> bool {
+        let client = self.clients.iter().find(|client| client.service == *service);
+        let open = client.and_then(|client| client.open.as_ref());
+        open.is_some_and(|(_, since)| since.elapsed() > SETTLE)
+    }
+
     fn call(&mut self, service: &Service) -> Result<(), TransportError> {
-        let client = self.clients.iter().find(|(other, _)| other == service);
-        let sent = client.map(|(_, client)| client.send_request(TriggerRequest::default()));
+        let client = self.clients.iter().find(|client| client.service == *service);
+        let open = client.and_then(|client| client.open.as_ref());
+        let sent = open.map(|(client, _)| client.send_request(TriggerRequest::default()));
         match sent {
             Some(Ok(_)) => Ok(()),
             Some(Err(error)) => {

@@ -25,6 +25,12 @@ impl Service {
     pub const COMMON: [Self; 5] =
         [Self::Hold, Self::Unhold, Self::Stop, Self::ClearFault, Self::Bias];
 
+    /// Whether calling it twice does the same as once: not so for a bias, which may be taken
+    /// under load the second time, nor for a twin's failure, which it would end.
+    pub fn is_idempotent(&self) -> bool {
+        matches!(self, Self::Hold | Self::Unhold | Self::Stop | Self::ClearFault)
+    }
+
     /// As it is called.
     pub fn name(&self) -> String {
         match self {

@@ -2,7 +2,7 @@
 
 use super::joints::JointNames;
 use super::net_ft::NetFtSettings;
-use super::topics::Topics;
+use super::topics::{Topic, Topics};
 use crate::backend::interlock::InterlockSettings;
 use crate::backend::interlock::gates::GateSettings;
 use crate::config::{Checked, Rules, is_default};
@@ -34,14 +34,36 @@ impl BackendKind {
     }
 }
 
+/// How services of ROS 2 are carried over DDS.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MappingKind {
+    /// As the vendor of the server does by default.
+    #[default]
+    Auto,
+    /// The request's identity in the inline QoS: Fast DDS, RTI Connext, RustDDS.
+    Enhanced,
+    /// The request's identity in a header of the payload: Eclipse Cyclone DDS.
+    Cyclone,
+    /// The header of "basic" RPC over DDS: RTI Connext, where set so.
+    Basic,
+}
+
 /// Table `[backend]` of an experiment; all but `kind` matters for an arm behind topics only.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct BackendSettings {
     /// Which body carries out the touches.
     pub kind: BackendKind,
-    /// Domain of ROS 2, `ROS_DOMAIN_ID` of the lab.
-    pub domain: u16,
+    /// Domain of ROS 2. Left out, `ROS_DOMAIN_ID` of the environment, or 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub domain: Option<u16>,
+    /// Network interfaces for ROS 2, by name or address, as in `["eth1"]`. Left out, those that
+    /// `ROS_LOCALHOST_ONLY` and `ROS_AUTOMATIC_DISCOVERY_RANGE` of the environment allow, or all.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub interfaces: Vec<String>,
+    /// How services of ROS 2 are carried over DDS; `auto` follows the vendor of the server.
+    pub service_mapping: MappingKind,
     /// Where the master of ROS 1 is.
     pub master: String,
     /// Names of the joints in the lab's messages, from the base on; left out, the manufacturer's.
@@ -55,6 +77,11 @@ pub struct BackendSettings {
     pub patience_s: f64,
     /// How far stamps may be ahead of this machine's clock.
     pub clock_ahead_s: f64,
+    /// Whether messages without a stamp are accepted; their age then counts from receipt.
+    pub accept_unstamped: bool,
+    /// Whether the status is published on change only, latched (transient local): its age then says
+    /// nothing, and the arm counts as lost when the publisher is gone.
+    pub status_on_change: bool,
     /// A force/torque sensor that is read over UDP in place of its topic.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub net_ft: Option<NetFtSettings>,
@@ -68,6 +95,9 @@ pub struct BackendSettings {
     pub topics: Topics,
 }
 
+/// Largest domain of DDS: ports of a larger one would exceed 65535 (RTPS 2.5, section 9.6.2).
+pub const DOMAIN_MAX: u16 = 232;
+
 /// Most ticks in a second: the cycle of the PA-10's servo driver, 2 ms (`hydro`, Orca robotics).
 const RATE_MAX_HZ: f64 = 500.0;
 
@@ -76,13 +106,17 @@ impl Default for BackendSettings {
     fn default() -> Self {
         Self {
             kind: BackendKind::Simulated,
-            domain: 0,
+            domain: None,
+            interfaces: Vec::new(),
+            service_mapping: MappingKind::Auto,
             master: "http://127.0.0.1:11311".into(),
             joints: Vec::new(),
             finger: 0,
             rate_hz: 250.0,
             patience_s: 5.0,
             clock_ahead_s: 0.005,
+            accept_unstamped: false,
+            status_on_change: false,
             net_ft: None,
             gates: GateSettings::default(),
             interlocks: InterlockSettings::default(),
@@ -92,6 +126,11 @@ impl Default for BackendSettings {
 }
 
 impl BackendSettings {
+    /// Whether messages of `topic` come on change only.
+    pub fn is_on_change(&self, topic: Topic) -> bool {
+        topic == Topic::Status && self.status_on_change
+    }
+
     /// The joints of `chain` as the lab names them.
     pub fn joint_names(&self, chain: &Chain) -> JointNames {
         JointNames::new(match self.joints.as_slice() {
@@ -103,7 +142,9 @@ impl BackendSettings {
 
 impl Checked for BackendSettings {
     fn check(&self, rules: &mut Rules) {
-        rules.number("domain", self.domain.into(), 0.0..=232.0);
+        if let Some(domain) = self.domain {
+            rules.number("domain", domain.into(), 0.0..=DOMAIN_MAX.into());
+        }
         let is_address = self.master.starts_with("http://") && self.master.len() > 7;
         rules.require("master", format!("\"{}\"", self.master), is_address, || {
             "an address, as in \"http://127.0.0.1:11311\"".into()

@@ -1,32 +1,58 @@
-//! What an arm's own computer says of it.
+//! The state of an arm, as its own computer reports it.
 
 use super::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, Level};
 use serde::Serialize;
+use thiserror::Error;
 
 /// The arm's state.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ArmStatus {
-    /// The servos hold the joints.
+    /// Whether the servos are on.
     pub servo_on: bool,
-    /// The brakes are closed.
+    /// Whether the brakes are closed.
     pub brake: bool,
-    /// The emergency stop is pressed.
+    /// Whether the emergency stop is pressed.
     pub estop: bool,
-    /// The dead-man switch is held.
+    /// Whether the dead-man switch is held.
     pub deadman: bool,
-    /// Told to hold.
+    /// Whether the arm holds its position and ignores commands.
     pub hold: bool,
     /// What is wrong, until it is cleared; empty if nothing is.
     pub alarm: String,
-    /// Times at which it did not keep its own time.
+    /// How many of its own control periods the arm's computer has missed.
     pub overruns: u64,
 }
 
-/// The name under which an arm tells its state.
+/// A status from which it cannot be known that the arm may move.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum StatusError {
+    /// No entry is the arm's; such a message may come from another device.
+    #[error("no status named \"{NAME}\" among {found:?}")]
+    OtherDevice {
+        /// Names of the entries.
+        found: Vec<String>,
+    },
+    /// A flag is missing, given twice, or not a boolean.
+    #[error("{key} is {found}; allowed are {}", WORDS.map(|[no, yes]| format!("{yes}/{no}")).join(", "))]
+    Flag {
+        /// Key of the flag.
+        key: &'static str,
+        /// What stands there.
+        found: String,
+    },
+}
+
+/// Name of the entry that reports the arm's state.
 const NAME: &str = "pa10";
 
+/// Keys of the flags, in the order of the fields.
+const FLAGS: [&str; 5] = ["servo_on", "brake", "estop", "deadman", "hold"];
+
+/// Spellings of false and true, in any case: those that drivers write as text.
+const WORDS: [[&str; 2]; 3] = [["false", "true"], ["0", "1"], ["off", "on"]];
+
 impl ArmStatus {
-    /// Why the arm does not move, if it does not.
+    /// Returns why the arm must not be commanded, or `None` if it may move.
     pub fn refusal(&self) -> Option<String> {
         if self.estop {
             Some("emergency stop".into())
@@ -34,6 +60,10 @@ impl ArmStatus {
             Some("dead-man switch released".into())
         } else if !self.alarm.is_empty() {
             Some(format!("alarm: {}", self.alarm))
+        } else if self.hold {
+            Some("hold".into())
+        } else if self.brake {
+            Some("brakes closed".into())
         } else if !self.servo_on {
             Some("servos off".into())
         } else {
@@ -41,16 +71,15 @@ impl ArmStatus {
         }
     }
 
-    /// As a message.
+    /// Whether nothing but an operator can make the arm move again.
+    pub fn needs_operator(&self) -> bool {
+        self.estop || !self.deadman || !self.alarm.is_empty()
+    }
+
+    /// Returns the message that reports this state.
     pub fn message(&self, stamp_s: f64) -> DiagnosticArray {
-        let flags = [
-            ("servo_on", self.servo_on),
-            ("brake", self.brake),
-            ("estop", self.estop),
-            ("deadman", self.deadman),
-            ("hold", self.hold),
-        ];
-        let flags = flags.map(|(key, is)| (key, is.to_string()));
+        let flags = [self.servo_on, self.brake, self.estop, self.deadman, self.hold];
+        let flags = FLAGS.into_iter().zip(flags.map(|is| is.to_string()));
         let rest = [("alarm", self.alarm.clone()), ("overruns", self.overruns.to_string())];
         let entry = |(key, value): (&str, String)| KeyValue { key: key.into(), value };
         let level = if self.refusal().is_some() { Level::Error } else { Level::Ok };
@@ -59,33 +88,56 @@ impl ArmStatus {
             name: NAME.into(),
             message: self.refusal().unwrap_or_else(|| "ready".into()),
             hardware_id: NAME.into(),
-            values: flags.into_iter().chain(rest).map(entry).collect(),
+            values: flags.chain(rest).map(entry).collect(),
         };
         DiagnosticArray { header: Header::new(stamp_s, ""), status: vec![status] }
     }
 
-    /// Of a message; none if it does not tell of the arm. A flag that is left out counts as the
-    /// safe one.
-    pub fn of(message: &DiagnosticArray) -> Option<Self> {
-        let status = message.status.iter().find(|status| status.name == NAME)?;
-        let is = |key| status.value(key).and_then(|text| text.parse().ok());
-        let mut alarm = status.value("alarm").unwrap_or_default().to_owned();
-        if alarm.is_empty() && status.level >= Level::Error as u8 {
-            alarm.clone_from(&status.message);
-        }
-        let estop = is("estop").unwrap_or(false);
-        let deadman = is("deadman").unwrap_or(true);
-        if estop || !deadman {
-            alarm = status.value("alarm").unwrap_or_default().to_owned();
-        }
-        Some(Self {
-            servo_on: is("servo_on").unwrap_or(true),
-            brake: is("brake").unwrap_or(false),
-            estop,
-            deadman,
-            hold: is("hold").unwrap_or(false),
+    /// Reads a message. A level of error or worse counts as an alarm, unless flags explain it.
+    ///
+    /// # Errors
+    /// If it has no entry of the arm, or a flag of it is missing or unreadable: neither says that
+    /// the arm may move.
+    pub fn read(message: &DiagnosticArray) -> Result<Self, StatusError> {
+        let of_arm = |status: &&DiagnosticStatus| status.name == NAME;
+        let entries: Vec<_> = message.status.iter().filter(of_arm).collect();
+        let Some(worst) = entries.iter().max_by_key(|status| status.level) else {
+            let found = message.status.iter().map(|status| status.name.clone()).collect();
+            return Err(StatusError::OtherDevice { found });
+        };
+        let flag = |key| flag(&entries, key).map_err(|found| StatusError::Flag { key, found });
+        let [servo_on, brake, estop, deadman, hold] = FLAGS.map(flag);
+        let text = |key| entries.iter().find_map(|status| status.value(key)).unwrap_or_default();
+        let alarm = text("alarm").to_owned();
+        let overruns = text("overruns").parse().unwrap_or(0);
+        let mut read = Self {
+            servo_on: servo_on?,
+            brake: brake?,
+            estop: estop?,
+            deadman: deadman?,
+            hold: hold?,
             alarm,
-            overruns: status.value("overruns").and_then(|text| text.parse().ok()).unwrap_or(0),
-        })
+            overruns,
+        };
+        if worst.level >= Level::Error as u8 && read.refusal().is_none() {
+            read.alarm = match worst.message.as_str() {
+                "" => format!("level {}", worst.level),
+                words => words.to_owned(),
+            };
+        }
+        Ok(read)
     }
+}
+
+/// The boolean of `key`; otherwise what stands in its place.
+fn flag(entries: &[&DiagnosticStatus], key: &str) -> Result<bool, String> {
+    let all = entries.iter().flat_map(|status| &status.values);
+    let mut values = all.filter(|entry| entry.key == key);
+    let Some(KeyValue { value, .. }) = values.next() else { return Err("missing".into()) };
+    if values.next().is_some() {
+        return Err("given twice".into());
+    }
+    let is = |word: &str| value.trim().eq_ignore_ascii_case(word);
+    let found = WORDS.iter().flatten().position(|word| is(word));
+    found.map(|at| at % 2 == 1).ok_or_else(|| format!("{value:?}"))
 }

@@ -22,8 +22,6 @@ pub enum Topic {
     Status,
     /// Joint velocities, to the arm.
     Command,
-    /// That who commands is alive, to the arm.
-    Heartbeat,
 }
 
 /// Which end of the topics.
@@ -45,26 +43,26 @@ struct Usual {
 
 impl Topic {
     /// All of them, in the order of the table.
-    pub const ALL: [Self; 6] =
-        [Self::Joints, Self::Wrench, Self::Tactile, Self::Status, Self::Command, Self::Heartbeat];
+    pub const ALL: [Self; 5] =
+        [Self::Joints, Self::Wrench, Self::Tactile, Self::Status, Self::Command];
 
     /// Who publishes it.
     pub fn publisher(self) -> Side {
         match self {
             Self::Joints | Self::Wrench | Self::Tactile | Self::Status => Side::Arm,
-            Self::Command | Self::Heartbeat => Side::Explorer,
+            Self::Command => Side::Explorer,
         }
     }
 
     /// Its key in `[backend.topics]`.
     pub fn key(self) -> &'static str {
-        ["joints", "wrench", "tactile", "status", "command", "heartbeat"][self as usize]
+        ["joints", "wrench", "tactile", "status", "command"][self as usize]
     }
 }
 
 /// Names, types and rates of what drivers of the time send (`pa10_hardware_interface`,
 /// `kth-ros-pkg/biotac_driver`, `netft_rdt_driver`), ages chosen: some frames of each may be lost.
-const USUAL: [Usual; 6] = [
+const USUAL: [Usual; 5] = [
     Usual {
         name: "/joint_states",
         types: &[JointState::<Header>::DEFINITION.name],
@@ -94,12 +92,6 @@ const USUAL: [Usual; 6] = [
         types: &[JointTrajectory::<Header>::DEFINITION.name, Float64MultiArray::DEFINITION.name],
         rate_hz: 250.0,
         age_s: 0.03,
-    },
-    Usual {
-        name: "/palpate/heartbeat",
-        types: &[Header::DEFINITION.name],
-        rate_hz: 50.0,
-        age_s: 0.1,
     },
 ];
 
@@ -150,7 +142,6 @@ line!(WrenchTopic, Topic::Wrench);
 line!(TactileTopic, Topic::Tactile);
 line!(StatusTopic, Topic::Status);
 line!(CommandTopic, Topic::Command);
-line!(HeartbeatTopic, Topic::Heartbeat);
 
 impl CommandTopic {
     /// Whether commands go without names and stamp.
@@ -180,8 +171,6 @@ pub struct Topics {
     pub status: StatusTopic,
     /// Joint velocities, to the arm.
     pub command: CommandTopic,
-    /// That the explorer is alive, to the arm.
-    pub heartbeat: HeartbeatTopic,
 }
 
 /// A line of the table, whichever it is.
@@ -222,7 +211,6 @@ impl Topics {
             Topic::Tactile => self.tactile.line(),
             Topic::Status => self.status.line(),
             Topic::Command => self.command.line(),
-            Topic::Heartbeat => self.heartbeat.line(),
         }
     }
 }
@@ -234,7 +222,6 @@ impl Checked for Topics {
         rules.table("tactile", &self.tactile);
         rules.table("status", &self.status);
         rules.table("command", &self.command);
-        rules.table("heartbeat", &self.heartbeat);
         let names = Topic::ALL.map(|topic| self.line(topic).name);
         for (i, topic) in Topic::ALL.iter().enumerate() {
             let first = !names[..i].contains(&names[i]);

@@ -103,6 +103,9 @@ pub trait Transport {
     /// How many publishers of a topic are known, this side's own among them.
     fn publisher_count(&self, topic: Topic) -> usize;
 
+    /// Whether a server of `service` has been found, so that a call reaches it.
+    fn is_served(&mut self, service: &Service) -> bool;
+
     /// Calls a service of the other side; its answer is a delivery.
     ///
     /// # Errors

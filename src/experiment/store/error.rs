@@ -31,6 +31,17 @@ pub enum StoreError {
         /// What that line is in this experiment.
         wanted: String,
     },
+    /// A file or planner is not the one that the rows were made with.
+    #[error(
+        "{}: {what} has changed since the run began, and its trials were made with what it was before; choose \
+         another folder with --out, or start again with --fresh", path.display()
+    )]
+    Changed {
+        /// The folder.
+        path: PathBuf,
+        /// Which, with its file.
+        what: String,
+    },
     /// An assignment to something that decides the rows of a run that is only shown.
     #[error(
         "--set {text}: a run that is there can be shown another way by `report.…` and `question` \

@@ -1,42 +1,16 @@
 //! Files of a run's folder: written whole or not at all.
 
-use super::error::StoreError;
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use super::error::{StoreError, io_error};
+use crate::files;
+use std::fs;
+use std::path::Path;
 
-/// Writes a file so that a reader sees all of it or none.
+/// Replaces a file, so that a reader sees all of it or none; symbolic links are replaced too.
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn write_whole(path: &Path, text: &str) -> Result<(), StoreError> {
-    write_whole_by(path, |file| file.write_all(text.as_bytes()))
-}
-
-/// As [`write_whole`], with what `write` writes.
-pub(super) fn write_whole_by(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> Result<(), StoreError> {
-    let partial = partial(path);
-    let written = File::create(&partial).and_then(|file| {
-        let mut file = BufWriter::new(file);
-        write(&mut file)?;
-        file.flush()?;
-        fs::rename(&partial, path)
-    });
-    written.map_err(|cause| {
-        // What a full disk has taken of it is in the way there.
-        let _ = fs::remove_file(&partial);
-        StoreError::Io { path: path.into(), cause }
-    })
-}
-
-/// Where a file is written until it is whole.
-pub(super) fn partial(path: &Path) -> PathBuf {
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".part");
-    partial.into()
+pub fn write_whole(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), StoreError> {
+    files::replace(path, bytes).map_err(io_error(path))
 }
 
 /// As [`write_whole`], unless the file says that already.
@@ -68,10 +42,5 @@ pub(super) fn same(
 
 /// Removes a file that may not be there.
 pub(super) fn remove(path: &Path) -> Result<(), StoreError> {
-    match fs::remove_file(path) {
-        Err(cause) if cause.kind() != io::ErrorKind::NotFound => {
-            Err(StoreError::Io { path: path.into(), cause })
-        }
-        _ => Ok(()),
-    }
+    files::remove(path).map_err(io_error(path))
 }

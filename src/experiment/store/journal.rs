@@ -5,7 +5,7 @@ use super::error::{StoreError, io_error};
 use crate::experiment::row::TouchRow;
 use crate::files;
 use serde::{Deserialize, Serialize};
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -45,8 +45,7 @@ impl Journal {
     /// If it cannot be read or written, or a line is damaged.
     pub fn open(folder: &Path) -> Result<Self, StoreError> {
         let path = folder.join(JOURNAL);
-        let file = OpenOptions::new().create(true).append(true).open(&path);
-        let file = file.map_err(io_error(&path))?;
+        let file = files::append(&path).map_err(io_error(&path))?;
         let bytes = files::bytes(&path, u64::MAX).map_err(io_error(&path))?;
         let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
         let mut entries = Vec::new();
@@ -70,15 +69,22 @@ impl Journal {
         self.entries.iter().filter(is_its).filter_map(|entry| entry.touch.clone()).collect()
     }
 
+    /// Why the run went no further, if a fault is the last that it holds.
+    pub fn halted(&self) -> Option<&str> {
+        self.entries.last()?.fault.as_deref()
+    }
+
     /// Adds a line and has it on the disk before it returns.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn add(&mut self, entry: &Entry) -> Result<(), StoreError> {
+    pub fn add(&mut self, entry: Entry) -> Result<(), StoreError> {
         let mut line =
-            serde_json::to_vec(entry).map_err(io::Error::from).map_err(io_error(&self.path))?;
+            serde_json::to_vec(&entry).map_err(io::Error::from).map_err(io_error(&self.path))?;
         line.push(b'\n');
         self.file.write_all(&line).map_err(io_error(&self.path))?;
-        self.file.sync_data().map_err(io_error(&self.path))
+        self.file.sync_data().map_err(io_error(&self.path))?;
+        self.entries.push(entry);
+        Ok(())
     }
 }

@@ -1,9 +1,10 @@
 //! Shards of a run, put together: the bytes of one that ran in a single process.
 
+use super::content::Content;
 use super::error::io_error;
 use super::rows::{self, Place};
 use super::surface::{self, SURFACE};
-use super::{Manifest, RunFolder, StoreError, TRIALS, resolved};
+use super::{RunFolder, StoreError, TRIALS, resolved};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::row::TrialId;
 use crate::experiment::truth::Truth;
@@ -66,6 +67,7 @@ pub enum MergeError {
 pub struct Shards {
     experiment: Experiment,
     truth: Truth,
+    content: Content,
     paths: Vec<PathBuf>,
     /// Which of `paths` has a row, and where, in the rows' order.
     places: Vec<(usize, Place)>,
@@ -81,6 +83,7 @@ impl Shards {
         super::require_run(first)?;
         let experiment = resolved::read(first, &[])?;
         let truth = surface::read(&first.join(SURFACE), &experiment)?;
+        let mut content = Content::default();
         let mut places: Vec<(usize, Place)> = Vec::new();
         for (i, path) in paths.iter().enumerate() {
             super::require_run(path)?;
@@ -89,6 +92,9 @@ impl Shards {
             if !is_same {
                 return Err(MergeError::Foreign { path: path.clone(), first: first.clone() });
             }
+            let own = Content::read(path)?;
+            own.require_same(&content, path, |_| true)?;
+            content.extend(own);
             let mut own = rows::places(&path.join(TRIALS), &experiment)?;
             own.retain(|place| experiment.lists(&place.id));
             places.extend(own.into_iter().map(|place| (i, place)));
@@ -106,7 +112,7 @@ impl Shards {
             let wanted = missing + places.len();
             return Err(MergeError::Missing { missing, wanted, trial, planner });
         }
-        Ok(Some(Self { experiment, truth, paths: paths.into(), places }))
+        Ok(Some(Self { experiment, truth, content, paths: paths.into(), places }))
     }
 
     /// What was run.
@@ -118,9 +124,9 @@ impl Shards {
     ///
     /// # Errors
     /// If there are rows already, or it cannot be written.
-    pub fn merge(&self, out: &Path, manifest: &Manifest) -> Result<usize, MergeError> {
+    pub fn merge(&self, out: &Path) -> Result<usize, MergeError> {
         let (mut folder, there) =
-            RunFolder::open(out, &self.experiment, &self.truth, manifest, false)?;
+            RunFolder::open(out, &self.experiment, &self.truth, &self.content, false)?;
         if !there.is_empty() {
             return Err(MergeError::Taken { path: out.into() });
         }

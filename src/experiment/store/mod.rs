@@ -1,7 +1,8 @@
 //! The folder a run's results lie in.
 //!
 //! `resolved.toml` (the experiment with every default written out), `manifest.json` (what ran it, a
-//! program each), `surface.csv` (the truth on the test grid), `trials.jsonl` (a row per finished
+//! program each), `content.json` (hashes of mesh, scan and of planners written outside of Palpate),
+//! `surface.csv` (the truth on the test grid), `trials.jsonl` (a row per finished
 //! trial). Everything else in it is drawn from these.
 //!
 //! A folder holds the rows of one [identity](Experiment::identity). It may be opened with more
@@ -11,6 +12,7 @@
 //! `resolved.toml` is the mark of a run's folder: it is written first and never removed. A folder
 //! that has it and no row yet, or at most the pieces of it that a crash leaves, is begun anew.
 
+mod content;
 mod error;
 mod file;
 mod journal;
@@ -20,6 +22,7 @@ mod resolved;
 mod rows;
 mod surface;
 
+pub use content::{CONTENT, Content};
 pub use error::StoreError;
 pub use file::write_whole;
 pub use journal::{Entry, JOURNAL, Journal};
@@ -28,13 +31,14 @@ pub use merge::{MergeError, Shards};
 pub use resolved::{RESOLVED, resolved, resolved_beside};
 
 use self::error::io_error;
-use self::file::{partial, remove, write_whole_by};
+use self::file::remove;
 use self::rows::Place;
 use self::surface::SURFACE;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::row::{TrialId, TrialRow};
 use crate::experiment::truth::Truth;
-use std::fs::{self, File, OpenOptions, TryLockError};
+use crate::files;
+use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -73,23 +77,19 @@ impl RunFolder {
     /// cut short by a crash is dropped.
     ///
     /// # Errors
-    /// If the folder holds something else, is being written, or cannot be.
+    /// If the folder holds something else or trials made of other `content`, is being written, or
+    /// cannot be.
     pub fn open(
         path: &Path,
         experiment: &Experiment,
         truth: &Truth,
-        manifest: &Manifest,
+        content: &Content,
         fresh: bool,
     ) -> Result<(Self, Vec<TrialId>), StoreError> {
         fs::create_dir_all(path).map_err(io_error(path))?;
         let file = path.join(TRIALS);
         refuse_foreign(path)?;
-        let trials = OpenOptions::new()
-            .create(true)
-            .read(true)
-            .append(true)
-            .open(&file)
-            .map_err(io_error(&file))?;
+        let trials = files::append(&file).map_err(io_error(&file))?;
         lock(&trials, path)?;
         let has_touches = fs::metadata(path.join(JOURNAL)).is_ok_and(|journal| journal.len() > 0);
         if fresh || !(has_touches || rows::has_some(&trials).map_err(io_error(&file))?) {
@@ -105,9 +105,15 @@ impl RunFolder {
         if trials.metadata().map_err(io_error(&file))?.len() > good_bytes {
             trials.set_len(good_bytes).map_err(io_error(&file))?;
         }
+        let mut now = content.clone();
+        let before = Content::read(path)?;
+        let has_row = |planner: &str| done.iter().any(|id| id.planner == planner);
+        now.require_same(&before, path, |planner| has_touches || has_row(planner))?;
+        now.extend(before);
+        now.write(path)?;
         resolved::write(path, experiment)?;
         done.retain(|id| experiment.lists(id));
-        let unsigned = Some(manifest.clone());
+        let unsigned = Some(Manifest::of(experiment));
         Ok((Self { path: path.into(), trials, unsigned }, done))
     }
 
@@ -159,9 +165,10 @@ impl RunFolder {
         if !rows::is_sorted(&places, experiment) {
             places.sort_by(|a, b| rows::order(&a.id, &b.id, experiment));
             let mut from = File::open(&file).map_err(io_error(&file))?;
-            write_whole_by(&file, |to| {
+            files::replace_by(&file, |to| {
                 places.iter().try_for_each(|place| rows::copy(&mut from, &place.bytes, to))
-            })?;
+            })
+            .map_err(io_error(&file))?;
         }
         Ok(tally)
     }
@@ -258,9 +265,9 @@ fn clear(path: &Path) -> Result<(), StoreError> {
             remove(&recording)?;
         }
     }
-    ["report.html", "summary.csv", "comparison.csv", "equal_error.csv", MANIFEST, SURFACE, JOURNAL]
-        .iter()
-        .try_for_each(|name| remove(&path.join(name)))
+    let tables = ["report.html", "summary.csv", "comparison.csv", "equal_error.csv"];
+    let own = [MANIFEST, CONTENT, SURFACE, JOURNAL];
+    tables.iter().chain(&own).try_for_each(|name| remove(&path.join(name)))
 }
 
 /// A folder that is not empty must hold a run, or at most what a crash leaves of a beginning: no
@@ -278,7 +285,7 @@ fn refuse_foreign(path: &Path) -> Result<(), StoreError> {
     if resolved::is_ours(path) || has_rows && length(RESOLVED).is_some() {
         return Ok(());
     }
-    let part = partial(Path::new(RESOLVED));
+    let part = files::partial(Path::new(RESOLVED));
     for entry in fs::read_dir(path).map_err(io_error(path))? {
         let name = entry.map_err(io_error(path))?.file_name();
         let is_empty = name.to_str().and_then(length) == Some(0);

@@ -55,6 +55,12 @@ pub trait Maker: Send + Sync {
     /// [own](super::is_own) one's.
     fn name(&self) -> &str;
 
+    /// The source text that decides its plans, whose hash becomes part of a run's identity; `None`
+    /// for what is compiled into the program, which a run's manifest names.
+    fn source(&self) -> Option<String> {
+        None
+    }
+
     /// Makes one for a trial; the generator is its only randomness.
     fn make(
         &self,

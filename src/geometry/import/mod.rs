@@ -76,5 +76,7 @@ fn read_and_repair(
     let bytes = files::bytes(path, BYTES_MAX)?;
     let mut raw = read(&Source { path, bytes: &bytes, buffers })?;
     raw.scale(metres_per_unit);
-    repair(raw)
+    let (mesh, report) = repair(raw)?;
+    let sha256 = mesh.sha256();
+    Ok((mesh, MeshReport { sha256, ..report }))
 }

@@ -6,6 +6,7 @@ pub mod equal_error;
 pub mod summary;
 
 use crate::experiment::measure::{Direction, Measure};
+use crate::experiment::store::write_whole;
 use anyhow::Context;
 use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
@@ -78,14 +79,22 @@ pub fn write_csv<T: Serialize + JsonSchema>(
     path: &Path,
     records: impl IntoIterator<Item = T>,
 ) -> anyhow::Result<()> {
-    let place = || path.display().to_string();
-    let mut writer =
-        csv::WriterBuilder::new().has_headers(false).from_path(path).with_context(place)?;
     let schema = schema_for!(T).to_value();
     let fields = schema["properties"].as_object().into_iter().flat_map(|fields| fields.keys());
-    writer.write_record(fields).with_context(place)?;
+    write_csv_with(path, fields, records)
+}
+
+/// As [`write_csv`], with a header of its own.
+fn write_csv_with<T: Serialize>(
+    path: &Path,
+    header: impl IntoIterator<Item = impl AsRef<[u8]>>,
+    records: impl IntoIterator<Item = T>,
+) -> anyhow::Result<()> {
+    let place = || path.display().to_string();
+    let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
+    writer.write_record(header).with_context(place)?;
     for record in records {
         writer.serialize(record).with_context(place)?;
     }
-    writer.flush().with_context(place)
+    Ok(write_whole(path, writer.into_inner().with_context(place)?)?)
 }

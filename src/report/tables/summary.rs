@@ -1,6 +1,6 @@
 //! The curves as a table of the page and of the terminal, and as a file.
 
-use super::{Cell, Table, titled};
+use super::{Cell, Table, titled, write_csv_with};
 use crate::experiment::curve_table::{CurveRecord, columns, curve_table};
 use crate::experiment::measure::{MEASURES, Measure};
 use crate::experiment::notice;
@@ -8,7 +8,6 @@ use crate::experiment::store::Run;
 use crate::experiment::summary;
 use crate::experiment::summary::{CurvePoint, Events};
 use crate::report::number::{shown, with_error};
-use anyhow::Context;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -143,17 +142,13 @@ pub fn happened(run: &Run) -> Vec<String> {
 /// # Errors
 /// If it cannot be written.
 pub fn write(run: &Run, folder: &Path) -> anyhow::Result<()> {
-    let path = folder.join("summary.csv");
-    let place = || path.display().to_string();
-    let mut writer =
-        csv::WriterBuilder::new().has_headers(false).from_path(&path).with_context(place)?;
     let header = ["planner", "touches", "trials"].map(String::from).into_iter();
-    writer.write_record(header.chain(columns(&run.experiment, &run.rows))).with_context(place)?;
-    for CurveRecord { point, values } in curve_table(&run.experiment, &run.rows, |_| true) {
-        let record = (&point.planner, point.touches, point.trials, values);
-        writer.serialize(record).with_context(place)?;
-    }
-    writer.flush().with_context(place)
+    let header = header.chain(columns(&run.experiment, &run.rows));
+    let curves = curve_table(&run.experiment, &run.rows, |_| true);
+    let records = curves
+        .into_iter()
+        .map(|CurveRecord { point, values }| (point.planner, point.touches, point.trials, values));
+    write_csv_with(&folder.join("summary.csv"), header, records)
 }
 
 /// What happened to a planner's trials, in a line; none if nothing did.

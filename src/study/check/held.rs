@@ -4,8 +4,7 @@ use super::baseline::{Baseline, Line, settings, span};
 use super::judged::{JUDGED, Judged};
 use super::verdict::{Judgement, Rules, Verdict, of_planner};
 use crate::experiment::Simulation;
-use crate::experiment::row::TrialRow;
-use crate::experiment::runner::{self, Job, RunError};
+use crate::experiment::runner::{self, Job, OnProgress, RunError};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What came of it.
@@ -54,7 +53,7 @@ pub fn hold(
     rules: &Rules,
     threads: usize,
     stop: &AtomicBool,
-    progress: &(dyn Fn(&TrialRow) + Sync),
+    progress: OnProgress,
 ) -> Result<Held, RunError> {
     let experiment = simulation.experiment();
     let (names, span) = (&experiment.planners, span(experiment));

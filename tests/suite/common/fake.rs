@@ -15,6 +15,10 @@ pub struct World {
     pub real_time: bool,
     /// From which tick on readings go through what.
     pub breaks: Option<(u64, Break)>,
+    /// From which tick on joints read what they read then, but for noise of this amplitude.
+    pub freezes: Option<(u64, f64)>,
+    /// By how many ticks joints follow their commands later.
+    pub lag: usize,
     /// Force along y on a stage's tip at y.
     pub wall: Option<Box<dyn Fn(f64) -> f64 + Send>>,
     /// The tick at which it says that it was stopped.
@@ -132,11 +136,18 @@ impl Backend for FakeBody {
             return Err(Fault::Stopped { time_s: self.reading.time_s });
         }
         let mut place = log.places.last().unwrap().clone();
-        place.iter_mut().zip(&command.qdot).for_each(|(q, qdot)| *q += qdot * 0.002);
+        let still = vec![0.0; place.len()];
+        let heard = log.commands.iter().rev().nth(self.world.lag).unwrap_or(&still).clone();
+        place.iter_mut().zip(&heard).for_each(|(q, qdot)| *q += qdot * 0.002);
         log.places.push(place.clone());
         drop(log);
-        self.reading.q = place;
-        self.reading.qdot.clone_from(&command.qdot);
+        match self.world.freezes.filter(|(from, _)| self.tick > *from) {
+            Some((_, noise)) => {
+                let sign = if self.tick.is_multiple_of(2) { noise } else { -noise };
+                self.reading.q.iter_mut().for_each(|q| *q += sign);
+            }
+            None => (self.reading.q, self.reading.qdot) = (place, heard),
+        }
         self.reading.applied.qdot.clone_from(&command.qdot);
         self.report();
         Ok(&self.reading)

@@ -15,6 +15,13 @@ use std::time::{Duration, Instant};
 /// The experiment that is run over topics.
 pub const EXPERIMENT: &str = "experiments/container_pa10.toml";
 
+/// What a real arm must be told of the container and the cell.
+pub const CELL: [&str; 3] = [
+    "scene.zone.depth_m=[0.59, 0.71]",
+    "backend.interlocks.lowest_m=0.0",
+    "backend.interlocks.workspace_m=[[-1.0, 1.0], [-1.2, 0.6], [0.0, 1.8]]",
+];
+
 /// A network that nobody else is on: a domain of ROS 2, or a master of ROS 1.
 pub struct Network {
     /// What `[backend]` says of it.
@@ -25,7 +32,7 @@ pub struct Network {
 impl Network {
     /// Of this number.
     pub fn new(number: u16) -> Self {
-        let mut settings = BackendSettings { domain: number, ..Default::default() };
+        let mut settings = BackendSettings { domain: Some(number), ..Default::default() };
         let is_first = std::env::var("PALPATE_ROS").is_ok_and(|name| name == "ros1");
         if !is_first {
             settings.kind = BackendKind::Ros2;
@@ -54,7 +61,7 @@ impl Network {
             "--set",
             &format!("backend.kind=\"{}\"", kind.name())[..],
             "--set",
-            &format!("backend.domain={domain}"),
+            &format!("backend.domain={}", domain.unwrap_or_default()),
             "--set",
             &format!("backend.master=\"{master}\""),
         ]
@@ -76,6 +83,7 @@ impl Network {
         command.args(["--set", &format!("touches={touches}")]);
         command.args(["--set", &format!("initial_touches={}", touches.min(5))]);
         command.args(["--set", &format!("planners=[\"{planner}\"]")]);
+        command.args(CELL.iter().flat_map(|set| ["--set", *set]));
         command
     }
 
@@ -84,7 +92,11 @@ impl Network {
         let mut command = Command::new(std::env::var("PALPATE_PEER").expect("PALPATE_PEER"));
         match self.settings.kind {
             BackendKind::Ros1 => command.args(["tests/ros1/peer.py", what, &self.settings.master]),
-            _ => command.args(["tests/ros2/peer.py", what, &self.settings.domain.to_string()]),
+            _ => command.args([
+                "tests/ros2/peer.py",
+                what,
+                &self.settings.domain.unwrap_or_default().to_string(),
+            ]),
         };
         command.args(more);
         command

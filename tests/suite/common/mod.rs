@@ -10,6 +10,7 @@ pub mod lab;
 pub mod presses;
 pub mod program;
 pub mod quiet;
+pub mod rig;
 pub mod runs;
 pub mod shapes;
 pub mod shipped;

@@ -19,9 +19,6 @@ macro_rules! header {
     };
 }
 
-/// `std_msgs/Header`.
-pub const HEADER: &str = header!();
-
 /// `sensor_msgs/JointState`.
 pub const JOINT_STATE: &str = whole!(
     "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",

@@ -114,15 +114,6 @@ impl Ros1 {
             Packet::Status(message) => Some(status_out(message.clone())),
             _ => None,
         })?;
-        self.topic(
-            side,
-            Topic::Heartbeat,
-            |message: Counted| Packet::Heartbeat(message.into()),
-            |packet| match packet {
-                Packet::Heartbeat(message) => Some(message.clone().into()),
-                _ => None,
-            },
-        )?;
         match self.topics.tactile.is_shadow() {
             true => self.topic(side, Topic::Tactile, fingers_in, |packet| match packet {
                 Packet::Fingers(message) => Some(fingers_out(*message.clone())),
@@ -226,6 +217,11 @@ impl Transport for Ros1 {
 
     fn publisher_count(&self, topic: Topic) -> usize {
         self.census.publishers(topic)
+    }
+
+    /// A call asks the master for the server by itself.
+    fn is_served(&mut self, _: &Service) -> bool {
+        true
     }
 
     fn call(&mut self, service: &Service) -> Result<(), TransportError> {

@@ -42,7 +42,6 @@ macro_rules! ros1 {
     };
 }
 
-ros1!(Counted, "std_msgs/Header", HEADER, "2176decaecbce78abc3b96ef049fabed");
 ros1!(
     JointState<Counted>,
     "sensor_msgs/JointState",

@@ -1,30 +1,30 @@
-//! Joints that do not do what they are told.
+//! Joints whose velocity is not the commanded one.
 
 use super::interlock::{Entry, Interlock, Now};
 use super::trip::Trip;
 use crate::backend::Reading;
 use crate::robot::arm::chain::MAX_JOINTS;
 
-/// Stops a body one of whose joints moves otherwise than was applied for some time.
+/// Stops a body one of whose joints moves at another velocity than was applied for some time.
 pub const ENTRY: Entry = Entry {
     name: NAME,
     make: |_, settings, _| {
-        let (share, limit_s) = (settings.follow_share, settings.follow_s);
-        Some(Box::new(Following { share, limit_s, since_s: [None; MAX_JOINTS] }))
+        let (share, limit_s) = (settings.tracking_error_ratio, settings.tracking_error_s);
+        Some(Box::new(VelocityTracking { share, limit_s, since_s: [None; MAX_JOINTS] }))
     },
 };
 
-const NAME: &str = "error of speed";
+const NAME: &str = "velocity tracking error";
 
-struct Following {
+struct VelocityTracking {
     /// Of the joint's speed limit.
     share: f64,
     limit_s: f64,
-    /// Since when each joint has been off.
+    /// Since when each joint's error has been too large.
     since_s: [Option<f64>; MAX_JOINTS],
 }
 
-impl Interlock for Following {
+impl Interlock for VelocityTracking {
     fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
         let speeds = reading.applied.qdot.iter().zip(now.qdot.iter());
         let joints = now.chain.joints.iter().zip(speeds).zip(&mut self.since_s);

@@ -1,0 +1,139 @@
+//! Joints that do not follow their commands: how far they have moved, at any speed.
+
+use super::interlock::{Entry, Interlock, Now};
+use super::trip::Trip;
+use crate::backend::Reading;
+use crate::robot::arm::Joints;
+use std::collections::VecDeque;
+
+/// Stops a real body one of whose joints has moved by another angle than was commanded.
+///
+/// A joint that follows with any delay up to `tracking_lag_s`, or smoothed over as much, has moved
+/// over a span by an amount between the least and the most that was commanded over spans of the
+/// same length which ended up to that much earlier. Short spans find a fast joint soon, long ones a
+/// joint at 0.1 mm/s, which moves less than the error that is always allowed for many seconds.
+pub const ENTRY: Entry = Entry {
+    name: NAME,
+    make: |_, settings, capabilities| {
+        let span = |step_s: f64| Span::new(step_s, settings.tracking_lag_s);
+        let tracking =
+            Tracking { spans: STEPS_S.map(span), commanded: Joints::zeros(), time_s: 0.0 };
+        capabilities.real_time.then(|| Box::new(tracking) as _)
+    },
+};
+
+const NAME: &str = "position tracking error";
+
+/// Time between the samples of each span.
+const STEPS_S: [f64; 5] = [0.0025, 0.01, 0.04, 0.16, 0.64];
+
+/// Steps of a span: they last 0.25, 1, 4, 16 and 64 s, the first a tick each at least.
+const SPAN_STEPS: usize = 100;
+
+/// A pause between readings after which the body was at rest and all begins anew.
+const PAUSE_S: f64 = 0.1;
+
+/// Error that is always allowed, as movement of any point of the robot.
+// heuristic: several times the sag of a loaded servo and the skin's give; a finger at 5 mm/s that
+// does not follow is found within half a second.
+const FLOOR_M: f64 = 2e-3;
+
+/// Error that is allowed besides, as a share of the commanded movement.
+// heuristic: steady error of a velocity servo.
+const SHARE: f64 = 0.05;
+
+/// A joint's position and the integral of its commands at some time.
+#[derive(Clone, Copy)]
+struct Sample {
+    time_s: f64,
+    q: Joints,
+    commanded: Joints,
+}
+
+/// What was commanded and read over a span that ends now.
+struct Span {
+    step_s: f64,
+    lag_steps: usize,
+    /// At steps of `step_s`, oldest first; never more than it was made for.
+    samples: VecDeque<Sample>,
+    most: usize,
+}
+
+impl Span {
+    fn new(step_s: f64, lag_s: f64) -> Self {
+        let lag_steps = (lag_s / step_s).ceil() as usize;
+        let most = SPAN_STEPS + lag_steps + 1;
+        Self { step_s, lag_steps, samples: VecDeque::with_capacity(most), most }
+    }
+
+    /// Adds a sample if a step has passed since the last one; whether it did.
+    fn push(&mut self, sample: Sample, period_s: f64) -> bool {
+        // Half a tick's slack, so that a late one does not skip a step.
+        let due_s = self.step_s - 0.5 * period_s;
+        if self.samples.back().is_some_and(|last| sample.time_s - last.time_s < due_s) {
+            return false;
+        }
+        if self.samples.len() == self.most {
+            self.samples.pop_front();
+        }
+        self.samples.push_back(sample);
+        true
+    }
+
+    /// How far the joints have moved, and the least and the most that they were commanded to.
+    /// Before the first sample the body was at rest.
+    fn moved(&self) -> [Joints; 3] {
+        let last = self.samples.len() - 1;
+        let steps = SPAN_STEPS.min(last);
+        let at = |back: usize| &self.samples[last.saturating_sub(back)];
+        let commanded = |lag: usize| at(lag).commanded - at(lag + steps).commanded;
+        let first = commanded(0);
+        let spans = (1..=self.lag_steps).map(commanded);
+        let [low, high] =
+            spans.fold([first; 2], |[low, high], span| [low.inf(&span), high.sup(&span)]);
+        [at(0).q - at(steps).q, low, high]
+    }
+}
+
+struct Tracking {
+    spans: [Span; STEPS_S.len()],
+    /// Integral of the applied commands.
+    commanded: Joints,
+    /// Time of the last reading.
+    time_s: f64,
+}
+
+impl Interlock for Tracking {
+    fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
+        let passed_s = now.time_s - self.time_s;
+        self.time_s = now.time_s;
+        let Some(applied) = now.chain.joints_from(&reading.applied.qdot) else { return Ok(()) };
+        if !(0.0..PAUSE_S).contains(&passed_s) {
+            self.spans.iter_mut().for_each(|span| span.samples.clear());
+            return Ok(());
+        }
+        self.commanded += applied * passed_s;
+        let sample = Sample { time_s: now.time_s, q: now.q, commanded: self.commanded };
+        for span in &mut self.spans {
+            if !span.push(sample, now.period_s) {
+                continue;
+            }
+            let [moved, low, high] = span.moved();
+            for (i, joint) in now.chain.joints.iter().enumerate() {
+                let reach_m = now.reaches_m[i];
+                let found = (low[i] - moved[i]).max(moved[i] - high[i]) * reach_m;
+                let limit = FLOOR_M + SHARE * low[i].abs().max(high[i].abs()) * reach_m;
+                if found > limit {
+                    let (part, unit) = (joint.name.into(), "m");
+                    return Err(Trip { interlock: NAME, part, found, limit, unit });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn reset(&mut self) {
+        self.spans.iter_mut().for_each(|span| span.samples.clear());
+        (self.commanded, self.time_s) = (Joints::zeros(), 0.0);
+    }
+}

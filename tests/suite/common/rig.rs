@@ -1,0 +1,273 @@
+//! An explorer and a twin in one process, in real time: the same code as over a network, but for the
+//! transport.
+
+use nalgebra::Point3;
+use palpate::backend::ros::arm::Lab;
+use palpate::backend::ros::clock;
+use palpate::backend::ros::fault::LinkFault;
+use palpate::backend::ros::memory::{Hub, Memory};
+use palpate::backend::ros::packet::Packet;
+use palpate::backend::ros::service::{Answer, Service};
+use palpate::backend::ros::settings::BackendSettings;
+use palpate::backend::ros::topics::{Side, Topic};
+use palpate::backend::ros::transport::{Delivery, Transport, TransportError, Waker};
+use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
+use palpate::explore::probe::{Probe, Touch};
+use palpate::robot::arm::Chain;
+use palpate::sim::finger::effects::wrench::WrenchEffect;
+use palpate::sim::simulator::Simulator;
+use palpate::sim::{Environment, Scene};
+use palpate::twin::failure::by_name;
+use palpate::twin::serve::{Event, Injection, Twin};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+pub const STAGE: &str = "scenes/container_finger.toml";
+#[cfg(feature = "mujoco")]
+pub const ARM: &str = "scenes/container_pa10.toml";
+
+/// Where the twin's fingertip truly was: the time of day and the place.
+pub type Track = Arc<Mutex<Vec<(f64, Point3<f64>)>>>;
+
+/// A twin in a thread, and how to reach it.
+pub struct Rig {
+    pub simulator: Simulator,
+    pub settings: BackendSettings,
+    pub hub: Hub,
+    pub events: Arc<Mutex<Vec<(f64, Event)>>>,
+    pub wire: Wire,
+    track: Track,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// A body that notes where its tip is.
+struct Tracked {
+    body: Box<dyn Backend>,
+    chain: Chain,
+    track: Track,
+}
+
+impl Backend for Tracked {
+    fn capabilities(&self) -> &Capabilities {
+        self.body.capabilities()
+    }
+
+    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
+        self.body.reset(seed)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        let reading = self.body.step(command)?;
+        let q = self.chain.joints_from(&reading.q).unwrap();
+        let tip: Point3<f64> = self.chain.forward(&q).translation.vector.into();
+        self.track.lock().unwrap().push((clock::now_s(), tip));
+        Ok(reading)
+    }
+
+    fn brake(&mut self) {
+        self.body.brake();
+    }
+}
+
+/// What an explorer sends and receives passes only while it is not cut.
+#[derive(Clone, Default)]
+pub struct Wire {
+    pub cuts_sent: Arc<AtomicBool>,
+    pub cuts_received: Arc<AtomicBool>,
+}
+
+/// An explorer's end behind a wire.
+struct Wired {
+    end: Memory,
+    wire: Wire,
+}
+
+impl Transport for Wired {
+    fn waker(&self) -> Waker {
+        self.end.waker()
+    }
+
+    fn send(&mut self, packet: &Packet) -> Result<(), TransportError> {
+        match self.wire.cuts_sent.load(Ordering::Relaxed) {
+            true => Ok(()),
+            false => self.end.send(packet),
+        }
+    }
+
+    fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
+        let is_cut = Arc::clone(&self.wire.cuts_received);
+        self.end.receive(timeout, &mut |delivery| {
+            if !is_cut.load(Ordering::Relaxed) {
+                take(delivery);
+            }
+        });
+    }
+
+    fn publisher_count(&self, topic: Topic) -> usize {
+        self.end.publisher_count(topic)
+    }
+
+    fn is_served(&mut self, service: &Service) -> bool {
+        self.end.is_served(service)
+    }
+
+    fn call(&mut self, service: &Service) -> Result<(), TransportError> {
+        match self.wire.cuts_sent.load(Ordering::Relaxed) {
+            true => Ok(()),
+            false => self.end.call(service),
+        }
+    }
+
+    fn answer(&mut self, service: &Service, call: u64, it: &Answer) -> Result<(), TransportError> {
+        self.end.answer(service, call, it)
+    }
+}
+
+/// How a movement ended after some time.
+#[derive(Clone, Copy, Debug)]
+pub struct Rest {
+    /// Time until the tip moved no more.
+    pub time_s: f64,
+    /// Length of the tip's path until then.
+    pub path_m: f64,
+}
+
+impl Rig {
+    pub fn new(
+        scene: &str,
+        settings: BackendSettings,
+        failures: &[(&str, f64, Option<f64>)],
+    ) -> Self {
+        Self::with(scene, &[], settings, failures)
+    }
+
+    pub fn with(
+        scene: &str,
+        sets: &[&str],
+        settings: BackendSettings,
+        failures: &[(&str, f64, Option<f64>)],
+    ) -> Self {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        let mut scene = Scene::load(Path::new(scene), &sets).unwrap();
+        scene.effects.wrench = Some(WrenchEffect::default());
+        let simulator = Simulator::new(Arc::new(Environment::build(scene).unwrap())).unwrap();
+        let (hub, stop) = (Hub::default(), Arc::new(AtomicBool::new(false)));
+        let events = Arc::new(Mutex::new(Vec::new()));
+        let injections: Vec<Injection> = failures
+            .iter()
+            .map(|&(name, at_s, for_s)| Injection { failure: by_name(name).unwrap(), at_s, for_s })
+            .collect();
+        let chain = simulator.environment().chain().unwrap();
+        let track = Track::default();
+        let body = Tracked {
+            body: simulator.body().unwrap().unwrap(),
+            chain: chain.clone(),
+            track: Arc::clone(&track),
+        };
+        let (end, stopped, told) = (hub.clone(), Arc::clone(&stop), Arc::clone(&events));
+        let settings_of_arm = settings.clone();
+        let thread = std::thread::spawn(move || {
+            let connect = Box::new(move || Ok(Box::new(end.end(Side::Arm)) as _));
+            let mut twin =
+                Twin::new(Box::new(body), &chain, &settings_of_arm, connect, injections, 0)
+                    .unwrap();
+            twin.run(&stopped, &mut |at_s, event| told.lock().unwrap().push((at_s, event)))
+                .unwrap();
+        });
+        let (thread, wire) = (Some(thread), Wire::default());
+        Self { simulator, settings, hub, stop, thread, events, track, wire }
+    }
+
+    pub fn lab(&self) -> Result<Arc<Lab>, LinkFault> {
+        let (end, wire) = (self.hub.end(Side::Explorer), self.wire.clone());
+        let connect = Box::new(move || Ok(Box::new(Wired { end, wire }) as _));
+        Lab::connect(&self.settings, &self.simulator.environment().chain().unwrap(), connect)
+    }
+
+    /// Touches over places at these fractions of the zone, until one fails.
+    pub fn touch(&self, lab: &Arc<Lab>, places: &[[f64; 2]]) -> Vec<Result<Touch, Fault>> {
+        let task = self.simulator.environment().task();
+        let body = Box::new(lab.body());
+        let mut servo = match self.simulator.servo_within(body, 0, &self.settings.interlocks) {
+            Ok(servo) => servo,
+            Err(fault) => return vec![Err(fault)],
+        };
+        let mut touches = Vec::new();
+        for place in places {
+            let touch = servo.touch(&task.approach(&task.zone().at(place)));
+            let failed = touch.is_err();
+            touches.push(touch);
+            if failed {
+                break;
+            }
+        }
+        touches
+    }
+
+    pub fn saw(&self, is_it: impl Fn(&Event) -> bool) -> bool {
+        self.events.lock().unwrap().iter().any(|(_, event)| is_it(event))
+    }
+
+    /// When the first failure began.
+    pub fn failed_s(&self) -> f64 {
+        let events = self.events.lock().unwrap();
+        let begins = |event: &Event| matches!(event, Event::Failure { is_on: true, .. });
+        events.iter().find(|(_, event)| begins(event)).unwrap().0
+    }
+
+    /// Length of the tip's path in the last `span`.
+    pub fn path_m(&self, span: Duration) -> f64 {
+        let since_s = clock::now_s() - span.as_secs_f64();
+        let track = self.track.lock().unwrap();
+        let after: Vec<_> = track.iter().filter(|(at_s, _)| *at_s >= since_s).collect();
+        after.windows(2).map(|pair| (pair[1].1 - pair[0].1).norm()).sum()
+    }
+
+    /// Waits until it has moved for `span`; the time then.
+    pub fn wait_until_it_moves(&self, span: Duration) -> f64 {
+        while !self.saw(|event| *event == Event::Moving) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        std::thread::sleep(span);
+        clock::now_s()
+    }
+
+    /// How the tip came to rest after `since_s`. It must be at rest now.
+    pub fn rest(&self, since_s: f64) -> Rest {
+        let track = self.track.lock().unwrap();
+        let after: Vec<_> = track.iter().filter(|(at_s, _)| *at_s >= since_s).collect();
+        let (end_s, end) = after.last().unwrap();
+        let is_near = |tip: &Point3<f64>| (tip - end).norm() < STILL_M;
+        let moving = after.iter().rposition(|(_, tip)| !is_near(tip));
+        let rest = moving.map_or(0, |last| last + 1);
+        let (rest_s, _) = after[rest];
+        assert!(end_s - rest_s > 0.1, "the tip still moves");
+        let path_m = after[..=rest].windows(2).map(|pair| (pair[1].1 - pair[0].1).norm()).sum();
+        Rest { time_s: rest_s - since_s, path_m }
+    }
+}
+
+/// The tip is at rest from when it stays this near to where it ends: the sag of servos is below.
+const STILL_M: f64 = 1e-4;
+
+impl Drop for Rig {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        let joined = self.thread.take().unwrap().join();
+        assert!(joined.is_ok() || std::thread::panicking());
+    }
+}
+
+/// For machines that run many tests at a time: what is tested is not how old something may be.
+pub fn patient() -> BackendSettings {
+    let mut settings = BackendSettings { patience_s: 20.0, ..BackendSettings::default() };
+    let topics = &mut settings.topics;
+    (topics.joints.age_s, topics.wrench.age_s, topics.tactile.age_s) = (0.4, 0.4, 0.4);
+    (topics.status.age_s, topics.command.age_s) = (1.0, 0.3);
+    settings.interlocks.wrench_silence_s = 0.5;
+    settings
+}
