@@ -84,6 +84,7 @@ pub trait Backend: Send {
     /// A fault ends the touch; the body is left at rest.
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault>;
 
-    /// Closes the brakes for the next step, which is told to stand still; without brakes, nothing.
+    /// Stops by the brakes instead of the servos: a simulated arm for its next step, which commands
+    /// it to stand still; an arm behind topics until an operator clears it. Without brakes, nothing.
     fn brake(&mut self) {}
 }

@@ -24,7 +24,7 @@ use std::sync::Arc;
 Examples:
   palpate register scenes/container_pa10.toml --ball 0.02 --at 0,-0.65,0.5
   palpate register scenes/container_pa10.toml --plate 0,1,0 --at 0,-0.65,0.5 --touches 60
-  palpate register experiments/container_pa10.toml --set backend.kind='\"ros2\"' --ball 0.02 --at 0,-0.65,0.5
+  palpate register experiments/real_arm.toml --ball 0.02 --at 0,-0.65,0.5
 
 Touches the ball or plate from many sides with many places of the finger, and writes registration.toml: \
 arm.tool_position_m and arm.tool_rotation_deg for the scene, where the body stands, and how sure each is.")]

@@ -1,6 +1,6 @@
 //! `palpate twin`.
 
-use super::find::{SCENES, find};
+use super::find::{EXPERIMENTS, SCENES, find};
 use super::known_body::KnownBodyArgs;
 use super::prepare::{environment, simulator};
 use super::progress::stop_on_interrupt;
@@ -21,12 +21,12 @@ use std::sync::Arc;
 
 const HELP: &str = "\
 Examples:
-  palpate twin experiments/container_pa10.toml
+  palpate twin real_arm
   palpate twin scenes/container_pa10.toml --domain 7 --seed 3
   palpate twin scenes/bird_pa10.toml --inject force_spike@12 --inject estop@20+2
   palpate twin scenes/container_pa10.toml --ball 0.02 --at 0.003,-0.652,0.501
 
-In another terminal: palpate run container_pa10 --set backend.kind='\"ros2\"'
+In another terminal: palpate run real_arm
 
 Serves the simulated arm over the topics of the experiment's [backend] in real time, with what an arm's own \
 computer does: a command that is late, garbled or of a second publisher stops the arm. Events are printed as \
@@ -41,7 +41,8 @@ fn failures() -> String {
 #[derive(clap::Args)]
 #[command(after_help = format!("{HELP}\n\nFailures:\n{}", failures()))]
 pub(super) struct Args {
-    /// A scene or an experiment (.toml) with a body that moves and a soft finger.
+    /// An experiment or a scene (.toml, or the name of a shipped one) whose body moves and whose finger is
+    /// soft.
     path: PathBuf,
     /// In place of the scene's object: what `register` touches.
     #[command(flatten)]
@@ -131,7 +132,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
 const TOUCHES: u32 = 1;
 
 fn experiment(args: &Args) -> anyhow::Result<Experiment> {
-    let path = find(&args.path, SCENES)?;
+    let path = find(&args.path, EXPERIMENTS).or_else(|_| find(&args.path, SCENES))?;
     let mut experiment = match is_experiment(&path) {
         true => Experiment::load(&path, &args.set)?,
         false => Experiment::on(&Scene::load(&path, &args.set)?, &["active"], 1, TOUCHES),

@@ -21,7 +21,7 @@ const ENDED: &[(&[&str], &str)] = &[
     (&["swapped_names"], "farther than it can"),
     (&["future"], "in the future"),
     (&["unstamped"], "its stamp is zero, so its age is unknown; stamp it, or set backend.accept"),
-    (&["backward"], "were dropped because their stamps ran backwards"),
+    (&["backward"], BACKWARD),
     (&["no_joints"], "nothing new on /joint_states"),
     (&["no_wrench"], "nothing new on /ft_sensor/wrench"),
     (&["no_tactile"], "nothing new on /biotac_pub"),
@@ -38,6 +38,15 @@ const ENDED: &[(&[&str], &str)] = &[
     (&["no_flags"], "message on /pa10/status refused: servo_on is missing; allowed are true/false"),
     (&["unknown_flag"], "message on /pa10/status refused: estop is \"unknown\"; allowed are"),
 ];
+
+/// What is said of messages dropped for their stamps.
+const BACKWARD: &str = "were dropped because their stamps ran backwards";
+
+/// Whether the explorer said what it must. Of a fast arm whose joint states are dropped it may see
+/// first that the joints stand still.
+fn is_said(said: &str, says: &str) -> bool {
+    said.contains(says) || says == BACKWARD && said.contains("joint standstill of ")
+}
 
 /// Each failure from some time after the first movement on.
 fn injected<'a>(names: &[&'a str], at_s: f64) -> Vec<(&'a str, f64, Option<f64>)> {
@@ -214,7 +223,7 @@ fn after_every_failure_the_tip_moves_ten_millimetres_at_most() {
         let rig = rig(speed_m_s, &injected(names, 0.5));
         let touches = rig.touch(&rig.lab().unwrap(), &[[0.1, 0.1], [0.9, 0.9]]);
         let Some(Err(fault)) = touches.last() else { panic!("{names:?}: {touches:?}") };
-        assert!(fault.to_string().contains(says), "{names:?}: {fault}");
+        assert!(is_said(&fault.to_string(), says), "{names:?}: {fault}");
         sleep(Duration::from_millis(500));
         let what = format!("{} at {:.0} mm/s", names.join(", "), 1e3 * speed_m_s);
         far.extend(told(&what, rig.rest(rig.failed_s()), &fault.to_string()));

@@ -290,7 +290,13 @@ impl Backend for Interlocked {
         }
         match self.judge() {
             Ok(()) => Ok(&self.reading),
-            Err(trip) => Err(self.trip(trip)),
+            Err(trip) => {
+                // Where readings cannot be trusted, nothing watches how the servos brake.
+                if trip.interlock != force::NAME && self.inner.capabilities().real_time {
+                    self.inner.brake();
+                }
+                Err(self.trip(trip))
+            }
         }
     }
 }

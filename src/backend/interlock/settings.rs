@@ -46,7 +46,7 @@ pub struct InterlockSettings {
     /// Longest without a tactile frame.
     pub frame_silence_s: f64,
     /// Stop a real body if an electrode, or a joint that is commanded to move, has read the same
-    /// value for this long: ten tactile frames.
+    /// value for this long: seven tactile frames.
     pub frozen_s: f64,
     /// Largest velocity tracking error of a joint, as a share of its largest velocity.
     #[serde(alias = "follow_share")]
@@ -85,9 +85,9 @@ impl Default for InterlockSettings {
             torque_limit_nm: None,
             force_rate_n_s: 2000.0,
             joint_silence_s: 0.04,
-            wrench_silence_s: 0.1,
+            wrench_silence_s: 0.07,
             frame_silence_s: 0.2,
-            frozen_s: 0.1,
+            frozen_s: 0.07,
             tracking_error_ratio: 0.3,
             tracking_error_s: 0.2,
             tracking_lag_s: 0.1,

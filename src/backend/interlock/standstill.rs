@@ -12,7 +12,7 @@ pub const ENTRY: Entry = Entry {
     make: |_, settings, capabilities| {
         let standstill = Standstill {
             frozen_s: settings.frozen_s,
-            silence_s: settings.joint_silence_s,
+            blind_s: BLIND_SHARE * settings.joint_silence_s,
             since_s: [None; MAX_JOINTS],
         };
         capabilities.real_time.then(|| Box::new(standstill) as _)
@@ -25,13 +25,16 @@ const NAME: &str = "joint standstill";
 // heuristic: three steps of an encoder of 1e-4 rad at a reach of 1 m.
 const SEEN_M: f64 = 3e-4;
 
-/// Movement of any point of the robot after which no longer is waited than for a silent joint.
-// heuristic: with the way on which the arm then brakes from 0.1 m/s, below 10 mm.
+/// Movement of any point of the robot after which it is stopped sooner, and how soon, as a share of
+/// the time after which joints count as silent.
+// heuristic: with the way on which the arm then brakes from 0.1 m/s, below 10 mm; and later than the
+// age limit of 50 ms of joint states over topics, so that a silent topic is reported as one.
 const BLIND_M: f64 = 5e-3;
+const BLIND_SHARE: f64 = 1.5;
 
 struct Standstill {
     frozen_s: f64,
-    silence_s: f64,
+    blind_s: f64,
     /// Since when each joint has been commanded without a change of its position.
     since_s: [Option<f64>; MAX_JOINTS],
 }
@@ -48,7 +51,7 @@ impl Interlock for Standstill {
             }
             let found = now.time_s - *since_s.get_or_insert(now.time_s - now.period_s);
             let unseen_m = unseen.abs() * reach_m;
-            let limit = if unseen_m > BLIND_M { self.silence_s } else { self.frozen_s };
+            let limit = if unseen_m > BLIND_M { self.blind_s } else { self.frozen_s };
             if unseen_m > SEEN_M && found > limit {
                 let (part, unit) = (joint.name.into(), "s");
                 return Err(Trip { interlock: NAME, part, found, limit, unit });

@@ -406,4 +406,8 @@ impl Backend for LabArm {
             Err(cause) => Err(self.fault(cause)),
         }
     }
+    /// Calls the stop of the arm's side, without waiting for its answer.
+    fn brake(&mut self) {
+        self.lab.link.call(Service::Stop);
+    }
 }

@@ -73,13 +73,13 @@ const USUAL: [Usual; 5] = [
         name: "/ft_sensor/wrench",
         types: &[WrenchStamped::<Header>::DEFINITION.name],
         rate_hz: 500.0,
-        age_s: 0.1,
+        age_s: 0.06,
     },
     Usual {
         name: "/biotac_pub",
         types: &[BioTacHand::<Header>::DEFINITION.name, BiotacAll::<Header>::DEFINITION.name],
         rate_hz: 100.0,
-        age_s: 0.1,
+        age_s: 0.08,
     },
     Usual {
         name: "/pa10/status",
