@@ -1,14 +1,15 @@
 //! What must hold before a body is moved.
 
 use crate::common::fake::{World, body_of};
+#[cfg(feature = "mujoco")]
 use crate::common::program::{palpate, said};
 use crate::common::shipped;
 use palpate::backend::Reading;
 use palpate::backend::interlock::{Expected, GateError, GateSettings, check_start};
 use palpate::robot::arm::ArmSettings;
 use palpate::sim::simulator::Simulator;
-use std::fs;
-use std::path::Path;
+#[cfg(feature = "mujoco")]
+use std::{fs, path::Path};
 
 fn checked(breaks: fn(u64, &mut Reading)) -> Result<(), GateError> {
     let chain = ArmSettings::default().chain();
@@ -88,6 +89,7 @@ fn counts(reading: &mut Reading, change: fn(&mut [f64; 19])) {
 }
 
 /// A real robot needs its cell and depths from a person; a simulation takes them from the mesh.
+#[cfg(feature = "mujoco")]
 #[test]
 fn what_protects_a_real_robot_is_asked_for_before_anything_moves() {
     let folder = tempfile::tempdir().unwrap();
@@ -124,8 +126,8 @@ fn what_protects_a_real_robot_is_asked_for_before_anything_moves() {
     assert!(!Path::new(out).exists());
 }
 
-/// Another program that holds the folder, and a fault that nobody cleared, are found before the
-/// arm is looked for.
+/// Another program that holds the folder is found before the arm is looked for.
+#[cfg(feature = "mujoco")]
 #[test]
 fn a_folder_that_may_not_be_used_is_refused_before_the_arm_is_looked_for() {
     let folder = tempfile::tempdir().unwrap();

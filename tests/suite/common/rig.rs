@@ -37,6 +37,7 @@ pub struct Rig {
     pub simulator: Simulator,
     pub settings: BackendSettings,
     pub hub: Hub,
+    #[cfg_attr(not(feature = "mujoco"), allow(dead_code))]
     pub events: Arc<Mutex<Vec<(f64, Event)>>>,
     pub wire: Wire,
     track: Track,
@@ -127,6 +128,7 @@ impl Transport for Wired {
     }
 }
 
+#[cfg(feature = "mujoco")]
 /// How a movement ended after some time.
 #[derive(Clone, Copy, Debug)]
 pub struct Rest {
@@ -208,10 +210,12 @@ impl Rig {
         touches
     }
 
+    #[cfg(feature = "mujoco")]
     pub fn saw(&self, is_it: impl Fn(&Event) -> bool) -> bool {
         self.events.lock().unwrap().iter().any(|(_, event)| is_it(event))
     }
 
+    #[cfg(feature = "mujoco")]
     /// When the first failure began.
     pub fn failed_s(&self) -> f64 {
         let events = self.events.lock().unwrap();
@@ -227,6 +231,7 @@ impl Rig {
         after.windows(2).map(|pair| (pair[1].1 - pair[0].1).norm()).sum()
     }
 
+    #[cfg(feature = "mujoco")]
     /// Waits until it has moved for `span`; the time then.
     pub fn wait_until_it_moves(&self, span: Duration) -> f64 {
         while !self.saw(|event| *event == Event::Moving) {
@@ -236,6 +241,7 @@ impl Rig {
         clock::now_s()
     }
 
+    #[cfg(feature = "mujoco")]
     /// How the tip came to rest after `since_s`. It must be at rest now.
     pub fn rest(&self, since_s: f64) -> Rest {
         let track = self.track.lock().unwrap();
@@ -251,6 +257,7 @@ impl Rig {
     }
 }
 
+#[cfg(feature = "mujoco")]
 /// The tip is at rest from when it stays this near to where it ends: the sag of servos is below.
 const STILL_M: f64 = 1e-4;
 
