@@ -8,13 +8,14 @@
 mod curves;
 
 use curves::{Curve, draw, print, seconds};
-use palpate::explore::around::{Belief, Scope, SpaceSettings};
+use palpate::explore::around::SpaceSettings;
+use palpate::explore::belief::Belief;
+use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
 use palpate::math::seed::stream;
 use palpate::report::style;
 use palpate::sim::probe::exact;
 use palpate::sim::{Environment, Scene};
-use palpate::task::Aim;
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
@@ -30,12 +31,11 @@ fn main() -> anyhow::Result<()> {
     let scene = Scene::load(&root.join("scenes/suite/around/mug.toml"), &[])?;
     let environment = Arc::new(Environment::build(scene)?);
     let (task, finger) = (environment.task(), &environment.scene().finger);
-    let scope = Scope::of(task, finger, false).ok_or(anyhow::anyhow!("no ball"))?;
-    let mut belief = Belief::new(scope, SpaceSettings::default());
-    let make = |name| planner::by_name(name).and_then(|entry| entry.make_around);
-    let make = |name| make(name).ok_or(anyhow::anyhow!("{name} does not go around"));
-    let mut planner = make("active")?(&Default::default(), stream(1, 0, "active"));
-    let mut begin = make("sobol")?(&Default::default(), stream(1, 0, "begin"));
+    let gp = GpSettings::default();
+    let mut belief = Belief::new(task, (finger, false), &gp, &SpaceSettings::default());
+    let make = |name| planner::by_name(name).ok_or(anyhow::anyhow!("no planner {name}"));
+    let mut planner = (make("active")?.make)(&Default::default(), stream(1, 0, "active"));
+    let mut begin = (make("sobol")?.make)(&Default::default(), stream(1, 0, "begin"));
     let mut probe = exact(Arc::clone(&environment));
     let curve = |name, colour, expected| Curve { name, colour, expected, values: Vec::new() };
     let mut refit = curve("update with refit", "#0072b2", 3.0);
@@ -43,13 +43,12 @@ fn main() -> anyhow::Result<()> {
     let mut both = curve("both", style::TRUTH, 3.0);
     let mut mesh = curve("mesh, 64 cells along a side", "#e69f00", 1.0);
     for count in 1..=COUNTS[COUNTS.len() - 1] {
-        let plan = if count <= 5 { begin.plan(&belief) } else { planner.plan(&belief) };
-        let aim = Aim::of(&plan.target).ok_or(anyhow::anyhow!("no aim"))?;
+        let plan = if count <= 5 { begin.plan(&belief) } else { planner.plan(&belief) }?;
         let approach = task.approach(&plan.target);
         let touch = probe.touch(&approach)?;
         let before = belief.clone();
         let update = |belief: &mut Belief| {
-            belief.observe(&aim, &approach, (&touch, probe.swept().as_ref()));
+            belief.observe(&plan.target, &approach, (&touch, probe.swept().as_ref()));
             belief.refit().map(|_| ())
         };
         update(&mut belief)?;
@@ -65,13 +64,14 @@ fn main() -> anyhow::Result<()> {
             let _ = black_box(update(&mut again));
         });
         let chosen = seconds(|| {
-            black_box(planner.plan(&belief));
+            let _ = black_box(planner.plan(&belief));
         });
         refit.values.push((n, updated - copied));
         choice.values.push((n, chosen));
         both.values.push((n, updated - copied + chosen));
         let meshed = seconds(|| {
-            black_box(belief.surface().and_then(|surface| surface.mesh(CELLS)));
+            let surface = belief.implicit_surface().and_then(|belief| belief.surface());
+            black_box(surface.and_then(|surface| surface.mesh(CELLS)));
         });
         mesh.values.push((n, meshed));
     }

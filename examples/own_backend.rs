@@ -5,7 +5,7 @@
 
 use nalgebra::{Point3, Vector3};
 use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
-use palpate::explore::belief::Belief;
+use palpate::explore::belief::{Belief, HeightField};
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
 use palpate::explore::planner::PlanningSettings;
@@ -95,19 +95,19 @@ pub fn task_and_robot() -> Result<(Task, Robot), palpate::task::TaskError> {
 }
 
 /// Explores with as many touches; the belief, and the largest error of a contact.
-pub fn explore(touches: usize) -> Result<(Belief, f64), Box<dyn std::error::Error>> {
+pub fn explore(touches: usize) -> Result<(HeightField, f64), Box<dyn std::error::Error>> {
     let (task, robot) = task_and_robot()?;
     let body = Slides::new(&robot);
     let mut servo = Servo::new(robot, task.touch().clone(), Box::new(body), 0)?;
-    let mut belief = Belief::new(task.zone().clone(), GpSettings::default());
+    let mut belief = HeightField::new(task.zone().clone(), GpSettings::default());
     let active = planner::by_name("active").ok_or("no such planner")?;
     let random = seed::stream(1, 0, active.name);
-    let mut planner = (active.make)(task.zone(), &PlanningSettings::default(), random);
+    let mut planner = (active.make)(&PlanningSettings::default(), random);
     let mut worst_m: f64 = 0.0;
     for count in 0..touches {
         let target = match count {
             0 => task.zone().at(&[0.3, 0.6]),
-            _ => planner.plan(&belief).target,
+            _ => planner.plan(&Belief::from(belief.clone()))?.target,
         };
         let touch = servo.touch(&task.approach(&target))?;
         if let Touch::Contact(contact) = &touch {

@@ -3,27 +3,25 @@
 //! `cargo run --release --example own_planner`
 
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::belief::Belief;
-use palpate::explore::planner::{self, Entry, Plan, Planner};
+use palpate::explore::belief::HeightField;
+use palpate::explore::planner::{self, Entry, Plan, ZonePlanner, over_zone};
 use palpate::gp::posterior::Scratch;
-use palpate::task::Zone;
 
 /// Of a few places drawn at random, touches the one of which the belief is least sure.
 struct BestOfSome {
-    zone: Zone,
     rng: rand_chacha::ChaCha8Rng,
 }
 
 /// Places that are drawn; more is nearer to the largest standard deviation, and slower.
 const DRAWN: usize = 30;
 
-impl Planner for BestOfSome {
-    fn plan(&mut self, belief: &Belief) -> Plan {
+impl ZonePlanner for BestOfSome {
+    fn plan(&mut self, belief: &HeightField) -> Plan {
         let mut scratch = Scratch::default();
         let mut variance = |place: &[f64]| belief.explorable_variance(place, &mut [], &mut scratch);
-        let mut best = planner::uniform(&self.zone, &mut self.rng);
+        let mut best = planner::uniform(belief.zone(), &mut self.rng);
         for _ in 1..DRAWN {
-            let place = planner::uniform(&self.zone, &mut self.rng);
+            let place = planner::uniform(belief.zone(), &mut self.rng);
             if variance(&place) > variance(&best) {
                 best = place;
             }
@@ -37,8 +35,8 @@ impl Planner for BestOfSome {
 pub static ENTRY: Entry = Entry {
     name: "best_of_some",
     about: "the least sure of thirty random places",
-    make: |zone, _, rng| Box::new(BestOfSome { zone: zone.clone(), rng }),
-    make_around: None,
+    zone_only: Some("it draws places of a zone"),
+    make: |_, rng| over_zone(BestOfSome { rng }),
 };
 
 /// Mean RMSE after the last touch of a few trials on the toy.

@@ -2,13 +2,14 @@
 
 use crate::ball::Ball;
 use crate::errors;
-use crate::known::Known;
+use crate::known::{Known, target_numbers};
 use crate::mesh::triangles_of;
 use crate::places::{Places, rows, seen_at};
 use crate::zone::Zone;
 use nalgebra::Point3;
 use numpy::{PyArray1, PyArray2, PyArrayDyn};
-use palpate::explore::{around, belief};
+use palpate::explore::around::ImplicitSurface;
+use palpate::explore::belief::HeightField;
 use palpate::gp::Posterior;
 use palpate::task::Aim;
 use pyo3::prelude::*;
@@ -30,17 +31,19 @@ type Solid<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'
 type Field<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>);
 
 impl Belief {
-    fn over_zone(&self, name: &str) -> PyResult<&belief::Belief> {
+    fn over_zone(&self, name: &str) -> PyResult<&HeightField> {
         match &self.0 {
-            Known::Zone(belief) => Ok(belief),
-            Known::Around(_) => Err(errors::not_around(name, "mesh(cells), field(points), ball")),
+            Known::HeightField(belief) => Ok(belief),
+            Known::ImplicitSurface(_) => {
+                Err(errors::not_around(name, "mesh(cells), field(points), ball"))
+            }
         }
     }
 
-    fn around(&self, name: &str) -> PyResult<&around::Belief> {
+    fn around(&self, name: &str) -> PyResult<&ImplicitSurface> {
         match &self.0 {
-            Known::Around(belief) => Ok(belief),
-            Known::Zone(_) => {
+            Known::ImplicitSurface(belief) => Ok(belief),
+            Known::HeightField(_) => {
                 Err(errors::not_over_zone(name, "mean(points), variance(points), zone"))
             }
         }
@@ -49,7 +52,7 @@ impl Belief {
     fn told<'py>(
         &self,
         points: &Bound<'py, PyAny>,
-        (belief, posterior): (&belief::Belief, Option<&Posterior>),
+        (belief, posterior): (&HeightField, Option<&Posterior>),
         of: impl FnOnce(&Posterior, &[Vec<f64>]) -> Vec<f64> + Send,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let places = Places::of(points, belief.zone().dimension())?;
@@ -63,7 +66,7 @@ impl Belief {
     fn gradients<'py>(
         &self,
         points: &Bound<'py, PyAny>,
-        (belief, posterior): (&belief::Belief, Option<&Posterior>),
+        (belief, posterior): (&HeightField, Option<&Posterior>),
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let dimension = belief.zone().dimension();
         let places = Places::of(points, dimension)?;
@@ -147,7 +150,7 @@ impl Belief {
     /// Every target asked for so far, shape (n, d), metres; around an object (n, 6).
     #[getter]
     fn targets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let (targets, width) = self.0.targets();
+        let (targets, width) = (self.0.targets(), target_numbers(&self.0));
         rows(py, &targets, width)
     }
 
@@ -238,7 +241,7 @@ impl Belief {
     }
 
     fn __repr__(&self) -> String {
-        let (targets, _) = self.0.targets();
+        let targets = self.0.targets();
         format!("Belief({} touches)", targets.len())
     }
 }

@@ -1,13 +1,13 @@
 //! An experiment, and its run with the interpreter let go.
 
 use crate::errors;
-use crate::planner::PythonMaker;
+use crate::planner::PythonFactory;
 use crate::run::Run;
 use crate::zone::Zone;
 use palpate::experiment::runner::{self, Progress};
 use palpate::experiment::store::{self, Content, RunFolder, resolved};
 use palpate::experiment::{self, Simulation};
-use palpate::explore::planner::Maker;
+use palpate::explore::planner::PlannerFactory;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -89,8 +89,8 @@ impl Experiment {
         let (look, stop) = told;
         let makers = own
             .into_iter()
-            .map(|(name, start)| -> PyResult<Box<dyn Maker>> {
-                Ok(Box::new(PythonMaker::new(py, name, start)?))
+            .map(|(name, start)| -> PyResult<Box<dyn PlannerFactory>> {
+                Ok(Box::new(PythonFactory::new(py, name, start)?))
             })
             .collect::<PyResult<_>>()?;
         let experiment = self.0.clone();

@@ -1,10 +1,10 @@
 //! One exploration: an episode of touches, what is seen of it, and what it is worth.
 
 use crate::errors;
-use crate::known::{AIM, Known, Measured, True};
+use crate::known::{self, AIM, Known, Measured, True};
 use nalgebra::{Point3, Vector3};
 use palpate::backend::Fault;
-use palpate::explore::around::planner::{Planner, Random};
+use palpate::explore::planner::sample::any_side;
 use palpate::explore::planner::uniform;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::math::seed;
@@ -220,7 +220,7 @@ impl Exploration {
             how,
             world: Arc::clone(world),
             probe: world.simulator.probe(0)?,
-            known: Known::nothing(world.simulator.environment()),
+            known: known::nothing(world.simulator.environment()),
             random: seed::stream(0, 0, "exploration"),
             score: 0.0,
             count: 0,
@@ -243,7 +243,7 @@ impl Exploration {
         let world = &worlds[self.random.random_range(0..worlds.len())];
         let probe = world.simulator.probe(self.random.random());
         self.world = Arc::clone(world);
-        self.known = Known::nothing(world.simulator.environment());
+        self.known = known::nothing(world.simulator.environment());
         self.told = vec![0.0; self.how.touches * world.row()];
         self.believed = vec![0.0; 2 * world.grid.len()];
         (self.count, self.is_over, self.failure) = (0, false, None);
@@ -269,10 +269,10 @@ impl Exploration {
 
     fn anywhere(&mut self) -> Vec<f64> {
         match &self.known {
-            Known::Zone(belief) => uniform(belief.zone(), &mut self.random),
-            Known::Around(belief) => {
-                let random = seed::stream(self.random.random(), 0, "side");
-                Random::new(random).plan(belief).target
+            Known::HeightField(belief) => uniform(belief.zone(), &mut self.random),
+            Known::ImplicitSurface(belief) => {
+                let mut random = seed::stream(self.random.random(), 0, "side");
+                any_side(belief.scope(), &mut random).target()
             }
         }
     }
@@ -285,7 +285,7 @@ impl Exploration {
             let approach = task.approach(target);
             let touch = self.probe.touch(&approach)?;
             if self.how.believes || self.how.reward != Reward::None {
-                let swept = self.probe.swept();
+                let swept = self.probe.swept().filter(|_| self.world.is_around());
                 self.known.observe(target, &approach, (&touch, swept.as_ref()));
             }
             met = match touch {
@@ -347,12 +347,12 @@ impl Exploration {
 /// Means and variances on the grid: of heights, or of the field.
 fn believed(known: &Known, grid: &[Vec<f64>]) -> Vec<(f64, f64)> {
     match known {
-        Known::Zone(belief) => {
+        Known::HeightField(belief) => {
             let told = belief.surface().map(|it| it.predict(grid.iter().map(Vec::as_slice)));
             let told = told.into_iter().flatten();
             told.map(|told| (told.mean, told.variance)).collect()
         }
-        Known::Around(belief) => {
+        Known::ImplicitSurface(belief) => {
             let Some(surface) = belief.surface() else { return Vec::new() };
             let points_w: Vec<Point3<f64>> = grid.iter().map(|at| Point3::from_slice(at)).collect();
             let mut field = surface.field();

@@ -1,7 +1,7 @@
 //! An exploration in the hands of whoever asks: touch by touch, with the belief after each.
 
 use crate::belief::Belief;
-use crate::known::{Known, Measured, True};
+use crate::known::{self, Known, Measured, True};
 use crate::scene::{Scene, Touch};
 use crate::{errors, exploration};
 use pyo3::prelude::*;
@@ -27,7 +27,7 @@ impl Exploration {
     fn new(py: Python<'_>, scene: Py<Scene>) -> Self {
         let environment = scene.get().environment();
         let (known, truth) = py.detach(|| {
-            (Known::nothing(environment), True::of(environment, exploration::TRUTH_PER_SIDE))
+            (known::nothing(environment), True::of(environment, exploration::TRUTH_PER_SIDE))
         });
         Self { known: Mutex::new(known), truth, scene }
     }
@@ -38,7 +38,7 @@ impl Exploration {
         let fitted = py.detach(|| {
             let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
             known.observe(&target, &told.approach, (&told.touch, told.swept.as_ref()));
-            known.refit()
+            known.refit().map(|_| ())
         });
         fitted.map_err(errors::other)?;
         Ok(touch)
@@ -71,6 +71,6 @@ impl Exploration {
 
     fn __repr__(&self) -> String {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        format!("Exploration({} touches)", known.targets().0.len())
+        format!("Exploration({} touches)", known.targets().len())
     }
 }

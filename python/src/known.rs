@@ -3,81 +3,22 @@
 use palpate::experiment::metrics::Metrics;
 use palpate::experiment::shape::{ShapeMetrics, TrueShape};
 use palpate::experiment::truth::Truth;
-use palpate::explore::around::{Scope, SpaceSettings};
+use palpate::explore::around::SpaceSettings;
 use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::probe::{Swept, Touch};
-use palpate::explore::{around, belief};
-use palpate::gp::Posterior;
-use palpate::gp::covariance::CovarianceError;
 use palpate::sim::Environment;
-use palpate::task::{Aim, Approach};
 
-/// A belief. Either kind is large, and few are held at once.
-#[derive(Clone)]
-#[allow(clippy::large_enum_variant)]
-pub(crate) enum Known {
-    /// Over a zone.
-    Zone(belief::Belief),
-    /// Around an object.
-    Around(around::Belief),
+pub(crate) use palpate::explore::belief::Belief as Known;
+
+/// Nothing known yet of what is explored in `environment`, fitted as where nobody says how.
+pub(crate) fn nothing(environment: &Environment) -> Known {
+    let scene = environment.scene();
+    let finger = (&scene.finger, scene.effects.is_soft());
+    Known::new(environment.task(), finger, &GpSettings::default(), &SpaceSettings::default())
 }
 
-impl Known {
-    /// Nothing yet of what is explored in `environment`, fitted as where nobody says how.
-    pub(crate) fn nothing(environment: &Environment) -> Self {
-        let scene = environment.scene();
-        match Scope::of(environment.task(), &scene.finger, scene.effects.is_soft()) {
-            Some(scope) => Self::Around(around::Belief::new(scope, SpaceSettings::default())),
-            None => {
-                let zone = environment.task().zone().clone();
-                Self::Zone(belief::Belief::new(zone, GpSettings::default()))
-            }
-        }
-    }
-
-    /// Takes in a touch at `target`, and around an object what was swept.
-    pub(crate) fn observe(
-        &mut self,
-        target: &[f64],
-        approach: &Approach,
-        (touch, swept): (&Touch, Option<&Swept>),
-    ) {
-        match self {
-            Self::Zone(belief) => belief.observe(target, touch),
-            Self::Around(belief) => {
-                if let Some(aim) = Aim::of(target) {
-                    belief.observe(&aim, approach, (touch, swept));
-                }
-            }
-        }
-    }
-
-    /// Fits it to all touches.
-    ///
-    /// # Errors
-    /// If there is no fit.
-    pub(crate) fn refit(&mut self) -> Result<(), CovarianceError> {
-        match self {
-            Self::Zone(belief) => belief.refit().map(|_| ()),
-            Self::Around(belief) => belief.refit().map(|_| ()),
-        }
-    }
-
-    /// The Gaussian process, once fitted.
-    pub(crate) fn posterior(&self) -> Option<&Posterior> {
-        match self {
-            Self::Zone(belief) => belief.surface(),
-            Self::Around(belief) => Some(belief.surface()?.posterior()),
-        }
-    }
-
-    /// Every target asked for so far, and how many numbers each has.
-    pub(crate) fn targets(&self) -> (Vec<Vec<f64>>, usize) {
-        match self {
-            Self::Zone(belief) => (belief.targets().to_vec(), belief.zone().dimension()),
-            Self::Around(belief) => (belief.asked().iter().map(Aim::target).collect(), AIM),
-        }
-    }
+/// How many numbers a target of `known` has.
+pub(crate) fn target_numbers(known: &Known) -> usize {
+    known.height_field().map_or(AIM, |field| field.zone().dimension())
 }
 
 /// Numbers of a target around an object.
@@ -112,10 +53,10 @@ impl True {
     /// the first fit, or without a truth.
     pub(crate) fn measure(&self, known: &Known, cells: u32) -> Option<Measured> {
         match (self, known) {
-            (Self::Zone(truth), Known::Zone(belief)) => {
+            (Self::Zone(truth), Known::HeightField(belief)) => {
                 truth.compare(belief.surface()?).map(Measured::Zone)
             }
-            (Self::Around(shape), Known::Around(belief)) => {
+            (Self::Around(shape), Known::ImplicitSurface(belief)) => {
                 Some(Measured::Around(shape.as_ref()?.judge(belief.surface()?, cells)))
             }
             _ => None,

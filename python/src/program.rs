@@ -1,7 +1,8 @@
 //! The command `palpate`: the same program, with planners of Python.
 
-use crate::planner::PythonMaker;
-use palpate::explore::planner::{Maker, PLANNERS};
+use crate::planner::PythonFactory;
+use palpate::experiment::entrant;
+use palpate::explore::planner::PlannerFactory;
 use pyo3::prelude::*;
 
 /// Runs the program on arguments, of which the first is its name; returns its exit code. `bring`
@@ -11,10 +12,10 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> 
     let brought = |name: &str| {
         let start = Python::attach(|py| {
             let start = bring.call1(py, (name,));
-            let made = start.and_then(|start| PythonMaker::new(py, name.into(), start));
+            let made = start.and_then(|start| PythonFactory::new(py, name.into(), start));
             made.map_err(|error| anyhow::anyhow!("{}", error.value(py)))
         });
-        Some(start.map(|made| -> Box<dyn Maker> { Box::new(made) }))
+        Some(start.map(|made| -> Box<dyn PlannerFactory> { Box::new(made) }))
     };
     py.detach(|| palpate::cli::main_with(arguments.into_iter().map(Into::into), &brought))
 }
@@ -22,5 +23,5 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> 
 /// The names of the built-in planners.
 #[pyfunction]
 pub(crate) fn planners() -> Vec<&'static str> {
-    PLANNERS.iter().map(|entry| entry.name).collect()
+    entrant::listed().map(|(name, _)| name).collect()
 }

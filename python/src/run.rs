@@ -106,10 +106,10 @@ impl Run {
         let experiment = &self.0.experiment;
         let known = if experiment.scene.around.is_some() {
             let touches = row.touches.get(..touch as usize).unwrap_or_default();
-            whole::belief(experiment, touches).map_err(errors::other)?.map(Known::Around)
+            whole::belief(experiment, touches).map_err(errors::other)?.map(Known::from)
         } else {
             let replay = Replay::of(experiment, row, touch).map_err(errors::other)?;
-            replay.map(|replay| Known::Zone(replay.belief))
+            replay.map(|replay| Known::HeightField(replay.belief))
         };
         let none = || {
             let (made, first) = (row.touches.len(), experiment.initial_touches);

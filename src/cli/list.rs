@@ -3,8 +3,8 @@
 use super::find::{EXPERIMENTS, SCENES, find, names};
 use super::terminal::{Ending, print};
 use crate::experiment::Experiment;
+use crate::experiment::entrant;
 use crate::experiment::measure::MEASURES;
-use crate::explore::planner::PLANNERS;
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
 use schemars::schema_for;
@@ -75,7 +75,7 @@ fn scenes() -> Vec<[String; 2]> {
 
 /// Every planner with what it does.
 pub(super) fn planners() -> Vec<[String; 2]> {
-    PLANNERS.iter().map(|planner| [planner.name, planner.about].map(String::from)).collect()
+    entrant::listed().map(|(name, about)| [name, about].map(String::from)).collect()
 }
 
 fn measures() -> Vec<[String; 2]> {

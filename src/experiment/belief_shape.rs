@@ -1,7 +1,7 @@
 //! A belief and its contacts as shapes that viewers draw.
 
 use crate::backend::recording::{ColorRgba, Marker, Point, Shape};
-use crate::explore::belief::Belief;
+use crate::explore::belief::HeightField;
 use crate::gp::posterior::Posterior;
 use crate::task::Zone;
 use crate::task::zone::grid_triangles;
@@ -24,7 +24,7 @@ const CONTACT: ColorRgba = ColorRgba { r: 0.1, g: 0.1, b: 0.1, a: 1.0 };
 /// The mean of the belief over the zone as a surface, or over an interval as a line, in `W`, where
 /// there probably is one, its colour between those of the smallest and the largest standard
 /// deviation; and the contacts, as the belief has them. Before the first fit both are of no points.
-pub(super) fn shapes(zone: &Zone, belief: &Belief) -> [Marker; 2] {
+pub(super) fn shapes(zone: &Zone, belief: &HeightField) -> [Marker; 2] {
     let shape = if zone.z_m.is_some() { Shape::TriangleList } else { Shape::LineStrip };
     // The corners of triangles are where they are: their scale is none.
     let size_m = if zone.z_m.is_some() { 1.0 } else { SIZE_M };
@@ -41,7 +41,7 @@ pub(super) fn shapes(zone: &Zone, belief: &Belief) -> [Marker; 2] {
     [surface, contacts]
 }
 
-fn draw(zone: &Zone, belief: &Belief, posterior: &Posterior, surface: &mut Marker) {
+fn draw(zone: &Zone, belief: &HeightField, posterior: &Posterior, surface: &mut Marker) {
     let places = zone.grid(PER_SIDE);
     let known = belief.presence().silhouette().is_likely(places.iter().map(Vec::as_slice));
     let predictions = posterior.predict(places.iter().map(Vec::as_slice));

@@ -4,6 +4,7 @@
 //! may change on a finished run. More trials and other planners are run beside the rows that are
 //! there; rows of trials or planners that are no longer listed are kept, but not shown.
 
+use super::entrant::{self, ORACLE};
 use super::measure::{CHAMFER, Measure, RMSE};
 use super::report_settings::{ReportSettings, TOUCHES_MAX};
 use super::row::TrialId;
@@ -280,11 +281,16 @@ impl Experiment {
         }
         for (i, name) in self.planners.iter().enumerate() {
             let key = format!("planners[{i}]");
-            let goes = planner::by_name(name).is_none_or(|entry| entry.make_around.is_some());
-            rules.require(&key, name, goes, || {
-                let around = planner::PLANNERS.iter().filter(|entry| entry.make_around.is_some());
-                let names: Vec<&str> = around.map(|entry| entry.name).collect();
-                format!("a planner that goes around an object: {}", names.join(", "))
+            let entry = planner::by_name(name);
+            let why = entry.and_then(|entry| entry.zone_only);
+            rules.require(&key, name, why.is_none(), || {
+                let around = planner::PLANNERS.iter().filter(|entry| entry.zone_only.is_none());
+                let names: Vec<&str> = around.map(|entry| entry.name).chain([ORACLE]).collect();
+                let why = why.unwrap_or_default();
+                format!(
+                    "a planner that goes around an object: {} ({name}: {why})",
+                    names.join(", ")
+                )
             });
         }
         for (key, count) in [
@@ -316,13 +322,13 @@ impl Checked for Experiment {
                 .into()
         });
         rules.require("planners", "[]", !self.planners.is_empty(), || {
-            planner::allowed("").join(", ")
+            entrant::allowed("").join(", ")
         });
         for (i, name) in self.planners.iter().enumerate() {
-            rules.one_of(&format!("planners[{i}]"), name, &planner::allowed(name));
+            rules.one_of(&format!("planners[{i}]"), name, &entrant::allowed(name));
             let first = !self.planners[..i].contains(name);
             rules.require(&format!("planners[{i}]"), name, first, || "each name once".into());
-            let is_seen = name != planner::ORACLE || self.backend.kind == BackendKind::Simulated;
+            let is_seen = name != ORACLE || self.backend.kind == BackendKind::Simulated;
             rules.require(&format!("planners[{i}]"), name, is_seen, || {
                 "planners that need not know how a touch will end, or a simulated backend".into()
             });

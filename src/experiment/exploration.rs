@@ -1,58 +1,143 @@
-//! What a trial does between touches, whatever is explored: believe, plan, be compared.
+//! What a trial does between touches: believe, plan, be compared.
 
+use super::entrant::{Chooser, Entrant};
+use super::experiment::Experiment;
+use super::oracle::GroundTruth;
+use super::outline::Outline;
 use super::row::{TouchRow, VerificationRows};
-use crate::explore::around;
-use crate::explore::belief;
-use crate::explore::plan::{Plan, Undecided};
+use super::verification::verify;
+use crate::explore::belief::{Belief, HeightField};
+use crate::explore::planner::{self, Plan, PlanError, PlannerFactory};
 use crate::explore::probe::{Probe, Swept, Touch};
 use crate::gp::covariance::CovarianceError;
+use crate::math::seed;
 use crate::task::Approach;
 
-/// What is known in a trial.
-#[derive(Clone, Copy)]
-pub enum Known<'a> {
-    /// Of one side of an object.
-    Zone(&'a belief::Belief),
-    /// Of a whole one.
-    Around(&'a around::Belief),
+/// One trial's belief, and what chooses its touches.
+pub(super) struct Exploration<'a> {
+    experiment: &'a Experiment,
+    truth: &'a GroundTruth<'a>,
+    trial: u32,
+    /// Of the initial touches: random places of a zone, evenly spread directions at an object.
+    start: Chooser,
+    chooser: Chooser,
+    belief: Belief,
 }
 
-/// One trial's belief and planner.
-pub(super) trait Exploration {
-    /// One of the touches that every planner starts with.
-    fn start(&mut self) -> Plan;
+impl<'a> Exploration<'a> {
+    /// Of `trial` of an entrant.
+    ///
+    /// # Errors
+    /// If the entrant cannot explore what the experiment explores, in words.
+    pub(super) fn new(
+        experiment: &'a Experiment,
+        truth: &'a GroundTruth<'a>,
+        entrant: Entrant,
+        trial: u32,
+    ) -> Result<Self, String> {
+        let stream = |purpose| seed::stream(experiment.seed, trial.into(), purpose);
+        let scene = truth.environment.scene();
+        let finger = (&scene.finger, scene.effects.is_soft());
+        let (gp, space) = (&experiment.gp, &experiment.space);
+        let belief = Belief::new(truth.environment.task(), finger, gp, space);
+        let (is_around, name) = (belief.implicit_surface().is_some(), entrant.name());
+        if let Some(why) = entrant.zone_only().filter(|_| is_around) {
+            return Err(format!("planner `{name}` does not go around an object: {why}"));
+        }
+        let start = planner::by_name(if is_around { "sobol" } else { "random" });
+        let start = start.ok_or("no planner for the initial touches")?;
+        let start = start.make(&experiment.planning, stream("initial touches"));
+        let chooser = entrant.make(&experiment.planning, stream(name));
+        Ok(Self { experiment, truth, trial, start: Chooser::Planner(start), chooser, belief })
+    }
 
-    /// What the planner asks for.
+    /// One of the touches that every planner starts with.
+    pub(super) fn start(&mut self) -> Result<Plan, PlanError> {
+        self.start.plan(&self.belief, self.truth)
+    }
+
+    /// The touch that the entrant chooses.
     ///
     /// # Errors
     /// If it names no target.
-    fn decide(&mut self) -> Result<Plan, Undecided>;
+    pub(super) fn plan(&mut self) -> Result<Plan, PlanError> {
+        self.chooser.plan(&self.belief, self.truth)
+    }
 
-    /// Takes in a touch.
-    fn observe(
+    /// Adds a touch.
+    pub(super) fn observe(
         &mut self,
         target: &[f64],
         approach: &Approach,
-        touch: &Touch,
-        swept: Option<&Swept>,
-    );
+        touched: (&Touch, Option<&Swept>),
+    ) {
+        self.belief.observe(target, approach, touched);
+    }
 
     /// Whether contact normals stand in the rows, because they are observed.
-    fn writes_normals(&self) -> bool;
+    pub(super) fn writes_normals(&self) -> bool {
+        self.experiment.gp.normals || self.belief.implicit_surface().is_some()
+    }
 
     /// Whether the places where contacts left the tip do.
-    fn writes_tips(&self) -> bool;
+    pub(super) fn writes_tips(&self) -> bool {
+        self.experiment.gp.free_space || self.belief.implicit_surface().is_some()
+    }
 
     /// Fits the belief, and writes it into `row` with how it compares with the truth.
     ///
     /// # Errors
     /// If there is no fit.
-    fn conclude(&mut self, row: &mut TouchRow, is_last: bool) -> Result<(), CovarianceError>;
+    pub(super) fn conclude(
+        &mut self,
+        row: &mut TouchRow,
+        is_last: bool,
+    ) -> Result<(), CovarianceError> {
+        let fitted = self.belief.refit().cloned();
+        match &self.belief {
+            Belief::HeightField(field) => {
+                if fitted.is_ok() {
+                    row.metrics = field.surface().and_then(|it| self.truth.truth.compare(it));
+                }
+                row.outline = outline(field, self.truth, is_last);
+            }
+            Belief::ImplicitSurface(surface) => {
+                let count = surface.asked().len() as u32;
+                let is_compared = fitted.is_ok() && self.experiment.is_compared(count);
+                if let Some(surface) = surface.surface().filter(|_| is_compared) {
+                    let cells = self.experiment.space.cells;
+                    row.shape = self.truth.shape.map(|shape| shape.judge(surface, cells));
+                }
+            }
+        }
+        if fitted.is_ok() {
+            row.jitter = self.belief.jitter();
+        }
+        row.fit = Some(fitted?);
+        Ok(())
+    }
 
     /// What is known now.
-    fn known(&self) -> Known<'_>;
+    pub(super) fn belief(&self) -> &Belief {
+        &self.belief
+    }
 
     /// Makes the touches that the belief does not learn from; and why there are no more, if a
     /// fault ended them.
-    fn verify(&self, probe: &mut dyn Probe, made: &[TouchRow]) -> VerificationRows;
+    pub(super) fn verify(&self, probe: &mut dyn Probe, made: &[TouchRow]) -> VerificationRows {
+        match &self.belief {
+            Belief::HeightField(field) => {
+                let task = self.truth.environment.task();
+                verify(self.experiment, task, field, probe, (made, self.trial))
+            }
+            Belief::ImplicitSurface(_) => (Vec::new(), None),
+        }
+    }
+}
+
+/// How near the believed silhouette is to the true one; its reliability only of the last.
+fn outline(belief: &HeightField, truth: &GroundTruth, is_last: bool) -> Option<Outline> {
+    let outline = Outline::of(belief.presence(), truth.truth)?;
+    let reliability = outline.reliability.filter(|_| is_last);
+    Some(Outline { reliability, ..outline })
 }

@@ -1,5 +1,6 @@
 //! Trials of a real arm: one after another, every touch kept, and none after a fault.
 
+use super::entrant::Entrant;
 use super::recorded_trial::{self, next_part, recording_path};
 use super::resumed::Resumed;
 use super::row::{TouchRow, TrialId, TrialRow};
@@ -9,7 +10,6 @@ use super::store::{Entry, Journal, RunFolder, StoreError};
 use super::witness::{Touched, Witness};
 use crate::backend::Fault;
 use crate::backend::ros::clock;
-use crate::explore::planner::Maker;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -99,7 +99,7 @@ pub fn run(
 /// Runs a trial from where its touches end.
 fn go_on(
     simulation: &Simulation,
-    planner: &dyn Maker,
+    planner: Entrant,
     trial: u32,
     made: &[TouchRow],
     keeper: &mut Keeper,
@@ -120,7 +120,7 @@ struct Keeper<'a> {
     stop: &'a AtomicBool,
     progress: OnProgress<'a>,
     trial: u32,
-    planner: &'a dyn Maker,
+    planner: Entrant<'a>,
     end: End,
 }
 

@@ -21,21 +21,21 @@
 //! ```
 
 pub mod analysis;
-mod around;
 mod belief_shape;
 pub mod cloud;
 pub mod comparison;
 pub mod curve_table;
+pub mod entrant;
 pub mod equal_error;
 #[allow(clippy::module_inception)]
 pub mod experiment;
-pub mod exploration;
+mod exploration;
 pub mod lab_runner;
 pub mod measure;
 pub mod metrics;
 pub mod notice;
+mod oracle;
 pub mod outline;
-mod over_zone;
 pub mod real_robot;
 pub mod recorded_trial;
 pub mod replay;
@@ -47,18 +47,18 @@ pub mod scan;
 pub mod scan_truth;
 pub mod shape;
 pub mod shard;
-mod sight;
 pub mod simulation;
 pub mod statistics;
 pub mod store;
 pub mod summary;
 pub mod sweep;
-pub mod trial;
+mod trial;
 pub mod truth;
 pub mod verification;
 pub mod verification_row;
 mod verified;
 pub mod witness;
 
+pub use entrant::Entrant;
 pub use experiment::Experiment;
 pub use simulation::Simulation;

@@ -1,7 +1,7 @@
 //! A trial that is recorded while it runs.
 
 use super::belief_shape::shapes;
-use super::exploration::Known;
+use super::entrant::Entrant;
 use super::resumed::Resumed;
 use super::row::{TouchRow, TrialRow};
 use super::simulation::Simulation;
@@ -9,14 +9,13 @@ use super::store::{RECORDINGS, resolved_beside};
 use super::witness::{Touched, Witness};
 use crate::backend::Fault;
 use crate::backend::recording::{self, About, Ending, Recorder, Recording};
-use crate::explore::planner::Maker;
 use crate::explore::probe::{Probe, Touch};
 use crate::task::Zone;
 use std::iter;
 use std::path::{Path, PathBuf};
 
 /// The file of a trial's recording in a run's folder.
-pub fn recording_path(run: &Path, planner: &dyn Maker, trial: u32) -> PathBuf {
+pub fn recording_path(run: &Path, planner: Entrant, trial: u32) -> PathBuf {
     run.join(RECORDINGS).join(format!("{}-{trial:04}.mcap", planner.name()))
 }
 
@@ -42,7 +41,7 @@ fn part(path: &Path, number: usize) -> PathBuf {
 
 /// As [`Simulation::trial`], recorded in the file `path`, which is replaced if it is there. What
 /// cannot be recorded fails the trial.
-pub fn run(simulation: &Simulation, planner: &dyn Maker, trial: u32, path: &Path) -> TrialRow {
+pub fn run(simulation: &Simulation, planner: Entrant, trial: u32, path: &Path) -> TrialRow {
     go_on(simulation, planner, trial, path, &[], &mut ())
 }
 
@@ -50,7 +49,7 @@ pub fn run(simulation: &Simulation, planner: &dyn Maker, trial: u32, path: &Path
 /// be replayed by itself. `witness` sees every touch.
 pub fn go_on(
     simulation: &Simulation,
-    planner: &dyn Maker,
+    planner: Entrant,
     trial: u32,
     path: &Path,
     made: &[TouchRow],
@@ -64,7 +63,7 @@ pub fn go_on(
 /// A fault before the first touch.
 fn run_faulty(
     simulation: &Simulation,
-    planner: &dyn Maker,
+    planner: Entrant,
     trial: u32,
     path: &Path,
     made: &[TouchRow],
@@ -127,10 +126,8 @@ impl Witness for Scribe<'_> {
         if let Touch::Contact(contact) = touched.touch {
             touch.normal = contact.normal_w.as_slice().into();
         }
-        let shapes = match touched.known {
-            Known::Zone(belief) => shapes(self.zone, belief),
-            Known::Around(_) => Default::default(),
-        };
+        let field = touched.belief.height_field();
+        let shapes = field.map_or_else(Default::default, |field| shapes(self.zone, field));
         self.recording.touched(&touch, shapes)?;
         seen
     }

@@ -1,8 +1,8 @@
 //! What the report of a run shows. It decides no row, so it may change on a finished run.
 
+use super::entrant;
 use super::measure::MEASURES;
 use crate::config::{Checked, Rules};
-use crate::explore::planner;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -62,7 +62,7 @@ impl Checked for ReportSettings {
         }
         for (key, names) in [("planners", &self.planners), ("baselines", &self.baselines)] {
             for (i, name) in names.iter().enumerate() {
-                rules.one_of(&format!("{key}[{i}]"), name, &planner::allowed(name));
+                rules.one_of(&format!("{key}[{i}]"), name, &entrant::allowed(name));
             }
         }
         if let Some(goal) = self.goal_touches {

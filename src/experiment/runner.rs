@@ -1,12 +1,12 @@
 //! Trials × planners on all cores.
 
+use super::entrant::Entrant;
 use super::recorded_trial::{self, recording_path};
 use super::row::{TrialId, TrialRow};
 use super::simulation::Simulation;
 use super::store::{RunFolder, StoreError};
 use super::witness::{Touched, Witness};
 use crate::backend::Fault;
-use crate::explore::planner::Maker;
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, ParallelBridge, ParallelIterator,
 };
@@ -64,7 +64,7 @@ impl Witness for Counted<'_> {
 }
 
 /// One piece of work.
-pub type Job<'a> = (u32, &'a dyn Maker);
+pub type Job<'a> = (u32, Entrant<'a>);
 
 /// Runs `jobs` and adds each row to `folder` as it finishes; returns how many trials it ran.
 ///
@@ -147,7 +147,7 @@ pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, RunError> {
 /// in somebody's code does not lose the others' work.
 fn run_caught(
     simulation: &Simulation,
-    (planner, trial): (&dyn Maker, u32),
+    (planner, trial): (Entrant, u32),
     recorded: Option<&Path>,
     progress: OnProgress,
 ) -> TrialRow {

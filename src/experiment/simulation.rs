@@ -1,14 +1,15 @@
 //! From an experiment to its trials: the one way that everything goes which runs a simulation.
 
 use super::cloud::CloudError;
+use super::entrant::{Entrant, ORACLE};
 use super::experiment::Experiment;
 use super::notice;
 use super::notice::Notice;
+use super::oracle::GroundTruth;
 use super::real_robot::{self, MissingForRobot};
 use super::row::TrialRow;
 use super::scan_truth::LeftOut;
 use super::shape::TrueShape;
-use super::sight::Sight;
 use super::trial;
 use super::truth::Truth;
 use super::witness::Witness;
@@ -16,7 +17,7 @@ use crate::backend::ros::arm::Lab;
 use crate::backend::ros::fault::LinkFault;
 use crate::backend::ros::settings::BackendKind;
 use crate::backend::{Backend, Fault};
-use crate::explore::planner::{self, Maker};
+use crate::explore::planner::{self, PlannerFactory};
 use crate::explore::probe::Probe;
 use crate::explore::probe::servo::Servo;
 use crate::math::seed;
@@ -41,7 +42,7 @@ pub struct Simulation {
     /// How far the truth may itself be off, if it was scanned.
     left_out: Option<LeftOut>,
     /// Planners that are not built in.
-    own_planners: Vec<Box<dyn Maker>>,
+    own_planners: Vec<Box<dyn PlannerFactory>>,
 }
 
 /// An experiment that cannot be simulated.
@@ -132,16 +133,21 @@ impl Simulation {
     }
 
     /// With planners that are not built in, under the names that the experiment lists them by.
-    pub fn with_planners(mut self, planners: Vec<Box<dyn Maker>>) -> Self {
+    pub fn with_planners(mut self, planners: Vec<Box<dyn PlannerFactory>>) -> Self {
         self.own_planners.extend(planners);
         self
     }
 
-    /// The planner of a name, built in or [own](Self::with_planners).
-    pub fn planner(&self, name: &str) -> Option<&dyn Maker> {
+    /// The entrant of a name: a planner that is built in or [own](Self::with_planners), or the
+    /// oracle.
+    pub fn planner(&self, name: &str) -> Option<Entrant<'_>> {
+        if name == ORACLE {
+            return Some(Entrant::Oracle);
+        }
         let own = self.own_planners.iter().map(|planner| &**planner);
-        let built_in = planner::by_name(name).map(|entry| -> &dyn Maker { entry });
-        built_in.or_else(|| own.into_iter().find(|planner| planner.name() == name))
+        let built_in = planner::by_name(name).map(Entrant::from);
+        let is_it = |planner: &&dyn PlannerFactory| planner.name() == name;
+        built_in.or_else(|| own.into_iter().find(is_it).map(Entrant::from))
     }
 
     /// What is run, with everything that it left to its object written out.
@@ -241,17 +247,18 @@ impl Simulation {
     }
 
     /// Runs one trial of `planner` from start to end; what goes wrong stands in its row.
-    pub fn trial(&self, planner: &dyn Maker, trial: u32) -> TrialRow {
+    pub fn trial<'a>(&self, planner: impl Into<Entrant<'a>>, trial: u32) -> TrialRow {
         self.trial_seen(planner, trial, &mut ())
     }
 
     /// As [`trial`](Self::trial), with `witness` told of every touch.
-    pub fn trial_seen(
+    pub fn trial_seen<'a>(
         &self,
-        planner: &dyn Maker,
+        planner: impl Into<Entrant<'a>>,
         trial: u32,
         witness: &mut dyn Witness,
     ) -> TrialRow {
+        let planner = planner.into();
         match self.probe(trial) {
             Ok(mut probe) => self.trial_before(&mut *probe, planner, trial, witness),
             Err(fault) => TrialRow::unstarted(trial, planner.name(), &fault),
@@ -259,24 +266,29 @@ impl Simulation {
     }
 
     /// As [`trial`](Self::trial), with the touches of any `probe`.
-    pub fn trial_with(&self, probe: &mut dyn Probe, planner: &dyn Maker, trial: u32) -> TrialRow {
+    pub fn trial_with<'a>(
+        &self,
+        probe: &mut dyn Probe,
+        planner: impl Into<Entrant<'a>>,
+        trial: u32,
+    ) -> TrialRow {
         self.trial_before(probe, planner, trial, &mut ())
     }
 
     /// As [`trial_with`](Self::trial_with), with `witness` told of every touch.
-    pub fn trial_before(
+    pub fn trial_before<'a>(
         &self,
         probe: &mut dyn Probe,
-        planner: &dyn Maker,
+        planner: impl Into<Entrant<'a>>,
         trial: u32,
         witness: &mut dyn Witness,
     ) -> TrialRow {
-        let sight = Sight {
+        let truth = GroundTruth {
             environment: self.environment(),
             truth: &self.truth,
             shape: self.shape.as_ref(),
         };
-        trial::run(&self.experiment, &sight, probe, planner, trial, witness)
+        trial::run(&self.experiment, &truth, probe, planner.into(), trial, witness)
     }
 }
 

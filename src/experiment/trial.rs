@@ -1,56 +1,51 @@
 //! Algorithm 1 of Yi et al. 2016: touch, fit, plan, again.
 
-use super::around::AroundObject;
+use super::entrant::Entrant;
 use super::experiment::Experiment;
 use super::exploration::Exploration;
-use super::over_zone::OverZone;
+use super::oracle::GroundTruth;
 use super::row::{TouchRow, TrialRow};
-use super::sight::Sight;
 use super::witness::{Touched, Witness};
-use crate::explore::planner;
 use crate::explore::probe::{Probe, Touch};
 use crate::task::Task;
 
-/// Runs one trial of `planner` from start to end with the touches of `probe`, before `witness`.
+/// Runs one trial of an entrant from start to end with the touches of `probe`, before `witness`.
 ///
-/// Its row depends on the experiment, the trial's number, the planner and the probe only.
-pub fn run(
+/// Its row depends on the experiment, the trial's number, the entrant and the probe only.
+pub(super) fn run(
     experiment: &Experiment,
-    sight: &Sight,
+    truth: &GroundTruth,
     probe: &mut dyn Probe,
-    planner: &dyn planner::Maker,
+    entrant: Entrant,
     trial: u32,
     witness: &mut dyn Witness,
 ) -> TrialRow {
     let mut row = TrialRow {
         trial,
-        planner: planner.name().into(),
+        planner: entrant.name().into(),
         failure: None,
         touches: Vec::new(),
         verification: Vec::new(),
     };
-    let task = sight.environment.task();
-    let mut exploration: Box<dyn Exploration> = match task.ball() {
-        None => Box::new(OverZone::new(experiment, sight, planner, trial)),
-        Some(_) => match AroundObject::new(experiment, sight, planner, trial) {
-            Some(around) => Box::new(around),
-            None => {
-                let name = planner.name();
-                row.failure = Some(format!("planner `{name}` does not go around an object"));
-                return row;
-            }
-        },
+    let task = truth.environment.task();
+    let mut exploration = match Exploration::new(experiment, truth, entrant, trial) {
+        Ok(exploration) => exploration,
+        Err(failure) => {
+            row.failure = Some(failure);
+            return row;
+        }
     };
     for count in 1..=experiment.touches {
-        let plan = match count <= experiment.initial_touches {
+        let planned = match count <= experiment.initial_touches {
             true => exploration.start(),
-            false => match exploration.decide() {
-                Ok(plan) => plan,
-                Err(undecided) => {
-                    row.failure = Some(format!("touch {count}: {undecided}"));
-                    break;
-                }
-            },
+            false => exploration.plan(),
+        };
+        let plan = match planned {
+            Ok(plan) => plan,
+            Err(error) => {
+                row.failure = Some(format!("touch {count}: {error}"));
+                break;
+            }
         };
         if !task.contains(&plan.target) {
             let (target, beyond) = (plan.target, beyond(task));
@@ -66,7 +61,7 @@ pub fn run(
             }
         };
         let swept = probe.swept();
-        exploration.observe(&plan.target, &approach, &touch, swept.as_ref());
+        exploration.observe(&plan.target, &approach, (&touch, swept.as_ref()));
         let swept = swept.filter(|_| exploration.writes_tips() || touch == Touch::Miss);
         let contact = match &touch {
             Touch::Contact(contact) => Some(contact),
@@ -94,7 +89,8 @@ pub fn run(
         {
             row.failure = Some(format!("fit after touch {count}: {error}"));
         }
-        let touched = Touched { count, touch: &touch, row: &touch_row, known: exploration.known() };
+        let belief = exploration.belief();
+        let touched = Touched { count, touch: &touch, row: &touch_row, belief };
         if let Err(fault) = witness.touched(&touched) {
             row.failure.get_or_insert_with(|| format!("touch {count}: {fault}"));
         }

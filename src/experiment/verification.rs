@@ -4,7 +4,7 @@
 use super::experiment::Experiment;
 use super::row::TouchRow;
 use super::verification_row::VerificationRow;
-use crate::explore::belief::Belief;
+use crate::explore::belief::HeightField;
 use crate::explore::probe::{Probe, Touch};
 use crate::gp::posterior::Scratch;
 use crate::math::seed;
@@ -20,7 +20,7 @@ use rand_chacha::ChaCha8Rng;
 pub fn verify(
     experiment: &Experiment,
     task: &Task,
-    belief: &Belief,
+    belief: &HeightField,
     probe: &mut dyn Probe,
     (touches, trial): (&[TouchRow], u32),
 ) -> (Vec<VerificationRow>, Option<String>) {
@@ -52,7 +52,7 @@ pub fn verify(
 }
 
 /// What the belief expects at a place, with the deviation of a touch; none before its first fit.
-fn expected(belief: &Belief, place: &[f64]) -> Option<(f64, f64)> {
+fn expected(belief: &HeightField, place: &[f64]) -> Option<(f64, f64)> {
     let surface = belief.surface()?;
     let mut scratch = Scratch::default();
     let noise_sd = surface.hyperparameters().noise_sd;
@@ -60,7 +60,7 @@ fn expected(belief: &Belief, place: &[f64]) -> Option<(f64, f64)> {
     Some((surface.mean(place, &mut scratch), variance.max(0.0).sqrt()))
 }
 
-fn predicted(belief: &Belief, target: Vec<f64>) -> Option<VerificationRow> {
+fn predicted(belief: &HeightField, target: Vec<f64>) -> Option<VerificationRow> {
     let (predicted_m, predicted_sd_m) = expected(belief, &target)?;
     Some(VerificationRow {
         target,
@@ -79,7 +79,7 @@ fn predicted(belief: &Belief, target: Vec<f64>) -> Option<VerificationRow> {
 fn meet(
     row: &mut VerificationRow,
     zone: &Zone,
-    belief: &Belief,
+    belief: &HeightField,
     (p_wc, first): (&Point3<f64>, Option<&Point3<f64>>),
 ) {
     let rise = |p_w: &Point3<f64>| {

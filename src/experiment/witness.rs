@@ -1,8 +1,8 @@
 //! Who is told of a trial while it runs.
 
-use super::exploration::Known;
 use super::row::TouchRow;
 use crate::backend::Fault;
+use crate::explore::belief::Belief;
 use crate::explore::probe::Touch;
 
 /// A touch that is done.
@@ -14,7 +14,7 @@ pub struct Touched<'a> {
     /// Its part of the trial's row.
     pub row: &'a TouchRow,
     /// What is known with it.
-    pub known: Known<'a>,
+    pub belief: &'a Belief,
 }
 
 /// Who is told of every touch of a trial when it is done, before the next is planned. What it does

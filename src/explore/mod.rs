@@ -6,7 +6,7 @@
 //!
 //! ```
 //! use nalgebra::Vector3;
-//! use palpate::explore::belief::Belief;
+//! use palpate::explore::belief::{Belief, HeightField};
 //! use palpate::explore::gp_settings::GpSettings;
 //! use palpate::explore::planner::{self, PlanningSettings};
 //! use palpate::explore::probe::{Contact, Touch};
@@ -15,20 +15,20 @@
 //!
 //! // An interval of x, 20 cm wide; the surface there is y = 0.1·x².
 //! let zone = Zone::new([-0.1, 0.1], None);
-//! let mut belief = Belief::new(zone.clone(), GpSettings::default());
+//! let mut heights = HeightField::new(zone.clone(), GpSettings::default());
 //! let touch_at = |x_m: f64| {
 //!     let p_wc = zone.point(&[x_m], 0.1 * x_m * x_m);
 //!     Touch::Contact(Contact { p_wc, normal_w: Vector3::y() })
 //! };
 //! for x_m in [-0.09, -0.02, 0.05] {
-//!     belief.observe(&[x_m], &touch_at(x_m));
+//!     heights.observe(&[x_m], &touch_at(x_m));
 //! }
-//! belief.refit()?;
+//! heights.refit()?;
 //!
 //! let active = planner::by_name("active").expect("it is there");
 //! let random = seed::stream(1, 0, "planner");
-//! let mut planner = (active.make)(&zone, &PlanningSettings::default(), random);
-//! let plan = planner.plan(&belief);
+//! let mut planner = (active.make)(&PlanningSettings::default(), random);
+//! let plan = planner.plan(&Belief::from(heights))?;
 //! assert!(zone.contains(&plan.target));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -38,7 +38,6 @@ pub mod belief;
 pub mod control;
 mod free_space;
 pub mod gp_settings;
-pub mod plan;
 pub mod planner;
 pub mod presence;
 pub mod probe;

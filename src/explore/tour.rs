@@ -1,6 +1,6 @@
 //! Short ways through several targets.
 
-use super::plan::Plan;
+use super::planner::Plan;
 
 /// Straight way along the zone from one place to another.
 pub fn distance_m(a: &[f64], b: &[f64]) -> f64 {

@@ -4,7 +4,7 @@ use crate::experiment::Experiment;
 use crate::experiment::metrics::Metrics;
 use crate::experiment::row::{TouchRow, TrialRow};
 use crate::experiment::store::Run;
-use crate::explore::belief::Belief;
+use crate::explore::belief::HeightField;
 use crate::explore::probe::{Contact, Swept, Touch};
 use crate::gp::Posterior;
 use crate::report::number::digits;
@@ -15,7 +15,7 @@ use nalgebra::{Point3, Vector3};
 /// One planner's belief after some touches of the trial that the report draws.
 pub struct Replay<'a> {
     /// What was known.
-    pub belief: Belief,
+    pub belief: HeightField,
     /// The posterior of the surface.
     pub surface: Posterior,
     /// Its agreement with the truth.
@@ -52,7 +52,7 @@ impl<'a> Replay<'a> {
         let Some(fit) = &last.fit else { return Ok(None) };
         let zone = &experiment.scene.zone;
         let place = || format!("trial {} of {}, touch {count}", row.trial, row.planner);
-        let mut belief = Belief::new(zone.clone(), experiment.gp.clone());
+        let mut belief = HeightField::new(zone.clone(), experiment.gp.clone());
         for touch in touches {
             ensure!(
                 touch.target.len() == zone.dimension(),

@@ -8,7 +8,7 @@ use crate::experiment::Experiment;
 use crate::experiment::row::{TouchRow, TrialRow};
 use crate::experiment::shape::ShapeMetrics;
 use crate::experiment::store::Run;
-use crate::explore::around::{Belief, Scope};
+use crate::explore::around::{ImplicitSurface, Scope};
 use crate::explore::probe::{Contact, Swept, Touch};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::coarse::coarse;
@@ -123,7 +123,10 @@ pub fn frame(
 ///
 /// # Errors
 /// If they do not belong to the object or cannot be conditioned on.
-pub fn belief(experiment: &Experiment, touches: &[TouchRow]) -> anyhow::Result<Option<Belief>> {
+pub fn belief(
+    experiment: &Experiment,
+    touches: &[TouchRow],
+) -> anyhow::Result<Option<ImplicitSurface>> {
     let Some(fit) = touches.last().and_then(|touch| touch.fit.as_ref()) else { return Ok(None) };
     let before = touches.len().checked_sub(2).and_then(|i| touches[i].fit.as_ref());
     let scene = &experiment.scene;
@@ -133,7 +136,7 @@ pub fn belief(experiment: &Experiment, touches: &[TouchRow]) -> anyhow::Result<O
     let scope = Scope::of(&task, &scene.finger, scene.effects.is_soft());
     let scope = scope.context("a task without a ball")?;
     let ball = scope.ball.clone();
-    let mut belief = Belief::new(scope, experiment.space.clone());
+    let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
     for touch in touches {
         let aim = Aim::of(&touch.target).context("a target that aims at nothing")?;
         // However the finger was rolled, it went the same way.

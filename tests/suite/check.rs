@@ -3,7 +3,7 @@
 use crate::common::program::palpate;
 use palpate::experiment::{Experiment, Simulation, runner};
 use palpate::explore::belief::Belief;
-use palpate::explore::planner::{self, Entry, Plan, Planner};
+use palpate::explore::planner::{self, Entry, Plan, PlanError, Planner};
 use palpate::math::seed;
 use palpate::study::check::baseline::Line;
 use palpate::study::check::cost::{Cost, total};
@@ -12,7 +12,6 @@ use palpate::study::check::judged::{JUDGED, Span};
 use palpate::study::check::sequence::Sequence;
 use palpate::study::check::verdict::of_planner;
 use palpate::study::check::{Baseline, Rules, Verdict, hold};
-use palpate::task::Zone;
 use rand::RngExt;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::fs;
@@ -232,7 +231,6 @@ fn a_trial_is_counted_by_valgrind() {
 /// The paper's planner, but that it keeps away from the zone's border: worse on purpose.
 struct Shy {
     own: Box<dyn Planner>,
-    zone: Zone,
     margin: f64,
 }
 
@@ -245,9 +243,10 @@ fn margin() -> f64 {
 }
 
 impl Planner for Shy {
-    fn plan(&mut self, belief: &Belief) -> Plan {
-        let plan = self.own.plan(belief);
-        let (low, high) = (self.zone.at(&[0.0; 2]), self.zone.at(&[1.0; 2]));
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+        let plan = self.own.plan(belief)?;
+        let zone = belief.height_field().ok_or("zones only")?.zone();
+        let (low, high) = (zone.at(&[0.0; 2]), zone.at(&[1.0; 2]));
         let sides = low.iter().zip(&high);
         let target = (plan.target.iter().zip(sides))
             .map(|(at, (low, high))| {
@@ -255,28 +254,28 @@ impl Planner for Shy {
                 at.clamp(low + off, high - off)
             })
             .collect();
-        Plan { target, ..plan }
+        Ok(Plan { target, ..plan })
     }
 }
 
 static WORSE: Entry = Entry {
     name: "worse",
     about: "active, but away from the border",
-    make: |zone, settings, rng| {
-        let own = (planner::by_name("active").unwrap().make)(zone, settings, rng);
-        Box::new(Shy { own, zone: zone.clone(), margin: margin() })
+    zone_only: Some("it keeps away from a border"),
+    make: |settings, rng| {
+        let own = (planner::by_name("active").unwrap().make)(settings, rng);
+        Box::new(Shy { own, margin: margin() })
     },
-    make_around: None,
 };
 
 static RESEEDED: Entry = Entry {
     name: "reseeded",
     about: "random, with other random numbers",
-    make: |zone, settings, mut rng| {
+    zone_only: None,
+    make: |settings, mut rng| {
         rng.random::<u64>();
-        (planner::by_name("random").unwrap().make)(zone, settings, rng)
+        (planner::by_name("random").unwrap().make)(settings, rng)
     },
-    make_around: None,
 };
 
 /// A check of `new` against the planner `old` with a fresh seed: its verdict, its trials, and the

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use palpate::experiment::row::TrialRow;
 use palpate::experiment::truth::Truth;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::belief::Belief;
+use palpate::explore::belief::HeightField;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
 use palpate::explore::probe::{Contact, Swept, Touch};
@@ -77,7 +77,7 @@ fn the_surface_is_below_what_the_finger_has_swept() {
 fn a_bound_lowers_the_mean_under_it_and_leaves_the_variance_honest() {
     let believe = |depth_m: Option<f64>| {
         let settings = GpSettings { free_space: depth_m.is_some(), ..GpSettings::default() };
-        let mut belief = Belief::new(SQUARE, settings);
+        let mut belief = HeightField::new(SQUARE, settings);
         for i in 0..5 {
             for x in [-0.04, 0.04] {
                 let z = -0.04 + 0.02 * f64::from(i);
@@ -122,7 +122,7 @@ fn normals_tilt_the_belief_and_grazing_ones_are_dropped() {
         (Vector3::new(0.0, -1.0, 0.0), [0.0, 0.0]),
     ] {
         let settings = GpSettings { normals: true, ..GpSettings::default() };
-        let mut belief = Belief::new(SQUARE, settings);
+        let mut belief = HeightField::new(SQUARE, settings);
         let p_wc = SQUARE.point(&[0.0, 0.0], 0.02);
         let contact = Contact { p_wc, normal_w: normal_w.normalize() };
         belief.observe(&[0.0, 0.0], &Touch::Contact(contact));
@@ -170,7 +170,7 @@ fn a_recorded_row_holds_all_that_the_belief_was_made_of() {
         assert_eq!(line.contains("slope_noise"), normals);
         let read: TrialRow = serde_json::from_str(&line).unwrap();
         assert_eq!(read, row);
-        let mut belief = Belief::new(experiment.scene.zone.clone(), experiment.gp.clone());
+        let mut belief = HeightField::new(experiment.scene.zone.clone(), experiment.gp.clone());
         for touch in &read.touches {
             let p_wc = Point3::from(touch.contact.unwrap());
             let normal_w = touch.normal.map_or(Vector3::y(), Vector3::from);

@@ -6,9 +6,8 @@ use palpate::experiment::store::{Content, Run, RunFolder, StoreError};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::planner::{
-    self, Maker, Plan, Planner, PlanningSettings, Sight, Undecided, is_own, uniform,
+    self, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, is_own, sample,
 };
-use palpate::task::Zone;
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 use std::process::Command;
@@ -20,12 +19,11 @@ struct Mine {
 }
 
 struct Random {
-    zone: Zone,
     random: ChaCha8Rng,
     touches: usize,
 }
 
-impl Maker for Mine {
+impl PlannerFactory for Mine {
     fn name(&self) -> &str {
         "mine:Random"
     }
@@ -34,20 +32,16 @@ impl Maker for Mine {
         Some(format!("random, {} touches", self.touches))
     }
 
-    fn make(&self, zone: &Zone, _: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {
-        Box::new(Random { zone: zone.clone(), random, touches: self.touches })
+    fn make(&self, _: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {
+        Box::new(Random { random, touches: self.touches })
     }
 }
 
 impl Planner for Random {
-    fn plan(&mut self, _: &Belief) -> Plan {
-        Plan { target: uniform(&self.zone, &mut self.random), sd_m: None, stall: None }
-    }
-
-    fn decide(&mut self, belief: &Belief, _: &dyn Sight) -> Result<Plan, Undecided> {
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
         match belief.targets().len() < self.touches {
-            true => Ok(self.plan(belief)),
-            false => Err(Undecided { reason: "enough".into() }),
+            true => Ok(Plan::at(sample::anywhere(belief, &mut self.random))),
+            false => Err("enough".into()),
         }
     }
 }

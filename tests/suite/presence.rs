@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use palpate::experiment::resumed::Resumed;
 use palpate::experiment::sweep::cells;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::belief::Belief;
+use palpate::explore::belief::HeightField;
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
 use palpate::explore::probe::{Contact, Swept, Touch};
@@ -22,7 +22,7 @@ fn zone() -> Zone {
 }
 
 /// A touch asked for at a target: a contact there, or none.
-fn touch(belief: &mut Belief, zone: &Zone, target: &[f64], meets: bool) {
+fn touch(belief: &mut HeightField, zone: &Zone, target: &[f64], meets: bool) {
     let p_wt = zone.point(target, 0.0);
     let contact = Contact { p_wc: p_wt, normal_w: Vector3::y() };
     belief.observe(target, &if meets { Touch::Contact(contact) } else { Touch::Miss });
@@ -38,7 +38,7 @@ proptest! {
         at in [0.0..SIDE_M, 0.0..SIDE_M],
     ) {
         let zone = zone();
-        let mut belief = Belief::new(zone.clone(), GpSettings::default());
+        let mut belief = HeightField::new(zone.clone(), GpSettings::default());
         for (x, z, meets) in &touches {
             touch(&mut belief, &zone, &[*x, *z], *meets);
         }
@@ -58,7 +58,7 @@ proptest! {
 #[test]
 fn touches_speak_for_their_surroundings() {
     let zone = zone();
-    let mut belief = Belief::new(zone.clone(), GpSettings::default());
+    let mut belief = HeightField::new(zone.clone(), GpSettings::default());
     assert_eq!(belief.presence().silhouette().at(&[0.05, 0.05]), 1.0);
     touch(&mut belief, &zone, &[0.02, 0.05], true);
     touch(&mut belief, &zone, &[0.08, 0.05], false);
@@ -71,7 +71,7 @@ fn touches_speak_for_their_surroundings() {
     assert!(below == 0.0 && above > 0.0, "{below} {above}");
     let radius_m = Finger::default().radius_m;
     let beyond = |offset: f64| {
-        let mut belief = Belief::new(zone.clone(), GpSettings::default());
+        let mut belief = HeightField::new(zone.clone(), GpSettings::default());
         let p_wc = zone.point(&[0.05 - offset * radius_m, 0.05], 0.0);
         let contact = Contact { p_wc, normal_w: Vector3::y() };
         belief.observe(&[0.05, 0.05], &Touch::Contact(contact));
@@ -97,7 +97,7 @@ fn brier(simulation: &Simulation, planner: &str) -> [f64; 2] {
     let zone = simulation.task().zone();
     let finger = simulation.environment().scene().finger.clone();
     let far_m = simulation.task().depth_m()[1];
-    let mut belief = Belief::new(zone.clone(), GpSettings::default());
+    let mut belief = HeightField::new(zone.clone(), GpSettings::default());
     for row in &row.touches {
         let p_wt = zone.x_wz() * zone.local(&row.target, -far_m);
         let touch = row.contact.map_or(Touch::Miss, |p_w| {

@@ -16,7 +16,7 @@ use palpate::experiment::recorded_trial::{self, next_part, parts, recording_path
 use palpate::experiment::replay::{self, Difference, ReplayError};
 use palpate::experiment::row::TouchRow;
 use palpate::experiment::witness::{Touched, Witness};
-use palpate::experiment::{Experiment, Simulation};
+use palpate::experiment::{Entrant, Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::robot::finger::Frame;
 use palpate::sim::simulator::Simulator;
@@ -500,7 +500,7 @@ fn experiment(sets: &[&str]) -> Experiment {
 /// Records a trial of `active` and returns the file.
 fn record(folder: &Path, sets: &[&str]) -> (Simulation, PathBuf) {
     let simulation = Simulation::new(experiment(sets)).unwrap();
-    let active = planner::by_name("active").unwrap();
+    let active = Entrant::from(planner::by_name("active").unwrap());
     let path = recording_path(folder, active, 0);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     let row = recorded_trial::run(&simulation, active, 0, &path);
@@ -636,7 +636,7 @@ impl Witness for Interrupts {
 fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     let folder = TempDir::new().unwrap();
     let simulation = Simulation::new(experiment(&[])).unwrap();
-    let active = planner::by_name("active").unwrap();
+    let active = Entrant::from(planner::by_name("active").unwrap());
     let path = recording_path(folder.path(), active, 0);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     let mut interrupts = Interrupts { made: Vec::new(), after: 0 };

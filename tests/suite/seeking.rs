@@ -3,12 +3,12 @@
 
 use crate::common::around::{belief, belief_with, meet, simulation, trial};
 use nalgebra::{Point3, Vector3};
-use palpate::explore::around::{Belief, SpaceSettings};
+use palpate::explore::around::{ImplicitSurface, SpaceSettings};
 use palpate::geometry::spread::directions;
 use palpate::task::Aim;
 
 /// A ball of 40 mm met from 30 sides.
-fn touched(mut belief: Belief) -> Belief {
+fn touched(mut belief: ImplicitSurface) -> ImplicitSurface {
     for out in directions(30) {
         let p_wc = Point3::from(out.scale(0.04));
         let aim = Aim::against(Point3::origin(), &out);

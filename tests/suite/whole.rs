@@ -9,9 +9,10 @@ use palpate::experiment::shape::TrueShape;
 use palpate::experiment::simulation::Simulation;
 use palpate::experiment::store::Run;
 use palpate::experiment::truth::Truth;
-use palpate::explore::around::Surface;
-use palpate::explore::around::planner::{Planner, Sobol};
+use palpate::explore::around::{ImplicitSurface, Surface};
+use palpate::explore::belief::Belief;
 use palpate::explore::planner;
+use palpate::explore::planner::Planner;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::seed::stream;
@@ -19,6 +20,7 @@ use palpate::report::{findings, whole};
 use palpate::sim::environment::Shape;
 use palpate::sim::{Environment, Scene};
 use palpate::task::Aim;
+use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 
 use crate::common::around::{approach, belief, meet, mesh, simulation, trial};
@@ -124,14 +126,22 @@ fn two_touching_bodies_are_found() {
     assert!(surface(&simulation, &row).mesh(64).unwrap().volume_m3() > 0.0);
 }
 
+fn make(name: &str, random: ChaCha8Rng) -> Box<dyn Planner> {
+    (planner::by_name(name).unwrap().make)(&Default::default(), random)
+}
+
+fn plan(planner: &mut Box<dyn Planner>, belief: &ImplicitSurface) -> Aim {
+    Aim::of(&planner.plan(&Belief::from(belief.clone())).unwrap().target).unwrap()
+}
+
 /// In another size everything is the same but for rounding.
 #[test]
 fn size_does_not_matter() {
     let touched = |scale: f64| {
         let mut belief = belief(0.1 * scale, 0.007 * scale);
-        let mut sobol = Sobol::new(stream(1, 0, "aims"));
+        let mut sobol = make("sobol", stream(1, 0, "aims"));
         for _ in 0..25 {
-            let aim = Aim::of(&sobol.plan(&belief).target).unwrap();
+            let aim = plan(&mut sobol, &belief);
             let outward = -aim.ahead_w.into_inner();
             // An ellipsoid, met where the way through its middle leaves it.
             let radii = Vector3::new(0.06, 0.035, 0.045) * scale;
@@ -160,11 +170,10 @@ fn size_does_not_matter() {
 #[test]
 fn an_object_that_is_not_there_is_not_found() {
     let mut belief = belief(0.1, 0.007);
-    for name in ["active", "random", "sobol", "integrated_variance", "travel"] {
-        let make = planner::by_name(name).unwrap().make_around.unwrap();
-        let mut planner = make(&Default::default(), stream(2, 0, name));
+    for name in ["active", "random", "sobol", "grid", "integrated_variance", "travel"] {
+        let mut planner = make(name, stream(2, 0, name));
         for _ in 0..6 {
-            let aim = Aim::of(&planner.plan(&belief).target).unwrap();
+            let aim = plan(&mut planner, &belief);
             let far = approach(&belief, &aim).p_far_w;
             meet(&mut belief, &aim, None, far);
             let (fit, surface) = belief.refit().unwrap();

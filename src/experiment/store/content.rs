@@ -2,6 +2,7 @@
 
 use super::error::{StoreError, io_error};
 use super::file::write_changed;
+use crate::experiment::entrant::Entrant;
 use crate::experiment::simulation::Simulation;
 use crate::files;
 use crate::sim::environment::Shape;
@@ -46,7 +47,11 @@ impl Content {
             content.add("truth.scan", sha256(&bytes), Some(&truth.scan));
         }
         for name in &experiment.planners {
-            if let Some(source) = simulation.planner(name).and_then(|planner| planner.source()) {
+            let source = match simulation.planner(name) {
+                Some(Entrant::Planner(factory)) => factory.source(),
+                _ => None,
+            };
+            if let Some(source) = source {
                 content.add(&format!("{PLANNER}{name}"), sha256(source.as_bytes()), None);
             }
         }

@@ -1,16 +1,15 @@
-//! A whole object, touched from any side: a belief over space, and planners on it.
+//! A whole object, touched from any side: a belief over space.
 
-pub mod belief;
 mod evidence;
 mod grid;
+mod implicit_surface;
 mod pieces;
-pub mod planner;
 mod prior;
 mod scope;
 pub mod settings;
 pub mod surface;
 
-pub use belief::Belief;
+pub use implicit_surface::ImplicitSurface;
 pub use scope::Scope;
 pub use settings::SpaceSettings;
 pub use surface::Surface;

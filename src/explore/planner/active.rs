@@ -1,16 +1,15 @@
-//! Algorithm 1 of Yi et al. 2016: touch where the belief's standard deviation is largest.
+//! Algorithm 1 of Yi et al. 2016: touch where the belief's standard deviation is largest. Around an
+//! object it is that of where the surface lies along its normal.
 
-use super::plan::{Entry, Planner};
-use super::search::Search;
-use crate::explore::around;
+use super::plan::{Entry, Plan, PlanError, Planner};
+use super::search::{Candidates, Search};
 use crate::explore::belief::Belief;
-use crate::explore::plan::Plan;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "active",
     about: "largest posterior standard deviation, by DIRECT then BFGS (the paper's)",
-    make: |zone, settings, rng| Box::new(Active { search: Search::new(zone, settings, rng) }),
-    make_around: Some(|_, rng| Box::new(around::planner::Active::new(rng))),
+    zone_only: None,
+    make: |settings, rng| Box::new(Active { search: Search::new(settings, rng) }),
 };
 
 struct Active {
@@ -19,10 +18,19 @@ struct Active {
 
 impl Planner for Active {
     /// The variance has its maximum where its root has, and its gradient is finite everywhere.
-    fn plan(&mut self, belief: &Belief) -> Plan {
-        if belief.surface().is_none() {
-            return self.search.anywhere();
-        }
-        self.search.plan(belief, |places, gradients| belief.explorable_variances(places, gradients))
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+        Ok(match belief {
+            Belief::HeightField(field) if field.surface().is_none() => {
+                self.search.anywhere(field.zone())
+            }
+            Belief::HeightField(field) => self
+                .search
+                .plan(field, |places, gradients| field.explorable_variances(places, gradients)),
+            Belief::ImplicitSurface(surface) => {
+                Candidates::choose(surface, &mut self.search.rng, |candidates| {
+                    candidates.all.iter().map(|candidate| candidate.offset_m).collect()
+                })
+            }
+        })
     }
 }

@@ -3,24 +3,23 @@
 //! Level k is the lattice of 2ᵏ + 1 places along each side, borders included, without those of
 //! the levels before; within a level, places come in bit-reversed (van der Corput) order, so that
 //! a trial may end at any touch. Each axis sees few distinct coordinates: a surface whose period
-//! the lattice shares is not seen until a finer level.
+//! the lattice shares is not seen until a finer level. Around an object it is a lattice of equal areas
+//! on the sphere of directions.
 
-use super::plan::{Entry, Planner};
+use super::plan::{Entry, Plan, PlanError, Planner};
+use super::sample::sampled;
 use crate::explore::belief::Belief;
-use crate::explore::plan::Plan;
-use crate::task::Zone;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "grid",
     about: "a lattice from coarse to fine, no model",
-    make: |zone, _, _| Box::new(Grid { zone: zone.clone(), level: 0, rest: lattice(zone, 0) }),
-    make_around: None,
+    zone_only: None,
+    make: |_, _| Box::new(Grid { next_level: 0, rest: Vec::new() }),
 };
 
 struct Grid {
-    zone: Zone,
-    level: u32,
-    /// What is left of this level, the next one last.
+    next_level: u32,
+    /// What is left of this level, the next node last: fractions 0..1.
     rest: Vec<Vec<f64>>,
 }
 
@@ -28,32 +27,34 @@ struct Grid {
 const FINEST: u32 = 11;
 
 impl Planner for Grid {
-    fn plan(&mut self, _: &Belief) -> Plan {
-        let target = loop {
-            match self.rest.pop() {
-                Some(place) => break place,
-                None => {
-                    self.level = (self.level + 1) % (FINEST + 1);
-                    self.rest = lattice(&self.zone, self.level);
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+        let target = sampled(belief, |dimension| {
+            loop {
+                match self.rest.pop() {
+                    Some(node) => break node,
+                    None => {
+                        self.rest = lattice(dimension, self.next_level);
+                        self.next_level = (self.next_level + 1) % (FINEST + 1);
+                    }
                 }
             }
-        };
-        Plan { target, sd_m: None, stall: None }
+        });
+        Ok(Plan::at(target))
     }
 }
 
-/// The places that `level` adds, last to first.
-fn lattice(zone: &Zone, level: u32) -> Vec<Vec<f64>> {
+/// The nodes that `level` adds, last to first.
+fn lattice(dimension: usize, level: u32) -> Vec<Vec<f64>> {
     let last = 1u32 << level;
     let is_new = |node: &[u32]| level == 0 || node.iter().any(|index| index % 2 == 1);
-    let mut nodes: Vec<Vec<u32>> = match zone.dimension() {
+    let mut nodes: Vec<Vec<u32>> = match dimension {
         1 => (0..=last).map(|x| vec![x]).collect(),
         _ => (0..=last).flat_map(|z| (0..=last).map(move |x| vec![x, z])).collect(),
     };
     nodes.retain(|node| is_new(node));
     nodes.sort_by_key(|node| std::cmp::Reverse(order(node)));
     let fraction = |index: &u32| f64::from(*index) / f64::from(last);
-    nodes.iter().map(|node| zone.at(&node.iter().map(fraction).collect::<Vec<_>>())).collect()
+    nodes.iter().map(|node| node.iter().map(fraction).collect()).collect()
 }
 
 /// The bits of a node's indices, those of all axes in turn, the smallest first.

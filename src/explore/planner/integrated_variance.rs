@@ -1,42 +1,57 @@
 //! Touch where the variance of the whole surface falls most: the active learning of Cohn (1996),
 //! also called integrated variance reduction.
 
-use super::plan::{Entry, Planner};
-use super::search::Search;
+use super::plan::{Entry, Plan, PlanError, Planner};
+use super::search::{Candidates, Search};
 use super::sobol;
-use crate::explore::around;
-use crate::explore::belief::Belief;
-use crate::explore::plan::Plan;
+use crate::explore::belief::{Belief, HeightField};
 use crate::gp::posterior::Scratch;
 use crate::gp::reduction::Reduction;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "integrated_variance",
-    about: "largest fall of the variance over the whole zone (Cohn's active learning)",
-    make: |zone, settings, mut rng: ChaCha8Rng| {
-        let count = settings.integrated_variance.places;
-        let places = sobol::places(zone, count, rng.random());
-        Box::new(IntegratedVariance { places, search: Search::new(zone, settings, rng) })
+    about: "largest fall of the variance over the whole surface (Cohn's active learning)",
+    zone_only: None,
+    make: |settings, rng| {
+        Box::new(IntegratedVariance { seed: None, search: Search::new(settings, rng) })
     },
-    make_around: Some(|_, rng| Box::new(around::planner::IntegratedVariance::new(rng))),
 };
 
 struct IntegratedVariance {
-    /// Where the variance is looked at.
-    places: Vec<Vec<f64>>,
+    /// Of the places of a zone at which the variance is looked at; drawn with the first plan.
+    seed: Option<u32>,
     search: Search,
 }
 
 impl Planner for IntegratedVariance {
-    fn plan(&mut self, belief: &Belief) -> Plan {
-        let Some(posterior) = belief.explorable() else { return self.search.anywhere() };
-        let reduction = Reduction::new(posterior, self.places.iter().map(Vec::as_slice));
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+        Ok(match belief {
+            Belief::HeightField(field) => self.in_zone(field),
+            Belief::ImplicitSurface(surface) => {
+                Candidates::choose(surface, &mut self.search.rng, |candidates| {
+                    let all = &candidates.all;
+                    let places = || all.iter().map(|candidate| candidate.p_w.coords.as_slice());
+                    let reduction = Reduction::new(candidates.surface().posterior(), places());
+                    let mut scratch = Scratch::default();
+                    places().map(|place| reduction.at(place, &mut scratch)).collect()
+                })
+            }
+        })
+    }
+}
+
+impl IntegratedVariance {
+    fn in_zone(&mut self, field: &HeightField) -> Plan {
+        let seed = *self.seed.get_or_insert_with(|| self.search.rng.random());
+        let Some(posterior) = field.explorable() else { return self.search.anywhere(field.zone()) };
+        let count = self.search.settings.integrated_variance.places;
+        let places = sobol::places(field.zone(), count, seed);
+        let reduction = Reduction::new(posterior, places.iter().map(Vec::as_slice));
         let mut scratch = Scratch::default();
-        let score = self.search.differentiated(|places| {
+        let score = self.search.differentiated(field.zone(), |places| {
             places.iter().map(|place| reduction.at(place, &mut scratch)).collect()
         });
-        self.search.plan(belief, score)
+        self.search.plan(field, score)
     }
 }

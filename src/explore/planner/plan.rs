@@ -1,37 +1,131 @@
-//! What a planner is: it sees the belief and the zone, and says where to touch.
+//! What a planner is: it sees the belief and nothing else, and says where to touch.
 
 use super::settings::PlanningSettings;
-use crate::explore::around;
-use crate::explore::belief::Belief;
-use crate::explore::plan::{Plan, Undecided};
-use crate::gp::Posterior;
-use crate::task::Zone;
-use rand::RngExt;
+use crate::explore::belief::{Belief, HeightField};
 use rand_chacha::ChaCha8Rng;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
-/// Chooses targets.
+/// Chooses targets. It is given the belief only: the ground truth is no part of it.
+///
+/// ```
+/// use palpate::explore::belief::Belief;
+/// use palpate::explore::planner::{Plan, PlanError, Planner};
+///
+/// struct Middle;
+///
+/// impl Planner for Middle {
+///     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+///         let field = belief.height_field().ok_or("it explores zones")?;
+///         Ok(Plan::at(field.zone().at(&[0.5; 2])))
+///     }
+/// }
+/// ```
+///
+/// A planner cannot ask for more: no other signature is one, and what an oracle sees cannot be
+/// named outside of `experiment`.
+///
+/// ```compile_fail
+/// use palpate::explore::belief::Belief;
+/// use palpate::experiment::truth::Truth;
+/// use palpate::explore::planner::{Plan, PlanError, Planner};
+///
+/// struct Cheat;
+///
+/// impl Planner for Cheat {
+///     fn plan(&mut self, belief: &Belief, truth: &Truth) -> Result<Plan, PlanError> {
+///         Ok(Plan::at(vec![truth.rmse_m(belief.posterior().unwrap()).unwrap()]))
+///     }
+/// }
+/// ```
+///
+/// ```compile_fail
+/// use palpate::experiment::oracle::GroundTruth;
+/// ```
+///
+/// ```compile_fail
+/// use palpate::experiment::oracle::Oracle;
+/// ```
+///
+/// ```compile_fail
+/// use palpate::explore::belief::Belief;
+///
+/// fn peek(belief: &Belief) -> &palpate::sim::Environment {
+///     belief.environment()
+/// }
+/// ```
 pub trait Planner: Send {
-    /// The next target, inside the zone.
-    fn plan(&mut self, belief: &Belief) -> Plan;
-
-    /// As [`plan`](Self::plan), with what few need: yardsticks look at the truth, and what runs
-    /// another's code can fail.
+    /// The next target.
     ///
     /// # Errors
-    /// If it names no target, which ends the trial.
-    fn decide(&mut self, belief: &Belief, _: &dyn Sight) -> Result<Plan, Undecided> {
-        Ok(self.plan(belief))
+    /// If it names none, which ends the trial.
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError>;
+}
+
+/// A planner's choice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// What to touch: a place of a zone, or six numbers that aim at an object from any side.
+    pub target: Vec<f64>,
+    /// Standard deviation there, if the planner looked at it: the root of
+    /// the belief's variance.
+    pub sd_m: Option<f64>,
+    /// Why the planner's own rule could not decide, if it could not.
+    pub stall: Option<Stall>,
+}
+
+impl Plan {
+    /// To touch `target`.
+    pub fn at(target: Vec<f64>) -> Self {
+        Self { target, sd_m: None, stall: None }
     }
 }
 
-/// The truth, as a yardstick sees it.
-pub trait Sight {
-    /// The belief with a touch at `target` taken in, not fitted again; none if nobody can tell how
-    /// that would end.
-    fn touched(&self, belief: &Belief, target: &[f64]) -> Option<Belief>;
+/// Why a planner's own rule could not decide; the target is then random, because any fixed
+/// pattern may be just the one the surface hides behind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Stall {
+    /// The belief is sure of the best place: that it is the best one is rounding.
+    Collapsed,
+    /// The same target as before would have been asked for again.
+    Repeated,
+    /// Around an object: no way is free to anything that it would ask for.
+    Blocked,
+}
 
-    /// Root mean square error of a belief; none where nobody knows the truth.
-    fn rmse_m(&self, belief: &Posterior) -> Option<f64>;
+/// Why a planner named no target.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("the planner named no target: {reason}")]
+pub struct PlanError {
+    /// In its own words.
+    pub reason: String,
+}
+
+impl From<&str> for PlanError {
+    fn from(reason: &str) -> Self {
+        Self { reason: reason.into() }
+    }
+}
+
+/// A planner that explores zones only, and never fails.
+pub trait ZonePlanner: Send {
+    /// The next target, inside the zone.
+    fn plan(&mut self, belief: &HeightField) -> Plan;
+}
+
+/// A [`ZonePlanner`] as a planner; around an object it names no target.
+pub fn over_zone(planner: impl ZonePlanner + 'static) -> Box<dyn Planner> {
+    Box::new(OverZone(planner))
+}
+
+struct OverZone<P>(P);
+
+impl<P: ZonePlanner> Planner for OverZone<P> {
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+        Ok(self.0.plan(belief.height_field().ok_or("it explores zones only")?))
+    }
 }
 
 /// A planner as an experiment file names it.
@@ -40,17 +134,14 @@ pub struct Entry {
     pub name: &'static str,
     /// One line for `--help`.
     pub about: &'static str,
+    /// Why it explores zones only and cannot go around an object, if so.
+    pub zone_only: Option<&'static str>,
     /// Makes one; the generator is its only randomness.
-    pub make: fn(&Zone, &PlanningSettings, ChaCha8Rng) -> Box<dyn Planner>,
-    /// Makes one that goes around a whole object, where its rule makes sense there.
-    pub make_around: Option<MakeAround>,
+    pub make: fn(&PlanningSettings, ChaCha8Rng) -> Box<dyn Planner>,
 }
 
-/// Makes a planner that goes around a whole object; the generator is its only randomness.
-pub type MakeAround = fn(&PlanningSettings, ChaCha8Rng) -> Box<dyn around::planner::Planner>;
-
-/// What makes the planners of one name: an [`Entry`], or what a program adds to its simulation.
-pub trait Maker: Send + Sync {
+/// Makes the planners of one name: an [`Entry`], or what a program adds to its simulation.
+pub trait PlannerFactory: Send + Sync {
     /// As in an experiment's list; if it is not that of an entry, it is an
     /// [own](super::is_own) one's.
     fn name(&self) -> &str;
@@ -61,49 +152,25 @@ pub trait Maker: Send + Sync {
         None
     }
 
-    /// Makes one for a trial; the generator is its only randomness.
-    fn make(
-        &self,
-        zone: &Zone,
-        settings: &PlanningSettings,
-        random: ChaCha8Rng,
-    ) -> Box<dyn Planner>;
-
-    /// Makes one that goes around a whole object; none if it cannot.
-    fn make_around(
-        &self,
-        _settings: &PlanningSettings,
-        _random: ChaCha8Rng,
-    ) -> Option<Box<dyn around::planner::Planner>> {
+    /// Why it cannot go around a whole object, if it cannot.
+    fn zone_only(&self) -> Option<&str> {
         None
     }
+
+    /// Makes one for a trial; the generator is its only randomness.
+    fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner>;
 }
 
-impl Maker for Entry {
+impl PlannerFactory for Entry {
     fn name(&self) -> &str {
         self.name
     }
 
-    fn make(
-        &self,
-        zone: &Zone,
-        settings: &PlanningSettings,
-        random: ChaCha8Rng,
-    ) -> Box<dyn Planner> {
-        (self.make)(zone, settings, random)
+    fn zone_only(&self) -> Option<&str> {
+        self.zone_only
     }
 
-    fn make_around(
-        &self,
-        settings: &PlanningSettings,
-        random: ChaCha8Rng,
-    ) -> Option<Box<dyn around::planner::Planner>> {
-        self.make_around.map(|make| make(settings, random))
+    fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {
+        (self.make)(settings, random)
     }
-}
-
-/// A uniformly random place of the zone.
-pub fn uniform(zone: &Zone, rng: &mut ChaCha8Rng) -> Vec<f64> {
-    let fractions: Vec<f64> = (0..zone.dimension()).map(|_| rng.random()).collect();
-    zone.at(&fractions)
 }

@@ -11,26 +11,20 @@
 //! How far touches speak for their surroundings is what a few touches tell least: the variance is
 //! that of a committee of beliefs, whose length scales differ from the fitted ones.
 
-use super::plan::{Entry, Planner};
+use super::plan::{Entry, Plan, ZonePlanner, over_zone};
 use super::search::Search;
 use super::sobol;
-use crate::explore::belief::Belief;
-use crate::explore::plan::Plan;
+use crate::explore::belief::HeightField;
 use crate::explore::tour::distance_m;
 use crate::gp::posterior::{Posterior, Scratch};
 use crate::gp::reduction::Reduction;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "silhouette",
     about: "integrated_variance where there probably is a surface, times the chance to meet one",
-    make: |zone, settings, mut rng: ChaCha8Rng| {
-        let count = settings.silhouette.places;
-        let places = sobol::places(zone, count, rng.random());
-        Box::new(Silhouette { places, search: Search::new(zone, settings, rng) })
-    },
-    make_around: None,
+    zone_only: Some("its silhouette is that of a surface seen along one approach"),
+    make: |settings, rng| over_zone(Silhouette { seed: None, search: Search::new(settings, rng) }),
 };
 
 /// Length scales of the committee in units of the fitted ones. Chosen on the suite's objects for
@@ -38,22 +32,27 @@ pub(super) const ENTRY: Entry = Entry {
 const COMMITTEE: [f64; 3] = [0.5, 1.0, 2.0];
 
 struct Silhouette {
-    /// Where the variance is looked at.
-    places: Vec<Vec<f64>>,
+    /// Of the places at which the variance is looked at; drawn with the first plan.
+    seed: Option<u32>,
     search: Search,
 }
 
-impl Planner for Silhouette {
-    fn plan(&mut self, belief: &Belief) -> Plan {
-        let Some(posterior) = belief.explorable() else { return self.search.anywhere() };
+impl ZonePlanner for Silhouette {
+    fn plan(&mut self, belief: &HeightField) -> Plan {
+        let seed = *self.seed.get_or_insert_with(|| self.search.rng.random());
+        let Some(posterior) = belief.explorable() else {
+            return self.search.anywhere(belief.zone());
+        };
+        let count = self.search.settings.silhouette.places;
+        let places = sobol::places(belief.zone(), count, seed);
         let silhouette = belief.presence().silhouette();
         let weigh = |place: &Vec<f64>| silhouette.hoped(place).sqrt();
-        let weights: Vec<f64> = self.places.iter().map(weigh).collect();
+        let weights: Vec<f64> = places.iter().map(weigh).collect();
         let committee: Vec<Posterior> =
             COMMITTEE.iter().filter_map(|scale| posterior.scaled(*scale).ok()).collect();
         let reductions: Vec<Reduction> = (committee.iter())
             .map(|member| {
-                let places = self.places.iter().map(Vec::as_slice);
+                let places = places.iter().map(Vec::as_slice);
                 Reduction::new(member, places).weighted(weights.clone())
             })
             .collect();
@@ -67,7 +66,8 @@ impl Planner for Silhouette {
                 }
             }
         };
-        let candidates = self.search.scattered(self.search.settings.silhouette.candidates);
+        let candidates =
+            self.search.scattered(belief.zone(), self.search.settings.silhouette.candidates);
         // In units of a touch that begins where the last one was.
         let time = |place: &[f64]| {
             let way = self.search.settings.silhouette.touch_way_m.zip(belief.targets().last());
@@ -76,7 +76,7 @@ impl Planner for Silhouette {
         let valued = candidates.into_iter().map(|place| (value(&place) / time(&place), place));
         match valued.max_by(|a, b| a.0.total_cmp(&b.0)) {
             Some((_, place)) => self.search.conclude(belief, place),
-            None => self.search.anywhere(),
+            None => self.search.anywhere(belief.zone()),
         }
     }
 }

@@ -2,42 +2,38 @@
 //!
 //! α(x) = σ(x)·(1 + w·|∇μ(x)| / mean|∇μ|), the mean taken over the zone.
 
-use super::plan::{Entry, Planner};
+use super::plan::{Entry, Plan, ZonePlanner, over_zone};
 use super::search::Search;
 use super::sobol;
-use crate::explore::belief::Belief;
-use crate::explore::plan::Plan;
+use crate::explore::belief::HeightField;
 use crate::gp::Posterior;
 use crate::gp::posterior::Scratch;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "slope",
     about: "standard deviation weighted by the slope of the posterior mean",
-    make: |zone, settings, rng| {
-        let places = sobol::places(zone, MEAN_PLACES, 0);
-        Box::new(Slope { places, search: Search::new(zone, settings, rng) })
-    },
-    make_around: None,
+    zone_only: Some("it follows the slope of a surface over a plane"),
+    make: |settings, rng| over_zone(Slope { search: Search::new(settings, rng) }),
 };
 
 /// Places over which the slope is averaged; chosen.
 const MEAN_PLACES: u32 = 256;
 
 struct Slope {
-    places: Vec<Vec<f64>>,
     search: Search,
 }
 
-impl Planner for Slope {
-    fn plan(&mut self, belief: &Belief) -> Plan {
-        let Some(surface) = belief.surface() else { return self.search.anywhere() };
+impl ZonePlanner for Slope {
+    fn plan(&mut self, belief: &HeightField) -> Plan {
+        let Some(surface) = belief.surface() else { return self.search.anywhere(belief.zone()) };
         let mut scratch = Scratch::default();
-        let slopes = self.places.iter().map(|place| slope(surface, place, &mut scratch));
-        let mean = slopes.sum::<f64>() / self.places.len() as f64;
+        let places = sobol::places(belief.zone(), MEAN_PLACES, 0);
+        let slopes = places.iter().map(|place| slope(surface, place, &mut scratch));
+        let mean = slopes.sum::<f64>() / places.len() as f64;
         let weight = self.search.settings.slope.weight;
         // A flat belief is steep nowhere.
         let per_slope = if mean > 0.0 { weight / mean } else { 0.0 };
-        let score = self.search.differentiated(|places| {
+        let score = self.search.differentiated(belief.zone(), |places| {
             let variances = belief.explorable_variances(places, &mut []);
             let steep = places.iter().map(|place| slope(surface, place, &mut scratch));
             let each = variances.iter().zip(steep);

@@ -1,10 +1,8 @@
 //! A scrambled Sobol sequence: evenly spread targets without any model.
 
-use super::plan::{Entry, Planner};
-use super::settings::PlanningSettings;
-use crate::explore::around;
+use super::plan::{Entry, Plan, PlanError, Planner};
+use super::sample::sampled;
 use crate::explore::belief::Belief;
-use crate::explore::plan::Plan;
 use crate::task::Zone;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -12,36 +10,33 @@ use rand_chacha::ChaCha8Rng;
 pub(super) const ENTRY: Entry = Entry {
     name: "sobol",
     about: "a scrambled Sobol sequence: evenly spread, no model (the fairer baseline)",
-    make: |zone, _: &PlanningSettings, mut rng: ChaCha8Rng| {
-        Box::new(Sobol { zone: zone.clone(), seed: rng.random(), index: 0 })
-    },
-    make_around: Some(|_, rng| Box::new(around::planner::Sobol::new(rng))),
+    zone_only: None,
+    make: |_, mut rng: ChaCha8Rng| Box::new(Sobol { seed: rng.random(), index: 0 }),
 };
 
 struct Sobol {
-    zone: Zone,
     seed: u32,
     index: u32,
 }
 
 impl Planner for Sobol {
-    fn plan(&mut self, _: &Belief) -> Plan {
-        let target = place(&self.zone, self.index, self.seed);
-        self.index += 1;
-        Plan { target, sd_m: None, stall: None }
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+        let target = sampled(belief, |count| {
+            let at = fractions(count, self.index, self.seed);
+            self.index += 1;
+            at
+        });
+        Ok(Plan::at(target))
     }
 }
 
 /// The first `count` places of the sequence that `seed` scrambles: evenly spread, with no period in
 /// common with a surface's.
 pub(super) fn places(zone: &Zone, count: u32, seed: u32) -> Vec<Vec<f64>> {
-    (0..count).map(|index| place(zone, index, seed)).collect()
+    (0..count).map(|index| zone.at(&fractions(zone.dimension(), index, seed))).collect()
 }
 
-/// Place `index` of the sequence that `seed` scrambles.
-fn place(zone: &Zone, index: u32, seed: u32) -> Vec<f64> {
-    let fractions: Vec<f64> = (0..zone.dimension())
-        .map(|axis| f64::from(sobol_burley::sample(index, axis as u32, seed)))
-        .collect();
-    zone.at(&fractions)
+/// Entry `index` of the sequence in `dimension` dimensions that `seed` scrambles.
+fn fractions(dimension: usize, index: u32, seed: u32) -> Vec<f64> {
+    (0..dimension).map(|axis| f64::from(sobol_burley::sample(index, axis as u32, seed))).collect()
 }

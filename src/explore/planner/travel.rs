@@ -6,22 +6,20 @@
 //! them; then the next tour is planned with what was learnt. Every tour has the place where σ is
 //! largest, so that none is put off for ever.
 
-use super::plan::{Entry, Planner};
-use super::search::Search;
-use crate::explore::around;
-use crate::explore::belief::Belief;
-use crate::explore::plan::Plan;
+use super::plan::{Entry, Plan, PlanError, Planner};
+use super::sample::any_side;
+use super::search::{Candidates, Search, decided, unseen};
+use crate::explore::around::ImplicitSurface;
+use crate::explore::belief::{Belief, HeightField};
 use crate::explore::tour::{distance_m, shorten};
+use crate::gp::posterior::Scratch;
+use crate::task::{Aim, Ball};
 
 pub(super) const ENTRY: Entry = Entry {
     name: "travel",
     about: "the largest standard deviations of the next touches, in the order of a short tour",
-    make: |zone, settings, rng| {
-        Box::new(Travel { tour: Vec::new(), search: Search::new(zone, settings, rng) })
-    },
-    make_around: Some(|settings, rng| {
-        Box::new(around::planner::Travel::new(settings.travel.tour, rng))
-    }),
+    zone_only: None,
+    make: |settings, rng| Box::new(Travel { tour: Vec::new(), search: Search::new(settings, rng) }),
 };
 
 struct Travel {
@@ -31,46 +29,112 @@ struct Travel {
 }
 
 impl Planner for Travel {
-    fn plan(&mut self, belief: &Belief) -> Plan {
-        if belief.surface().is_none() {
-            return self.search.anywhere();
-        }
-        let plan = match self.tour.pop() {
-            Some(plan) => plan,
-            None => {
-                let places = self.largest(belief);
-                let tour = places.into_iter().map(|place| self.search.conclude(belief, place));
-                self.tour = tour.collect();
-                if let Some(last) = belief.targets().last() {
-                    shorten(&mut self.tour, last, &distance_m);
-                }
-                self.tour.reverse();
-                self.tour.pop().unwrap_or_else(|| self.search.anywhere())
-            }
-        };
-        match plan.stall {
-            // Touches of this tour may have told what this one was to tell.
-            None => self.search.conclude(belief, plan.target),
-            Some(_) => plan,
-        }
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+        Ok(match belief {
+            Belief::HeightField(field) => self.in_zone(field),
+            Belief::ImplicitSurface(surface) => self.around(surface),
+        })
     }
 }
 
 impl Travel {
+    fn in_zone(&mut self, field: &HeightField) -> Plan {
+        if field.surface().is_none() {
+            return self.search.anywhere(field.zone());
+        }
+        let plan = match self.tour.pop() {
+            Some(plan) => plan,
+            None => {
+                let places = self.largest(field);
+                let tour = places.into_iter().map(|place| self.search.conclude(field, place));
+                self.tour = tour.collect();
+                if let Some(last) = field.targets().last() {
+                    shorten(&mut self.tour, last, &distance_m);
+                }
+                self.tour.reverse();
+                self.tour.pop().unwrap_or_else(|| self.search.anywhere(field.zone()))
+            }
+        };
+        match plan.stall {
+            // Touches of this tour may have told what this one was to tell.
+            None => self.search.conclude(field, plan.target),
+            Some(_) => plan,
+        }
+    }
+
     /// The places of a tour, at least one: each where σ is largest given touches at those before.
-    fn largest(&self, belief: &Belief) -> Vec<Vec<f64>> {
-        let (_, first) =
-            self.search.maximum(|places, gradients| belief.explorable_variances(places, gradients));
+    fn largest(&self, field: &HeightField) -> Vec<Vec<f64>> {
+        let (_, first) = self.search.maximum(field.zone(), |places, gradients| {
+            field.explorable_variances(places, gradients)
+        });
         let mut places = vec![first];
-        let mut known = belief.explorable().cloned();
+        let mut known = field.explorable().cloned();
         for _ in 1..self.search.settings.travel.tour {
             let last = places.last().map(Vec::as_slice);
             known = known.and_then(|known| known.fantasize(last.into_iter()).ok());
             let Some(posterior) = &known else { break };
-            let (_, place) =
-                self.search.maximum(|places, gradients| posterior.variances(places, gradients));
+            let (_, place) = self
+                .search
+                .maximum(field.zone(), |places, gradients| posterior.variances(places, gradients));
             places.push(place);
         }
         places
     }
+
+    fn around(&mut self, surface: &ImplicitSurface) -> Plan {
+        if let Some(aim) = unseen(surface, &mut self.search.rng) {
+            return decided(&aim, None);
+        }
+        if let Some(plan) = self.tour.pop() {
+            return plan;
+        }
+        let aside = any_side(surface.scope(), &mut self.search.rng);
+        if let Some(candidates) = Candidates::of(surface, &mut self.search.rng) {
+            self.tour = self.farthest(surface, &candidates, &aside);
+            self.tour.reverse();
+        }
+        self.tour.pop().unwrap_or_else(|| decided(&aside, None))
+    }
+
+    /// The aims of a tour: each where the surface may lie farthest off, given touches at those
+    /// before.
+    fn farthest(
+        &self,
+        surface: &ImplicitSurface,
+        candidates: &Candidates,
+        aside: &Aim,
+    ) -> Vec<Plan> {
+        let mut plans: Vec<Plan> = Vec::new();
+        let mut known = candidates.surface().posterior().clone();
+        for _ in 0..self.search.settings.travel.tour {
+            let mut scratch = Scratch::default();
+            let variances = (candidates.all.iter())
+                .map(|candidate| known.variance(candidate.p_w.coords.as_slice(), &mut scratch));
+            let plan = candidates.best(variances, aside);
+            let Some(aim) = Aim::of(&plan.target).filter(|_| plan.stall.is_none()) else { break };
+            plans.push(plan);
+            let place = aim.p_w.coords;
+            match known.fantasize([place.as_slice()].into_iter()) {
+                Ok(after) => known = after,
+                Err(_) => break,
+            }
+        }
+        if plans.is_empty() {
+            plans.push(decided(aside, None));
+        }
+        if let Some(last) = surface.asked().last().map(Aim::target) {
+            let ball = &surface.scope().ball;
+            shorten(&mut plans, &last, &|a, b| way_m(ball, a, b));
+        }
+        plans
+    }
+}
+
+/// Straight way between where the ways of two targets enter the ball.
+fn way_m(ball: &Ball, a: &[f64], b: &[f64]) -> f64 {
+    let near_w = |target: &[f64]| {
+        let aim = Aim::of(target)?;
+        Some(aim.p_w + aim.ahead_w.scale(ball.chord_m(&aim)[0]))
+    };
+    near_w(a).zip(near_w(b)).map_or(0.0, |(a, b)| (a - b).norm())
 }

@@ -1,26 +1,25 @@
 //! Seek the highest point by its upper confidence bound (Srinivas et al. 2010): μ + κ·σ.
 
-use super::plan::{Entry, Planner};
+use super::plan::{Entry, Plan, ZonePlanner, over_zone};
 use super::search::Search;
-use crate::explore::belief::Belief;
-use crate::explore::plan::Plan;
+use crate::explore::belief::HeightField;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "ucb",
     about: "seeks the highest point: upper confidence bound",
-    make: |zone, settings, rng| Box::new(Ucb { search: Search::new(zone, settings, rng) }),
-    make_around: None,
+    zone_only: Some("it looks for the highest point, and an object has none"),
+    make: |settings, rng| over_zone(Ucb { search: Search::new(settings, rng) }),
 };
 
 struct Ucb {
     search: Search,
 }
 
-impl Planner for Ucb {
-    fn plan(&mut self, belief: &Belief) -> Plan {
-        let Some(surface) = belief.surface() else { return self.search.anywhere() };
+impl ZonePlanner for Ucb {
+    fn plan(&mut self, belief: &HeightField) -> Plan {
+        let Some(surface) = belief.surface() else { return self.search.anywhere(belief.zone()) };
         let sds = self.search.settings.ucb.sds;
-        let score = self.search.differentiated(|places| {
+        let score = self.search.differentiated(belief.zone(), |places| {
             let means = surface.means(places.iter().map(Vec::as_slice));
             let variances = belief.explorable_variances(places, &mut []);
             means

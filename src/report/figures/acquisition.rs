@@ -3,7 +3,7 @@
 use super::curves;
 use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
-use crate::explore::belief::Belief;
+use crate::explore::belief::HeightField;
 use crate::gp::posterior::Scratch;
 use crate::report::axes::{Axis, Length, Panel, colour_bar};
 use crate::report::canvas::{Area, Canvas};
@@ -53,7 +53,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
 }
 
 /// Standard deviation that a touch asked for at `place` could still remove.
-fn deviation_m(belief: &Belief, place: &[f64], scratch: &mut Scratch) -> f64 {
+fn deviation_m(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> f64 {
     belief.explorable_variance(place, &mut [], scratch).sqrt()
 }
 

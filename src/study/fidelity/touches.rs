@@ -5,10 +5,10 @@ use crate::backend::Fault;
 use crate::backend::trace::Trace;
 use crate::experiment::statistics::median;
 use crate::experiment::truth::Truth;
-use crate::explore::belief::Belief;
+use crate::explore::belief::HeightField;
 use crate::explore::gp_settings::GpSettings;
 use crate::explore::planner;
-use crate::explore::planner::PlanningSettings;
+use crate::explore::planner::{PlannerFactory, PlanningSettings};
 use crate::explore::probe::{Contact, Probe, Touch};
 use crate::math::seed;
 use crate::sim::environment::EnvironmentError;
@@ -42,12 +42,11 @@ pub struct Touches {
 
 /// Evenly spread places of the scene's zone.
 pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Vec<f64>> {
-    let belief = Belief::new(scene.zone.clone(), GpSettings::default());
-    let sobol = planner::by_name("sobol").map(|entry| {
-        (entry.make)(&scene.zone, &PlanningSettings::default(), seed::stream(seed, 0, "targets"))
-    });
-    sobol
-        .map_or_else(Vec::new, |mut sobol| (0..count).map(|_| sobol.plan(&belief).target).collect())
+    let belief = HeightField::new(scene.zone.clone(), GpSettings::default()).into();
+    let Some(entry) = planner::by_name("sobol") else { return Vec::new() };
+    let random = seed::stream(seed, 0, "targets");
+    let mut sobol = entry.make(&PlanningSettings::default(), random);
+    (0..count).filter_map(|_| Some(sobol.plan(&belief).ok()?.target)).collect()
 }
 
 /// Why nothing can be measured.
@@ -182,7 +181,7 @@ pub fn surface_rmse_m(
     contacts: &[Option<Contact>],
     truth: &Truth,
 ) -> Option<f64> {
-    let mut belief = Belief::new(scene.zone.clone(), GpSettings::default());
+    let mut belief = HeightField::new(scene.zone.clone(), GpSettings::default());
     for (target, contact) in targets.iter().zip(contacts) {
         let touch = contact.clone().map_or(Touch::Miss, Touch::Contact);
         belief.observe(target, &touch);

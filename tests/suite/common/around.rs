@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use palpate::experiment::Experiment;
 use palpate::experiment::row::TrialRow;
 use palpate::experiment::simulation::Simulation;
-use palpate::explore::around::{Belief, Scope, SpaceSettings};
+use palpate::explore::around::{ImplicitSurface, Scope, SpaceSettings};
 use palpate::explore::planner;
 use palpate::explore::probe::{Contact, Swept, Touch};
 use palpate::geometry::bvh::MeshBvh;
@@ -44,23 +44,23 @@ pub fn trial(simulation: &Simulation, name: &str) -> TrialRow {
     row
 }
 
-pub fn belief(ball_m: f64, radius_m: f64) -> Belief {
+pub fn belief(ball_m: f64, radius_m: f64) -> ImplicitSurface {
     belief_with(SpaceSettings::default(), ball_m, radius_m)
 }
 
-pub fn belief_with(settings: SpaceSettings, ball_m: f64, radius_m: f64) -> Belief {
+pub fn belief_with(settings: SpaceSettings, ball_m: f64, radius_m: f64) -> ImplicitSurface {
     let ball = Ball { centre_w: Point3::origin(), radius_m: ball_m, lowest_m: None };
     let finger = Finger { radius_m, pitch_deg: 0.0, ..Finger::default() };
     let task = Task::around(ball, TouchSettings::default(), &finger);
-    Belief::new(Scope::of(&task, &finger, false).unwrap(), settings)
+    ImplicitSurface::new(Scope::of(&task, &finger, false).unwrap(), settings)
 }
 
-pub fn approach(belief: &Belief, aim: &Aim) -> Approach {
+pub fn approach(belief: &ImplicitSurface, aim: &Aim) -> Approach {
     belief.scope().ball.approach(aim, &Finger::default(), 0.01, 0.0)
 }
 
 pub fn meet(
-    belief: &mut Belief,
+    belief: &mut ImplicitSurface,
     aim: &Aim,
     met: Option<(Point3<f64>, Vector3<f64>)>,
     p_wt: Point3<f64>,

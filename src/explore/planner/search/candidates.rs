@@ -1,12 +1,11 @@
 //! Places of the believed surface among which planners choose.
 
-use super::plan::{blocked, decided};
-use super::random::anywhere;
 use super::unseen::unseen;
 use super::way::free_aim;
-use crate::explore::around::belief::Belief;
+use crate::explore::around::ImplicitSurface;
 use crate::explore::around::surface::{Surface, steepness};
-use crate::explore::plan::Plan;
+use crate::explore::planner::plan::{Plan, Stall};
+use crate::explore::planner::sample::any_side;
 use crate::task::Aim;
 use nalgebra::{Point3, UnitVector3};
 use rand::RngExt;
@@ -29,7 +28,7 @@ pub struct Candidate {
 
 /// Places all over the believed surface.
 pub struct Candidates<'a> {
-    belief: &'a Belief,
+    belief: &'a ImplicitSurface,
     surface: &'a Surface,
     /// In no order.
     pub all: Vec<Candidate>,
@@ -38,7 +37,7 @@ pub struct Candidates<'a> {
 impl<'a> Candidates<'a> {
     /// Of what `belief` holds for the surface, thinned evenly; none before the first fit, or where
     /// no surface is believed.
-    pub fn of(belief: &'a Belief, rng: &mut ChaCha8Rng) -> Option<Self> {
+    pub fn of(belief: &'a ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Self> {
         let surface = belief.surface()?;
         let mesh = surface.mesh(CELLS)?;
         let vertices = mesh.vertices();
@@ -59,14 +58,14 @@ impl<'a> Candidates<'a> {
     /// To go where the scores that `score` gives the candidates are highest and the way is free, or
     /// now and then where nothing is known; anywhere where no surface is believed.
     pub fn choose(
-        belief: &Belief,
+        belief: &ImplicitSurface,
         rng: &mut ChaCha8Rng,
         score: impl FnOnce(&Candidates) -> Vec<f64>,
     ) -> Plan {
         if let Some(aim) = unseen(belief, rng) {
             return decided(&aim, None);
         }
-        let aside = anywhere(belief.scope(), rng);
+        let aside = any_side(belief.scope(), rng);
         match Candidates::of(belief, rng) {
             Some(candidates) => candidates.best(score(&candidates).into_iter(), &aside),
             None => decided(&aside, None),
@@ -91,4 +90,14 @@ impl<'a> Candidates<'a> {
         });
         free.unwrap_or_else(|| blocked(anywhere))
     }
+}
+
+/// A plan to go where a planner's own rule wants.
+pub fn decided(aim: &Aim, sd_m: Option<f64>) -> Plan {
+    Plan { target: aim.target(), sd_m, stall: None }
+}
+
+/// A plan to go anywhere, since no way to what the rule wants is free.
+fn blocked(aim: &Aim) -> Plan {
+    Plan { target: aim.target(), sd_m: None, stall: Some(Stall::Blocked) }
 }

@@ -1,9 +1,9 @@
-//! What is known after some touches: a Gaussian process over the zone, and where it is unsure.
+//! The heights of a surface over a zone: a Gaussian process, and where it is unsure.
 
-use super::free_space::Ceiling;
-use super::gp_settings::{Band, GpSettings};
-use super::presence::Presence;
-use super::probe::{Swept, Touch};
+use crate::explore::free_space::Ceiling;
+use crate::explore::gp_settings::{Band, GpSettings};
+use crate::explore::presence::Presence;
+use crate::explore::probe::{Swept, Touch};
 use crate::gp::choice::Choice;
 use crate::gp::covariance::CovarianceError;
 use crate::gp::fit::Fit;
@@ -24,7 +24,7 @@ const NORMAL_Y_MIN: f64 = 0.05;
 
 /// The belief of one trial.
 #[derive(Clone)]
-pub struct Belief {
+pub struct HeightField {
     zone: Zone,
     kernels: Choice,
     settings: GpSettings,
@@ -42,7 +42,7 @@ pub struct Belief {
     explored: Option<Posterior>,
 }
 
-impl Belief {
+impl HeightField {
     /// Knows nothing yet. Kernels are chosen [`between`](Choice::between).
     pub fn new(zone: Zone, settings: GpSettings) -> Self {
         let contacts = Observations::new(zone.dimension());

@@ -1,6 +1,6 @@
 //! Whether the finger can go straight at a place of the believed surface.
 
-use crate::explore::around::belief::Belief;
+use crate::explore::around::ImplicitSurface;
 use crate::explore::around::surface::SurfaceField;
 use crate::task::Aim;
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -26,7 +26,7 @@ const ALONG: f64 = 0.97;
 /// belief leaves room for the fingertip: against the normal if it can be, or from another side.
 /// None if there is none that was not asked for before.
 pub fn free_aim(
-    belief: &Belief,
+    belief: &ImplicitSurface,
     surface: &mut SurfaceField,
     (p_w, normal_w): (&Point3<f64>, &UnitVector3<f64>),
 ) -> Option<Aim> {
@@ -60,7 +60,7 @@ fn any_orthogonal(to: &UnitVector3<f64>) -> Vector3<f64> {
     to.cross(&axis).normalize()
 }
 
-fn is_new(belief: &Belief, aim: &Aim) -> bool {
+fn is_new(belief: &ImplicitSurface, aim: &Aim) -> bool {
     let near_m = NEAR * belief.scope().radius_m;
     belief.asked().iter().all(|asked| {
         (asked.p_w - aim.p_w).norm() > near_m || asked.ahead_w.dot(&aim.ahead_w) < ALONG
@@ -68,7 +68,7 @@ fn is_new(belief: &Belief, aim: &Aim) -> bool {
 }
 
 /// Whether the belief leaves the fingertip room along the way of `aim` outside the object.
-pub(super) fn has_room(belief: &Belief, surface: &mut SurfaceField, aim: &Aim) -> bool {
+pub(super) fn has_room(belief: &ImplicitSurface, surface: &mut SurfaceField, aim: &Aim) -> bool {
     let (ball, radius_m) = (&belief.scope().ball, belief.scope().radius_m);
     let back = |radii: f64| aim.p_w - aim.ahead_w.scale(radii * radius_m);
     let mut radii = FIRST;

@@ -2,11 +2,11 @@
 //!
 //! The function is asked for whole lists of places: values of many cost less than many values.
 
-use super::plan::uniform;
-use super::settings::PlanningSettings;
-use super::sobol;
-use crate::explore::belief::Belief;
-use crate::explore::plan::{Plan, Stall};
+use crate::explore::belief::HeightField;
+use crate::explore::planner::plan::{Plan, Stall};
+use crate::explore::planner::sample::uniform;
+use crate::explore::planner::settings::PlanningSettings;
+use crate::explore::planner::sobol;
 use crate::gp::posterior::Scratch;
 use crate::math::climb::{Climb, Manner};
 use crate::math::direct::direct;
@@ -48,57 +48,60 @@ const SAME_HILL: f64 = 0.04;
 /// error, where its own and the rounding error balance.
 const STEP: f64 = 1e-5;
 
-/// What all acquisition planners have in common.
-pub(super) struct Search {
-    pub(super) zone: Zone,
-    pub(super) settings: PlanningSettings,
-    rng: ChaCha8Rng,
+/// Finds where an acquisition function is largest over a zone.
+pub struct Search {
+    /// Settings of all planners.
+    pub settings: PlanningSettings,
+    /// All of the randomness.
+    pub rng: ChaCha8Rng,
 }
 
 impl Search {
-    pub(super) fn new(zone: &Zone, settings: &PlanningSettings, rng: ChaCha8Rng) -> Self {
-        Self { zone: zone.clone(), settings: settings.clone(), rng }
+    /// Whose only randomness is `rng`.
+    pub fn new(settings: &PlanningSettings, rng: ChaCha8Rng) -> Self {
+        Self { settings: settings.clone(), rng }
     }
 
     /// A random place, of a belief that knows nothing.
-    pub(super) fn anywhere(&mut self) -> Plan {
-        Plan { target: uniform(&self.zone, &mut self.rng), sd_m: None, stall: None }
+    pub fn anywhere(&mut self, zone: &Zone) -> Plan {
+        Plan::at(uniform(zone, &mut self.rng))
     }
 
     /// The place where `score` is largest; `score` returns the values of places and writes their
     /// gradients into its second argument unless that is empty.
-    pub(super) fn plan(
+    pub fn plan(
         &mut self,
-        belief: &Belief,
+        belief: &HeightField,
         score: impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64>,
     ) -> Plan {
-        let (_, place) = self.maximum(score);
+        let (_, place) = self.maximum(belief.zone(), score);
         self.conclude(belief, place)
     }
 
     /// Plans to touch `place`, or a random one if a touch there would tell nothing.
-    pub(super) fn conclude(&mut self, belief: &Belief, place: Vec<f64>) -> Plan {
-        let stall = self.stall(belief, &place);
-        let target = if stall.is_none() { place } else { uniform(&self.zone, &mut self.rng) };
+    pub fn conclude(&mut self, belief: &HeightField, place: Vec<f64>) -> Plan {
+        let stall = stalled(belief, &place);
+        let target = if stall.is_none() { place } else { uniform(belief.zone(), &mut self.rng) };
         let sd_m = Some(variance(belief, &target).sqrt());
         Plan { target, sd_m, stall }
     }
 
     /// The largest value of `score` that was found, and its place.
-    pub(super) fn maximum(
+    pub fn maximum(
         &self,
+        zone: &Zone,
         mut score: impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64>,
     ) -> (f64, Vec<f64>) {
         let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
-        let (lower, upper) = self.corners(MARGIN);
+        let (lower, upper) = corners(zone, MARGIN);
         let bounds = Bounds { lower: &lower, upper: &upper };
         direct(bounds, self.settings.direct_evaluations, |places| {
-            let places: Vec<_> = places.iter().map(|place| self.clamped(place)).collect();
+            let places: Vec<_> = places.iter().map(|place| clamped(zone, place)).collect();
             let values = score(&places, &mut []);
             seen.extend(values.iter().copied().zip(places));
             values
         });
-        let (lower, upper) = self.corners(0.0);
+        let (lower, upper) = corners(zone, 0.0);
         let bounds = Bounds { lower: &lower, upper: &upper };
         let manner = Manner {
             first_step: FIRST_STEP,
@@ -107,14 +110,14 @@ impl Search {
             budget: self.settings.lbfgs_evaluations,
         };
         let start = |start: Vec<f64>| Climb::new(bounds, &start, None, manner);
-        let mut climbs: Vec<Climb> = self.hills(seen).into_iter().map(start).collect();
+        let mut climbs: Vec<Climb> = hills(zone, seen).into_iter().map(start).collect();
         loop {
             let asked: Vec<Vec<f64>> =
                 climbs.iter().filter_map(|climb| climb.asked().map(<[f64]>::to_vec)).collect();
             if asked.is_empty() {
                 break;
             }
-            let mut gradients = vec![vec![0.0; self.zone.dimension()]; asked.len()];
+            let mut gradients = vec![vec![0.0; zone.dimension()]; asked.len()];
             let values = score(&asked, &mut gradients);
             let going = climbs.iter_mut().filter(|climb| climb.asked().is_some());
             for ((climb, value), gradient) in going.zip(values).zip(&gradients) {
@@ -126,7 +129,7 @@ impl Search {
                 climb.asked().is_none() || !climb.is_measured() || climb.hope(HOPE) >= highest
             });
         }
-        let mut best = (f64::MIN, self.zone.at(&vec![0.5; self.zone.dimension()]));
+        let mut best = (f64::MIN, zone.at(&vec![0.5; zone.dimension()]));
         for climb in &climbs {
             let top = climb.top();
             if top.value > best.0 {
@@ -137,16 +140,17 @@ impl Search {
     }
 
     /// Evenly spread places, others each time: none was asked for before.
-    pub(super) fn scattered(&mut self, count: u32) -> Vec<Vec<f64>> {
-        sobol::places(&self.zone, count, self.rng.random())
+    pub fn scattered(&mut self, zone: &Zone, count: u32) -> Vec<Vec<f64>> {
+        sobol::places(zone, count, self.rng.random())
     }
 
     /// `values` with their gradients by central differences, one-sided at the zone's border.
-    pub(super) fn differentiated<V: FnMut(&[Vec<f64>]) -> Vec<f64>>(
+    pub fn differentiated<V: FnMut(&[Vec<f64>]) -> Vec<f64>>(
         &self,
+        zone: &Zone,
         mut values: V,
     ) -> impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64> + use<V> {
-        let sides: Vec<[f64; 2]> = self.zone.sides().collect();
+        let sides: Vec<[f64; 2]> = zone.sides().collect();
         move |places, gradients| {
             if gradients.is_empty() {
                 return values(places);
@@ -177,50 +181,50 @@ impl Search {
             told.into_iter().step_by(each).collect()
         }
     }
+}
 
-    /// Lowest and highest corner of the zone, moved out by `margin` of its sides.
-    fn corners(&self, margin: f64) -> (Vec<f64>, Vec<f64>) {
-        let moved = |[low, high]: [f64; 2]| {
-            let step = margin * (high - low);
-            (low - step, high + step)
-        };
-        self.zone.sides().map(moved).unzip()
-    }
+/// Lowest and highest corner of the zone, moved out by `margin` of its sides.
+fn corners(zone: &Zone, margin: f64) -> (Vec<f64>, Vec<f64>) {
+    let moved = |[low, high]: [f64; 2]| {
+        let step = margin * (high - low);
+        (low - step, high + step)
+    };
+    zone.sides().map(moved).unzip()
+}
 
-    fn clamped(&self, place: &[f64]) -> Vec<f64> {
-        place.iter().zip(self.zone.sides()).map(|(at, [low, high])| at.clamp(low, high)).collect()
-    }
+fn clamped(zone: &Zone, place: &[f64]) -> Vec<f64> {
+    place.iter().zip(zone.sides()).map(|(at, [low, high])| at.clamp(low, high)).collect()
+}
 
-    /// The best places seen that are not next to a better one.
-    fn hills(&self, mut seen: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
-        seen.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut hills: Vec<Vec<f64>> = Vec::new();
-        for (_, place) in seen {
-            let is_apart = |hill: &Vec<f64>| self.zone.distance(hill, &place) > SAME_HILL;
-            if hills.iter().all(is_apart) {
-                hills.push(place);
-            }
-            if hills.len() == HILLS {
-                break;
-            }
+/// The best places seen that are not next to a better one.
+fn hills(zone: &Zone, mut seen: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
+    seen.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut hills: Vec<Vec<f64>> = Vec::new();
+    for (_, place) in seen {
+        let is_apart = |hill: &Vec<f64>| zone.distance(hill, &place) > SAME_HILL;
+        if hills.iter().all(is_apart) {
+            hills.push(place);
         }
-        hills
-    }
-
-    /// Why a touch at `place` would tell nothing, if so.
-    fn stall(&self, belief: &Belief, place: &[f64]) -> Option<Stall> {
-        let lost_sd = LOST_IN_ROUNDING * belief.surface()?.hyperparameters().signal_sd;
-        let same = |target: &Vec<f64>| self.zone.distance(target, place) < SAME_TARGET;
-        if variance(belief, place) <= lost_sd * lost_sd {
-            Some(Stall::Collapsed)
-        } else if belief.targets().iter().any(same) {
-            Some(Stall::Repeated)
-        } else {
-            None
+        if hills.len() == HILLS {
+            break;
         }
+    }
+    hills
+}
+
+/// Why a touch at `place` would tell nothing, if so.
+fn stalled(belief: &HeightField, place: &[f64]) -> Option<Stall> {
+    let lost_sd = LOST_IN_ROUNDING * belief.surface()?.hyperparameters().signal_sd;
+    let same = |target: &Vec<f64>| belief.zone().distance(target, place) < SAME_TARGET;
+    if variance(belief, place) <= lost_sd * lost_sd {
+        Some(Stall::Collapsed)
+    } else if belief.targets().iter().any(same) {
+        Some(Stall::Repeated)
+    } else {
+        None
     }
 }
 
-fn variance(belief: &Belief, place: &[f64]) -> f64 {
+fn variance(belief: &HeightField, place: &[f64]) -> f64 {
     belief.explorable_variance(place, &mut [], &mut Scratch::default())
 }

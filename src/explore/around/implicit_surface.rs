@@ -19,7 +19,7 @@ use nalgebra::Point3;
 
 /// The belief of one trial around an object.
 #[derive(Clone)]
-pub struct Belief {
+pub struct ImplicitSurface {
     scope: Scope,
     settings: SpaceSettings,
     kernel: &'static dyn Kernel,
@@ -47,7 +47,7 @@ const STEP_FIRST: f64 = 0.7;
 const STEP_NEXT: f64 = 0.35;
 const STEP_LAST: f64 = 0.1;
 
-impl Belief {
+impl ImplicitSurface {
     /// Knows nothing yet.
     pub fn new(scope: Scope, settings: SpaceSettings) -> Self {
         let kernel = kernel::by_name(&settings.kernel).unwrap_or(&Matern52);

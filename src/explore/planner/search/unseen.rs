@@ -1,9 +1,9 @@
 //! Where nothing was met or swept yet: a piece that no touch has met is in no belief, so that no
 //! deviation leads to it.
 
-use super::random::in_ball;
 use super::way::has_room;
-use crate::explore::around::belief::Belief;
+use crate::explore::around::ImplicitSurface;
+use crate::explore::planner::sample::in_ball;
 use crate::task::Aim;
 use nalgebra::Point3;
 use rand_chacha::ChaCha8Rng;
@@ -23,7 +23,7 @@ const HOLE: f64 = 0.15;
 
 /// An aim into the largest hole between all that was met and swept, if it is time for one and there
 /// is a large one that can be reached.
-pub(super) fn unseen(belief: &Belief, rng: &mut ChaCha8Rng) -> Option<Aim> {
+pub fn unseen(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
     let scope = belief.scope();
     let whole = &scope.ball;
     let is_known = scope.met(belief.contacts()).radius_m >= KNOWN * whole.radius_m;

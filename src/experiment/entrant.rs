@@ -1,0 +1,89 @@
+//! What an experiment compares: planners, and the oracle beside them.
+
+use super::oracle::{GroundTruth, Oracle};
+use crate::explore::belief::Belief;
+use crate::explore::planner::{
+    Entry, PLANNERS, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, is_own,
+};
+use rand_chacha::ChaCha8Rng;
+
+/// Name of the oracle in an experiment's list of planners.
+pub const ORACLE: &str = "oracle";
+
+/// Each name that an experiment may list, with a line about it.
+pub fn listed() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let oracle = "what lowers the true error most (looks at the truth: only to measure others by)";
+    PLANNERS.iter().map(|entry| (entry.name, entry.about)).chain([(ORACLE, oracle)])
+}
+
+/// The names that may stand where `name` stands: those [`listed`], and `name` itself if it is that
+/// of an [own](is_own) planner.
+pub fn allowed(name: &str) -> Vec<&str> {
+    listed().map(|(name, _)| name).chain(is_own(name).then_some(name)).collect()
+}
+
+/// A planner or the oracle.
+#[derive(Clone, Copy)]
+pub enum Entrant<'a> {
+    /// A planner, which sees the belief.
+    Planner(&'a dyn PlannerFactory),
+    /// The oracle, which sees the ground truth.
+    Oracle,
+}
+
+impl<'a> Entrant<'a> {
+    /// As in an experiment's list.
+    pub fn name(&self) -> &'a str {
+        match *self {
+            Self::Planner(factory) => factory.name(),
+            Self::Oracle => ORACLE,
+        }
+    }
+
+    /// Why it cannot go around a whole object, if it cannot.
+    pub(super) fn zone_only(&self) -> Option<&'a str> {
+        match *self {
+            Self::Planner(factory) => factory.zone_only(),
+            Self::Oracle => None,
+        }
+    }
+
+    /// Makes what chooses the touches of one trial.
+    pub(super) fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Chooser {
+        match self {
+            Self::Planner(factory) => Chooser::Planner(factory.make(settings, random)),
+            Self::Oracle => Chooser::Oracle(Box::new(Oracle::new(settings, random))),
+        }
+    }
+}
+
+impl<'a> From<&'a Entry> for Entrant<'a> {
+    fn from(entry: &'a Entry) -> Self {
+        Self::Planner(entry)
+    }
+}
+
+impl<'a> From<&'a dyn PlannerFactory> for Entrant<'a> {
+    fn from(factory: &'a dyn PlannerFactory) -> Self {
+        Self::Planner(factory)
+    }
+}
+
+/// What chooses the touches of one trial.
+pub(super) enum Chooser {
+    Planner(Box<dyn Planner>),
+    Oracle(Box<Oracle>),
+}
+
+impl Chooser {
+    /// The next target.
+    ///
+    /// # Errors
+    /// If the planner names none.
+    pub(super) fn plan(&mut self, belief: &Belief, truth: &GroundTruth) -> Result<Plan, PlanError> {
+        match self {
+            Self::Planner(planner) => planner.plan(belief),
+            Self::Oracle(oracle) => Ok(oracle.plan(belief, truth)),
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! The oracle, which chooses touches by the ground truth: it shows how much any planner could gain.
+//!
+//! Only trials make one. A planner is given the belief alone.
+
+use super::shape::TrueShape;
+use super::statistics::mean;
+use super::truth::Truth;
+use crate::explore::around::ImplicitSurface;
+use crate::explore::around::Surface;
+use crate::explore::around::surface::steepness;
+use crate::explore::belief::Belief;
+use crate::explore::planner::sample::any_side;
+use crate::explore::planner::search::{Candidates, Search, decided, free_aim};
+use crate::explore::planner::{Plan, PlanningSettings};
+use crate::sim::Environment;
+use crate::sim::probe::exact;
+use crate::task::Aim;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
+
+/// What the beliefs of a trial are compared with.
+pub(super) struct GroundTruth<'a> {
+    /// The scene, with the object's mesh.
+    pub(super) environment: &'a Arc<Environment>,
+    /// True heights over a zone.
+    pub(super) truth: &'a Truth,
+    /// The true surface of a whole object; none in a zone.
+    pub(super) shape: Option<&'a TrueShape>,
+}
+
+/// Points of the true surface at which the oracle compares.
+// heuristic: its choice is the same with all of them, and takes eight times as long.
+const LOOKED_AT: usize = 8;
+
+impl GroundTruth<'_> {
+    /// The belief with a touch of a rigid finger at `target`, not fitted again.
+    fn touched(&self, belief: &Belief, target: &[f64]) -> Option<Belief> {
+        let mut probe = exact(Arc::clone(self.environment));
+        let approach = self.environment.task().approach(target);
+        let touch = probe.touch(&approach).ok()?;
+        let mut after = belief.clone();
+        after.observe(target, &approach, (&touch, probe.swept().as_ref()));
+        Some(after)
+    }
+
+    /// Error of a belief, m: over a zone root mean square; in space the mean of |f| / |∇f| on the
+    /// true surface.
+    fn error_m(&self, belief: &Belief) -> Option<f64> {
+        match belief {
+            Belief::HeightField(field) => self.truth.rmse_m(field.surface()?),
+            Belief::ImplicitSurface(surface) => Some(off_m(self.shape?, surface.surface()?)),
+        }
+    }
+}
+
+fn off_m(shape: &TrueShape, surface: &Surface) -> f64 {
+    let mut field = surface.field();
+    let spots = shape.samples().iter().step_by(LOOKED_AT);
+    let offsets_m: Vec<f64> = spots
+        .map(|spot| {
+            let field = field.at(&spot.point);
+            field.value.abs() / steepness(&field.gradient)
+        })
+        .collect();
+    mean(&offsets_m)
+}
+
+/// Tries touches on the ground truth and asks for the one after which the belief is nearest to it.
+pub(super) struct Oracle {
+    search: Search,
+}
+
+impl Oracle {
+    /// Of one trial; `rng` is its only randomness.
+    pub(super) fn new(settings: &PlanningSettings, rng: ChaCha8Rng) -> Self {
+        Self { search: Search::new(settings, rng) }
+    }
+
+    /// The touch after which `belief` is nearest to `truth`.
+    pub(super) fn plan(&mut self, belief: &Belief, truth: &GroundTruth) -> Plan {
+        match belief {
+            Belief::HeightField(field) => {
+                let count = self.search.settings.oracle.candidates;
+                let targets = self.search.scattered(field.zone(), count);
+                match self.best(belief, truth, targets) {
+                    Some(target) => self.search.conclude(field, target),
+                    None => self.search.anywhere(field.zone()),
+                }
+            }
+            Belief::ImplicitSurface(surface) => {
+                let targets = self.aims(surface).iter().map(Aim::target).collect();
+                match self.best(belief, truth, targets) {
+                    Some(target) => Plan::at(target),
+                    None => decided(&any_side(surface.scope(), &mut self.search.rng), None),
+                }
+            }
+        }
+    }
+
+    fn best(
+        &self,
+        belief: &Belief,
+        truth: &GroundTruth,
+        targets: Vec<Vec<f64>>,
+    ) -> Option<Vec<f64>> {
+        let is_refitted = self.search.settings.oracle.refit && belief.height_field().is_some();
+        let errors = targets.into_iter().filter_map(|target| {
+            let mut after = truth.touched(belief, &target)?;
+            match is_refitted {
+                true => after.refit().map(|_| ()).ok()?,
+                false => after.fit().is_some().then(|| after.condition())?.ok()?,
+            }
+            Some((truth.error_m(&after)?, target))
+        });
+        errors.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, target)| target)
+    }
+
+    /// Random places of the believed surface with a free way, and as many random directions where
+    /// there are not enough.
+    fn aims(&mut self, surface: &ImplicitSurface) -> Vec<Aim> {
+        let tried = self.search.settings.oracle.candidates;
+        let rng = &mut self.search.rng;
+        let mut aims = Vec::new();
+        if let Some(candidates) = Candidates::of(surface, rng) {
+            let mut field = candidates.surface().field();
+            for _ in 0..tried {
+                let at = rng.random_range(0..candidates.all.len());
+                let place = (&candidates.all[at].p_w, &candidates.all[at].normal_w);
+                aims.extend(free_aim(surface, &mut field, place));
+            }
+        }
+        while aims.len() < tried as usize {
+            aims.push(any_side(surface.scope(), rng));
+        }
+        aims
+    }
+}
