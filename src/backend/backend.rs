@@ -85,6 +85,7 @@ pub trait Backend: Send {
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault>;
 
     /// Stops by the brakes instead of the servos: a simulated arm for its next step, which commands
-    /// it to stand still; an arm behind topics until an operator clears it. Without brakes, nothing.
+    /// it to stand still; an arm behind topics until an operator clears it. A body without brakes
+    /// does nothing.
     fn brake(&mut self) {}
 }

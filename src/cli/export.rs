@@ -109,7 +109,7 @@ fn closed(run: &mut Run, args: &Args, touches: u32) -> anyhow::Result<(Points, S
     }
     let of = || format!("{} had no fit after {touches} touches", args.planner);
     let row = replay::row(run, &args.planner).with_context(of)?;
-    let truth = whole::truth(&run.experiment.scene);
+    let truth = whole::truth(run);
     let frame = whole::frame(&run.experiment, row, touches, truth.as_ref(), usize::MAX)?;
     let frame = frame.with_context(of)?;
     ensure!(

@@ -90,7 +90,9 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     make_folder(&folder)?;
     write_whole(&folder.join("cloud.ply"), cloud.ply())?;
     write_whole(&folder.join("cloud.csv"), csv(&touches))?;
-    if let Some(svg) = drawing::picture(&environment, mesh, &cloud.points) {
+    let height_m = |place: &[f64]| environment.true_height_m(place);
+    if let Some(svg) = drawing::picture((environment.task().zone(), mesh, &height_m), &cloud.points)
+    {
         files::write(&folder.join("scan.svg"), &svg)?;
     }
     let faults = touches.iter().filter(|one| one.touch.is_err()).count();

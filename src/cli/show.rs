@@ -146,7 +146,10 @@ fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
     if let Some(path) = &args.png {
         let svg = match &whole_object {
             Some((ball, shape)) => what_is_reached(ball, shape.as_ref(), &environment),
-            None => report::zone::picture(&environment),
+            None => environment.mesh().and_then(|mesh| {
+                let height_m = |place: &[f64]| environment.true_height_m(place);
+                report::zone::picture(environment.task().zone(), mesh, &height_m)
+            }),
         };
         let svg = svg.context("--png: this scene has no object to draw")?;
         store::write_whole(path, png::render(&svg)?)?;

@@ -300,7 +300,7 @@ fn sampled(
 ) -> Result<(Truth, Option<LeftOut>), SimulationError> {
     let per_side = experiment.grid as usize;
     if environment.task().ball().is_some() {
-        return Ok((Truth::nothing(), None));
+        return Ok((Truth::around(environment.mesh()), None));
     }
     let (truth, left_out) = match &experiment.truth {
         Some(scan) => {

@@ -1,10 +1,13 @@
 //! The true surface on the test grid of an experiment.
 
 use super::metrics::{Calibration, Errors, Metrics, Sums};
+use crate::geometry::coarse::coarse;
+use crate::geometry::mesh::Mesh;
 use crate::gp::Posterior;
 use crate::sim::Environment;
 use crate::sim::reach;
 use crate::task::Zone;
+use std::sync::Arc;
 
 /// True heights on the test grid of an experiment.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +23,13 @@ pub struct Truth {
     pub is_reachable: Vec<bool>,
     /// Whether a place without a height has no surface; otherwise none is known.
     pub is_whole: bool,
+    /// The surface of a whole object in `W`, to be drawn and compared with; none in a zone.
+    pub mesh: Option<Arc<Mesh>>,
 }
+
+/// Triangles of the surface of a whole object that a run keeps.
+// heuristic: a megabyte of text, and finer than any figure shows.
+const TRIANGLES: usize = 20_000;
 
 /// The belief's variance is looked at in every so many places of the grid: it costs the square of
 /// the number of touches where the mean costs that number. Chosen.
@@ -50,9 +59,17 @@ impl Truth {
         Self::new(zone, places, vec![None; count], vec![false; count])
     }
 
-    /// Without a test place: what stands where a whole object is explored.
-    pub fn nothing() -> Self {
-        Self::new(&Zone::nothing(), Vec::new(), Vec::new(), Vec::new())
+    /// Of a whole object with the surface `mesh`, made coarser if it is large; without a test place.
+    pub fn around(mesh: Option<&Mesh>) -> Self {
+        let kept = mesh.map(|mesh| match mesh.triangles().len() > TRIANGLES {
+            true => {
+                let (vertices, triangles) = coarse(mesh, TRIANGLES);
+                Mesh::new(&vertices, &triangles).map_or_else(|_| mesh.clone(), |(mesh, _)| mesh)
+            }
+            false => mesh.clone(),
+        });
+        let nowhere = Self::new(&Zone::nothing(), Vec::new(), Vec::new(), Vec::new());
+        Self { mesh: kept.map(Arc::new), ..nowhere }
     }
 
     /// Whether any height is known.
@@ -68,7 +85,7 @@ impl Truth {
         is_reachable: Vec<bool>,
     ) -> Self {
         let is_edge = places.iter().map(|place| zone.is_edge(place)).collect();
-        Self { places, heights_m, is_edge, is_reachable, is_whole: false }
+        Self { places, heights_m, is_edge, is_reachable, is_whole: false, mesh: None }
     }
 
     /// How many test places have a surface.

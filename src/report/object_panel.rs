@@ -7,7 +7,6 @@ use super::relief_panel::ReliefPanel;
 use super::style;
 use super::style::LATER;
 use crate::geometry::mesh::Mesh;
-use crate::sim::Environment;
 use crate::task::Zone;
 
 /// Room for the numbers on the left.
@@ -16,14 +15,16 @@ const LEFT_PX: f64 = 20.0;
 /// Places along each side of the zone's rim; more would not show.
 const PLACES: usize = 90;
 
+/// True height above the datum at a place of a zone, m; none where there is no surface.
+pub type Heights<'a> = &'a dyn Fn(&[f64]) -> Option<f64>;
+
 /// Draws the object into `area`, its heights above the datum coloured along `axis`.
 pub fn draw(
     canvas: &mut Canvas,
     area: Area,
-    (environment, mesh): (&Environment, &Mesh),
+    (zone, mesh, height_m): (&Zone, &Mesh, Heights),
     axis: &Axis,
 ) {
-    let zone = environment.task().zone();
     let unit = Length::of(zone);
     let mesh = &mesh.transformed(&zone.x_wz().inverse());
     let (low, high) = mesh.bounds();
@@ -45,10 +46,8 @@ pub fn draw(
         // Where the zone looks past the object, its rim is seen at the height of the datum.
         let at_datum = side.iter().map(|place| panel.view.at([place[0], 0.0, place[1]]));
         canvas.line(at_datum, &style::stroke(LATER, 0.6));
-        let on_surface = side.iter().map(|place| {
-            let height_m = environment.true_height_m(place)?;
-            Some(panel.view.at([place[0], height_m, place[1]]))
-        });
+        let on_surface =
+            side.iter().map(|place| Some(panel.view.at([place[0], height_m(place)?, place[1]])));
         let on_surface: Vec<_> = on_surface.collect();
         for part in on_surface.split(Option::is_none) {
             canvas.line(part.iter().flatten().copied(), &style::stroke(LATER, 2.0));

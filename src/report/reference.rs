@@ -4,7 +4,6 @@ use crate::config::Rules;
 use crate::experiment::Experiment;
 use crate::experiment::measure::{Direction, MEASURES};
 use crate::experiment::row::TrialRow;
-use crate::sim::finger::Effects;
 use schemars::{JsonSchema, schema_for};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -79,8 +78,8 @@ pub fn settings() -> String {
 }
 
 fn allowed() -> BTreeMap<String, String> {
-    let Ok(mut complete) = toml::from_str::<Experiment>(COMPLETE) else { return BTreeMap::new() };
-    complete.scene.effects = Effects::all();
+    let Ok(complete) = toml::from_str::<Experiment>(COMPLETE) else { return BTreeMap::new() };
+    let complete = Experiment { scene: complete.scene.with_all_effects(), ..complete };
     let rules = Rules::of(&complete).into_iter();
     // What holds for every entry is said of the whole.
     rules.map(|(key, allowed)| (whole(&key), allowed)).collect()

@@ -2,12 +2,12 @@
 
 use super::axes::{Axis, Length, colour_bar};
 use super::canvas::{Area, Canvas};
-use super::object_panel;
+use super::object_panel::{self, Heights};
 use super::relief::{Space, brightness};
 use super::relief_panel::ReliefPanel;
 use super::style;
 use crate::geometry::mesh::Mesh;
-use crate::sim::Environment;
+use crate::task::Zone;
 use nalgebra::{Point3, Vector3};
 
 const PANEL: (f64, f64) = (430.0, 480.0);
@@ -16,11 +16,9 @@ const FOOT_PX: f64 = 64.0;
 /// The object on the left with the zone's rim on it, the points of contact on the right, as SVG;
 /// none without points.
 pub fn picture(
-    environment: &Environment,
-    mesh: &Mesh,
+    (zone, mesh, height_m): (&Zone, &Mesh, Heights),
     points: &[(Point3<f64>, Vector3<f64>)],
 ) -> Option<String> {
-    let zone = &environment.scene().zone;
     let unit = Length::of(zone);
     let x_zw = zone.x_wz().inverse();
     let heights_m = || points.iter().map(|(p_w, _)| zone.height_m(p_w));
@@ -29,7 +27,7 @@ pub fn picture(
     let mut canvas = Canvas::new(2.0 * PANEL.0, PANEL.1 + FOOT_PX);
     let area =
         |column: f64| Area { left: column * PANEL.0, top: 8.0, width: PANEL.0, height: PANEL.1 };
-    object_panel::draw(&mut canvas, area(0.0), (environment, mesh), &inside);
+    object_panel::draw(&mut canvas, area(0.0), (zone, mesh, height_m), &inside);
 
     let (low, high) = inside.range();
     let space = Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: [low, high] };

@@ -12,8 +12,6 @@ use crate::explore::around::{ImplicitSurface, Scope};
 use crate::explore::probe::{Contact, Swept, Touch};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::coarse::coarse;
-use crate::sim::environment::Shape;
-use crate::sim::{Environment, Scene};
 use crate::task::{Aim, Task};
 use anyhow::{Context, ensure};
 use nalgebra::{Point3, Vector3};
@@ -21,12 +19,9 @@ use nalgebra::{Point3, Vector3};
 /// Triangles of a surface that is drawn; chosen, so that a page stays a few megabytes.
 const TRIANGLES: usize = 3000;
 
-/// The true surface, if the object's file is still there.
-pub fn truth(scene: &Scene) -> Option<MeshBvh> {
-    match Environment::build(scene.clone()).ok()?.shape() {
-        Shape::Mesh { bvh, .. } => Some(bvh.clone()),
-        Shape::Function(_) => None,
-    }
+/// The true surface that the run keeps, with its search tree; none of a run without it.
+pub fn truth(run: &Run) -> Option<MeshBvh> {
+    run.truth.mesh.as_deref().cloned().map(MeshBvh::new)
 }
 
 /// The part of the page that moves; empty of a run over a zone.
@@ -38,7 +33,7 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     if experiment.scene.around.is_none() {
         return Ok(String::new());
     }
-    let truth = truth(&experiment.scene);
+    let truth = truth(run);
     let planners = experiment.drawn_planners();
     let counts = counts(experiment.initial_touches, experiment.touches, planners.len(), TRIANGLES);
     let sequences = sequences(run, &planners, &counts, truth.as_ref())?;

@@ -328,6 +328,11 @@ impl Checked for Scene {
 }
 
 impl Scene {
+    /// The scene with every effect, each as it is by default.
+    pub fn with_all_effects(self) -> Self {
+        Self { effects: Effects::all(), ..self }
+    }
+
     /// Duration of one control tick: the scene's, or the body's own. That of a simulated arm is
     /// the cycle of the PA-10's servo driver (`hydro`, Orca robotics); a body without inertia needs
     /// no more than a tick for each tactile frame.

@@ -123,3 +123,31 @@ fn an_object_too_small_to_go_around_is_refused_at_once() {
     }
     assert!(!folder.path().join("runs").exists());
 }
+
+/// What figures need of the truth lies in the folder: it may move, and the mesh may go or change.
+#[test]
+fn a_report_needs_its_folder_alone() {
+    let folder = around();
+    succeeds(folder.path(), &["run", "small.toml"]);
+    let read = |run: &str| {
+        let path = folder.path().join(run);
+        let files = ["report.html", "figures/solids.svg", "figures/errors.svg", "summary.csv"];
+        files.map(|name| fs::read(path.join(name)).ok())
+    };
+    let drawn = read("runs/small");
+    assert!(drawn[0].is_some() && drawn[1].is_some());
+    let mesh = folder.path().join("mesh.obj");
+    let text = fs::read_to_string(&mesh).unwrap();
+    fs::write(&mesh, text.replace("v 0 0 1\n", "v 0 0 2\n")).unwrap();
+    fs::create_dir(folder.path().join("elsewhere")).unwrap();
+    fs::rename(folder.path().join("runs/small"), folder.path().join("elsewhere/deep")).unwrap();
+    succeeds(folder.path(), &["report", "elsewhere/deep"]);
+    assert!(read("elsewhere/deep") == drawn);
+    fs::remove_file(&mesh).unwrap();
+    succeeds(folder.path(), &["report", "elsewhere/deep"]);
+    assert!(read("elsewhere/deep") == drawn);
+    let export = ["export", "elsewhere/deep", "--planner", "active", "--out", "it.ply"];
+    succeeds(folder.path(), &export);
+    let text = fs::read_to_string(folder.path().join("it.ply")).unwrap();
+    assert!(text.contains("property float error_m"));
+}

@@ -110,7 +110,8 @@ fn joints_that_freeze_are_found_within_ten_millimetres_at_any_speed() {
     for speed_m_s in [0.0001, 0.001, 0.003, 0.005, 0.015, 0.04, 0.1] {
         let (went_m, said) = frozen(speed_m_s, 0.0);
         println!("{speed_m_s} m/s: {:.2} mm, {said}", 1e3 * went_m);
-        assert!(said.contains("joint standstill of Y"), "{said}");
+        let found = ["joint standstill of Y", "position tracking error of Y"];
+        assert!(found.iter().any(|words| said.contains(words)), "{said}");
         // 0.1 s and one tick, or what shows; and the way to rest.
         assert!(went_m < 0.01 && went_m < (speed_m_s * 0.13).max(4e-4), "{speed_m_s}: {went_m}");
         let (went_m, said) = frozen(speed_m_s, 1e-6);

@@ -3,7 +3,6 @@
 use crate::common::program::palpate;
 use palpate::experiment::sweep::cells;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::planner;
 use palpate::study::check::baseline::span;
 use palpate::study::check::judged::JUDGED;
 use palpate::study::compare::{Compared, Contender, Said};
@@ -64,7 +63,7 @@ fn logs(experiment: Experiment, names: &[&str], trials: u32) -> Vec<f64> {
     let span = span(&experiment);
     let simulation = Simulation::new(experiment).unwrap();
     let of = |name: &&str| {
-        let planner = planner::by_name(name).unwrap();
+        let planner = simulation.planner(name).unwrap();
         let rows = (0..trials).into_par_iter().map(|trial| simulation.trial(planner, trial));
         let logs = rows.map(|row| {
             let is_whole = row.failure.is_none();

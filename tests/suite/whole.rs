@@ -255,7 +255,7 @@ fn what_cannot_be_asked_for_is_refused() {
         assert!(error.contains(words), "{error}");
     };
     let active = "planners = [\"active\"]";
-    refused("planners = [\"active\", \"grid\"]", "around = {}", "planners[1]");
+    refused("planners = [\"active\", \"slope\"]", "around = {}", "planners[1]");
     refused("planners = [\"silhouette\"]", "around = {}", "goes around an object");
     refused(active, "around = {}\nzone = { x_m = [0, 1] }", "scene.zone");
     refused(active, "", "[around] for a whole object");
@@ -321,7 +321,7 @@ fn a_run_says_what_it_found() {
     assert_eq!(active.measure.id, "chamfer_m");
     let touches = active.touches.value;
     assert!(touches % 4.0 == 0.0 && (8.0..=32.0).contains(&touches), "{touches}");
-    let run = Run { experiment, truth: Truth::nothing(), rows, unlisted: 0 };
+    let run = Run { experiment, truth: Truth::around(None), rows, unlisted: 0 };
     let found = findings::sentences(&run).join(" ");
     assert!(found.contains("After 32 touches the mean Chamfer distance is: active"), "{found}");
     assert!(found.contains(&format!(": active {touches}.")), "{found}");

@@ -11,7 +11,7 @@ pub const ENTRY: Entry = Entry {
     name: NAME,
     make: |_, settings, capabilities| {
         let standstill = Standstill {
-            frozen_s: settings.frozen_s,
+            frozen_s: settings.frozen_s.max(settings.tracking_lag_s),
             blind_s: BLIND_SHARE * settings.joint_silence_s,
             since_s: [None; MAX_JOINTS],
         };

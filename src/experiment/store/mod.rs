@@ -2,7 +2,7 @@
 //!
 //! `resolved.toml` (the experiment with every default written out), `manifest.json` (what ran it, a
 //! program each), `content.json` (hashes of mesh, scan and of planners written outside of Palpate),
-//! `surface.csv` (the truth on the test grid), `trials.jsonl` (a row per finished
+//! `surface.csv` (the truth on the test grid; of a whole object `surface.obj`), `trials.jsonl` (a row per finished
 //! trial). Everything else in it is drawn from these.
 //!
 //! A folder holds the rows of one [identity](Experiment::identity). It may be opened with more
@@ -33,7 +33,7 @@ pub use resolved::{RESOLVED, resolved, resolved_beside};
 use self::error::io_error;
 use self::file::remove;
 use self::rows::Place;
-use self::surface::SURFACE;
+use self::surface::{MESH, SURFACE};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::row::{TrialId, TrialRow};
 use crate::experiment::truth::Truth;
@@ -99,7 +99,6 @@ impl RunFolder {
             clear(path)?;
         }
         resolved::same_run(path, experiment)?;
-        surface::write_or_compare(path, experiment, truth)?;
         let mut done = Vec::new();
         let good_bytes = rows::scan(&file, experiment, |row, _| done.push(row.id()))?;
         if trials.metadata().map_err(io_error(&file))?.len() > good_bytes {
@@ -110,6 +109,7 @@ impl RunFolder {
         let has_row = |planner: &str| done.iter().any(|id| id.planner == planner);
         now.require_same(&before, path, |planner| has_touches || has_row(planner))?;
         now.extend(before);
+        surface::write_or_compare(path, experiment, truth)?;
         now.write(path)?;
         resolved::write(path, experiment)?;
         done.retain(|id| experiment.lists(id));
@@ -266,7 +266,7 @@ fn clear(path: &Path) -> Result<(), StoreError> {
         }
     }
     let tables = ["report.html", "summary.csv", "comparison.csv", "equal_error.csv"];
-    let own = [MANIFEST, CONTENT, SURFACE, JOURNAL];
+    let own = [MANIFEST, CONTENT, SURFACE, MESH, JOURNAL];
     tables.iter().chain(&own).try_for_each(|name| remove(&path.join(name)))
 }
 

@@ -1,15 +1,20 @@
-//! `surface.csv`: the truth of a run on its test grid.
+//! `surface.csv`: the truth of a run on its test grid. `surface.obj`: that of a whole object.
 
 use super::error::{StoreError, io_error};
 use super::file::{same, write_whole};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::truth::Truth;
 use crate::files;
+use crate::geometry::import::import;
+use crate::geometry::mesh::Mesh;
 use std::io;
 use std::path::Path;
 
 /// File of the true surface.
 pub(super) const SURFACE: &str = "surface.csv";
+
+/// File of the true surface of a whole object.
+pub(super) const MESH: &str = "surface.obj";
 
 /// Writes the truth, or, if the folder has it already, insists that it is the same.
 pub(super) fn write_or_compare(
@@ -17,12 +22,29 @@ pub(super) fn write_or_compare(
     experiment: &Experiment,
     truth: &Truth,
 ) -> Result<(), StoreError> {
-    let (path, wanted) = (folder.join(SURFACE), text(experiment, truth));
-    match files::text(&path, u64::MAX) {
-        Ok(found) => same(folder, SURFACE, [&found, &wanted]),
-        Err(cause) if cause.kind() == io::ErrorKind::NotFound => write_whole(&path, &wanted),
-        Err(cause) => Err(StoreError::Io { path, cause }),
+    let mesh = truth.mesh.as_deref().map(|mesh| (MESH, obj(mesh)));
+    for (name, wanted) in [(SURFACE, text(experiment, truth))].into_iter().chain(mesh) {
+        let path = folder.join(name);
+        match files::text(&path, u64::MAX) {
+            Ok(found) => same(folder, name, [&found, &wanted])?,
+            Err(cause) if cause.kind() == io::ErrorKind::NotFound => write_whole(&path, &wanted)?,
+            Err(cause) => return Err(StoreError::Io { path, cause }),
+        }
     }
+    Ok(())
+}
+
+/// A mesh as Wavefront OBJ, every digit of its vertices written.
+fn obj(mesh: &Mesh) -> String {
+    let mut text = String::from("# The true surface of the object, in metres in W.\n");
+    for vertex in mesh.vertices() {
+        text += &format!("v {} {} {}\n", vertex.x, vertex.y, vertex.z);
+    }
+    for triangle in mesh.triangles() {
+        let [a, b, c] = triangle.map(|corner| corner + 1);
+        text += &format!("f {a} {b} {c}\n");
+    }
+    text
 }
 
 /// The truth as the file holds it.
@@ -42,12 +64,17 @@ fn text(experiment: &Experiment, truth: &Truth) -> String {
 
 /// Reads back what [`write_or_compare`] wrote for `experiment`.
 pub(super) fn read(path: &Path, experiment: &Experiment) -> Result<Truth, StoreError> {
-    let zone = &experiment.scene.zone;
-    if experiment.scene.around.is_some() {
-        return Ok(Truth::nothing());
-    }
     let bad =
         |line: usize, message: String| StoreError::BadRow { path: path.into(), line, message };
+    let zone = &experiment.scene.zone;
+    if experiment.scene.around.is_some() {
+        let mesh = path.with_file_name(MESH);
+        if !mesh.exists() {
+            return Ok(Truth::around(None));
+        }
+        let (mesh, _) = import(&mesh, 1.0).map_err(|error| bad(1, error.to_string()))?;
+        return Ok(Truth::around(Some(&mesh)));
+    }
     let text = files::text(path, u64::MAX).map_err(io_error(path))?;
     let (mut places, mut heights_m, mut is_reachable) = (Vec::new(), Vec::new(), Vec::new());
     for (i, record) in csv::Reader::from_reader(text.as_bytes()).records().enumerate() {

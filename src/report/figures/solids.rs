@@ -23,7 +23,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         return Ok(None);
     }
     let counts = run.experiment.drawn_touch_counts();
-    let truth = whole::truth(&run.experiment.scene);
+    let truth = whole::truth(run);
     let sequences =
         whole::sequences(run, &run.experiment.drawn_planners(), &counts, truth.as_ref())?;
     let mesh = truth.as_ref().map(|bvh| &**bvh.mesh());

@@ -6,7 +6,6 @@ use palpate::experiment::Experiment;
 use palpate::experiment::row::TrialRow;
 use palpate::experiment::simulation::Simulation;
 use palpate::explore::around::{ImplicitSurface, Scope, SpaceSettings};
-use palpate::explore::planner;
 use palpate::explore::probe::{Contact, Swept, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
@@ -39,7 +38,7 @@ pub fn simulation(field: Field, settings: &str) -> Simulation {
 }
 
 pub fn trial(simulation: &Simulation, name: &str) -> TrialRow {
-    let row = simulation.trial(planner::by_name(name).unwrap(), 0);
+    let row = simulation.trial(simulation.planner(name).unwrap(), 0);
     assert_eq!(row.failure, None);
     row
 }
