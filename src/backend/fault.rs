@@ -161,8 +161,8 @@ pub enum Fault {
         /// By which, and why.
         trip: Trip,
     },
-    /// The body must not be moved from where it stands: outside the workspace, too deep, or too near
-    /// to something.
+    /// The body must not be moved from where it is: outside the workspace, too deep, or too near to
+    /// something.
     #[error(
         "the arm is not moved from where it stands, its tip at [{:.3}, {:.3}, {:.3}] m: {trip}; bring \
          it near its home posture by hand: {}", p_wt[0], p_wt[1], p_wt[2], posture(home)
