@@ -6,8 +6,10 @@ behind; or, isolated, in a process of its own, which can be ended (`_isolated`).
 
 from __future__ import annotations
 
+import ast
 import ctypes
 import importlib
+import importlib.util
 import inspect
 import os
 import sys
@@ -84,21 +86,52 @@ def source_of(factory: Factory) -> str:
             return f"unknown {uuid.uuid4()}"
     folder = Path(str(module.__file__)).parent
     sources: dict[str, str] = {}
-    waiting = [module]
+    waiting = [(module.__name__, Path(str(module.__file__)))]
     while waiting:
-        used = waiting.pop()
-        file = Path(str(getattr(used, "__file__", None)))
-        name = file.relative_to(folder).as_posix() if file.is_relative_to(folder) else None
-        is_installed = "site-packages" in file.parts or "dist-packages" in file.parts
-        if name is None or name in sources or (is_installed and used is not module):
+        module_name, file = waiting.pop()
+        name = file.relative_to(folder).as_posix()
+        if name in sources:
             continue
-        sources[name] = file.read_bytes().decode(errors="replace") if file.is_file() else ""
-        for value in list(vars(used).values()):
-            origin = getattr(value, "__module__", None)
-            other = value if inspect.ismodule(value) else sys.modules.get(origin if isinstance(origin, str) else "")
-            if other is not None:
-                waiting.append(other)
+        sources[name] = file.read_bytes().decode(errors="replace")
+        for used in _imported(module_name, sources[name]):
+            origin = _file_of(used)
+            if origin is not None and origin.is_relative_to(folder) and not _is_installed(origin):
+                waiting.append((used, origin))
     return "\n".join(f"# {name}\n{sources[name]}" for name in sorted(sources))
+
+
+def _imported(module: str, text: str) -> list[str]:
+    """The modules that the source of a module may import, by their full names."""
+    found = []
+    try:
+        tree = ast.parse(text)
+    except (SyntaxError, ValueError):
+        return []
+    known = sys.modules.get(module)
+    package = getattr(known, "__package__", None) or ""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            parents = package.split(".")[: -(node.level - 1) or None] if node.level else []
+            base = ".".join([*parents, *([node.module] if node.module else [])])
+            found += [base, *(f"{base}.{alias.name}" for alias in node.names)]
+    return [name for name in found if name]
+
+
+def _file_of(module: str) -> Path | None:
+    """Where a module's source lies; None of one without, or that is not there."""
+    try:
+        known = sys.modules.get(module)
+        origin = known.__file__ if known is not None else importlib.util.find_spec(module).origin  # type: ignore[union-attr]
+    except (ImportError, AttributeError, ValueError):
+        return None
+    file = Path(origin) if origin else None
+    return file if file is not None and file.suffix == ".py" and file.is_file() else None
+
+
+def _is_installed(file: Path) -> bool:
+    return "site-packages" in file.parts or "dist-packages" in file.parts
 
 
 def _plans(planner: Any) -> bool:

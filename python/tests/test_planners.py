@@ -164,7 +164,8 @@ def test_an_edited_planner_does_not_keep_its_rows(tmp_path):
     # A module that the planner uses counts, one that lies beside it does not.
     (tmp_path / "other.py").write_text("SHARE = 1\n")
     assert run().returncode == 0
-    helper.write_text("SHARE = 0.25\n")
+    helper.write_text("from constant import SHARE\n")
+    (tmp_path / "constant.py").write_text("SHARE = 0.25\n")
     edited = run()
     assert edited.returncode == 2
     assert "planner mine:Fixed has changed" in edited.stderr and "--fresh" in edited.stderr

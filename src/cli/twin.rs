@@ -41,8 +41,8 @@ fn failures() -> String {
 #[derive(clap::Args)]
 #[command(after_help = format!("{HELP}\n\nFailures:\n{}", failures()))]
 pub(super) struct Args {
-    /// An experiment or a scene (.toml, or the name of a shipped one) whose body moves and whose finger is
-    /// soft.
+    /// An experiment or a scene (.toml, or the name of a shipped one) whose body moves and whose
+    /// finger is soft.
     path: PathBuf,
     /// In place of the scene's object: what `register` touches.
     #[command(flatten)]

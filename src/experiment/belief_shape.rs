@@ -1,7 +1,7 @@
 //! A belief and its contacts as shapes that viewers draw.
 
 use crate::backend::recording::{ColorRgba, Marker, Point, Shape};
-use crate::explore::belief::HeightField;
+use crate::explore::belief::{Belief, HeightField};
 use crate::gp::posterior::Posterior;
 use crate::task::Zone;
 use crate::task::zone::grid_triangles;
@@ -21,35 +21,62 @@ const UNSURE: ColorRgba = ColorRgba { r: 0.94, g: 0.54, b: 0.38, a: 0.8 };
 /// Of contacts; chosen.
 const CONTACT: ColorRgba = ColorRgba { r: 0.1, g: 0.1, b: 0.1, a: 1.0 };
 
-/// The mean of the belief over the zone as a surface, or over an interval as a line, in `W`, where
-/// there probably is one, its colour between those of the smallest and the largest standard
-/// deviation; and the contacts, as the belief has them. Before the first fit both are of no points.
-pub(super) fn shapes(zone: &Zone, belief: &HeightField) -> [Marker; 2] {
-    let shape = if zone.z_m.is_some() { Shape::TriangleList } else { Shape::LineStrip };
+/// Cells along the longest side of the box in which a closed surface is sought.
+// heuristic: to look at; a tenth of the time of a belief's own.
+const CELLS: u32 = 28;
+
+/// The believed surface in `W`, its colour between those of the smallest and the largest standard
+/// deviation, and the contacts as the belief has them. Over a zone it is drawn where there probably
+/// is one, over an interval as a line. Before the first fit both are of no points.
+pub(super) fn shapes(belief: &Belief) -> [Marker; 2] {
+    let is_line = belief.height_field().is_some_and(|field| field.zone().z_m.is_none());
+    let shape = if is_line { Shape::LineStrip } else { Shape::TriangleList };
     // The corners of triangles are where they are: their scale is none.
-    let size_m = if zone.z_m.is_some() { 1.0 } else { SIZE_M };
+    let size_m = if is_line { SIZE_M } else { 1.0 };
     let mut surface = Marker::new("belief", shape, size_m, SURE);
     let mut contacts = Marker::new("contacts", Shape::SphereList, SIZE_M, CONTACT);
-    if let Some(posterior) = belief.surface() {
-        draw(zone, belief, posterior, &mut surface);
-        let seen = posterior.observations();
-        let point = |(i, &height): (usize, &f64)| {
-            zone.point(&seen.place(i).collect::<Vec<_>>(), height).into()
-        };
-        contacts.points = seen.heights().iter().enumerate().map(point).collect();
+    match belief {
+        Belief::HeightField(field) => {
+            if let Some(posterior) = field.surface() {
+                let zone = field.zone();
+                draw(zone, field, posterior, &mut surface);
+                let seen = posterior.observations();
+                let point = |(i, &height): (usize, &f64)| {
+                    zone.point(&seen.place(i).collect::<Vec<_>>(), height).into()
+                };
+                contacts.points = seen.heights().iter().enumerate().map(point).collect();
+            }
+        }
+        Belief::ImplicitSurface(belief) => {
+            if let Some(believed) = belief.surface() {
+                contacts.points = belief.contacts().map(|p_w| (*p_w).into()).collect();
+                if let Some(mesh) = believed.mesh(CELLS) {
+                    let colours = colours(&believed.offsets_m(mesh.vertices()));
+                    let corners = mesh.triangles().iter().flatten().map(|&corner| corner as usize);
+                    let corner = |at: usize| (Point::from(mesh.vertices()[at]), colours[at]);
+                    (surface.points, surface.colors) = corners.map(corner).unzip();
+                }
+            }
+        }
     }
     [surface, contacts]
+}
+
+/// The colour of each standard deviation.
+fn colours(sds: &[f64]) -> Vec<ColorRgba> {
+    let ends = (f64::INFINITY, f64::MIN_POSITIVE);
+    let (least, most) = sds.iter().fold(ends, |(low, high), &sd| (low.min(sd), high.max(sd)));
+    let share = |sd: f64| ((sd - least) / (most - least).max(f64::MIN_POSITIVE)) as f32;
+    sds.iter().map(|&sd| between(share(sd))).collect()
 }
 
 fn draw(zone: &Zone, belief: &HeightField, posterior: &Posterior, surface: &mut Marker) {
     let places = zone.grid(PER_SIDE);
     let known = belief.presence().silhouette().is_likely(places.iter().map(Vec::as_slice));
     let predictions = posterior.predict(places.iter().map(Vec::as_slice));
-    let deviations = || predictions.iter().map(|prediction| prediction.variance.max(0.0).sqrt());
-    let (least, most) = deviations()
-        .fold((f64::INFINITY, f64::MIN_POSITIVE), |(low, high), sd| (low.min(sd), high.max(sd)));
-    let share = |sd: f64| ((sd - least) / (most - least).max(f64::MIN_POSITIVE)) as f32;
-    let colors: Vec<ColorRgba> = deviations().map(|sd| between(share(sd))).collect();
+    let sds: Vec<f64> =
+        predictions.iter().map(|prediction| prediction.variance.max(0.0).sqrt()).collect();
+    let colors = colours(&sds);
     let points: Vec<Point> = (places.iter().zip(&predictions))
         .map(|(place, prediction)| zone.point(place, prediction.mean).into())
         .collect();

@@ -293,12 +293,6 @@ impl Experiment {
                 )
             });
         }
-        for (key, count) in [
-            ("verification_touches", self.verification_touches),
-            ("repeat_touches", self.repeat_touches),
-        ] {
-            rules.require(key, count, count == 0, || "0 around a whole object".into());
-        }
         rules.require("truth", "(given)", self.truth.is_none(), || {
             "no truth: around a whole object it is the object's own surface".into()
         });

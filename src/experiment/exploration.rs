@@ -125,13 +125,8 @@ impl<'a> Exploration<'a> {
     /// Makes the touches that the belief does not learn from; and why there are no more, if a
     /// fault ended them.
     pub(super) fn verify(&self, probe: &mut dyn Probe, made: &[TouchRow]) -> VerificationRows {
-        match &self.belief {
-            Belief::HeightField(field) => {
-                let task = self.truth.environment.task();
-                verify(self.experiment, task, field, probe, (made, self.trial))
-            }
-            Belief::ImplicitSurface(_) => (Vec::new(), None),
-        }
+        let task = self.truth.environment.task();
+        verify(self.experiment, task, &self.belief, probe, (made, self.trial))
     }
 }
 

@@ -54,7 +54,7 @@ pub mod summary;
 pub mod sweep;
 mod trial;
 pub mod truth;
-pub mod verification;
+mod verification;
 pub mod verification_row;
 mod verified;
 pub mod witness;

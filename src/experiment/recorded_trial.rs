@@ -10,7 +10,6 @@ use super::witness::{Touched, Witness};
 use crate::backend::Fault;
 use crate::backend::recording::{self, About, Ending, Recorder, Recording};
 use crate::explore::probe::{Probe, Touch};
-use crate::task::Zone;
 use std::iter;
 use std::path::{Path, PathBuf};
 
@@ -85,10 +84,8 @@ fn run_faulty(
     }
     let recorder = Recorder::new(body, recording.clone());
     let mut servo = simulation.servo(Box::new(recorder), seed)?;
-    let zone = simulation.task().zone();
     let mut scribe = Scribe {
         recording: recording.clone(),
-        zone,
         made: made.len() as u32,
         witness,
         is_interrupted: false,
@@ -106,7 +103,6 @@ fn run_faulty(
 /// Adds every touch to a recording.
 struct Scribe<'a> {
     recording: Recording,
-    zone: &'a Zone,
     /// Touches that were made before.
     made: u32,
     witness: &'a mut dyn Witness,
@@ -126,9 +122,7 @@ impl Witness for Scribe<'_> {
         if let Touch::Contact(contact) = touched.touch {
             touch.normal = contact.normal_w.as_slice().into();
         }
-        let field = touched.belief.height_field();
-        let shapes = field.map_or_else(Default::default, |field| shapes(self.zone, field));
-        self.recording.touched(&touch, shapes)?;
+        self.recording.touched(&touch, shapes(touched.belief))?;
         seen
     }
 }

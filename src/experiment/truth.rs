@@ -59,7 +59,8 @@ impl Truth {
         Self::new(zone, places, vec![None; count], vec![false; count])
     }
 
-    /// Of a whole object with the surface `mesh`, made coarser if it is large; without a test place.
+    /// Of a whole object with the surface `mesh`, made coarser if it is large; without a test
+    /// place.
     pub fn around(mesh: Option<&Mesh>) -> Self {
         let kept = mesh.map(|mesh| match mesh.triangles().len() > TRIANGLES {
             true => {

@@ -2,13 +2,15 @@
 //! held against what the finger then meets.
 
 use super::experiment::Experiment;
-use super::row::TouchRow;
+use super::row::{TouchRow, VerificationRows};
 use super::verification_row::VerificationRow;
-use crate::explore::belief::HeightField;
+use crate::explore::around::surface::steepness;
+use crate::explore::belief::{Belief, HeightField};
+use crate::explore::planner::sample::sampled;
 use crate::explore::probe::{Probe, Touch};
 use crate::gp::posterior::Scratch;
 use crate::math::seed;
-use crate::task::{Task, Zone};
+use crate::task::{Aim, Task};
 use nalgebra::Point3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -16,95 +18,141 @@ use rand_chacha::ChaCha8Rng;
 /// Makes the verification touches of `trial`, then those that repeat an earlier one; what was made
 /// of them, and why there are no more, if a fault ended them.
 ///
-/// Their places depend on the experiment's seed and the trial, not on the planner.
-pub fn verify(
+/// Their targets depend on the experiment's seed and the trial, not on the planner.
+pub(super) fn verify(
     experiment: &Experiment,
     task: &Task,
-    belief: &HeightField,
+    belief: &Belief,
     probe: &mut dyn Probe,
     (touches, trial): (&[TouchRow], u32),
-) -> (Vec<VerificationRow>, Option<String>) {
+) -> VerificationRows {
     let mut rows = Vec::new();
     let mut stream = seed::stream(experiment.seed, trial.into(), "verification");
-    let zone = task.zone();
-    let places = new_places(zone, experiment.verification_touches, &mut stream);
-    let places = places.into_iter().map(|target| (target, None));
+    let targets = new_targets(belief, experiment.verification_touches, &mut stream);
+    let targets = targets.into_iter().map(|target| (target, None));
     let again = repeated(touches, experiment.repeat_touches);
     let again = again.into_iter().map(|at| (touches[at].target.clone(), Some(at)));
-    for (target, again) in places.chain(again) {
-        let Some(mut row) = predicted(belief, target) else { break };
-        let touch = match probe.touch(&task.approach(&row.target)) {
+    for (target, again) in targets.chain(again) {
+        let Some((predicted_m, predicted_sd_m)) = predicted(belief, &target) else { break };
+        let touch = match probe.touch(&task.approach(&target)) {
             Ok(touch) => touch,
             Err(fault) => {
                 let failure = format!("verification touch {}: {fault}", rows.len() + 1);
                 return (rows, Some(failure));
             }
         };
-        row.again = again.map(|at| at as u32 + 1);
-        row.overload = touch == Touch::Overload;
+        let mut row = VerificationRow {
+            target,
+            again: again.map(|at| at as u32 + 1),
+            predicted_m,
+            predicted_sd_m,
+            contact: None,
+            overload: touch == Touch::Overload,
+            error_m: None,
+            sd_m: None,
+            difference_m: None,
+        };
         if let Touch::Contact(contact) = &touch {
             let first = again.and_then(|at| touches[at].contact).map(Point3::from);
-            meet(&mut row, zone, belief, (&contact.p_wc, first.as_ref()));
+            meet(&mut row, belief, (&contact.p_wc, first.as_ref()));
         }
         rows.push(row);
     }
     (rows, None)
 }
 
-/// What the belief expects at a place, with the deviation of a touch; none before its first fit.
-fn expected(belief: &HeightField, place: &[f64]) -> Option<(f64, f64)> {
-    let surface = belief.surface()?;
+/// What the belief expects at a place of a zone, with the deviation of a touch; none before its
+/// first fit.
+fn height(field: &HeightField, place: &[f64]) -> Option<(f64, f64)> {
+    let surface = field.surface()?;
     let mut scratch = Scratch::default();
     let noise_sd = surface.hyperparameters().noise_sd;
     let variance = surface.variance(place, &mut scratch) + noise_sd * noise_sd;
     Some((surface.mean(place, &mut scratch), variance.max(0.0).sqrt()))
 }
 
-fn predicted(belief: &HeightField, target: Vec<f64>) -> Option<VerificationRow> {
-    let (predicted_m, predicted_sd_m) = expected(belief, &target)?;
-    Some(VerificationRow {
-        target,
-        again: None,
-        predicted_m,
-        predicted_sd_m,
-        contact: None,
-        overload: false,
-        error_m: None,
-        sd_m: None,
-        difference_m: None,
-    })
+/// How far a point of `W` lies outside of the believed surface, with the deviation of a touch; none
+/// before the first fit.
+fn outside(belief: &Belief, p_w: &Point3<f64>) -> Option<(f64, f64)> {
+    match belief {
+        Belief::HeightField(field) => {
+            let (mean_m, sd_m) = height(field, &field.zone().place(p_w))?;
+            Some((field.zone().height_m(p_w) - mean_m, sd_m))
+        }
+        Belief::ImplicitSurface(surface) => {
+            let surface = surface.surface()?;
+            let sd = surface.sds_m(&[*p_w]).first().copied()?;
+            let noise_sd = surface.posterior().hyperparameters().noise_sd;
+            let field = surface.field().at(p_w);
+            let per_m = steepness(&field.gradient);
+            Some((field.value / per_m, sd.hypot(noise_sd) / per_m))
+        }
+    }
+}
+
+/// Where the belief expects a touch at `target` to meet the surface: the height at a place; around
+/// an object the distance before the point that is aimed at, 0 with the deviation of the ball's
+/// radius where it expects nothing on the way.
+fn predicted(belief: &Belief, target: &[f64]) -> Option<(f64, f64)> {
+    match belief {
+        Belief::HeightField(field) => height(field, target),
+        Belief::ImplicitSurface(surface) => {
+            let (aim, ball) = (Aim::of(target)?, &surface.scope().ball);
+            let mut field = surface.surface()?.field();
+            let at = |along_m: f64| aim.p_w + aim.ahead_w.scale(along_m);
+            let [from_m, to_m] = ball.chord_m(&aim);
+            let along_m = first_zero([from_m, to_m], |along_m| field.value(&at(along_m)));
+            Some(match along_m {
+                Some(along_m) => (-along_m, outside(belief, &at(along_m))?.1),
+                None => (0.0, ball.radius_m),
+            })
+        }
+    }
+}
+
+/// Steps in which a way is searched for the surface, and halvings of the one where it is found.
+// heuristic: a twentieth of the ball's radius, then a millionth of that.
+const STEPS: usize = 40;
+const HALVINGS: usize = 20;
+
+/// The first argument between two at which a function turns negative.
+fn first_zero([from, to]: [f64; 2], mut value: impl FnMut(f64) -> f64) -> Option<f64> {
+    let at = |i: usize| from + (to - from) * i as f64 / STEPS as f64;
+    let entered = (1..=STEPS).find(|&i| value(at(i)) < 0.0)?;
+    let (mut low, mut high) = (at(entered - 1), at(entered));
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        *(if value(middle) < 0.0 { &mut high } else { &mut low }) = middle;
+    }
+    Some(high)
 }
 
 /// Writes what was met into `row`; `first` is the contact that it repeats.
 fn meet(
     row: &mut VerificationRow,
-    zone: &Zone,
-    belief: &HeightField,
+    belief: &Belief,
     (p_wc, first): (&Point3<f64>, Option<&Point3<f64>>),
 ) {
-    let rise = |p_w: &Point3<f64>| {
-        let (mean_m, sd_m) = expected(belief, &zone.place(p_w))?;
-        Some((zone.height_m(p_w) - mean_m, sd_m))
-    };
     row.contact = Some(p_wc.coords.into());
-    let error = rise(p_wc);
+    let error = outside(belief, p_wc);
     row.error_m = error.map(|(error_m, _)| error_m);
     row.sd_m = error.map(|(_, sd_m)| sd_m);
-    let before = first.and_then(rise);
+    let before = first.and_then(|first| outside(belief, first));
     row.difference_m = error.zip(before).map(|((now_m, _), (before_m, _))| now_m - before_m);
 }
 
-/// `count` places of a Halton sequence over the zone, shifted by `random` (Cranley and Patterson
-/// 1976).
-fn new_places(zone: &Zone, count: u32, random: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
-    let shifts: Vec<f64> = (0..zone.dimension()).map(|_| random.random()).collect();
-    let place = |i: u32| {
+/// `count` targets of a Halton sequence over the unit square, shifted by `random` (Cranley and
+/// Patterson 1976).
+fn new_targets(belief: &Belief, count: u32, random: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
+    let dimension = belief.height_field().map_or(2, |field| field.zone().dimension());
+    let shifts: Vec<f64> = (0..dimension).map(|_| random.random()).collect();
+    let mut i = 0;
+    let mut next = |_| {
+        i += 1;
         let axes = [2, 3].into_iter().zip(&shifts);
-        let fractions: Vec<f64> =
-            axes.map(|(base, shift)| (radical_inverse(i, base) + shift).fract()).collect();
-        zone.at(&fractions)
+        axes.map(|(base, shift)| (radical_inverse(i, base) + shift).fract()).collect()
     };
-    (1..=count).map(place).collect()
+    (0..count).map(|_| sampled(belief, &mut next)).collect()
 }
 
 /// The digits of `i` in `base`, mirrored behind the point.

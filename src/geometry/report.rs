@@ -36,8 +36,8 @@ impl fmt::Display for Finding {
 /// summary for a person.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshReport {
-    /// SHA-256 of the mesh: of its vertices, 24 bytes each, then of its triangles, 12 bytes each, all
-    /// little-endian; in hexadecimal.
+    /// SHA-256 of the mesh: of its vertices, 24 bytes each, then of its triangles, 12 bytes each,
+    /// all little-endian; in hexadecimal.
     pub sha256: String,
     /// Vertices as imported.
     pub vertices_before: usize,

@@ -24,8 +24,8 @@ const PER_SIDE_MAX: f64 = 128.0;
 const ROUNDING_M: f64 = 1e-9;
 
 /// Whether the finger, sent to some target in the zone, can touch the surface at each of `places`
-/// with the true height above the datum in `heights_m`; a place without a surface is none. `tell` is
-/// called with how far the work has come.
+/// with the true height above the datum in `heights_m`; a place without a surface is none. `tell`
+/// is called with how far the work has come.
 pub fn is_reachable(
     environment: &Environment,
     places: &[Vec<f64>],

@@ -261,7 +261,6 @@ fn what_cannot_be_asked_for_is_refused() {
     refused(active, "", "[around] for a whole object");
     refused(active, "around = { radius_m = -1 }", "scene.around.radius_m");
     refused(active, "around = { centre_m = [0, 0, 1e9] }", "scene.around.centre_m");
-    refused(&format!("{active}\nverification_touches = 3"), "around = {}", "verification_touches");
     refused(
         &format!("{active}\nspace = {{ kernel = \"squared_exponential\" }}"),
         "around = {}",
@@ -325,4 +324,37 @@ fn a_run_says_what_it_found() {
     let found = findings::sentences(&run).join(" ");
     assert!(found.contains("After 32 touches the mean Chamfer distance is: active"), "{found}");
     assert!(found.contains(&format!(": active {touches}.")), "{found}");
+}
+
+/// What a belief expects of touches that it does not learn from holds, within its own deviations;
+/// and a rigid finger that does the same again meets the same.
+#[test]
+fn verification_touches_hold_a_belief_around_an_object_to_what_it_expects() {
+    let settings = "planners = [\"active\"]\ntouches = 40\nverification_touches = 20\n\
+                    repeat_touches = 3\nspace = { compared_every = 40 }";
+    for name in ["active", "random"] {
+        let simulation = simulation(sphere, settings);
+        let row = trial(&simulation, name);
+        assert_eq!(row.verification.len(), 23);
+        let (again, new): (Vec<_>, Vec<_>) =
+            row.verification.iter().partition(|touch| touch.again.is_some());
+        for touch in &new {
+            let (error_m, sd_m) = (touch.error_m.unwrap(), touch.sd_m.unwrap());
+            // The sphere is some centimetres wide.
+            assert!(error_m.abs() < 2e-3 && error_m.abs() < 6.0 * sd_m, "{name}: {touch:?}");
+            // Where it was expected and where it was met: nearly the same, seen along the way.
+            let aim = Aim::of(&touch.target).unwrap();
+            let met = Point3::from(touch.contact.unwrap());
+            let before_m = -(met - aim.p_w).dot(&aim.ahead_w);
+            assert!((before_m - touch.predicted_m).abs() < 0.02, "{name}: {touch:?} {before_m}");
+            assert!(touch.predicted_sd_m > 0.0 && touch.predicted_sd_m < 5e-3, "{touch:?}");
+        }
+        for touch in &again {
+            assert!(touch.difference_m.unwrap().abs() < 1e-9, "{name}: {touch:?}");
+        }
+        let covered = palpate::experiment::measure::by_id("verification_coverage").unwrap();
+        assert!((covered.of)(&row, 40).unwrap() >= 0.85, "{name}");
+        let rmse = palpate::experiment::measure::VERIFICATION_RMSE;
+        assert!((rmse.of)(&row, 40).unwrap() < 1e-3, "{name}");
+    }
 }

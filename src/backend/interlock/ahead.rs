@@ -18,8 +18,8 @@ pub const GRAIN_M: f64 = 1e-3;
 const LOOKS: usize = 32;
 
 impl<'a> Ahead<'a> {
-    /// If `qdot` is commanded for one tick, takes effect `reaction_s` later, and is then braked; and
-    /// if the body has moved as commanded since its position was last seen to change.
+    /// If `qdot` is commanded for one tick, takes effect `reaction_s` later, and is then braked;
+    /// and if the body has moved as commanded since its position was last seen to change.
     pub fn of(now: &'a Now, qdot: &Joints, reaction_s: f64) -> Self {
         let time_s = now.period_s + reaction_s + 0.5 * stopping_s(now, qdot);
         Self { now, from: now.q, by: now.unseen + qdot * time_s }

@@ -27,8 +27,8 @@ const SEEN_M: f64 = 3e-4;
 
 /// Movement of any point of the robot after which it is stopped sooner, and how soon, as a share of
 /// the time after which joints count as silent.
-// heuristic: with the way on which the arm then brakes from 0.1 m/s, below 10 mm; and later than the
-// age limit of 50 ms of joint states over topics, so that a silent topic is reported as one.
+// heuristic: with the way on which the arm then brakes from 0.1 m/s, below 10 mm; and later than
+// the age limit of 50 ms of joint states over topics, so that a silent topic is reported as one.
 const BLIND_M: f64 = 5e-3;
 const BLIND_SHARE: f64 = 1.5;
 

@@ -22,8 +22,8 @@ pub struct Interface {
 }
 
 impl Network {
-    /// Of `settings`, with the variables that `variable` returns and the interfaces of this machine.
-    /// Settings come before variables: `ROS_DOMAIN_ID`, `ROS_LOCALHOST_ONLY` and
+    /// Of `settings`, with the variables that `variable` returns and the interfaces of this
+    /// machine. Settings come before variables: `ROS_DOMAIN_ID`, `ROS_LOCALHOST_ONLY` and
     /// `ROS_AUTOMATIC_DISCOVERY_RANGE`, as REP 2003 and the documentation of ROS 2 have them.
     ///
     /// # Errors

@@ -2,8 +2,8 @@
 //!
 //! `resolved.toml` (the experiment with every default written out), `manifest.json` (what ran it, a
 //! program each), `content.json` (hashes of mesh, scan and of planners written outside of Palpate),
-//! `surface.csv` (the truth on the test grid; of a whole object `surface.obj`), `trials.jsonl` (a row per finished
-//! trial). Everything else in it is drawn from these.
+//! `surface.csv` (the truth on the test grid; of a whole object `surface.obj`), `trials.jsonl` (a
+//! row per finished trial). Everything else in it is drawn from these.
 //!
 //! A folder holds the rows of one [identity](Experiment::identity). It may be opened with more
 //! trials, other planners or another report: `resolved.toml` then says so, and what is missing is

@@ -126,8 +126,8 @@ fn fits(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), St
 const FAR_M: f64 = 1e6;
 
 /// Largest number without a unit that a measure can come to, apart from shares and correlations.
-// heuristic: the negative log density of a belief that is far too sure of itself; no larger one has been
-// computed from finite numbers.
+// heuristic: the negative log density of a belief that is far too sure of itself; no larger one has
+// been computed from finite numbers.
 const LARGE: f64 = 1e300;
 
 /// The first number of a touch that no trial can come to, with its name and what is allowed.

@@ -3,8 +3,8 @@
 //! Level k is the lattice of 2ᵏ + 1 places along each side, borders included, without those of
 //! the levels before; within a level, places come in bit-reversed (van der Corput) order, so that
 //! a trial may end at any touch. Each axis sees few distinct coordinates: a surface whose period
-//! the lattice shares is not seen until a finer level. Around an object it is a lattice of equal areas
-//! on the sphere of directions.
+//! the lattice shares is not seen until a finer level. Around an object it is a lattice of equal
+//! areas on the sphere of directions.
 
 use super::plan::{Entry, Plan, PlanError, Planner};
 use super::sample::sampled;

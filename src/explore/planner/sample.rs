@@ -12,8 +12,8 @@ pub fn uniform(zone: &Zone, rng: &mut ChaCha8Rng) -> Vec<f64> {
     zone.at(&fractions(zone.dimension(), rng))
 }
 
-/// A uniformly random target: a place of a zone, or a side of the ball from which the finger goes at
-/// its centre.
+/// A uniformly random target: a place of a zone, or a side of the ball from which the finger goes
+/// at its centre.
 pub fn anywhere(belief: &Belief, rng: &mut ChaCha8Rng) -> Vec<f64> {
     sampled(belief, |count| fractions(count, rng))
 }
@@ -22,9 +22,9 @@ fn fractions(count: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
     (0..count).map(|_| rng.random()).collect()
 }
 
-/// The target at the fractions 0..1 that `next` returns, of which it is asked for one or two. Around
-/// an object they stand for a side, and more are asked for until one can be reached.
-pub(super) fn sampled(belief: &Belief, mut next: impl FnMut(usize) -> Vec<f64>) -> Vec<f64> {
+/// The target at the fractions 0..1 that `next` returns, of which it is asked for one or two.
+/// Around an object they stand for a side, and more are asked for until one can be reached.
+pub fn sampled(belief: &Belief, mut next: impl FnMut(usize) -> Vec<f64>) -> Vec<f64> {
     match belief {
         Belief::HeightField(field) => field.zone().at(&next(field.zone().dimension())),
         Belief::ImplicitSurface(surface) => reached(surface.scope(), || next(2)).target(),
