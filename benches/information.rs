@@ -8,11 +8,11 @@
 
 use nalgebra::{Rotation3, Unit, Vector3};
 use palpate::backend::Fault;
-use palpate::experiment::equal_error::{Estimate, equal_error};
 use palpate::experiment::measure::RMSE;
-use palpate::experiment::metrics::Metrics;
-use palpate::experiment::row::TrialRow;
+use palpate::experiment::measure::metrics::Metrics;
+use palpate::experiment::statistics::equal_error::{Estimate, equal_error};
 use palpate::experiment::statistics::{Paired, median};
+use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::explore::probe::{Contact, Probe, Swept, Touch};

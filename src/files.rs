@@ -73,10 +73,10 @@ pub fn replace(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
     replace_by(path, |file| file.write_all(bytes.as_ref()))
 }
 
-/// As [`replace`], with what `write` writes.
+/// Replaces a file like [`replace`], by what `write` writes.
 ///
 /// # Errors
-/// As [`replace`].
+/// If it cannot be written; then the file of before is still there.
 pub fn replace_by(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,

@@ -1,10 +1,10 @@
 //! Rows and curves as columns: what frames are made of.
 
 use numpy::PyArray1;
-use palpate::experiment::curve_table::{columns, curve_table};
 use palpate::experiment::measure::in_files;
-use palpate::experiment::row::{TouchRow, TrialRow};
+use palpate::experiment::statistics::curve_table::{columns, curve_table};
 use palpate::experiment::store::Run;
+use palpate::experiment::trial::row::{TouchRow, TrialRow};
 use palpate::explore::planner::Stall;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -44,7 +44,7 @@ impl Exploration {
         Ok(touch)
     }
 
-    /// What is known now.
+    /// The belief after the touches so far.
     #[getter]
     fn belief(&self) -> Belief {
         Belief(self.known.lock().unwrap_or_else(PoisonError::into_inner).clone())

@@ -1,7 +1,7 @@
 //! What is known of one side of an object or of a whole one, and the truth that it is held against.
 
-use palpate::experiment::metrics::Metrics;
-use palpate::experiment::shape::{ShapeMetrics, TrueShape};
+use palpate::experiment::measure::metrics::Metrics;
+use palpate::experiment::measure::shape::{ShapeMetrics, TrueShape};
 use palpate::experiment::truth::Truth;
 use palpate::explore::around::SpaceSettings;
 use palpate::explore::gp_settings::GpSettings;
@@ -9,7 +9,7 @@ use palpate::sim::Environment;
 
 pub(crate) use palpate::explore::belief::Belief as Known;
 
-/// Nothing known yet of what is explored in `environment`, fitted as where nobody says how.
+/// Returns an empty belief over what `environment` explores, with default settings.
 pub(crate) fn nothing(environment: &Environment) -> Known {
     let scene = environment.scene();
     let finger = (&scene.finger, scene.effects.is_soft());

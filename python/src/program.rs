@@ -1,7 +1,7 @@
 //! The command `palpate`: the same program, with planners of Python.
 
 use crate::planner::PythonFactory;
-use palpate::experiment::entrant;
+use palpate::experiment::trial::entrant;
 use palpate::explore::planner::PlannerFactory;
 use pyo3::prelude::*;
 

@@ -170,7 +170,7 @@ pub enum Fault {
     Astray {
         /// When.
         time_s: f64,
-        /// What is violated.
+        /// The violated limit.
         trip: Box<Trip>,
         /// The tip in `W`.
         p_wt: [f64; 3],

@@ -3,8 +3,8 @@
 use super::find::{EXPERIMENTS, SCENES, find, names};
 use super::terminal::{Ending, print};
 use crate::experiment::Experiment;
-use crate::experiment::entrant;
 use crate::experiment::measure::MEASURES;
+use crate::experiment::trial::entrant;
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
 use schemars::schema_for;

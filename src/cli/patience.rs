@@ -50,7 +50,7 @@ fn show_slow(patience: Duration, show: impl Fn(&str), begun: &Receiver<String>) 
     }
 }
 
-/// Of steps that are each too short to be shown, one is after as many times the patience.
+/// If steps are each too short to be shown, one is shown after this many times the patience.
 const SEVERAL: u32 = 3;
 
 #[cfg(test)]

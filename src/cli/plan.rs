@@ -5,7 +5,7 @@ use super::find::{EXPERIMENTS, find};
 use super::prepare::{bound_threads, simulation};
 use super::progress::stop_on_interrupt;
 use super::terminal::{Ending, Talk, print};
-use crate::experiment::shard::Shard;
+use crate::experiment::runner::shard::Shard;
 use crate::experiment::{Experiment, runner};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;

@@ -3,8 +3,8 @@
 use super::prepare::simulation;
 use super::terminal::{Ending, Talk, print};
 use crate::backend::recording::Recorded;
-use crate::experiment::recorded_trial::parts;
-use crate::experiment::replay::{self, Difference, Replay};
+use crate::experiment::trial::recorded_trial::parts;
+use crate::experiment::trial::replay::{self, Difference, Replay};
 use crate::words::brief;
 use anyhow::Context;
 use serde_json::json;

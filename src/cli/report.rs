@@ -1,7 +1,7 @@
 //! `palpate report`.
 
 use super::terminal::{Ending, print};
-use crate::experiment::analysis::Analysis;
+use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{self, Run};
 use crate::report;
 use std::path::PathBuf;

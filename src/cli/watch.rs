@@ -8,7 +8,7 @@ use crate::backend::Fault;
 use crate::backend::watched::{Sight, Watched};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};
-use crate::experiment::row::TrialRow;
+use crate::experiment::trial::row::TrialRow;
 use crate::explore::planner;
 use crate::explore::planner::PLANNERS;
 use crate::explore::probe::servo::Servo;

@@ -4,13 +4,13 @@
 //! may change on a finished run. More trials and other planners are run beside the rows that are
 //! there; rows of trials or planners that are no longer listed are kept, but not shown.
 
-use super::entrant::{self, ORACLE};
-use super::measure::{CHAMFER, Measure, RMSE};
-use super::report_settings::{ReportSettings, TOUCHES_MAX};
-use super::row::TrialId;
-use super::scan_truth::ScanTruth;
 use crate::backend::ros::settings::{BackendKind, BackendSettings};
 use crate::config::{Checked, ConfigError, Loader, Rules, is_default};
+use crate::experiment::measure::{CHAMFER, Measure, RMSE};
+use crate::experiment::report_settings::{ReportSettings, TOUCHES_MAX};
+use crate::experiment::trial::entrant::{self, ORACLE};
+use crate::experiment::trial::row::TrialId;
+use crate::experiment::truth::scan_truth::ScanTruth;
 use crate::explore::around::SpaceSettings;
 use crate::explore::gp_settings::GpSettings;
 use crate::explore::planner;

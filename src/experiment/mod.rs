@@ -20,45 +20,20 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod analysis;
-mod belief_shape;
-pub mod cloud;
-pub mod comparison;
-pub mod curve_table;
-pub mod entrant;
-pub mod equal_error;
 #[allow(clippy::module_inception)]
 pub mod experiment;
-mod exploration;
-pub mod lab_runner;
 pub mod measure;
-pub mod metrics;
 pub mod notice;
-mod oracle;
-pub mod outline;
 pub mod real_robot;
-pub mod recorded_trial;
-pub mod replay;
 pub mod report_settings;
-pub mod resumed;
-pub mod row;
 pub mod runner;
-pub mod scan;
-pub mod scan_truth;
-pub mod shape;
-pub mod shard;
 pub mod simulation;
 pub mod statistics;
 pub mod store;
-pub mod summary;
 pub mod sweep;
-mod trial;
+pub mod trial;
 pub mod truth;
-mod verification;
-pub mod verification_row;
-mod verified;
-pub mod witness;
 
-pub use entrant::Entrant;
 pub use experiment::Experiment;
 pub use simulation::Simulation;
+pub use trial::entrant::Entrant;

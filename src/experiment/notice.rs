@@ -1,13 +1,13 @@
 //! What a reader must know before he believes the numbers of an experiment.
 
-use super::experiment::Experiment;
-use super::measure::{CENTRED_R, Measure, R};
-use super::row::{TrialRow, of_planner};
-use super::scan_truth::LeftOut;
-use super::shape::TrueShape;
-use super::store::Run;
-use super::summary;
-use super::truth::Truth;
+use crate::experiment::experiment::Experiment;
+use crate::experiment::measure::shape::TrueShape;
+use crate::experiment::measure::{CENTRED_R, Measure, R};
+use crate::experiment::statistics::summary;
+use crate::experiment::store::Run;
+use crate::experiment::trial::row::{TrialRow, of_planner};
+use crate::experiment::truth::Truth;
+use crate::experiment::truth::scan_truth::LeftOut;
 use crate::task::Zone;
 use std::fmt;
 

@@ -1,7 +1,7 @@
 //! Settings that a real robot needs and that a simulation takes from its mesh.
 
-use super::experiment::Experiment;
 use crate::backend::ros::settings::BackendKind;
+use crate::experiment::experiment::Experiment;
 use thiserror::Error;
 
 /// An experiment with a real robot lacks settings that protect it.
@@ -71,10 +71,10 @@ pub fn check(experiment: &Experiment) -> Result<(), MissingForRobot> {
     }
 }
 
-/// As [`check`] of an experiment that touches a known body, whose depths follow from it.
+/// Checks the cell alone: an experiment that touches a known body has its depths from it.
 ///
 /// # Errors
-/// As [`check`], of the interlocks alone.
+/// If the interlocks lack a setting, as [`check`] says it.
 pub fn check_cell(experiment: &Experiment) -> Result<(), MissingForRobot> {
     let is_of_cell = |needed: &Needed| [LOWEST, WORKSPACE].contains(needed);
     check(experiment).or_else(|MissingForRobot { kind, missing }| {

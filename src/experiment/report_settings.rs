@@ -1,8 +1,8 @@
 //! What the report of a run shows. It decides no row, so it may change on a finished run.
 
-use super::entrant;
-use super::measure::MEASURES;
 use crate::config::{Checked, Rules};
+use crate::experiment::measure::MEASURES;
+use crate::experiment::trial::entrant;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

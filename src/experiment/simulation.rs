@@ -1,22 +1,22 @@
 //! From an experiment to its trials: the one way that everything goes which runs a simulation.
 
-use super::cloud::CloudError;
-use super::entrant::{Entrant, ORACLE};
-use super::experiment::Experiment;
-use super::notice;
-use super::notice::Notice;
-use super::oracle::GroundTruth;
-use super::real_robot::{self, MissingForRobot};
-use super::row::TrialRow;
-use super::scan_truth::LeftOut;
-use super::shape::TrueShape;
-use super::trial;
-use super::truth::Truth;
-use super::witness::Witness;
 use crate::backend::ros::arm::Lab;
 use crate::backend::ros::fault::LinkFault;
 use crate::backend::ros::settings::BackendKind;
 use crate::backend::{Backend, Fault};
+use crate::experiment::experiment::Experiment;
+use crate::experiment::measure::shape::TrueShape;
+use crate::experiment::notice;
+use crate::experiment::notice::Notice;
+use crate::experiment::real_robot::{self, MissingForRobot};
+use crate::experiment::trial::GroundTruth;
+use crate::experiment::trial::entrant::{Entrant, ORACLE};
+use crate::experiment::trial::row::TrialRow;
+use crate::experiment::trial::trial;
+use crate::experiment::trial::witness::Witness;
+use crate::experiment::truth::Truth;
+use crate::experiment::truth::cloud::CloudError;
+use crate::experiment::truth::scan_truth::LeftOut;
 use crate::explore::planner::{self, PlannerFactory};
 use crate::explore::probe::Probe;
 use crate::explore::probe::servo::Servo;
@@ -251,7 +251,7 @@ impl Simulation {
         self.trial_seen(planner, trial, &mut ())
     }
 
-    /// As [`trial`](Self::trial), with `witness` told of every touch.
+    /// Runs a trial like [`trial`](Self::trial); `witness` sees every touch.
     pub fn trial_seen<'a>(
         &self,
         planner: impl Into<Entrant<'a>>,

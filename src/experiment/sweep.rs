@@ -1,7 +1,7 @@
 //! Several experiments in one file: every combination of the values in its table `[sweep]`.
 
-use super::experiment::{Experiment, SWEEP};
 use crate::config::{ConfigError, Loader};
+use crate::experiment::experiment::{Experiment, SWEEP};
 use std::path::Path;
 use toml::Value;
 

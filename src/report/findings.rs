@@ -2,15 +2,15 @@
 
 use super::number::{digits, with_error};
 use crate::experiment::measure;
+use crate::experiment::measure::metrics::constant_r;
 use crate::experiment::measure::{
     CENTRED_R, CHAMFER, COVERAGE, EDGE_RMSE, Measure, R, REPEATABILITY, RMSE,
     VERIFICATION_COVERAGE, VERIFICATION_RMSE,
 };
-use crate::experiment::metrics::constant_r;
 use crate::experiment::notice;
+use crate::experiment::statistics::summary;
+use crate::experiment::statistics::summary::CurvePoint;
 use crate::experiment::store::Run;
-use crate::experiment::summary;
-use crate::experiment::summary::CurvePoint;
 
 /// The mean of Eq. 5 that counts as found, as where the paper says "almost 1".
 const R_FOUND: f64 = 0.99;

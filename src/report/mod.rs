@@ -38,7 +38,7 @@ pub mod zone;
 
 pub use figures::{Drawing, FIGURES, Figure};
 
-use crate::experiment::analysis::Analysis;
+use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
 use anyhow::Context;
 use std::path::Path;

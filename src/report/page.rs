@@ -8,7 +8,7 @@ use super::html;
 use super::html::{section, table_body, wide};
 use super::tables::{Table, claims, comparison, equal_error, summary};
 use super::verdict;
-use crate::experiment::analysis::Analysis;
+use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::Run;
 
 /// Files of a run folder that the page points to.

@@ -3,7 +3,7 @@
 use crate::config::Rules;
 use crate::experiment::Experiment;
 use crate::experiment::measure::{Direction, MEASURES};
-use crate::experiment::row::TrialRow;
+use crate::experiment::trial::row::TrialRow;
 use schemars::{JsonSchema, schema_for};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -219,9 +219,9 @@ pub fn fields<T: JsonSchema>() -> String {
 
 /// The fields of a line of `trials.jsonl`, of each of its touches and of their parts.
 pub fn rows() -> String {
-    let touch = fields::<crate::experiment::row::TouchRow>();
-    let metrics = fields::<crate::experiment::metrics::Metrics>();
-    let shape = fields::<crate::experiment::shape::ShapeMetrics>();
+    let touch = fields::<crate::experiment::trial::row::TouchRow>();
+    let metrics = fields::<crate::experiment::measure::metrics::Metrics>();
+    let shape = fields::<crate::experiment::measure::shape::ShapeMetrics>();
     let fit = fields::<crate::gp::fit::Fit>();
     format!(
         "{}\nEach of `touches`:\n\n{touch}\nIts `metrics`:\n\n{metrics}\nIts `shape`:\n\n{shape}\n\

@@ -5,7 +5,7 @@ use super::canvas::Area;
 use super::compare::Sheet;
 use super::style;
 use super::style::FAINT_INK;
-use crate::experiment::outline::TENTHS;
+use crate::experiment::measure::outline::TENTHS;
 use crate::study::compare::{Compared, Contender};
 
 const PANEL_PX: Area = Area { left: 70.0, top: 60.0, width: 300.0, height: 300.0 };

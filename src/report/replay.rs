@@ -1,9 +1,9 @@
 //! Beliefs as they were: a recorded trial's touches and hyperparameters, conditioned again.
 
 use crate::experiment::Experiment;
-use crate::experiment::metrics::Metrics;
-use crate::experiment::row::{TouchRow, TrialRow};
+use crate::experiment::measure::metrics::Metrics;
 use crate::experiment::store::Run;
+use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::explore::belief::HeightField;
 use crate::explore::probe::{Contact, Swept, Touch};
 use crate::gp::Posterior;

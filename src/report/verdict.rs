@@ -2,9 +2,9 @@
 
 use super::findings::{HONEST, share_in_band};
 use super::tables::{Verdict, comparison, equal_error};
-use crate::experiment::analysis::Analysis;
+use crate::experiment::statistics::analysis::Analysis;
+use crate::experiment::statistics::summary;
 use crate::experiment::store::Run;
-use crate::experiment::summary;
 
 /// Sentences; none of a run without a belief.
 pub fn sentences(run: &Run, analysis: &Analysis) -> Vec<String> {

@@ -7,10 +7,10 @@
 
 use super::check::baseline::span;
 use super::check::judged::JUDGED;
-use crate::experiment::outline::TENTHS;
-use crate::experiment::row::{TouchRow, TrialRow, of_planner};
+use crate::experiment::measure::outline::TENTHS;
 use crate::experiment::statistics::{mean, percentiles_95, resampled_within};
 use crate::experiment::store::Run;
+use crate::experiment::trial::row::{TouchRow, TrialRow, of_planner};
 use std::collections::HashMap;
 use thiserror::Error;
 

@@ -2,8 +2,8 @@
 //! much of what could be gained a planner gains.
 
 use super::compare::{Compared, Contender};
-use crate::experiment::entrant::ORACLE;
 use crate::experiment::statistics::{mean, percentiles_95, resampled_within};
+use crate::experiment::trial::entrant::ORACLE;
 
 /// Who gains nothing; who gains all that can be is the [`ORACLE`].
 pub const FLOOR: &str = "random";

@@ -190,7 +190,7 @@ impl ArmPc {
         &self.applied
     }
 
-    /// Which velocity of the incoming command exceeds its joint's limit, in words.
+    /// Describes the first velocity of the incoming command that exceeds its joint's limit.
     fn beyond_limits(&self) -> Option<String> {
         let joints = self.names.names().iter().zip(&self.qdot_limits);
         let fast = |qdot: f64, limit: f64| qdot.abs() > limit * (1.0 + ROUNDING);

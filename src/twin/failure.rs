@@ -55,7 +55,7 @@ const NOISE_N: f64 = 0.3;
 /// Lead of a clock that goes wrong; chosen.
 const AHEAD_S: i32 = 1;
 
-/// What stamps lose with each message where they run backwards.
+/// Decrement of the stamps with each message where they run backwards.
 // heuristic: hundreds of messages stay within the age limit of 50 ms.
 const BACKWARD_S: f64 = 1e-4;
 

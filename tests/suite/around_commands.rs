@@ -124,7 +124,7 @@ fn an_object_too_small_to_go_around_is_refused_at_once() {
     assert!(!folder.path().join("runs").exists());
 }
 
-/// What figures need of the truth lies in the folder: it may move, and the mesh may go or change.
+/// The folder has the truth that figures need: it may move, and the mesh may go or change.
 #[test]
 fn a_report_needs_its_folder_alone() {
     let folder = around();

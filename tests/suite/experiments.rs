@@ -1,10 +1,10 @@
 //! What the shipped experiments must show, run whole or cut down in trials.
 
-use palpate::experiment::equal_error::equal_error;
 use palpate::experiment::measure::{EDGE_RMSE, R, RMSE};
-use palpate::experiment::row::{TrialRow, of_planner};
-use palpate::experiment::summary;
-use palpate::experiment::summary::CurvePoint;
+use palpate::experiment::statistics::equal_error::equal_error;
+use palpate::experiment::statistics::summary;
+use palpate::experiment::statistics::summary::CurvePoint;
+use palpate::experiment::trial::row::{TrialRow, of_planner};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use rayon::prelude::*;

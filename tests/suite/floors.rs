@@ -327,5 +327,5 @@ fn imports_are_read_whole() {
     let path = |text: &str| -> Module { text.split('/').map(str::to_owned).collect() };
     // Through a name that a front page passes on, and through one in the midst of an expression.
     assert!(edges[&path("explore/belief/height_field")].contains(&path("task/zone")));
-    assert!(edges[&path("experiment/exploration")].contains(&path("explore/belief")));
+    assert!(edges[&path("experiment/trial/exploration")].contains(&path("explore/belief")));
 }

@@ -12,8 +12,8 @@ use rand_chacha::ChaCha8Rng;
 use tempfile::TempDir;
 
 use crate::common::program::{command, fails, folder, said, succeeds};
-use palpate::experiment::row::TouchRow;
 use palpate::experiment::store::{Entry, Journal};
+use palpate::experiment::trial::row::TouchRow;
 
 /// Kills of one test; `PALPATE_FUZZ` asks for more.
 const KILLS: u64 = 100;

@@ -1,7 +1,7 @@
 //! Contact normals and swept free space, from the touch to the recorded belief.
 
 use nalgebra::{Point3, Vector3};
-use palpate::experiment::row::TrialRow;
+use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::truth::Truth;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::HeightField;

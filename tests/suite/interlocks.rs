@@ -136,7 +136,7 @@ fn joints_that_lag_by_less_than_is_allowed_trip_nothing() {
     }
 }
 
-/// What bounds the tip looks at where it may be, not only at where it was last seen.
+/// Bounds hold where the tip may be, not only where it was last seen.
 #[test]
 fn a_box_bounds_also_a_tip_that_is_not_seen_to_move() {
     let mut site = site(stage(Point3::origin(), Finger::default().r_at()));

@@ -304,7 +304,7 @@ fn multicast_members(device: &str) -> u32 {
     members
 }
 
-/// What the settings name is used, and nothing else.
+/// Only the interfaces named in the settings are used.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
 fn only_the_named_interfaces_are_used() {

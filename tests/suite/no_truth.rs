@@ -1,11 +1,11 @@
 //! What is told where nobody knows the truth: verification touches, repeated ones, scans as truth.
 
-use palpate::experiment::analysis::Analysis;
 use palpate::experiment::measure;
-use palpate::experiment::row::TrialRow;
-use palpate::experiment::scan_truth::ScanTruth;
+use palpate::experiment::statistics::analysis::Analysis;
 use palpate::experiment::store::Run;
+use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::truth::Truth;
+use palpate::experiment::truth::scan_truth::ScanTruth;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::report;

@@ -1,8 +1,8 @@
 //! Planners that are not built in: a program adds them to its simulation.
 
-use palpate::experiment::row::TrialId;
 use palpate::experiment::runner::{self, RunError};
 use palpate::experiment::store::{Content, Run, RunFolder, StoreError};
+use palpate::experiment::trial::row::TrialId;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::planner::{

@@ -4,7 +4,7 @@
 //! Without a Chromium this is skipped, and says so; `make page-test` insists on one.
 
 use crate::common::runs::{CURVE, SURFACE, run};
-use palpate::experiment::analysis::Analysis;
+use palpate::experiment::statistics::analysis::Analysis;
 use palpate::experiment::store::Run;
 use palpate::report;
 use std::fs;

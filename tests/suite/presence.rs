@@ -1,8 +1,8 @@
 //! Where there probably is a surface, and planners that ask.
 
 use nalgebra::{Point3, Vector3};
-use palpate::experiment::resumed::Resumed;
 use palpate::experiment::sweep::cells;
+use palpate::experiment::trial::resumed::Resumed;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::HeightField;
 use palpate::explore::gp_settings::GpSettings;

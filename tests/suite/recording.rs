@@ -12,10 +12,10 @@ use palpate::backend::recording::{
 };
 use palpate::backend::ros::message::{BioTacHand, JointState, JointTrajectory, WrenchStamped};
 use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading, Wrench};
-use palpate::experiment::recorded_trial::{self, next_part, parts, recording_path};
-use palpate::experiment::replay::{self, Difference, ReplayError};
-use palpate::experiment::row::TouchRow;
-use palpate::experiment::witness::{Touched, Witness};
+use palpate::experiment::trial::recorded_trial::{self, next_part, parts, recording_path};
+use palpate::experiment::trial::replay::{self, Difference, ReplayError};
+use palpate::experiment::trial::row::TouchRow;
+use palpate::experiment::trial::witness::{Touched, Witness};
 use palpate::experiment::{Entrant, Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::robot::finger::Frame;

@@ -1,11 +1,11 @@
 //! Figures and page of made-up runs.
 
 use crate::common::runs::{CURVE, SURFACE, run};
-use palpate::experiment::analysis::Analysis;
+use palpate::experiment::measure::outline::Outline;
+use palpate::experiment::measure::shape::ShapeMetrics;
 use palpate::experiment::measure::{Direction, MEASURES, Scale};
-use palpate::experiment::outline::Outline;
 use palpate::experiment::report_settings::Claim;
-use palpate::experiment::shape::ShapeMetrics;
+use palpate::experiment::statistics::analysis::Analysis;
 use palpate::experiment::store::Run;
 use palpate::report;
 use palpate::report::axes::Axis;

@@ -2,7 +2,7 @@
 
 use crate::common::shapes::{box_corners, box_mesh, point, sphere_mesh};
 use nalgebra::{UnitVector3, Vector3};
-use palpate::experiment::shape::{Reach, TrueShape};
+use palpate::experiment::measure::shape::{Reach, TrueShape};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::import::import;
 use palpate::geometry::mesh::Mesh;

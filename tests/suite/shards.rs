@@ -2,7 +2,7 @@
 
 use crate::common::counting::peak_bytes;
 use crate::common::program::palpate;
-use palpate::experiment::shard::{NoShard, Shard};
+use palpate::experiment::runner::shard::{NoShard, Shard};
 use palpate::experiment::store::Shards;
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,4 @@
-//! What goes wrong on either side of the topics: what the explorer says, and how far the tip still
-//! moves.
+//! Failures on either side of the topics: the explorer's message, and how far the tip still moves.
 //!
 //! The tests of times and paths need the machine for themselves and are ignored without:
 //! `make test-faults` runs them and prints the table of `docs/real-arm.md`.
@@ -40,7 +39,7 @@ const ENDED: &[(&[&str], &str)] = &[
     (&["unknown_flag"], "message on /pa10/status refused: estop is \"unknown\"; allowed are"),
 ];
 
-/// What is said of messages dropped for their stamps.
+/// Part of the message about messages dropped for their stamps.
 const BACKWARD: &str = "were dropped because their stamps ran backwards";
 
 /// Whether the explorer said what it must. Of a fast arm whose joint states are dropped it may see
@@ -60,7 +59,7 @@ fn the_explorer_says_what_failed() {
     std::thread::scope(|scope| {
         for (names, says) in ENDED {
             scope.spawn(move || {
-                // Silence is told by how old something may be, and so is order.
+                // Silence and order are found by age limits, which must be the usual ones.
                 let is_aged = ["no_joints", "no_wrench", "no_tactile", "backward"];
                 let settings = match is_aged.contains(&names[0]) {
                     true => BackendSettings { patience_s: 20.0, ..BackendSettings::default() },
@@ -79,7 +78,7 @@ fn the_explorer_says_what_failed() {
     });
 }
 
-/// What does not hinder does not stop.
+/// Failures that do not hinder a touch do not stop it.
 #[test]
 fn what_does_not_hinder_a_touch_does_not_stop_it() {
     std::thread::scope(|scope| {

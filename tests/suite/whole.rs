@@ -3,11 +3,11 @@
 
 use nalgebra::{Point3, Vector3};
 use palpate::experiment::Experiment;
-use palpate::experiment::equal_error::equal_errors;
-use palpate::experiment::row::TrialRow;
-use palpate::experiment::shape::TrueShape;
+use palpate::experiment::measure::shape::TrueShape;
 use palpate::experiment::simulation::Simulation;
+use palpate::experiment::statistics::equal_error::equal_errors;
 use palpate::experiment::store::Run;
+use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::truth::Truth;
 use palpate::explore::around::{ImplicitSurface, Surface};
 use palpate::explore::belief::Belief;
@@ -326,7 +326,7 @@ fn a_run_says_what_it_found() {
     assert!(found.contains(&format!(": active {touches}.")), "{found}");
 }
 
-/// What a belief expects of touches that it does not learn from holds, within its own deviations;
+/// Verification touches meet what the belief expects, within its own deviations;
 /// and a rigid finger that does the same again meets the same.
 #[test]
 fn verification_touches_hold_a_belief_around_an_object_to_what_it_expects() {

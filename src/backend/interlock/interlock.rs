@@ -49,7 +49,7 @@ pub struct Now {
     pub qdot: Joints,
     /// What was commanded last.
     pub sent: Joints,
-    /// What each joint was commanded to move by since its position as read last changed, rad or m:
+    /// Commanded movement of each joint since its position as read last changed, rad or m:
     /// where the body may be beyond `q`.
     pub unseen: Joints,
     /// Pose of the fingertip.

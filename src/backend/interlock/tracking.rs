@@ -50,7 +50,7 @@ struct Sample {
     commanded: Joints,
 }
 
-/// What was commanded and read over a span that ends now.
+/// Commands and positions over a span that ends now.
 struct Span {
     step_s: f64,
     lag_steps: usize,

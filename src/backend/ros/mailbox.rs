@@ -26,7 +26,7 @@ const FRAMES_MAX: usize = 64;
 /// After as many silent periods the arm is commanded to stand still.
 const SILENT_PERIODS: f64 = 1.5;
 
-/// What was received last.
+/// The last message of each topic.
 #[derive(Default)]
 pub struct Heard {
     /// Joint positions, rad.
@@ -39,7 +39,7 @@ pub struct Heard {
     pub frames: VecDeque<Frame>,
     /// State of the arm.
     pub status: Option<ArmStatus>,
-    /// What was received on each topic.
+    /// Reception state of each topic.
     pub topics: [TopicState; Topic::ALL.len()],
     /// The first message that ends the run.
     pub refused: Option<LinkFault>,
@@ -56,7 +56,7 @@ pub struct Heard {
     pub since: Option<Instant>,
 }
 
-/// What was received on a topic.
+/// Reception state of a topic.
 #[derive(Clone, Debug, Default)]
 pub struct TopicState {
     /// When the last message was received.

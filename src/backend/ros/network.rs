@@ -22,7 +22,7 @@ pub struct Interface {
 }
 
 impl Network {
-    /// Of `settings`, with the variables that `variable` returns and the interfaces of this
+    /// Reads `settings`, the variables that `variable` returns and the interfaces of this
     /// machine. Settings come before variables: `ROS_DOMAIN_ID`, `ROS_LOCALHOST_ONLY` and
     /// `ROS_AUTOMATIC_DISCOVERY_RANGE`, as REP 2003 and the documentation of ROS 2 have them.
     ///
@@ -61,7 +61,7 @@ impl Network {
         let is_local = match range.as_deref() {
             None | Some("SUBNET" | "SYSTEM_DEFAULT") => local_only,
             Some("LOCALHOST") => true,
-            // Without discovery nobody is found, and peers cannot be listed.
+            // Without discovery no peer is found, and peers cannot be listed.
             other => {
                 let other = other.unwrap_or_default();
                 return Err(format!(

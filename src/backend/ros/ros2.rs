@@ -92,7 +92,7 @@ fn best_effort() -> QosProfile {
     QosProfile::subscription_default().history(History::KeepLast { depth: DEPTH })
 }
 
-/// What a reader asks for to be sent the last message that was published before it came.
+/// QoS of a reader that is also sent the last message published before it came.
 fn latched() -> QosProfile {
     reliable().durability(Durability::TransientLocal)
 }

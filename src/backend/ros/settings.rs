@@ -38,7 +38,7 @@ impl BackendKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MappingKind {
-    /// As the vendor of the server does by default.
+    /// The default of the server's vendor.
     #[default]
     Auto,
     /// The request's identity in the inline QoS: Fast DDS, RTI Connext, RustDDS.

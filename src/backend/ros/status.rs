@@ -37,7 +37,7 @@ pub enum StatusError {
     Flag {
         /// Key of the flag.
         key: &'static str,
-        /// What stands there.
+        /// The value found.
         found: String,
     },
 }

@@ -2,8 +2,8 @@
 
 use super::error::{StoreError, io_error};
 use super::file::write_changed;
-use crate::experiment::entrant::Entrant;
 use crate::experiment::simulation::Simulation;
+use crate::experiment::trial::entrant::Entrant;
 use crate::files;
 use crate::sim::environment::Shape;
 use sha2::{Digest, Sha256};

@@ -2,7 +2,7 @@
 //! that it belongs to.
 
 use super::error::{StoreError, io_error};
-use crate::experiment::row::TouchRow;
+use crate::experiment::trial::row::TouchRow;
 use crate::files;
 use serde::{Deserialize, Serialize};
 use std::fs::File;

@@ -6,7 +6,7 @@ use super::rows::{self, Place};
 use super::surface::{self, SURFACE};
 use super::{RunFolder, StoreError, TRIALS, resolved};
 use crate::experiment::experiment::Experiment;
-use crate::experiment::row::TrialId;
+use crate::experiment::trial::row::TrialId;
 use crate::experiment::truth::Truth;
 use std::fs::File;
 use std::path::{Path, PathBuf};

@@ -35,7 +35,7 @@ use self::file::remove;
 use self::rows::Place;
 use self::surface::{MESH, SURFACE};
 use crate::experiment::experiment::Experiment;
-use crate::experiment::row::{TrialId, TrialRow};
+use crate::experiment::trial::row::{TrialId, TrialRow};
 use crate::experiment::truth::Truth;
 use crate::files;
 use std::fs::{self, File, TryLockError};

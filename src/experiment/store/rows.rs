@@ -2,7 +2,7 @@
 
 use super::error::{StoreError, io_error};
 use crate::experiment::experiment::Experiment;
-use crate::experiment::row::{TouchRow, TrialId, TrialRow};
+use crate::experiment::trial::row::{TouchRow, TrialId, TrialRow};
 use crate::{files, words};
 use std::cmp::Ordering;
 use std::collections::HashSet;

@@ -1,4 +1,4 @@
-//! What is known after some touches: a Gaussian process, over a zone or in space.
+//! The belief after some touches: a Gaussian process, over a zone or in space.
 
 mod height_field;
 

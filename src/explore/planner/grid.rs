@@ -19,7 +19,7 @@ pub(super) const ENTRY: Entry = Entry {
 
 struct Grid {
     next_level: u32,
-    /// What is left of this level, the next node last: fractions 0..1.
+    /// Remaining nodes of this level, the next one last: fractions 0..1.
     rest: Vec<Vec<f64>>,
 }
 

@@ -19,7 +19,7 @@ pub(super) const ENTRY: Entry = Entry {
 };
 
 struct IntegratedVariance {
-    /// Of the places of a zone at which the variance is looked at; drawn with the first plan.
+    /// Seed of the places of a zone at which the variance is computed; drawn with the first plan.
     seed: Option<u32>,
     search: Search,
 }

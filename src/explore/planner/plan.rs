@@ -1,4 +1,4 @@
-//! What a planner is: it sees the belief and nothing else, and says where to touch.
+//! The planner's trait: a planner gets the belief and nothing else, and chooses where to touch.
 
 use super::settings::PlanningSettings;
 use crate::explore::belief::{Belief, HeightField};
@@ -41,11 +41,11 @@ use thiserror::Error;
 /// ```
 ///
 /// ```compile_fail
-/// use palpate::experiment::oracle::GroundTruth;
+/// use palpate::experiment::trial::oracle::GroundTruth;
 /// ```
 ///
 /// ```compile_fail
-/// use palpate::experiment::oracle::Oracle;
+/// use palpate::experiment::trial::oracle::Oracle;
 /// ```
 ///
 /// ```compile_fail
@@ -66,7 +66,7 @@ pub trait Planner: Send {
 /// A planner's choice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// What to touch: a place of a zone, or six numbers that aim at an object from any side.
+    /// The target: a place of a zone, or six numbers that aim at an object from any side.
     pub target: Vec<f64>,
     /// Standard deviation there, if the planner looked at it: the root of
     /// the belief's variance.

@@ -32,7 +32,7 @@ pub(super) const ENTRY: Entry = Entry {
 const COMMITTEE: [f64; 3] = [0.5, 1.0, 2.0];
 
 struct Silhouette {
-    /// Of the places at which the variance is looked at; drawn with the first plan.
+    /// Seed of the places at which the variance is computed; drawn with the first plan.
     seed: Option<u32>,
     search: Search,
 }

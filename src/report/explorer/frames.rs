@@ -2,8 +2,8 @@
 
 use super::code::Code;
 use super::shell;
-use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
+use crate::experiment::trial::row::TouchRow;
 use crate::gp::batch::Prediction;
 use crate::report::axes;
 use crate::report::axes::{Axis, Length};

@@ -1,12 +1,12 @@
 //! Errors against touches, Fig. 4 of Yi et al. 2016.
 
 use super::figure::Figure;
-use crate::experiment::curve_table;
+use crate::experiment::measure::metrics;
 use crate::experiment::measure::{Aggregate, MEASURES, Measure, R, Scale};
-use crate::experiment::metrics;
+use crate::experiment::statistics::curve_table;
+use crate::experiment::statistics::summary;
+use crate::experiment::statistics::summary::CurvePoint;
 use crate::experiment::store::Run;
-use crate::experiment::summary;
-use crate::experiment::summary::CurvePoint;
 use crate::report::axes::{Axis, Panel};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{Legend, Swatch};

@@ -1,8 +1,8 @@
 //! Beliefs of a surface after some touches, Figs. 5 and 7 of Yi et al. 2016.
 
 use super::figure::{Figure, miss_entry};
-use crate::experiment::row::TouchRow;
 use crate::experiment::store::Run;
+use crate::experiment::trial::row::TouchRow;
 use crate::gp::posterior::Scratch;
 use crate::report::axes::{Axis, Length, colour_bar};
 use crate::report::canvas::{Area, Canvas, PointPx};

@@ -1,8 +1,8 @@
 //! Where the finger was sent and where it met the object, seen along the approach.
 
 use super::figure::{Figure, miss_entry};
+use crate::experiment::statistics::summary::median_shift_m;
 use crate::experiment::store::Run;
-use crate::experiment::summary::median_shift_m;
 use crate::report::axes::{Axis, Length, Panel};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{Legend, Swatch};

@@ -2,8 +2,8 @@
 
 use super::{Cell, Table, titled};
 use crate::experiment::measure;
+use crate::experiment::statistics::summary::typical;
 use crate::experiment::store::Run;
-use crate::experiment::summary::typical;
 use crate::report::number::shown;
 
 /// A line for each measure of each claim; none if nothing is claimed.

@@ -1,8 +1,8 @@
 //! The planners against their baselines in every measure, as tables of the page and as a file.
 
 use super::{Cell, Table, Verdict, titled, write_csv};
-use crate::experiment::comparison::Comparison;
 use crate::experiment::measure::{Direction, MEASURES, Measure, in_files};
+use crate::experiment::statistics::comparison::Comparison;
 use crate::experiment::store::Run;
 use crate::report::number::{digits, with_interval};
 use schemars::JsonSchema;

@@ -1,8 +1,8 @@
 //! Touches to equal error, as tables of the page and as a file.
 
 use super::{Cell, Table, Verdict, write_csv};
-use crate::experiment::equal_error::{EqualError, Estimate, errors};
 use crate::experiment::measure::Direction;
+use crate::experiment::statistics::equal_error::{EqualError, Estimate, errors};
 use crate::experiment::store::Run;
 use crate::report::number::{digits, with_interval};
 use schemars::JsonSchema;

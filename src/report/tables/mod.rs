@@ -84,7 +84,7 @@ pub fn write_csv<T: Serialize + JsonSchema>(
     write_csv_with(path, fields, records)
 }
 
-/// As [`write_csv`], with a header of its own.
+/// Writes records as CSV under a given header.
 fn write_csv_with<T: Serialize>(
     path: &Path,
     header: impl IntoIterator<Item = impl AsRef<[u8]>>,

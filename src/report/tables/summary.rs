@@ -1,12 +1,12 @@
 //! The curves as a table of the page and of the terminal, and as a file.
 
 use super::{Cell, Table, titled, write_csv_with};
-use crate::experiment::curve_table::{CurveRecord, columns, curve_table};
 use crate::experiment::measure::{MEASURES, Measure};
 use crate::experiment::notice;
+use crate::experiment::statistics::curve_table::{CurveRecord, columns, curve_table};
+use crate::experiment::statistics::summary;
+use crate::experiment::statistics::summary::{CurvePoint, Events};
 use crate::experiment::store::Run;
-use crate::experiment::summary;
-use crate::experiment::summary::{CurvePoint, Events};
 use crate::report::number::{shown, with_error};
 use serde_json::{Map, Value, json};
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use super::cost::Cost;
 use super::judged::{JUDGED, Span};
-use crate::experiment::row::TrialRow;
+use crate::experiment::trial::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

@@ -1,7 +1,7 @@
 //! What a planner is judged by when it is held against what it was: one line to add one.
 
 use crate::experiment::measure::{CENTRED_R, CHAMFER, RMSE};
-use crate::experiment::row::{TouchRow, TrialRow};
+use crate::experiment::trial::row::{TouchRow, TrialRow};
 
 /// A number of a trial, less of which is better.
 #[derive(Debug)]

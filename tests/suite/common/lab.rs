@@ -1,7 +1,7 @@
 //! An explorer and a twin in processes of their own, over ROS 2 or ROS 1: `PALPATE_ROS` says which.
 
 use palpate::backend::ros::settings::{BackendKind, BackendSettings};
-use palpate::experiment::row::TrialRow;
+use palpate::experiment::trial::row::TrialRow;
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 /// The experiment that is run over topics.
 pub const EXPERIMENT: &str = "experiments/container_pa10.toml";
 
-/// What a real arm must be told of the container and the cell.
+/// Settings that a real arm needs of the container and the cell.
 pub const CELL: [&str; 3] = [
     "scene.zone.depth_m=[0.59, 0.71]",
     "backend.interlocks.lowest_m=0.0",

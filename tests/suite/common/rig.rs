@@ -74,7 +74,7 @@ impl Backend for Tracked {
     }
 }
 
-/// What an explorer sends and receives passes only while it is not cut.
+/// A connection that can be cut in either direction.
 #[derive(Clone, Default)]
 pub struct Wire {
     pub cuts_sent: Arc<AtomicBool>,

@@ -1,9 +1,9 @@
 //! Made-up runs, so that no trial has to be run.
 
 use palpate::experiment::experiment::Experiment;
-use palpate::experiment::metrics::Metrics;
-use palpate::experiment::row::{TouchRow, TrialRow};
+use palpate::experiment::measure::metrics::Metrics;
 use palpate::experiment::store::Run;
+use palpate::experiment::trial::row::{TouchRow, TrialRow};
 use palpate::experiment::truth::Truth;
 use palpate::gp::fit::Fit;
 use palpate::gp::kernel::Hyperparameters;

@@ -2,9 +2,9 @@
 //!
 //! Only trials make one. A planner is given the belief alone.
 
-use super::shape::TrueShape;
-use super::statistics::mean;
-use super::truth::Truth;
+use crate::experiment::measure::shape::TrueShape;
+use crate::experiment::statistics::mean;
+use crate::experiment::truth::Truth;
 use crate::explore::around::ImplicitSurface;
 use crate::explore::around::Surface;
 use crate::explore::around::surface::steepness;
@@ -19,14 +19,14 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
-/// What the beliefs of a trial are compared with.
-pub(super) struct GroundTruth<'a> {
+/// The ground truth that the beliefs of a trial are compared with.
+pub(in crate::experiment) struct GroundTruth<'a> {
     /// The scene, with the object's mesh.
-    pub(super) environment: &'a Arc<Environment>,
+    pub(in crate::experiment) environment: &'a Arc<Environment>,
     /// True heights over a zone.
-    pub(super) truth: &'a Truth,
+    pub(in crate::experiment) truth: &'a Truth,
     /// The true surface of a whole object; none in a zone.
-    pub(super) shape: Option<&'a TrueShape>,
+    pub(in crate::experiment) shape: Option<&'a TrueShape>,
 }
 
 /// Points of the true surface at which the oracle compares.
@@ -67,18 +67,18 @@ fn off_m(shape: &TrueShape, surface: &Surface) -> f64 {
 }
 
 /// Tries touches on the ground truth and asks for the one after which the belief is nearest to it.
-pub(super) struct Oracle {
+pub(in crate::experiment) struct Oracle {
     search: Search,
 }
 
 impl Oracle {
-    /// Of one trial; `rng` is its only randomness.
-    pub(super) fn new(settings: &PlanningSettings, rng: ChaCha8Rng) -> Self {
+    /// Makes the oracle of one trial; `rng` is its only randomness.
+    pub(in crate::experiment) fn new(settings: &PlanningSettings, rng: ChaCha8Rng) -> Self {
         Self { search: Search::new(settings, rng) }
     }
 
     /// The touch after which `belief` is nearest to `truth`.
-    pub(super) fn plan(&mut self, belief: &Belief, truth: &GroundTruth) -> Plan {
+    pub(in crate::experiment) fn plan(&mut self, belief: &Belief, truth: &GroundTruth) -> Plan {
         match belief {
             Belief::HeightField(field) => {
                 let count = self.search.settings.oracle.candidates;

@@ -1,18 +1,18 @@
 //! Algorithm 1 of Yi et al. 2016: touch, fit, plan, again.
 
-use super::entrant::Entrant;
-use super::experiment::Experiment;
-use super::exploration::Exploration;
-use super::oracle::GroundTruth;
-use super::row::{TouchRow, TrialRow};
-use super::witness::{Touched, Witness};
+use crate::experiment::experiment::Experiment;
+use crate::experiment::trial::entrant::Entrant;
+use crate::experiment::trial::exploration::Exploration;
+use crate::experiment::trial::oracle::GroundTruth;
+use crate::experiment::trial::row::{TouchRow, TrialRow};
+use crate::experiment::trial::witness::{Touched, Witness};
 use crate::explore::probe::{Probe, Touch};
 use crate::task::Task;
 
 /// Runs one trial of an entrant from start to end with the touches of `probe`, before `witness`.
 ///
 /// Its row depends on the experiment, the trial's number, the entrant and the probe only.
-pub(super) fn run(
+pub(in crate::experiment) fn run(
     experiment: &Experiment,
     truth: &GroundTruth,
     probe: &mut dyn Probe,

@@ -1,11 +1,11 @@
-//! What a trial does between touches: believe, plan, be compared.
+//! The steps of a trial between touches: fit, plan, compare.
 
-use super::entrant::{Chooser, Entrant};
-use super::experiment::Experiment;
-use super::oracle::GroundTruth;
-use super::outline::Outline;
-use super::row::{TouchRow, VerificationRows};
-use super::verification::verify;
+use crate::experiment::experiment::Experiment;
+use crate::experiment::measure::outline::Outline;
+use crate::experiment::trial::entrant::{Chooser, Entrant};
+use crate::experiment::trial::oracle::GroundTruth;
+use crate::experiment::trial::row::{TouchRow, VerificationRows};
+use crate::experiment::trial::verification::verify;
 use crate::explore::belief::{Belief, HeightField};
 use crate::explore::planner::{self, Plan, PlanError, PlannerFactory};
 use crate::explore::probe::{Probe, Swept, Touch};
@@ -18,14 +18,14 @@ pub(super) struct Exploration<'a> {
     experiment: &'a Experiment,
     truth: &'a GroundTruth<'a>,
     trial: u32,
-    /// Of the initial touches: random places of a zone, evenly spread directions at an object.
+    /// Chooses the initial touches: random places of a zone, evenly spread directions at an object.
     start: Chooser,
     chooser: Chooser,
     belief: Belief,
 }
 
 impl<'a> Exploration<'a> {
-    /// Of `trial` of an entrant.
+    /// Begins `trial` of an entrant.
     ///
     /// # Errors
     /// If the entrant cannot explore what the experiment explores, in words.
@@ -117,7 +117,7 @@ impl<'a> Exploration<'a> {
         Ok(())
     }
 
-    /// What is known now.
+    /// The belief after the touches so far.
     pub(super) fn belief(&self) -> &Belief {
         &self.belief
     }

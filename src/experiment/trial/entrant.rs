@@ -1,6 +1,6 @@
-//! What an experiment compares: planners, and the oracle beside them.
+//! Entrants of an experiment: planners, and the oracle beside them.
 
-use super::oracle::{GroundTruth, Oracle};
+use crate::experiment::trial::oracle::{GroundTruth, Oracle};
 use crate::explore::belief::Belief;
 use crate::explore::planner::{
     Entry, PLANNERS, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, is_own,
@@ -32,7 +32,7 @@ pub enum Entrant<'a> {
 }
 
 impl<'a> Entrant<'a> {
-    /// As in an experiment's list.
+    /// Its name in an experiment's list.
     pub fn name(&self) -> &'a str {
         match *self {
             Self::Planner(factory) => factory.name(),
@@ -48,7 +48,7 @@ impl<'a> Entrant<'a> {
         }
     }
 
-    /// Makes what chooses the touches of one trial.
+    /// Makes the chooser of one trial.
     pub(super) fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Chooser {
         match self {
             Self::Planner(factory) => Chooser::Planner(factory.make(settings, random)),
@@ -69,7 +69,7 @@ impl<'a> From<&'a dyn PlannerFactory> for Entrant<'a> {
     }
 }
 
-/// What chooses the touches of one trial.
+/// Chooses the touches of one trial.
 pub(super) enum Chooser {
     Planner(Box<dyn Planner>),
     Oracle(Box<Oracle>),

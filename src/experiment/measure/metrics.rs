@@ -37,32 +37,32 @@ pub struct Metrics {
 
 /// Running sum of squared errors.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Errors {
+pub(in crate::experiment) struct Errors {
     count: f64,
     squares: f64,
 }
 
 impl Errors {
-    pub(super) fn add(&mut self, error: f64) {
+    pub(in crate::experiment) fn add(&mut self, error: f64) {
         self.count += 1.0;
         self.squares += error * error;
     }
 
-    pub(super) fn rmse(&self) -> Option<f64> {
+    pub(in crate::experiment) fn rmse(&self) -> Option<f64> {
         (self.count > 0.0).then(|| (self.squares / self.count).sqrt())
     }
 }
 
 /// Running sums of how errors compare with their believed variance.
 #[derive(Default)]
-pub(super) struct Calibration {
+pub(in crate::experiment) struct Calibration {
     count: f64,
     inside: f64,
     nlpd: f64,
 }
 
 impl Calibration {
-    pub(super) fn add(&mut self, error: f64, variance: f64) {
+    pub(in crate::experiment) fn add(&mut self, error: f64, variance: f64) {
         // A belief without any noise may be sure to the last bit.
         let variance = variance.max(f64::MIN_POSITIVE);
         self.count += 1.0;
@@ -71,7 +71,7 @@ impl Calibration {
     }
 
     /// Share inside the 95 % band, and mean negative log density.
-    pub(super) fn told(&self) -> (Option<f64>, Option<f64>) {
+    pub(in crate::experiment) fn told(&self) -> (Option<f64>, Option<f64>) {
         (self.mean(self.inside), self.mean(self.nlpd))
     }
 
@@ -85,7 +85,7 @@ impl Calibration {
 /// Running sums of true heights f and believed heights g. The centred ones are updated by
 /// Welford's rule: a large common offset must not cancel what little the heights vary.
 #[derive(Default)]
-pub(super) struct Sums {
+pub(in crate::experiment) struct Sums {
     count: f64,
     ff: f64,
     gg: f64,
@@ -100,7 +100,7 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    pub(super) fn add(&mut self, f: f64, g: f64) {
+    pub(in crate::experiment) fn add(&mut self, f: f64, g: f64) {
         self.count += 1.0;
         self.ff += f * f;
         self.gg += g * g;
@@ -116,7 +116,7 @@ impl Sums {
     }
 
     /// Everything, given the errors at the edge and where the finger reaches and does not.
-    pub(super) fn metrics(
+    pub(in crate::experiment) fn metrics(
         &self,
         [edge, reachable, unreachable]: [Errors; 3],
         calibration: Calibration,

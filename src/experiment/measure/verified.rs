@@ -1,8 +1,8 @@
 //! How a trial's verification touches came out.
 
-use super::metrics::{Calibration, Errors};
-use super::row::TrialRow;
-use super::verification_row::VerificationRow;
+use crate::experiment::measure::metrics::{Calibration, Errors};
+use crate::experiment::trial::row::TrialRow;
+use crate::experiment::trial::verification_row::VerificationRow;
 
 /// The rows of a trial's verification touches at new places, where `touches` are all that it made.
 fn verified(row: &TrialRow, touches: u32) -> Option<impl Iterator<Item = &VerificationRow>> {

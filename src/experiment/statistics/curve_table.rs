@@ -1,12 +1,12 @@
 //! The curves as a table with intervals, which `summary.csv` holds.
 
-use super::comparison::paired;
-use super::experiment::Experiment;
-use super::measure::{Measure, in_files};
-use super::row::TrialRow;
-use super::statistics::Samples;
-use super::summary;
-use super::summary::CurvePoint;
+use crate::experiment::experiment::Experiment;
+use crate::experiment::measure::{Measure, in_files};
+use crate::experiment::statistics::Samples;
+use crate::experiment::statistics::comparison::paired;
+use crate::experiment::statistics::summary;
+use crate::experiment::statistics::summary::CurvePoint;
+use crate::experiment::trial::row::TrialRow;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 /// One planner after one number of touches.

@@ -1,10 +1,10 @@
 //! One line of `trials.jsonl`: everything a trial did.
 
-use super::metrics::Metrics;
-use super::outline::Outline;
-use super::shape::ShapeMetrics;
-use super::verification_row::VerificationRow;
 use crate::backend::Fault;
+use crate::experiment::measure::metrics::Metrics;
+use crate::experiment::measure::outline::Outline;
+use crate::experiment::measure::shape::ShapeMetrics;
+use crate::experiment::trial::verification_row::VerificationRow;
 use crate::explore::planner::Stall;
 use crate::gp::fit::Fit;
 use schemars::JsonSchema;

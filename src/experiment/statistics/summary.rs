@@ -1,9 +1,9 @@
 //! Curves over touches: what many trials of one planner have in common.
 
-use super::experiment::Experiment;
-use super::measure::{MEASURES, Measure};
-use super::row::{TouchRow, TrialRow, of_planner};
-use super::statistics::{mean, mean_and_error, median};
+use crate::experiment::experiment::Experiment;
+use crate::experiment::measure::{MEASURES, Measure};
+use crate::experiment::statistics::{mean, mean_and_error, median};
+use crate::experiment::trial::row::{TouchRow, TrialRow, of_planner};
 use crate::explore::planner::Stall;
 use crate::task::Zone;
 use nalgebra::Point3;
@@ -85,7 +85,7 @@ pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<C
 }
 
 /// The trials of a planner that have a belief after some touches.
-pub(super) fn fitted<'a>(
+pub(in crate::experiment) fn fitted<'a>(
     rows: &'a [TrialRow],
     planner: &'a str,
     touches: u32,

@@ -1,9 +1,9 @@
 //! Touches that need no truth: after a trial's last touch the belief says what it expects, and is
 //! held against what the finger then meets.
 
-use super::experiment::Experiment;
-use super::row::{TouchRow, VerificationRows};
-use super::verification_row::VerificationRow;
+use crate::experiment::experiment::Experiment;
+use crate::experiment::trial::row::{TouchRow, VerificationRows};
+use crate::experiment::trial::verification_row::VerificationRow;
 use crate::explore::around::surface::steepness;
 use crate::explore::belief::{Belief, HeightField};
 use crate::explore::planner::sample::sampled;
@@ -61,7 +61,7 @@ pub(super) fn verify(
     (rows, None)
 }
 
-/// What the belief expects at a place of a zone, with the deviation of a touch; none before its
+/// Expected height at a place of a zone, with the deviation of a touch; none before the
 /// first fit.
 fn height(field: &HeightField, place: &[f64]) -> Option<(f64, f64)> {
     let surface = field.surface()?;

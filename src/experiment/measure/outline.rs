@@ -1,6 +1,6 @@
 //! How near the believed silhouette is to the object's own.
 
-use super::truth::Truth;
+use crate::experiment::truth::Truth;
 use crate::explore::presence::Presence;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,9 +1,9 @@
 //! Each planner against a baseline, trial by trial: they share initial touches.
 
-use super::experiment::Experiment;
-use super::measure::{Direction, MEASURES, Measure};
-use super::row::{TrialRow, of_planner};
-use super::statistics::Paired;
+use crate::experiment::experiment::Experiment;
+use crate::experiment::measure::{Direction, MEASURES, Measure};
+use crate::experiment::statistics::Paired;
+use crate::experiment::trial::row::{TrialRow, of_planner};
 use std::collections::HashMap;
 
 /// One measure of one planner against one baseline after the last touch.

@@ -1,8 +1,8 @@
 //! The truth of an object that nobody has a mesh of: heights taken from a scan of it.
 
-use super::cloud::{self, CloudError};
-use super::truth::Truth;
 use crate::config::{Checked, Rules};
+use crate::experiment::truth::Truth;
+use crate::experiment::truth::cloud::{self, CloudError};
 use crate::task::Zone;
 use nalgebra::{Matrix3, Point3, Vector3};
 use schemars::JsonSchema;

@@ -1,7 +1,7 @@
 //! Who is told of a trial while it runs.
 
-use super::row::TouchRow;
 use crate::backend::Fault;
+use crate::experiment::trial::row::TouchRow;
 use crate::explore::belief::Belief;
 use crate::explore::probe::Touch;
 

@@ -1,14 +1,14 @@
 //! A trial that is recorded while it runs.
 
-use super::belief_shape::shapes;
-use super::entrant::Entrant;
-use super::resumed::Resumed;
-use super::row::{TouchRow, TrialRow};
-use super::simulation::Simulation;
-use super::store::{RECORDINGS, resolved_beside};
-use super::witness::{Touched, Witness};
 use crate::backend::Fault;
 use crate::backend::recording::{self, About, Ending, Recorder, Recording};
+use crate::experiment::simulation::Simulation;
+use crate::experiment::store::{RECORDINGS, resolved_beside};
+use crate::experiment::trial::belief_shape::shapes;
+use crate::experiment::trial::entrant::Entrant;
+use crate::experiment::trial::resumed::Resumed;
+use crate::experiment::trial::row::{TouchRow, TrialRow};
+use crate::experiment::trial::witness::{Touched, Witness};
 use crate::explore::probe::{Probe, Touch};
 use std::iter;
 use std::path::{Path, PathBuf};
@@ -44,7 +44,7 @@ pub fn run(simulation: &Simulation, planner: Entrant, trial: u32, path: &Path) -
     go_on(simulation, planner, trial, path, &[], &mut ())
 }
 
-/// As [`run`], continued after the touches `made`: the recording begins with them, so that it can
+/// Continues a trial after the touches `made`: the recording begins with them, so that it can
 /// be replayed by itself. `witness` sees every touch.
 pub fn go_on(
     simulation: &Simulation,

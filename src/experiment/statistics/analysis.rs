@@ -1,9 +1,9 @@
 //! How the planners of a run compare, found once for its files and its page: every bootstrap takes
 //! its time.
 
-use super::comparison::{Comparison, comparisons};
-use super::equal_error::{EqualError, equal_errors};
-use super::store::Run;
+use crate::experiment::statistics::comparison::{Comparison, comparisons};
+use crate::experiment::statistics::equal_error::{EqualError, equal_errors};
+use crate::experiment::store::Run;
 
 /// The planners of a run held against their baselines.
 #[derive(Debug)]

@@ -1,15 +1,15 @@
 //! Trials of a real arm: one after another, every touch kept, and none after a fault.
 
-use super::entrant::Entrant;
-use super::recorded_trial::{self, next_part, recording_path};
-use super::resumed::Resumed;
-use super::row::{TouchRow, TrialId, TrialRow};
-use super::runner::{OnProgress, Progress, RunError, jobs};
-use super::simulation::Simulation;
-use super::store::{Entry, Journal, RunFolder, StoreError};
-use super::witness::{Touched, Witness};
 use crate::backend::Fault;
 use crate::backend::ros::clock;
+use crate::experiment::runner::{OnProgress, Progress, RunError, jobs};
+use crate::experiment::simulation::Simulation;
+use crate::experiment::store::{Entry, Journal, RunFolder, StoreError};
+use crate::experiment::trial::entrant::Entrant;
+use crate::experiment::trial::recorded_trial::{self, next_part, recording_path};
+use crate::experiment::trial::resumed::Resumed;
+use crate::experiment::trial::row::{TouchRow, TrialId, TrialRow};
+use crate::experiment::trial::witness::{Touched, Witness};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -1,6 +1,10 @@
 //! The true surface on the test grid of an experiment.
 
-use super::metrics::{Calibration, Errors, Metrics, Sums};
+pub mod cloud;
+pub mod scan;
+pub mod scan_truth;
+
+use crate::experiment::measure::metrics::{Calibration, Errors, Metrics, Sums};
 use crate::geometry::coarse::coarse;
 use crate::geometry::mesh::Mesh;
 use crate::gp::Posterior;
@@ -41,7 +45,8 @@ impl Truth {
         Self::sample_telling(environment, per_side, &|_| ())
     }
 
-    /// As [`sample`](Self::sample); `tell` is called with the name of each step, as it begins.
+    /// Samples like [`sample`](Self::sample); `tell` is called with the name of each step, as it
+    /// begins.
     pub fn sample_telling(environment: &Environment, per_side: usize, tell: &dyn Fn(&str)) -> Self {
         tell("looking where the surface is");
         let places = environment.scene().zone.grid(per_side);
@@ -59,8 +64,8 @@ impl Truth {
         Self::new(zone, places, vec![None; count], vec![false; count])
     }
 
-    /// Of a whole object with the surface `mesh`, made coarser if it is large; without a test
-    /// place.
+    /// The truth of a whole object with the surface `mesh`, made coarser if it is large; without a
+    /// test place.
     pub fn around(mesh: Option<&Mesh>) -> Self {
         let kept = mesh.map(|mesh| match mesh.triangles().len() > TRIANGLES {
             true => {

@@ -1,7 +1,7 @@
 //! Touches on a grid of targets: the object's surface as the finger feels it, without a belief.
 
-use super::runner::{RunError, pool};
 use crate::backend::Fault;
+use crate::experiment::runner::{RunError, pool};
 use crate::explore::probe::Touch;
 use crate::sim::simulator::Simulator;
 use crate::task::Zone;

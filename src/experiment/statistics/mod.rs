@@ -1,5 +1,11 @@
 //! What can be said of a few trials.
 
+pub mod analysis;
+pub mod comparison;
+pub mod curve_table;
+pub mod equal_error;
+pub mod summary;
+
 use crate::math::seed;
 use rand::RngExt;
 

@@ -1,13 +1,13 @@
 //! A recorded trial run again by today's code, on what was read then.
 
-use super::experiment::Experiment;
-use super::resumed::Resumed;
-use super::row::TouchRow;
-use super::simulation::Simulation;
-use super::witness::{Touched, Witness};
 use crate::backend::Fault;
 use crate::backend::recording::{self, Player, Recorded};
 use crate::config::ConfigError;
+use crate::experiment::experiment::Experiment;
+use crate::experiment::simulation::Simulation;
+use crate::experiment::trial::resumed::Resumed;
+use crate::experiment::trial::row::TouchRow;
+use crate::experiment::trial::witness::{Touched, Witness};
 use crate::explore::probe::servo::Servo;
 use crate::explore::probe::{Probe, Swept, Touch};
 use crate::task::Approach;

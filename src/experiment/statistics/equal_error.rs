@@ -6,11 +6,11 @@
 //! is. All of it, goal, counts, ways and their ratios, is found again in every sample of the
 //! trials, the same sample for both planners: that is what the intervals are of.
 
-use super::comparison::pairs;
-use super::experiment::Experiment;
-use super::measure::{MEASURES, Measure};
-use super::row::{TrialRow, of_planner};
-use super::statistics::{Ranked, Samples, percentiles_95};
+use crate::experiment::experiment::Experiment;
+use crate::experiment::measure::{MEASURES, Measure};
+use crate::experiment::statistics::comparison::pairs;
+use crate::experiment::statistics::{Ranked, Samples, percentiles_95};
+use crate::experiment::trial::row::{TrialRow, of_planner};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::collections::BTreeMap;
 

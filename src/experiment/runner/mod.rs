@@ -1,12 +1,15 @@
 //! Trials × planners on all cores.
 
-use super::entrant::Entrant;
-use super::recorded_trial::{self, recording_path};
-use super::row::{TrialId, TrialRow};
-use super::simulation::Simulation;
-use super::store::{RunFolder, StoreError};
-use super::witness::{Touched, Witness};
+pub mod lab_runner;
+pub mod shard;
+
 use crate::backend::Fault;
+use crate::experiment::simulation::Simulation;
+use crate::experiment::store::{RunFolder, StoreError};
+use crate::experiment::trial::entrant::Entrant;
+use crate::experiment::trial::recorded_trial::{self, recording_path};
+use crate::experiment::trial::row::{TrialId, TrialRow};
+use crate::experiment::trial::witness::{Touched, Witness};
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, ParallelBridge, ParallelIterator,
 };

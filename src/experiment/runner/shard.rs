@@ -1,6 +1,6 @@
 //! A part of an experiment's trials, for a machine or task of its own.
 
-use super::runner::Job;
+use crate::experiment::runner::Job;
 use std::str::FromStr;
 use thiserror::Error;
 

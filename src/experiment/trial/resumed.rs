@@ -1,7 +1,7 @@
 //! A trial that goes on where it was broken off: the touches that it has made are not made again.
 
-use super::row::TouchRow;
 use crate::backend::Fault;
+use crate::experiment::trial::row::TouchRow;
 use crate::explore::probe::{Contact, Probe, Swept, Touch};
 use crate::robot::Finger;
 use crate::task::Approach;
