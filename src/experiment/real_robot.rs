@@ -8,7 +8,8 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
     "backend.kind = \"{kind}\" moves a real robot, which needs {}; a simulation would take depths from the mesh, \
-     the ground truth. Write what is true of the cell, all in metres in the frame of the robot's base, as in\n{}",
+     the ground truth. Give what is true of the cell by --set, or in the files of the scene and the experiment \
+     (experiments/real_arm.toml), in metres in the frame of the robot's base, as in\n{}",
     names(missing),
     lines(missing)
 )]
