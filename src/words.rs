@@ -63,3 +63,8 @@ pub fn json(error: &serde_json::Error) -> String {
         _ => what.into(),
     }
 }
+
+/// Bytes in hexadecimal, as hashes are written.
+pub fn hex(bytes: impl AsRef<[u8]>) -> String {
+    bytes.as_ref().iter().map(|byte| format!("{byte:02x}")).collect()
+}

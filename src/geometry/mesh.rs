@@ -1,6 +1,7 @@
 //! The triangle mesh that can be trusted.
 
 use super::extent::extent;
+use crate::words::hex;
 use nalgebra::{Isometry3, Point3};
 use sha2::{Digest, Sha256};
 
@@ -64,7 +65,7 @@ impl Mesh {
         for triangle in &self.triangles {
             triangle.iter().for_each(|corner| hash.update(corner.to_le_bytes()));
         }
-        hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+        hex(hash.finalize())
     }
 
     /// Surface area, in m²: half the sum of ‖(b − a) × (c − a)‖.

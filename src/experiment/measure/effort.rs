@@ -1,4 +1,4 @@
-//! What a trial took, and what its fit found.
+//! Measures of a trial's effort, and of the hyperparameters that its fit found.
 
 use super::measure::{METRES, Measure, SECONDS, Scale, length_along, length_scale, less, touch};
 use crate::experiment::trial::row::TrialRow;

@@ -12,11 +12,11 @@ pub struct Measure {
     pub id: &'static str,
     /// Its name in words.
     pub title: &'static str,
-    /// What it is measured and shown in.
+    /// Its unit, in files and for readers.
     pub unit: Unit,
-    /// Which way is better.
+    /// Whether less or more of it is better.
     pub direction: Direction,
-    /// What is told of it over many trials.
+    /// The statistics reported of it over many trials.
     pub aggregate: Aggregate,
     /// How it is drawn over touches.
     pub scale: Scale,
@@ -44,7 +44,7 @@ pub struct Unit {
     pub decimals: usize,
 }
 
-/// Which way is better.
+/// Whether less or more of a measure is better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Less of it.
@@ -55,7 +55,7 @@ pub enum Direction {
     Neither,
 }
 
-/// What is told of many trials.
+/// The statistics reported of many trials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aggregate {
     /// The mean with its standard error.
@@ -67,12 +67,12 @@ pub enum Aggregate {
 }
 
 impl Aggregate {
-    /// Whether the mean is told.
+    /// Whether the mean is reported.
     pub fn has_mean(self) -> bool {
         self != Self::Median
     }
 
-    /// Whether the median is told.
+    /// Whether the median is reported.
     pub fn has_median(self) -> bool {
         self != Self::Mean
     }
@@ -101,7 +101,7 @@ pub(super) const METRES: Unit = Unit { suffix: "_m", symbol: "m", per_si: 1.0, d
 pub(super) const SECONDS: Unit = Unit { suffix: "_s", symbol: "s", per_si: 1.0, decimals: 1 };
 
 impl Measure {
-    /// The columns of what is told of it over many trials: its mean with the standard error, its
+    /// The columns of its statistics over many trials: its mean with the standard error, its
     /// median with the ends of its interval.
     pub fn columns(&self) -> Vec<String> {
         let mut statistics = Vec::new();
@@ -139,12 +139,12 @@ impl Measure {
         Self { is_tabled: false, ..self }
     }
 
-    /// Of whole objects.
+    /// Marks a measure of whole objects.
     pub(super) const fn of_shapes(self) -> Self {
         Self { is_of_shapes: true, ..self }
     }
 
-    /// As an error.
+    /// Marks an error, in which planners are compared after every touch.
     pub(super) const fn error(self) -> Self {
         Self { is_error: true, ..self }
     }

@@ -1,4 +1,4 @@
-//! The table of measures: what trials are judged by, and how each of them is told.
+//! The table of measures: the numbers by which trials are compared, and how each is reported.
 //!
 //! A measure is a line of [`MEASURES`]. The columns of `summary.csv` with their intervals, the
 //! lines of `comparison.csv`, the panels of the convergence figure, the tables of the page and the

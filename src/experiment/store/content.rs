@@ -6,6 +6,7 @@ use crate::experiment::simulation::Simulation;
 use crate::experiment::trial::entrant::Entrant;
 use crate::files;
 use crate::sim::environment::Shape;
+use crate::words::hex;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::io;
@@ -119,5 +120,5 @@ impl Content {
 }
 
 fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    hex(Sha256::digest(bytes))
 }

@@ -4,6 +4,7 @@ use super::cost::Cost;
 use super::judged::{JUDGED, Span};
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
+use crate::words::hex;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -127,13 +128,9 @@ impl Line {
 /// same.
 fn hash(row: &TrialRow) -> String {
     let line = serde_json::to_vec(row).unwrap_or_default();
-    let mut text = hex(&Sha256::digest(line));
+    let mut text = hex(Sha256::digest(line));
     text.truncate(32);
     text
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// SHA-256 of what decides the rows of `experiment`. Where its files lie does not count, but what
@@ -146,7 +143,7 @@ pub fn settings(experiment: &Experiment) -> String {
         it.mesh = PathBuf::new();
     }
     let text = serde_json::to_vec(&identity).unwrap_or_default();
-    hex(&Sha256::new().chain_update(text).chain_update(object).finalize())
+    hex(Sha256::new().chain_update(text).chain_update(object).finalize())
 }
 
 /// Which touches of an experiment's trials count.
