@@ -44,7 +44,7 @@ fn main() -> anyhow::Result<()> {
     let mut mesh = curve("mesh, 64 cells along a side", "#e69f00", 1.0);
     for count in 1..=COUNTS[COUNTS.len() - 1] {
         let plan = if count <= 5 { begin.plan(&belief) } else { planner.plan(&belief) }?;
-        let approach = task.approach(&plan.target);
+        let approach = task.approach(&plan.target).unwrap();
         let touch = probe.touch(&approach)?;
         let before = belief.clone();
         let update = |belief: &mut Belief| {

@@ -55,7 +55,7 @@ fn main() -> anyhow::Result<()> {
     ];
     let cast = environment(&["body=\"cast\"", rigid])?;
     let truth: Vec<Rest> = (touches::targets(cast.scene(), PLACES, 0).into_iter())
-        .filter_map(|target| true_rest(&cast, target))
+        .filter_map(|target| true_rest(&cast, target.numbers()))
         .collect();
     let ours = exact(&cast, &truth)?;
     println!(
@@ -110,7 +110,7 @@ fn true_rest(environment: &Environment, target: Vec<f64>) -> Option<Rest> {
     let scene = environment.scene();
     let lift = |dx_m: f64, dz_m: f64| {
         let height_m = environment.true_height_m(&[target[0] + dx_m, target[1] + dz_m])?;
-        let y_m = scene.zone.datum_y_m() + height_m;
+        let y_m = scene.zone.as_ref().unwrap().datum_y_m() + height_m;
         Some((y_m - scene.finger.front_m(dx_m, dz_m)?, dx_m, dz_m, y_m))
     };
     let reach_m = scene.finger.radius_m + scene.finger.length_m;
@@ -134,7 +134,7 @@ fn true_rest(environment: &Environment, target: Vec<f64>) -> Option<Rest> {
 fn exact(cast: &Arc<Environment>, truth: &[Rest]) -> anyhow::Result<Vec<Rest>> {
     let mut probe = Simulator::new(Arc::clone(cast))?.probe(0)?;
     let mut rest = |target: &Vec<f64>| {
-        let approach = cast.task().approach(target);
+        let approach = cast.task().approach(&target[..].into()).unwrap();
         let y_m = rest(cast, &approach).context("a place without contact")?.p_wt.y;
         let Touch::Contact(contact) = probe.touch(&approach)? else { anyhow::bail!("a miss") };
         Ok(Rest { target: target.clone(), y_m, p_wc: contact.p_wc })
@@ -193,7 +193,7 @@ fn step(
         let chain = environment.chain().context("no chain")?;
         let mut controller = Controller::new(chain, scene.period_s())?;
         for (gap_m, duration_s) in [(2e-3, 3.0), (-depth_m, 1.0)] {
-            let mut p_wt = scene.zone.point(&rest.target, 0.0);
+            let mut p_wt = scene.zone.as_ref().unwrap().point(&rest.target, 0.0);
             p_wt.y = rest.y_m + gap_m;
             let goal = Goal::still(Isometry3::from_parts(p_wt.into(), scene.finger.r_at()));
             let until_s = reading.time_s + duration_s;

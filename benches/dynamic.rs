@@ -35,7 +35,7 @@ fn main() -> anyhow::Result<()> {
         let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
         let environment = Arc::new(Environment::build(Scene::load(&path, &sets)?)?);
         let simulator = Simulator::new(Arc::clone(&environment))?;
-        let targets = environment.scene().zone.grid(4);
+        let targets = environment.task().zone().unwrap().grid(4);
         let mut simulated_s = 0.0;
         let touches_s = best(|| {
             let Ok(Some(body)) = simulator.body() else { return f64::NAN };
@@ -44,7 +44,7 @@ fn main() -> anyhow::Result<()> {
             };
             let begun = Instant::now();
             for target in &targets {
-                let _ = servo.touch(&environment.task().approach(target));
+                let _ = servo.touch(&environment.task().approach(&target[..].into()).unwrap());
             }
             simulated_s = servo.time_s().unwrap_or(f64::NAN);
             begun.elapsed().as_secs_f64()
@@ -68,7 +68,7 @@ fn main() -> anyhow::Result<()> {
         else {
             continue;
         };
-        let approach = environment.task().approach(&[0.0, 0.5]);
+        let approach = environment.task().approach(&[0.0, 0.5].into()).unwrap();
         let Some(rest) = rest(&environment, &approach) else { continue };
         let mut feel = FingertipState::new(tip, &palpate::math::seed::stream(1, 0, "finger"));
         for gap_mm in [-0.5, 0.5, 1.0, 2.0, 5.0, 20.0] {

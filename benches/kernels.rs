@@ -72,7 +72,7 @@ fn contact(c: &mut Criterion) {
     let Some(mut probe) = simulator.and_then(|simulator| simulator.probe(0).ok()) else {
         return;
     };
-    let approach = environment.task().approach(&[0.013, 0.487]);
+    let approach = environment.task().approach(&[0.013, 0.487].into()).unwrap();
     group.bench_function("touch", |b| b.iter(|| probe.touch(black_box(&approach))));
     if let Shape::Mesh { bvh, .. } = environment.shape() {
         let origin = Point3::new(0.013, -0.5, 0.487);

@@ -99,22 +99,24 @@ pub fn explore(touches: usize) -> Result<(HeightField, f64), Box<dyn std::error:
     let (task, robot) = task_and_robot()?;
     let body = Slides::new(&robot);
     let mut servo = Servo::new(robot, task.touch().clone(), Box::new(body), 0)?;
-    let mut belief = HeightField::new(task.zone().clone(), GpSettings::default());
+    let zone = task.zone().ok_or("no zone")?;
+    let mut belief = HeightField::new(zone.clone(), GpSettings::default());
     let active = planner::by_name("active").ok_or("no such planner")?;
     let random = seed::stream(1, 0, active.name);
     let mut planner = (active.make)(&PlanningSettings::default(), random);
     let mut worst_m: f64 = 0.0;
     for count in 0..touches {
         let target = match count {
-            0 => task.zone().at(&[0.3, 0.6]),
+            0 => zone.at(&[0.3, 0.6]).into(),
             _ => planner.plan(&Belief::from(belief.clone()))?.target,
         };
-        let touch = servo.touch(&task.approach(&target))?;
+        let approach = task.approach(&target).ok_or("not in the zone")?;
+        let touch = servo.touch(&approach)?;
         if let Touch::Contact(contact) = &touch {
             let p_w = contact.p_wc;
             worst_m = worst_m.max((p_w.y - wall_y_m(p_w.x, p_w.z)).abs());
         }
-        belief.observe(&target, &touch);
+        belief.observe(target.place().ok_or("no place")?, &touch);
         belief.refit()?;
     }
     Ok((belief, worst_m))

@@ -27,7 +27,7 @@ impl ZonePlanner for BestOfSome {
             }
         }
         let sd_m = Some(variance(&best).sqrt());
-        Plan { target: best, sd_m, stall: None }
+        Plan { sd_m, ..Plan::at(best) }
     }
 }
 

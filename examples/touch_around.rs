@@ -56,7 +56,7 @@ fn sweep(environment: &Arc<Environment>, count: usize) -> Result<(), Box<dyn Err
             *ends.entry("out of reach".into()).or_default() += 1;
             continue;
         }
-        let approach = task.approach(&aim.target());
+        let approach = task.approach(&aim.into()).unwrap();
         let begun = Instant::now();
         let touch = probe.touch(&approach);
         work_s += begun.elapsed().as_secs_f64();

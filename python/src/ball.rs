@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use numpy::PyArray1;
-use palpate::task::{self, Aim};
+use palpate::task::{self, Aim, Region, Target};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -39,7 +39,8 @@ impl Ball {
 
     /// Whether a target, shape (6,), aims at a point of it.
     fn contains(&self, target: Vec<f64>) -> bool {
-        Aim::of(&target).is_some_and(|aim| self.0.contains(&aim))
+        Target::from_numbers(&target)
+            .is_some_and(|target| Region::from(self.0.clone()).contains(&target))
     }
 
     /// The target, shape (6,), that aims at a point in the world, the centre if left out, from the
@@ -59,7 +60,7 @@ impl Ball {
                 "outward = {outward:?}, at = {at:?}: allowed are finite numbers, and a direction"
             )));
         }
-        Ok(PyArray1::from_vec(py, Aim::against(p_w, &outward_w).target()))
+        Ok(PyArray1::from_vec(py, Target::from(Aim::against(p_w, &outward_w)).numbers()))
     }
 
     /// For pickles.

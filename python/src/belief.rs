@@ -11,7 +11,7 @@ use numpy::{PyArray1, PyArray2, PyArrayDyn};
 use palpate::explore::around::ImplicitSurface;
 use palpate::explore::belief::HeightField;
 use palpate::gp::Posterior;
-use palpate::task::Aim;
+use palpate::task::Target;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -150,7 +150,8 @@ impl Belief {
     /// Every target asked for so far, shape (n, d), metres; around an object (n, 6).
     #[getter]
     fn targets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let (targets, width) = (self.0.targets(), target_numbers(&self.0));
+        let targets: Vec<Vec<f64>> = self.0.targets().iter().map(Target::numbers).collect();
+        let width = target_numbers(&self.0);
         rows(py, &targets, width)
     }
 
@@ -193,7 +194,9 @@ impl Belief {
     /// Around an object: whether the finger can be brought to what a target, shape (6,), aims at.
     fn reaches(&self, target: Vec<f64>) -> PyResult<bool> {
         let scope = self.around("reaches")?.scope();
-        Ok(Aim::of(&target).is_some_and(|aim| scope.ball.contains(&aim) && scope.reaches(&aim)))
+        let target = Target::from_numbers(&target);
+        let aim = target.as_ref().and_then(Target::aim);
+        Ok(aim.is_some_and(|aim| scope.ball.contains(aim) && scope.reaches(aim)))
     }
 
     /// Around an object: points of contact in the world, shape (m, 3), metres.

@@ -62,12 +62,9 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     counts(&told, "touch", all.iter().map(|(_, count, _)| *count))?;
     words(&told, "outcome", touches().map(|touch| Some(outcome(touch))))?;
     let scene = &run.experiment.scene;
-    let coordinates = match &scene.around {
-        Some(_) => &AIM[..],
-        None => &PLACE[..scene.zone.dimension()],
-    };
+    let coordinates = scene.zone.as_ref().map_or(&AIM[..], |zone| &PLACE[..zone.dimension()]);
     for (axis, name) in coordinates.iter().enumerate() {
-        numbers(&told, name, touches().map(|touch| touch.target.get(axis).copied()))?;
+        numbers(&told, name, touches().map(|touch| touch.target.numbers().get(axis).copied()))?;
     }
     for (axis, name) in ["contact_x_m", "contact_y_m", "contact_z_m"].iter().enumerate() {
         numbers(&told, name, touches().map(|touch| Some(touch.contact?[axis])))?;

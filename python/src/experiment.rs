@@ -65,10 +65,8 @@ impl Experiment {
 
     #[getter]
     fn zone(&self) -> PyResult<Zone> {
-        match self.0.scene.around {
-            None => Ok(Zone(self.0.scene.zone.clone())),
-            Some(_) => Err(errors::not_around("zone", "ball, of its run")),
-        }
+        let zone = self.0.scene.zone.clone().map(Zone);
+        zone.ok_or_else(|| errors::not_around("zone", "ball, of its run"))
     }
 
     fn to_toml(&self) -> String {

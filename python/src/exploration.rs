@@ -10,7 +10,7 @@ use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::math::seed;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
-use palpate::task::{Aim, Ball, Task, Zone};
+use palpate::task::{Aim, Ball, Region, Target, Task, Zone};
 use pyo3::prelude::*;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -51,10 +51,10 @@ impl World {
         py.detach(|| {
             let environment = Arc::new(Environment::build(scene).map_err(errors::scene)?);
             let truth = True::of(&environment, TRUTH_PER_SIDE);
-            let grid = match (grid, environment.task().ball()) {
+            let grid = match (grid, environment.task().region()) {
                 (0, _) => Vec::new(),
-                (grid, None) => environment.task().zone().grid(grid),
-                (grid, Some(ball)) => cube(ball, grid),
+                (grid, Region::Zone(zone)) => zone.grid(grid),
+                (grid, Region::Ball(ball)) => cube(ball, grid),
             };
             let simulator = Simulator::new(environment).map_err(errors::scene)?;
             simulator.check_reach().map_err(errors::scene)?;
@@ -66,10 +66,6 @@ impl World {
         self.simulator.environment().task()
     }
 
-    fn zone(&self) -> &Zone {
-        self.task().zone()
-    }
-
     /// Whether a whole object is explored.
     pub(crate) fn is_around(&self) -> bool {
         self.task().ball().is_some()
@@ -77,17 +73,17 @@ impl World {
 
     /// Axes of the grid.
     pub(crate) fn axes(&self) -> usize {
-        if self.is_around() { 3 } else { self.zone().dimension() }
+        self.task().zone().map_or(3, Zone::dimension)
     }
 
     /// Numbers of an action.
     pub(crate) fn action(&self) -> usize {
-        if self.is_around() { AIM } else { self.zone().dimension() }
+        self.task().zone().map_or(AIM, Zone::dimension)
     }
 
     /// Numbers that are told of a touch.
     pub(crate) fn row(&self) -> usize {
-        if self.is_around() { AIM + 7 } else { 2 * self.zone().dimension() + 2 }
+        self.task().zone().map_or(AIM + 7, |zone| 2 * zone.dimension() + 2)
     }
 
     /// The names of its measures.
@@ -97,48 +93,51 @@ impl World {
 
     /// What lengths are told in units of.
     fn unit_m(&self) -> f64 {
-        self.task().ball().map_or_else(|| 0.5 * self.zone().widest_m(), |ball| ball.radius_m)
+        match self.task().region() {
+            Region::Zone(zone) => 0.5 * zone.widest_m(),
+            Region::Ball(ball) => ball.radius_m,
+        }
     }
 
     /// What an action means: a place of the zone; around an object the side from which the finger
     /// comes, and what it aims at as an offset from the centre, drawn back into the ball.
-    fn target(&self, action: &[f32]) -> Vec<f64> {
+    fn target(&self, action: &[f32]) -> Target {
         let clamped = action.iter().map(|at| f64::from(at.clamp(-1.0, 1.0)));
-        match self.task().ball() {
-            None => {
+        match self.task().region() {
+            Region::Zone(zone) => {
                 let fractions: Vec<f64> = clamped.map(|at| 0.5 * (at + 1.0)).collect();
-                self.zone().at(&fractions)
+                zone.at(&fractions).into()
             }
-            Some(ball) => {
+            Region::Ball(ball) => {
                 let six: Vec<f64> = clamped.collect();
                 let offset = Vector3::from_column_slice(&six[3..]).cap_magnitude(1.0);
                 let p_w = ball.centre_w + offset * ball.radius_m;
-                Aim::against(p_w, &Vector3::from_column_slice(&six[..3])).target()
+                Aim::against(p_w, &Vector3::from_column_slice(&six[..3])).into()
             }
         }
     }
 
     /// What is told of a touch: its target, where it met and 1, or zeros.
-    fn told(&self, target: &[f64], met: Option<&Contact>) -> Vec<f64> {
-        let mut row = match self.task().ball() {
-            None => self.told_over_zone(target, met),
-            Some(ball) => {
+    fn told(&self, target: &Target, met: Option<&Contact>) -> Vec<f64> {
+        let mut row = match (self.task().region(), target) {
+            (Region::Zone(zone), Target::Place(place)) => self.told_over_zone(zone, place, met),
+            (Region::Ball(ball), Target::Aim(aim)) => {
                 let within = |p_w: Point3<f64>| (p_w - ball.centre_w) / ball.radius_m;
-                let mut row: Vec<f64> = target[3..].iter().map(|ahead| -ahead).collect();
-                row.extend(within(Point3::from_slice(&target[..3])).iter());
+                let mut row: Vec<f64> = aim.ahead_w.iter().map(|ahead| -ahead).collect();
+                row.extend(within(aim.p_w).iter());
                 if let Some(contact) = met {
                     row.extend(within(contact.p_wc).iter().chain(contact.normal_w.iter()));
                     row.push(1.0);
                 }
                 row
             }
+            _ => Vec::new(),
         };
         row.resize(self.row(), 0.0);
         row
     }
 
-    fn told_over_zone(&self, target: &[f64], met: Option<&Contact>) -> Vec<f64> {
-        let zone = self.zone();
+    fn told_over_zone(&self, zone: &Zone, target: &[f64], met: Option<&Contact>) -> Vec<f64> {
         let fraction = |(at, [low, high]): (&f64, [f64; 2])| 2.0 * (at - low) / (high - low) - 1.0;
         let mut row: Vec<f64> = target.iter().zip(zone.sides()).map(fraction).collect();
         if let Some(contact) = met {
@@ -267,22 +266,21 @@ impl Exploration {
         self.reward = if self.failure.is_none() { before - self.score } else { 0.0 };
     }
 
-    fn anywhere(&mut self) -> Vec<f64> {
+    fn anywhere(&mut self) -> Target {
         match &self.known {
-            Known::HeightField(belief) => uniform(belief.zone(), &mut self.random),
+            Known::HeightField(belief) => uniform(belief.zone(), &mut self.random).into(),
             Known::ImplicitSurface(belief) => {
                 let mut random = seed::stream(self.random.random(), 0, "side");
-                any_side(belief.scope(), &mut random).target()
+                any_side(belief.scope(), &mut random).into()
             }
         }
     }
 
     /// An aim that the finger cannot be brought to is a touch that met nothing.
-    fn touch_at(&mut self, target: &[f64]) -> Result<(), Fault> {
+    fn touch_at(&mut self, target: &Target) -> Result<(), Fault> {
         let task = self.world.task();
         let mut met = None;
-        if !self.world.is_around() || task.contains(target) {
-            let approach = task.approach(target);
+        if let Some(approach) = task.approach(target) {
             let touch = self.probe.touch(&approach)?;
             if self.how.believes || self.how.reward != Reward::None {
                 let swept = self.probe.swept().filter(|_| self.world.is_around());

@@ -4,6 +4,7 @@ use crate::belief::Belief;
 use crate::known::{self, Known, Measured, True};
 use crate::scene::{Scene, Touch};
 use crate::{errors, exploration};
+use palpate::task::Target;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, PoisonError};
@@ -37,7 +38,9 @@ impl Exploration {
         let (touch, told) = self.scene.get().touched(py, target.clone())?;
         let fitted = py.detach(|| {
             let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-            known.observe(&target, &told.approach, (&told.touch, told.swept.as_ref()));
+            if let Some(target) = Target::from_numbers(&target) {
+                known.observe(&target, &told.approach, (&told.touch, told.swept.as_ref()));
+            }
             known.refit().map(|_| ())
         });
         fitted.map_err(errors::other)?;

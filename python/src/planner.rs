@@ -5,7 +5,7 @@ use crate::desk::{Desk, NoTarget, Trial};
 use crate::known::{Known, target_numbers};
 use crate::zone::Zone;
 use palpate::explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
-use palpate::task;
+use palpate::task::{self, Target};
 use pyo3::prelude::*;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -107,6 +107,7 @@ impl Planner for PythonPlanner {
             let reason = format!("it has {found} coordinates, a target {of} {wanted}");
             return Err(PlanError { reason });
         }
+        let target = Target::from_numbers(&target).ok_or("its target has no direction")?;
         Ok(Plan::at(target))
     }
 }

@@ -26,11 +26,8 @@ type Surface<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArray1<f64>>);
 
 impl Run {
     fn over_zone(&self, name: &str) -> PyResult<&task::Zone> {
-        let scene = &self.0.experiment.scene;
-        match scene.around {
-            None => Ok(&scene.zone),
-            Some(_) => Err(errors::not_around(name, "ball, and palpate.Scene's mesh()")),
-        }
+        let zone = self.0.experiment.scene.zone.as_ref();
+        zone.ok_or_else(|| errors::not_around(name, "ball, and palpate.Scene's mesh()"))
     }
 
     fn row(&self, trial: u32, planner: &str) -> PyResult<&TrialRow> {

@@ -50,10 +50,7 @@ impl Scene {
 
     fn over_zone(&self, name: &str) -> PyResult<&task::Zone> {
         let task = self.environment().task();
-        match task.ball() {
-            None => Ok(task.zone()),
-            Some(_) => Err(errors::not_around(name, "ball, mesh()")),
-        }
+        task.zone().ok_or_else(|| errors::not_around(name, "ball, mesh()"))
     }
 
     /// Touches at a target; with the way and what was swept.
@@ -62,14 +59,14 @@ impl Scene {
     /// `ValueError` if it is none, `SimulationError` if the body cannot.
     pub(crate) fn touched(&self, py: Python<'_>, target: Vec<f64>) -> PyResult<(Touch, Told)> {
         let task = self.environment().task();
-        if !task.contains(&target) {
+        let known = task::Target::from_numbers(&target).filter(|at| task.contains(at));
+        let Some(approach) = known.and_then(|at| task.approach(&at)) else {
             let words = match task.ball() {
                 None => "is not in the zone",
                 Some(_) => "is not six numbers that aim into the ball, to where the finger can go",
             };
             return Err(PyValueError::new_err(format!("{target:?} {words}")));
-        }
-        let approach = task.approach(&target);
+        };
         let touched = py.detach(|| {
             let mut probe = self.probe.lock().unwrap_or_else(PoisonError::into_inner);
             let probe = match &mut *probe {
@@ -85,8 +82,7 @@ impl Scene {
             probe::Touch::Miss => ("miss", None),
             probe::Touch::Overload => ("overload", None),
         };
-        let zone = task.ball().is_none().then(|| task.zone());
-        let place = zone
+        let place = (task.zone())
             .zip(contact.as_ref())
             .map(|(zone, contact)| (zone.place(&contact.p_wc), zone.height_m(&contact.p_wc)));
         let told = Told { approach, touch, swept };
@@ -208,9 +204,9 @@ impl Scene {
 
     fn __repr__(&self) -> String {
         let scene = self.environment().scene();
-        let explored = match scene.around {
-            Some(_) => "around an object".into(),
-            None => scene.zone.dimension().to_string(),
+        let explored = match &scene.zone {
+            Some(zone) => zone.dimension().to_string(),
+            None => "around an object".into(),
         };
         format!("Scene(body {}, {explored})", scene.body.name())
     }

@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let mut run = Run::read(&args.run)?;
     let is_around = run.experiment.scene.around.is_some();
     ensure!(
-        is_around || run.experiment.scene.zone.dimension() == 2,
+        run.experiment.scene.zone.as_ref().is_none_or(|zone| zone.z_m.is_some()),
         "{} explored a curve, which has no mesh; its figures show it",
         args.run.display()
     );
@@ -175,7 +175,7 @@ fn chosen(run: &Run, args: &Args) -> anyhow::Result<u32> {
 
 /// The belief's mean as a surface in `W`, where there probably is one.
 fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
-    let zone = &run.experiment.scene.zone;
+    let zone = replay.belief.zone();
     let places = zone.grid(grid);
     let known = known::over(replay, places.iter().map(Vec::as_slice));
     // The vertex that a place becomes, if it becomes one.

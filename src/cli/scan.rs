@@ -60,10 +60,12 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let mesh = environment.mesh().with_context(|| {
         format!("{} has no object, so there is no surface to scan", args.scene.display())
     })?;
+    let zone = environment.task().zone();
+    let zone = zone.with_context(|| format!("{} has no [zone] to scan", args.scene.display()))?;
     let name = args.scene.file_stem().unwrap_or_default().to_string_lossy();
     let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(format!("{name}-scan")));
     args.force.claim_folder(&folder, "cloud.ply")?;
-    let grid = args.grid.unwrap_or_else(|| scan::default_grid(&environment.scene().zone));
+    let grid = args.grid.unwrap_or_else(|| scan::default_grid(zone));
     let stop = stop_on_interrupt("rows")?;
     let bar = progress_bar(talk, &name, "rows", grid[1] as u64, 0);
     let simulator = simulator(&environment, talk)?;
@@ -82,7 +84,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
                 "Palpate {}: {name} touched on a grid of {columns} x {rows}",
                 env!("CARGO_PKG_VERSION")
             ),
-            environment.task().zone().frame_words(),
+            zone.frame_words(),
         ],
         points: points.collect(),
         ..Points::default()
@@ -91,8 +93,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     write_whole(&folder.join("cloud.ply"), cloud.ply())?;
     write_whole(&folder.join("cloud.csv"), csv(&touches))?;
     let height_m = |place: &[f64]| environment.true_height_m(place);
-    if let Some(svg) = drawing::picture((environment.task().zone(), mesh, &height_m), &cloud.points)
-    {
+    if let Some(svg) = drawing::picture((zone, mesh, &height_m), &cloud.points) {
         files::write(&folder.join("scan.svg"), &svg)?;
     }
     let faults = touches.iter().filter(|one| one.touch.is_err()).count();

@@ -148,7 +148,7 @@ fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
             Some((ball, shape)) => what_is_reached(ball, shape.as_ref(), &environment),
             None => environment.mesh().and_then(|mesh| {
                 let height_m = |place: &[f64]| environment.true_height_m(place);
-                report::zone::picture(environment.task().zone(), mesh, &height_m)
+                report::zone::picture(environment.task().zone()?, mesh, &height_m)
             }),
         };
         let svg = svg.context("--png: this scene has no object to draw")?;

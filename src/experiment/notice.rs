@@ -77,11 +77,9 @@ const HIGH_R: f64 = 0.999;
 const LOW_CENTRED_R: f64 = 0.9;
 
 /// What `truth` says of an experiment in `zone` before it is run.
-pub fn of_truth(zone: &Zone, truth: &Truth) -> Vec<Notice> {
+pub fn of_truth(zone: Option<&Zone>, truth: &Truth) -> Vec<Notice> {
+    let Some(zone) = zone else { return Vec::new() };
     let count = truth.count();
-    if zone.is_nothing() {
-        return Vec::new();
-    }
     if count == 0 {
         return vec![Notice::NoTruth];
     }
@@ -105,7 +103,7 @@ const ALMOST_ALL: f64 = 0.99;
 /// The same and what its rows say.
 pub fn of_run(run: &Run) -> Vec<Notice> {
     let Run { experiment, truth, rows, .. } = run;
-    let mut notices = of_truth(&experiment.scene.zone, truth);
+    let mut notices = of_truth(experiment.scene.zone.as_ref(), truth);
     notices.extend(experiment.planners.iter().filter_map(|planner| few_contacts(rows, planner)));
     notices.extend(blind_r(experiment, rows));
     notices

@@ -59,7 +59,7 @@ pub fn check(experiment: &Experiment) -> Result<(), MissingForRobot> {
         Some(around) => {
             [(CENTRE, around.centre_m.is_some()), (RADIUS, around.radius_m.is_some())].to_vec()
         }
-        None => vec![(DEPTH, scene.zone.depth_m.is_some())],
+        None => vec![(DEPTH, scene.zone.as_ref().is_some_and(|zone| zone.depth_m.is_some()))],
     };
     let interlocks = &experiment.backend.interlocks;
     let cell =

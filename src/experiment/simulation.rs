@@ -86,7 +86,9 @@ impl Simulation {
         real_robot::check(&experiment)?;
         if experiment.backend.kind != BackendKind::Simulated {
             // Otherwise taken from the mesh.
-            experiment.scene.zone.datum_y_m.get_or_insert(0.0);
+            if let Some(zone) = &mut experiment.scene.zone {
+                zone.datum_y_m.get_or_insert(0.0);
+            }
         }
         let environment = Environment::build_telling(experiment.scene.clone(), tell)?;
         let (truth, left_out) = sampled(&experiment, &environment, tell)?;
@@ -299,12 +301,12 @@ fn sampled(
     tell: &dyn Fn(&str),
 ) -> Result<(Truth, Option<LeftOut>), SimulationError> {
     let per_side = experiment.grid as usize;
-    if environment.task().ball().is_some() {
+    let Some(zone) = environment.task().zone() else {
         return Ok((Truth::around(environment.mesh()), None));
-    }
+    };
     let (truth, left_out) = match &experiment.truth {
         Some(scan) => {
-            let (truth, left_out) = scan.sample(&environment.scene().zone, per_side)?;
+            let (truth, left_out) = scan.sample(zone, per_side)?;
             (truth, Some(left_out))
         }
         None => (Truth::sample_telling(environment, per_side, tell), None),

@@ -9,7 +9,7 @@ use crate::explore::probe::{Contact, Swept, Touch};
 use crate::gp::Posterior;
 use crate::report::number::digits;
 use crate::task::Zone;
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use nalgebra::{Point3, Vector3};
 
 /// One planner's belief after some touches of the trial that the report draws.
@@ -50,18 +50,15 @@ impl<'a> Replay<'a> {
         let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
         let Some(last) = touches.last() else { return Ok(None) };
         let Some(fit) = &last.fit else { return Ok(None) };
-        let zone = &experiment.scene.zone;
+        let Some(zone) = &experiment.scene.zone else { return Ok(None) };
         let place = || format!("trial {} of {}, touch {count}", row.trial, row.planner);
         let mut belief = HeightField::new(zone.clone(), experiment.gp.clone());
         for touch in touches {
-            ensure!(
-                touch.target.len() == zone.dimension(),
-                "{}: a target of {} coordinates in a zone of {}",
-                place(),
-                touch.target.len(),
-                zone.dimension()
-            );
-            belief.observe(&touch.target, &met(zone, touch));
+            let target = touch.target.place().filter(|it| it.len() == zone.dimension());
+            let target = target.with_context(|| {
+                format!("{}: a target that is no place of the zone: {:?}", place(), touch.target)
+            })?;
+            belief.observe(target, &met(zone, touch));
             if let Some(tip) = touch.tip {
                 let finger = experiment.scene.finger.clone();
                 belief.observe_swept(&Swept { finger, p_wt: Point3::from(tip) });
@@ -116,7 +113,7 @@ pub fn heights_m<'a>(
         .into_iter()
         .filter_map(move |planner| row(run, planner))
         .flat_map(|row| &row.touches)
-        .filter_map(move |touch| Some(contact(&run.experiment.scene.zone, touch)?.1));
+        .filter_map(move |touch| Some(contact(run.experiment.scene.zone.as_ref()?, touch)?.1));
     run.truth.heights_m.iter().flatten().copied().chain(touched)
 }
 

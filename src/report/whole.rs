@@ -12,7 +12,7 @@ use crate::explore::around::{ImplicitSurface, Scope};
 use crate::explore::probe::{Contact, Swept, Touch};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::coarse::coarse;
-use crate::task::{Aim, Task};
+use crate::task::Task;
 use anyhow::{Context, ensure};
 use nalgebra::{Point3, Vector3};
 
@@ -65,8 +65,8 @@ fn sequence(
     let place = |count: usize| format!("trial {} of {}, touch {count}", row.trial, row.planner);
     let mut sequence = Sequence { planner: row.planner.clone(), ..Sequence::default() };
     for (i, touch) in row.touches.iter().enumerate() {
-        let aim = Aim::of(&touch.target)
-            .with_context(|| format!("{}: a target that aims at nothing", place(i + 1)))?;
+        let aim = (touch.target.aim())
+            .with_context(|| format!("{}: a target that is no aim", place(i + 1)))?;
         sequence.touches.push(Mark {
             aim_w: aim.p_w,
             along_w: *aim.ahead_w,
@@ -127,18 +127,16 @@ pub fn belief(
     let scene = &experiment.scene;
     let ball = scene.around.as_ref().and_then(|around| around.ball());
     let ball = ball.context("the ball of [around] is not written out")?;
-    let task = Task::around(ball, scene.touch.clone(), &scene.finger);
-    let scope = Scope::of(&task, &scene.finger, scene.effects.is_soft());
-    let scope = scope.context("a task without a ball")?;
-    let ball = scope.ball.clone();
+    let task = Task::new(ball.clone(), scene.touch.clone(), &scene.finger)?;
+    let scope = Scope::new(ball.clone(), &task, (&scene.finger, scene.effects.is_soft()));
     let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
     for touch in touches {
-        let aim = Aim::of(&touch.target).context("a target that aims at nothing")?;
+        let aim = touch.target.aim().context("a target that is no aim")?;
         // However the finger was rolled, it went the same way.
-        let approach = ball.approach(&aim, &scene.finger, scene.touch.standoff_m, 0.0);
+        let approach = ball.approach(aim, &scene.finger, scene.touch.standoff_m, 0.0);
         let swept =
             touch.tip.map(|tip| Swept { finger: scene.finger.clone(), p_wt: Point3::from(tip) });
-        belief.observe(&aim, &approach, (&met(touch)?, swept.as_ref()));
+        belief.observe(aim, &approach, (&met(touch)?, swept.as_ref()));
     }
     belief.condition(before, fit)?;
     Ok(Some(belief))

@@ -4,7 +4,7 @@ use super::scene::Scene;
 use crate::explore::probe::servo::ArmReach;
 use crate::geometry::mesh::Mesh;
 use crate::robot::Robot;
-use crate::task::{Around, Ball, RADIUS_M, Task};
+use crate::task::{Around, Ball, RADIUS_M, Task, TaskError};
 use nalgebra::Point3;
 use std::sync::Arc;
 use thiserror::Error;
@@ -34,6 +34,9 @@ pub enum AroundError {
         /// How far the object reaches from its centre.
         farthest_m: f64,
     },
+    /// There is no task.
+    #[error(transparent)]
+    Task(#[from] TaskError),
     /// The arm would begin where the object may be.
     #[error(
         "at arm.home_deg the tip is at {:?}, {inside_m:.3} m too near to the object to go around it: move \
@@ -72,10 +75,10 @@ pub(super) fn task(scene: &Scene, ball: Ball, mesh: &Mesh) -> Result<Task, Aroun
         return Err(AroundError::OutsideBall { radius_m: ball.radius_m, farthest_m });
     }
     if !scene.body.moves() {
-        return Ok(Task::around(ball, touch.clone(), finger));
+        return Ok(Task::new(ball, touch.clone(), finger)?);
     }
     let around = ball.keep_out(finger, touch.standoff_m);
-    let task = Task::around(ball, touch.clone(), finger);
+    let task = Task::new(ball, touch.clone(), finger)?;
     let Some(arm) = arm else { return Ok(task) };
     let robot =
         Robot { chain: arm.chain(), finger: finger.clone(), is_soft: scene.effects.is_soft() };

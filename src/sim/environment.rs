@@ -16,7 +16,7 @@ use crate::robot::arm::Chain;
 use crate::robot::arm::stage::{stage, stage_with_wrist};
 use crate::robot::finger::shape::BIOTAC_RADIUS_M;
 use crate::sim::finger::Fingertip;
-use crate::task::{Task, TaskError, Zone};
+use crate::task::{Region, Task, TaskError, Zone};
 use nalgebra::{Point3, Vector3};
 use std::borrow::Cow;
 use thiserror::Error;
@@ -138,20 +138,21 @@ impl Environment {
             let task = around::task(&scene, ball, bvh.mesh())?;
             return Ok(Self::of(scene, shape, task, notices));
         }
-        let extent = extent(&scene.zone, &shape);
-        let depth_m = *scene.zone.depth_m.get_or_insert([-extent.high.y, -extent.low.y]);
+        let zone = scene.zone.as_mut().ok_or(EnvironmentError::Missing { part: "zone" })?;
+        let extent = extent(zone, &shape);
+        let depth_m = *zone.depth_m.get_or_insert([-extent.high.y, -extent.low.y]);
         if let Shape::Mesh { bvh, .. } = &shape {
             let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
-            let size = SizeMismatch::between(&scene.zone, unit, (&extent.low, &extent.high));
-            check_overlap(&scene.zone, depth_m, &extent, size)?;
-            check_front(&scene.zone, bvh, depth_m[0], -extent.high.y)?;
+            let size = SizeMismatch::between(zone, unit, (&extent.low, &extent.high));
+            check_overlap(zone, depth_m, &extent, size)?;
+            check_front(zone, bvh, depth_m[0], -extent.high.y)?;
             notices.extend(size.map(Notice::Size));
-            if scene.zone.datum_y_m.is_none() {
-                scene.zone.datum_y_m = Some(middle_y_m(&scene.zone, bvh, depth_m));
+            if zone.datum_y_m.is_none() {
+                zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
             }
         }
-        scene.zone.datum_y_m.get_or_insert(0.0);
-        let task = Task::new(scene.zone.clone(), scene.touch.clone(), &scene.finger)?;
+        zone.datum_y_m.get_or_insert(0.0);
+        let task = Task::new(zone.clone(), scene.touch.clone(), &scene.finger)?;
         Ok(Self::of(scene, shape, task, notices))
     }
 
@@ -204,24 +205,25 @@ impl Environment {
     /// middle, clear of the object. None for a function.
     pub fn chain(&self) -> Option<Chain> {
         self.mesh()?;
-        let Scene { arm, finger, zone, .. } = &self.scene;
-        Some(arm.as_ref().map_or_else(
-            || {
-                if let Some(ball) = self.task.ball() {
-                    let standoff_m = self.task.touch().standoff_m;
-                    let around_m = ball.keep_out(finger, standoff_m).radius_m + CLEARANCE_M;
-                    let home_w = ball.centre_w + Vector3::y() * around_m;
-                    let room = (ball.centre_w, around_m);
-                    return stage_with_wrist(room, home_w, finger.r_at());
-                }
+        let Scene { arm, finger, .. } = &self.scene;
+        if let Some(arm) = arm {
+            return Some(arm.chain());
+        }
+        Some(match self.task.region() {
+            Region::Ball(ball) => {
+                let standoff_m = self.task.touch().standoff_m;
+                let around_m = ball.keep_out(finger, standoff_m).radius_m + CLEARANCE_M;
+                let home_w = ball.centre_w + Vector3::y() * around_m;
+                stage_with_wrist((ball.centre_w, around_m), home_w, finger.r_at())
+            }
+            Region::Zone(zone) => {
                 let [near_m, _] = self.task.depth_m();
                 let home_y_m = -near_m + CLEARANCE_M + finger.radius_m;
                 let x_wz = zone.x_wz();
                 let home_w = x_wz * zone.local(&zone.at(&[0.5, 0.5]), home_y_m);
                 stage(home_w, x_wz.rotation * finger.r_at())
-            },
-            |arm| arm.chain(),
-        ))
+            }
+        })
     }
 
     /// True height above the datum at `place`: the first surface met along the approach, or none.
@@ -229,7 +231,7 @@ impl Environment {
         match &self.shape {
             Shape::Function(function) => place.first().map(|&x| function.height_m(x)),
             Shape::Mesh { bvh, .. } => {
-                let zone = &self.scene.zone;
+                let zone = self.task.zone()?;
                 let ahead_w = zone.ahead_w();
                 let [near_m, far_m] = self.task.depth_m();
                 let start_y_m = -near_m + CLEARANCE_M;

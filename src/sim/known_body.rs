@@ -43,7 +43,8 @@ pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Envir
         truth: None,
     };
     let touch = design::touch_settings(&scene.touch);
-    let scene = Scene { zone, around: None, object: Some(object), touch, ..scene.clone() };
+    let scene =
+        Scene { zone: Some(zone), around: None, object: Some(object), touch, ..scene.clone() };
     let bvh = MeshBvh::new(mesh.transformed(&x_wo));
     Environment::around(scene, Shape::Mesh { bvh, report: report.into() })
 }

@@ -9,6 +9,7 @@ use super::probe::rest;
 use crate::robot::finger::shape::Front;
 use crate::sim::Environment;
 use crate::sim::scene::Body;
+use crate::task::Zone;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -35,7 +36,7 @@ pub fn is_reachable(
     if environment.scene().body == Body::Function {
         return heights_m.iter().map(Option::is_some).collect();
     }
-    let fingers = Fingers::new(environment);
+    let Some(fingers) = Fingers::new(environment) else { return vec![false; places.len()] };
     let lowest_y_m = fingers.lowest_y_m();
     let part = places.len().div_ceil(PARTS).max(1);
     let mut is_reachable = Vec::with_capacity(places.len());
@@ -55,6 +56,7 @@ const PARTS: usize = 20;
 /// Fingers all over the zone, each let down onto the object when first asked for.
 struct Fingers<'a> {
     environment: &'a Environment,
+    zone: &'a Zone,
     front: Front,
     /// Their coordinates along each side of the zone; x varies fastest.
     sides_m: Vec<Vec<f64>>,
@@ -73,8 +75,9 @@ struct Strip {
 }
 
 impl<'a> Fingers<'a> {
-    fn new(environment: &'a Environment) -> Self {
-        let zone = &environment.scene().zone;
+    /// Returns `None` without a zone.
+    fn new(environment: &'a Environment) -> Option<Self> {
+        let zone = environment.task().zone()?;
         let radius_m = environment.scene().finger.radius_m;
         let steps = |side_m: f64| (side_m * PER_RADIUS / radius_m).clamp(1.0, PER_SIDE_MAX).ceil();
         let sides_m: Vec<Vec<f64>> = (zone.sides())
@@ -90,19 +93,20 @@ impl<'a> Fingers<'a> {
             .sum();
         let count = sides_m.iter().map(Vec::len).product();
         let tips_y_m = (0..count).map(|_| OnceLock::new()).collect();
-        Self {
+        Some(Self {
             environment,
+            zone,
             front: environment.scene().finger.front(),
             sides_m,
             tips_y_m,
             tolerance_m: TOLERANCE_M + missed_m,
-        }
+        })
     }
 
     /// Whether one of them touches the surface at `place`. Those are asked first that may come
     /// lowest over it, and those that stay above it not at all, so that few are let down.
     fn touch(&self, place: &[f64], height_m: f64, lowest_y_m: &[f64]) -> bool {
-        let datum_y_m = self.environment.scene().zone.datum_y_m();
+        let datum_y_m = self.zone.datum_y_m();
         let is_touched =
             |envelope_y_m: f64| envelope_y_m - datum_y_m - height_m <= self.tolerance_m;
         let mut over: Vec<(f64, usize, f64)> = (self.over(place))
@@ -212,7 +216,7 @@ impl<'a> Fingers<'a> {
     fn surface_y_m(&self, finger: usize) -> Option<f64> {
         let Shape::Mesh { bvh, .. } = self.environment.shape() else { return None };
         let task = self.environment.task();
-        let zone = task.zone();
+        let zone = self.zone;
         let [near_m, far_m] = task.depth_m();
         let target: Vec<f64> = self.target(finger).collect();
         let start_w = zone.x_wz() * zone.local(&target, CLEARANCE_M - near_m);
@@ -223,8 +227,9 @@ impl<'a> Fingers<'a> {
     fn tip_y_m(&self, finger: usize) -> Option<f64> {
         *self.tips_y_m[finger].get_or_init(|| {
             let target: Vec<f64> = self.target(finger).collect();
-            let rest = rest(self.environment, &self.environment.task().approach(&target))?;
-            let x_zw = self.environment.scene().zone.x_wz().inverse();
+            let approach = self.environment.task().approach(&target.into())?;
+            let rest = rest(self.environment, &approach)?;
+            let x_zw = self.zone.x_wz().inverse();
             Some(x_zw.transform_point(&rest.p_wt).y)
         })
     }

@@ -30,8 +30,8 @@ pub struct Scene {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub function: Option<Function>,
     /// The rectangle explored, of one side of an object.
-    #[serde(default = "Zone::nothing", skip_serializing_if = "Zone::is_nothing")]
-    pub zone: Zone,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zone: Option<Zone>,
     /// The ball explored, of a whole object from all sides; in place of a zone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub around: Option<Around>,
@@ -203,14 +203,15 @@ impl Checked for Scene {
     fn check(&self, rules: &mut Rules) {
         match &self.around {
             None => {
-                let given = !self.zone.is_nothing();
-                rules.require("zone", "(none)", given, || {
+                rules.require("zone", "(none)", self.zone.is_some(), || {
                     "a table [zone] with x_m and z_m, or [around] for a whole object".into()
                 });
-                rules.table("zone", &self.zone);
+                if let Some(zone) = &self.zone {
+                    rules.table("zone", zone);
+                }
             }
             Some(around) => {
-                rules.require("zone", "(given)", self.zone.is_nothing(), || {
+                rules.require("zone", "(given)", self.zone.is_none(), || {
                     "no zone: [around] explores the object from all sides".into()
                 });
                 rules.table("around", around);
@@ -228,7 +229,7 @@ impl Checked for Scene {
                 rules.require("around", "(given)", self.around.is_none(), || {
                     "no around: body = \"function\" touches a curve".into()
                 });
-                let flat = self.zone.z_m.is_none();
+                let flat = self.zone.as_ref().is_none_or(|zone| zone.z_m.is_none());
                 rules.require("arm", "(given)", self.arm.is_none(), || {
                     "no arm: body = \"function\" is touched by none".into()
                 });

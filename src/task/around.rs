@@ -1,6 +1,7 @@
 //! A whole object inside a ball, touched from any side.
 
 use super::approach::{Approach, BEYOND_M, KeepOut, chord_m};
+use super::target::Aim;
 use crate::config::{Checked, Rules};
 use crate::robot::Finger;
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
@@ -66,36 +67,9 @@ pub struct Ball {
     pub lowest_m: Option<f64>,
 }
 
-/// What a planner asks for around an object: to go straight at a point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Aim {
-    /// The point, in `W`.
-    pub p_w: Point3<f64>,
-    /// Which way the finger goes, in `W`.
-    pub ahead_w: UnitVector3<f64>,
-}
-
-impl Aim {
-    /// At `p_w` against the outward direction `outward_w`; along −z where that has no length.
-    pub fn against(p_w: Point3<f64>, outward_w: &Vector3<f64>) -> Self {
-        let down_w = -Vector3::z_axis();
-        Self { p_w, ahead_w: UnitVector3::try_new(-outward_w, 1e-12).unwrap_or(down_w) }
-    }
-
-    /// As a row writes it: the point's x, y, z, then the direction's.
-    pub fn target(&self) -> Vec<f64> {
-        self.p_w.coords.iter().chain(self.ahead_w.iter()).copied().collect()
-    }
-
-    /// From what a row writes; none unless it is six finite numbers with a direction among them.
-    pub fn of(target: &[f64]) -> Option<Self> {
-        let &[x, y, z, u, v, w] = target else { return None };
-        let p_w = Point3::new(x, y, z);
-        let ahead_w = UnitVector3::try_new(Vector3::new(u, v, w), 1e-6)?;
-        let is_finite = p_w.iter().chain(ahead_w.iter()).all(|number| number.is_finite());
-        is_finite.then_some(Self { p_w, ahead_w })
-    }
-}
+/// Rolls of the finger about its approach that are tried, in this order.
+// heuristic: eighths of a turn, the smallest first.
+pub(super) const ROLLS_DEG: [f64; 8] = [0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0];
 
 /// How much larger than the ball around an object's box one is that nobody gave; chosen, so that
 /// approaches begin beside the object.
@@ -189,7 +163,7 @@ mod tests {
 
     proptest! {
         /// The way of an aim goes over its point along its direction, from the ball's surface to
-        /// its surface, and its target is the same aim again.
+        /// its surface.
         #[test]
         fn an_approach_goes_over_its_point(
             at in prop::array::uniform3(-0.5f64..0.5),
@@ -209,20 +183,8 @@ mod tests {
             for end in [approach.p_near_w, approach.p_far_w] {
                 prop_assert!(((end - centre_w).norm() - 0.9).abs() < 1e-9);
             }
-            let again = Aim::of(&aim.target()).unwrap();
-            prop_assert!((again.p_w - aim.p_w).norm() < 1e-12);
-            prop_assert!((*again.ahead_w - *aim.ahead_w).norm() < 1e-12);
             let up_w = approach.r_wa * Vector3::z();
             prop_assert!(up_w.z >= -1e-12);
         }
-    }
-
-    #[test]
-    fn a_target_is_six_numbers_with_a_direction() {
-        assert!(Aim::of(&[0.0; 6]).is_none());
-        assert!(Aim::of(&[0.0, 0.0, 0.0, 0.0, 0.0, f64::NAN]).is_none());
-        assert!(Aim::of(&[0.0, 0.0, 1.0]).is_none());
-        let aim = Aim::of(&[0.0, 0.0, 0.0, 0.0, 0.0, -2.0]).unwrap();
-        assert_eq!(*aim.ahead_w, -Vector3::z());
     }
 }

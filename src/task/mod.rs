@@ -2,14 +2,18 @@
 
 pub mod approach;
 pub mod around;
+mod reach;
+mod region;
+mod target;
 #[allow(clippy::module_inception)]
 mod task;
 pub mod touch;
-mod ways;
 pub mod zone;
 
 pub use approach::{Approach, KeepOut};
-pub use around::{Aim, Around, Ball, RADIUS_M};
+pub use around::{Around, Ball, RADIUS_M};
+pub use reach::{DIRECTIONS, Reach};
+pub use region::Region;
+pub use target::{Aim, Target};
 pub use task::{Task, TaskError};
-pub use ways::{DIRECTIONS, Reach};
 pub use zone::Zone;

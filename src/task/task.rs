@@ -1,33 +1,36 @@
 //! A task: where something may be touched, and how each target is.
 
 use super::approach::Approach;
-use super::around::{Aim, Ball};
+use super::around::{Ball, ROLLS_DEG};
+use super::reach::{Cells, Reach};
+use super::region::Region;
+use super::target::{Aim, Target};
 use super::touch::TouchSettings;
-use super::ways::{Reach, Ways};
 use super::zone::Zone;
 use crate::geometry::spread::directions;
 use crate::robot::Finger;
-use nalgebra::{Point3, UnitQuaternion, UnitVector3};
+use nalgebra::UnitVector3;
+use std::fmt;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// What the robot is told, complete: everything between a planner's target and an [`Approach`].
-#[derive(Clone, Debug, PartialEq)]
+/// The complete task of the robot: everything between a planner's target and an [`Approach`].
+#[derive(Clone)]
 pub struct Task {
-    zone: Zone,
-    /// Of a whole object, in place of the zone.
-    ways: Option<Ways>,
+    region: Region,
     touch: TouchSettings,
-    /// Nearest and farthest depth.
+    finger: Finger,
+    /// Nearest and farthest depth of a zone.
     depth_m: [f64; 2],
-    /// Attitude of the fingertip in the zone's frame.
-    r_zt: UnitQuaternion<f64>,
+    /// `None` for a body that reaches everything.
+    reach: Option<Arc<dyn Reach>>,
+    cells: Cells,
 }
 
 /// What a task lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum TaskError {
-    /// Nobody says from where to where the finger shall go.
+    /// The zone has no depth.
     #[error(
         "zone.depth_m is missing: nearest and farthest depth along the approach, in metres, at which \
          there may be something to touch"
@@ -36,39 +39,45 @@ pub enum TaskError {
 }
 
 impl Task {
-    /// To explore `zone` with `finger`, touching as `touch` says.
+    /// To explore `region` with `finger`, touching as `touch` says.
     ///
     /// # Errors
-    /// If the zone does not say its depth.
-    pub fn new(zone: Zone, touch: TouchSettings, finger: &Finger) -> Result<Self, TaskError> {
-        let depth_m = zone.depth_m.ok_or(TaskError::NoDepth)?;
-        Ok(Self { zone, ways: None, touch, depth_m, r_zt: finger.r_at() })
+    /// If a zone does not say its depth.
+    pub fn new(
+        region: impl Into<Region>,
+        touch: TouchSettings,
+        finger: &Finger,
+    ) -> Result<Self, TaskError> {
+        let region = region.into();
+        let depth_m = match &region {
+            Region::Zone(zone) => zone.depth_m.ok_or(TaskError::NoDepth)?,
+            Region::Ball(_) => [0.0; 2],
+        };
+        let (finger, cells) = (finger.clone(), Cells::new());
+        Ok(Self { region, touch, finger, depth_m, reach: None, cells })
     }
 
-    /// To explore a whole object inside `ball`.
-    pub fn around(ball: Ball, touch: TouchSettings, finger: &Finger) -> Self {
-        let (zone, r_zt) = (Zone::nothing(), finger.r_at());
-        let standoff_m = touch.standoff_m;
-        let ways = Ways::new(ball, finger.clone(), standoff_m);
-        Self { zone, ways: Some(ways), touch, depth_m: [0.0; 2], r_zt }
-    }
-
-    /// Around a whole object, only where `reach` says that the body gets.
+    /// Limits the approaches of a whole object to those that `reach` allows.
     pub fn within(mut self, reach: Arc<dyn Reach>) -> Self {
-        if let Some(ways) = &mut self.ways {
-            ways.set_reach(reach);
+        if self.ball().is_some() {
+            (self.reach, self.cells) = (Some(reach), Cells::new());
         }
         self
     }
 
-    /// The ball in which a whole object is explored; none of a task with a zone.
-    pub fn ball(&self) -> Option<&Ball> {
-        self.ways.as_ref().map(|ways| &ways.ball)
+    /// Where to explore.
+    pub fn region(&self) -> &Region {
+        &self.region
     }
 
-    /// Where to explore; [nothing](Zone::nothing) around a whole object.
-    pub fn zone(&self) -> &Zone {
-        &self.zone
+    /// The ball in which a whole object is explored, if it is one.
+    pub fn ball(&self) -> Option<&Ball> {
+        self.region.ball()
+    }
+
+    /// The zone that is explored, if it is one.
+    pub fn zone(&self) -> Option<&Zone> {
+        self.region.zone()
     }
 
     /// How to touch.
@@ -76,31 +85,33 @@ impl Task {
         &self.touch
     }
 
-    /// Nearest and farthest depth along the approach from the origin of `Z`.
+    /// Nearest and farthest depth along the approach from the origin of `Z`; zeros of a ball.
     pub fn depth_m(&self) -> [f64; 2] {
         self.depth_m
     }
 
-    /// Whether `target` is one of this task: a place of the zone, or six numbers that aim into the
-    /// ball, to where the finger can be brought.
-    pub fn contains(&self, target: &[f64]) -> bool {
-        match &self.ways {
-            None => self.zone.contains(target),
-            Some(_) => Aim::of(target).is_some_and(|aim| self.reaches(&aim)),
-        }
-    }
-
-    /// Whether the finger can be brought over the point of the ball that is aimed at, above what is
+    /// Whether `target` lies in the region and the finger can be brought there, above what is
     /// below the object and within the body's reach.
-    pub fn reaches(&self, aim: &Aim) -> bool {
-        let inside = |ways: &&Ways| ways.ball.contains(aim);
-        self.ways.as_ref().filter(inside).is_some_and(|ways| ways.approach(aim).is_some())
+    pub fn contains(&self, target: &Target) -> bool {
+        self.region.contains(target) && self.approach(target).is_some()
     }
 
-    /// As [`reaches`](Self::reaches) for about this direction and the middle of the ball: found
-    /// once for directions near to each other, for who looks at very many.
+    /// Whether the finger can be brought over the point of the ball that is aimed at.
+    pub fn reaches(&self, aim: &Aim) -> bool {
+        self.contains(&Target::Aim(*aim))
+    }
+
+    /// Whether [`reaches`](Self::reaches) holds for about this direction and the middle of the
+    /// ball: found once for directions near to each other, for use in searches. Nothing limits it
+    /// without a body's reach and something below.
     pub fn may_reach(&self, aim: &Aim) -> bool {
-        self.ways.as_ref().is_some_and(|ways| ways.may_reach(aim))
+        let Some(ball) = self.ball() else { return false };
+        if self.reach.is_none() && ball.lowest_m.is_none() {
+            return true;
+        }
+        self.cells.get(&-aim.ahead_w.into_inner(), |outward_w| {
+            self.over(ball, &Aim::against(ball.centre_w, outward_w)).is_some()
+        })
     }
 
     /// Those of `of` outward directions, spread evenly, against which the finger cannot be brought
@@ -112,22 +123,49 @@ impl Task {
         directions(of).filter(is_missed).collect()
     }
 
-    /// The way over `target`: of a place of the zone along the zone's own axis, around an object
-    /// straight over the point that is aimed at, with the finger rolled about the approach as
-    /// little as it must be. Of a target that is none it is not finite.
-    pub fn approach(&self, target: &[f64]) -> Approach {
-        if let Some(ways) = &self.ways {
-            let approach = Aim::of(target).and_then(|aim| ways.approach(&aim));
-            return approach.unwrap_or_else(|| {
-                let nowhere = Point3::from([f64::NAN; 3]);
-                let r_wa = UnitQuaternion::identity();
-                let (p_near_w, p_far_w) = (nowhere, nowhere);
-                Approach { p_near_w, p_far_w, r_wa, r_at: self.r_zt, around: None }
-            });
+    /// The approach of `target`: of a place along the zone's own axis, of an aim straight over its
+    /// point. Returns `None` if the target is none of the region's kind, or cannot be reached.
+    pub fn approach(&self, target: &Target) -> Option<Approach> {
+        match (&self.region, target) {
+            (Region::Zone(zone), Target::Place(place)) => {
+                let x_wz = zone.x_wz();
+                let [p_near_w, p_far_w] =
+                    self.depth_m.map(|depth_m| x_wz * zone.local(place, -depth_m));
+                let (r_wa, r_at) = (x_wz.rotation, self.finger.r_at());
+                Some(Approach { p_near_w, p_far_w, r_wa, r_at, around: None })
+            }
+            (Region::Ball(ball), Target::Aim(aim)) => self.over(ball, aim),
+            _ => None,
         }
-        let x_wz = self.zone.x_wz();
-        let [p_near_w, p_far_w] =
-            self.depth_m.map(|depth_m| x_wz * self.zone.local(target, -depth_m));
-        Approach { p_near_w, p_far_w, r_wa: x_wz.rotation, r_at: self.r_zt, around: None }
+    }
+
+    /// With the finger rolled about the approach as little as it must be for its hull to stay
+    /// above the lowest z and for the body to reach it. Returns `None` if no roll does.
+    fn over(&self, ball: &Ball, aim: &Aim) -> Option<Approach> {
+        let Self { finger, touch, reach, .. } = self;
+        let mut rolled = ROLLS_DEG
+            .iter()
+            .map(|roll_deg| ball.approach(aim, finger, touch.standoff_m, roll_deg.to_radians()));
+        rolled.find(|approach| {
+            ball.is_free(aim, approach, finger)
+                && reach.as_ref().is_none_or(|reach| reach.reaches(approach))
+        })
+    }
+}
+
+impl fmt::Debug for Task {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { region, touch, .. } = self;
+        f.debug_struct("Task").field("region", region).field("touch", touch).finish()
+    }
+}
+
+impl PartialEq for Task {
+    /// Whatever the body reaches.
+    fn eq(&self, other: &Self) -> bool {
+        let of = |Self { region, touch, finger, .. }: &Self| {
+            (region.clone(), touch.clone(), finger.clone())
+        };
+        of(self) == of(other)
     }
 }

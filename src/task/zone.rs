@@ -75,16 +75,6 @@ impl Zone {
         Self { x_m, z_m, datum_y_m: None, depth_m: None, position_m, rotation_deg }
     }
 
-    /// Without extent: what stands where a whole object is explored.
-    pub const fn nothing() -> Self {
-        Self::new([0.0; 2], None)
-    }
-
-    /// Whether it has no extent.
-    pub fn is_nothing(&self) -> bool {
-        *self == Self::nothing()
-    }
-
     /// The y from which heights are measured: what it says, or 0.
     pub fn datum_y_m(&self) -> f64 {
         self.datum_y_m.unwrap_or(0.0)

@@ -44,21 +44,19 @@ fn outwards() -> impl Iterator<Item = Vector3<f64>> {
 fn a_soft_finger_feels_a_sphere_from_all_sides_as_well_as_from_one() {
     let off_m = |p_w: &Point3<f64>| ((p_w - Point3::from(MIDDLE_W)).norm() - RADIUS_M).abs();
     let mut one = scene("container_around_finger.toml", &[]);
-    (one.around, one.zone) = (None, Zone::new([-0.03, 0.03], Some([0.47, 0.53])));
+    (one.around, one.zone) = (None, Some(Zone::new([-0.03, 0.03], Some([0.47, 0.53]))));
     let one = with_sphere(one).unwrap();
     let mut probe = Simulator::new(Arc::clone(&one)).unwrap().probe(1).unwrap();
-    let touches = one
-        .scene()
-        .zone
-        .grid(4)
-        .into_iter()
-        .map(|place| off_m(&contact(probe.touch(&one.task().approach(&place)).unwrap()).p_wc));
+    let touches = one.task().zone().unwrap().grid(4).into_iter().map(|place| {
+        let approach = one.task().approach(&place.into()).unwrap();
+        off_m(&contact(probe.touch(&approach).unwrap()).p_wc)
+    });
     let worst_m = touches.fold(0.0, f64::max);
     let all = around("container_around_finger.toml", &[]);
     let mut probe = Simulator::new(Arc::clone(&all)).unwrap().probe(1).unwrap();
     for outward_w in outwards() {
         let aim = Aim::against(MIDDLE_W.into(), &outward_w);
-        let found = contact(probe.touch(&all.task().approach(&aim.target())).unwrap());
+        let found = contact(probe.touch(&all.task().approach(&aim.into()).unwrap()).unwrap());
         let found_m = off_m(&found.p_wc);
         assert!(found_m < worst_m, "{outward_w:?}: {found_m}, of a zone {worst_m}");
         assert!((found.p_wc - Point3::from(MIDDLE_W)).dot(&outward_w) > 0.0, "{outward_w:?}");
@@ -74,12 +72,12 @@ fn the_finger_is_rolled_only_where_it_must_be_and_always_the_same() {
         let outward_w = direction(i, 200);
         let aim = Aim::against(MIDDLE_W.into(), &outward_w);
         assert!(free.task().reaches(&aim) && free.task().may_reach(&aim));
-        let unrolled = free.task().approach(&aim.target());
+        let unrolled = free.task().approach(&aim.into()).unwrap();
         assert!((unrolled.r_wa * Vector3::z()).z > -1e-12);
-        let approach = low.task().approach(&aim.target());
+        let approach = low.task().approach(&aim.into()).unwrap();
         assert_eq!(low.task().reaches(&aim), approach.is_finite());
         if approach.is_finite() {
-            assert_eq!(approach, low.task().approach(&aim.target()));
+            assert_eq!(approach, low.task().approach(&aim.into()).unwrap());
             let angle_rad = approach.r_wa.angle_to(&unrolled.r_wa);
             rolled += usize::from(angle_rad > 1e-9);
             let steps = angle_rad.to_degrees() / 45.0;
@@ -97,15 +95,13 @@ fn nothing_goes_below_what_the_object_stands_on() {
         let (task, finger) = (environment.task(), &environment.scene().finger);
         let below = Aim::against(MIDDLE_W.into(), &-Vector3::z());
         assert!(!task.reaches(&below) && !task.may_reach(&below));
-        assert!(!task.contains(&below.target()));
+        assert!(!task.contains(&below.into()) && task.approach(&below.into()).is_none());
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
-        let refused = probe.touch(&task.approach(&below.target()));
-        assert!(matches!(refused, Err(Fault::Refused { .. })), "{refused:?}");
         let mut touched = 0;
         for i in (0..60).step_by(3) {
             let aim = Aim::against(MIDDLE_W.into(), &direction(i, 60));
             if task.reaches(&aim) {
-                let approach = task.approach(&aim.target());
+                let approach = task.approach(&aim.into()).unwrap();
                 let end = probe.touch(&approach).unwrap();
                 touched += usize::from(matches!(end, Touch::Contact(_)));
                 let lowest_m =
@@ -135,7 +131,7 @@ fn an_arm_comes_to_all_that_it_reaches() {
         let aim = Aim::against(middle_w, &direction((i * 17) % 40, 40));
         if task.reaches(&aim) {
             reached += 1;
-            let touch = probe.touch(&task.approach(&aim.target()));
+            let touch = probe.touch(&task.approach(&aim.into()).unwrap());
             assert!(matches!(touch, Ok(Touch::Contact(_))), "{aim:?}: {touch:?}");
         }
     }
@@ -174,7 +170,7 @@ fn from_where_a_touch_left_it_an_arm_comes_to_what_it_reaches_or_does_not_move()
         let aim = Aim::against(task.ball().unwrap().centre_w, &direction(i, 420));
         assert!(task.reaches(&aim), "{i}");
         let mut servo = simulator.servo(standing_at(q), 1).unwrap();
-        match servo.touch(&task.approach(&aim.target())) {
+        match servo.touch(&task.approach(&aim.into()).unwrap()) {
             Ok(Touch::Miss) => arrived.push(i),
             Err(Fault::NoWay { time_s, .. }) => assert_eq!(time_s, 0.0),
             end => panic!("{i}: {end:?}"),

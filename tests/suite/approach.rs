@@ -19,7 +19,8 @@ fn turned(scene: &Scene, x_ww: &Isometry3<f64>) -> Scene {
     let mut scene = scene.clone();
     let object = scene.object.as_mut().unwrap();
     (object.position_m, object.rotation_deg) = pose(x_ww * object.x_wo());
-    (scene.zone.position_m, scene.zone.rotation_deg) = pose(x_ww * scene.zone.x_wz());
+    let zone = scene.zone.as_mut().unwrap();
+    (zone.position_m, zone.rotation_deg) = pose(x_ww * zone.x_wz());
     scene
 }
 
@@ -27,10 +28,10 @@ fn turned(scene: &Scene, x_ww: &Isometry3<f64>) -> Scene {
 fn found(scene: Scene, targets: &[Vec<f64>]) -> Vec<Option<[f64; 6]>> {
     let environment = Arc::new(Environment::build(scene).unwrap());
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
-    let zone = environment.task().zone();
+    let zone = environment.task().zone().unwrap();
     // A body of its own for each: no touch begins where another ended.
     let touch = |target: &Vec<f64>| match (simulator.probe(3).unwrap())
-        .touch(&environment.task().approach(target))
+        .touch(&environment.task().approach(&target[..].into()).unwrap())
         .unwrap()
     {
         Touch::Contact(contact) => {
@@ -74,7 +75,8 @@ fn a_side_is_the_same_from_wherever_it_is_explored() {
         // No target so round that a movement's last tick hangs on rounding.
         let mut dice = Dice(5);
         let mut share = || 0.5 + 0.45 * dice.roll();
-        let targets: Vec<_> = (0..12).map(|_| scene.zone.at(&[share(), share()])).collect();
+        let targets: Vec<_> =
+            (0..12).map(|_| scene.zone.as_ref().unwrap().at(&[share(), share()])).collect();
         let along_y = found(scene.clone(), &targets);
         assert!(along_y.iter().flatten().count() > 8, "{name}: mostly misses");
         for x_ww in sides {
@@ -103,7 +105,7 @@ fn the_truth_and_the_default_depth_turn_with_the_zone() {
     for (a, b) in along_y.task().depth_m().iter().zip(other.task().depth_m()) {
         assert!((a - b).abs() < 1e-9, "{a} {b}");
     }
-    for place in scene.zone.grid(9) {
+    for place in scene.zone.as_ref().unwrap().grid(9) {
         let heights = [&along_y, &other].map(|environment| environment.true_height_m(&place));
         let [Some(a), Some(b)] = heights else { panic!("{heights:?}") };
         assert!((a - b).abs() < 1e-7, "{place:?}: {a} {b}");
@@ -128,7 +130,7 @@ proptest! {
         prop_assert!(zone.distance(&zone.place(&p_w), &place) < 1e-11);
         let finger = palpate::robot::Finger::default();
         let task = palpate::task::Task::new(zone.clone(), Default::default(), &finger).unwrap();
-        let approach = task.approach(&place);
+        let approach = task.approach(&place.as_slice().into()).unwrap();
         let way = approach.p_far_w - approach.p_near_w;
         prop_assert!((way - approach.direction_w().scale(0.3)).norm() < 1e-12);
         prop_assert!((approach.direction_w().into_inner() - zone.ahead_w().into_inner()).norm() < 1e-15);
@@ -161,5 +163,5 @@ fn a_depth_range_beside_the_object_is_refused() {
     let error = build("zone.depth_m=[0.65, 0.8]").err().unwrap().to_string();
     assert!(error.contains("begins at 0.65 m"), "{error}");
     let own = build("zone.depth_m=[0.4, 0.8]").unwrap();
-    assert_eq!(own.scene().zone.depth_m, Some([0.4, 0.8]));
+    assert_eq!(own.task().zone().unwrap().depth_m, Some([0.4, 0.8]));
 }

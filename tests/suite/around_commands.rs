@@ -90,7 +90,7 @@ fn a_known_body_takes_the_place_of_a_whole_object() {
     let scene = scene("container_around_pa10.toml", &[]);
     let environment = known_body::environment(&scene, &body).unwrap();
     assert!(environment.task().ball().is_none());
-    assert!(environment.task().zone().dimension() == 2);
+    assert!(environment.task().zone().unwrap().dimension() == 2);
 }
 
 /// Centre and radius say nothing of the mesh, whose hash does.

@@ -248,13 +248,13 @@ impl Planner for Shy {
         let zone = belief.height_field().ok_or("zones only")?.zone();
         let (low, high) = (zone.at(&[0.0; 2]), zone.at(&[1.0; 2]));
         let sides = low.iter().zip(&high);
-        let target = (plan.target.iter().zip(sides))
+        let target = (plan.target.numbers().iter().zip(sides))
             .map(|(at, (low, high))| {
                 let off = self.margin * (high - low);
                 at.clamp(low + off, high - off)
             })
-            .collect();
-        Ok(Plan { target, ..plan })
+            .collect::<Vec<f64>>();
+        Ok(Plan { target: target.into(), ..plan })
     }
 }
 

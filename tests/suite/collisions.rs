@@ -76,7 +76,7 @@ fn an_arm_is_stopped_by_the_table_and_by_the_guard_before_it() {
 fn a_touch_far_from_everything_is_the_same_to_the_bit() {
     let touched = |environment: &Arc<Environment>| {
         let mut probe = Simulator::new(Arc::clone(environment)).unwrap().probe(1).unwrap();
-        probe.touch(&environment.task().approach(&[0.01, 0.5])).unwrap()
+        probe.touch(&environment.task().approach(&[0.01, 0.5].into()).unwrap()).unwrap()
     };
     let (without, with) = (arm(&[]), arm(&["effects.collision={}"]));
     assert_eq!(touched(&without), touched(&with));

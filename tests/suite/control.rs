@@ -231,10 +231,10 @@ fn every_place_of_the_scenes_has_a_posture() {
             let environment = Environment::build(scene).unwrap();
             let chain = environment.chain().unwrap();
             let attitude = environment.scene().finger.r_at();
-            for place in environment.scene().zone.grid(5) {
+            for place in environment.task().zone().unwrap().grid(5) {
                 // From the datum, deep in the object, to well in front of it.
                 for height_m in [0.0, 0.1] {
-                    let p = environment.scene().zone.point(&place, height_m);
+                    let p = environment.task().zone().unwrap().point(&place, height_m);
                     let x_wt = Isometry3::from_parts(p.into(), attitude);
                     let q = posture(&chain, &x_wt).unwrap();
                     let x = chain.forward(&q);

@@ -47,7 +47,7 @@ fn tapped(environment: &Arc<Environment>, target: &[f64]) -> (Touch, Vec<Reading
     let readings = Arc::new(Mutex::new(Vec::new()));
     let body = Tap { inner: simulator.body().unwrap().unwrap(), readings: Arc::clone(&readings) };
     let mut servo = simulator.servo(Box::new(body), 1).unwrap();
-    let touch = servo.touch(&environment.task().approach(target)).unwrap();
+    let touch = servo.touch(&environment.task().approach(&target[..].into()).unwrap()).unwrap();
     let readings = readings.lock().unwrap().clone();
     (touch, readings)
 }
@@ -82,8 +82,8 @@ fn pressed_to_the_same_depth_forces_and_places_are_the_kinematic_ones() {
             .map(|body| Simulator::new(environment(name, &[arm, body, effects])).unwrap());
         let scene = still.environment().scene();
         for fractions in [[0.4, 0.4], [0.7, 0.6], [0.2, 0.7]] {
-            let target = scene.zone.at(&fractions);
-            let approach = still.environment().task().approach(&target);
+            let target = scene.zone.as_ref().unwrap().at(&fractions);
+            let approach = still.environment().task().approach(&target.as_slice().into()).unwrap();
             let p = rest(still.environment(), &approach).unwrap().p_wt;
             let at = |depth_m: f64| {
                 let place = Translation3::new(p.x, p.y - depth_m, p.z);
@@ -167,7 +167,12 @@ fn a_touch_stops_gently_and_keeps_its_limits_and_its_line() {
         let chain = environment.chain().unwrap();
         let top = environment.mesh().unwrap().bounds().1.y;
         let start_y = top + scene.finger.bulge_m() + scene.touch.standoff_m;
-        for target in scene.zone.grid(2).into_iter().chain([scene.zone.at(&[0.5, 0.5])]) {
+        for target in scene.zone.as_ref().unwrap().grid(2).into_iter().chain([scene
+            .zone
+            .as_ref()
+            .unwrap()
+            .at(&[0.5, 0.5])])
+        {
             let (touch, readings) = tapped(&environment, &target);
             contact(touch);
             let force = |reading: &Reading| reading.ideal.map_or(0.0, |ideal| ideal.force_n);
@@ -213,8 +218,8 @@ fn a_finger_without_skin_finds_the_surface() {
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
         let Shape::Mesh { bvh, .. } = environment.shape() else { panic!() };
         let (mut off, mut apart): (f64, f64) = (0.0, 0.0);
-        for target in environment.scene().zone.grid(3) {
-            let approach = environment.task().approach(&target);
+        for target in environment.task().zone().unwrap().grid(3) {
+            let approach = environment.task().approach(&target.as_slice().into()).unwrap();
             let felt = contact(probe.touch(&approach).unwrap());
             let exact = contact(cast.touch(&approach).unwrap());
             off = off.max(bvh.closest_point(&felt.p_wc).distance_m);
@@ -295,7 +300,7 @@ fn registration_errors_move_what_is_found_and_nothing_else() {
     let touch = |effects: &str, seed: u64| {
         let environment = environment("container_finger.toml", &[effects]);
         let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
-        let approach = environment.task().approach(&[0.01, 0.5]);
+        let approach = environment.task().approach(&[0.01, 0.5].into()).unwrap();
         let found = contact(simulator.probe(seed).unwrap().touch(&approach).unwrap());
         let Shape::Mesh { bvh, .. } = environment.shape() else { panic!() };
         (bvh.closest_point(&found.p_wc).distance_m, found)
@@ -324,7 +329,11 @@ fn a_force_sensor_tells_contact_where_no_fluid_does() {
         for seed in 0..3 {
             let mut probe = simulator.probe(seed).unwrap();
             for target in [[0.0, 0.5], [0.03, 0.47]] {
-                let found = contact(probe.touch(&environment.task().approach(&target)).unwrap());
+                let found = contact(
+                    probe
+                        .touch(&environment.task().approach(&target.as_slice().into()).unwrap())
+                        .unwrap(),
+                );
                 let off = bvh.closest_point(&found.p_wc).distance_m;
                 assert!(off < 5e-4, "{body} {target:?} {off}");
             }

@@ -100,7 +100,7 @@ fn an_effect_that_is_off_has_no_state_and_does_no_work() {
     let touched = |scene: &Scene| {
         let environment = Arc::new(Environment::build(scene.clone()).unwrap());
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(0).unwrap();
-        probe.touch(&environment.task().approach(&[0.0, 0.5])).unwrap();
+        probe.touch(&environment.task().approach(&[0.0, 0.5].into()).unwrap()).unwrap();
     };
     let worked = |scene: &Scene, effect: &str| {
         let before = counter::count_of(effect).unwrap();

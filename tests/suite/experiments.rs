@@ -118,7 +118,12 @@ fn targets_past_the_object_are_missed_once_and_not_asked_for_again() {
         assert!(misses > 0, "the zone does not look past the object");
         for (i, touch) in row.touches.iter().enumerate() {
             for earlier in row.touches[..i].iter().filter(|earlier| earlier.contact.is_none()) {
-                let distance = experiment.scene.zone.distance(&touch.target, &earlier.target);
+                let distance = experiment
+                    .scene
+                    .zone
+                    .as_ref()
+                    .unwrap()
+                    .distance(&touch.target.numbers(), &earlier.target.numbers());
                 assert!(distance > 1e-3, "touch {i}: {distance}");
             }
         }

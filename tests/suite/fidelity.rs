@@ -174,7 +174,7 @@ fn at_the_limit_of_approach_the_skin_is_not_used_up() {
         let environment = Arc::new(Environment::build(scene.clone()).unwrap());
         let touches = touch_all(&environment, &targets, 0, &mut || true).unwrap().unwrap();
         let task = environment.task();
-        let rest = |target: &Vec<f64>| rest(&environment, &task.approach(target)).unwrap().p_wt;
+        let rest = |target| rest(&environment, &task.approach(target).unwrap()).unwrap().p_wt;
         let rest_m = targets.iter().map(|target| rest(target).y);
         let depth_m = |(rest_m, load): (f64, &Option<ReferenceLoad>)| {
             Some(rest_m - load.as_ref()?.motion.x_wt.translation.y)

@@ -174,7 +174,11 @@ fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     let mut missed = 0;
     for touch in replay.touches {
         missed += usize::from(touch.contact.is_none());
-        assert!(touch.contact.is_some() || !is_known(&touch.target), "{:?}", touch.target);
+        assert!(
+            touch.contact.is_some() || !is_known(&touch.target.numbers()),
+            "{:?}",
+            touch.target
+        );
     }
     assert!(missed > 0);
     // The object ends at 46 mm on both sides.
@@ -199,10 +203,10 @@ fn nothing_is_drawn_of_a_belief_without_a_surface() {
         let whole = run(settings);
         let mut nowhere = run(settings);
         nowhere.truth.heights_m[1..].fill(None);
-        let zone = nowhere.experiment.scene.zone.clone();
+        let zone = nowhere.experiment.scene.zone.clone().unwrap();
         for touch in nowhere.rows.iter_mut().flat_map(|row| &mut row.touches) {
             touch.contact = None;
-            touch.tip = Some(tip_behind(&zone, &touch.target));
+            touch.tip = Some(tip_behind(&zone, &touch.target.numbers()));
         }
         for name in names {
             let drawn = |run: &Run| figures(run).into_iter().find(|(of, _)| *of == name);

@@ -100,7 +100,7 @@ fn fits_of_a_known_noise_reach_the_global_maximum() {
     let lengths = vec![(5e-4, 0.1).into(), (6e-4, 0.12).into()];
     let noise = TouchNoise::Known(3e-4);
     let bounds = SearchBox { touch_noise: noise, ..search_box(Mean::Zero, lengths) };
-    let zone = simulation.environment().scene().zone.clone();
+    let zone = simulation.environment().task().zone().unwrap().clone();
     let row = simulation.trial(planner::by_name("active").unwrap(), 19);
     let mut touches = Observations::new(2);
     let mut fits = 0;

@@ -177,7 +177,7 @@ fn a_touch_goes_through_the_dynamic_body() {
     let environment = environment(shell(8, 6), wall(), 45.0);
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
     let mut probe = simulator.probe(1).unwrap();
-    match probe.touch(&environment.task().approach(&[0.0, 0.0])).unwrap() {
+    match probe.touch(&environment.task().approach(&[0.0, 0.0].into()).unwrap()).unwrap() {
         // Electrodes tell the place to some 3 mm (docs/finger.md).
         Touch::Contact(contact) => assert!(contact.p_wc.y.abs() < 3e-3, "{contact:?}"),
         other => panic!("{other:?}"),

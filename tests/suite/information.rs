@@ -41,14 +41,16 @@ fn the_surface_is_below_what_the_finger_has_swept() {
         let experiment = load(name, &[]).unwrap();
         let environment = Arc::new(Environment::build(experiment.scene.clone()).unwrap());
         let truth = Truth::sample(&environment, 21);
-        let zone = &environment.scene().zone;
+        let zone = environment.task().zone().unwrap();
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
         assert_eq!(probe.swept(), None);
         let mut rng = seed::stream(1, 0, "targets");
         let (mut bounded, mut tight) = (0, 0);
         for _ in 0..200 {
             let touch = probe
-                .touch(&environment.task().approach(&planner::uniform(zone, &mut rng)))
+                .touch(
+                    &environment.task().approach(&planner::uniform(zone, &mut rng).into()).unwrap(),
+                )
                 .unwrap();
             let swept = probe.swept().unwrap();
             let Touch::Contact(Contact { p_wc, .. }) = touch else { panic!("missed") };
@@ -66,7 +68,10 @@ fn the_surface_is_below_what_the_finger_has_swept() {
             }
         }
         assert!(bounded > 1000 && tight > 100, "{name}: {bounded} {tight}");
-        assert_eq!(probe.touch(&environment.task().approach(&[0.3, 0.5])), Ok(Touch::Miss));
+        assert_eq!(
+            probe.touch(&environment.task().approach(&[0.3, 0.5].into()).unwrap()),
+            Ok(Touch::Miss)
+        );
         assert!(probe.swept().unwrap().p_wt.y < environment.mesh().unwrap().bounds().0.y);
     }
 }
@@ -145,7 +150,7 @@ fn the_toys_normals_are_its_slopes() {
             .unwrap()
             .probe(1)
             .unwrap()
-            .touch(&environment.task().approach(&[x]))
+            .touch(&environment.task().approach(&[x].into()).unwrap())
             .unwrap();
         let Touch::Contact(Contact { normal_w, .. }) = touch else { panic!("missed") };
         let [above, below] = [1e-6, -1e-6].map(|by| environment.true_height_m(&[x + by]).unwrap());
@@ -170,11 +175,12 @@ fn a_recorded_row_holds_all_that_the_belief_was_made_of() {
         assert_eq!(line.contains("slope_noise"), normals);
         let read: TrialRow = serde_json::from_str(&line).unwrap();
         assert_eq!(read, row);
-        let mut belief = HeightField::new(experiment.scene.zone.clone(), experiment.gp.clone());
+        let mut belief =
+            HeightField::new(experiment.scene.zone.clone().unwrap(), experiment.gp.clone());
         for touch in &read.touches {
             let p_wc = Point3::from(touch.contact.unwrap());
             let normal_w = touch.normal.map_or(Vector3::y(), Vector3::from);
-            belief.observe(&touch.target, &Touch::Contact(Contact { p_wc, normal_w }));
+            belief.observe(&touch.target.numbers(), &Touch::Contact(Contact { p_wc, normal_w }));
             if let Some(tip) = touch.tip {
                 let finger = experiment.scene.finger.clone();
                 belief.observe_swept(&Swept { finger, p_wt: Point3::from(tip) });

@@ -327,8 +327,9 @@ fn no_touch_of_a_shipped_scene_comes_near_one() {
             let environment = shipped::environment(name, sets);
             let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
             let mut probe = simulator.probe(1).unwrap();
-            for place in environment.scene().zone.grid(2).into_iter().step_by(3) {
-                let touch = probe.touch(&environment.task().approach(&place));
+            for place in environment.task().zone().unwrap().grid(2).into_iter().step_by(3) {
+                let touch =
+                    probe.touch(&environment.task().approach(&place.as_slice().into()).unwrap());
                 assert!(touch.is_ok(), "{name} {sets:?} {place:?}: {touch:?}");
             }
         }

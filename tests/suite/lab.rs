@@ -93,7 +93,7 @@ fn the_container_is_explored_over_topics_as_in_the_simulator() {
         let mut probe = simulation.probe(0).unwrap();
         let mut off_m = Vec::new();
         for touch in &row.touches {
-            let approach = simulation.task().approach(&touch.target);
+            let approach = simulation.task().approach(&touch.target).unwrap();
             let here = match probe.touch(&approach).unwrap() {
                 Touch::Contact(contact) => Some(contact.p_wc),
                 _ => None,

@@ -63,7 +63,7 @@ fn a_scan_is_the_surface_and_does_not_depend_on_threads() {
     let environment = Environment::build(Scene::load(&path, &[]).unwrap()).unwrap();
     for point in &points {
         let true_m = environment.true_height_m(&[point[0], point[2]]).unwrap();
-        let felt_m = point[1] - environment.scene().zone.datum_y_m();
+        let felt_m = point[1] - environment.task().zone().unwrap().datum_y_m();
         assert!((felt_m - true_m).abs() < 1e-4, "{point:?}: {true_m}");
         let length = point[3..6].iter().map(|part| part * part).sum::<f64>().sqrt();
         assert!((length - 1.0).abs() < 1e-5 && point[4] > 0.0, "{point:?}");
@@ -96,7 +96,8 @@ fn a_belief_is_exported_as_it_was_and_mistakes_say_what_is_allowed() {
     assert!(points.iter().all(is_sure));
     // The RMSE of the vertices against the recorded truth is the recorded one.
     let run_read = palpate::experiment::store::Run::read(Path::new(run)).unwrap();
-    let (truth, datum_m) = (&run_read.truth, run_read.experiment.scene.zone.datum_y_m());
+    let (truth, datum_m) =
+        (&run_read.truth, run_read.experiment.scene.zone.as_ref().unwrap().datum_y_m());
     let squares: Vec<f64> = (points.iter().zip(&truth.heights_m))
         .filter_map(|(point, height_m)| Some((point[1] - datum_m - (*height_m)?).powi(2)))
         .collect();

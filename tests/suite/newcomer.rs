@@ -112,7 +112,7 @@ fn the_side_that_is_named_faces_the_finger() {
         let up = ["new", "container.obj", "--up", "z", "--side", side, "--force"];
         succeeds(folder.path(), &up);
         let scene = Scene::load(&folder.path().join("container-scene.toml"), &[]).unwrap();
-        let extents_m = scene.zone.extents_m();
+        let extents_m = scene.zone.as_ref().unwrap().extents_m();
         for (extent_m, whole_m) in extents_m.iter().zip(seen) {
             assert!(
                 *extent_m <= whole_m + 1e-3 && *extent_m > 0.7 * whole_m,

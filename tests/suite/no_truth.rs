@@ -41,7 +41,7 @@ fn verification_touches_follow_a_trial_and_change_nothing_of_it() {
     assert!(!serde_json::to_string(&plain).unwrap().contains("verification"));
     assert_eq!(verified.verification.len(), 16);
     let other = row(container(&WITH), "random", 1);
-    let new = |row: &TrialRow| -> Vec<Vec<f64>> {
+    let new = |row: &TrialRow| -> Vec<palpate::task::Target> {
         let new = row.verification.iter().filter(|touch| touch.again.is_none());
         new.map(|touch| touch.target.clone()).collect()
     };
@@ -80,7 +80,7 @@ fn a_run_without_truth_is_told() {
     for with in [&WITH[..], &[]] {
         let experiment = container(with);
         let environment = Arc::new(Environment::build(experiment.scene.clone()).unwrap());
-        let truth = Truth::unknown(&environment.scene().zone, experiment.grid as usize);
+        let truth = Truth::unknown(environment.task().zone().unwrap(), experiment.grid as usize);
         let simulation = Simulation::against(experiment, environment, truth.clone()).unwrap();
         let planners = ["active", "random"].map(|name| planner::by_name(name).unwrap());
         let rows: Vec<TrialRow> = (0..2)

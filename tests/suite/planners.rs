@@ -86,7 +86,7 @@ fn every_planner_stays_in_the_zone_and_repeats_itself() {
             for _ in 0..20 {
                 let plans = planners.each_mut().map(|planner| planner.plan(&belief));
                 assert_eq!(plans[0], plans[1], "{}", entry.name);
-                for (at, [low, high]) in plans[0].target.iter().zip(zone.sides()) {
+                for (at, [low, high]) in plans[0].target.numbers().iter().zip(zone.sides()) {
                     assert!((low..=high).contains(at), "{}: {at}", entry.name);
                 }
             }
@@ -116,7 +116,7 @@ fn a_belief_without_any_contact_still_plans() {
         belief.observe(&targets[0], &Touch::Miss);
         for _ in 0..30 {
             belief.refit().unwrap();
-            let target = planner.plan(&belief).target;
+            let target = planner.plan(&belief).target.numbers();
             let repeated = targets.iter().any(|other| SQUARE.distance(other, &target) < 1e-6);
             assert!(!repeated, "{}: {target:?} again", entry.name);
             belief.observe(&target, &Touch::Miss);
@@ -203,7 +203,7 @@ fn finds(name: &str, formula: impl for<'a> Fn(&'a HeightField, &[Vec<f64>]) -> F
             let values: Vec<f64> = grid.iter().map(|place| worth(place, &mut scratch)).collect();
             let best = values.iter().copied().fold(f64::MIN, f64::max);
             let worst = values.iter().copied().fold(f64::MAX, f64::min);
-            let share = (worth(&plan.target, &mut scratch) - worst) / (best - worst);
+            let share = (worth(&plan.target.numbers(), &mut scratch) - worst) / (best - worst);
             assert!(share > 0.998, "{name}, {} d, {trial}: {share}", zone.dimension());
         }
     }
@@ -288,9 +288,13 @@ fn travel_tours_the_places_of_active_on_a_shorter_way() {
         let belief = belief(&SQUARE, trial, 8 + 3 * trial as usize, 99);
         let largest = make("active").plan(&belief);
         let mut travel = make("travel");
-        let places: Vec<Vec<f64>> = (0..tour).map(|_| travel.plan(&belief).target).collect();
+        let places: Vec<Vec<f64>> =
+            (0..tour).map(|_| travel.plan(&belief).target.numbers()).collect();
         let near = |a: &[f64], b: &[f64]| SQUARE.distance(a, b) < 0.02;
-        assert!(places.iter().any(|place| near(place, &largest.target)), "{trial}: {places:?}");
+        assert!(
+            places.iter().any(|place| near(place, &largest.target.numbers())),
+            "{trial}: {places:?}"
+        );
         let way = |places: &[Vec<f64>]| -> f64 {
             let start = belief.targets().last().unwrap();
             let from = std::iter::once(start).chain(places);
@@ -309,11 +313,11 @@ fn travel_tours_the_places_of_active_on_a_shorter_way() {
 fn grid_goes_from_coarse_to_fine() {
     let belief = HeightField::new(LINE, GpSettings::default());
     let mut grid = make("grid");
-    let places: Vec<f64> = (0..9).map(|_| grid.plan(&belief).target[0]).collect();
+    let places: Vec<f64> = (0..9).map(|_| grid.plan(&belief).target.numbers()[0]).collect();
     assert_eq!(places, [-2.0, 2.0, 0.0, -1.0, 1.0, -1.5, 0.5, -0.5, 1.5]);
     let belief = HeightField::new(SQUARE, GpSettings::default());
     let mut grid = make("grid");
-    let places: Vec<Vec<f64>> = (0..289).map(|_| grid.plan(&belief).target).collect();
+    let places: Vec<Vec<f64>> = (0..289).map(|_| grid.plan(&belief).target.numbers()).collect();
     for place in SQUARE.grid(17) {
         let same = |other: &&Vec<f64>| SQUARE.distance(&place, other) < 1e-9;
         assert_eq!(places.iter().filter(same).count(), 1, "{place:?}");

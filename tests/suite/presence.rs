@@ -94,16 +94,17 @@ fn simulation(scene: &str) -> Simulation {
 fn brier(simulation: &Simulation, planner: &str) -> [f64; 2] {
     let row = simulation.trial(planner::by_name(planner).unwrap(), 0);
     assert_eq!(row.failure, None);
-    let zone = simulation.task().zone();
+    let zone = simulation.task().zone().unwrap();
     let finger = simulation.environment().scene().finger.clone();
     let far_m = simulation.task().depth_m()[1];
     let mut belief = HeightField::new(zone.clone(), GpSettings::default());
     for row in &row.touches {
-        let p_wt = zone.x_wz() * zone.local(&row.target, -far_m);
+        let target = row.target.place().unwrap();
+        let p_wt = zone.x_wz() * zone.local(target, -far_m);
         let touch = row.contact.map_or(Touch::Miss, |p_w| {
             Touch::Contact(Contact { p_wc: Point3::from(p_w), normal_w: Vector3::y() })
         });
-        belief.observe(&row.target, &touch);
+        belief.observe(target, &touch);
         belief.observe_swept(&Swept { finger: finger.clone(), p_wt });
     }
     let silhouette = belief.presence().silhouette();

@@ -14,7 +14,10 @@ fn open(environment: &Arc<Environment>) -> Box<dyn Probe> {
 }
 
 fn contact(environment: &Arc<Environment>, target: &[f64]) -> Contact {
-    match open(environment).touch(&environment.task().approach(target)).unwrap() {
+    match open(environment)
+        .touch(&environment.task().approach(&target[..].into()).unwrap())
+        .unwrap()
+    {
         Touch::Contact(contact) => contact,
         other => panic!("{target:?}: {other:?}"),
     }
@@ -54,7 +57,7 @@ fn a_thin_probe_finds_the_nose_that_the_finger_cannot_enter_beside() {
     // Just beside the nose, whose radius is about 3 mm.
     let beside = [0.005, 0.528];
     let truth = BIRD.true_height_m(&beside).unwrap();
-    let datum = BIRD.scene().zone.datum_y_m();
+    let datum = BIRD.task().zone().unwrap().datum_y_m();
     assert!((contact(&thin, &beside).p_wc.y - datum - truth).abs() < 1e-3);
     let finger = contact(&BIRD, &beside);
     assert!(finger.p_wc.y - datum - truth > 5e-3, "the finger stays on the nose");
@@ -62,7 +65,8 @@ fn a_thin_probe_finds_the_nose_that_the_finger_cannot_enter_beside() {
 
 #[test]
 fn past_the_object_the_finger_meets_nothing() {
-    let touch = |target: &[f64]| open(&BIRD).touch(&BIRD.task().approach(target));
+    let touch =
+        |target: &[f64]| open(&BIRD).touch(&BIRD.task().approach(&target[..].into()).unwrap());
     assert_eq!(touch(&[0.3, 0.5]), Ok(Touch::Miss));
     assert!(touch(&[f64::NAN, 0.5]).is_err());
     assert!(touch(&[0.0, f64::INFINITY]).is_err());
@@ -76,7 +80,7 @@ proptest! {
         let environment = if is_bird { &*BIRD } else { &*CONTAINER };
         let Shape::Mesh { bvh, .. } = environment.shape() else { unreachable!() };
         let finger = &environment.scene().finger;
-        let ahead_w = environment.task().approach(&[x, z]).direction_w();
+        let ahead_w = environment.task().approach(&[x, z].into()).unwrap().direction_w();
         let start = nalgebra::Point3::new(x, -0.5, z);
         let hull = Capsule {
             p0_w: start,

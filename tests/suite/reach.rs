@@ -96,7 +96,7 @@ fn a_plane_is_all_in_reach_and_nothing_is_beside_the_object() {
 
 /// The slow twin lets every finger down and looks at all of them.
 fn by_brute_force(environment: &Environment, places: &[Vec<f64>]) -> Vec<bool> {
-    let (zone, finger) = (&environment.scene().zone, &environment.scene().finger);
+    let (zone, finger) = (environment.task().zone().unwrap(), &environment.scene().finger);
     let steps: Vec<f64> = (zone.extents_m().iter())
         .map(|side_m| (side_m * 8.0 / finger.radius_m).clamp(1.0, 128.0).ceil())
         .collect();
@@ -107,7 +107,8 @@ fn by_brute_force(environment: &Environment, places: &[Vec<f64>]) -> Vec<bool> {
     for j in 0..=steps[1] as usize {
         for i in 0..=steps[0] as usize {
             let target = zone.at(&[i as f64 / steps[0], j as f64 / steps[1]]);
-            let rest = rest(environment, &environment.task().approach(&target));
+            let rest =
+                rest(environment, &environment.task().approach(&target.as_slice().into()).unwrap());
             fingers.extend(rest.map(|rest| (target, (x_zw * rest.p_wt).y)));
         }
     }
@@ -153,13 +154,13 @@ fn reach_is_what_letting_every_finger_down_finds() {
         for rough_m in [0.001, 0.006, 0.03] {
             let profile = environment(&[(-0.06, 0.0), (0.06, 0.0)], finger);
             let mut scene = profile.scene().clone();
-            scene.zone.depth_m = None;
-            scene.zone.rotation_deg = [0.0, 0.0, 20.0 * rng.random::<f64>()];
+            scene.zone.as_mut().unwrap().depth_m = None;
+            scene.zone.as_mut().unwrap().rotation_deg = [0.0, 0.0, 20.0 * rng.random::<f64>()];
             let bvh = MeshBvh::new(random_relief(rng, rough_m));
             let Shape::Mesh { report, .. } = profile.shape() else { unreachable!() };
             let shape = Shape::Mesh { bvh, report: report.clone() };
             let environment = Environment::around(scene, shape).unwrap();
-            let places = environment.scene().zone.grid(15);
+            let places = environment.task().zone().unwrap().grid(15);
             let heights: Vec<_> =
                 places.iter().map(|place| environment.true_height_m(place)).collect();
             let fast = reach::is_reachable(&environment, &places, &heights, &|_| ());

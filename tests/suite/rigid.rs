@@ -43,11 +43,13 @@ fn touch(mesh: Mesh, collision: Collision, targets: &[[f64; 2]]) -> Vec<Contact>
     let environment = Arc::new(Environment::around(scene, shape).unwrap());
     let simulator = Simulator::new(Arc::clone(&environment)).unwrap();
     let mut probe = simulator.probe(0).unwrap();
-    let mut touch =
-        |target: &[f64; 2]| match probe.touch(&environment.task().approach(target)).unwrap() {
-            Touch::Contact(contact) => contact,
-            other => panic!("{collision:?} {target:?}: {other:?}"),
-        };
+    let mut touch = |target: &[f64; 2]| match probe
+        .touch(&environment.task().approach(&target[..].into()).unwrap())
+        .unwrap()
+    {
+        Touch::Contact(contact) => contact,
+        other => panic!("{collision:?} {target:?}: {other:?}"),
+    };
     targets.iter().map(&mut touch).collect()
 }
 

@@ -26,7 +26,7 @@ fn every_shipped_scene_can_be_built() {
             assert!(mesh.vertices().iter().all(inside), "{}", path.display());
             continue;
         }
-        let middle = environment.scene().zone.at(&[0.5, 0.5]);
+        let middle = environment.task().zone().unwrap().at(&[0.5, 0.5]);
         assert!(environment.true_height_m(&middle).is_some(), "{}", path.display());
     }
 }
@@ -68,7 +68,7 @@ fn the_mesh_and_its_formula_give_the_same_heights() {
         let mut scene = Scene::load(&path, &[]).unwrap();
         scene.object.as_mut().unwrap().truth = None;
         let mesh = Environment::build(scene).unwrap();
-        let mut errors: Vec<f64> = (analytic.scene().zone.grid(60).iter())
+        let mut errors: Vec<f64> = (analytic.task().zone().unwrap().grid(60).iter())
             .map(|place| {
                 let heights =
                     [&analytic, &mesh].map(|environment| environment.true_height_m(place).unwrap());

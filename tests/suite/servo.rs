@@ -15,7 +15,7 @@ fn simulator(environment: &Arc<Environment>, seed: u64) -> Box<dyn Probe> {
 }
 
 fn touch(environment: &Arc<Environment>, seed: u64, target: &[f64]) -> Result<Touch, Fault> {
-    simulator(environment, seed).touch(&environment.task().approach(target))
+    simulator(environment, seed).touch(&environment.task().approach(&target[..].into()).unwrap())
 }
 
 /// Distance of a touch's contact from the mesh.
@@ -32,7 +32,7 @@ fn without_electrodes_the_contact_is_exact_and_with_them_within_three_millimetre
         scene.effects.electrodes = None;
         let ideal = Arc::new(Environment::build(scene).unwrap());
         let mut squares = 0.0;
-        let targets = soft.scene().zone.grid(4);
+        let targets = soft.task().zone().unwrap().grid(4);
         for target in &targets {
             let exact = contact(touch(&ideal, 1, target).unwrap());
             assert!(off_surface_m(&ideal, &exact) < 3e-4, "{name} {target:?}");
@@ -50,7 +50,7 @@ fn without_electrodes_the_contact_is_exact_and_with_them_within_three_millimetre
 fn an_arm_carries_the_finger_to_the_same_contacts_as_the_stage() {
     let stage = environment("container_finger.toml", &[]);
     let arm = environment("container_finger.toml", &["arm.links=\"C\""]);
-    for target in stage.scene().zone.grid(3) {
+    for target in stage.task().zone().unwrap().grid(3) {
         let by_stage = contact(touch(&stage, 1, &target).unwrap());
         let by_arm = contact(touch(&arm, 1, &target).unwrap());
         // The arm is a quarter of a millimetre of approach later or sooner when the frame comes.
@@ -64,9 +64,13 @@ fn a_trial_repeats_to_the_bit_and_its_noise_is_the_seeds() {
     let environment = environment("container_finger.toml", &[]);
     let run = |seed| {
         let mut probe = simulator(&environment, seed);
-        let targets = environment.scene().zone.grid(3).into_iter().take(4);
+        let targets = environment.task().zone().unwrap().grid(3).into_iter().take(4);
         targets
-            .map(|target| probe.touch(&environment.task().approach(&target)).unwrap())
+            .map(|target| {
+                probe
+                    .touch(&environment.task().approach(&target.as_slice().into()).unwrap())
+                    .unwrap()
+            })
             .collect::<Vec<_>>()
     };
     assert_eq!(run(7), run(7));
@@ -98,8 +102,8 @@ fn interlocks_leave_every_touch_as_it_is_to_the_bit() {
     for sets in [&[][..], &["arm.links=\"C\"", "effects.wrench={}"]] {
         let environment = environment("bird_finger.toml", sets);
         let (mut bare, mut probe) = (bare(&environment, 5), simulator(&environment, 5));
-        for target in environment.scene().zone.grid(2) {
-            let approach = environment.task().approach(&target);
+        for target in environment.task().zone().unwrap().grid(2) {
+            let approach = environment.task().approach(&target.as_slice().into()).unwrap();
             assert_eq!(bare.touch(&approach).unwrap(), probe.touch(&approach).unwrap());
             assert_eq!(bare.time_s(), probe.time_s());
         }
@@ -114,7 +118,7 @@ fn a_target_that_is_not_a_number_or_out_of_reach_ends_as_a_fault() {
     // It strays on the way, and is not let.
     let strayed = touch(&arm, 1, &[2.9, 0.5]);
     assert!(matches!(strayed, Err(Fault::Interlock { .. })), "{strayed:?}");
-    let far = bare(&arm, 1).touch(&arm.task().approach(&[2.9, 0.5]));
+    let far = bare(&arm, 1).touch(&arm.task().approach(&[2.9, 0.5].into()).unwrap());
     let Err(Fault::OutOfReach { distance_m, .. }) = far else { panic!("{far:?}") };
     // Nearly as far as the target is from the base, less the arm's length.
     assert!((1.5..2.5).contains(&distance_m), "{distance_m}");
@@ -162,7 +166,7 @@ fn broken(environment: &Arc<Environment>, breaks: Breaks) -> (Result<Touch, Faul
     };
     let simulator = Simulator::new(Arc::clone(environment)).unwrap();
     let mut servo = simulator.servo(Box::new(body), 1).unwrap();
-    let touch = servo.touch(&environment.task().approach(&[0.02, 0.5]));
+    let touch = servo.touch(&environment.task().approach(&[0.02, 0.5].into()).unwrap());
     let commands = commands.lock().unwrap().clone();
     (touch, commands)
 }

@@ -291,7 +291,8 @@ fn a_touch_of_a_scene_is_felt_with_it() {
     let [columns, shell] = [&[][..], &sets].map(|sets| {
         let environment = environment("container_finger.toml", sets);
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
-        contact(probe.touch(&environment.task().approach(&[0.0, 0.5])).unwrap()).p_wc
+        contact(probe.touch(&environment.task().approach(&[0.0, 0.5].into()).unwrap()).unwrap())
+            .p_wc
     });
     // Electrodes tell the place to some 3 mm (docs/finger.md).
     assert!((shell - columns).norm() < 3e-3 && shell != columns, "{shell} {columns}");

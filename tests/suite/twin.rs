@@ -20,7 +20,11 @@ fn compare(scene: &str, settings: BackendSettings) {
     let touches = rig.touch(&rig.lab().unwrap(), &[place]);
     let Ok(Touch::Contact(far)) = &touches[0] else { panic!("{touches:?}") };
     let task = rig.simulator.environment().task();
-    let near = rig.simulator.probe(0).unwrap().touch(&task.approach(&task.zone().at(&place)));
+    let near = rig
+        .simulator
+        .probe(0)
+        .unwrap()
+        .touch(&task.approach(&task.zone().unwrap().at(&place).into()).unwrap());
     let Ok(Touch::Contact(near)) = near else { panic!("{near:?}") };
     let off_m = (far.p_wc - near.p_wc).norm();
     assert!(off_m < 3e-4, "{off_m}: {far:?} {near:?}");

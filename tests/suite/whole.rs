@@ -19,7 +19,7 @@ use palpate::math::seed::stream;
 use palpate::report::{findings, whole};
 use palpate::sim::environment::Shape;
 use palpate::sim::{Environment, Scene};
-use palpate::task::Aim;
+use palpate::task::{Aim, Target};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 
@@ -131,7 +131,7 @@ fn make(name: &str, random: ChaCha8Rng) -> Box<dyn Planner> {
 }
 
 fn plan(planner: &mut Box<dyn Planner>, belief: &ImplicitSurface) -> Aim {
-    Aim::of(&planner.plan(&Belief::from(belief.clone())).unwrap().target).unwrap()
+    *planner.plan(&Belief::from(belief.clone())).unwrap().target.aim().unwrap()
 }
 
 /// In another size everything is the same but for rounding.
@@ -233,7 +233,7 @@ fn rows_are_reproducible() {
 #[test]
 fn planners_begin_alike() {
     let simulation = simulation(sphere, "planners = [\"active\", \"random\"]\ntouches = 6");
-    let targets = |name: &str, trial: u32| -> Vec<Vec<f64>> {
+    let targets = |name: &str, trial: u32| -> Vec<Target> {
         let row = simulation.trial(planner::by_name(name).unwrap(), trial);
         row.touches.into_iter().take(5).map(|touch| touch.target).collect()
     };
@@ -343,7 +343,7 @@ fn verification_touches_hold_a_belief_around_an_object_to_what_it_expects() {
             // The sphere is some centimetres wide.
             assert!(error_m.abs() < 2e-3 && error_m.abs() < 6.0 * sd_m, "{name}: {touch:?}");
             // Where it was expected and where it was met: nearly the same, seen along the way.
-            let aim = Aim::of(&touch.target).unwrap();
+            let aim = touch.target.aim().unwrap();
             let met = Point3::from(touch.contact.unwrap());
             let before_m = -(met - aim.p_w).dot(&aim.ahead_w);
             assert!((before_m - touch.predicted_m).abs() < 0.02, "{name}: {touch:?} {before_m}");

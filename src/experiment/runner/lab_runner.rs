@@ -144,7 +144,7 @@ impl Witness for Keeper<'_> {
             let is_same = made.target == touched.row.target;
             return is_same.then_some(()).ok_or(Fault::PlannedOtherwise {
                 touch: touched.count,
-                target: made.target.clone(),
+                target: made.target.numbers(),
             });
         }
         let entry = Entry {

@@ -119,7 +119,7 @@ pub fn median_shift_m(zone: &Zone, rows: &[TrialRow]) -> Option<f64> {
         .filter_map(|touch| {
             let place = zone.place(&Point3::from(touch.contact?));
             let square = |(a, b): (&f64, &f64)| (a - b).powi(2);
-            Some(place.iter().zip(&touch.target).map(square).sum::<f64>().sqrt())
+            Some(place.iter().zip(touch.target.place()?).map(square).sum::<f64>().sqrt())
         })
         .collect();
     median(&shifts_m)

@@ -88,11 +88,8 @@ fn belongs(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
     if found > wanted {
         return Err(format!("{found} touches of {wanted}"));
     }
-    // A target, and the lengths of a fit.
-    let dimensions = match experiment.scene.around {
-        None => [experiment.scene.zone.dimension(); 2],
-        Some(_) => [6, 3],
-    };
+    // Coordinates of a target, and length scales of a fit.
+    let dimensions = experiment.scene.zone.as_ref().map_or([6, 3], |zone| [zone.dimension(); 2]);
     row.touches.iter().zip(1..).try_for_each(|(touch, count)| {
         fits(touch, dimensions).map_err(|message| format!("touch {count}: {message}"))
     })
@@ -101,7 +98,8 @@ fn belongs(row: &TrialRow, experiment: &Experiment) -> Result<(), String> {
 /// Whether a touch has a target of as many coordinates, with a fit of as many lengths that a belief
 /// can be made of; if not, why.
 fn fits(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), String> {
-    let target = touch.target.len();
+    let numbers = touch.target.numbers();
+    let target = numbers.len();
     if target != coordinates {
         return Err(format!("a target of {target} coordinates where {coordinates} are needed"));
     }
@@ -137,7 +135,8 @@ fn impossible(touch: &TouchRow) -> Option<(&'static str, f64, [f64; 2])> {
     const LENGTH: [f64; 2] = [0.0, FAR_M];
     let coordinate = |value: f64| ("a coordinate", Some(value), [-FAR_M, FAR_M]);
     let places = [touch.contact, touch.normal, touch.tip].into_iter().flatten().flatten();
-    let places = touch.target.iter().copied().chain(places).map(coordinate);
+    let numbers = touch.target.numbers();
+    let places = numbers.into_iter().chain(places).map(coordinate);
     let metrics = touch.metrics.iter().flat_map(|metrics| {
         [
             ("r", Some(metrics.r), CORRELATION),

@@ -49,8 +49,8 @@ fn obj(mesh: &Mesh) -> String {
 
 /// The truth as the file holds it.
 fn text(experiment: &Experiment, truth: &Truth) -> String {
-    let mut text =
-        String::from(if experiment.scene.zone.dimension() == 1 { "x_m" } else { "x_m,z_m" });
+    let is_interval = experiment.scene.zone.as_ref().is_some_and(|zone| zone.z_m.is_none());
+    let mut text = String::from(if is_interval { "x_m" } else { "x_m,z_m" });
     text += ",height_m,is_reachable\n";
     for (i, place) in truth.places.iter().enumerate() {
         for coordinate in place {
@@ -66,15 +66,14 @@ fn text(experiment: &Experiment, truth: &Truth) -> String {
 pub(super) fn read(path: &Path, experiment: &Experiment) -> Result<Truth, StoreError> {
     let bad =
         |line: usize, message: String| StoreError::BadRow { path: path.into(), line, message };
-    let zone = &experiment.scene.zone;
-    if experiment.scene.around.is_some() {
+    let Some(zone) = &experiment.scene.zone else {
         let mesh = path.with_file_name(MESH);
         if !mesh.exists() {
             return Ok(Truth::around(None));
         }
         let (mesh, _) = import(&mesh, 1.0).map_err(|error| bad(1, error.to_string()))?;
         return Ok(Truth::around(Some(&mesh)));
-    }
+    };
     let text = files::text(path, u64::MAX).map_err(io_error(path))?;
     let (mut places, mut heights_m, mut is_reachable) = (Vec::new(), Vec::new(), Vec::new());
     for (i, record) in csv::Reader::from_reader(text.as_bytes()).records().enumerate() {

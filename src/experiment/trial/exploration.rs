@@ -11,7 +11,7 @@ use crate::explore::planner::{self, Plan, PlanError, PlannerFactory};
 use crate::explore::probe::{Probe, Swept, Touch};
 use crate::gp::covariance::CovarianceError;
 use crate::math::seed;
-use crate::task::Approach;
+use crate::task::{Approach, Target};
 
 /// One trial's belief, and what chooses its touches.
 pub(super) struct Exploration<'a> {
@@ -67,7 +67,7 @@ impl<'a> Exploration<'a> {
     /// Adds a touch.
     pub(super) fn observe(
         &mut self,
-        target: &[f64],
+        target: &Target,
         approach: &Approach,
         touched: (&Touch, Option<&Swept>),
     ) {

@@ -14,7 +14,7 @@ use crate::explore::planner::search::{Candidates, Search, decided, free_aim};
 use crate::explore::planner::{Plan, PlanningSettings};
 use crate::sim::Environment;
 use crate::sim::probe::exact;
-use crate::task::Aim;
+use crate::task::{Aim, Target};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
@@ -35,9 +35,9 @@ const LOOKED_AT: usize = 8;
 
 impl GroundTruth<'_> {
     /// The belief with a touch of a rigid finger at `target`, not fitted again.
-    fn touched(&self, belief: &Belief, target: &[f64]) -> Option<Belief> {
+    fn touched(&self, belief: &Belief, target: &Target) -> Option<Belief> {
         let mut probe = exact(Arc::clone(self.environment));
-        let approach = self.environment.task().approach(target);
+        let approach = self.environment.task().approach(target)?;
         let touch = probe.touch(&approach).ok()?;
         let mut after = belief.clone();
         after.observe(target, &approach, (&touch, probe.swept().as_ref()));
@@ -82,14 +82,15 @@ impl Oracle {
         match belief {
             Belief::HeightField(field) => {
                 let count = self.search.settings.oracle.candidates;
-                let targets = self.search.scattered(field.zone(), count);
+                let places = self.search.scattered(field.zone(), count);
+                let targets = places.into_iter().map(Target::from).collect();
                 match self.best(belief, truth, targets) {
-                    Some(target) => self.search.conclude(field, target),
-                    None => self.search.anywhere(field.zone()),
+                    Some(Target::Place(place)) => self.search.conclude(field, place),
+                    _ => self.search.anywhere(field.zone()),
                 }
             }
             Belief::ImplicitSurface(surface) => {
-                let targets = self.aims(surface).iter().map(Aim::target).collect();
+                let targets = self.aims(surface).into_iter().map(Target::from).collect();
                 match self.best(belief, truth, targets) {
                     Some(target) => Plan::at(target),
                     None => decided(&any_side(surface.scope(), &mut self.search.rng), None),
@@ -98,12 +99,7 @@ impl Oracle {
         }
     }
 
-    fn best(
-        &self,
-        belief: &Belief,
-        truth: &GroundTruth,
-        targets: Vec<Vec<f64>>,
-    ) -> Option<Vec<f64>> {
+    fn best(&self, belief: &Belief, truth: &GroundTruth, targets: Vec<Target>) -> Option<Target> {
         let is_refitted = self.search.settings.oracle.refit && belief.height_field().is_some();
         let errors = targets.into_iter().filter_map(|target| {
             let mut after = truth.touched(belief, &target)?;

@@ -143,7 +143,7 @@ fn recorded(row: &TouchRow, touch: u32) -> Result<recording::Touch<'_>, Fault> {
     Ok(recording::Touch {
         touch,
         time_s,
-        target: (&row.target).into(),
+        target: row.target.numbers().into(),
         outcome: outcome.into(),
         contact: row.contact.as_ref().map_or(&[][..], |contact| contact).into(),
         normal: row.normal.as_ref().map_or(&[][..], |normal| normal).into(),

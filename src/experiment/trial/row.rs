@@ -7,6 +7,7 @@ use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::trial::verification_row::VerificationRow;
 use crate::explore::planner::Stall;
 use crate::gp::fit::Fit;
+use crate::task::Target;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -39,9 +40,8 @@ pub struct TrialRow {
 /// One touch and the belief after it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TouchRow {
-    /// Where the finger was sent: (x) or (x, z) of a zone; around an object the point aimed at and
-    /// the unit vector along which the finger went, x, y and z of each in `W`.
-    pub target: Vec<f64>,
+    /// Where the finger was sent. Rows of versions before 0.2 hold its numbers without a name.
+    pub target: Target,
     /// The point of contact (x, y, z) in `W`; none for a miss or a touch broken off.
     pub contact: Option<[f64; 3]>,
     /// Whether the touch was broken off: too much force, or no place in what the finger felt.
@@ -116,11 +116,10 @@ impl TrialRow {
 impl TouchRow {
     /// Where the finger was, as far as [travel](TrialRow::path_m) is concerned.
     fn place(&self) -> &[f64] {
-        match (self.target.get(..3), &self.contact) {
-            (Some(_), Some(contact)) => contact,
-            (Some(aimed_at), None) => aimed_at,
-            // A zone has two coordinates at most.
-            (None, _) => &self.target,
+        match (&self.target, &self.contact) {
+            (Target::Place(place), _) => place,
+            (Target::Aim(_), Some(contact)) => contact,
+            (Target::Aim(aim), None) => aim.p_w.coords.as_slice(),
         }
     }
 }

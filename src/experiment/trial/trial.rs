@@ -47,12 +47,12 @@ pub(in crate::experiment) fn run(
                 break;
             }
         };
-        if !task.contains(&plan.target) {
-            let (target, beyond) = (plan.target, beyond(task));
+        let is_inside = task.region().contains(&plan.target);
+        let Some(approach) = task.approach(&plan.target).filter(|_| is_inside) else {
+            let (target, beyond) = (plan.target.numbers(), beyond(task));
             row.failure = Some(format!("touch {count}: planned at {target:?}, {beyond}"));
             break;
-        }
-        let approach = task.approach(&plan.target);
+        };
         let touch = match probe.touch(&approach) {
             Ok(touch) => touch,
             Err(fault) => {

@@ -10,7 +10,7 @@ use crate::explore::planner::sample::sampled;
 use crate::explore::probe::{Probe, Touch};
 use crate::gp::posterior::Scratch;
 use crate::math::seed;
-use crate::task::{Aim, Task};
+use crate::task::{Target, Task};
 use nalgebra::Point3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -33,8 +33,12 @@ pub(super) fn verify(
     let again = repeated(touches, experiment.repeat_touches);
     let again = again.into_iter().map(|at| (touches[at].target.clone(), Some(at)));
     for (target, again) in targets.chain(again) {
-        let Some((predicted_m, predicted_sd_m)) = predicted(belief, &target) else { break };
-        let touch = match probe.touch(&task.approach(&target)) {
+        let predicted = predicted(belief, &target);
+        let Some(((predicted_m, predicted_sd_m), approach)) = predicted.zip(task.approach(&target))
+        else {
+            break;
+        };
+        let touch = match probe.touch(&approach) {
             Ok(touch) => touch,
             Err(fault) => {
                 let failure = format!("verification touch {}: {fault}", rows.len() + 1);
@@ -93,14 +97,14 @@ fn outside(belief: &Belief, p_w: &Point3<f64>) -> Option<(f64, f64)> {
 /// Where the belief expects a touch at `target` to meet the surface: the height at a place; around
 /// an object the distance before the point that is aimed at, 0 with the deviation of the ball's
 /// radius where it expects nothing on the way.
-fn predicted(belief: &Belief, target: &[f64]) -> Option<(f64, f64)> {
+fn predicted(belief: &Belief, target: &Target) -> Option<(f64, f64)> {
     match belief {
-        Belief::HeightField(field) => height(field, target),
+        Belief::HeightField(field) => height(field, target.place()?),
         Belief::ImplicitSurface(surface) => {
-            let (aim, ball) = (Aim::of(target)?, &surface.scope().ball);
+            let (aim, ball) = (target.aim()?, &surface.scope().ball);
             let mut field = surface.surface()?.field();
             let at = |along_m: f64| aim.p_w + aim.ahead_w.scale(along_m);
-            let [from_m, to_m] = ball.chord_m(&aim);
+            let [from_m, to_m] = ball.chord_m(aim);
             let along_m = first_zero([from_m, to_m], |along_m| field.value(&at(along_m)));
             Some(match along_m {
                 Some(along_m) => (-along_m, outside(belief, &at(along_m))?.1),
@@ -143,7 +147,7 @@ fn meet(
 
 /// `count` targets of a Halton sequence over the unit square, shifted by `random` (Cranley and
 /// Patterson 1976).
-fn new_targets(belief: &Belief, count: u32, random: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
+fn new_targets(belief: &Belief, count: u32, random: &mut ChaCha8Rng) -> Vec<Target> {
     let dimension = belief.height_field().map_or(2, |field| field.zone().dimension());
     let shifts: Vec<f64> = (0..dimension).map(|_| random.random()).collect();
     let mut i = 0;

@@ -1,5 +1,6 @@
 //! What came of a touch that was predicted before it was made.
 
+use crate::task::Target;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct VerificationRow {
     /// Where the finger was sent, as in the trial's touches.
-    pub target: Vec<f64>,
+    pub target: Target,
     /// Which of the trial's touches it repeats, counted from 1; none of a touch at a new place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub again: Option<u32>,

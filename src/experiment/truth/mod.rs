@@ -14,7 +14,7 @@ use crate::task::Zone;
 use std::sync::Arc;
 
 /// True heights on the test grid of an experiment.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Truth {
     /// The test places.
     pub places: Vec<Vec<f64>>,
@@ -49,11 +49,13 @@ impl Truth {
     /// begins.
     pub fn sample_telling(environment: &Environment, per_side: usize, tell: &dyn Fn(&str)) -> Self {
         tell("looking where the surface is");
-        let places = environment.scene().zone.grid(per_side);
+        let Some(zone) = environment.task().zone() else {
+            return Self::around(environment.mesh());
+        };
+        let places = zone.grid(per_side);
         let heights_m: Vec<_> =
             places.iter().map(|place| environment.true_height_m(place)).collect();
         let is_reachable = reach::is_reachable(environment, &places, &heights_m, tell);
-        let zone = &environment.scene().zone;
         Self { is_whole: true, ..Self::new(zone, places, heights_m, is_reachable) }
     }
 
@@ -74,8 +76,7 @@ impl Truth {
             }
             false => mesh.clone(),
         });
-        let nowhere = Self::new(&Zone::nothing(), Vec::new(), Vec::new(), Vec::new());
-        Self { mesh: kept.map(Arc::new), ..nowhere }
+        Self { mesh: kept.map(Arc::new), ..Self::default() }
     }
 
     /// Whether any height is known.

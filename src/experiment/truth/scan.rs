@@ -44,7 +44,7 @@ pub fn scan(
     progress: &(dyn Fn() + Sync),
 ) -> Result<Option<Vec<ScanTouch>>, RunError> {
     let task = simulator.environment().task();
-    let zone = task.zone();
+    let Some(zone) = task.zone() else { return Ok(None) };
     let share = |i: usize, count: usize| i as f64 / (count.max(2) - 1) as f64;
     let row = |j: usize| {
         if stop.load(Ordering::Relaxed) {
@@ -53,15 +53,16 @@ pub fn scan(
         let mut probe = simulator.probe(j as u64);
         let touches = (0..columns).map(|i| {
             let target = zone.at(&[share(i, columns), share(j, rows)]);
+            let approach = task.approach(&target.clone().into())?;
             let touch = match &mut probe {
-                Ok(probe) => probe.touch(&task.approach(&target)),
+                Ok(probe) => probe.touch(&approach),
                 Err(fault) => Err(fault.clone()),
             };
-            ScanTouch { touch, target }
+            Some(ScanTouch { touch, target })
         });
-        let touches: Vec<ScanTouch> = touches.collect();
+        let touches: Option<Vec<ScanTouch>> = touches.collect();
         progress();
-        Some(touches)
+        touches
     };
     let touches: Option<Vec<Vec<ScanTouch>>> =
         pool(threads)?.install(|| (0..rows).into_par_iter().map(row).collect());

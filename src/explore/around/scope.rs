@@ -23,12 +23,10 @@ pub struct Scope {
 }
 
 impl Scope {
-    /// Of a task around a whole object, touched by `finger`, which may be soft; none of one with a
-    /// zone.
-    pub fn of(task: &Task, finger: &Finger, is_soft: bool) -> Option<Self> {
-        let ball = task.ball()?.clone();
+    /// The `ball` of a task around a whole object, touched by `finger`, which may be soft.
+    pub fn new(ball: Ball, task: &Task, (finger, is_soft): (&Finger, bool)) -> Self {
         let offset_m = if is_soft { SOFT_OFFSET_M } else { 0.0 };
-        Some(Self { ball, radius_m: finger.radius_m, offset_m, task: Arc::new(task.clone()) })
+        Self { ball, radius_m: finger.radius_m, offset_m, task: Arc::new(task.clone()) }
     }
 
     /// The ball about `contacts`, which says how large the object is when the one it is sought in

@@ -11,7 +11,7 @@ use crate::gp::Posterior;
 use crate::gp::covariance::CovarianceError;
 use crate::gp::fit::Fit;
 use crate::robot::Finger;
-use crate::task::{Aim, Approach, Task};
+use crate::task::{Approach, Region, Target, Task};
 
 /// The belief of one trial. Either kind is large, and few are held at once.
 #[derive(Clone)]
@@ -31,9 +31,12 @@ impl Belief {
         gp: &GpSettings,
         space: &SpaceSettings,
     ) -> Self {
-        match Scope::of(task, finger, is_soft) {
-            Some(scope) => ImplicitSurface::new(scope, space.clone()).into(),
-            None => HeightField::new(task.zone().clone(), gp.clone()).into(),
+        match task.region() {
+            Region::Zone(zone) => HeightField::new(zone.clone(), gp.clone()).into(),
+            Region::Ball(ball) => {
+                let scope = Scope::new(ball.clone(), task, (finger, is_soft));
+                ImplicitSurface::new(scope, space.clone()).into()
+            }
         }
     }
 
@@ -41,20 +44,19 @@ impl Belief {
     /// belief changes with the next [`refit`](Self::refit).
     pub fn observe(
         &mut self,
-        target: &[f64],
+        target: &Target,
         approach: &Approach,
         (touch, swept): (&Touch, Option<&Swept>),
     ) {
-        match self {
-            Self::HeightField(field) => {
-                field.observe(target, touch);
+        match (self, target) {
+            (Self::HeightField(field), Target::Place(place)) => {
+                field.observe(place, touch);
                 swept.into_iter().for_each(|swept| field.observe_swept(swept));
             }
-            Self::ImplicitSurface(surface) => {
-                if let Some(aim) = Aim::of(target) {
-                    surface.observe(&aim, approach, (touch, swept));
-                }
+            (Self::ImplicitSurface(surface), Target::Aim(aim)) => {
+                surface.observe(aim, approach, (touch, swept));
             }
+            _ => {}
         }
     }
 
@@ -107,10 +109,12 @@ impl Belief {
     }
 
     /// Every target asked for so far.
-    pub fn targets(&self) -> Vec<Vec<f64>> {
+    pub fn targets(&self) -> Vec<Target> {
         match self {
-            Self::HeightField(field) => field.targets().to_vec(),
-            Self::ImplicitSurface(surface) => surface.asked().iter().map(Aim::target).collect(),
+            Self::HeightField(field) => field.targets().iter().cloned().map(Target::from).collect(),
+            Self::ImplicitSurface(surface) => {
+                surface.asked().iter().copied().map(Target::from).collect()
+            }
         }
     }
 

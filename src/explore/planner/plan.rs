@@ -2,6 +2,7 @@
 
 use super::settings::PlanningSettings;
 use crate::explore::belief::{Belief, HeightField};
+use crate::task::Target;
 use rand_chacha::ChaCha8Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,8 +67,8 @@ pub trait Planner: Send {
 /// A planner's choice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// The target: a place of a zone, or six numbers that aim at an object from any side.
-    pub target: Vec<f64>,
+    /// Where to touch.
+    pub target: Target,
     /// Standard deviation there, if the planner looked at it: the root of
     /// the belief's variance.
     pub sd_m: Option<f64>,
@@ -77,8 +78,8 @@ pub struct Plan {
 
 impl Plan {
     /// To touch `target`.
-    pub fn at(target: Vec<f64>) -> Self {
-        Self { target, sd_m: None, stall: None }
+    pub fn at(target: impl Into<Target>) -> Self {
+        Self { target: target.into(), sd_m: None, stall: None }
     }
 }
 

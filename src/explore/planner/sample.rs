@@ -2,7 +2,7 @@
 
 use crate::explore::around::Scope;
 use crate::explore::belief::Belief;
-use crate::task::{Aim, Ball, Zone};
+use crate::task::{Aim, Ball, Target, Zone};
 use nalgebra::{Point3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,7 @@ pub fn uniform(zone: &Zone, rng: &mut ChaCha8Rng) -> Vec<f64> {
 
 /// A uniformly random target: a place of a zone, or a side of the ball from which the finger goes
 /// at its centre.
-pub fn anywhere(belief: &Belief, rng: &mut ChaCha8Rng) -> Vec<f64> {
+pub fn anywhere(belief: &Belief, rng: &mut ChaCha8Rng) -> Target {
     sampled(belief, |count| fractions(count, rng))
 }
 
@@ -24,10 +24,10 @@ fn fractions(count: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
 
 /// The target at the fractions 0..1 that `next` returns, of which it is asked for one or two.
 /// Around an object they stand for a side, and more are asked for until one can be reached.
-pub fn sampled(belief: &Belief, mut next: impl FnMut(usize) -> Vec<f64>) -> Vec<f64> {
+pub fn sampled(belief: &Belief, mut next: impl FnMut(usize) -> Vec<f64>) -> Target {
     match belief {
-        Belief::HeightField(field) => field.zone().at(&next(field.zone().dimension())),
-        Belief::ImplicitSurface(surface) => reached(surface.scope(), || next(2)).target(),
+        Belief::HeightField(field) => field.zone().at(&next(field.zone().dimension())).into(),
+        Belief::ImplicitSurface(surface) => reached(surface.scope(), || next(2)).into(),
     }
 }
 

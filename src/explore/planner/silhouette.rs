@@ -15,7 +15,6 @@ use super::plan::{Entry, Plan, ZonePlanner, over_zone};
 use super::search::Search;
 use super::sobol;
 use crate::explore::belief::HeightField;
-use crate::explore::tour::distance_m;
 use crate::gp::posterior::{Posterior, Scratch};
 use crate::gp::reduction::Reduction;
 use rand::RngExt;
@@ -71,7 +70,10 @@ impl ZonePlanner for Silhouette {
         // In units of a touch that begins where the last one was.
         let time = |place: &[f64]| {
             let way = self.search.settings.silhouette.touch_way_m.zip(belief.targets().last());
-            1.0 + way.map_or(0.0, |(touch_way_m, here)| distance_m(here, place) / touch_way_m)
+            let travel_m = |here: &[f64]| {
+                here.iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+            };
+            1.0 + way.map_or(0.0, |(touch_way_m, here)| travel_m(here) / touch_way_m)
         };
         let valued = candidates.into_iter().map(|place| (value(&place) / time(&place), place));
         match valued.max_by(|a, b| a.0.total_cmp(&b.0)) {

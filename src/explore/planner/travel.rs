@@ -11,9 +11,9 @@ use super::sample::any_side;
 use super::search::{Candidates, Search, decided, unseen};
 use crate::explore::around::ImplicitSurface;
 use crate::explore::belief::{Belief, HeightField};
-use crate::explore::tour::{distance_m, shorten};
+use crate::explore::tour::shorten;
 use crate::gp::posterior::Scratch;
-use crate::task::{Aim, Ball};
+use crate::task::{Aim, Region, Target};
 
 pub(super) const ENTRY: Entry = Entry {
     name: "travel",
@@ -48,17 +48,20 @@ impl Travel {
                 let places = self.largest(field);
                 let tour = places.into_iter().map(|place| self.search.conclude(field, place));
                 self.tour = tour.collect();
-                if let Some(last) = field.targets().last() {
-                    shorten(&mut self.tour, last, &distance_m);
+                if let Some(last) = field.targets().last().cloned() {
+                    let zone = Region::from(field.zone().clone());
+                    shorten(&mut self.tour, &last.into(), &|a, b| zone.travel_m(a, b));
                 }
                 self.tour.reverse();
                 self.tour.pop().unwrap_or_else(|| self.search.anywhere(field.zone()))
             }
         };
-        match plan.stall {
+        match &plan {
             // Touches of this tour may have told what this one was to tell.
-            None => self.search.conclude(field, plan.target),
-            Some(_) => plan,
+            Plan { stall: None, target: Target::Place(place), .. } => {
+                self.search.conclude(field, place.clone())
+            }
+            _ => plan,
         }
     }
 
@@ -111,9 +114,9 @@ impl Travel {
             let variances = (candidates.all.iter())
                 .map(|candidate| known.variance(candidate.p_w.coords.as_slice(), &mut scratch));
             let plan = candidates.best(variances, aside);
-            let Some(aim) = Aim::of(&plan.target).filter(|_| plan.stall.is_none()) else { break };
+            let aimed_at = plan.target.aim().filter(|_| plan.stall.is_none());
+            let Some(place) = aimed_at.map(|aim| aim.p_w.coords) else { break };
             plans.push(plan);
-            let place = aim.p_w.coords;
             match known.fantasize([place.as_slice()].into_iter()) {
                 Ok(after) => known = after,
                 Err(_) => break,
@@ -122,19 +125,10 @@ impl Travel {
         if plans.is_empty() {
             plans.push(decided(aside, None));
         }
-        if let Some(last) = surface.asked().last().map(Aim::target) {
-            let ball = &surface.scope().ball;
-            shorten(&mut plans, &last, &|a, b| way_m(ball, a, b));
+        if let Some(last) = surface.asked().last() {
+            let ball = Region::from(surface.scope().ball.clone());
+            shorten(&mut plans, &Target::from(*last), &|a, b| ball.travel_m(a, b));
         }
         plans
     }
-}
-
-/// Straight way between where the ways of two targets enter the ball.
-fn way_m(ball: &Ball, a: &[f64], b: &[f64]) -> f64 {
-    let near_w = |target: &[f64]| {
-        let aim = Aim::of(target)?;
-        Some(aim.p_w + aim.ahead_w.scale(ball.chord_m(&aim)[0]))
-    };
-    near_w(a).zip(near_w(b)).map_or(0.0, |(a, b)| (a - b).norm())
 }

@@ -5,7 +5,7 @@ use crate::backend::interlock::{InterlockSettings, Interlocked, Site};
 use crate::backend::{Backend, Fault};
 use crate::geometry::distance::{HalfSpace, OrientedBox};
 use crate::robot::Robot;
-use crate::task::Task;
+use crate::task::{Region, Task};
 use nalgebra::{Point3, Vector3};
 
 /// `body`, which moves `robot`, stopped where it has no business in `task` or something is wrong;
@@ -29,23 +29,26 @@ fn site(robot: &Robot, task: &Task, object: Option<OrientedBox>) -> Site {
     let home: Point3<f64> = robot.chain.forward(&robot.chain.home).translation.vector.into();
     let (mut low, mut high) = (home, home);
     let mut farthest = None;
-    if let Some(ball) = task.ball() {
-        let finger = &robot.finger;
-        let around_m = ball.keep_out(finger, touch.standoff_m).radius_m;
-        let beyond_m = ball.radius_m + finger.radius_m + BEYOND_M;
-        let reach = Vector3::repeat(around_m.max(beyond_m));
-        (low, high) = (low.inf(&(ball.centre_w - reach)), high.sup(&(ball.centre_w + reach)));
-    } else {
+    match task.region() {
+        Region::Ball(ball) => {
+            let finger = &robot.finger;
+            let around_m = ball.keep_out(finger, touch.standoff_m).radius_m;
+            let beyond_m = ball.radius_m + finger.radius_m + BEYOND_M;
+            let reach = Vector3::repeat(around_m.max(beyond_m));
+            (low, high) = (low.inf(&(ball.centre_w - reach)), high.sup(&(ball.centre_w + reach)));
+        }
         // Ways are parallel and the zone is a rectangle: its corners span them all.
-        for place in task.zone().grid(2) {
-            let approach = task.approach(&place);
-            let ends =
-                [standoff(robot, touch.standoff_m, &approach), turning_point(robot, &approach)]
-                    .map(|x_wt| Point3::from(x_wt.translation.vector));
-            for p_w in &ends {
-                (low, high) = (low.inf(p_w), high.sup(p_w));
+        Region::Zone(zone) => {
+            let corners = zone.grid(2).into_iter();
+            for approach in corners.filter_map(|place| task.approach(&place.into())) {
+                let ends =
+                    [standoff(robot, touch.standoff_m, &approach), turning_point(robot, &approach)]
+                        .map(|x_wt| Point3::from(x_wt.translation.vector));
+                for p_w in &ends {
+                    (low, high) = (low.inf(p_w), high.sup(p_w));
+                }
+                farthest = Some(HalfSpace { p_w: ends[1], outward_w: approach.direction_w() });
             }
-            farthest = Some(HalfSpace { p_w: ends[1], outward_w: approach.direction_w() });
         }
     }
     Site {

@@ -101,12 +101,12 @@ impl Data {
 /// Replays the trial that the report draws; none if there is nothing to show.
 pub(super) fn data(run: &Run) -> anyhow::Result<Option<Data>> {
     let experiment = &run.experiment;
-    let zone = &experiment.scene.zone;
+    let Some(zone) = &experiment.scene.zone else { return Ok(None) };
     let kind = zone.dimension() - 1;
     let names: Vec<&str> = experiment.planners.iter().map(String::as_str).collect();
     let heights_m = replay::heights_m(run, names.iter().copied());
     let Some(axis) = Axis::around(heights_m, MARGIN[kind], 5.0) else { return Ok(None) };
-    let grid = Grid::new(run, PLACES_MAX[kind])?;
+    let grid = Grid::new(run, zone.dimension(), PLACES_MAX[kind])?;
     let places: Vec<&[f64]> =
         grid.indices.iter().map(|&index| run.truth.places[index].as_slice()).collect();
     let (first, last) = (experiment.initial_touches, experiment.touches);
@@ -189,9 +189,8 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(run: &Run, most: usize) -> anyhow::Result<Self> {
+    fn new(run: &Run, dimension: usize, most: usize) -> anyhow::Result<Self> {
         let (side, count) = (run.experiment.grid as usize, run.truth.places.len());
-        let dimension = run.experiment.scene.zone.dimension();
         ensure!(
             side > 1 && count == side.pow(dimension as u32),
             "the true surface has {count} places on a grid of {side} along each side"
@@ -225,7 +224,7 @@ fn belief(
 fn contact(zone: &Zone, touch: &TouchRow, unit: Length) -> (f64, Option<f64>, Option<f64>) {
     let met = replay::contact(zone, touch);
     let height = met.as_ref().map(|(_, height_m)| short(height_m * unit.per_m));
-    let place = met.map_or(touch.target.clone(), |(place, _)| place);
+    let place = met.map_or_else(|| touch.target.numbers(), |(place, _)| place);
     let coordinate = |side: usize| place.get(side).map(|at| short(at * unit.per_m));
     (coordinate(0).unwrap_or(0.0), height, coordinate(1))
 }

@@ -14,6 +14,7 @@ use crate::report::replay;
 use crate::report::replay::Replay;
 use crate::report::style;
 use crate::report::style::{INITIAL, LATER};
+use crate::task::Zone;
 
 pub(super) const FIGURE: Figure = Figure { name: "acquisition", caption, draw };
 
@@ -36,9 +37,7 @@ fn planner(run: &Run) -> Option<&str> {
 }
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
-    if run.experiment.scene.around.is_some() {
-        return Ok(None);
-    }
+    let Some(zone) = &run.experiment.scene.zone else { return Ok(None) };
     let (Some(planner), Some(&count)) = (planner(run), run.experiment.drawn_touch_counts().first())
     else {
         return Ok(None);
@@ -46,9 +45,9 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let Some(before) = Replay::new(run, planner, count)? else { return Ok(None) };
     let after = Replay::new(run, planner, count + 1)?;
     let replays: Vec<Replay> = std::iter::once(before).chain(after).collect();
-    Ok(match run.experiment.scene.zone.dimension() {
-        1 => draw_curves(run, planner, &replays),
-        _ => draw_maps(run, planner, &replays),
+    Ok(match zone.dimension() {
+        1 => draw_curves((run, zone), planner, &replays),
+        _ => draw_maps((run, zone), planner, &replays),
     })
 }
 
@@ -62,7 +61,7 @@ fn maximum(replay: &Replay, read: impl Iterator<Item = (Vec<f64>, f64)>) -> Opti
     let planned = replay
         .next
         .filter(|next| next.planned_sd_m.is_some() && next.stall.is_none())
-        .map(|next| next.target.clone());
+        .and_then(|next| next.target.place().map(<[f64]>::to_vec));
     planned.or_else(|| read.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(place, _)| place))
 }
 
@@ -89,11 +88,10 @@ const GAPS_PX: (f64, f64) = (66.0, 40.0);
 /// A place, the deviation there, and whether it is drawn.
 type Reading = (Vec<f64>, f64, bool);
 
-fn draw_curves(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
-    let zone = &run.experiment.scene.zone;
+fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> Option<String> {
     let unit = Length::of(zone);
     let read: Vec<Vec<Reading>> =
-        replays.iter().map(|replay| read_deviations(run, replay)).collect();
+        replays.iter().map(|replay| readings(zone.grid(STEPS), replay)).collect();
     let all = read.iter().flatten().map(|(_, sd_m, _)| sd_m * unit.per_m);
     let (_, largest) = Axis::around(all.chain([0.0]), 0.12, 4.0)?.range();
     let mut entries = vec![
@@ -110,7 +108,7 @@ fn draw_curves(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
     let legend = Legend::new(width - LEFT_PX, entries);
     let top = TOP_PX + legend.more_px();
     let most = Area { left: LEFT_PX, top, width: CURVE_PX.0, height: CURVE_PX.1 };
-    let shape = curves::belief_panel(zone, curves::height_axis(run)?, most, EQUAL_HEIGHT_PX);
+    let shape = curves::belief_panel(zone, curves::height_axis(run, unit)?, most, EQUAL_HEIGHT_PX);
     let height = shape.area.bottom() + GAPS_PX.1 + CURVE_PX.2 + 56.0;
     let mut canvas = Canvas::new(width, height);
     legend.draw(&mut canvas, [LEFT_PX, 20.0]);
@@ -122,11 +120,6 @@ fn draw_curves(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
         draw_column(&mut canvas, run, planner, (replay, read), [above, below]);
     }
     Some(canvas.finish())
-}
-
-/// Deviations along the zone in metres.
-fn read_deviations(run: &Run, replay: &Replay) -> Vec<Reading> {
-    readings(run.experiment.scene.zone.grid(STEPS), replay)
 }
 
 fn readings(places: Vec<Vec<f64>>, replay: &Replay) -> Vec<Reading> {
@@ -147,7 +140,7 @@ fn draw_column(
     (replay, read): (&Replay, &[Reading]),
     [above, below]: [Panel; 2],
 ) {
-    let unit = Length::of(&run.experiment.scene.zone);
+    let unit = Length::of(replay.belief.zone());
     let colour = style::planner(&run.experiment.planners, planner);
     let words = |name: &str| format!("{name} ({})", unit.symbol);
     above.frame(canvas);
@@ -174,8 +167,7 @@ const MAP_PX: (f64, f64) = (400.0, 640.0);
 /// Least room from one map to the next: below it are the words of the colour bar.
 const MAP_STEP_PX: f64 = 330.0;
 
-fn draw_maps(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
-    let zone = &run.experiment.scene.zone;
+fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> Option<String> {
     let unit = Length::of(zone);
     let [x, z] = [zone.x_m, zone.z_m?].map(|side| side.map(|end| end * unit.per_m));
     let mut entries = vec![
@@ -219,7 +211,9 @@ fn draw_maps(run: &Run, planner: &str, replays: &[Replay]) -> Option<String> {
                 let colour = if is_initial { INITIAL } else { LATER };
                 match replay::contact(zone, touch) {
                     Some((place, _)) => canvas.cross(on_map(&place), colour),
-                    None => canvas.diamond(on_map(&touch.target), &style::stroke(colour, 1.6)),
+                    None => {
+                        canvas.diamond(on_map(&touch.target.numbers()), &style::stroke(colour, 1.6))
+                    }
                 }
             }
             if let Some(place) = maximum(replay, map.places(zone)) {

@@ -37,16 +37,13 @@ const EQUAL_HEIGHT_PX: f64 = 340.0;
 const GAP: (f64, f64) = (22.0, 68.0);
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
-    if run.experiment.scene.around.is_some() {
-        return Ok(None);
-    }
-    let zone = &run.experiment.scene.zone;
+    let Some(zone) = &run.experiment.scene.zone else { return Ok(None) };
     let (planners, counts) = (run.experiment.drawn_planners(), run.experiment.drawn_touch_counts());
     if zone.dimension() != 1 || !planners.iter().any(|name| replay::row(run, name).is_some()) {
         return Ok(None);
     }
-    let Some(y) = height_axis(run) else { return Ok(None) };
     let unit = Length::of(zone);
+    let Some(y) = height_axis(run, unit) else { return Ok(None) };
     let most = Area { left: 0.0, top: 0.0, width: PANEL.0, height: PANEL.1 };
     let panel = belief_panel(zone, y, most, EQUAL_HEIGHT_PX);
     let step = (PANEL.0 + GAP.0, panel.area.height + GAP.1);
@@ -100,10 +97,9 @@ pub(super) fn belief_panel(zone: &Zone, heights: Axis, most: Area, height_px: f6
 }
 
 /// Room for the truth and every drawn touch, and nearly as much again for the bands.
-pub(super) fn height_axis(run: &Run) -> Option<Axis> {
-    let per_m = Length::of(&run.experiment.scene.zone).per_m;
+pub(super) fn height_axis(run: &Run, unit: Length) -> Option<Axis> {
     let heights_m = replay::heights_m(run, run.experiment.drawn_planners());
-    Axis::around(heights_m.map(|height_m| height_m * per_m), 0.4, 5.0)
+    Axis::around(heights_m.map(|height_m| height_m * unit.per_m), 0.4, 5.0)
 }
 
 fn entries(run: &Run) -> Vec<(Swatch, &'static str)> {
@@ -126,9 +122,9 @@ pub(super) fn draw_belief(
     replay: &Replay,
     colour: &str,
 ) {
-    let zone = &run.experiment.scene.zone;
+    let zone = replay.belief.zone();
     let per_m = Length::of(zone).per_m;
-    let belief = read(run, replay);
+    let belief = read(replay);
     let band: Vec<(f64, f64, f64)> = belief
         .iter()
         .map(|&(x, mean, sd)| (x, mean - BAND_SD * sd, mean + BAND_SD * sd))
@@ -150,7 +146,7 @@ pub(super) fn draw_belief(
                     canvas.cross(panel.at(place[0] * per_m, height * per_m), colour);
                 }
                 None => {
-                    let [x, _] = panel.at(touch.target[0] * per_m, 0.0);
+                    let [x, _] = panel.at(touch.target.numbers()[0] * per_m, 0.0);
                     canvas.diamond([x, panel.area.bottom() - 6.0], &style::stroke(colour, 1.3));
                 }
             }
@@ -159,9 +155,9 @@ pub(super) fn draw_belief(
 }
 
 /// (x, mean, standard deviation) along the zone, not finite where the belief is not drawn.
-fn read(run: &Run, replay: &Replay) -> Vec<(f64, f64, f64)> {
+fn read(replay: &Replay) -> Vec<(f64, f64, f64)> {
     let mut scratch = Scratch::default();
-    let places = run.experiment.scene.zone.grid(STEPS);
+    let places = replay.belief.zone().grid(STEPS);
     let drawn = known::over(replay, places.iter().map(Vec::as_slice));
     (places.iter().zip(drawn))
         .map(|(place, is_drawn)| match is_drawn {

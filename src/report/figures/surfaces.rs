@@ -14,13 +14,15 @@ use crate::report::replay;
 use crate::report::replay::Replay;
 use crate::report::style;
 use crate::report::style::{INITIAL, LATER};
+use crate::task::Zone;
 use anyhow::ensure;
 
 /// Beliefs beside the true surface.
 pub const FIGURE: Figure = Figure { name: "surfaces", caption, draw };
 
 fn caption(run: &Run) -> String {
-    let stretch = space(run).map_or(1.0, |space| space.stretch());
+    let zone = run.experiment.scene.zone.as_ref();
+    let stretch = zone.and_then(|zone| space(run, zone)).map_or(1.0, |space| space.stretch());
     let stretched = match stretch > 1.0 {
         true => format!(" Heights are stretched {stretch:.1} times."),
         false => String::new(),
@@ -45,16 +47,14 @@ const FOOT_PX: f64 = 62.0;
 const BAR_LEFT_MIN_PX: f64 = 215.0;
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
-    if run.experiment.scene.around.is_some() {
-        return Ok(None);
-    }
+    let Some(zone) = &run.experiment.scene.zone else { return Ok(None) };
     let (planners, counts) = (run.experiment.drawn_planners(), run.experiment.drawn_touch_counts());
-    let Some(space) = space(run) else { return Ok(None) };
+    let Some(space) = space(run, zone) else { return Ok(None) };
     if !planners.iter().any(|planner| replay::row(run, planner).is_some()) {
         return Ok(None);
     }
     let grid = Grid::new(run)?;
-    let unit = Length::of(&run.experiment.scene.zone);
+    let unit = Length::of(zone);
     let (columns, rows) = (counts.len() as f64 + 1.0, planners.len() as f64);
     let width = columns * PANEL.0;
     let legend = Legend::new(width, entries(run));
@@ -91,7 +91,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
                 relief.draw(&mut canvas);
                 canvas.grouped(ON_RELIEF, |canvas| {
                     for (touch, is_initial) in replay.marks() {
-                        mark(&panel, canvas, run, &relief, (touch, is_initial));
+                        mark(&panel, canvas, zone, &relief, (touch, is_initial));
                     }
                 });
             }
@@ -103,13 +103,12 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         let heights: Vec<Option<f64>> = grid.places().map(|(_, height_m)| height_m).collect();
         Relief::new(&panel.view, &grid.xs, &grid.zs, &heights, &axis).draw(&mut canvas);
     }
-    draw_colour_bar(&mut canvas, run, space, [0.5 * width, height - FOOT_PX + 14.0]);
+    draw_colour_bar(&mut canvas, unit, space, [0.5 * width, height - FOOT_PX + 14.0]);
     Ok(Some(canvas.finish()))
 }
 
 /// What is drawn: the zone, and heights around the truth and the drawn touches; none in 1-D.
-fn space(run: &Run) -> Option<Space> {
-    let zone = &run.experiment.scene.zone;
+fn space(run: &Run, zone: &Zone) -> Option<Space> {
     let (low, high) =
         Axis::around(replay::heights_m(run, run.experiment.drawn_planners()), 0.08, 5.0)?.range();
     Some(Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: [low, high] })
@@ -153,12 +152,12 @@ impl<'a> Grid<'a> {
 fn mark(
     panel: &ReliefPanel,
     canvas: &mut Canvas,
-    run: &Run,
+    zone: &Zone,
     relief: &Relief,
     (touch, is_initial): (&TouchRow, bool),
 ) {
     let colour = if is_initial { INITIAL } else { LATER };
-    match replay::contact(&run.experiment.scene.zone, touch) {
+    match replay::contact(zone, touch) {
         Some((place, height)) => {
             let point = [place[0], height, place[1]];
             let at = panel.view.at(point);
@@ -169,7 +168,8 @@ fn mark(
             canvas.circle(at, 3.1, &attributes);
         }
         None => {
-            let at = [touch.target[0], panel.space.height_m[0], touch.target[1]];
+            let target = touch.target.numbers();
+            let at = [target[0], panel.space.height_m[0], target[1]];
             canvas.diamond(panel.view.at(at), &style::stroke(colour, 1.3));
         }
     }
@@ -185,8 +185,7 @@ fn entries(run: &Run) -> Vec<(Swatch, &'static str)> {
     entries
 }
 
-fn draw_colour_bar(canvas: &mut Canvas, run: &Run, space: Space, [middle, top]: PointPx) {
-    let unit = Length::of(&run.experiment.scene.zone);
+fn draw_colour_bar(canvas: &mut Canvas, unit: Length, space: Space, [middle, top]: PointPx) {
     let [low, high] = space.height_m.map(|height| height * unit.per_m);
     // Its words stand on the left, in whatever font a browser has.
     let left = (middle - 60.0).max(BAR_LEFT_MIN_PX);

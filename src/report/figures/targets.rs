@@ -14,7 +14,8 @@ use crate::report::style::{FAINT_INK, INITIAL, LATER, PAPER};
 pub(super) const FIGURE: Figure = Figure { name: "targets", caption, draw };
 
 fn caption(run: &Run) -> String {
-    let shift = match median_shift_m(&run.experiment.scene.zone, &run.rows) {
+    let zone = run.experiment.scene.zone.as_ref();
+    let shift = match zone.and_then(|zone| median_shift_m(zone, &run.rows)) {
         Some(shift_m) => format!(
             " Over all trials, half of the contacts lie more than {} mm beside their target.",
             digits(1e3 * shift_m)
@@ -38,10 +39,7 @@ const WIDTH_MIN_PX: f64 = 420.0;
 const MARGIN: f64 = 0.12;
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {
-    if run.experiment.scene.around.is_some() {
-        return Ok(None);
-    }
-    let zone = &run.experiment.scene.zone;
+    let Some(zone) = &run.experiment.scene.zone else { return Ok(None) };
     let Some(z_m) = zone.z_m else { return Ok(None) };
     let rows: Vec<_> = (run.experiment.drawn_planners().into_iter())
         .filter_map(|planner| replay::row(run, planner))
@@ -81,7 +79,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             for (count, touch) in row.touches.iter().enumerate() {
                 let initial = count < run.experiment.initial_touches as usize;
                 let colour = if initial { INITIAL } else { LATER };
-                let target = at(&touch.target);
+                let target = at(&touch.target.numbers());
                 match replay::contact(zone, touch) {
                     Some((place, _)) => {
                         canvas.line([target, at(&place)], &style::stroke(FAINT_INK, 0.9));

@@ -18,14 +18,14 @@ const GROUND_M: f64 = 0.01;
 /// meets nothing lie as low as the lowest that do.
 pub(super) fn obstacle(environment: &Environment) -> Option<String> {
     let Shape::Mesh { bvh, .. } = environment.shape() else { return None };
-    let scene = environment.scene();
+    let (scene, zone) = (environment.scene(), environment.task().zone()?);
     let margin_m = scene.finger.radius_m + scene.finger.length_m;
     let side = |[low, high]: [f64; 2]| [low - margin_m, high + margin_m];
-    let (x_m, z_m) = (side(scene.zone.x_m), side(scene.zone.z_m.unwrap_or_default()));
+    let (x_m, z_m) = (side(zone.x_m), side(zone.z_m.unwrap_or_default()));
     let at =
         |[low, high]: [f64; 2], i: usize| low + (high - low) * i as f64 / (PER_SIDE - 1) as f64;
-    let x_wz = scene.zone.x_wz();
-    let ahead_w = scene.zone.ahead_w();
+    let x_wz = zone.x_wz();
+    let ahead_w = zone.ahead_w();
     let [near_m, far_m] = environment.task().depth_m();
     let start_y_m = -near_m + CLEARANCE_M;
     let heights: Vec<Option<f64>> = (0..PER_SIDE * PER_SIDE)

@@ -4,8 +4,8 @@ use super::mesh::asset;
 use super::text::{list, pose};
 use crate::geometry::mesh::Mesh;
 use crate::robot::arm::Chain;
-use crate::task::Task;
-use nalgebra::{Point3, Translation3, Vector3};
+use crate::task::{Task, Zone};
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 /// Thickness of the board that the object is fixed to, and how far it reaches beyond it.
 const BOARD_M: f64 = 0.02;
@@ -19,7 +19,7 @@ const BESIDE: Vector3<f64> = Vector3::new(1.08, 0.45, 0.36);
 /// all there is.
 pub(super) fn scenery(mesh: &Mesh, task: &Task, chain: &Chain) -> String {
     // The board stands behind the object as the finger sees it.
-    let x_wz = task.zone().x_wz();
+    let x_wz = task.zone().map_or_else(Isometry3::identity, Zone::x_wz);
     let (low, high) = mesh.transformed(&x_wz.inverse()).bounds();
     let middle_z = nalgebra::center(&low, &high);
     let half = (high - low) / 2.0;

@@ -23,12 +23,13 @@ impl FunctionProbe {
 impl Probe for FunctionProbe {
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         refuse_unless_finite(approach)?;
-        let zone = &self.environment.scene().zone;
-        let place = zone.place(&approach.p_near_w);
-        let (Shape::Function(function), Some(&x_m)) = (self.environment.shape(), place.first())
+        let (Shape::Function(function), Some(zone)) =
+            (self.environment.shape(), self.environment.task().zone())
         else {
             return Ok(Touch::Miss);
         };
+        let place = zone.place(&approach.p_near_w);
+        let x_m = place[0];
         let normal_z = Vector3::new(-function.slope(x_m), 1.0, 0.0).normalize();
         Ok(Touch::Contact(Contact {
             p_wc: zone.point(&place, function.height_m(x_m)),

@@ -14,6 +14,7 @@ use crate::study::fidelity::reference_load::ReferenceLoad;
 use crate::study::fidelity::rung_result::electrode_rms_counts;
 use crate::study::fidelity::spread::Spread;
 use crate::study::fidelity::touches::{MeasureError, Touches, touch_all};
+use crate::task::Target;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -53,7 +54,7 @@ pub struct Budget {
 /// The scene as it is, measured once.
 pub struct Baseline {
     environment: Arc<Environment>,
-    targets: Vec<Vec<f64>>,
+    targets: Vec<Target>,
     touches: Touches,
     truth: Truth,
     verdict: Option<Paired>,
@@ -66,7 +67,7 @@ impl Baseline {
     /// If the scene cannot be built.
     pub fn new(
         scene: &Scene,
-        targets: Vec<Vec<f64>>,
+        targets: Vec<Target>,
         budget: Budget,
         tick: &mut dyn FnMut() -> bool,
     ) -> Result<Option<Self>, MeasureError> {
@@ -136,12 +137,13 @@ fn state_bytes(environment: &Environment) -> i64 {
 fn runs(
     name: &str,
     environment: &Arc<Environment>,
-    targets: &[Vec<f64>],
+    targets: &[Target],
 ) -> Result<Option<u64>, MeasureError> {
     let Some(target) = targets.first() else { return Ok(None) };
     let mut probe = Simulator::new(Arc::clone(environment))?.probe(0)?;
     let before = count_of(name);
-    let _ = probe.touch(&environment.task().approach(target));
+    let Some(approach) = environment.task().approach(target) else { return Ok(None) };
+    let _ = probe.touch(&approach);
     Ok(count_of(name).zip(before).map(|(after, before)| after - before))
 }
 
@@ -150,7 +152,7 @@ fn runs(
 pub(super) fn time_ratios(
     without: &Arc<Environment>,
     with: &Arc<Environment>,
-    targets: &[Vec<f64>],
+    targets: &[Target],
     pairs: usize,
 ) -> Result<Vec<f64>, MeasureError> {
     let open = |environment: &Arc<Environment>| -> Result<_, MeasureError> {
@@ -159,11 +161,12 @@ pub(super) fn time_ratios(
     let mut probes = [open(without)?, open(with)?];
     let mut ratios = Vec::with_capacity(pairs);
     for (i, target) in targets.iter().cycle().take(pairs).enumerate() {
+        let Some(approach) = with.task().approach(target) else { continue };
         let mut taken_s = [0.0; 2];
         // Which goes first alternates: the second finds the caches warm.
         for k in [i % 2, (i + 1) % 2] {
             let begun = Instant::now();
-            let _ = std::hint::black_box(probes[k].touch(&with.task().approach(target)));
+            let _ = std::hint::black_box(probes[k].touch(&approach));
             taken_s[k] = begun.elapsed().as_secs_f64();
         }
         ratios.push(taken_s[1] / taken_s[0]);

@@ -9,6 +9,7 @@ use crate::study::fidelity::reference_load::noise_free;
 use crate::study::fidelity::rung_result::electrode_rms_counts;
 use crate::study::fidelity::tolerance::{Quantity, Tolerance};
 use crate::study::fidelity::touches::{MeasureError, Touches, targets, touch_once};
+use crate::task::Target;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -21,7 +22,7 @@ const TOUCHES: usize = 10;
 /// Trials with their targets, no target twice.
 #[derive(Clone, Debug)]
 pub struct Trials {
-    targets: Vec<Vec<Vec<f64>>>,
+    targets: Vec<Vec<Target>>,
     first: u64,
 }
 
@@ -34,7 +35,7 @@ impl Trials {
     }
 
     /// All targets.
-    pub fn targets(&self) -> Vec<Vec<f64>> {
+    pub fn targets(&self) -> Vec<Target> {
         self.targets.concat()
     }
 
@@ -96,7 +97,7 @@ impl Yardstick for ByTouches {
         Self::new(full, self.tolerance, (count, FRESH))
     }
 
-    fn timed(&self) -> Vec<Vec<f64>> {
+    fn timed(&self) -> Vec<Target> {
         self.trials.targets()
     }
 }

@@ -8,6 +8,7 @@ use crate::experiment::{Experiment, Simulation};
 use crate::explore::planner;
 use crate::sim::{Environment, Scene};
 use crate::study::fidelity::touches::MeasureError;
+use crate::task::Target;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -65,7 +66,7 @@ pub struct ByVerdict {
     touches: u32,
     advantages: Vec<Option<f64>>,
     margin_m: Option<f64>,
-    targets: Vec<Vec<f64>>,
+    targets: Vec<Target>,
 }
 
 impl ByVerdict {
@@ -129,7 +130,7 @@ impl Yardstick for ByVerdict {
         Self::new(full, self.margin_m, first..first + count as u32, self.touches)
     }
 
-    fn timed(&self) -> Vec<Vec<f64>> {
+    fn timed(&self) -> Vec<Target> {
         self.targets.clone()
     }
 }

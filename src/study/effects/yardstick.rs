@@ -2,6 +2,7 @@
 
 use crate::sim::Scene;
 use crate::study::fidelity::touches::MeasureError;
+use crate::task::Target;
 
 /// Number of the first trial that had no say in the choice; chosen, beyond any that has.
 pub(super) const FRESH: u64 = 1_000_000;
@@ -59,5 +60,5 @@ pub trait Yardstick: Sized {
     fn fresh(&self, full: &Scene, count: usize) -> Result<Self, MeasureError>;
 
     /// Targets on which a touch is timed.
-    fn timed(&self) -> Vec<Vec<f64>>;
+    fn timed(&self) -> Vec<Target>;
 }

@@ -8,6 +8,7 @@ use crate::robot::finger::TipMotion;
 use crate::sim::environment::Shape;
 use crate::sim::scene::Body;
 use crate::sim::{Environment, Scene};
+use crate::task::Target;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::sync::Arc;
@@ -77,7 +78,7 @@ pub struct OrderRecord {
 /// If the touches cannot be made.
 pub fn in_time_step(
     scene: &Scene,
-    targets: &[Vec<f64>],
+    targets: &[Target],
     tick: &mut dyn FnMut() -> bool,
 ) -> Result<Option<Order>, MeasureError> {
     let mut runs: Vec<(f64, Touches)> = Vec::new();

@@ -55,7 +55,7 @@ pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<Reference
     let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape()) else {
         return None;
     };
-    let zone = environment.task().zone();
+    let zone = environment.task().zone()?;
     let height_m = |tick: &Tick| zone.height_m(&tick.motion.x_wt.translation.vector.into());
     let mut shell = simulator.shell().ok()?;
     let deepest_m = ticks.iter().map(height_m).fold(f64::INFINITY, f64::min);

@@ -62,9 +62,10 @@ pub fn in_step(scene: &Scene) -> Result<Option<Order>, MeasureError> {
 
 /// The force after each tick while the finger is pressed.
 fn pressed(environment: &Arc<Environment>) -> Result<Option<Vec<f64>>, MeasureError> {
-    let middle = environment.scene().zone.at(&[0.5, 0.5]);
+    let Some(zone) = environment.task().zone() else { return Ok(None) };
     let simulator = Simulator::new(Arc::clone(environment))?;
-    let approach = environment.task().approach(&middle);
+    let middle = zone.at(&[0.5, 0.5]).into();
+    let Some(approach) = environment.task().approach(&middle) else { return Ok(None) };
     let (Some(chain), Some(rest), Some(mut body)) =
         (environment.chain(), rest(environment, &approach), simulator.body()?)
     else {

@@ -14,7 +14,7 @@ use crate::math::seed;
 use crate::sim::environment::EnvironmentError;
 use crate::sim::simulator::{Simulator, SimulatorError};
 use crate::sim::{Environment, Scene};
-use crate::task::Approach;
+use crate::task::{Approach, Target};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -41,8 +41,9 @@ pub struct Touches {
 }
 
 /// Evenly spread places of the scene's zone.
-pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Vec<f64>> {
-    let belief = HeightField::new(scene.zone.clone(), GpSettings::default()).into();
+pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Target> {
+    let Some(zone) = scene.zone.clone() else { return Vec::new() };
+    let belief = HeightField::new(zone, GpSettings::default()).into();
     let Some(entry) = planner::by_name("sobol") else { return Vec::new() };
     let random = seed::stream(seed, 0, "targets");
     let mut sobol = entry.make(&PlanningSettings::default(), random);
@@ -70,7 +71,7 @@ pub enum MeasureError {
 /// If the body cannot be brought to its start.
 pub fn touch_all(
     environment: &Arc<Environment>,
-    targets: &[Vec<f64>],
+    targets: &[Target],
     seed: u64,
     tick: &mut dyn FnMut() -> bool,
 ) -> Result<Option<Touches>, MeasureError> {
@@ -90,7 +91,7 @@ pub fn touch_all(
 /// If the body cannot be brought to its start.
 pub fn touch_once(
     environment: &Arc<Environment>,
-    targets: &[Vec<f64>],
+    targets: &[Target],
     seed: u64,
     after: &mut dyn FnMut(&Approach) -> bool,
 ) -> Result<Option<Touches>, MeasureError> {
@@ -115,7 +116,7 @@ pub fn touch_once(
     };
     let mut simulated_s = Vec::new();
     for target in targets {
-        let approach = environment.task().approach(target);
+        let Some(approach) = environment.task().approach(target) else { continue };
         let contact = match traced.touch(&approach) {
             Ok(Touch::Contact(contact)) => Some(contact),
             Ok(Touch::Miss | Touch::Overload) => None,
@@ -177,14 +178,14 @@ pub fn finger_bytes(environment: &Environment) -> usize {
 /// nothing can be fitted.
 pub fn surface_rmse_m(
     scene: &Scene,
-    targets: &[Vec<f64>],
+    targets: &[Target],
     contacts: &[Option<Contact>],
     truth: &Truth,
 ) -> Option<f64> {
-    let mut belief = HeightField::new(scene.zone.clone(), GpSettings::default());
+    let mut belief = HeightField::new(scene.zone.clone()?, GpSettings::default());
     for (target, contact) in targets.iter().zip(contacts) {
         let touch = contact.clone().map_or(Touch::Miss, Touch::Contact);
-        belief.observe(target, &touch);
+        belief.observe(target.place()?, &touch);
     }
     let (_, surface) = belief.refit().ok()?;
     Some(truth.compare(surface)?.rmse_m)

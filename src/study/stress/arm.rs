@@ -6,6 +6,7 @@ use super::solids::{mesh, wall};
 use super::wall::scene;
 use crate::robot::arm::ArmSettings;
 use crate::sim::Scene;
+use crate::task::Zone;
 
 pub(super) const CASES: &[Case] = &[
     case(
@@ -82,10 +83,8 @@ pub(super) const CASES: &[Case] = &[
 
 /// The arm touches the middle of a small wall at `place_m`; out of reach, it says so.
 pub(super) fn reach(scene: Scene, [x, y, z]: [f64; 3], arm: ArmSettings) -> Outcome {
-    let mut zone = scene.zone.clone();
-    zone.x_m = [x - 0.03, x + 0.03];
-    zone.z_m = Some([z - 0.03, z + 0.03]);
-    zone.datum_y_m = Some(y);
+    let zone = Zone::new([x - 0.03, x + 0.03], Some([z - 0.03, z + 0.03]));
+    let zone = Some(Zone { datum_y_m: Some(y), ..zone });
     let Some(mesh) = mesh(wall(0.03), [x, y, z]) else { return Outcome::Wrong("no mesh".into()) };
     touch_solid(Scene { zone, arm: Some(arm), ..scene }, mesh, &[x, z]).on_surface(1e-3)
 }

@@ -54,7 +54,9 @@ pub(super) fn touch_solid_with(
         return CheckedTouch::not_done("no body");
     };
     let (trace, ticks) = Trace::new(body, chain);
-    let approach = environment.task().approach(target);
+    let Some(approach) = environment.task().approach(&target.to_vec().into()) else {
+        return CheckedTouch::not_done("no approach");
+    };
     let touch =
         (simulator.servo(wrap(Box::new(trace)), 1)).and_then(|mut servo| servo.touch(&approach));
     let ticks = ticks.take();

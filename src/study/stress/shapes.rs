@@ -204,8 +204,10 @@ fn sizes(radius_m: f64, period_s: f64) -> Outcome {
 fn far(distance_m: f64, period_s: f64) -> Outcome {
     let [near, far] = [0.0, distance_m].map(|by_m| {
         let mut scene = scene(period_s);
-        scene.zone.x_m = scene.zone.x_m.map(|x| x + by_m);
-        scene.zone.datum_y_m = Some(scene.zone.datum_y_m() + by_m);
+        if let Some(zone) = &mut scene.zone {
+            zone.x_m = zone.x_m.map(|x| x + by_m);
+            zone.datum_y_m = Some(zone.datum_y_m() + by_m);
+        }
         let solid = ball(Point3::new(0.0, -0.02, 0.0), 0.02, 40);
         mesh(solid, [by_m, by_m, 0.0]).map(|mesh| touch_solid(scene, mesh, &[by_m, 0.0]))
     });

@@ -11,6 +11,7 @@ use crate::explore::control::{Controller, Goal};
 use crate::robot::arm::ArmSettings;
 use crate::sim::Environment;
 use crate::sim::mujoco::{Dynamic, Models};
+use crate::task::Zone;
 use nalgebra::{Isometry3, Vector6};
 use std::sync::Arc;
 
@@ -113,9 +114,8 @@ impl WallPress {
             scene.arm = Some(ArmSettings::default());
         }
         let [x, y, z] = face_w;
-        scene.zone.x_m = [x - 0.03, x + 0.03];
-        scene.zone.z_m = Some([z - 0.03, z + 0.03]);
-        scene.zone.datum_y_m = Some(y);
+        let zone = Zone::new([x - 0.03, x + 0.03], Some([z - 0.03, z + 0.03]));
+        scene.zone = Some(Zone { datum_y_m: Some(y), ..zone });
         let setup = FingerOnWall::new(&scene.effects, 1.0)?;
         let depth_m = depth_m(&setup)?;
         let pressed_y_m = y + setup.at(depth_m, 0.0).x_wt.translation.y;

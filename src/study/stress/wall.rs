@@ -116,7 +116,7 @@ pub(super) const CASES: &[Case] = &[
         (&[7.5, 20.0, 100.0], 3),
         |mm, period_s| {
             let mut scene = scene(period_s);
-            scene.zone.x_m = [-0.2, 0.2];
+            scene.zone = Some(Zone::new([-0.2, 0.2], scene.zone.and_then(|zone| zone.z_m)));
             let Some(mesh) = mesh(wall(0.03), [0.0; 3]) else {
                 return Outcome::Wrong("no mesh".into());
             };
@@ -135,7 +135,7 @@ pub(super) fn scene(period_s: f64) -> Scene {
         body: Body::Kinematic,
         function: None,
         around: None,
-        zone: Zone::new([-0.05, 0.05], Some([-0.05, 0.05])),
+        zone: Some(Zone::new([-0.05, 0.05], Some([-0.05, 0.05]))),
         object: None,
         finger: Finger::default(),
         arm: None,
@@ -180,8 +180,11 @@ fn many(count: f64, period_s: f64) -> Outcome {
         Err(fault) => return Outcome::Faulted(fault.to_string()),
     };
     let mut first: Option<Contact> = None;
+    let Some(approach) = environment.task().approach(&vec![0.0, 0.0].into()) else {
+        return Outcome::Wrong("no approach".into());
+    };
     for i in 0..count as u32 {
-        match probe.touch(&environment.task().approach(&[0.0, 0.0])) {
+        match probe.touch(&approach) {
             Ok(Touch::Contact(contact)) => {
                 let moved_m = (contact.p_wc - first.get_or_insert(contact.clone()).p_wc).norm();
                 if moved_m > 3e-4 {

@@ -50,8 +50,8 @@ pub fn belief(ball_m: f64, radius_m: f64) -> ImplicitSurface {
 pub fn belief_with(settings: SpaceSettings, ball_m: f64, radius_m: f64) -> ImplicitSurface {
     let ball = Ball { centre_w: Point3::origin(), radius_m: ball_m, lowest_m: None };
     let finger = Finger { radius_m, pitch_deg: 0.0, ..Finger::default() };
-    let task = Task::around(ball, TouchSettings::default(), &finger);
-    ImplicitSurface::new(Scope::of(&task, &finger, false).unwrap(), settings)
+    let task = Task::new(ball.clone(), TouchSettings::default(), &finger).unwrap();
+    ImplicitSurface::new(Scope::new(ball, &task, (&finger, false)), settings)
 }
 
 pub fn approach(belief: &ImplicitSurface, aim: &Aim) -> Approach {

@@ -64,8 +64,8 @@ pub fn wall() -> Mesh {
 pub fn environment(effects: Effects, mesh: Mesh, pitch_deg: f64) -> Arc<Environment> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
     let mut scene = Scene::load(&path, &["zone.x_m=[-0.02,0.02]".into()]).unwrap();
-    scene.zone.z_m = Some([-0.02, 0.02]);
-    scene.zone.datum_y_m = Some(0.0);
+    scene.zone.as_mut().unwrap().z_m = Some([-0.02, 0.02]);
+    scene.zone.as_mut().unwrap().datum_y_m = Some(0.0);
     scene.body = Body::Dynamic;
     scene.finger.pitch_deg = pitch_deg;
     scene.effects = effects;

@@ -199,8 +199,9 @@ impl Rig {
             Err(fault) => return vec![Err(fault)],
         };
         let mut touches = Vec::new();
+        let zone = task.zone().unwrap();
         for place in places {
-            let touch = servo.touch(&task.approach(&task.zone().at(place)));
+            let touch = servo.touch(&task.approach(&zone.at(place).into()).unwrap());
             let failed = touch.is_err();
             touches.push(touch);
             if failed {

@@ -52,7 +52,7 @@ fn height_m(place: &[f64]) -> Option<f64> {
 /// A run of an experiment, with touches that no planner chose.
 pub fn run(text: &str) -> Run {
     let experiment: Experiment = toml::from_str(text).unwrap();
-    let zone = &experiment.scene.zone;
+    let zone = experiment.scene.zone.as_ref().unwrap();
     let places = zone.grid(experiment.grid as usize);
     let heights_m = places.iter().map(|place| height_m(place)).collect();
     let is_reachable = vec![true; places.len()];
@@ -76,7 +76,7 @@ pub fn tip_behind(zone: &Zone, target: &[f64]) -> [f64; 3] {
 }
 
 fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> TouchRow {
-    let zone = &experiment.scene.zone;
+    let zone = experiment.scene.zone.as_ref().unwrap();
     // Multiples of two irrational numbers spread evenly over the zone.
     let is_initial = count <= experiment.initial_touches;
     let shift = if is_initial { 0.0 } else { 0.37 * f64::from(planner.as_bytes()[0]) };
@@ -115,7 +115,7 @@ fn touch(experiment: &Experiment, (trial, planner): (u32, &str), count: u32) -> 
         shape: None,
         contact: height_m(&target).map(|height_m| zone.point(&target, height_m).coords.into()),
         tip: height_m(&target).is_none().then(|| tip_behind(zone, &target)),
-        target,
+        target: target.into(),
         overload: false,
         normal: None,
         time_s: None,

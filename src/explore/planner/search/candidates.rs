@@ -94,10 +94,10 @@ impl<'a> Candidates<'a> {
 
 /// A plan to go where a planner's own rule wants.
 pub fn decided(aim: &Aim, sd_m: Option<f64>) -> Plan {
-    Plan { target: aim.target(), sd_m, stall: None }
+    Plan { sd_m, ..Plan::at(*aim) }
 }
 
 /// A plan to go anywhere, since no way to what the rule wants is free.
 fn blocked(aim: &Aim) -> Plan {
-    Plan { target: aim.target(), sd_m: None, stall: Some(Stall::Blocked) }
+    Plan { stall: Some(Stall::Blocked), ..Plan::at(*aim) }
 }

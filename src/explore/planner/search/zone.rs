@@ -83,7 +83,7 @@ impl Search {
         let stall = stalled(belief, &place);
         let target = if stall.is_none() { place } else { uniform(belief.zone(), &mut self.rng) };
         let sd_m = Some(variance(belief, &target).sqrt());
-        Plan { target, sd_m, stall }
+        Plan { target: target.into(), sd_m, stall }
     }
 
     /// The largest value of `score` that was found, and its place.

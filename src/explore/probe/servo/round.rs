@@ -228,9 +228,9 @@ mod tests {
             let aims = [first, second].map(|part| aim(&ball, part.try_into().unwrap()));
             let [Some(from), Some(to)] = aims else { return Ok(()) };
             let (robot, touch) = (robot(), TouchSettings::default());
-            let task = Task::around(ball.clone(), touch.clone(), &robot.finger);
+            let task = Task::new(ball.clone(), touch.clone(), &robot.finger).unwrap();
             prop_assume!(task.reaches(&from) && task.reaches(&to));
-            let approaches = [from, to].map(|aim| task.approach(&aim.target()));
+            let approaches = [from, to].map(|aim| task.approach(&aim.into()).unwrap());
             let [from, to] = approaches.map(|approach| standoff(&robot, touch.standoff_m, &approach));
             let (around, r_at) = (approaches[0].around.unwrap(), approaches[0].r_at);
             let heel_t = Vector3::x() * -robot.finger.length_m;

@@ -79,16 +79,16 @@ const TRIED_PER_SIDE: usize = 5;
 /// # Errors
 /// [`OutOfReach`] with the place that is missed by most.
 pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), OutOfReach> {
-    if task.ball().is_some() {
+    let Some(zone) = task.zone() else {
         let of = DIRECTIONS;
         let is_any = task.unreached(of).len() < of;
         return if is_any { Ok(()) } else { Err(OutOfReach::Around { of }) };
-    }
-    let places = task.zone().grid(TRIED_PER_SIDE);
+    };
+    let places = zone.grid(TRIED_PER_SIDE);
     let of = places.len();
     let mut missed = Vec::new();
     for place in places {
-        let approach = task.approach(&place);
+        let Some(approach) = task.approach(&place.clone().into()) else { continue };
         let poses = [
             ("the stand-off", standoff(robot, task.touch().standoff_m, &approach)),
             ("the farthest depth", turning_point(robot, &approach)),

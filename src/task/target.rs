@@ -1,0 +1,196 @@
+//! A target: where a planner sends the finger.
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a planner asks the robot to explore next.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(into = "Written", try_from = "Read")]
+#[schemars(with = "Written")]
+pub enum Target {
+    /// The place (x) or (x, z) of a zone, m.
+    Place(Vec<f64>),
+    /// A point of a ball, and the direction of the approach.
+    Aim(Aim),
+}
+
+impl Target {
+    /// The place of a zone, if it is one.
+    pub fn place(&self) -> Option<&[f64]> {
+        match self {
+            Self::Place(place) => Some(place),
+            Self::Aim(_) => None,
+        }
+    }
+
+    /// The aim into a ball, if it is one.
+    pub fn aim(&self) -> Option<&Aim> {
+        match self {
+            Self::Place(_) => None,
+            Self::Aim(aim) => Some(aim),
+        }
+    }
+
+    /// Its coordinates for a table: (x) or (x, z) of a place; x, y and z of the point and then of
+    /// the direction of an aim.
+    pub fn numbers(&self) -> Vec<f64> {
+        match self {
+            Self::Place(place) => place.clone(),
+            Self::Aim(aim) => aim.p_w.coords.iter().chain(aim.ahead_w.iter()).copied().collect(),
+        }
+    }
+
+    /// The target whose [`numbers`](Self::numbers) they are: one or two of a place, six of an aim.
+    /// Returns `None` for another count, and for an aim without a direction.
+    pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
+        match *numbers {
+            [_] | [_, _] => Some(Self::Place(numbers.to_vec())),
+            [x, y, z, u, v, w] => Some(Self::Aim(Aim::along([x, y, z], [u, v, w])?)),
+            _ => None,
+        }
+    }
+}
+
+impl From<Vec<f64>> for Target {
+    fn from(place: Vec<f64>) -> Self {
+        Self::Place(place)
+    }
+}
+
+impl<const N: usize> From<[f64; N]> for Target {
+    fn from(place: [f64; N]) -> Self {
+        Self::Place(place.into())
+    }
+}
+
+impl From<&[f64]> for Target {
+    fn from(place: &[f64]) -> Self {
+        Self::Place(place.into())
+    }
+}
+
+impl From<Aim> for Target {
+    fn from(aim: Aim) -> Self {
+        Self::Aim(aim)
+    }
+}
+
+/// A straight approach over a point of a ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    /// The point, in `W`.
+    pub p_w: Point3<f64>,
+    /// Direction of the approach, in `W`.
+    pub ahead_w: UnitVector3<f64>,
+}
+
+impl Aim {
+    /// At `p_w` against the outward direction `outward_w`; along −z where that has no length.
+    pub fn against(p_w: Point3<f64>, outward_w: &Vector3<f64>) -> Self {
+        let down_w = -Vector3::z_axis();
+        Self { p_w, ahead_w: UnitVector3::try_new(-outward_w, 1e-12).unwrap_or(down_w) }
+    }
+
+    /// At the point `p_w` along `ahead_w`, kept as it is if its length is 1. Returns `None` if a
+    /// number is not finite or the direction has no length.
+    pub fn along(p_w: [f64; 3], ahead_w: [f64; 3]) -> Option<Self> {
+        let (p_w, ahead_w) = (Point3::from(p_w), Vector3::from(ahead_w));
+        let is_finite = p_w.iter().chain(&ahead_w).all(|number| number.is_finite());
+        let is_unit = (ahead_w.norm() - 1.0).abs() < 1e-12;
+        let ahead_w = match is_unit {
+            true => UnitVector3::new_unchecked(ahead_w),
+            false => UnitVector3::try_new(ahead_w, 1e-6)?,
+        };
+        is_finite.then_some(Self { p_w, ahead_w })
+    }
+}
+
+/// A target as a row writes it.
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+enum Written {
+    /// The place (x) or (x, z) of a zone, m.
+    Place(Vec<f64>),
+    /// An approach of a whole object.
+    Aim {
+        /// The point aimed at, in `W`, m.
+        p_w: [f64; 3],
+        /// Unit direction of the approach, in `W`.
+        ahead_w: [f64; 3],
+    },
+}
+
+impl From<Target> for Written {
+    fn from(target: Target) -> Self {
+        match target {
+            Target::Place(place) => Self::Place(place),
+            Target::Aim(Aim { p_w, ahead_w }) => {
+                Self::Aim { p_w: p_w.into(), ahead_w: ahead_w.into_inner().into() }
+            }
+        }
+    }
+}
+
+/// A target as a row may have it: versions before 0.2 wrote its numbers without a name.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Read {
+    Written(Written),
+    Numbers(Vec<f64>),
+}
+
+impl TryFrom<Read> for Target {
+    type Error = String;
+
+    fn try_from(read: Read) -> Result<Self, String> {
+        match read {
+            Read::Written(Written::Place(place)) => Ok(Self::Place(place)),
+            Read::Written(Written::Aim { p_w, ahead_w }) => {
+                let aim = Aim::along(p_w, ahead_w);
+                aim.map(Self::Aim).ok_or_else(|| format!("no direction in {ahead_w:?}"))
+            }
+            Read::Numbers(numbers) => Self::from_numbers(&numbers)
+                .ok_or_else(|| format!("{} numbers are no target", numbers.len())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// A target is read as it was written, bit by bit, by its name or by its numbers.
+        #[test]
+        fn a_target_is_read_as_it_was_written(
+            at in prop::array::uniform3(-0.5f64..0.5),
+            outward in prop::array::uniform3(-1f64..1.0),
+        ) {
+            let aim = Aim::against(Point3::from(at), &Vector3::from(outward));
+            for target in [Target::from(aim), Target::from(at[..2].to_vec())] {
+                let json = serde_json::to_string(&target).unwrap();
+                prop_assert_eq!(&serde_json::from_str::<Target>(&json).unwrap(), &target);
+                let numbers = serde_json::to_string(&target.numbers()).unwrap();
+                prop_assert_eq!(&serde_json::from_str::<Target>(&numbers).unwrap(), &target);
+            }
+        }
+    }
+
+    #[test]
+    fn a_target_is_written_by_name() {
+        let json = |target: Target| serde_json::to_string(&target).unwrap();
+        assert_eq!(json(vec![0.5, 1.0].into()), r#"{"place":[0.5,1.0]}"#);
+        let aim = Aim::against(Point3::origin(), &Vector3::z());
+        assert_eq!(json(aim.into()), r#"{"aim":{"p_w":[0.0,0.0,0.0],"ahead_w":[-0.0,-0.0,-1.0]}}"#);
+    }
+
+    #[test]
+    fn an_aim_has_a_point_and_a_direction() {
+        assert!(Aim::along([0.0; 3], [0.0; 3]).is_none());
+        assert!(Aim::along([0.0; 3], [0.0, 0.0, f64::NAN]).is_none());
+        assert!(Target::from_numbers(&[0.0; 3]).is_none());
+        assert_eq!(*Aim::along([0.0; 3], [0.0, 0.0, -2.0]).unwrap().ahead_w, -Vector3::z());
+    }
+}
