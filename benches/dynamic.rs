@@ -28,7 +28,7 @@ fn main() -> anyhow::Result<()> {
         ("bird_pa10.toml", &[]),
         ("container_pa10.toml", &["effects={}", "touch.approach_m_s=0.005"]),
         ("container_finger.toml", &["body=\"dynamic\""]),
-        ("container_finger.toml", &["arm.links=\"C\""]),
+        ("container_finger.toml", &["arm.model=\"pa10\""]),
         ("container_finger.toml", &[]),
     ] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);

@@ -15,7 +15,7 @@ const TICKS: u32 = 20_000;
 fn main() -> anyhow::Result<()> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
     let sets =
-        ["arm.links=\"C\"".into(), "effects={skin={samples=100}, fluid={}, wrench={}}".into()];
+        ["arm.model=\"pa10\"".into(), "effects={skin={samples=100}, fluid={}, wrench={}}".into()];
     let environment = Arc::new(Environment::build(Scene::load(&path, &sets)?)?);
     let simulator = Simulator::new(Arc::clone(&environment))?;
     let (Some(robot), task) = (environment.robot(), environment.task()) else { return Ok(()) };

@@ -29,7 +29,7 @@ impl Capabilities {
     pub fn of(chain: &Chain, period_s: f64) -> Self {
         let joints = &chain.joints;
         Self {
-            joints: joints.iter().map(|joint| joint.name.into()).collect(),
+            joints: joints.iter().map(|joint| joint.name.to_string()).collect(),
             q_limits: joints.iter().map(|joint| joint.q_limits).collect(),
             qdot_limits: joints.iter().map(|joint| joint.qdot_limit).collect(),
             period_s,

@@ -175,7 +175,7 @@ pub enum Fault {
         /// The tip in `W`.
         p_wt: [f64; 3],
         /// Joints with their positions at home, rad or m.
-        home: Vec<(&'static str, f64)>,
+        home: Vec<(String, f64)>,
     },
     /// The body stopped answering.
     #[error("no answer since {time_s:.3} s")]
@@ -210,7 +210,7 @@ pub enum Fault {
     },
 }
 
-fn posture(joints: &[(&str, f64)]) -> String {
+fn posture(joints: &[(String, f64)]) -> String {
     let words: Vec<String> = joints.iter().map(|(name, q)| format!("{name} {q:.3}")).collect();
     words.join(", ")
 }

@@ -1,21 +1,25 @@
 //! The robot as capsules: what of it can bump into something.
 
-use super::arm::{Chain, Links};
 use super::robot::Robot;
 use crate::geometry::sweep::Capsule;
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
+use std::sync::Arc;
 
 /// A capsule that moves with a link.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LinkCapsule {
-    /// Of its link: the manufacturer's, `base`, `tool` or `finger`.
-    pub name: &'static str,
+    /// Name in messages: of its link, `tool` or `finger`.
+    pub name: Arc<str>,
     /// How many joints move it: the place of its frame in [`Chain::frames`].
     pub link: usize,
     /// Ends of its axis in that frame.
     pub ends: [Point3<f64>; 2],
     /// Radius.
     pub radius_m: f64,
+    /// Whether its link is too near to the foot to come to the object or the table.
+    pub near_base: bool,
+    /// Whether what the hand carries can fold back onto it.
+    pub folds: bool,
 }
 
 impl LinkCapsule {
@@ -26,31 +30,29 @@ impl LinkCapsule {
     }
 
     /// Whether it can meet `other` in the joints' limits and must not: they are three joints apart.
-    /// Nearer neighbours touch where they are joined; of those the forearm's barrel alone is met,
-    /// by what the hand carries.
+    /// Nearer neighbours touch where they are joined; of those one that [`folds`](Self::folds) is
+    /// met by what the hand carries.
     pub fn may_meet(&self, other: &Self) -> bool {
         let (near, far) = if self.link < other.link { (self, other) } else { (other, self) };
-        let is_folded = near.name == BARREL && CARRIED.contains(&far.name);
-        far.link >= near.link + 3 || is_folded
+        far.link >= near.link + 3 || (near.folds && far.is_carried())
+    }
+
+    /// Whether it is beyond the flange: the tool or the finger.
+    pub fn is_carried(&self) -> bool {
+        CARRIED.contains(&&*self.name)
     }
 }
 
 /// What the last joint carries beyond its flange.
-pub const CARRIED: [&str; 2] = [TOOL, "finger"];
+const CARRIED: [&str; 2] = [TOOL, "finger"];
 
 /// What is between flange and finger.
 pub const TOOL: &str = "tool";
 
-/// The wide part of the forearm behind its fork.
-const BARREL: &str = "E2 barrel";
-
-/// Adapter and finger of `robot`, and its arm if that is a PA-10, told by the names of its joints.
+/// The arm of `robot`, its adapter and its finger.
 pub fn capsules(robot: &Robot) -> Vec<LinkCapsule> {
     let Robot { chain, finger, .. } = robot;
-    let mut all = match is_pa10(chain) {
-        true => arm(chain),
-        false => Vec::new(),
-    };
+    let mut all = chain.capsules.clone();
     // As the model draws it: from the flange to the finger's heel, twice as thick as the finger.
     let mount_m = chain.tool.translation.vector.norm();
     let heel_m = (mount_m - finger.length_m).max(0.0);
@@ -58,47 +60,12 @@ pub fn capsules(robot: &Robot) -> Vec<LinkCapsule> {
     let link = chain.joints.len();
     let parts = [(TOOL, 0.0, heel_m, 2.0), ("finger", heel_m, mount_m, 1.0)];
     all.extend(parts.map(|(name, from_m, to_m, times)| LinkCapsule {
-        name,
+        name: name.into(),
         link,
+        near_base: false,
+        folds: false,
         ends: [from_m, to_m].map(on_flange),
         radius_m: times * finger.radius_m,
     }));
     all
-}
-
-/// Whether the joints are those of a PA-10.
-fn is_pa10(chain: &Chain) -> bool {
-    let names = Links::default().joints().map(|joint| joint.name);
-    chain.joints.iter().map(|joint| joint.name).eq(names)
-}
-
-/// Around the primitive shapes of `models/pa10`, after Choreonoid's `share/model/PA10` (MIT), whose
-/// lengths follow those of the links; radii in m.
-fn arm(chain: &Chain) -> Vec<LinkCapsule> {
-    let step = |i: usize| chain.joints.get(i).map_or(0.0, |joint| joint.origin_m.z);
-    let flange_m = chain.flange.translation.z;
-    let (up, across) = (Vector3::z(), Vector3::y());
-    let part = |name, link, from: Vector3<f64>, to: Vector3<f64>, radius_m| LinkCapsule {
-        name,
-        link,
-        ends: [from.into(), to.into()],
-        radius_m,
-    };
-    let shoulder = up * (step(1) + 0.05) / 2.0;
-    let fork = |side: f64| across * side * 0.055;
-    vec![
-        part("base", 0, Vector3::zeros(), up * step(0), 0.12),
-        part("S1", 1, Vector3::zeros(), Vector3::zeros(), 0.12),
-        part("S1", 1, shoulder - across * 0.088, shoulder + across * 0.088, 0.08),
-        part("S2", 2, across * -0.075, across * 0.075, 0.06),
-        part("S2", 2, Vector3::zeros(), up * step(2), 0.06),
-        part("S3", 3, Vector3::zeros(), up * step(3), 0.10),
-        part("E1", 4, across * -0.05, across * 0.05, 0.05),
-        part("E1", 4, Vector3::zeros(), up * step(4), 0.05),
-        part(BARREL, 5, up * -0.01, up * 0.05, 0.05),
-        part("E2", 5, fork(-1.0) + up * 0.05, fork(-1.0) + up * step(5), 0.026),
-        part("E2", 5, fork(1.0) + up * 0.05, fork(1.0) + up * step(5), 0.026),
-        part("W1", 6, across * -0.045, across * 0.045, 0.035),
-        part("W2", 7, Vector3::zeros(), up * flange_m, 0.049),
-    ]
 }

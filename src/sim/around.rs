@@ -4,6 +4,7 @@ use super::scene::Scene;
 use crate::explore::probe::servo::ArmReach;
 use crate::geometry::mesh::Mesh;
 use crate::robot::Robot;
+use crate::robot::arm::Chain;
 use crate::task::{Around, Ball, RADIUS_M, Task, TaskError};
 use nalgebra::Point3;
 use std::sync::Arc;
@@ -67,8 +68,13 @@ pub(super) fn ball(around: &mut Around, mesh: &Mesh) -> Result<Ball, AroundError
 }
 
 /// The task of a body in `ball`, with what its arm reaches.
-pub(super) fn task(scene: &Scene, ball: Ball, mesh: &Mesh) -> Result<Task, AroundError> {
-    let Scene { touch, finger, arm, .. } = scene;
+pub(super) fn task(
+    scene: &Scene,
+    arm: Option<&Chain>,
+    ball: Ball,
+    mesh: &Mesh,
+) -> Result<Task, AroundError> {
+    let Scene { touch, finger, .. } = scene;
     let away_m = |p_w: &Point3<f64>| (p_w - ball.centre_w).norm();
     let farthest_m = mesh.vertices().iter().map(away_m).fold(0.0, f64::max);
     if farthest_m > ball.radius_m {
@@ -81,7 +87,7 @@ pub(super) fn task(scene: &Scene, ball: Ball, mesh: &Mesh) -> Result<Task, Aroun
     let task = Task::new(ball, touch.clone(), finger)?;
     let Some(arm) = arm else { return Ok(task) };
     let robot =
-        Robot { chain: arm.chain(), finger: finger.clone(), is_soft: scene.effects.is_soft() };
+        Robot { chain: arm.clone(), finger: finger.clone(), is_soft: scene.effects.is_soft() };
     let home_w = robot.chain.forward(&robot.chain.home).translation.vector.into();
     let inside_m = around.depth_m(&home_w);
     if inside_m > 0.0 {

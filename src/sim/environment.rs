@@ -4,6 +4,7 @@ use super::around::{self, AroundError};
 use super::function::Function;
 use super::notice::{Notice, SizeMismatch};
 use super::scene::{Body, Object, Scene, Unit};
+use crate::config::ConfigError;
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::error::MeshError;
 use crate::geometry::implicit::Implicit;
@@ -12,8 +13,8 @@ use crate::geometry::mesh::Mesh;
 use crate::geometry::report::MeshReport;
 use crate::geometry::surfaces;
 use crate::robot::Robot;
-use crate::robot::arm::Chain;
 use crate::robot::arm::stage::{stage, stage_with_wrist};
+use crate::robot::arm::{ArmSettings, Chain, model};
 use crate::robot::finger::shape::BIOTAC_RADIUS_M;
 use crate::sim::finger::Fingertip;
 use crate::task::{Region, Task, TaskError, Zone};
@@ -26,6 +27,8 @@ pub struct Environment {
     scene: Scene,
     shape: Shape,
     task: Task,
+    arm: Option<Chain>,
+    arm_mjcf: Option<String>,
     fingertip: Option<Fingertip>,
     notices: Vec<Notice>,
 }
@@ -49,6 +52,9 @@ pub enum EnvironmentError {
     /// The object's mesh is unusable.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+    /// The arm's model is unusable.
+    #[error(transparent)]
+    Arm(#[from] ConfigError),
     /// The scene lacks the part its body needs.
     #[error("the scene has no {part}, which its body needs")]
     Missing {
@@ -125,6 +131,7 @@ impl Environment {
     /// If the shape lies wholly outside the zone.
     pub fn around(mut scene: Scene, shape: Shape) -> Result<Self, EnvironmentError> {
         let mut notices = Vec::new();
+        let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose()?;
         if let Cow::Owned(effects) = scene.felt_effects() {
             scene.effects = effects;
             notices.push(Notice::DefaultFinger);
@@ -135,8 +142,8 @@ impl Environment {
         }
         if let (Some(around), Shape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
             let ball = around::ball(around, bvh.mesh())?;
-            let task = around::task(&scene, ball, bvh.mesh())?;
-            return Ok(Self::of(scene, shape, task, notices));
+            let task = around::task(&scene, arm.as_ref(), ball, bvh.mesh())?;
+            return Self::of(scene, shape, (task, arm), notices);
         }
         let zone = scene.zone.as_mut().ok_or(EnvironmentError::Missing { part: "zone" })?;
         let extent = extent(zone, &shape);
@@ -153,13 +160,25 @@ impl Environment {
         }
         zone.datum_y_m.get_or_insert(0.0);
         let task = Task::new(zone.clone(), scene.touch.clone(), &scene.finger)?;
-        Ok(Self::of(scene, shape, task, notices))
+        Self::of(scene, shape, (task, arm), notices)
     }
 
-    fn of(scene: Scene, shape: Shape, task: Task, notices: Vec<Notice>) -> Self {
+    fn of(
+        scene: Scene,
+        shape: Shape,
+        (task, arm): (Task, Option<Chain>),
+        notices: Vec<Notice>,
+    ) -> Result<Self, EnvironmentError> {
+        let arm_mjcf = match &scene.arm {
+            Some(settings) => model::mjcf(&settings.model)?,
+            None => None,
+        };
+        if scene.body == Body::Dynamic && scene.arm.is_some() && arm_mjcf.is_none() {
+            return Err(EnvironmentError::Missing { part: "`mjcf` in its arm's model" });
+        }
         let fingertip =
             (scene.effects.is_soft()).then(|| Fingertip::new(&scene.finger, &scene.effects));
-        Self { scene, shape, task, fingertip, notices }
+        Ok(Self { scene, shape, task, arm, arm_mjcf, fingertip, notices })
     }
 
     /// What may not be meant.
@@ -205,9 +224,9 @@ impl Environment {
     /// middle, clear of the object. None for a function.
     pub fn chain(&self) -> Option<Chain> {
         self.mesh()?;
-        let Scene { arm, finger, .. } = &self.scene;
-        if let Some(arm) = arm {
-            return Some(arm.chain());
+        let finger = &self.scene.finger;
+        if let Some(arm) = &self.arm {
+            return Some(arm.clone());
         }
         Some(match self.task.region() {
             Region::Ball(ball) => {
@@ -224,6 +243,11 @@ impl Environment {
                 stage(home_w, x_wz.rotation * finger.r_at())
             }
         })
+    }
+
+    /// MJCF of the scene's arm, if the model has one.
+    pub fn arm_mjcf(&self) -> Option<&str> {
+        self.arm_mjcf.as_deref()
     }
 
     /// True height above the datum at `place`: the first surface met along the approach, or none.

@@ -7,7 +7,7 @@ use palpate::robot::arm::ArmSettings;
 #[test]
 fn the_controller_allocates_nothing() {
     assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(1)))), 1);
-    let chain = ArmSettings::default().chain();
+    let chain = ArmSettings::default().chain().unwrap();
     let mut q = chain.home;
     let mut goal = Goal::still(chain.forward(&q));
     let mut controller = Controller::new(chain, 0.004).unwrap();
@@ -28,7 +28,7 @@ fn interlocks_allocate_nothing() {
     use palpate::backend::{Backend, Command};
     use palpate::explore::probe::interlocks::interlocked;
     use palpate::sim::simulator::Simulator;
-    let sets = ["arm.links=\"C\"", "effects={skin={samples=100}, fluid={}, wrench={}}"];
+    let sets = ["arm.model=\"pa10\"", "effects={skin={samples=100}, fluid={}, wrench={}}"];
     let environment = shipped::environment("container_finger.toml", &sets);
     let body = Simulator::new(environment.clone()).unwrap().body().unwrap().unwrap();
     let (robot, task) = (environment.robot().unwrap(), environment.task());

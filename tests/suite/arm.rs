@@ -1,7 +1,7 @@
 //! The arm: its chain and its MuJoCo model must be the same arm.
 
 use palpate::math::seed;
-use palpate::robot::arm::{ArmSettings, Chain, Joints, Links};
+use palpate::robot::arm::{ArmSettings, Chain, Joints};
 use palpate::sim::{Environment, Scene};
 use rand::RngExt;
 use std::path::Path;
@@ -14,9 +14,9 @@ fn environment(arm: Option<ArmSettings>) -> Environment {
     Environment::build(scene).unwrap()
 }
 
-fn arm(links: Links) -> ArmSettings {
+fn arm(model: &str) -> ArmSettings {
     ArmSettings {
-        links,
+        model: model.into(),
         base_position_m: [0.1, -0.05, 0.2],
         base_rotation_deg: [5.0, -10.0, 30.0],
         ..Default::default()
@@ -25,7 +25,7 @@ fn arm(links: Links) -> ArmSettings {
 
 /// Chains that are tested: both link sets on an odd base, and the stage.
 fn chains() -> [(Environment, Chain); 3] {
-    [Some(arm(Links::C)), Some(arm(Links::A)), None].map(|arm| {
+    [Some(arm("pa10")), Some(arm("pa10_a")), None].map(|arm| {
         let environment = environment(arm);
         let chain = environment.chain().unwrap();
         (environment, chain)
@@ -44,8 +44,8 @@ fn anywhere(chain: &Chain, random: &mut impl rand::Rng) -> Joints {
 /// `pa10.main.wrl` (A).
 #[test]
 fn upright_flange_heights_are_the_published_ones() {
-    for (links, height_m) in [(Links::C, 1.317), (Links::A, 1.345)] {
-        let mut chain = ArmSettings { links, ..Default::default() }.chain();
+    for (model, height_m) in [("pa10", 1.317), ("pa10_a", 1.345)] {
+        let mut chain = ArmSettings { model: model.into(), ..Default::default() }.chain().unwrap();
         chain.tool = nalgebra::Isometry3::identity();
         let x = chain.forward(&Joints::zeros());
         assert!((x.translation.vector - nalgebra::Vector3::z() * height_m).norm() < 1e-12);
@@ -102,7 +102,7 @@ mod mujoco {
     use nalgebra::{Vector3, Vector6};
     use palpate::backend::{Fault, Wrench};
     use palpate::math::seed;
-    use palpate::robot::arm::{ArmSettings, Links};
+    use palpate::robot::arm::ArmSettings;
     use palpate::sim::Environment;
     use palpate::sim::mjcf;
     use palpate::sim::mjcf::Mode;
@@ -155,12 +155,12 @@ mod mujoco {
         for (environment, chain) in &chains()[..2] {
             let model = model(environment);
             for (i, joint) in chain.joints.iter().enumerate() {
-                let id = model.name_to_id(MjtObjBase::mjOBJ_JOINT, joint.name);
+                let id = model.name_to_id(MjtObjBase::mjOBJ_JOINT, &joint.name);
                 assert_eq!(id, Some(i), "{}", joint.name);
                 // The stop stands 3 degrees beyond the servo's limit.
                 let stop = joint.q_limits[1] + 3.0_f64.to_radians();
                 assert!((model.jnt_range()[i][1] - stop).abs() < 1e-6, "{}", joint.name);
-                assert_eq!(model.name_to_id(MjtObjBase::mjOBJ_ACTUATOR, joint.name), Some(i));
+                assert_eq!(model.name_to_id(MjtObjBase::mjOBJ_ACTUATOR, &joint.name), Some(i));
             }
         }
     }
@@ -188,7 +188,7 @@ mod mujoco {
     /// With a proportional servo alone the arm sags 6 degrees in this time.
     #[test]
     fn servos_do_not_sag() {
-        for arm in [Some(arm(Links::C)), Some(ArmSettings::default()), None] {
+        for arm in [Some(arm("pa10")), Some(ArmSettings::default()), None] {
             let (mut plant, home) = plant(arm);
             let (rest, idle) = (vec![0.0; home.len()], Wrench::default());
             for speed in [0.0, 0.2] {
@@ -224,7 +224,7 @@ mod mujoco {
     #[test]
     fn servos_follow_a_sine() {
         for (amplitude, arm) in
-            [(0.2, Some(ArmSettings::default())), (0.2, Some(arm(Links::A))), (0.05, None)]
+            [(0.2, Some(ArmSettings::default())), (0.2, Some(arm("pa10_a"))), (0.05, None)]
         {
             let (mut plant, home) = plant(arm);
             let mut worst: f64 = 0.0;
@@ -247,7 +247,7 @@ mod mujoco {
         for (force_n, torque_nm, arm) in [
             (Vector3::zeros(), twist, Some(ArmSettings::default())),
             (Vector3::new(-500.0, 200.0, 300.0), Vector3::zeros(), Some(ArmSettings::default())),
-            (Vector3::new(-500.0, 200.0, 300.0), Vector3::zeros(), Some(arm(Links::A))),
+            (Vector3::new(-500.0, 200.0, 300.0), Vector3::zeros(), Some(arm("pa10_a"))),
             (Vector3::new(-500.0, 300.0, 400.0), Vector3::zeros(), None),
         ] {
             let (mut plant, home) = plant(arm);
@@ -296,8 +296,8 @@ mod mujoco {
 
     #[test]
     fn pose_and_velocity_are_those_after_the_step() {
-        let (mut plant, _) = plant(Some(arm(Links::C)));
-        let chain = arm(Links::C).chain();
+        let (mut plant, _) = plant(Some(arm("pa10")));
+        let chain = arm("pa10").chain().unwrap();
         for _ in 0..200 {
             plant.step(&[0.1, -0.1, 0.2, 0.1, -0.3, 0.2, 0.1], &Wrench::default()).unwrap();
         }
@@ -341,7 +341,7 @@ mod mujoco {
     fn the_same_inputs_give_the_same_bits() {
         let environment = environment(Some(ArmSettings::default()));
         let model = Arc::new(model(&environment));
-        let home = ArmSettings::default().chain().home;
+        let home = ArmSettings::default().chain().unwrap().home;
         let run = || {
             let mut plant = Plant::new(Arc::clone(&model)).unwrap();
             plant.reset(home.as_slice()).unwrap();

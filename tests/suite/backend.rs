@@ -171,7 +171,7 @@ fn capabilities_are_those_of_the_chain() {
         let capabilities = body.capabilities();
         assert_eq!(capabilities.joints.len(), chain.joints.len(), "{name}");
         for (i, joint) in chain.joints.iter().enumerate() {
-            assert_eq!(capabilities.joints[i], joint.name, "{name}");
+            assert_eq!(*capabilities.joints[i], *joint.name, "{name}");
             assert_eq!(capabilities.q_limits[i], joint.q_limits, "{name}");
             assert_eq!(capabilities.qdot_limits[i], joint.qdot_limit, "{name}");
         }

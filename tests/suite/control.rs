@@ -5,7 +5,7 @@ use palpate::explore::control::{Controller, Goal, posture};
 use palpate::math::seed;
 use palpate::robot::arm::ArmError;
 use palpate::robot::arm::stage::stage;
-use palpate::robot::arm::{ArmSettings, Chain, Joints, Links};
+use palpate::robot::arm::{ArmSettings, Chain, Joints};
 use palpate::robot::finger::Finger;
 use palpate::sim::{Environment, Scene};
 use proptest::prelude::*;
@@ -15,7 +15,7 @@ use std::path::Path;
 const PERIOD_S: f64 = 0.004;
 
 fn arm() -> Chain {
-    ArmSettings::default().chain()
+    ArmSettings::default().chain().unwrap()
 }
 
 fn slides() -> Chain {
@@ -223,7 +223,7 @@ fn every_place_of_the_scenes_has_a_posture() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
         for arm in [
             Some(ArmSettings::default()),
-            Some(ArmSettings { links: Links::A, ..Default::default() }),
+            Some(ArmSettings { model: "pa10_a".into(), ..Default::default() }),
             None,
         ] {
             let mut scene = Scene::load(&path, &[]).unwrap();
@@ -295,8 +295,8 @@ mod mujoco {
     #[test]
     fn an_approach_stays_on_its_line() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bird.toml");
-        let [c, a] =
-            [Links::C, Links::A].map(|links| Some(ArmSettings { links, ..Default::default() }));
+        let [c, a] = ["pa10", "pa10_a"]
+            .map(|model| Some(ArmSettings { model: model.into(), ..Default::default() }));
         for settings in [c, a, None] {
             let mut scene = Scene::load(&path, &[]).unwrap();
             scene.arm = settings;

@@ -266,7 +266,7 @@ fn a_row_with_an_impossible_number_is_refused() {
         fails(folder.path(), &["report", "run"], &says);
     }
     let mut far = row.clone();
-    far["touches"][0]["target"][0] = 1e200.into();
+    far["touches"][0]["target"]["place"][0] = 1e200.into();
     fs::write(&file, format!("{far}\n")).unwrap();
     fails(
         folder.path(),

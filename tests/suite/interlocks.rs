@@ -20,7 +20,7 @@ fn site(chain: Chain) -> Site {
 }
 
 fn arm() -> Site {
-    site(ArmSettings::default().chain())
+    site(ArmSettings::default().chain().unwrap())
 }
 
 fn interlocks(site: &Site, settings: &InterlockSettings, world: World) -> (Interlocked, Fake) {

@@ -263,7 +263,7 @@ fn an_arm_of_another_implementation_is_heard_and_answers() {
     let arm = network.peer("arm", &["14"]).stdout(Stdio::piped()).spawn().unwrap();
     // The status was published before anybody was there to hear it.
     sleep(Duration::from_millis(1500));
-    let chain = ArmSettings::default().chain();
+    let chain = ArmSettings::default().chain().unwrap();
     let on_change = BackendSettings { status_on_change: true, ..network.settings.clone() };
     let lab = Lab::join(&on_change, &chain).unwrap();
     for service in Service::COMMON {
@@ -319,7 +319,7 @@ fn only_the_named_interfaces_are_used() {
     let with_lo = counts();
     assert!(with_lo[0] > before[0] && with_lo[1] == before[1], "{before:?} {with_lo:?}");
     let settings = BackendSettings { interfaces: vec!["lo".into()], ..network.settings.clone() };
-    let lab = Lab::join(&settings, &ArmSettings::default().chain()).unwrap();
+    let lab = Lab::join(&settings, &ArmSettings::default().chain().unwrap()).unwrap();
     assert_eq!(counts()[1], before[1]);
     drop((lab, twin));
     if Path::new("/sys/class/net/dds0").exists() {
@@ -328,7 +328,7 @@ fn only_the_named_interfaces_are_used() {
         drop(twin);
         let unknown =
             BackendSettings { interfaces: vec!["wlan7".into()], ..network.settings.clone() };
-        let fault = Lab::join(&unknown, &ArmSettings::default().chain()).err().unwrap();
+        let fault = Lab::join(&unknown, &ArmSettings::default().chain().unwrap()).err().unwrap();
         assert!(
             fault.to_string().contains("wlan7") && fault.to_string().contains("dds0"),
             "{fault}"

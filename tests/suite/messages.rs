@@ -108,18 +108,18 @@ fn a_damaged_row_is_faulted_at_its_line() {
     let again = ["run", "small.toml", "--set", "trials=2"];
     readers.push(&again);
     let coordinate =
-        &second[second.find("\"target\":[").unwrap() + 10..].split(',').next().unwrap();
+        &second[second.find("\"target\":{\"place\":[").unwrap() + 19..].split(',').next().unwrap();
     let length =
         &second[second.find("\"length_scales\":[").unwrap() + 17..].split(',').next().unwrap();
     let damages = [
         (
-            format!("\"target\":[{coordinate},"),
-            "\"target\":[".into(),
+            format!("\"target\":{{\"place\":[{coordinate},"),
+            "\"target\":{\"place\":[".into(),
             "touch 1: a target of 1 coordinates where 2 are needed",
         ),
         (
-            format!("\"target\":[{coordinate}"),
-            format!("\"target\":[{coordinate},0.2"),
+            format!("\"target\":{{\"place\":[{coordinate}"),
+            format!("\"target\":{{\"place\":[{coordinate},0.2"),
             "touch 1: a target of 3",
         ),
         (

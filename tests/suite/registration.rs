@@ -74,7 +74,7 @@ fn a_line_is_fitted_with_its_covariance() {
 }
 
 fn pa10(is_soft: bool) -> Robot {
-    Robot { chain: ArmSettings::default().chain(), finger: Finger::default(), is_soft }
+    Robot { chain: ArmSettings::default().chain().unwrap(), finger: Finger::default(), is_soft }
 }
 
 const BALL: KnownBody = KnownBody::Ball { centre_w: Point3::new(0.0, -0.65, 0.5), radius_m: 0.02 };
@@ -243,10 +243,10 @@ fn a_correction_moves_the_tool() {
         tool_rotation_deg: [1.0, 2.0, -3.0],
         ..plain.clone()
     };
-    let moved = plain.chain().tool * pose([1e-3, -2e-3, 3e-3], [1.0, 2.0, -3.0]);
-    assert_eq!(corrected.chain().tool, moved);
+    let moved = plain.chain().unwrap().tool * pose([1e-3, -2e-3, 3e-3], [1.0, 2.0, -3.0]);
+    assert_eq!(corrected.chain().unwrap().tool, moved);
     let zero = ArmSettings { tool_position_m: [0.0; 3], ..plain.clone() };
-    assert_eq!(zero.chain(), plain.chain());
+    assert_eq!(zero.chain().unwrap(), plain.chain().unwrap());
     assert!(!toml::to_string(&plain).unwrap().contains("tool_position"));
 }
 

@@ -49,7 +49,7 @@ fn without_electrodes_the_contact_is_exact_and_with_them_within_three_millimetre
 #[test]
 fn an_arm_carries_the_finger_to_the_same_contacts_as_the_stage() {
     let stage = environment("container_finger.toml", &[]);
-    let arm = environment("container_finger.toml", &["arm.links=\"C\""]);
+    let arm = environment("container_finger.toml", &["arm.model=\"pa10\""]);
     for target in stage.task().zone().unwrap().grid(3) {
         let by_stage = contact(touch(&stage, 1, &target).unwrap());
         let by_arm = contact(touch(&arm, 1, &target).unwrap());
@@ -99,7 +99,7 @@ fn bare(environment: &Arc<Environment>, seed: u64) -> Servo {
 
 #[test]
 fn interlocks_leave_every_touch_as_it_is_to_the_bit() {
-    for sets in [&[][..], &["arm.links=\"C\"", "effects.wrench={}"]] {
+    for sets in [&[][..], &["arm.model=\"pa10\"", "effects.wrench={}"]] {
         let environment = environment("bird_finger.toml", sets);
         let (mut bare, mut probe) = (bare(&environment, 5), simulator(&environment, 5));
         for target in environment.task().zone().unwrap().grid(2) {
@@ -114,7 +114,7 @@ fn interlocks_leave_every_touch_as_it_is_to_the_bit() {
 fn a_target_that_is_not_a_number_or_out_of_reach_ends_as_a_fault() {
     let near = environment("container_finger.toml", &[]);
     assert!(matches!(touch(&near, 1, &[f64::NAN, 0.5]), Err(Fault::Refused { .. })));
-    let arm = environment("container_finger.toml", &["arm.links=\"C\"", "zone.x_m=[-0.05, 3]"]);
+    let arm = environment("container_finger.toml", &["arm.model=\"pa10\"", "zone.x_m=[-0.05, 3]"]);
     // It strays on the way, and is not let.
     let strayed = touch(&arm, 1, &[2.9, 0.5]);
     assert!(matches!(strayed, Err(Fault::Interlock { .. })), "{strayed:?}");

@@ -82,7 +82,7 @@ fn joints_of_other_names_are_named() {
 #[test]
 fn nobody_there_is_said_with_names_and_types() {
     let settings = BackendSettings { patience_s: 0.1, ..BackendSettings::default() };
-    let chain = palpate::robot::arm::ArmSettings::default().chain();
+    let chain = palpate::robot::arm::ArmSettings::default().chain().unwrap();
     let connect = Box::new(|| Ok(Box::new(Hub::default().end(Side::Explorer)) as _));
     let error = Lab::connect(&settings, &chain, connect).map(|_| ()).unwrap_err().to_string();
     for word in ["0.1 s", "/joint_states (sensor_msgs/msg/JointState)", "/biotac_pub", "domain"] {

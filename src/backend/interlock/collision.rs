@@ -8,7 +8,7 @@ use super::trip::Trip;
 use crate::geometry::distance::{HalfSpace, OrientedBox};
 use crate::geometry::sweep::Capsule;
 use crate::robot::arm::Joints;
-use crate::robot::capsules::{CARRIED, LinkCapsule, capsules};
+use crate::robot::capsules::{LinkCapsule, capsules};
 use nalgebra::{Point3, Vector3};
 
 /// Stops the body before links come near to each other, to the table or to the object.
@@ -21,10 +21,6 @@ pub const ENTRY: Entry = Entry {
 };
 
 const NAME: &str = "clearance";
-
-/// The first link that can come down to a table or reach out to an object: those before it stand
-/// on the foot.
-const FIRST_FAR: usize = 3;
 
 /// Looks at the capsules of the links where the body cannot help going.
 struct Guard {
@@ -59,11 +55,11 @@ impl Guard {
             let beside = links.iter().enumerate().skip(i + 1);
             let met = beside.filter(|(_, other)| link.may_meet(other));
             pairs.extend(met.map(|(k, _)| Pair { link: i, other: Other::Link(k) }));
-            if let Some(z_m) = settings.lowest_m.filter(|_| link.link >= FIRST_FAR) {
+            if let Some(z_m) = settings.lowest_m.filter(|_| !link.near_base) {
                 let (p_w, outward_w) = (Point3::new(0.0, 0.0, z_m), Vector3::z_axis());
                 pairs.push(Pair { link: i, other: Other::Table(HalfSpace { p_w, outward_w }) });
             }
-            let is_arm = link.link >= FIRST_FAR && !CARRIED.contains(&link.name);
+            let is_arm = !link.near_base && !link.is_carried();
             if let Some(object) = site.object.filter(|_| is_arm) {
                 pairs.push(Pair { link: i, other: Other::Object(object) });
             }
@@ -101,7 +97,7 @@ impl Guard {
     fn name(&self, pair: usize) -> String {
         let Pair { link, other } = &self.pairs[pair];
         let other = match other {
-            Other::Link(other) => self.links[*other].name,
+            Other::Link(other) => &*self.links[*other].name,
             Other::Table(_) => "the table",
             Other::Object(_) => "the object",
         };

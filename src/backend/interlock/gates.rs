@@ -8,6 +8,7 @@ use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// How a body is looked at before it moves; figures without a source are chosen.
@@ -52,7 +53,7 @@ pub enum GateError {
     #[error("joint {joint} stands at {q:.4}, outside its limits {low:.4} to {high:.4}")]
     Outside {
         /// The joint.
-        joint: &'static str,
+        joint: Arc<str>,
         /// Where it stands, rad or m.
         q: f64,
         /// Its smallest position.
@@ -67,7 +68,7 @@ pub enum GateError {
     )]
     Away {
         /// The joint.
-        joint: &'static str,
+        joint: Arc<str>,
         /// Where it stands, rad or m.
         q: f64,
         /// Where it is expected.
@@ -79,7 +80,7 @@ pub enum GateError {
     #[error("joint {joint} moved by {moved:.5} while told to stand still; allowed are {allowed}")]
     Moves {
         /// The joint.
-        joint: &'static str,
+        joint: Arc<str>,
         /// By how much, rad or m.
         moved: f64,
         /// Largest allowed.
@@ -183,16 +184,25 @@ fn check_joints(
             places().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| (a.min(q), b.max(q)));
         let Some(q) = places().next_back() else { continue };
         if let Some(q) = [least, most].into_iter().find(|q| !(low..=high).contains(q)) {
-            return Err(GateError::Outside { joint: joint.name, q, low, high });
+            return Err(GateError::Outside { joint: joint.name.clone(), q, low, high });
         }
         if let Some(&expected) = expected.and_then(|expected| expected.get(i))
             && (q - expected).abs() > settings.near
         {
-            return Err(GateError::Away { joint: joint.name, q, expected, allowed: settings.near });
+            return Err(GateError::Away {
+                joint: joint.name.clone(),
+                q,
+                expected,
+                allowed: settings.near,
+            });
         }
         let moved = most - least;
         if moved > settings.still {
-            return Err(GateError::Moves { joint: joint.name, moved, allowed: settings.still });
+            return Err(GateError::Moves {
+                joint: joint.name.clone(),
+                moved,
+                allowed: settings.still,
+            });
         }
     }
     Ok(())

@@ -153,7 +153,7 @@ impl Interlocked {
             time_s: self.now.time_s,
             trip: Box::new(trip),
             p_wt: self.now.x_wt.translation.vector.into(),
-            home: joints.map(|(joint, &q)| (joint.name, q)).collect(),
+            home: joints.map(|(joint, &q)| (joint.name.to_string(), q)).collect(),
         }
     }
 

@@ -48,7 +48,7 @@ impl Interlock for JointLimits {
             let [low, high] = joint.q_limits;
             let limit = if q > high { high } else { low };
             if !(low - BEYOND..=high + BEYOND).contains(&q) {
-                let (part, unit) = (joint.name.into(), "rad or m");
+                let (part, unit) = (joint.name.to_string(), "rad or m");
                 return Err(Trip { interlock: NAME, part, found: q, limit, unit });
             }
         }

@@ -29,7 +29,7 @@ mod workspace;
 pub use gates::{Baseline, Expected, GateError, GateSettings, check_start};
 pub use interlock::{Entry, Interlock, Now};
 pub use interlocked::{Interlocked, Operator};
-pub use settings::InterlockSettings;
+pub use settings::{InterlockSettings, defaults};
 pub use site::Site;
 pub use table::INTERLOCKS;
 pub use trip::Trip;

@@ -70,17 +70,27 @@ pub struct InterlockSettings {
 /// finger at 20 mm/s adds within 10 ms against 20 N/mm is 4 N.
 const ABOVE_TOUCH_N: f64 = 10.0;
 
+/// Defaults that a rehearsal of motions keeps to as well.
+pub mod defaults {
+    /// Farthest that the tip may leave the box around home and its touches.
+    pub const TIP_MARGIN_M: f64 = 0.2;
+    /// Least distance between links.
+    pub const CLEARANCE_M: f64 = 0.02;
+    /// From a command until the joints begin to brake.
+    pub const REACTION_S: f64 = 0.01;
+}
+
 impl Default for InterlockSettings {
     /// No touch of the scenes that ship comes near to them.
     fn default() -> Self {
         Self {
             tip_speed_m_s: None,
-            tip_margin_m: 0.2,
+            tip_margin_m: defaults::TIP_MARGIN_M,
             workspace_m: None,
             lowest_m: None,
             depth_margin_m: 0.01,
-            clearance_m: 0.02,
-            reaction_s: 0.01,
+            clearance_m: defaults::CLEARANCE_M,
+            reaction_s: defaults::REACTION_S,
             force_limit_n: None,
             torque_limit_nm: None,
             force_rate_n_s: 2000.0,

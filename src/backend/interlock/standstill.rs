@@ -53,7 +53,7 @@ impl Interlock for Standstill {
             let unseen_m = unseen.abs() * reach_m;
             let limit = if unseen_m > BLIND_M { self.blind_s } else { self.frozen_s };
             if unseen_m > SEEN_M && found > limit {
-                let (part, unit) = (joint.name.into(), "s");
+                let (part, unit) = (joint.name.to_string(), "s");
                 return Err(Trip { interlock: NAME, part, found, limit, unit });
             }
         }

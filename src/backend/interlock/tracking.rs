@@ -124,7 +124,7 @@ impl Interlock for Tracking {
                 let found = (low[i] - moved[i]).max(moved[i] - high[i]) * reach_m;
                 let limit = FLOOR_M + SHARE * low[i].abs().max(high[i].abs()) * reach_m;
                 if found > limit {
-                    let (part, unit) = (joint.name.into(), "m");
+                    let (part, unit) = (joint.name.to_string(), "m");
                     return Err(Trip { interlock: NAME, part, found, limit, unit });
                 }
             }

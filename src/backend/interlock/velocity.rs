@@ -35,7 +35,7 @@ impl Interlock for VelocityTracking {
                 continue;
             }
             if now.time_s - *since_s.get_or_insert(now.time_s) > self.limit_s {
-                let (part, unit) = (joint.name.into(), "rad/s or m/s");
+                let (part, unit) = (joint.name.to_string(), "rad/s or m/s");
                 return Err(Trip { interlock: NAME, part, found, limit, unit });
             }
         }

@@ -18,8 +18,8 @@ pub const ENTRY: Entry = Entry {
         let workspace = settings
             .workspace_m
             .map(|[x, y, z]| [0, 1].map(|end| Point3::new(x[end], y[end], z[end])));
-        let elbow = site.robot.chain.joints.iter().position(|joint| joint.name == ELBOW);
-        let whole = [Some(Part::Tip), elbow.map(|joint| Part::Elbow { link: joint + 1 })];
+        let elbow = site.robot.chain.elbow;
+        let whole = [Some(Part::Tip), elbow.map(|link| Part::Elbow { link })];
         let whole = whole.into_iter().flatten();
         let mut rooms: Vec<Room> = business.into_iter().collect();
         if let Some([low, high]) = workspace {
@@ -31,9 +31,6 @@ pub const ENTRY: Entry = Entry {
 };
 
 const NAME: &str = "workspace";
-
-/// The joint of the elbow.
-const ELBOW: &str = "E1";
 
 struct Workspace {
     rooms: Vec<Room>,

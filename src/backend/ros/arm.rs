@@ -331,7 +331,7 @@ impl LabArm {
             for (joint, (&from, &to)) in joints {
                 if (to - from).abs() > JUMP_RAD + joint.qdot_limit * dt_s {
                     let joint = joint.name.to_owned();
-                    return Err(LinkFault::Jump { joint, from, to, dt_s });
+                    return Err(LinkFault::Jump { joint: joint.to_string(), from, to, dt_s });
                 }
             }
         }

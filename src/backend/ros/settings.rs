@@ -134,7 +134,7 @@ impl BackendSettings {
     /// The joints of `chain` as the lab names them.
     pub fn joint_names(&self, chain: &Chain) -> JointNames {
         JointNames::new(match self.joints.as_slice() {
-            [] => chain.joints.iter().map(|joint| joint.name.to_owned()).collect(),
+            [] => chain.joints.iter().map(|joint| joint.name.to_string()).collect(),
             named => named.to_vec(),
         })
     }

@@ -1,6 +1,8 @@
 //! A serial chain: where its tip is and how it moves.
 
+use crate::robot::capsules::LinkCapsule;
 use nalgebra::{Isometry3, Point3, SMatrix, SVector, UnitQuaternion, UnitVector3, Vector3};
+use std::sync::Arc;
 
 /// Most joints of a chain.
 pub const MAX_JOINTS: usize = 7;
@@ -25,7 +27,7 @@ pub enum Kind {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// The manufacturer's name; joints are matched by name, never by number.
-    pub name: &'static str,
+    pub name: Arc<str>,
     /// How it moves.
     pub kind: Kind,
     /// Its origin in the frame of the joint before it; all frames are parallel at q = 0.
@@ -77,6 +79,10 @@ pub struct Chain {
     pub tool: Isometry3<f64>,
     /// The posture to start from and to prefer.
     pub home: Joints,
+    /// What of its links can collide.
+    pub capsules: Vec<LinkCapsule>,
+    /// How many joints move the elbow's link, if it has an elbow.
+    pub elbow: Option<usize>,
 }
 
 impl Chain {

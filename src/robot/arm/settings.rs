@@ -1,26 +1,31 @@
 //! The arm in a scene: which, where, and how it stands.
 
-use super::chain::{Chain, Joints};
-use super::pa10::Links;
-use crate::config::{Checked, Rules};
+use super::chain::{Chain, Kind};
+use super::model::{ArmModel, MODELS};
+use crate::config::{Checked, ConfigError, Origin, Rules};
 use crate::math::pose::pose;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::f64::consts::FRAC_PI_2;
+use std::path::Path;
 
-/// A PA-10 with the finger along its flange's axis.
+/// An arm with the finger along its flange's axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmSettings {
-    /// Link lengths: `"C"` or `"A"`.
-    pub links: Links,
+    /// The arm: `"pa10"` (PA-10-7C), `"pa10_a"` (the older PA-10), or a file like
+    /// `models/pa10/c.toml`.
+    #[serde(alias = "links", deserialize_with = "model")]
+    pub model: String,
     /// Where the base stands in `W`.
     pub base_position_m: [f64; 3],
     /// Turns of the base about the fixed axes x, then y, then z of `W`.
     pub base_rotation_deg: [f64; 3],
-    /// The posture S1 S2 S3 E1 E2 W1 W2 to start from and to prefer.
-    pub home_deg: [f64; 7],
+    /// The posture to start from and to prefer, a number for each joint: deg, or m where it slides.
+    /// Left out, that of the model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub home_deg: Option<Vec<f64>>,
     /// From the flange along its axis to the origin of `T`.
     pub mount_m: f64,
     /// Where the origin of `T` really is, in the frame that `T` has at the end of the mount, as
@@ -38,15 +43,15 @@ pub struct ArmSettings {
 pub const TOOL_KG: f64 = 0.15;
 
 impl Default for ArmSettings {
-    /// Chosen: the base is `W`; at home the elbow is up and the finger points along -y, 45
+    /// A PA-10 with its base at `W`: at home the elbow is up and the finger points along -y, 45
     /// degrees up, 0.56 m in front of the base's axis and 0.48 m above its foot. The mount
     /// leaves room for a force/torque sensor and an adapter.
     fn default() -> Self {
         Self {
-            links: Links::C,
+            model: MODELS[0].0.into(),
             base_position_m: [0.0; 3],
             base_rotation_deg: [0.0; 3],
-            home_deg: [-90.0, 15.0, 0.0, 120.0, 0.0, -90.0, 0.0],
+            home_deg: None,
             mount_m: 0.12,
             tool_position_m: [0.0; 3],
             tool_rotation_deg: [0.0; 3],
@@ -63,18 +68,64 @@ impl ArmSettings {
     }
 
     /// The arm as a chain from `W` to `T`.
-    pub fn chain(&self) -> Chain {
-        Chain {
+    ///
+    /// # Errors
+    /// If its model cannot be read, or `home_deg` is not within the model's limits.
+    pub fn chain(&self) -> Result<Chain, ConfigError> {
+        let model = ArmModel::load(&self.model)?;
+        let home = self.home_deg.clone().unwrap_or_else(|| model.home());
+        self.check_home(&model).map_or(Ok(()), |(key, value, allowed)| {
+            let origin = Origin::File { path: (&self.model).into(), line: None };
+            Err(ConfigError::NotAllowed { origin, key: format!("arm.{key}"), value, allowed })
+        })?;
+        Ok(Chain {
             base: pose(self.base_position_m, self.base_rotation_deg),
-            joints: self.links.joints().into(),
-            flange: Translation3::new(0.0, 0.0, self.links.flange_m()).into(),
+            joints: model.joints(),
+            flange: model.flange(),
             tool: match self.correction() {
                 Some(correction) => tool(self.mount_m) * correction,
                 None => tool(self.mount_m),
             },
-            home: Joints::from(self.home_deg.map(f64::to_radians)),
-        }
+            home: model.positions(&home),
+            capsules: model.capsules(),
+            elbow: model.elbow(),
+        })
     }
+
+    /// Key, value and allowed values of the first number of `home_deg` that is beyond the limits of
+    /// `model`.
+    fn check_home(&self, model: &ArmModel) -> Option<(String, String, String)> {
+        let home = self.home_deg.as_ref()?;
+        let joints = model.joints();
+        if home.len() != joints.len() {
+            let allowed = format!("{} numbers, one for each joint", joints.len());
+            return Some(("home_deg".into(), format!("{home:?}"), allowed));
+        }
+        home.iter().zip(&joints).enumerate().find_map(|(i, (&home, joint))| {
+            let [low, high] = match joint.kind {
+                Kind::Revolute => joint.q_limits.map(f64::to_degrees).map(f64::round),
+                Kind::Prismatic => joint.q_limits,
+            };
+            let allowed = || format!("{low} to {high}");
+            let is_within = (low..=high).contains(&home);
+            (!is_within).then(|| (format!("home_deg[{i}]"), home.to_string(), allowed()))
+        })
+    }
+}
+
+/// Whether `model` names a file, and not one of [`MODELS`].
+pub fn is_file(model: &str) -> bool {
+    Path::new(model).extension().is_some_and(|extension| extension == "toml")
+}
+
+/// Reads `model`; versions before 0.2 had `links = "C"` or `"A"` in its place.
+fn model<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let model = String::deserialize(deserializer)?;
+    Ok(match model.as_str() {
+        "C" => MODELS[0].0.into(),
+        "A" => MODELS[1].0.into(),
+        _ => model,
+    })
 }
 
 fn is_zero(numbers: &[f64; 3]) -> bool {
@@ -93,9 +144,22 @@ impl Checked for ArmSettings {
     fn check(&self, rules: &mut Rules) {
         rules.numbers("base_position_m", &self.base_position_m, -1e3..=1e3);
         rules.numbers("base_rotation_deg", &self.base_rotation_deg, -360.0..=360.0);
-        for (i, (joint, &home)) in self.links.joints().iter().zip(&self.home_deg).enumerate() {
-            let [low, high] = joint.q_limits.map(f64::to_degrees).map(f64::round);
-            rules.number(&format!("home_deg[{i}]"), home, low..=high);
+        let is_known = MODELS.iter().any(|(name, _)| *name == self.model);
+        rules.require(
+            "model",
+            format!("\"{}\"", self.model),
+            is_known || is_file(&self.model),
+            || {
+                let names: Vec<String> =
+                    MODELS.iter().map(|(name, _)| format!("\"{name}\"")).collect();
+                format!("{}, or a file ending in .toml", names.join(", "))
+            },
+        );
+        // A file is read when the arm is built: a run's folder is read without it.
+        if let Some(model) = is_known.then(|| ArmModel::load(&self.model).ok()).flatten()
+            && let Some((key, value, allowed)) = self.check_home(&model)
+        {
+            rules.require(&key, value, false, || allowed);
         }
         rules.number("mount_m", self.mount_m, 0.01..=0.5);
         rules.numbers("tool_position_m", &self.tool_position_m, -0.1..=0.1);

@@ -44,6 +44,8 @@ pub fn stage(p_wt: Point3<f64>, r_wt: UnitQuaternion<f64>) -> Chain {
         flange: Isometry3::from_parts(Default::default(), r_wt) * tool.inverse(),
         tool,
         home: Joints::from_fn(|i, _| p_wt.coords.get(i).copied().unwrap_or(0.0)),
+        capsules: Vec::new(),
+        elbow: None,
     }
 }
 
@@ -55,7 +57,7 @@ pub fn stage_with_wrist(
     r_wt: UnitQuaternion<f64>,
 ) -> Chain {
     let hinges = WRIST.iter().map(|&(name, axis)| Joint {
-        name,
+        name: name.into(),
         kind: Kind::Revolute,
         origin_m: Vector3::zeros(),
         axis: UnitVector3::new_unchecked(axis.into()),
@@ -70,7 +72,7 @@ pub fn stage_with_wrist(
 fn slides(middle_w: Point3<f64>, travel_m: f64) -> impl Iterator<Item = Joint> {
     let axes = [("X", Vector3::x_axis()), ("Y", Vector3::y_axis()), ("Z", Vector3::z_axis())];
     axes.into_iter().enumerate().map(move |(i, (name, axis))| Joint {
-        name,
+        name: name.into(),
         kind: Kind::Prismatic,
         origin_m: Vector3::zeros(),
         axis,

@@ -50,7 +50,11 @@ const SENSOR: &str = r#"  <sensor>
 pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     let mesh = environment.mesh()?;
     let chain = environment.chain()?;
-    if environment.scene().arm.is_none() && chain.turns() {
+    let has_model = match environment.scene().arm {
+        Some(_) => environment.arm_mjcf().is_some(),
+        None => !chain.turns(),
+    };
+    if !has_model {
         return None;
     }
     let shown = mode == Mode::Picture;
@@ -84,7 +88,12 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
 {sensor}  <keyframe><key name="home" qpos="{home}"/></keyframe>
 {skin}{scenery}</mujoco>
 "#,
-        robot = robot::robot(environment.scene(), &chain, (collides, bumps), is_soft),
+        robot = robot::robot(
+            environment.scene(),
+            (&chain, environment.arm_mjcf()),
+            (collides, bumps),
+            is_soft,
+        ),
         sensor = if senses { SENSOR } else { "" },
         discard = !shown,
         integrator = keyword(environment.scene().solver.integrator),

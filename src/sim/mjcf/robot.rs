@@ -2,13 +2,11 @@
 
 use super::fingertip;
 use super::text::{CONTACT, LINK, TABLE, pose};
+use crate::robot::arm::Chain;
 use crate::robot::arm::settings::TOOL_KG;
-use crate::robot::arm::{Chain, Links};
 use crate::robot::finger::Finger;
 use crate::sim::Scene;
 
-const C: &str = include_str!("../../../models/pa10/c.xml");
-const A: &str = include_str!("../../../models/pa10/a.xml");
 const STAGE: &str = include_str!("../../../models/stage.xml");
 
 /// How the models say that their shapes meet nothing.
@@ -19,16 +17,12 @@ const PASSING: &str = r#"contype="0" conaffinity="0""#;
 /// the finger has a pad and a nail if it `is_soft`.
 pub(super) fn robot(
     scene: &Scene,
-    chain: &Chain,
+    (chain, model): (&Chain, Option<&str>),
     (collides, bumps): (bool, bool),
     is_soft: bool,
 ) -> String {
-    let model = match scene.arm.as_ref().map(|arm| arm.links) {
-        Some(Links::C) => C,
-        Some(Links::A) => A,
-        None => STAGE,
-    };
-    let after_open = model.split_once("<mujoco").and_then(|(_, rest)| rest.split_once('>'));
+    let after_open =
+        model.unwrap_or(STAGE).split_once("<mujoco").and_then(|(_, rest)| rest.split_once('>'));
     let inner = after_open.and_then(|(_, rest)| rest.split_once("</mujoco>"));
     let tool_kg = scene.arm.as_ref().map_or(TOOL_KG, |arm| arm.tool_kg);
     let contact = match (collides, bumps) {

@@ -79,7 +79,7 @@ fn finger_tick(bvh: &MeshBvh, model: SkinModel, name: &str, gap_m: f64) -> Piece
 
 /// Resolved-rate control of a PA-10 near its home.
 fn control_tick() -> Option<Piece> {
-    let chain = ArmSettings::default().chain();
+    let chain = ArmSettings::default().chain().ok()?;
     let home = chain.home;
     let (mut x_wt, _) = chain.jacobian(&home);
     x_wt.translation.vector.y -= 0.01;

@@ -25,8 +25,8 @@ pub(super) const CASES: &[Case] = &[
         "W1 away from it deg",
         (&[60.0, 20.0, 5.0, 1.0, 0.0], 5),
         |away_deg, period_s| {
-            let mut arm = ArmSettings::default();
-            arm.home_deg[5] = -away_deg;
+            let home_deg = [-90.0, 15.0, 0.0, 120.0, 0.0, -away_deg, 0.0];
+            let arm = ArmSettings { home_deg: Some(home_deg.into()), ..ArmSettings::default() };
             reach(scene(period_s), [0.0, -0.65, 0.5], arm)
         },
     )

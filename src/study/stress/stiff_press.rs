@@ -107,7 +107,7 @@ impl WallPress {
         stiffen(&mut scene.effects, times);
         let mut face_w = [0.0; 3];
         if arm {
-            let chain = ArmSettings::default().chain();
+            let chain = ArmSettings::default().chain().ok()?;
             let tip = chain.forward(&chain.home).translation.vector;
             // As far as a stage keeps from it.
             face_w = [tip.x, tip.y - 0.01 - scene.finger.radius_m, tip.z];

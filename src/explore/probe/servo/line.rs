@@ -83,7 +83,7 @@ mod tests {
             from in prop::array::uniform7(-1.5..1.5f64),
             to in prop::array::uniform7(-1.5..1.5f64),
         ) {
-            let chain = ArmSettings::default().chain();
+            let chain = ArmSettings::default().chain().unwrap();
             let (from, to) = (Joints::from(from), Joints::from(to));
             let mut line = Line::new(&chain, &from, &to, 0.1);
             let tip = chain.flange * chain.tool;

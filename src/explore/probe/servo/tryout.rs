@@ -3,12 +3,13 @@
 
 use super::line::Line;
 use super::trajectory::Path;
+use crate::backend::interlock::defaults;
 use crate::explore::control::Controller;
 use crate::geometry::sweep::Capsule;
 use crate::robot::Robot;
 use crate::robot::arm::chain::MAX_JOINTS;
 use crate::robot::arm::{Chain, Joints, Kind};
-use crate::robot::capsules::{CARRIED, LinkCapsule, TOOL, capsules};
+use crate::robot::capsules::{LinkCapsule, TOOL, capsules};
 use crate::task::KeepOut;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -25,27 +26,22 @@ const NEAR_M: f64 = 1e-3;
 const NEAR_RAD: f64 = 0.01;
 const TICKS_TO_END: usize = 40;
 
-/// Distance that links keep from each other, as interlocks ask unless they are told otherwise.
-const CLEARANCE_M: f64 = 0.02;
-
 /// How far joints keep from their limits, and links from each other beyond that distance, because
 /// nothing moves exactly as it is tried out; chosen.
 const SLACK_RAD: f64 = 0.1;
 const SLACK_M: f64 = 5e-3;
 
-/// How far the tip may be from the box around home and ball; chosen: three quarters of what
-/// interlocks allow unless they are told otherwise.
-const TIP_MARGIN_M: f64 = 0.15;
+/// How far the tip may be from the box around home and ball, as a share of what interlocks allow.
+// heuristic: a quarter is left for what the rehearsal does not know.
+const TIP_MARGIN: f64 = 0.75;
 
 /// How far anything moves from one posture that is looked at to the next, straight in the space of
 /// the joints; chosen: no more than is asked beyond the interlocks' clearance.
 const GRAIN_M: f64 = 2e-3;
 
-/// From a command until the joints begin to brake, as interlocks take it; chosen.
-const REACTION_S: f64 = 0.02;
-
-/// The first link that can be where the object is: those before it stand on the foot.
-const FIRST_FAR: usize = 3;
+/// From a command until the joints begin to brake, as a multiple of what interlocks take.
+// heuristic: a tick more.
+const REACTION: f64 = 2.0;
 
 /// What does not change from one movement to the next.
 #[derive(Clone)]
@@ -82,7 +78,8 @@ impl Clear {
     pub(super) fn of(around: &KeepOut, robot: &Robot, standoff_m: f64, slack: f64) -> Self {
         let radius_m = around.radius_m - standoff_m - robot.finger.bulge_m();
         let home_w = Point3::from(robot.chain.forward(&robot.chain.home).translation.vector);
-        let [beyond, margin] = [around.radius_m, TIP_MARGIN_M].map(Vector3::repeat);
+        let [beyond, margin] =
+            [around.radius_m, TIP_MARGIN * defaults::TIP_MARGIN_M].map(Vector3::repeat);
         let low = home_w.inf(&(around.centre_w - beyond)) - margin;
         let high = home_w.sup(&(around.centre_w + beyond)) + margin;
         let ball = (around.centre_w, radius_m);
@@ -149,7 +146,7 @@ impl Tryout {
         line.postures(GRAIN_M).all(|q| {
             self.is_clear(&q, clear, false)
                 && self.is_apart(&q, clear)
-                && self.is_above(&self.chain.frames(&q), clear, &CARRIED)
+                && self.is_above(&self.chain.frames(&q), clear, LinkCapsule::is_carried)
         })
     }
 
@@ -157,14 +154,14 @@ impl Tryout {
     fn stops(&self, q: &Joints, qdot: &Joints) -> Joints {
         let joints = self.chain.joints.iter().zip(qdot.iter());
         let braking_s = joints.map(|(joint, qdot)| qdot.abs() / joint.qddot_limit);
-        let time_s = REACTION_S + braking_s.fold(0.0, f64::max) / 2.0;
+        let time_s = REACTION * defaults::REACTION_S + braking_s.fold(0.0, f64::max) / 2.0;
         self.chain.clamp(&(q + qdot * time_s))
     }
 
     /// Whether links keep from each other.
     fn is_apart(&self, q: &Joints, clear: &Clear) -> bool {
         let frames = self.chain.frames(q);
-        let least_m = CLEARANCE_M + clear.slack * SLACK_M;
+        let least_m = defaults::CLEARANCE_M + clear.slack * SLACK_M;
         let placed = |i: usize| self.links[i].at(&frames[self.links[i].link]);
         self.pairs.iter().all(|&[k, i]| placed(k).to_capsule_m(&placed(i)) > least_m)
     }
@@ -185,17 +182,22 @@ impl Tryout {
         let (p_wt, [low, high]) = (Point3::from(x_wt.translation.vector), clear.tip_w);
         let (centre_w, radius_m) = clear.ball;
         let ball = Capsule { p0_w: centre_w, p1_w: centre_w, radius_m };
-        let mut far = self.links.iter().filter(|link| link.link >= FIRST_FAR);
+        let mut far = self.links.iter().filter(|link| !link.near_base);
         (p_wt - low).inf(&(high - p_wt)).min() >= 0.0
-            && self.is_above(&frames, clear, &[TOOL])
+            && self.is_above(&frames, clear, |link| &*link.name == TOOL)
             && (is_approach
                 || far.all(|link| link.at(&frames[link.link]).to_capsule_m(&ball) > 0.0))
     }
 
-    /// Whether the links of these names are above the lowest z.
-    fn is_above(&self, frames: &[Isometry3<f64>], clear: &Clear, names: &[&str]) -> bool {
+    /// Whether the links of which `holds` is true are above the lowest z.
+    fn is_above(
+        &self,
+        frames: &[Isometry3<f64>],
+        clear: &Clear,
+        holds: impl Fn(&LinkCapsule) -> bool,
+    ) -> bool {
         let Some(lowest_m) = clear.lowest_m else { return true };
-        let mut links = self.links.iter().filter(|link| names.contains(&link.name));
+        let mut links = self.links.iter().filter(|link| holds(link));
         links.all(|link| {
             let Capsule { p0_w, p1_w, radius_m } = link.at(&frames[link.link]);
             p0_w.z.min(p1_w.z) - radius_m >= lowest_m
