@@ -4,7 +4,7 @@
 //! own_backend` explores the wall and says how well the belief knows it.
 
 use nalgebra::{Point3, Vector3};
-use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading};
+use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading, Sample};
 use palpate::explore::belief::{Belief, HeightField};
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
@@ -78,7 +78,7 @@ impl Backend for Slides {
         self.reading.qdot.clone_from(&command.qdot);
         self.reading.applied.clone_from(command);
         self.reading.time_s += self.capabilities.period_s;
-        self.reading.ideal = self.feel();
+        self.reading.samples = self.feel().map(Sample::Ideal).into_iter().collect();
         Ok(&self.reading)
     }
 }

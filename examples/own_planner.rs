@@ -1,62 +1,55 @@
-//! A planner of one's own, held against the built-in ones on the paper's toy.
+//! A planner of one's own, for zones and whole objects alike, held against a built-in one.
 //!
 //! `cargo run --release --example own_planner`
 
 use palpate::experiment::{Experiment, Simulation};
-use palpate::explore::belief::HeightField;
-use palpate::explore::planner::{self, Entry, Plan, ZonePlanner, over_zone};
-use palpate::gp::posterior::Scratch;
+use palpate::explore::belief::Belief;
+use palpate::explore::planner::{self, Entry, Plan, PlanError, Planner, sample};
 
-/// Of a few places drawn at random, touches the one of which the belief is least sure.
-struct BestOfSome {
+/// Of thirty random targets, takes the one farthest from all earlier ones (Mitchell 1991).
+struct FarthestOfSome {
     rng: rand_chacha::ChaCha8Rng,
 }
 
-/// Places that are drawn; more is nearer to the largest standard deviation, and slower.
-const DRAWN: usize = 30;
-
-impl ZonePlanner for BestOfSome {
-    fn plan(&mut self, belief: &HeightField) -> Plan {
-        let mut scratch = Scratch::default();
-        let mut variance = |place: &[f64]| belief.explorable_variance(place, &mut [], &mut scratch);
-        let mut best = planner::uniform(belief.zone(), &mut self.rng);
-        for _ in 1..DRAWN {
-            let place = planner::uniform(belief.zone(), &mut self.rng);
-            if variance(&place) > variance(&best) {
-                best = place;
-            }
-        }
-        let sd_m = Some(variance(&best).sqrt());
-        Plan { sd_m, ..Plan::at(best) }
+impl Planner for FarthestOfSome {
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+        let earlier: Vec<Vec<f64>> = belief.targets().iter().map(|it| it.numbers()).collect();
+        let distance = |target: &[f64]| -> f64 {
+            let squares = |other: &Vec<f64>| -> f64 {
+                other.iter().zip(target).map(|(a, b)| (a - b).powi(2)).sum()
+            };
+            earlier.iter().map(squares).fold(f64::INFINITY, f64::min)
+        };
+        let some = (0..30).map(|_| sample::anywhere(belief, &mut self.rng));
+        let farthest =
+            some.max_by(|a, b| distance(&a.numbers()).total_cmp(&distance(&b.numbers())));
+        farthest.map(Plan::at).ok_or_else(|| "no target".into())
     }
 }
 
 /// As an experiment names it.
 pub static ENTRY: Entry = Entry {
-    name: "best_of_some",
-    about: "the least sure of thirty random places",
-    zone_only: Some("it draws places of a zone"),
-    make: |_, rng| over_zone(BestOfSome { rng }),
+    name: "farthest_of_some",
+    about: "the farthest from earlier targets of thirty random ones",
+    zone_only: None,
+    make: |_, rng| Box::new(FarthestOfSome { rng }),
 };
 
-/// Mean RMSE after the last touch of a few trials on the toy.
-pub fn rmse(planner: &Entry, trials: u32) -> Result<f64, Box<dyn std::error::Error>> {
-    let toy = concat!(env!("CARGO_MANIFEST_DIR"), "/experiments/toy.toml");
-    let experiment = Experiment::load(toy.as_ref(), &["touches=30".into()])?;
-    let simulation = Simulation::new(experiment)?;
-    let mut sum = 0.0;
-    for number in 0..trials {
-        let row = simulation.trial(planner, number);
-        let last = row.touches.last().and_then(|touch| touch.metrics);
-        sum += last.ok_or("the trial failed")?.rmse_m;
-    }
-    Ok(sum / f64::from(trials))
+/// The error after the last touch of a trial: mm over a zone, the Chamfer distance around an object.
+pub fn error(planner: &Entry, experiment: &str) -> Result<f64, Box<dyn std::error::Error>> {
+    let path = format!("{}/experiments/{experiment}.toml", env!("CARGO_MANIFEST_DIR"));
+    let simulation = Simulation::new(Experiment::load(path.as_ref(), &["touches=20".into()])?)?;
+    let row = simulation.trial(planner, 0);
+    let touches = row.touches.len() as u32;
+    let error = simulation.experiment().error();
+    (error.of)(&row, touches).ok_or_else(|| row.failure.unwrap_or_default().into())
 }
 
 #[allow(dead_code)]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    for planner in ["active", "random"].into_iter().filter_map(planner::by_name).chain([&ENTRY]) {
-        println!("{:<14} RMSE after 30 touches {:.4}", planner.name, rmse(planner, 5)?);
+    for planner in [&ENTRY].into_iter().chain(planner::by_name("random")) {
+        let [toy, around] = [error(planner, "toy")?, error(planner, "around")?];
+        println!("{:<17} toy {toy:.4} m, container from all sides {around:.5} m", planner.name);
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! A body whose sensors and joints fail, to test what drives it.
 
-use super::{Backend, Capabilities, Command, Fault, Reading};
+use super::{Backend, Capabilities, Command, Fault, Reading, Sample};
 use crate::math::seed;
 use crate::robot::finger::Frame;
 use crate::robot::finger::frame::FULL_SCALE_COUNTS;
@@ -36,7 +36,7 @@ pub struct FaultInjector {
     from_tick: u64,
     tick: u64,
     rng: ChaCha8Rng,
-    held: VecDeque<(u64, Frame)>,
+    held: VecDeque<(u64, Sample)>,
     last: Option<Frame>,
     reading: Reading,
     command: Command,
@@ -62,31 +62,31 @@ impl FaultInjector {
         let Self { reading, rng, .. } = self;
         match self.failure {
             Failure::NanPressure => {
-                reading.frames.iter_mut().for_each(|frame| frame.pdc_counts = Some(f64::NAN));
+                reading.frames_mut().for_each(|frame| frame.pdc_counts = Some(f64::NAN));
             }
             Failure::NanJoint => reading.q.iter_mut().take(1).for_each(|q| *q = f64::NAN),
             Failure::Frozen => {
-                for frame in &mut reading.frames {
+                for frame in reading.frames_mut() {
                     frame.clone_from(self.last.get_or_insert_with(|| frame.clone()));
                 }
             }
             Failure::Saturated => {
-                for frame in &mut reading.frames {
+                for frame in reading.frames_mut() {
                     frame.pdc_counts = frame.pdc_counts.map(|_| FULL_SCALE_COUNTS);
                     frame.electrode_counts =
                         frame.electrode_counts.map(|all| all.map(|_| FULL_SCALE_COUNTS));
                 }
             }
-            Failure::Lost(share) => reading.frames.retain(|_| rng.random::<f64>() >= share),
+            Failure::Lost(share) => reading.samples.retain(|_| rng.random::<f64>() >= share),
             Failure::Late(ticks) => {
                 let due = self.tick + ticks as u64;
-                self.held.extend(reading.frames.drain(..).map(|frame| (due, frame)));
-                while let Some((_, frame)) = self.held.pop_front_if(|(due, _)| *due <= self.tick) {
-                    reading.frames.push(frame);
+                self.held.extend(reading.samples.drain(..).map(|sample| (due, sample)));
+                while let Some((_, sample)) = self.held.pop_front_if(|(due, _)| *due <= self.tick) {
+                    reading.samples.push(sample);
                 }
             }
             Failure::Spikes(share) => {
-                for frame in &mut reading.frames {
+                for frame in reading.frames_mut() {
                     if let Some(pdc) = &mut frame.pdc_counts
                         && rng.random::<f64>() < share
                     {
@@ -125,7 +125,7 @@ impl Backend for FaultInjector {
         self.reading.clone_from(self.inner.step(&self.command)?);
         match is_failing {
             true => self.spoil(),
-            false => self.last = self.reading.frames.last().cloned().or(self.last.take()),
+            false => self.last = self.reading.frames().last().cloned().or(self.last.take()),
         }
         Ok(&self.reading)
     }

@@ -17,7 +17,8 @@ pub mod ros;
 pub mod trace;
 pub mod watched;
 
+pub use crate::robot::sensor::{IdealContact, Sample, Wrench};
 pub use backend::{Backend, Capabilities};
 pub use command::Command;
 pub use fault::{Fault, Quantity};
-pub use reading::{IdealContact, Reading, Wrench};
+pub use reading::Reading;

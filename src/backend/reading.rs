@@ -3,7 +3,8 @@
 use super::command::Command;
 use super::fault::{Fault, Quantity};
 use crate::robot::finger::Frame;
-use nalgebra::{Isometry3, Point3, Vector3};
+use crate::robot::sensor::{IdealContact, Sample, Wrench};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// What a body returns after a tick. Time stands in it and is never read from a clock.
@@ -17,11 +18,8 @@ pub struct Reading {
     pub qdot: Vec<f64>,
     /// What the force/torque sensor at the finger's mount says, if there is one.
     pub wrench: Option<Wrench>,
-    /// Tactile frames that arrived during the tick, oldest first.
-    pub frames: Vec<Frame>,
-    /// Where and how much the skin is loaded, in a scene that leaves out the sensor which would
-    /// tell; a real body never knows it.
-    pub ideal: Option<IdealContact>,
+    /// Samples of the fingertip's sensor that arrived during the tick, oldest first.
+    pub samples: Vec<Sample>,
     /// The command as it was really applied after limiting.
     pub applied: Command,
 }
@@ -29,12 +27,36 @@ pub struct Reading {
 impl Reading {
     /// Becomes the same as `other` in the memory that it has.
     pub fn copy(&mut self, other: &Self) {
-        let Self { time_s, q, qdot, wrench, frames, ideal, applied } = self;
-        (*time_s, *wrench, *ideal) = (other.time_s, other.wrench, other.ideal);
+        let Self { time_s, q, qdot, wrench, samples, applied } = self;
+        (*time_s, *wrench) = (other.time_s, other.wrench);
         q.clone_from(&other.q);
         qdot.clone_from(&other.qdot);
-        frames.clone_from(&other.frames);
+        samples.clone_from(&other.samples);
         applied.qdot.clone_from(&other.applied.qdot);
+    }
+
+    /// Frames of a BioTac that arrived during the tick, oldest first.
+    pub fn frames(&self) -> impl DoubleEndedIterator<Item = &Frame> {
+        self.samples.iter().filter_map(|sample| match sample {
+            Sample::BioTac(frame) => Some(frame),
+            _ => None,
+        })
+    }
+
+    /// The same, to be altered.
+    pub fn frames_mut(&mut self) -> impl Iterator<Item = &mut Frame> {
+        self.samples.iter_mut().filter_map(|sample| match sample {
+            Sample::BioTac(frame) => Some(frame),
+            _ => None,
+        })
+    }
+
+    /// The contact as a simulator knows it, in a scene that leaves out the sensor which would tell.
+    pub fn ideal(&self) -> Option<IdealContact> {
+        self.samples.iter().find_map(|sample| match sample {
+            Sample::Ideal(contact) => Some(*contact),
+            _ => None,
+        })
     }
 
     /// Whether the numbers that a controller acts on are numbers. Tactile frames are judged one by
@@ -57,34 +79,4 @@ impl Reading {
             }
         }
     }
-}
-
-/// Force and torque of the object on the finger, in the fingertip's frame `T` about its origin.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Wrench {
-    /// Force.
-    pub force_n: Vector3<f64>,
-    /// Torque about the origin of `T`.
-    pub torque_nm: Vector3<f64>,
-}
-
-impl Wrench {
-    /// The same load, given in a frame A about its origin, in a frame B about B's origin; `x_ba` is
-    /// the pose of A in B.
-    pub fn moved(&self, x_ba: &Isometry3<f64>) -> Self {
-        let force_n = x_ba.rotation * self.force_n;
-        let lever = x_ba.translation.vector.cross(&force_n);
-        Self { force_n, torque_nm: x_ba.rotation * self.torque_nm + lever }
-    }
-}
-
-/// A contact as a simulator knows it: exact.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct IdealContact {
-    /// Centre of pressure on the skin, in `T`.
-    pub p_tc: Point3<f64>,
-    /// Unit outward normal of the object there, in `T`.
-    pub normal_t: Vector3<f64>,
-    /// Magnitude of the force.
-    pub force_n: f64,
 }

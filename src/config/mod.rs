@@ -131,6 +131,14 @@ impl Loader {
         Ok(())
     }
 
+    /// As [`resolve_path`](Self::resolve_path), if what stands under `key` ends with `ending`.
+    pub fn resolve_path_ending(&mut self, key: &str, ending: &str) {
+        let is_file = |value: &Value| value.as_str().is_some_and(|name| name.ends_with(ending));
+        if self.value(key).is_some_and(is_file) {
+            self.resolve_path(key);
+        }
+    }
+
     /// Makes the file name under the dotted `key` absolute: one from a file is relative to that
     /// file's folder, one from `--set` to the current folder.
     pub fn resolve_path(&mut self, key: &str) {

@@ -156,7 +156,10 @@ impl Experiment {
         others.iter().try_for_each(|set| loader.set(set))?;
         loader.resolve_path("scene.object.mesh");
         loader.resolve_path("truth.scan");
-        loader.finish()
+        loader.resolve_path_ending("scene.arm.model", ".toml");
+        let mut experiment: Self = loader.finish()?;
+        experiment.backend.complete(experiment.scene.arm.as_ref());
+        Ok(experiment)
     }
 
     /// What decides the rows of a run, all else left blank: a row depends on the name of its

@@ -20,6 +20,11 @@ pub struct Cell {
     pub sets: Vec<String>,
 }
 
+/// Whether `value` of `key` is a file's name; an arm's model may be one.
+fn is_file(key: &str, value: &str) -> bool {
+    FILES.contains(&key) || (key == "scene.arm.model" && value.ends_with(".toml"))
+}
+
 /// The combinations of the file at `path`, the last key's values in a row; none without a sweep.
 ///
 /// # Errors
@@ -40,7 +45,7 @@ pub fn cells(path: &Path) -> Result<Vec<Cell>, ConfigError> {
         let longer = |cell: &Cell| -> Vec<Cell> {
             let with = |(i, value): (usize, &Value)| {
                 let set = match value {
-                    Value::String(name) if FILES.contains(&key.as_str()) => {
+                    Value::String(name) if is_file(key, name) => {
                         format!(
                             "{key}={}",
                             Value::String(folder.join(name).to_string_lossy().into())

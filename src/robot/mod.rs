@@ -5,6 +5,7 @@ pub mod capsules;
 pub mod finger;
 #[allow(clippy::module_inception)]
 mod robot;
+pub mod sensor;
 
 pub use finger::Finger;
 pub use robot::Robot;

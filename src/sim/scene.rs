@@ -395,6 +395,7 @@ impl Scene {
         }
         sets.iter().try_for_each(|set| loader.set(set))?;
         loader.resolve_path("object.mesh");
+        loader.resolve_path_ending("arm.model", ".toml");
         loader.finish()
     }
 }

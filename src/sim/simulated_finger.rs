@@ -1,6 +1,6 @@
 //! What the simulated finger feels of the scene's object, for every simulated body.
 
-use crate::backend::{Fault, IdealContact, Reading, Wrench};
+use crate::backend::{Fault, IdealContact, Reading, Sample, Wrench};
 use crate::math::seed;
 use crate::robot::finger::Frame;
 use crate::robot::finger::TipMotion;
@@ -113,8 +113,9 @@ impl SimulatedFinger {
     /// what a force/torque sensor under the load `mount` (in `T`) says, and the load where no
     /// sensor tells it.
     pub fn report(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
-        reading.frames.clear();
-        reading.frames.extend(std::iter::from_fn(|| self.frame()));
+        reading.samples.clear();
+        reading.samples.extend(std::iter::from_fn(|| self.frame()).map(Sample::BioTac));
+        reading.samples.extend(self.ideal().map(Sample::Ideal));
         let effect = self.environment.scene().effects.wrench.as_ref();
         reading.wrench = self.drawn.gauge.as_mut().zip(effect).map(|(gauge, effect)| {
             let Wrench { force_n: f, torque_nm: t } = mount.moved(&self.x_mt);
@@ -125,7 +126,6 @@ impl SimulatedFinger {
             };
             said.moved(&self.x_mt.inverse())
         });
-        reading.ideal = self.ideal();
     }
 
     /// The oldest tactile frame that has arrived and was not asked for yet.

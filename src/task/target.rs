@@ -132,7 +132,7 @@ impl From<Target> for Written {
     }
 }
 
-/// A target as a row may have it: versions before 0.2 wrote its numbers without a name.
+/// A target as a row may have it: version 0.1 wrote its numbers without a name.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Read {

@@ -3,6 +3,7 @@
 
 use crate::config::{Checked, Rules};
 use crate::robot::finger::Detection;
+use crate::robot::finger::contact_point::ContactEstimate;
 use crate::robot::finger::frame::FRAME_S;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -38,20 +39,6 @@ pub struct TouchSettings {
     pub pressure_limit_counts: f64,
     /// Which point counts as the contact.
     pub point: ContactEstimate,
-}
-
-/// Which estimate from the electrodes counts as the point of contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ContactEstimate {
-    /// The centroid of Eq. 1, projected onto the skin.
-    #[default]
-    Skin,
-    /// The centroid of Eq. 1 itself, among the electrodes, as in Yi et al. 2016.
-    Electrodes,
-    /// Where a plane presses that explains all electrodes best, together with a skin that is
-    /// carried sideways; for fingers that press hard, or shear.
-    Plane,
 }
 
 impl Default for TouchSettings {

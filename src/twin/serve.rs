@@ -287,7 +287,7 @@ impl Twin {
         if is_new {
             tell(clock::now_s(), Event::Status(self.told.clone()));
         }
-        let message = self.told.message(clock::now_s());
+        let message = self.told.message(clock::now_s(), self.settings.topics.device());
         self.sender.send(&self.link, Packet::Status(message), now_s);
     }
 }
@@ -322,7 +322,7 @@ fn packets(
     }
     let is_shadow = topics.tactile.is_shadow();
     let finger = usize::from(settings.finger);
-    let frames = reading.frames.iter();
+    let frames = reading.frames();
     packets.extend(frames.map(|frame| tactile::packet(frame, stamp_s, finger, is_shadow)));
     (packets, wrench)
 }

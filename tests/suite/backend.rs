@@ -118,7 +118,7 @@ fn time_goes_on_by_the_period_and_readings_are_finite() {
                 assert_eq!(part.len(), joints.len(), "{name}");
                 assert!(part.iter().all(|value| value.is_finite()), "{name}");
             }
-            assert!(reading.frames.iter().all(|frame| frame.is_finite()), "{name}");
+            assert!(reading.frames().all(|frame| frame.is_finite()), "{name}");
             if let Some(wrench) = reading.wrench {
                 assert!(wrench.force_n.norm() < 10.0 && wrench.torque_nm.norm() < 1.0, "{name}");
             }

@@ -2,8 +2,17 @@
 
 #[path = "../../examples/own_backend.rs"]
 mod own_backend;
+#[path = "../../examples/own_measure.rs"]
+mod own_measure;
 #[path = "../../examples/own_planner.rs"]
 mod own_planner;
+#[path = "../../examples/own_sensor.rs"]
+mod own_sensor;
+
+use palpate::experiment::statistics::summary::typical;
+use palpate::explore::probe::Touch;
+use palpate::sim::simulator::Simulator;
+use palpate::sim::{Environment, Scene};
 
 /// The servo over a body written by hand, with nothing of the simulator: contacts lie on the wall,
 /// for what this body feels is exact, and the belief knows the plane.
@@ -22,12 +31,84 @@ fn the_servo_drives_a_body_that_no_simulator_made() {
     }
 }
 
-/// Thirty draws come near to the largest standard deviation, and so near to `active`: better than
-/// random in the mean of a few trials.
+/// It chooses targets in a zone and around an object, and its errors are numbers of both.
 #[test]
-fn an_own_planner_runs_beside_the_others() {
-    let random = palpate::explore::planner::by_name("random").unwrap();
-    let [ours, random] =
-        [&own_planner::ENTRY, random].map(|planner| own_planner::rmse(planner, 4).unwrap());
-    assert!(ours < random, "{ours} {random}");
+fn an_own_planner_explores_zones_and_whole_objects() {
+    for experiment in ["toy", "around"] {
+        let error_m = own_planner::error(&own_planner::ENTRY, experiment).unwrap();
+        assert!(error_m > 0.0 && error_m < 1.0, "{experiment}: {error_m}");
+    }
+}
+
+/// The mean over the touches lies between the errors that it is of.
+#[test]
+fn an_own_measure_is_found_from_rows() {
+    let rows = own_measure::rows().unwrap();
+    let value = typical(&rows, "active", 20, &own_measure::MEAN_RMSE).unwrap();
+    let errors = rows.iter().filter(|row| row.planner == "active").flat_map(|row| &row.touches);
+    let errors: Vec<f64> = errors.filter_map(|touch| Some(touch.metrics?.rmse_m)).collect();
+    let (low, high) = errors.iter().fold((f64::MAX, 0.0), |(a, b), &e| (e.min(a), e.max(b)));
+    assert!(low < value && value < high, "{low} {value} {high}");
+}
+
+/// A switch knows no place, but the container is nearly flat in its middle.
+#[test]
+fn an_own_sensor_ends_touches_and_places_them() {
+    let below_m = own_sensor::touch().unwrap();
+    assert!(below_m.abs() < 2e-3, "{below_m}");
+}
+
+/// An arm with six joints that is not built in reaches the same object, and touches it as a stage
+/// does.
+#[test]
+fn an_arm_from_a_file_touches() {
+    let touched = |sets: &[&str]| {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).into()).collect();
+        let scene = Scene::load("scenes/container_finger.toml".as_ref(), &sets).unwrap();
+        let simulator = Simulator::new(Environment::build(scene).unwrap().into()).unwrap();
+        simulator.check_reach().unwrap();
+        let task = simulator.environment().task();
+        let mut probe = simulator.probe(1).unwrap();
+        let places = [[-0.02, 0.48], [0.0, 0.5], [0.02, 0.52]];
+        places.map(|place| match probe.touch(&task.approach(&place.into()).unwrap()).unwrap() {
+            Touch::Contact(contact) => contact.p_wc,
+            other => panic!("{other:?}"),
+        })
+    };
+    let arm = touched(&["arm.model=examples/ur5e.toml", "effects={skin={}}"]);
+    let stage = touched(&["effects={skin={}}"]);
+    for (arm, stage) in arm.iter().zip(&stage) {
+        assert!((arm - stage).norm() < 1e-3, "{arm} {stage}");
+    }
+}
+
+/// An arm's file that is wrong is refused with its name, the key, and what is allowed.
+#[test]
+fn a_wrong_arm_is_refused_by_name() {
+    let text = std::fs::read_to_string("examples/ur5e.toml").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let wrong = [
+        ("axis = [0.0, 0.0, 1.0]", "axis = [0, 0, 0]", "joint[0].axis"),
+        ("limits_deg = [-360, 360]", "limits_deg = [360, -360]", "joint[0].limits_deg"),
+        ("link = \"elbow_joint\"", "link = \"elbow\"", "capsule[3].link"),
+        ("namespace = \"/ur5e\"", "namespce = \"/ur5e\"", "namespce"),
+        ("home_deg = 72.15", "home_deg = 400", "joint[0].home_deg"),
+    ];
+    for (right, bad, key) in wrong {
+        let path = folder.path().join("bad.toml");
+        std::fs::write(&path, text.replacen(right, bad, 1)).unwrap();
+        let sets = [format!("arm.model={}", path.display())];
+        let scene = Scene::load("scenes/container_finger.toml".as_ref(), &sets).unwrap();
+        let error = Environment::build(scene).err().unwrap().to_string();
+        assert!(error.contains("bad.toml") && error.contains(key), "{key}: {error}");
+    }
+    let sets = ["arm.model=examples/none.toml".to_string()];
+    let scene = Scene::load("scenes/container_finger.toml".as_ref(), &sets).unwrap();
+    assert!(Environment::build(scene).err().unwrap().to_string().contains("none.toml"));
+    let sets = ["arm.model=pa11".to_string()];
+    let error = Scene::load("scenes/container_finger.toml".as_ref(), &sets).unwrap_err();
+    assert!(
+        error.to_string().contains("\"pa10\", \"pa10_a\", or a file ending in .toml"),
+        "{error}"
+    );
 }

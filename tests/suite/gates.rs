@@ -57,7 +57,7 @@ fn what_is_not_in_order_is_said_with_its_numbers() {
             |tick, reading| reading.wrench.as_mut().unwrap().force_n.z = 1e-3 * tick as f64,
             |error| matches!(error, GateError::Drifts { drift_n, .. } if (drift_n - 0.75).abs() < 0.01),
         ),
-        (|_, reading| reading.frames.clear(), |error| matches!(error, GateError::NoFrames { .. })),
+        (|_, reading| reading.samples.clear(), |error| matches!(error, GateError::NoFrames { .. })),
         (
             |_, reading| counts(reading, |counts| counts[4] = 2000.0),
             |error| matches!(error, GateError::Electrode { electrode: 5, .. }),
@@ -69,7 +69,7 @@ fn what_is_not_in_order_is_said_with_its_numbers() {
         (
             |tick, reading| {
                 let sign = if (tick / 5).is_multiple_of(2) { 1.0 } else { -1.0 };
-                for frame in &mut reading.frames {
+                for frame in reading.frames_mut() {
                     frame.electrode_counts.as_mut().unwrap()[7] += 40.0 * sign;
                 }
             },
@@ -85,7 +85,7 @@ fn what_is_not_in_order_is_said_with_its_numbers() {
 }
 
 fn counts(reading: &mut Reading, change: fn(&mut [f64; 19])) {
-    reading.frames.iter_mut().for_each(|frame| change(frame.electrode_counts.as_mut().unwrap()));
+    reading.frames_mut().for_each(|frame| change(frame.electrode_counts.as_mut().unwrap()));
 }
 
 /// A real robot needs its cell and depths from a person; a simulation takes them from the mesh.

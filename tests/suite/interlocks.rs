@@ -45,7 +45,7 @@ const CAUSES: [(&str, Breaks); 13] = [
     ("silence of the joints", |_, reading| reading.time_s = 0.2),
     ("silence of the force", |_, reading| reading.wrench = None),
     ("silence of the force", |_, reading| reading.wrench = Some(Wrench::default())),
-    ("silence of the skin", |_, reading| reading.frames.clear()),
+    ("silence of the skin", |_, reading| reading.samples.clear()),
     ("value of E3", |_, reading| electrode(reading, 2, 4095.0)),
     ("value of E4", |_, reading| electrode(reading, 3, 0.0)),
     ("standstill of E19", |_, reading| electrode(reading, 18, 2000.0)),
@@ -59,7 +59,7 @@ fn force(reading: &mut Reading, more_n: f64) {
 }
 
 fn electrode(reading: &mut Reading, i: usize, counts: f64) {
-    for frame in &mut reading.frames {
+    for frame in reading.frames_mut() {
         frame.electrode_counts.as_mut().unwrap()[i] = counts;
     }
 }
@@ -283,7 +283,7 @@ fn it_goes_back_from_nothing_but_force() {
     }
     // Nor from force, if the skin is silent too.
     let both: Breaks = |tick, reading| {
-        reading.frames.clear();
+        reading.samples.clear();
         force(reading, (0.24 * (tick - 100) as f64).min(26.0));
     };
     let world = World { breaks: Some((100, both)), ..World::real() };

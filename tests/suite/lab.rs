@@ -267,7 +267,7 @@ fn an_arm_of_another_implementation_is_heard_and_answers() {
     let on_change = BackendSettings { status_on_change: true, ..network.settings.clone() };
     let lab = Lab::join(&on_change, &chain).unwrap();
     for service in Service::COMMON {
-        lab.call(&service).unwrap_or_else(|fault| panic!("{}: {fault}", service.name()));
+        lab.call(&service).unwrap_or_else(|fault| panic!("{}: {fault}", service.name("/pa10")));
     }
     drop(lab);
     // The wrong mapping never gets an answer, and the message names the setting.
@@ -280,7 +280,7 @@ fn an_arm_of_another_implementation_is_heard_and_answers() {
     let told = String::from_utf8(arm.wait_with_output().unwrap().stdout).unwrap();
     let called: Value = serde_json::from_str(&told).unwrap();
     for service in Service::COMMON {
-        let name = Value::from(service.name());
+        let name = Value::from(service.name("/pa10"));
         assert!(called["called"].as_array().unwrap().contains(&name), "{name}: {told}");
     }
 }

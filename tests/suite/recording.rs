@@ -11,7 +11,9 @@ use palpate::backend::recording::{
     Tick, Touch, decoded,
 };
 use palpate::backend::ros::message::{BioTacHand, JointState, JointTrajectory, WrenchStamped};
-use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading, Wrench};
+use palpate::backend::{
+    Backend, Capabilities, Command, Fault, IdealContact, Reading, Sample, Wrench,
+};
 use palpate::experiment::trial::recorded_trial::{self, next_part, parts, recording_path};
 use palpate::experiment::trial::replay::{self, Difference, ReplayError};
 use palpate::experiment::trial::row::TouchRow;
@@ -110,13 +112,13 @@ fn bits(reading: &Reading) -> Vec<Option<u64>> {
         Some(wrench) => all.extend(wrench.force_n.iter().chain(wrench.torque_nm.iter())),
         None => bits.push(None),
     }
-    match reading.ideal {
+    match reading.ideal() {
         Some(ideal) => {
             all.extend(ideal.p_tc.iter().chain(ideal.normal_t.iter()).chain([&ideal.force_n]));
         }
         None => bits.push(None),
     }
-    for frame in &reading.frames {
+    for frame in reading.frames() {
         all.push(frame.time_s);
         let lists = [
             frame.electrode_counts.map(|all| all.to_vec()),
@@ -171,12 +173,12 @@ fn any_reading() -> impl Strategy<Value = Reading> {
                 force_n: [a, b, c].into(),
                 torque_nm: [d, e, f].into(),
             }),
-            frames,
-            ideal: ideal.map(|[a, b, c, d, e, f, force_n]| IdealContact {
-                p_tc: [a, b, c].into(),
-                normal_t: [d, e, f].into(),
-                force_n,
-            }),
+            samples: (frames.into_iter().map(Sample::BioTac))
+                .chain(ideal.map(|[a, b, c, d, e, f, force_n]| {
+                    let (p_tc, normal_t) = ([a, b, c].into(), [d, e, f].into());
+                    Sample::Ideal(IdealContact { p_tc, normal_t, force_n })
+                }))
+                .collect(),
             applied: Command { qdot: applied },
         },
     )
@@ -388,7 +390,7 @@ fn what_others_read_is_what_was_read() {
             }
             "/biotac_pub" => {
                 let hand: BioTacHand = decoded(data).unwrap();
-                let frames: Vec<&Frame> = readings.iter().flat_map(|all| &all.frames).collect();
+                let frames: Vec<&Frame> = readings.iter().flat_map(Reading::frames).collect();
                 let frame = frames[number];
                 let [first, .., last] = frame.electrode_counts.unwrap();
                 let told = hand.bt_data[0].electrode_data;
@@ -407,7 +409,7 @@ fn what_others_read_is_what_was_read() {
             _ => assert_eq!(decoded::<Marker>(data).unwrap().points.len(), 3),
         }
     }
-    let frames = readings.iter().map(|reading| reading.frames.len()).sum();
+    let frames = readings.iter().map(|reading| reading.frames().count()).sum();
     assert!(frames > 20);
     assert_eq!(seen, [81, 80, 81, frames, 81, 2, 2, 2]);
 }

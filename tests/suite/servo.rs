@@ -176,7 +176,7 @@ fn a_sensor_that_falls_silent_and_joints_that_do_not_move_are_faults_with_their_
     let environment = environment("container_finger.toml", &[]);
     let (silent, _) = broken(&environment, |tick, reading| {
         if tick > 5 {
-            reading.frames.clear();
+            reading.samples.clear();
         }
     });
     assert!(matches!(silent, Err(Fault::Lost { time_s }) if time_s > 0.0), "{silent:?}");
@@ -208,13 +208,13 @@ fn a_pressure_that_is_not_a_number_is_silence_and_a_frozen_one_ends_inside() {
     let environment = environment("container_finger.toml", &[]);
     let (nan, _) = broken(&environment, |tick, reading| {
         if tick > 5 {
-            reading.frames.iter_mut().for_each(|frame| frame.pdc_counts = Some(f64::NAN));
+            reading.frames_mut().for_each(|frame| frame.pdc_counts = Some(f64::NAN));
         }
     });
     assert!(matches!(nan, Err(Fault::Lost { .. })), "{nan:?}");
     // Without a force sensor nothing else tells of the object until it meets the tip's centre.
     let (frozen, _) = broken(&environment, |_, reading| {
-        reading.frames.iter_mut().for_each(|frame| frame.pdc_counts = Some(2000.0));
+        reading.frames_mut().for_each(|frame| frame.pdc_counts = Some(2000.0));
     });
     assert!(matches!(frozen, Err(Fault::Inside { .. })), "{frozen:?}");
 }

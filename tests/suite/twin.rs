@@ -106,6 +106,7 @@ fn the_arm_moves_again_when_the_operator_has_cleared_it() {
 
 #[test]
 fn every_service_has_a_name_of_its_own() {
-    let names: std::collections::HashSet<String> = services().iter().map(Service::name).collect();
+    let names: std::collections::HashSet<String> =
+        services().iter().map(|service| service.name("/pa10")).collect();
     assert_eq!(names.len(), services().len());
 }

@@ -152,45 +152,49 @@ fn with<'a>(key: &'a str, text: &'a str) -> Vec<(&'a str, &'a str)> {
 
 #[test]
 fn a_status_is_read_as_drivers_write_it_and_nothing_unreadable_is_safe() {
-    assert_eq!(ArmStatus::read(&status(0, &READY)).unwrap().refusal(), None);
+    assert_eq!(ArmStatus::read(&status(0, &READY), "pa10").unwrap().refusal(), None);
     for (key, is_ready) in READY {
         for [no, yes] in
             [["false", "true"], ["False", "True"], ["0", "1"], ["off", "ON"], [" FALSE", "TRUE "]]
         {
             let text = |is: bool| if is { yes } else { no };
             let ready = is_ready == "true";
-            let read = |is| ArmStatus::read(&status(0, &with(key, text(is)))).unwrap().refusal();
+            let read =
+                |is| ArmStatus::read(&status(0, &with(key, text(is))), "pa10").unwrap().refusal();
             assert_eq!(read(ready), None, "{key} {yes}");
             assert!(read(!ready).is_some(), "{key} {no}");
         }
         for text in ["", "unknown", "yes", "2", "-1", "1.0", "truefalse", "None", "\u{1d7ef}"] {
-            let error = ArmStatus::read(&status(0, &with(key, text))).unwrap_err();
+            let error = ArmStatus::read(&status(0, &with(key, text)), "pa10").unwrap_err();
             let said = error.to_string();
             assert!(said.contains(key) && said.contains(&format!("{text:?}")), "{said}");
         }
         let without: Vec<_> = READY.into_iter().filter(|(other, _)| *other != key).collect();
         let found = "missing".into();
         assert_eq!(
-            ArmStatus::read(&status(0, &without)),
+            ArmStatus::read(&status(0, &without), "pa10"),
             Err(StatusError::Flag { key, found }),
             "{key}"
         );
         let twice = [&READY[..], &[(key, "true")]].concat();
-        assert!(ArmStatus::read(&status(0, &twice)).is_err(), "{key}");
+        assert!(ArmStatus::read(&status(0, &twice), "pa10").is_err(), "{key}");
     }
-    assert!(ArmStatus::read(&status(0, &[])).is_err());
+    assert!(ArmStatus::read(&status(0, &[]), "pa10").is_err());
     // Whatever is wrong is an alarm, with or without words.
     for level in 2..=255 {
-        assert!(ArmStatus::read(&status(level, &READY)).unwrap().refusal().is_some(), "{level}");
+        assert!(
+            ArmStatus::read(&status(level, &READY), "pa10").unwrap().refusal().is_some(),
+            "{level}"
+        );
     }
     let alarm = [&READY[..], &[("alarm", "joint 3 is hot")]].concat();
-    let read = ArmStatus::read(&status(0, &alarm)).unwrap();
+    let read = ArmStatus::read(&status(0, &alarm), "pa10").unwrap();
     assert_eq!(read.refusal().unwrap(), "alarm: joint 3 is hot");
     // What it writes, it reads.
-    assert_eq!(ArmStatus::read(&read.message(1.0)).unwrap(), read);
+    assert_eq!(ArmStatus::read(&read.message(1.0, "pa10"), "pa10").unwrap(), read);
     let mut other = status(0, &READY);
     other.status[0].name = "hand".into();
-    assert!(matches!(ArmStatus::read(&other), Err(StatusError::OtherDevice { .. })));
+    assert!(matches!(ArmStatus::read(&other, "pa10"), Err(StatusError::OtherDevice { .. })));
 }
 
 /// The most that the tip may move from a failure on.

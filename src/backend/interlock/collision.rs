@@ -8,7 +8,8 @@ use super::trip::Trip;
 use crate::geometry::distance::{HalfSpace, OrientedBox};
 use crate::geometry::sweep::Capsule;
 use crate::robot::arm::Joints;
-use crate::robot::capsules::{LinkCapsule, capsules};
+use crate::robot::arm::capsule::LinkCapsule;
+use crate::robot::capsules::capsules;
 use nalgebra::{Point3, Vector3};
 
 /// Stops the body before links come near to each other, to the table or to the object.

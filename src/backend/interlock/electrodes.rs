@@ -48,7 +48,7 @@ struct Electrodes {
 
 impl Interlock for Electrodes {
     fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
-        for counts in reading.frames.iter().filter_map(|frame| frame.electrode_counts) {
+        for counts in reading.frames().filter_map(|frame| frame.electrode_counts) {
             for (i, &count) in counts.iter().enumerate() {
                 let part = || format!("E{}", i + 1);
                 let still = &mut self.still[i];

@@ -161,7 +161,7 @@ pub fn check_start(
     readings.iter().try_for_each(Reading::check)?;
     check_joints(&readings, chain, expected.q, settings)?;
     let wrench = check_force(&readings, settings)?;
-    let frames: Vec<&Frame> = readings.iter().flat_map(|reading| &reading.frames).collect();
+    let frames: Vec<&Frame> = readings.iter().flat_map(Reading::frames).collect();
     if frames.is_empty() && expected.sends_frames {
         return Err(GateError::NoFrames { hold_s: settings.hold_s });
     }

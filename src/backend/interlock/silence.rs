@@ -36,7 +36,7 @@ impl Interlock for Silence {
         let news = [
             reading.time_s > self.time_s || self.heard[0].is_none(),
             reading.wrench.is_some() && is_new,
-            !reading.frames.is_empty(),
+            reading.frames().next().is_some(),
         ];
         (self.time_s, self.force_n) = (reading.time_s, force_n);
         for (i, (heard, is_news)) in self.heard.iter_mut().zip(news).enumerate() {

@@ -21,6 +21,7 @@ pub struct Recorder {
 
 /// What is kept from tick to tick, so that none asks for memory.
 struct Page {
+    loads: Loads,
     tick: u64,
     time_s: f64,
     joints: JointState,
@@ -45,9 +46,7 @@ impl Backend for Recorder {
     fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
         self.page.tick = 0;
         let reading = self.inner.reset(seed)?;
-        let loads = Loads::of(reading);
-        let tick = Tick { seed, ..Tick::read(0, reading, &loads) };
-        self.page.write(&mut self.recording.sheet(), &tick, reading)?;
+        self.page.write(&mut self.recording.sheet(), reading, Tick { seed, ..Tick::default() })?;
         Ok(reading)
     }
 
@@ -58,10 +57,9 @@ impl Backend for Recorder {
         let mut sheet = self.recording.sheet();
         match &result {
             Ok(reading) => {
-                let loads = Loads::of(reading);
                 let command = (&command.qdot).into();
-                let tick = Tick { command, ..Tick::read(number, reading, &loads) };
-                self.page.write(&mut sheet, &tick, reading)?;
+                let tick = Tick { tick: number, command, ..Tick::default() };
+                self.page.write(&mut sheet, reading, tick)?;
             }
             Err(fault) => {
                 let (time_s, fault) = (self.page.time_s, fault.to_string().into());
@@ -83,6 +81,7 @@ impl Page {
             ..JointTrajectoryPoint::default()
         };
         Self {
+            loads: Loads::default(),
             tick: 0,
             time_s: 0.0,
             joints: JointState {
@@ -100,16 +99,19 @@ impl Page {
         }
     }
 
-    fn write(&mut self, sheet: &mut Sheet, tick: &Tick, reading: &Reading) -> Result<(), Fault> {
+    /// Writes `tick` with what `reading` holds.
+    fn write(&mut self, sheet: &mut Sheet, reading: &Reading, tick: Tick) -> Result<(), Fault> {
         let time_s = reading.time_s;
         self.time_s = time_s;
         let stamp = Time::from_s(time_s);
-        sheet.put(Topic::Tick, time_s, tick)?;
+        self.loads.take(reading);
+        let is_reset = tick.is_reset();
+        sheet.put(Topic::Tick, time_s, &tick.read(reading, &self.loads))?;
         self.joints.header.stamp = stamp;
         self.joints.position.clone_from(&reading.q);
         self.joints.velocity.clone_from(&reading.qdot);
         sheet.put(Topic::Joints, time_s, &self.joints)?;
-        if !tick.is_reset() {
+        if !is_reset {
             self.applied.header.stamp = stamp;
             for point in &mut self.applied.points {
                 point.velocities.clone_from(&reading.applied.qdot);
@@ -122,7 +124,7 @@ impl Page {
             self.wrench.wrench.torque = wrench.torque_nm.into();
             sheet.put(Topic::Wrench, time_s, &self.wrench)?;
         }
-        for frame in &reading.frames {
+        for frame in reading.frames() {
             self.tactile.header.stamp = Time::from_s(frame.time_s);
             self.tactile.bt_time = BioTacTime {
                 frame_start_time: Time::from_s(frame.time_s - FRAME_S),

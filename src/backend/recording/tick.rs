@@ -1,7 +1,7 @@
 //! One control tick, to the bit.
 
 use crate::backend::ros::message::{Definition, Described};
-use crate::backend::{Command, IdealContact, Reading, Wrench};
+use crate::backend::{Command, IdealContact, Reading, Sample, Wrench};
 use crate::robot::finger::Frame;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -83,39 +83,41 @@ impl Tick<'_> {
         Definition { fields: fields!(), ..Self::DEFINITION };
 }
 
-/// The numbers of a wrench or an ideal contact, where they lie while a tick is written.
+/// The loads and frames of a reading, where they lie while a tick is written.
 #[derive(Default)]
 pub(super) struct Loads {
     wrench: Option<[f64; 6]>,
     ideal: Option<[f64; 7]>,
+    frames: Vec<Frame>,
 }
 
 impl Loads {
-    pub(super) fn of(reading: &Reading) -> Self {
-        let wrench = reading
+    /// Takes those of `reading`, in the memory that it has.
+    pub(super) fn take(&mut self, reading: &Reading) {
+        self.wrench = reading
             .wrench
             .map(|Wrench { force_n: f, torque_nm: t }| [f.x, f.y, f.z, t.x, t.y, t.z]);
-        let ideal = reading.ideal.map(|IdealContact { p_tc: p, normal_t: n, force_n }| {
+        self.ideal = reading.ideal().map(|IdealContact { p_tc: p, normal_t: n, force_n }| {
             [p.x, p.y, p.z, n.x, n.y, n.z, force_n]
         });
-        Self { wrench, ideal }
+        self.frames.clear();
+        self.frames.extend(reading.frames().cloned());
     }
 }
 
 impl<'a> Tick<'a> {
     /// With what `reading` holds; `loads` are its own.
-    pub(super) fn read(tick: u64, reading: &'a Reading, loads: &'a Loads) -> Self {
+    pub(super) fn read(self, reading: &'a Reading, loads: &'a Loads) -> Self {
         Self {
-            tick,
             time_s: reading.time_s,
             q: (&reading.q).into(),
             qdot: (&reading.qdot).into(),
             applied: (&reading.applied.qdot).into(),
             wrench: loads.wrench.as_ref().map_or(&[][..], |all| all).into(),
             ideal: loads.ideal.as_ref().map_or(&[][..], |all| all).into(),
-            frames: Cow::Borrowed(&reading.frames),
-            slips: Cow::Borrowed(&reading.frames),
-            ..Self::default()
+            frames: Cow::Borrowed(&loads.frames),
+            slips: Cow::Borrowed(&loads.frames),
+            ..self
         }
     }
 
@@ -127,6 +129,10 @@ impl<'a> Tick<'a> {
         }
         let wrench = <[f64; 6]>::try_from(&*self.wrench).ok();
         let ideal = <[f64; 7]>::try_from(&*self.ideal).ok();
+        let ideal = ideal.map(|[a, b, c, d, e, f, force_n]| {
+            let (p_tc, normal_t) = (Point3::new(a, b, c), Vector3::new(d, e, f));
+            Sample::Ideal(IdealContact { p_tc, normal_t, force_n })
+        });
         *reading = Reading {
             time_s: self.time_s,
             q: self.q.into_owned(),
@@ -135,12 +141,7 @@ impl<'a> Tick<'a> {
                 force_n: Vector3::new(a, b, c),
                 torque_nm: Vector3::new(d, e, f),
             }),
-            frames,
-            ideal: ideal.map(|[a, b, c, d, e, f, force_n]| IdealContact {
-                p_tc: Point3::new(a, b, c),
-                normal_t: Vector3::new(d, e, f),
-                force_n,
-            }),
+            samples: frames.into_iter().map(Sample::BioTac).chain(ideal).collect(),
             applied: Command { qdot: self.applied.into_owned() },
         };
     }

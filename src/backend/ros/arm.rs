@@ -15,7 +15,7 @@ use super::topics::{Side, Topic};
 use super::transport::{Connect, TransportError};
 use crate::backend::interlock::gates::{Expected, GateError, check_start};
 use crate::backend::pace::Pace;
-use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
+use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Sample};
 use crate::robot::arm::Chain;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
@@ -153,7 +153,7 @@ impl Lab {
             }
             sleep(LOOK);
         };
-        Err(LinkFault::Service { name: service.name(), words })
+        Err(LinkFault::Service { name: service.name(self.settings.topics.namespace()), words })
     }
 
     /// Forgets faults, here and on the arm's side: the operator's to ask for.
@@ -207,7 +207,7 @@ impl Lab {
 
     fn check_publishers(&self) -> Result<(), LinkFault> {
         let count = self.link.publisher_count(Topic::Command);
-        let topic = self.settings.topics.command.name.clone();
+        let topic = self.settings.topics.line(Topic::Command).name.into_owned();
         if count > 1 { Err(LinkFault::Publishers { topic, count }) } else { Ok(()) }
     }
 
@@ -232,13 +232,14 @@ impl Lab {
             let state = &heard.topics[topic as usize];
             if self.settings.is_on_change(topic) {
                 if self.link.publisher_count(topic) == 0 {
-                    return Err(LinkFault::Gone { topic: line.name.into() });
+                    return Err(LinkFault::Gone { topic: line.name.clone().into_owned() });
                 }
                 continue;
             }
             let age_s = state.at.map_or(f64::MAX, |at| at.elapsed().as_secs_f64());
             if age_s > line.age_s {
-                let (topic, late_s, backward) = (line.name.into(), state.late_s, state.backward);
+                let (topic, late_s, backward) =
+                    (line.name.clone().into_owned(), state.late_s, state.backward);
                 return Err(LinkFault::Silent { topic, age_s, late_s, backward });
             }
         }
@@ -335,12 +336,12 @@ impl LabArm {
                 }
             }
         }
-        let Reading { q, qdot, wrench, frames, .. } = &mut self.reading;
+        let Reading { q, qdot, wrench, samples, .. } = &mut self.reading;
         q.clone_from(&heard.q);
         qdot.clone_from(&heard.qdot);
         *wrench = heard.wrench.map(|wrench| wrench.moved(&self.lab.chain.tool.inverse()));
-        frames.clear();
-        frames.extend(heard.frames.drain(..));
+        samples.clear();
+        samples.extend(heard.frames.drain(..).map(Sample::BioTac));
         self.reading.time_s = time_s;
         Ok(())
     }

@@ -108,7 +108,7 @@ impl Postman {
         let line = self.settings.topics.line(topic);
         let stamp_s = header.stamp.s();
         if stamp_s == 0.0 {
-            let topic = line.name.into();
+            let topic = line.name.clone().into_owned();
             return match self.settings.accept_unstamped {
                 true => Ok(true),
                 false => Err(LinkFault::Unstamped { topic }),
@@ -116,7 +116,10 @@ impl Postman {
         }
         let age_s = clock::now_s() - stamp_s;
         if age_s < -self.settings.clock_ahead_s {
-            return Err(LinkFault::Future { topic: line.name.into(), ahead_s: -age_s });
+            return Err(LinkFault::Future {
+                topic: line.name.clone().into_owned(),
+                ahead_s: -age_s,
+            });
         }
         if stamp_s < state.stamp_s {
             state.backward += 1;
@@ -153,7 +156,7 @@ impl Postman {
         packet: &Packet,
         received: Instant,
     ) -> Result<(), LinkFault> {
-        let name = || self.settings.topics.line(topic).name.to_owned();
+        let name = || self.settings.topics.line(topic).name.into_owned();
         let refuse = |words| Err(LinkFault::Message { topic: name(), words });
         let state = &mut heard.topics[topic as usize];
         match packet {
@@ -189,7 +192,7 @@ impl Postman {
                 heard.wrench = Some(wrench);
             }
             Packet::Status(message) => {
-                let status = match ArmStatus::read(message) {
+                let status = match ArmStatus::read(message, self.settings.topics.device()) {
                     Ok(status) => status,
                     Err(error @ StatusError::OtherDevice { .. }) => {
                         state.skipped = Some(error.to_string());
@@ -236,7 +239,7 @@ impl Sink for Postman {
         match delivery {
             Delivery::Packet { packet, received, .. } => self.take_packet(&packet, received),
             Delivery::Garbled { topic, words } => {
-                let topic = self.settings.topics.line(topic).name.to_owned();
+                let topic = self.settings.topics.line(topic).name.into_owned();
                 let fault = LinkFault::Message { topic, words };
                 self.boxes.heard().refused.get_or_insert(fault);
             }

@@ -243,7 +243,7 @@ impl Ros2 {
         topic: Topic,
         qos: &QosProfile,
     ) -> Result<(String, rustdds::Topic), TransportError> {
-        let name = self.topics.line(topic).name.to_owned();
+        let name = self.topics.line(topic).name.into_owned();
         let type_name = MessageTypeName::new(M::DEFINITION.package(), M::DEFINITION.short_name());
         let path = Name::parse(&name).map_err(open(&name))?;
         let dds = self.node.create_topic(&path, type_name, qos).map_err(open(&name))?;
@@ -284,7 +284,7 @@ impl Ros2 {
     }
 
     fn serve(&mut self, service: Service) -> Result<(), TransportError> {
-        let name = service.name();
+        let name = service.name(self.topics.namespace());
         let path = Name::parse(&name).map_err(open(&name))?;
         // Who calls cannot be known before: the usual one, unless it is said.
         let mapping = mapping(self.mapping, [0, 0]);
@@ -307,7 +307,7 @@ impl Ros2 {
         let readers = self.context.domain_participant().discovered_readers();
         for i in 0..self.clients.len() {
             let ServiceClient { service, open: None } = &self.clients[i] else { continue };
-            let name = service.name();
+            let name = service.name(self.topics.namespace());
             // As rmw names the topic of a service's requests.
             let requests = format!("rq{name}Request");
             let is_server = |topic: &str| topic == requests;
@@ -367,7 +367,7 @@ impl Transport for Ros2 {
 
     fn send(&mut self, packet: &Packet) -> Result<(), TransportError> {
         let sent = self.writers.iter().find_map(|writer| writer(packet));
-        TransportError::of_sending(self.topics.line(packet.topic()).name, sent)
+        TransportError::of_sending(&self.topics.line(packet.topic()).name, sent)
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
@@ -393,7 +393,7 @@ impl Transport for Ros2 {
     }
 
     fn publisher_count(&self, topic: Topic) -> usize {
-        self.node.publisher_count(self.topics.line(topic).name)
+        self.node.publisher_count(&self.topics.line(topic).name)
     }
 
     fn is_served(&mut self, service: &Service) -> bool {
@@ -408,10 +408,14 @@ impl Transport for Ros2 {
         let sent = open.map(|(client, _)| client.send_request(TriggerRequest::default()));
         match sent {
             Some(Ok(_)) => Ok(()),
-            Some(Err(error)) => {
-                Err(TransportError::Send { what: service.name(), words: error.to_string() })
-            }
-            None => Err(TransportError::Send { what: service.name(), words: "not known".into() }),
+            Some(Err(error)) => Err(TransportError::Send {
+                what: service.name(self.topics.namespace()),
+                words: error.to_string(),
+            }),
+            None => Err(TransportError::Send {
+                what: service.name(self.topics.namespace()),
+                words: "not known".into(),
+            }),
         }
     }
 
@@ -423,11 +427,14 @@ impl Transport for Ros2 {
     ) -> Result<(), TransportError> {
         let server = self.servers.iter().find(|(other, _)| other == service);
         let (Some((_, server)), Some(id)) = (server, self.calls.remove(&call)) else {
-            return Err(TransportError::Send { what: service.name(), words: "no call".into() });
+            return Err(TransportError::Send {
+                what: service.name(self.topics.namespace()),
+                words: "no call".into(),
+            });
         };
         let response = TriggerResponse { success: answer.is_done, message: answer.words.clone() };
         server.send_response(id, response).map_err(|error| TransportError::Send {
-            what: service.name(),
+            what: service.name(self.topics.namespace()),
             words: error.to_string(),
         })
     }

@@ -31,13 +31,13 @@ impl Service {
         matches!(self, Self::Hold | Self::Unhold | Self::Stop | Self::ClearFault)
     }
 
-    /// As it is called.
-    pub fn name(&self) -> String {
+    /// Its name at an arm with this namespace.
+    pub fn name(&self, namespace: &str) -> String {
         match self {
-            Self::Hold => "/pa10/hold".into(),
-            Self::Unhold => "/pa10/unhold".into(),
-            Self::Stop => "/pa10/stop".into(),
-            Self::ClearFault => "/pa10/clear_fault".into(),
+            Self::Hold => format!("{namespace}/hold"),
+            Self::Unhold => format!("{namespace}/unhold"),
+            Self::Stop => format!("{namespace}/stop"),
+            Self::ClearFault => format!("{namespace}/clear_fault"),
             Self::Bias => "/ft_sensor/bias".into(),
             Self::Twin(name) => format!("/twin/{name}"),
         }

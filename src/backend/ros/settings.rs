@@ -6,7 +6,7 @@ use super::topics::{Topic, Topics};
 use crate::backend::interlock::InterlockSettings;
 use crate::backend::interlock::gates::GateSettings;
 use crate::config::{Checked, Rules, is_default};
-use crate::robot::arm::Chain;
+use crate::robot::arm::{ArmModel, ArmSettings, Chain};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -126,6 +126,15 @@ impl Default for BackendSettings {
 }
 
 impl BackendSettings {
+    /// Takes what the file leaves to the model of `arm` from it; a model that cannot be read is
+    /// an error of the scene, where it is built.
+    pub fn complete(&mut self, arm: Option<&ArmSettings>) {
+        if self.topics.namespace.is_none() {
+            let model = arm.and_then(|arm| ArmModel::load(&arm.model).ok());
+            self.topics.namespace = model.map(|model| model.namespace);
+        }
+    }
+
     /// Whether messages of `topic` come on change only.
     pub fn is_on_change(&self, topic: Topic) -> bool {
         topic == Topic::Status && self.status_on_change

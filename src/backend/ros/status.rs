@@ -27,8 +27,10 @@ pub struct ArmStatus {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum StatusError {
     /// No entry is the arm's; such a message may come from another device.
-    #[error("no status named \"{NAME}\" among {found:?}")]
+    #[error("no status named \"{device}\" among {found:?}")]
     OtherDevice {
+        /// The name that is looked for.
+        device: String,
         /// Names of the entries.
         found: Vec<String>,
     },
@@ -41,9 +43,6 @@ pub enum StatusError {
         found: String,
     },
 }
-
-/// Name of the entry that reports the arm's state.
-const NAME: &str = "pa10";
 
 /// Keys of the flags, in the order of the fields.
 const FLAGS: [&str; 5] = ["servo_on", "brake", "estop", "deadman", "hold"];
@@ -76,8 +75,8 @@ impl ArmStatus {
         self.estop || !self.deadman || !self.alarm.is_empty()
     }
 
-    /// Returns the message that reports this state.
-    pub fn message(&self, stamp_s: f64) -> DiagnosticArray {
+    /// Returns the message that reports this state as that of `device`.
+    pub fn message(&self, stamp_s: f64, device: &str) -> DiagnosticArray {
         let flags = [self.servo_on, self.brake, self.estop, self.deadman, self.hold];
         let flags = FLAGS.into_iter().zip(flags.map(|is| is.to_string()));
         let rest = [("alarm", self.alarm.clone()), ("overruns", self.overruns.to_string())];
@@ -85,25 +84,26 @@ impl ArmStatus {
         let level = if self.refusal().is_some() { Level::Error } else { Level::Ok };
         let status = DiagnosticStatus {
             level: level as u8,
-            name: NAME.into(),
+            name: device.into(),
             message: self.refusal().unwrap_or_else(|| "ready".into()),
-            hardware_id: NAME.into(),
+            hardware_id: device.into(),
             values: flags.chain(rest).map(entry).collect(),
         };
         DiagnosticArray { header: Header::new(stamp_s, ""), status: vec![status] }
     }
 
-    /// Reads a message. A level of error or worse counts as an alarm, unless flags explain it.
+    /// Reads the entries of `device` in a message. A level of error or worse counts as an alarm,
+    /// unless flags explain it.
     ///
     /// # Errors
     /// If it has no entry of the arm, or a flag of it is missing or unreadable: neither says that
     /// the arm may move.
-    pub fn read(message: &DiagnosticArray) -> Result<Self, StatusError> {
-        let of_arm = |status: &&DiagnosticStatus| status.name == NAME;
+    pub fn read(message: &DiagnosticArray, device: &str) -> Result<Self, StatusError> {
+        let of_arm = |status: &&DiagnosticStatus| status.name == device;
         let entries: Vec<_> = message.status.iter().filter(of_arm).collect();
         let Some(worst) = entries.iter().max_by_key(|status| status.level) else {
             let found = message.status.iter().map(|status| status.name.clone()).collect();
-            return Err(StatusError::OtherDevice { found });
+            return Err(StatusError::OtherDevice { device: device.into(), found });
         };
         let flag = |key| flag(&entries, key).map_err(|found| StatusError::Flag { key, found });
         let [servo_on, brake, estop, deadman, hold] = FLAGS.map(flag);

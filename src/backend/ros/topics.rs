@@ -8,6 +8,7 @@ use super::message::{
 use crate::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// What is sent between an arm and who explores with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -82,13 +83,13 @@ const USUAL: [Usual; 5] = [
         age_s: 0.08,
     },
     Usual {
-        name: "/pa10/status",
+        name: "status",
         types: &[DiagnosticArray::<Header>::DEFINITION.name],
         rate_hz: 50.0,
         age_s: 0.2,
     },
     Usual {
-        name: "/pa10/joint_velocity_cmd",
+        name: "joint_velocity_cmd",
         types: &[JointTrajectory::<Header>::DEFINITION.name, Float64MultiArray::DEFINITION.name],
         rate_hz: 250.0,
         age_s: 0.03,
@@ -102,7 +103,7 @@ macro_rules! line {
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct $name {
-            /// Its name, beginning with a slash.
+            /// Its name; without a slash at the beginning, in the namespace.
             pub name: String,
             /// Its message type, as in `sensor_msgs/msg/JointState`.
             #[serde(rename = "type")]
@@ -123,15 +124,16 @@ macro_rules! line {
         }
 
         impl $name {
-            fn line(&self) -> Line<'_> {
+            fn line(&self, namespace: &str) -> Line<'_> {
                 let Self { name, type_name, rate_hz, age_s } = self;
+                let name = within(namespace, name);
                 Line { name, type_name, rate_hz: *rate_hz, age_s: *age_s }
             }
         }
 
         impl Checked for $name {
             fn check(&self, rules: &mut Rules) {
-                self.line().check(rules, USUAL[$topic as usize].types);
+                self.line("").check(rules, USUAL[$topic as usize].types);
             }
         }
     };
@@ -161,6 +163,10 @@ impl TactileTopic {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Topics {
+    /// Namespace of the arm's services, and of topics without a slash at the beginning. Left out,
+    /// that of the arm's model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub namespace: Option<String>,
     /// The arm's joints, from it.
     pub joints: JointsTopic,
     /// The force/torque sensor, in its own frame, its bias not taken off.
@@ -174,10 +180,10 @@ pub struct Topics {
 }
 
 /// A line of the table, whichever it is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Line<'a> {
-    /// Its name.
-    pub name: &'a str,
+    /// Its name, with its namespace.
+    pub name: Cow<'a, str>,
     /// Its message type.
     pub type_name: &'a str,
     /// How often it is sent.
@@ -186,15 +192,21 @@ pub struct Line<'a> {
     pub age_s: f64,
 }
 
+/// `name` in `namespace`, unless it begins with a slash.
+fn within<'a>(namespace: &str, name: &'a str) -> Cow<'a, str> {
+    match name.starts_with('/') {
+        true => name.into(),
+        false => format!("{namespace}/{name}").into(),
+    }
+}
+
 impl Line<'_> {
     fn check(&self, rules: &mut Rules, types: &[&str]) {
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "_/".contains(c);
-        let named = self.name.starts_with('/')
-            && self.name.len() > 1
-            && !self.name.ends_with('/')
-            && self.name.chars().all(is_plain);
+        let named =
+            !self.name.is_empty() && !self.name.ends_with('/') && self.name.chars().all(is_plain);
         rules.require("name", format!("\"{}\"", self.name), named, || {
-            "a slash, then letters, digits, _ and slashes".into()
+            "letters, digits, _ and slashes".into()
         });
         rules.one_of("type", self.type_name, types);
         rules.number("rate_hz", self.rate_hz, 1.0..=10_000.0);
@@ -205,18 +217,36 @@ impl Line<'_> {
 impl Topics {
     /// The line of a topic.
     pub fn line(&self, topic: Topic) -> Line<'_> {
+        let namespace = self.namespace();
         match topic {
-            Topic::Joints => self.joints.line(),
-            Topic::Wrench => self.wrench.line(),
-            Topic::Tactile => self.tactile.line(),
-            Topic::Status => self.status.line(),
-            Topic::Command => self.command.line(),
+            Topic::Joints => self.joints.line(namespace),
+            Topic::Wrench => self.wrench.line(namespace),
+            Topic::Tactile => self.tactile.line(namespace),
+            Topic::Status => self.status.line(namespace),
+            Topic::Command => self.command.line(namespace),
         }
+    }
+
+    /// Namespace of the arm's services.
+    pub fn namespace(&self) -> &str {
+        self.namespace.as_deref().unwrap_or_default()
+    }
+
+    /// Name of the entry of the arm in its status: its namespace without slashes.
+    pub fn device(&self) -> &str {
+        self.namespace().trim_matches('/')
     }
 }
 
 impl Checked for Topics {
     fn check(&self, rules: &mut Rules) {
+        let namespace = self.namespace.as_deref();
+        rules.require(
+            "namespace",
+            format!("{namespace:?}"),
+            namespace.is_none_or(|name| name.starts_with('/') && !name.ends_with('/')),
+            || "a slash and a name".into(),
+        );
         rules.table("joints", &self.joints);
         rules.table("wrench", &self.wrench);
         rules.table("tactile", &self.tactile);

@@ -97,7 +97,8 @@ pub(super) const CORRELATION: Unit = Unit { suffix: "", symbol: "", per_si: 1.0,
 pub(super) const PLAIN: Unit = Unit { decimals: 3, ..CORRELATION };
 pub(super) const PERCENT: Unit = Unit { symbol: "%", per_si: 100.0, ..PLAIN };
 pub(super) const MM: Unit = Unit { suffix: "_m", symbol: "mm", per_si: 1e3, decimals: 3 };
-pub(super) const METRES: Unit = Unit { suffix: "_m", symbol: "m", per_si: 1.0, decimals: 3 };
+/// Metres.
+pub const METRES: Unit = Unit { suffix: "_m", symbol: "m", per_si: 1.0, decimals: 3 };
 pub(super) const SECONDS: Unit = Unit { suffix: "_s", symbol: "s", per_si: 1.0, decimals: 1 };
 
 impl Measure {

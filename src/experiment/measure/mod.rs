@@ -18,7 +18,7 @@ mod verified;
 
 pub use closed_surface::CHAMFER;
 pub use heights::{CENTRED_R, COVERAGE, EDGE_RMSE, R, RMSE};
-pub use measure::{Aggregate, Direction, Measure, Scale, Unit};
+pub use measure::{Aggregate, Direction, METRES, Measure, Scale, Unit};
 pub use verification::{REPEATABILITY, VERIFICATION_COVERAGE, VERIFICATION_RMSE};
 
 use crate::experiment::trial::row::TrialRow;

@@ -22,7 +22,7 @@ const SCAN_MAX: u64 = 1 << 30;
 const PLANNER: &str = "planner ";
 
 /// SHA-256 of the files that a run reads and of the planners written outside of Palpate, by what
-/// they are: `scene.object.mesh`, `truth.scan`, `planner MODULE:NAME`.
+/// they are: `scene.object.mesh`, `scene.arm.model`, `truth.scan`, `planner MODULE:NAME`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Content {
     hashes: BTreeMap<String, String>,
@@ -46,6 +46,12 @@ impl Content {
         if let Some(truth) = &experiment.truth {
             let bytes = files::bytes(&truth.scan, SCAN_MAX).map_err(io_error(&truth.scan))?;
             content.add("truth.scan", sha256(&bytes), Some(&truth.scan));
+        }
+        if let Some(arm) = experiment.scene.arm.as_ref().filter(|arm| arm.is_file()) {
+            let path = Path::new(&arm.model);
+            let mut bytes = files::bytes(path, files::TEXT_MAX).map_err(io_error(path))?;
+            bytes.extend(simulation.environment().arm_mjcf().unwrap_or_default().as_bytes());
+            content.add("scene.arm.model", sha256(&bytes), Some(path));
         }
         for name in &experiment.planners {
             let source = match simulation.planner(name) {

@@ -64,6 +64,12 @@ fn saved(experiment: &Experiment, folder: &Path) -> String {
         let mesh = object.mesh.canonicalize().unwrap_or_else(|_| object.mesh.clone());
         object.mesh = relative(&mesh, &folder);
     }
+    if let (Some(arm), Ok(folder)) = (&mut experiment.scene.arm, folder.canonicalize())
+        && arm.is_file()
+    {
+        let model = Path::new(&arm.model).canonicalize().unwrap_or_else(|_| (&arm.model).into());
+        arm.model = relative(&model, &folder).to_string_lossy().into_owned();
+    }
     if let (Some(truth), Ok(folder)) = (&mut experiment.truth, folder.canonicalize()) {
         let scan = truth.scan.canonicalize().unwrap_or_else(|_| truth.scan.clone());
         truth.scan = relative(&scan, &folder);

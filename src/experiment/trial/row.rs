@@ -40,7 +40,7 @@ pub struct TrialRow {
 /// One touch and the belief after it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TouchRow {
-    /// Where the finger was sent. Rows of versions before 0.2 hold its numbers without a name.
+    /// Where the finger was sent. Rows of version 0.1 hold its numbers without a name.
     pub target: Target,
     /// The point of contact (x, y, z) in `W`; none for a miss or a touch broken off.
     pub contact: Option<[f64; 3]>,

@@ -1,6 +1,6 @@
 //! A serial chain: where its tip is and how it moves.
 
-use crate::robot::capsules::LinkCapsule;
+use super::capsule::LinkCapsule;
 use nalgebra::{Isometry3, Point3, SMatrix, SVector, UnitQuaternion, UnitVector3, Vector3};
 use std::sync::Arc;
 

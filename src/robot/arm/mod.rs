@@ -1,5 +1,6 @@
 //! What carries the finger: a chain of joints, of an arm or a three-axis stage.
 
+pub mod capsule;
 pub mod chain;
 mod error;
 pub mod model;

@@ -1,10 +1,11 @@
 //! An arm's model: a file with its joints, home posture, collision capsules and topics.
 
+use super::capsule::LinkCapsule;
 use super::chain::{Joint, Joints, Kind, MAX_JOINTS};
 use crate::config::{Checked, ConfigError, Loader, Rules};
 use crate::files;
-use crate::robot::capsules::LinkCapsule;
-use nalgebra::{Isometry3, Translation3, UnitVector3, Vector3};
+use crate::math::pose::pose;
+use nalgebra::{Isometry3, UnitVector3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -35,8 +36,11 @@ pub struct ArmModel {
     /// Name of the joint that the workspace interlock watches beside the tip.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elbow: Option<String>,
-    /// Origin of the flange in the last joint's frame, m. The tool points along its +z.
+    /// Origin of the flange in the last joint's frame, m. The tool points along the flange's +z.
     pub flange_m: [f64; 3],
+    /// Turns of the flange about the fixed axes x, then y, then z of that frame.
+    #[serde(default)]
+    pub flange_rotation_deg: [f64; 3],
     /// Joints, from the base on.
     pub joint: Vec<JointModel>,
     /// What of it can collide.
@@ -129,7 +133,7 @@ impl ArmModel {
 
     /// Pose of the flange in the last joint's frame.
     pub fn flange(&self) -> Isometry3<f64> {
-        Translation3::from(self.flange_m).into()
+        pose(self.flange_m, self.flange_rotation_deg)
     }
 
     /// The home posture, deg, or m where a joint slides.
@@ -257,6 +261,7 @@ impl Checked for ArmModel {
             "a slash and a name".into()
         });
         rules.numbers("flange_m", &self.flange_m, -FAR_M..=FAR_M);
+        rules.numbers("flange_rotation_deg", &self.flange_rotation_deg, -360.0..=360.0);
         let names: Vec<&str> = self.joint.iter().map(JointModel::name).collect();
         for (i, joint) in self.joint.iter().enumerate() {
             let key = format!("joint[{i}]");

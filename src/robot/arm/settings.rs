@@ -67,6 +67,11 @@ impl ArmSettings {
         (!is_there).then(|| pose(self.tool_position_m, self.tool_rotation_deg))
     }
 
+    /// Whether its model is a file, and not one of [`MODELS`].
+    pub fn is_file(&self) -> bool {
+        Path::new(&self.model).extension().is_some_and(|extension| extension == "toml")
+    }
+
     /// The arm as a chain from `W` to `T`.
     ///
     /// # Errors
@@ -113,12 +118,7 @@ impl ArmSettings {
     }
 }
 
-/// Whether `model` names a file, and not one of [`MODELS`].
-pub fn is_file(model: &str) -> bool {
-    Path::new(model).extension().is_some_and(|extension| extension == "toml")
-}
-
-/// Reads `model`; versions before 0.2 had `links = "C"` or `"A"` in its place.
+/// Reads `model`; version 0.1 had `links = "C"` or `"A"` in its place.
 fn model<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let model = String::deserialize(deserializer)?;
     Ok(match model.as_str() {
@@ -145,16 +145,10 @@ impl Checked for ArmSettings {
         rules.numbers("base_position_m", &self.base_position_m, -1e3..=1e3);
         rules.numbers("base_rotation_deg", &self.base_rotation_deg, -360.0..=360.0);
         let is_known = MODELS.iter().any(|(name, _)| *name == self.model);
-        rules.require(
-            "model",
-            format!("\"{}\"", self.model),
-            is_known || is_file(&self.model),
-            || {
-                let names: Vec<String> =
-                    MODELS.iter().map(|(name, _)| format!("\"{name}\"")).collect();
-                format!("{}, or a file ending in .toml", names.join(", "))
-            },
-        );
+        rules.require("model", format!("\"{}\"", self.model), is_known || self.is_file(), || {
+            let names: Vec<String> = MODELS.iter().map(|(name, _)| format!("\"{name}\"")).collect();
+            format!("{}, or a file ending in .toml", names.join(", "))
+        });
         // A file is read when the arm is built: a run's folder is read without it.
         if let Some(model) = is_known.then(|| ArmModel::load(&self.model).ok()).flatten()
             && let Some((key, value, allowed)) = self.check_home(&model)

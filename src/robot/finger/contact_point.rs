@@ -5,6 +5,8 @@ use super::frame::FULL_SCALE_COUNTS;
 use super::frame::{ELECTRODES, Frame};
 use super::shape::Finger;
 use nalgebra::{Point3, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// Electrodes that fell by less than this in all say nothing of a place (chosen: below the noise
 /// of 19 electrodes).
@@ -13,6 +15,20 @@ const LEAST_COUNTS: f64 = 10.0;
 /// An electrode that reads less than this untouched is open: pressed hardest, a sound one reads 259
 /// (MiaoLi/syntouchcontact, F2).
 pub(super) const OPEN_COUNTS: f64 = 200.0;
+
+/// Which estimate from the electrodes counts as the point of contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactEstimate {
+    /// The centroid of Eq. 1, projected onto the skin.
+    #[default]
+    Skin,
+    /// The centroid of Eq. 1 itself, among the electrodes, as in Yi et al. 2016.
+    Electrodes,
+    /// Where a plane presses that explains all electrodes best, together with a skin that is
+    /// carried sideways; for fingers that press hard, or shear.
+    Plane,
+}
 
 /// What the sensor reads untouched.
 #[derive(Clone, Debug, PartialEq)]

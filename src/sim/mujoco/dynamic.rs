@@ -1,7 +1,7 @@
 //! An arm or stage with masses, servos and friction, carrying the finger.
 
 use super::{Models, Plant};
-use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
+use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Sample, Wrench};
 use crate::robot::arm::Chain;
 use crate::robot::finger::TipMotion;
 use crate::sim::Environment;
@@ -97,7 +97,10 @@ impl Dynamic {
         reading.qdot.extend_from_slice(plant.qdot());
         match &mut self.finger {
             Some(finger) => finger.report(&plant.mount(), self.capabilities.period_s, reading),
-            None => reading.ideal = plant.contact(),
+            None => {
+                reading.samples.clear();
+                reading.samples.extend(plant.contact().map(Sample::Ideal));
+            }
         }
     }
 }

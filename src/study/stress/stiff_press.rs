@@ -179,7 +179,7 @@ impl WallPress {
 }
 
 fn force_n(reading: &Reading) -> f64 {
-    reading.ideal.map_or(0.0, |ideal| ideal.force_n)
+    reading.ideal().map_or(0.0, |ideal| ideal.force_n)
 }
 
 /// Where the skin bears [`FORCE_N`].

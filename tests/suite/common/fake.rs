@@ -1,6 +1,6 @@
 //! A body of numbers alone, which does what it is told and reads what a test wants.
 
-use palpate::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
+use palpate::backend::{Backend, Capabilities, Command, Fault, Reading, Sample, Wrench};
 use palpate::robot::arm::Chain;
 use palpate::robot::finger::Frame;
 use palpate::robot::finger::frame::ELECTRODES;
@@ -96,12 +96,16 @@ impl FakeBody {
             wrench.force_n.y = wall(reading.q[1]);
         }
         reading.wrench = Some(wrench);
-        reading.frames.clear();
+        reading.samples.clear();
         if tick.is_multiple_of(5) {
             let counts = std::array::from_fn(|i| (3000.0 + 5.0 * noise(i as u64)).round());
             let counts: [f64; ELECTRODES] = counts;
             let (time_s, electrode_counts) = (reading.time_s, Some(counts));
-            reading.frames.push(Frame { time_s, electrode_counts, ..Frame::default() });
+            reading.samples.push(Sample::BioTac(Frame {
+                time_s,
+                electrode_counts,
+                ..Frame::default()
+            }));
         }
         let is_mended = self.log.0.lock().unwrap().is_mended;
         if let Some((from, breaks)) = self.world.breaks.filter(|_| !is_mended)

@@ -2,6 +2,7 @@
 
 use palpate::backend::ros::settings::{BackendKind, BackendSettings};
 use palpate::experiment::trial::row::TrialRow;
+use palpate::robot::arm::ArmSettings;
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -33,6 +34,7 @@ impl Network {
     /// Of this number.
     pub fn new(number: u16) -> Self {
         let mut settings = BackendSettings { domain: Some(number), ..Default::default() };
+        settings.complete(Some(&ArmSettings::default()));
         let is_first = std::env::var("PALPATE_ROS").is_ok_and(|name| name == "ros1");
         if !is_first {
             settings.kind = BackendKind::Ros2;

@@ -13,6 +13,7 @@ use palpate::backend::ros::topics::{Side, Topic};
 use palpate::backend::ros::transport::{Delivery, Transport, TransportError, Waker};
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::explore::probe::{Probe, Touch};
+use palpate::robot::arm::ArmSettings;
 use palpate::robot::arm::Chain;
 use palpate::sim::finger::effects::wrench::WrenchEffect;
 use palpate::sim::simulator::Simulator;
@@ -156,6 +157,8 @@ impl Rig {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
         let mut scene = Scene::load(Path::new(scene), &sets).unwrap();
         scene.effects.wrench = Some(WrenchEffect::default());
+        let mut settings = settings;
+        settings.complete(Some(&ArmSettings::default()));
         let simulator = Simulator::new(Arc::new(Environment::build(scene).unwrap())).unwrap();
         let (hub, stop) = (Hub::default(), Arc::new(AtomicBool::new(false)));
         let events = Arc::new(Mutex::new(Vec::new()));

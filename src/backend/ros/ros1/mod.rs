@@ -145,7 +145,7 @@ impl Ros1 {
         wrap: fn(M) -> Packet,
         pick: fn(&Packet) -> Option<M>,
     ) -> Result<(), TransportError> {
-        let name = self.topics.line(topic).name.to_owned();
+        let name = self.topics.line(topic).name.into_owned();
         if topic.publisher() == side {
             let publisher: Publisher<M> = self
                 .runtime
@@ -180,7 +180,7 @@ impl Ros1 {
 
     /// A service is answered by the link's loop; the caller's task waits for it.
     fn serve(&mut self, number: usize, service: Service) -> Result<(), TransportError> {
-        let name = service.name();
+        let name = service.name(self.topics.namespace());
         let (inlet, waiting) = (self.inlet.clone(), Arc::clone(&self.waiting));
         let number = number as u64;
         let answer = move |_: Request| {
@@ -208,7 +208,7 @@ impl Transport for Ros1 {
 
     fn send(&mut self, packet: &Packet) -> Result<(), TransportError> {
         let sent = self.writers.iter().find_map(|writer| writer(&self.runtime, packet));
-        TransportError::of_sending(self.topics.line(packet.topic()).name, sent)
+        TransportError::of_sending(&self.topics.line(packet.topic()).name, sent)
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
@@ -226,8 +226,9 @@ impl Transport for Ros1 {
 
     fn call(&mut self, service: &Service) -> Result<(), TransportError> {
         let (node, inlet, service) = (self.node.clone(), self.inlet.clone(), service.clone());
+        let name = service.name(self.topics.namespace());
         self.runtime.spawn(async move {
-            let answer = match node.service_client::<Trigger>(&service.name()).await {
+            let answer = match node.service_client::<Trigger>(&name).await {
                 Ok(client) => match client.call(&Request {}).await {
                     Ok(Response { success, message }) => {
                         Answer { is_done: success, words: message }
@@ -251,7 +252,10 @@ impl Transport for Ros1 {
         let sent = waiting.remove(&call).map(|waiting| waiting.send(answer.clone()));
         match sent {
             Some(Ok(())) => Ok(()),
-            _ => Err(TransportError::Send { what: service.name(), words: "no call".into() }),
+            _ => Err(TransportError::Send {
+                what: service.name(self.topics.namespace()),
+                words: "no call".into(),
+            }),
         }
     }
 }

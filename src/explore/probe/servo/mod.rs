@@ -16,6 +16,7 @@ use crate::explore::control::{Controller, Goal, posture};
 use crate::robot::Robot;
 use crate::robot::arm::{ArmError, Joints};
 use crate::robot::finger::frame::FRAME_S;
+use crate::robot::sensor::{SensedContact, Sensor};
 use crate::task::Approach;
 use crate::task::touch::TouchSettings;
 use contact_monitor::{ApproachEnd, ContactMonitor};
@@ -90,6 +91,12 @@ impl Servo {
         })
     }
 
+    /// Asks `sensor` before those that Palpate knows.
+    pub fn with_sensor(mut self, sensor: Box<dyn Sensor>) -> Self {
+        self.monitor.add(sensor);
+        self
+    }
+
     /// Pose of the fingertip by forward kinematics.
     fn x_wt(&mut self) -> Isometry3<f64> {
         let x_wt = self.control.x_wt(&self.state.q);
@@ -114,7 +121,7 @@ impl Servo {
         let reading = self.body.step(&self.command)?;
         self.state.take(reading)?;
         self.monitor.take(reading);
-        match self.monitor.heard_s() {
+        match self.monitor.last_sample_s() {
             Some(heard_s) if self.state.time_s - heard_s > SILENCE_S => {
                 Err(Fault::Lost { time_s: heard_s })
             }
@@ -196,8 +203,8 @@ impl Servo {
         self.monitor.forget();
         let here = Goal::still(x_wt);
         let until_s = self.state.time_s + count as f64 * FRAME_S;
-        while self.monitor.frames().len() < count {
-            if self.monitor.heard_s().is_none() && self.state.time_s >= until_s {
+        while self.monitor.collected() < count {
+            if self.monitor.last_sample_s().is_none() && self.state.time_s >= until_s {
                 break;
             }
             self.tick(&here)?;
@@ -226,7 +233,7 @@ impl Servo {
         }
         let x_wt = self.x_wt();
         self.tip = Some(x_wt);
-        Ok(self.monitor.contact(&self.robot.finger, self.settings.point).map(|(p_tc, normal_t)| {
+        Ok(self.monitor.contact(&self.robot.finger).map(|SensedContact { p_tc, normal_t }| {
             Contact { p_wc: x_wt * p_tc, normal_w: x_wt.rotation * normal_t }
         }))
     }
@@ -253,7 +260,7 @@ impl Probe for Servo {
                 self.go("the stand-off", above, travel_m_s, false)?;
             }
         }
-        self.rest(above, self.monitor.frames_of_tare())?;
+        self.rest(above, self.monitor.samples_of_tare())?;
         self.monitor.tare();
         let below = turning_point(&self.robot, approach);
         let end = self.go("the object", below, approach_m_s, true)?;

@@ -7,9 +7,10 @@ use crate::backend::interlock::defaults;
 use crate::explore::control::Controller;
 use crate::geometry::sweep::Capsule;
 use crate::robot::Robot;
+use crate::robot::arm::capsule::{LinkCapsule, TOOL};
 use crate::robot::arm::chain::MAX_JOINTS;
 use crate::robot::arm::{Chain, Joints, Kind};
-use crate::robot::capsules::{LinkCapsule, TOOL, capsules};
+use crate::robot::capsules::capsules;
 use crate::task::KeepOut;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -92,7 +93,7 @@ impl Tryout {
     pub(super) fn new(robot: &Robot) -> Option<Self> {
         let is_arm = robot.chain.joints.iter().any(|joint| {
             let [low, high] = joint.q_limits;
-            joint.kind == Kind::Revolute && high - low < 2.0 * std::f64::consts::TAU
+            joint.kind == Kind::Revolute && high - low <= 4.0 * std::f64::consts::TAU
         });
         let links = capsules(robot);
         let pairs = (0..links.len()).flat_map(|i| (0..i).map(move |k| [k, i]));

@@ -1,0 +1,59 @@
+//! A fingertip sensor of one's own: a switch, which tells that there is contact and not where.
+//!
+//! `cargo run --release --example own_sensor`
+
+use nalgebra::Vector3;
+use palpate::backend::{Sample, Wrench};
+use palpate::explore::probe::{Probe, Touch, servo::Servo};
+use palpate::robot::Finger;
+use palpate::robot::sensor::{SensedContact, Sensor};
+use palpate::sim::{Environment, Scene, simulator::Simulator};
+
+/// Closes at 0.5 N above the force at rest, and takes the point of the tip that is ahead for the
+/// point of contact. A switch with its own driver would read [`Sample::Channels`].
+#[derive(Default)]
+pub struct Switch {
+    force_n: Option<Vector3<f64>>,
+    rest_n: Option<Vector3<f64>>,
+}
+
+impl Sensor for Switch {
+    fn take(&mut self, _: f64, _: &[Sample], wrench: Option<&Wrench>) {
+        self.force_n = wrench.map(|wrench| wrench.force_n);
+    }
+    fn forget(&mut self) {}
+    fn tare(&mut self) {
+        self.rest_n = self.force_n;
+    }
+    fn is_present(&self) -> bool {
+        self.rest_n.is_some()
+    }
+    fn is_touching(&self) -> Option<bool> {
+        Some((self.force_n? - self.rest_n?).norm() > 0.5)
+    }
+    fn locate(&self, finger: &Finger) -> Option<SensedContact> {
+        let ahead_t = finger.ahead_t();
+        Some(SensedContact { p_tc: (ahead_t * finger.radius_m).into(), normal_t: -ahead_t })
+    }
+}
+
+/// The true height of the container's middle above a contact there, m.
+pub fn touch() -> Result<f64, Box<dyn std::error::Error>> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/container_finger.toml");
+    let scene = Scene::load(path.as_ref(), &["effects={skin={}, fluid={}, wrench={}}".into()])?;
+    let simulator = Simulator::new(Environment::build(scene)?.into())?;
+    let (world, place) = (simulator.environment(), [0.0, 0.5]);
+    let (body, robot) = simulator.body()?.zip(world.robot()).ok_or("no body")?;
+    let (task, zone) = (world.task(), world.task().zone().ok_or("no zone")?);
+    let mut servo =
+        Servo::new(robot, task.touch().clone(), body, 1)?.with_sensor(Box::new(Switch::default()));
+    let touch = servo.touch(&task.approach(&place.into()).ok_or("not in the zone")?)?;
+    let Touch::Contact(contact) = touch else { return Err("a miss".into()) };
+    Ok(world.true_height_m(&place).ok_or("no surface")? - zone.height_m(&contact.p_wc))
+}
+
+#[allow(dead_code)]
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    println!("contact {:.2} mm below the true surface", 1e3 * touch()?);
+    Ok(())
+}

@@ -1,0 +1,110 @@
+//! The BioTac: contact by its fluid's pressure, place by its electrodes.
+
+use super::sample::{Sample, Wrench};
+use super::{SensedContact, Sensor};
+use crate::robot::finger::contact_point::{self, ContactEstimate};
+use crate::robot::finger::plane_fit::PlaneFit;
+use crate::robot::finger::{Detection, Detector, Finger, Frame, Tare};
+
+/// Finds contacts in the frames of a BioTac.
+pub struct BioTac {
+    detector: Detector,
+    estimate: ContactEstimate,
+    /// Rise of PDC above its tare that is too much.
+    pressure_limit_counts: f64,
+    plane_fit: Option<PlaneFit>,
+    touching: bool,
+    tare: Option<Tare>,
+    frames: Vec<Frame>,
+    last_s: Option<f64>,
+}
+
+impl BioTac {
+    /// In the size of `finger`.
+    pub fn new(
+        finger: &Finger,
+        detection: Detection,
+        estimate: ContactEstimate,
+        pressure_limit_counts: f64,
+    ) -> Self {
+        let by_plane = estimate == ContactEstimate::Plane;
+        Self {
+            detector: Detector::new(detection),
+            estimate,
+            pressure_limit_counts,
+            plane_fit: by_plane.then(|| PlaneFit::new(finger)),
+            touching: false,
+            tare: None,
+            frames: Vec::new(),
+            last_s: None,
+        }
+    }
+}
+
+impl Sensor for BioTac {
+    fn take(&mut self, time_s: f64, samples: &[Sample], _: Option<&Wrench>) {
+        for sample in samples {
+            let Sample::BioTac(frame) = sample else { continue };
+            if !frame.is_finite() {
+                continue;
+            }
+            self.last_s = Some(time_s);
+            if self.tare.is_some() {
+                self.touching = self.detector.update(frame);
+            }
+            self.frames.push(frame.clone());
+        }
+    }
+
+    fn forget(&mut self) {
+        self.frames.clear();
+    }
+
+    fn tare(&mut self) {
+        self.tare = Some(Tare::of(&self.frames));
+        self.detector.tare(&self.frames);
+        self.touching = false;
+    }
+
+    fn samples_of_tare(&self) -> usize {
+        self.detector.wants()
+    }
+
+    fn collected(&self) -> Option<usize> {
+        Some(self.frames.len())
+    }
+
+    fn last_sample_s(&self) -> Option<f64> {
+        self.last_s
+    }
+
+    fn is_present(&self) -> bool {
+        self.last_s.is_some()
+    }
+
+    fn is_touching(&self) -> Option<bool> {
+        let can_tell = self.frames.last().is_some_and(|frame| self.detector.hears(frame));
+        can_tell.then_some(self.touching)
+    }
+
+    fn is_overloaded(&self) -> bool {
+        let rest = self.tare.as_ref().and_then(|tare| tare.pdc_counts);
+        let now = self.frames.last().and_then(|frame| frame.pdc_counts);
+        rest.zip(now).is_some_and(|(rest, now)| now - rest > self.pressure_limit_counts)
+    }
+
+    fn locate(&self, finger: &Finger) -> Option<SensedContact> {
+        let mean = Tare::of(&self.frames);
+        let mean = Frame { electrode_counts: mean.electrode_counts, ..Frame::default() };
+        let tare = self.tare.as_ref()?;
+        let mut found = contact_point::locate(finger, tare, &mean)?;
+        if let Some(plane_fit) = &self.plane_fit {
+            found = plane_fit.locate(tare, &mean)?;
+        }
+        let p_tc = match self.estimate {
+            ContactEstimate::Skin | ContactEstimate::Plane => found.surface_t,
+            ContactEstimate::Electrodes => found.centroid_t,
+        };
+        Some(SensedContact { p_tc, normal_t: -found.normal_t })
+    }
+}

@@ -1,0 +1,36 @@
+//! The ideal sensor of a simulated finger whose scene leaves out the sensor that would tell.
+
+use super::sample::{IdealContact, Sample, Wrench};
+use super::{SensedContact, Sensor};
+use crate::robot::finger::Finger;
+
+/// Reads contacts as the simulator knows them.
+#[derive(Clone, Debug, Default)]
+pub struct IdealSensor {
+    contact: Option<IdealContact>,
+}
+
+impl Sensor for IdealSensor {
+    fn take(&mut self, _: f64, samples: &[Sample], _: Option<&Wrench>) {
+        self.contact = samples.iter().find_map(|sample| match sample {
+            Sample::Ideal(contact) => Some(*contact),
+            _ => None,
+        });
+    }
+
+    fn forget(&mut self) {}
+
+    fn tare(&mut self) {}
+
+    fn is_present(&self) -> bool {
+        self.contact.is_some()
+    }
+
+    fn force_n(&self) -> Option<f64> {
+        self.contact.map(|contact| contact.force_n)
+    }
+
+    fn locate(&self, _: &Finger) -> Option<SensedContact> {
+        self.contact.map(|IdealContact { p_tc, normal_t, .. }| SensedContact { p_tc, normal_t })
+    }
+}

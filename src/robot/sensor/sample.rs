@@ -1,0 +1,58 @@
+//! What a body returns of its fingertip sensors.
+
+use crate::robot::finger::Frame;
+use nalgebra::{Isometry3, Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// One message of a fingertip sensor.
+// Few are held at once, and none is moved in a tick: a box would allocate in each.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sample {
+    /// A frame of a BioTac.
+    BioTac(Frame),
+    /// A contact as a simulator knows it, in a scene that leaves out the sensor which would tell.
+    Ideal(IdealContact),
+    /// Numbers of a sensor that Palpate does not know.
+    Channels(Channels),
+}
+
+/// Numbers of a sensor that a program adds, which knows what they mean.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Channels {
+    /// When they were sampled, since reset.
+    pub time_s: f64,
+    /// A number for each channel.
+    pub values: Vec<f64>,
+}
+
+/// A contact as a simulator knows it: exact.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct IdealContact {
+    /// Centre of pressure on the skin, in `T`.
+    pub p_tc: Point3<f64>,
+    /// Unit outward normal of the object there, in `T`.
+    pub normal_t: Vector3<f64>,
+    /// Magnitude of the force.
+    pub force_n: f64,
+}
+
+/// Force and torque of the object on the finger, in the fingertip's frame `T` about its origin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Wrench {
+    /// Force.
+    pub force_n: Vector3<f64>,
+    /// Torque about the origin of `T`.
+    pub torque_nm: Vector3<f64>,
+}
+
+impl Wrench {
+    /// The same load, given in a frame A about its origin, in a frame B about B's origin; `x_ba` is
+    /// the pose of A in B.
+    pub fn moved(&self, x_ba: &Isometry3<f64>) -> Self {
+        let force_n = x_ba.rotation * self.force_n;
+        let lever = x_ba.translation.vector.cross(&force_n);
+        Self { force_n, torque_nm: x_ba.rotation * self.torque_nm + lever }
+    }
+}
