@@ -249,5 +249,5 @@ impl Belief {
     }
 }
 
-/// Cells that a believed surface may be made of, as `space.cells`.
+/// Cells that a believed surface may be made of, as `gp.cells`.
 const CELLS: [u32; 2] = [8, 256];

@@ -43,14 +43,14 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Vertices along each side of the zone [default: the experiment's grid]; around an object,
-    /// cells along the surface's longest side [default: the experiment's space.cells].
+    /// cells along the surface's longest side [default: the experiment's gp.cells].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=2001))]
     grid: Option<u16>,
     #[command(flatten)]
     force: Force,
 }
 
-/// Cells that a belief around an object may be made of, as `space.cells`.
+/// Cells that a belief around an object may be made of, as `gp.cells`.
 const CELLS: std::ops::RangeInclusive<u16> = 8..=256;
 
 pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {

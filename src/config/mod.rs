@@ -37,6 +37,8 @@ pub struct Loader {
     sources: Vec<Source>,
     /// Keys set on the command line and how they were typed.
     sets: Vec<(String, String)>,
+    /// A table that is read as another one, and that one.
+    read_as: Option<[&'static str; 2]>,
 }
 
 impl Loader {
@@ -55,7 +57,30 @@ impl Loader {
     pub fn of(path: &Path, text: String) -> Result<Self, ConfigError> {
         let (table, document) = parse(path, text)?;
         let source = Source { path: path.into(), prefix: String::new(), document };
-        Ok(Self { table, sources: vec![source], sets: Vec::new() })
+        Ok(Self { table, sources: vec![source], sets: Vec::new(), read_as: None })
+    }
+
+    /// Reads the table `key` as if it stood under `other`, unless there is one; messages name `key`.
+    pub fn read_as(&mut self, key: &'static str, other: &'static str) {
+        if let (false, Some(table)) = (self.table.contains_key(other), self.table.remove(key)) {
+            self.table.insert(other.into(), table);
+            self.read_as = Some([key, other]);
+        }
+    }
+
+    /// The key under which `key` was given.
+    fn given(&self, key: &str) -> String {
+        match self.read_as.and_then(|[given, other]| Some((given, key.strip_prefix(other)?))) {
+            Some((given, rest)) if rest.is_empty() || rest.starts_with(['.', '[']) => {
+                format!("{given}{rest}")
+            }
+            _ => key.into(),
+        }
+    }
+
+    /// Whether something stands under the dotted key.
+    pub fn has_value(&self, key: &str) -> bool {
+        self.value(key).is_some()
     }
 
     /// Whether the file itself, or an assignment so far, has the key.
@@ -169,6 +194,7 @@ impl Loader {
         match rules.violation {
             None => Ok(config),
             Some((key, value, allowed)) => {
+                let key = self.given(&key);
                 Err(ConfigError::NotAllowed { origin: self.origin(&key), key, value, allowed })
             }
         }
@@ -180,18 +206,25 @@ impl Loader {
             let unknown = names.next().unwrap_or_default();
             let allowed: Vec<String> = names.collect();
             let key = join(path.rsplit_once('.').map_or(".", |(parent, _)| parent), &unknown);
+            let key = self.given(&key);
             let nearest = words::nearest(key.rsplit('.').next().unwrap_or(&key), &allowed);
             return ConfigError::UnknownKey { origin: self.origin(&key), key, nearest, allowed };
         }
         if let (true, Some(missing)) = (message.starts_with("missing field"), names.next()) {
-            let key = join(path, &missing);
+            let key = self.given(&join(path, &missing));
             return ConfigError::Missing { origin: self.origin(&key), key };
+        }
+        if let (true, Some(twice)) = (message.starts_with("duplicate field"), names.next()) {
+            let key = join(path, &twice);
+            let message = "given by its present name and by a former one: keep one".into();
+            return ConfigError::Invalid { origin: self.origin(&key), key, value: None, message };
         }
         let key = String::from(path);
         let value = self.value(&key).map(|value| value.to_string());
         let allowed = words::allowed(message).or_else(|| self.choices::<T>(&key));
         let message =
             allowed.map_or_else(|| message.to_owned(), |allowed| format!("allowed is {allowed}"));
+        let key = self.given(&key);
         ConfigError::Invalid { origin: self.origin(&key), key, value, message }
     }
 

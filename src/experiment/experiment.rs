@@ -15,6 +15,7 @@ use crate::explore::around::SpaceSettings;
 use crate::explore::gp_settings::GpSettings;
 use crate::explore::planner;
 use crate::explore::planner::PlanningSettings;
+use crate::robot::arm::ArmSettings;
 use crate::sim::Scene;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -52,11 +53,10 @@ pub struct Experiment {
     /// Test places along each side of the zone, on which the metrics are taken.
     #[serde(default = "grid")]
     pub grid: u32,
-    /// How the belief is fitted; or the path of a file that says it.
+    /// How the belief over a zone is fitted; or the path of a file that says it.
     #[serde(default)]
     pub gp: GpSettings,
-    /// How the belief over space is fitted, around a whole object; or the path of a file that says
-    /// it.
+    /// How the belief around a whole object is fitted: there, what `[gp]` says.
     #[serde(default, skip_serializing_if = "is_default")]
     pub space: SpaceSettings,
     /// How planners search.
@@ -157,8 +157,17 @@ impl Experiment {
         loader.resolve_path("scene.object.mesh");
         loader.resolve_path("truth.scan");
         loader.resolve_path_ending("scene.arm.model", ".toml");
+        if loader.has_value("scene.around") {
+            // Version 0.1 wrote the settings of a zone's belief here as well, all of them.
+            let is_of_zone = ["gp.mean", "gp.signal", "gp.free_space"];
+            match is_of_zone.iter().all(|key| loader.has_value(key)) {
+                true => drop(loader.take("gp")),
+                false => loader.read_as("gp", "space"),
+            }
+        }
         let mut experiment: Self = loader.finish()?;
         experiment.backend.complete(experiment.scene.arm.as_ref());
+        experiment.scene.arm.iter_mut().for_each(ArmSettings::complete);
         Ok(experiment)
     }
 

@@ -61,13 +61,21 @@ pub fn settings() -> String {
     for setting in &walk.found {
         let here = setting.key.rsplit_once('.').map_or("", |(table, _)| table);
         if table != Some(here) {
-            let title = if here.is_empty() { "the experiment".into() } else { format!("`{here}`") };
+            let title = match here {
+                "" => "the experiment".into(),
+                AROUND => "`gp`, around a whole object".into(),
+                _ => format!("`{here}`"),
+            };
             text += &format!(
                 "\n### {title}\n\n| key | type | default | allowed | what |\n|---|---|---|---|---|\n"
             );
             table = Some(here);
         }
         let Setting { key, kind, default, allowed, words } = setting;
+        let key = match here {
+            AROUND => key.replacen(AROUND, "gp", 1),
+            _ => key.clone(),
+        };
         let code =
             |text: &Option<String>| text.as_ref().map_or(String::new(), |t| format!("`{t}`"));
         let allowed = allowed.clone().unwrap_or_default();
@@ -76,6 +84,9 @@ pub fn settings() -> String {
     }
     text
 }
+
+/// Field of the experiment that its table `[gp]` fills around a whole object.
+const AROUND: &str = "space";
 
 fn allowed() -> BTreeMap<String, String> {
     let Ok(complete) = toml::from_str::<Experiment>(COMPLETE) else { return BTreeMap::new() };

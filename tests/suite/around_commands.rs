@@ -17,7 +17,7 @@ fn around() -> TempDir {
     write(
         "small.toml",
         "name = \"small\"\nscene = \"scene.toml\"\nplanners = [\"active\", \"random\"]\ntrials = 2\n\
-         initial_touches = 4\ntouches = 8\n\n[space]\ncells = 16\ncompared_every = 4\n\n\
+         initial_touches = 4\ntouches = 8\n\n[gp]\ncells = 16\ncompared_every = 4\n\n\
          [report]\ntouch_counts = [8]\n",
     );
     folder
@@ -61,7 +61,7 @@ fn planners_around_an_object_are_held_against_what_they_were() {
     let same = succeeds(folder.path(), &check);
     assert!(same.trim_end().ends_with("identical"), "{same}");
     // Touches are the same, and what is made of them is not.
-    let other = palpate(folder.path(), &[&check[..], &["--set", "space.cells=24"]].concat());
+    let other = palpate(folder.path(), &[&check[..], &["--set", "gp.cells=24"]].concat());
     let told = String::from_utf8_lossy(&other.stdout).into_owned();
     assert!(matches!(other.status.code(), Some(0 | 1 | 3)), "{told} {}", said(&other));
     assert!(told.contains("error after the last touch") && !told.contains("RMSE"), "{told}");

@@ -7,6 +7,7 @@ use palpate::experiment::measure::shape::TrueShape;
 use palpate::experiment::simulation::Simulation;
 use palpate::experiment::statistics::equal_error::equal_errors;
 use palpate::experiment::store::Run;
+use palpate::experiment::store::resolved;
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::truth::Truth;
 use palpate::explore::around::{ImplicitSurface, Surface};
@@ -262,11 +263,34 @@ fn what_cannot_be_asked_for_is_refused() {
     refused(active, "around = { radius_m = -1 }", "scene.around.radius_m");
     refused(active, "around = { centre_m = [0, 0, 1e9] }", "scene.around.centre_m");
     refused(
-        &format!("{active}\nspace = {{ kernel = \"squared_exponential\" }}"),
+        &format!("{active}\ngp = {{ kernel = \"squared_exponential\" }}"),
         "around = {}",
-        "space.kernel",
+        "gp.kernel",
     );
+    refused(&format!("{active}\ngp = {{ cells = 4 }}"), "around = {}", "gp.cells");
+    refused(&format!("{active}\ngp = {{ mean = \"zero\" }}"), "around = {}", "gp.mean");
+    // As version 0.1 wrote it.
     refused(&format!("{active}\nspace = {{ cells = 4 }}"), "around = {}", "space.cells");
+}
+
+/// One table `[gp]` says how the belief is fitted, in either region: it is written out and read as
+/// it was, and so is what version 0.1 wrote out.
+#[test]
+fn one_table_says_how_a_belief_is_fitted() {
+    let path = "experiments/around.toml".as_ref();
+    let read = |text: &str| Experiment::parse(path, text.into(), &[]).unwrap();
+    let sets = ["gp.cells=24".into(), "gp.kernel=matern_32".into()];
+    let given = Experiment::load(path, &sets).unwrap();
+    assert_eq!((given.space.cells, given.space.kernel.as_str()), (24, "matern_32"));
+    let written = resolved(&given);
+    assert!(written.contains("\n[gp]\n") && !written.contains("[space]"), "{written}");
+    assert_eq!(read(&written), given);
+    let before = toml::to_string(&given).unwrap();
+    assert!(before.contains("[gp]") && before.contains("[space]"));
+    assert_eq!(read(&before), given);
+    // Left at its defaults, `[space]` was not written.
+    let plain = Experiment::load(path, &[]).unwrap();
+    assert_eq!(read(&toml::to_string(&plain).unwrap()), plain);
 }
 
 /// A ball that the object is nowhere in is refused by name before anything is touched.

@@ -5,13 +5,25 @@ use super::file::{same, write_changed};
 use crate::experiment::experiment::Experiment;
 use crate::files;
 use std::path::{Component, Path, PathBuf};
+use toml_edit::DocumentMut;
 
 /// File of a run's settings, defaults written out.
 pub const RESOLVED: &str = "resolved.toml";
 
 /// The experiment with every default written out.
 pub fn resolved(experiment: &Experiment) -> String {
-    let text = toml::to_string(experiment).unwrap_or_default();
+    let mut text = toml::to_string(experiment).unwrap_or_default();
+    // Around an object `[gp]` is the belief's own table.
+    if experiment.scene.around.is_some()
+        && let (Ok(mut whole), Ok(Ok(belief))) = (
+            text.parse::<DocumentMut>(),
+            toml::to_string(&experiment.space).map(|text| text.parse::<DocumentMut>()),
+        )
+    {
+        whole.remove("space");
+        whole.insert("gp", belief.as_item().clone());
+        text = whole.to_string();
+    }
     format!("{TITLE}\n{text}")
 }
 

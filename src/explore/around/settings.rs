@@ -4,7 +4,7 @@ use crate::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Table `[space]`: how the Gaussian process over space is fitted around a whole object.
+/// Table `[gp]` around a whole object: how the Gaussian process over space is fitted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SpaceSettings {

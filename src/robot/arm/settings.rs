@@ -67,6 +67,14 @@ impl ArmSettings {
         (!is_there).then(|| pose(self.tool_position_m, self.tool_rotation_deg))
     }
 
+    /// Writes out the home posture that is left to the model; a model that cannot be read is an
+    /// error where the arm is built.
+    pub fn complete(&mut self) {
+        if let (None, Ok(model)) = (&self.home_deg, ArmModel::load(&self.model)) {
+            self.home_deg = Some(model.home());
+        }
+    }
+
     /// Whether its model is a file, and not one of [`MODELS`].
     pub fn is_file(&self) -> bool {
         Path::new(&self.model).extension().is_some_and(|extension| extension == "toml")
