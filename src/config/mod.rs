@@ -60,7 +60,8 @@ impl Loader {
         Ok(Self { table, sources: vec![source], sets: Vec::new(), read_as: None })
     }
 
-    /// Reads the table `key` as if it stood under `other`, unless there is one; messages name `key`.
+    /// Reads the table `key` as if it stood under `other`, unless there is one; messages name
+    /// `key`.
     pub fn read_as(&mut self, key: &'static str, other: &'static str) {
         if let (false, Some(table)) = (self.table.contains_key(other), self.table.remove(key)) {
             self.table.insert(other.into(), table);
