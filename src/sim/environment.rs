@@ -53,8 +53,8 @@ pub enum EnvironmentError {
     #[error(transparent)]
     Mesh(#[from] MeshError),
     /// The arm's model is unusable.
-    #[error(transparent)]
-    Arm(#[from] ConfigError),
+    #[error("{0}")]
+    Arm(Box<ConfigError>),
     /// The scene lacks the part its body needs.
     #[error("the scene has no {part}, which its body needs")]
     Missing {
@@ -131,7 +131,8 @@ impl Environment {
     /// If the shape lies wholly outside the zone.
     pub fn around(mut scene: Scene, shape: Shape) -> Result<Self, EnvironmentError> {
         let mut notices = Vec::new();
-        let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose()?;
+        let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose();
+        let arm = arm.map_err(|error| EnvironmentError::Arm(error.into()))?;
         if let Cow::Owned(effects) = scene.felt_effects() {
             scene.effects = effects;
             notices.push(Notice::DefaultFinger);
@@ -170,7 +171,9 @@ impl Environment {
         notices: Vec<Notice>,
     ) -> Result<Self, EnvironmentError> {
         let arm_mjcf = match &scene.arm {
-            Some(settings) => model::mjcf(&settings.model)?,
+            Some(settings) => {
+                model::mjcf(&settings.model).map_err(|error| EnvironmentError::Arm(error.into()))?
+            }
             None => None,
         };
         if scene.body == Body::Dynamic && scene.arm.is_some() && arm_mjcf.is_none() {

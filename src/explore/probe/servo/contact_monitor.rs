@@ -6,9 +6,11 @@ use crate::robot::sensor::{BioTac, ForceTorqueTip, IdealSensor, SensedContact, S
 use crate::task::touch::TouchSettings;
 use nalgebra::Vector3;
 
+type MakeSensor = fn(&TouchSettings, &Finger) -> Box<dyn Sensor>;
+
 /// The sensors that a touch asks, in this order: the first that a body has decides where contacts
 /// are.
-pub(super) const SENSORS: [fn(&TouchSettings, &Finger) -> Box<dyn Sensor>; 3] = [
+pub(super) const SENSORS: [MakeSensor; 3] = [
     |_, _| Box::new(IdealSensor::default()),
     |settings, finger| {
         let TouchSettings { detection, point, pressure_limit_counts, .. } = settings;
