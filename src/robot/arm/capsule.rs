@@ -9,7 +9,8 @@ use std::sync::Arc;
 pub struct LinkCapsule {
     /// Name in messages: of its link, `tool` or `finger`.
     pub name: Arc<str>,
-    /// How many joints move it: the place of its frame in [`Chain::frames`].
+    /// How many joints move it: the place of its frame in
+    /// [`Chain::frames`](super::chain::Chain::frames).
     pub link: usize,
     /// Ends of its axis in that frame.
     pub ends: [Point3<f64>; 2],
