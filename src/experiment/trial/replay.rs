@@ -196,7 +196,7 @@ impl Witness for Reader<'_> {
             return Ok(());
         };
         let now = serde_json::to_string(touched.row).unwrap_or_default();
-        if now == then.row {
+        if now == then.row || rewritten(&then.row).is_some_and(|then| now == then) {
             self.same += 1;
             return Ok(());
         }
@@ -206,5 +206,33 @@ impl Witness for Reader<'_> {
             now,
         });
         Err(Fault::Stopped { time_s: touched.row.time_s.unwrap_or_default() })
+    }
+}
+
+/// A recorded row as this version writes it: version 0.1 wrote targets without a name. Returns
+/// `None` if it cannot be read.
+fn rewritten(row: &str) -> Option<String> {
+    serde_json::to_string(&serde_json::from_str::<TouchRow>(row).ok()?).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rewritten;
+
+    /// Also the numbers of an aim, whose direction is written digit by digit as it was.
+    #[test]
+    fn a_row_of_version_0_1_is_rewritten_with_the_name_of_its_target() {
+        for (before, now) in [
+            ("[0.1,0.7]", r#"{"place":[0.1,0.7]}"#),
+            (
+                "[0.1,-0.65,0.5,-0.6,0.0,0.8]",
+                r#"{"aim":{"p_w":[0.1,-0.65,0.5],"ahead_w":[-0.6,0.0,0.8]}}"#,
+            ),
+        ] {
+            let row = |target: &str| format!(r#"{{"target":{target},"contact":[0.1,-0.6,0.7]}}"#);
+            assert_eq!(rewritten(&row(before)), Some(row(now)));
+            assert_eq!(rewritten(&row(now)), Some(row(now)));
+        }
+        assert_eq!(rewritten("{}"), None);
     }
 }
