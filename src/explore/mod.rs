@@ -11,7 +11,7 @@
 //! use palpate::explore::planner::{self, PlanningSettings};
 //! use palpate::explore::probe::{Contact, Touch};
 //! use palpate::math::seed;
-//! use palpate::task::Zone;
+//! use palpate::task::{Region, Zone};
 //!
 //! // An interval of x, 20 cm wide; the surface there is y = 0.1·x².
 //! let zone = Zone::new([-0.1, 0.1], None);
@@ -29,7 +29,7 @@
 //! let random = seed::stream(1, 0, "planner");
 //! let mut planner = (active.make)(&PlanningSettings::default(), random);
 //! let plan = planner.plan(&Belief::from(heights))?;
-//! assert!(zone.contains(&plan.target));
+//! assert!(Region::from(zone).contains(&plan.target));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
