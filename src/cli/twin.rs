@@ -141,5 +141,6 @@ fn experiment(args: &Args) -> anyhow::Result<Experiment> {
     backend.domain = args.domain.or(backend.domain);
     let usual = || Some(backend.kind).filter(|kind| *kind != BackendKind::Simulated);
     backend.kind = args.kind.or_else(usual).unwrap_or(BackendKind::Ros2);
+    backend.complete(experiment.scene.arm.as_ref());
     Ok(experiment)
 }

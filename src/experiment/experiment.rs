@@ -166,7 +166,9 @@ impl Experiment {
             }
         }
         let mut experiment: Self = loader.finish()?;
-        experiment.backend.complete(experiment.scene.arm.as_ref());
+        if experiment.backend.kind != BackendKind::Simulated {
+            experiment.backend.complete(experiment.scene.arm.as_ref());
+        }
         experiment.scene.arm.iter_mut().for_each(ArmSettings::complete);
         Ok(experiment)
     }

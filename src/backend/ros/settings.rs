@@ -126,11 +126,12 @@ impl Default for BackendSettings {
 }
 
 impl BackendSettings {
-    /// Takes what the file leaves to the model of `arm` from it; a model that cannot be read is
-    /// an error of the scene, where it is built.
+    /// Takes what the file leaves to the model of `arm` from it, or from the default arm's for a
+    /// stage; a model that cannot be read is an error of the scene, where it is built.
     pub fn complete(&mut self, arm: Option<&ArmSettings>) {
         if self.topics.namespace.is_none() {
-            let model = arm.and_then(|arm| ArmModel::load(&arm.model).ok());
+            let arm = arm.cloned().unwrap_or_default();
+            let model = ArmModel::load(&arm.model).ok();
             self.topics.namespace = model.map(|model| model.namespace);
         }
     }
