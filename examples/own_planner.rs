@@ -6,7 +6,7 @@ use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::Belief;
 use palpate::explore::planner::{self, Entry, Plan, PlanError, Planner, sample};
 
-/// Of thirty random targets, takes the one farthest from all earlier ones (Mitchell 1991).
+/// Takes the farthest from all earlier targets of thirty random ones (Mitchell 1991).
 struct FarthestOfSome {
     rng: rand_chacha::ChaCha8Rng,
 }

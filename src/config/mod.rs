@@ -157,7 +157,7 @@ impl Loader {
         Ok(())
     }
 
-    /// As [`resolve_path`](Self::resolve_path), if what stands under `key` ends with `ending`.
+    /// Calls [`resolve_path`](Self::resolve_path) if the value of `key` ends with `ending`.
     pub fn resolve_path_ending(&mut self, key: &str, ending: &str) {
         let is_file = |value: &Value| value.as_str().is_some_and(|name| name.ends_with(ending));
         if self.value(key).is_some_and(is_file) {

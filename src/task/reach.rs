@@ -1,10 +1,10 @@
-//! Which approaches of a whole object a body can make.
+//! Reach: the approaches of a whole object that a body can make.
 
 use super::approach::Approach;
 use nalgebra::Vector3;
 use std::sync::{Arc, OnceLock};
 
-/// What a body can do around a whole object.
+/// The reach of a body around a whole object.
 pub trait Reach: Send + Sync {
     /// Whether it can come to where an approach sets out, go it to its end, and come back.
     fn reaches(&self, approach: &Approach) -> bool;
@@ -47,7 +47,7 @@ fn middle(cell: usize) -> Vector3<f64> {
 pub(super) struct Cells(Arc<[OnceLock<bool>]>);
 
 impl Cells {
-    /// Of which nothing has been asked.
+    /// Returns cells of which none has been searched.
     pub(super) fn new() -> Self {
         Self((0..CELLS).map(|_| OnceLock::new()).collect())
     }

@@ -4,7 +4,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What a planner asks the robot to explore next.
+/// A target: what the robot explores next, as a planner decides.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(into = "Written", try_from = "Read")]
 #[schemars(with = "Written")]

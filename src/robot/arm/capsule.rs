@@ -1,4 +1,4 @@
-//! What of an arm can collide: capsules that move with its links.
+//! Collision capsules that move with the links of an arm.
 
 use crate::geometry::sweep::Capsule;
 use nalgebra::{Isometry3, Point3};
@@ -9,7 +9,7 @@ use std::sync::Arc;
 pub struct LinkCapsule {
     /// Name in messages: of its link, `tool` or `finger`.
     pub name: Arc<str>,
-    /// How many joints move it: the place of its frame in
+    /// Number of joints that move it: the place of its frame in
     /// [`Chain::frames`](super::chain::Chain::frames).
     pub link: usize,
     /// Ends of its axis in that frame.
@@ -43,8 +43,8 @@ impl LinkCapsule {
     }
 }
 
-/// What the last joint carries beyond its flange.
+/// Names of the parts that the last joint carries beyond its flange.
 const CARRIED: [&str; 2] = [TOOL, "finger"];
 
-/// What is between flange and finger.
+/// Name of the adapter between flange and finger.
 pub const TOOL: &str = "tool";

@@ -79,9 +79,9 @@ pub struct Chain {
     pub tool: Isometry3<f64>,
     /// The posture to start from and to prefer.
     pub home: Joints,
-    /// What of its links can collide.
+    /// Collision capsules of its links.
     pub capsules: Vec<LinkCapsule>,
-    /// How many joints move the elbow's link, if it has an elbow.
+    /// Number of joints that move the elbow's link, if it has an elbow.
     pub elbow: Option<usize>,
 }
 

@@ -1,4 +1,4 @@
-//! What carries the finger: a chain of joints, of an arm or a three-axis stage.
+//! The arm or the three-axis stage that carries the finger, as a chain of joints.
 
 pub mod capsule;
 pub mod chain;

@@ -43,7 +43,7 @@ pub struct ArmModel {
     pub flange_rotation_deg: [f64; 3],
     /// Joints, from the base on.
     pub joint: Vec<JointModel>,
-    /// What of it can collide.
+    /// Collision capsules of its links.
     #[serde(default)]
     pub capsule: Vec<CapsuleModel>,
 }
@@ -157,10 +157,11 @@ impl ArmModel {
 
     /// Capsules that move with its links.
     pub fn capsules(&self) -> Vec<LinkCapsule> {
-        self.capsule.iter().filter_map(|capsule| capsule.on(self.link(&capsule.link)?)).collect()
+        let on_link = |capsule: &CapsuleModel| Some(capsule.on(self.link(&capsule.link)?));
+        self.capsule.iter().filter_map(on_link).collect()
     }
 
-    /// How many joints move the link of this name.
+    /// Number of joints that move the link of this name.
     fn link(&self, name: &str) -> Option<usize> {
         match name == BASE {
             true => Some(0),
@@ -168,7 +169,7 @@ impl ArmModel {
         }
     }
 
-    /// How many joints move the elbow's link.
+    /// Number of joints that move the elbow's link.
     pub fn elbow(&self) -> Option<usize> {
         self.link(self.elbow.as_deref()?)
     }
@@ -197,53 +198,46 @@ impl JointModel {
         name
     }
 
+    /// Origin and axis in the frame of the joint before it.
+    fn placement(&self) -> (&[f64; 3], &[f64; 3]) {
+        let (Self::Revolute { origin_m, axis, .. } | Self::Prismatic { origin_m, axis, .. }) = self;
+        (origin_m, axis)
+    }
+
     fn joint(&self) -> Joint {
-        let name = self.name().into();
-        let placed = |origin_m: &[f64; 3], axis: &[f64; 3]| {
-            (Vector3::from(*origin_m), UnitVector3::new_normalize(Vector3::from(*axis)))
+        let (origin_m, axis) = self.placement();
+        let (kind, q_limits, qdot_limit, qddot_limit) = match self {
+            Self::Revolute { limits_deg, speed_rad_s, acceleration_deg_s2, .. } => {
+                let limits = limits_deg.map(f64::to_radians);
+                (Kind::Revolute, limits, *speed_rad_s, acceleration_deg_s2.to_radians())
+            }
+            Self::Prismatic { limits_m, speed_m_s, acceleration_m_s2, .. } => {
+                (Kind::Prismatic, *limits_m, *speed_m_s, *acceleration_m_s2)
+            }
         };
-        match self {
-            Self::Revolute {
-                origin_m, axis, limits_deg, speed_rad_s, acceleration_deg_s2, ..
-            } => {
-                let (origin_m, axis) = placed(origin_m, axis);
-                Joint {
-                    name,
-                    kind: Kind::Revolute,
-                    origin_m,
-                    axis,
-                    q_limits: limits_deg.map(f64::to_radians),
-                    qdot_limit: *speed_rad_s,
-                    qddot_limit: acceleration_deg_s2.to_radians(),
-                }
-            }
-            Self::Prismatic { origin_m, axis, limits_m, speed_m_s, acceleration_m_s2, .. } => {
-                let (origin_m, axis) = placed(origin_m, axis);
-                Joint {
-                    name,
-                    kind: Kind::Prismatic,
-                    origin_m,
-                    axis,
-                    q_limits: *limits_m,
-                    qdot_limit: *speed_m_s,
-                    qddot_limit: *acceleration_m_s2,
-                }
-            }
+        Joint {
+            name: self.name().into(),
+            kind,
+            origin_m: Vector3::from(*origin_m),
+            axis: UnitVector3::new_normalize(Vector3::from(*axis)),
+            q_limits,
+            qdot_limit,
+            qddot_limit,
         }
     }
 }
 
 impl CapsuleModel {
     /// On the link that `link` joints move.
-    fn on(&self, link: usize) -> Option<LinkCapsule> {
-        Some(LinkCapsule {
+    fn on(&self, link: usize) -> LinkCapsule {
+        LinkCapsule {
             name: self.name.as_deref().unwrap_or(&self.link).into(),
             link,
             ends: [self.from_m.into(), self.to_m.into()],
             radius_m: self.radius_m,
             near_base: self.near_base,
             folds: self.folds,
-        })
+        }
     }
 }
 
@@ -271,10 +265,8 @@ impl Checked for ArmModel {
                 !names[..i].contains(&names[i]),
                 || "a name of its own".into(),
             );
-            let (origin_m, axis) = match joint {
+            match joint {
                 JointModel::Revolute {
-                    origin_m,
-                    axis,
                     limits_deg,
                     home_deg,
                     speed_rad_s,
@@ -289,16 +281,9 @@ impl Checked for ArmModel {
                     rules.number(&format!("{key}.speed_rad_s"), *speed_rad_s, 1e-3..=100.0);
                     let key = format!("{key}.acceleration_deg_s2");
                     rules.number(&key, *acceleration_deg_s2, 0.1..=1e5);
-                    (origin_m, axis)
                 }
                 JointModel::Prismatic {
-                    origin_m,
-                    axis,
-                    limits_m,
-                    home_m,
-                    speed_m_s,
-                    acceleration_m_s2,
-                    ..
+                    limits_m, home_m, speed_m_s, acceleration_m_s2, ..
                 } => {
                     rules.interval(&format!("{key}.limits_m"), *limits_m, -FAR_M..=FAR_M);
                     let [low, high] = *limits_m;
@@ -311,20 +296,19 @@ impl Checked for ArmModel {
                         *acceleration_m_s2,
                         1e-3..=1e3,
                     );
-                    (origin_m, axis)
                 }
-            };
+            }
+            let (origin_m, axis) = joint.placement();
             rules.numbers(&format!("{key}.origin_m"), origin_m, -FAR_M..=FAR_M);
             let length = Vector3::from(*axis).norm();
             rules.require(&format!("{key}.axis"), format!("{axis:?}"), length > 1e-6, || {
                 "three numbers that are not all zero".into()
             });
         }
-        let links = || names.iter().copied().chain([BASE]);
+        let links: Vec<&str> = names.iter().copied().chain([BASE]).collect();
         for (i, capsule) in self.capsule.iter().enumerate() {
             let key = format!("capsule[{i}]");
-            let known: Vec<&str> = links().collect();
-            rules.one_of(&format!("{key}.link"), &capsule.link, &known);
+            rules.one_of(&format!("{key}.link"), &capsule.link, &links);
             rules.numbers(&format!("{key}.from_m"), &capsule.from_m, -FAR_M..=FAR_M);
             rules.numbers(&format!("{key}.to_m"), &capsule.to_m, -FAR_M..=FAR_M);
             rules.number(&format!("{key}.radius_m"), capsule.radius_m, 1e-4..=FAR_M);

@@ -16,7 +16,7 @@ const LEAST_COUNTS: f64 = 10.0;
 /// (MiaoLi/syntouchcontact, F2).
 pub(super) const OPEN_COUNTS: f64 = 200.0;
 
-/// Which estimate from the electrodes counts as the point of contact.
+/// The estimate from the electrodes that is taken as the point of contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ContactEstimate {

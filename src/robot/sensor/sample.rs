@@ -1,4 +1,4 @@
-//! What a body returns of its fingertip sensors.
+//! Samples: messages of the fingertip sensors of a body.
 
 use crate::robot::finger::Frame;
 use nalgebra::{Isometry3, Point3, Vector3};

@@ -1,4 +1,4 @@
-//! What the finger's sensors say while it moves: contact, too much force, and where.
+//! The contact monitor: combines the finger's sensors during a touch.
 
 use crate::backend::Reading;
 use crate::robot::finger::Finger;
