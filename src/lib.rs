@@ -16,7 +16,7 @@
 //! | 3 | [`task`], [`backend`] | what the robot is told; what is commanded and read |
 //! | 2 | [`robot`], [`gp`] | arm and finger; Gaussian processes |
 //! | 1 | [`geometry`], [`config`], [`math`] | know nothing of each other |
-//! | 0 | [`files`], [`words`] | read what somebody named; how messages put values |
+//! | 0 | [`error`], [`files`], [`words`] | the error of bad input; reading files; how messages put values |
 //!
 //! [`experiment::Simulation`] is the front door: from an experiment's file to its trials. What
 //! stands below `sim` is what runs on a real arm: a [`Servo`](explore::probe::servo::Servo) is made
@@ -32,6 +32,7 @@
 pub mod backend;
 pub mod cli;
 pub mod config;
+pub mod error;
 pub mod experiment;
 pub mod explore;
 pub mod files;
