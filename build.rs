@@ -1,5 +1,5 @@
 //! Lets every built binary find MuJoCo's shared library without environment variables, and tells
-//! it which commit and compiler it was built from.
+//! it which commit it was built from.
 
 use std::env;
 use std::path::Path;
@@ -10,13 +10,11 @@ const HEAD_LOG: &str = ".git/logs/HEAD";
 
 fn main() {
     println!("cargo::rerun-if-env-changed=MUJOCO_DYNAMIC_LINK_DIR");
-    println!("cargo::rerun-if-env-changed=CARGO_INCREMENTAL");
     println!("cargo::rerun-if-changed=build.rs");
     if Path::new(HEAD_LOG).exists() {
         println!("cargo::rerun-if-changed={HEAD_LOG}");
     }
     println!("cargo::rustc-env=PALPATE_COMMIT={}", commit().unwrap_or("unknown".into()));
-    println!("cargo::rustc-env=PALPATE_BUILD={}", build());
     if env::var_os("CARGO_FEATURE_MUJOCO").is_none() {
         return;
     }
@@ -33,19 +31,6 @@ fn main() {
     if let Ok(dir) = env::var("MUJOCO_DYNAMIC_LINK_DIR") {
         println!("cargo::rustc-link-arg=-Wl,-rpath,{dir}");
     }
-}
-
-/// What decides how many instructions a source becomes.
-fn build() -> String {
-    let variable = |name| env::var(name).unwrap_or_default();
-    let output = Command::new(variable("RUSTC")).arg("--version").output();
-    let version = output.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
-    let (target, level) = (variable("TARGET"), variable("OPT_LEVEL"));
-    let parts = match (variable("CARGO_INCREMENTAL").as_str(), variable("PROFILE").as_str()) {
-        ("1", _) | ("", "debug") => ", in small parts",
-        _ => "",
-    };
-    format!("{}, {target}, level {level}{parts}", version.unwrap_or_default())
 }
 
 fn commit() -> Option<String> {

@@ -9,6 +9,9 @@
 mod counting;
 #[path = "common/curves.rs"]
 mod curves;
+#[path = "common/pieces/mod.rs"]
+#[allow(dead_code)]
+mod pieces;
 
 use counting::peak_bytes;
 use curves::{Curve, draw, print, seconds};
@@ -18,8 +21,8 @@ use palpate::gp::likelihood::Likelihood;
 use palpate::gp::posterior::Scratch;
 use palpate::gp::{Mean, Posterior};
 use palpate::report::style;
-use palpate::study::bench::product;
-use palpate::study::bench::sample::{KERNEL, hyperparameters, search_box, touches};
+use pieces::product;
+use pieces::sample::{KERNEL, hyperparameters, search_box, touches};
 use std::hint::black_box;
 
 const COUNTS: [usize; 11] = [10, 25, 50, 100, 200, 400, 1000, 2000, 4000, 7000, 10_000];

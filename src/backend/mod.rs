@@ -1,14 +1,13 @@
 //! Bodies that are commanded and read: simulated, recorded or real.
 //!
 //! [`Backend`] is the trait of a body, one control tick at a time. `delay`, `interlock`, `trace`,
-//! `watched`, `fault_injector` and the recorder of `recording` are bodies around other bodies.
+//! `watched` and the recorder of `recording` are bodies around other bodies.
 
 #[allow(clippy::module_inception)]
 mod backend;
 mod command;
 pub mod delay;
 mod fault;
-pub mod fault_injector;
 pub mod interlock;
 pub mod pace;
 mod reading;

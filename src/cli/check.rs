@@ -1,6 +1,5 @@
 //! `palpate check`.
 
-use super::check_cost::{NO_COUNTER, count, counted_by, tell as tell_cost};
 use super::columns::aligned;
 use super::find::{EXPERIMENTS, find};
 use super::output::Force;
@@ -11,7 +10,6 @@ use crate::experiment::runner::{self, Progress};
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, Simulation};
 use crate::report::check::{figure, junit, lines};
-use crate::study::check::cost::Cost;
 use crate::study::check::{Baseline, Held, Rules, Verdict, differs, hold};
 use anyhow::{Context, bail};
 use std::path::PathBuf;
@@ -23,14 +21,12 @@ Examples:
   palpate check toy --baseline experiments/baselines/toy.jsonl
   palpate check toy --baseline experiments/baselines/toy.jsonl --bless 'length scales are fitted in logarithms'
   palpate check bird --baseline bird.jsonl --tolerance 0.1 --max-trials 100 --junit check.xml --svg check.svg
-  palpate check toy --baseline experiments/baselines/toy.jsonl --cost
 
 Runs the first four trials of every planner. Rows that are the bytes of the baseline's are identical, and that is \
 all. Otherwise new and old are paired by trial, which share seeds, on the mean of the logarithm of the error over the \
 touches; trials are added by tens until an interval that holds at any time says better, ok (its upper end is below \
 the tolerance) or worse, or --max-trials are spent: undecided. Other measures stand beside it, corrected after Holm, and \
-can only be worse. No time is judged; --cost counts the instructions of one trial of each planner, which are the same on a \
-busy machine, and skips where there is no valgrind.
+can only be worse. No time is judged.
 
 Exit codes: 0 identical, better or ok, 1 worse or missing, 3 undecided, 2 could not.")]
 pub(super) struct Args {
@@ -48,10 +44,6 @@ pub(super) struct Args {
     /// Write the baseline as it is now, and why.
     #[arg(long, value_name = "WHY")]
     bless: Option<String>,
-    /// Count a trial's instructions with valgrind instead, or too if a baseline is written; 2 %
-    /// more are worse.
-    #[arg(long, conflicts_with_all = ["junit", "markdown", "svg"])]
-    cost: bool,
     /// Write the verdicts as JUnit XML.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
@@ -93,15 +85,6 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         }
     };
     bound_threads(args.threads)?;
-    let counter = if args.cost { counted_by() } else { None };
-    if args.cost && counter.is_none() {
-        print(NO_COUNTER)?;
-    }
-    let cost = counter.map(|by| count(&path, &args.set, &experiment, &by, talk)).transpose()?;
-    if let (true, None, Some(old)) = (args.cost, &args.bless, &old) {
-        let told = cost.map(|cost| tell_cost(&args.baseline, old, &cost)).transpose()?;
-        return Ok(told.map_or(Ending::Done, ending));
-    }
     let simulation = simulation(experiment, talk)?;
     if simulation.is_real() {
         bail!("backend.kind: a check runs on the simulated body; allowed is \"simulated\"");
@@ -109,7 +92,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let stop = stop_on_interrupt("trials")?;
     let rules = Rules { tolerance: args.tolerance, ..Rules::default() };
     if let Some(why) = &args.bless {
-        return bless(args, &simulation, (old.as_ref(), cost), (why, &rules), &stop, talk);
+        return bless(args, &simulation, old.as_ref(), (why, &rules), &stop, talk);
     }
     let old = old.context("no baseline")?;
     let most = runner::jobs(&simulation, &[])?.len();
@@ -120,17 +103,12 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     tell(args, &name, &old, &held, &rules)?;
     Ok(match held.is_stopped {
         true => Ending::Interrupted,
-        false => ending(held.verdict()),
+        false => match held.verdict() {
+            Verdict::Identical | Verdict::Better | Verdict::Ok => Ending::Done,
+            Verdict::Undecided => Ending::Undecided,
+            Verdict::Worse | Verdict::Missing => Ending::Failed,
+        },
     })
-}
-
-/// How a check ends that has said so.
-fn ending(verdict: Verdict) -> Ending {
-    match verdict {
-        Verdict::Identical | Verdict::Better | Verdict::Ok => Ending::Done,
-        Verdict::Undecided => Ending::Undecided,
-        Verdict::Worse | Verdict::Missing => Ending::Failed,
-    }
 }
 
 fn tell(args: &Args, name: &str, old: &Baseline, held: &Held, rules: &Rules) -> anyhow::Result<()> {
@@ -162,7 +140,7 @@ fn tell(args: &Args, name: &str, old: &Baseline, held: &Held, rules: &Rules) -> 
 fn bless(
     args: &Args,
     simulation: &Simulation,
-    (old, cost): (Option<&Baseline>, Option<Cost>),
+    old: Option<&Baseline>,
     (why, rules): (&str, &Rules),
     stop: &AtomicBool,
     talk: Talk,
@@ -178,7 +156,6 @@ fn bless(
         return Ok(Ending::Interrupted);
     }
     let mut new = Baseline::new(simulation, &rows, why);
-    new.header.cost = cost.or_else(|| old?.header.cost.clone());
     new.header.differs = old.map_or(Vec::new(), |old| differs(old, &new, rules));
     write_whole(&args.baseline, &new.text()?)?;
     let mut text = format!("{} trials in {}", rows.len(), args.baseline.display());

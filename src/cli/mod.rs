@@ -1,14 +1,11 @@
 //! The command line.
 
 mod align;
-mod bench;
 mod calibrate;
 mod check;
-mod check_cost;
 mod columns;
 mod compare;
 mod completions;
-mod cost;
 mod effects;
 mod export;
 mod fidelity;
@@ -31,7 +28,6 @@ mod report;
 mod run;
 mod scan;
 mod show;
-mod stress;
 mod suite;
 mod terminal;
 mod twin;
@@ -69,7 +65,6 @@ Examples:
   palpate suite experiments/suite/six.toml  planners on objects that differ: who is better where
   palpate check toy --baseline experiments/baselines/toy.jsonl
   palpate fidelity scenes/bird_finger.toml --tolerance 0.2mm
-  palpate stress                            hard cases until they break
 
 Exit codes: 0 done, 1 a test failed, 2 could not (the message says why), 3 undecided, 130 interrupted; run the same command \
 again to continue.";
@@ -104,16 +99,10 @@ enum Command {
     Export(export::Args),
     /// Hold planners against what they were: better, ok, worse, or undecided.
     Check(check::Args),
-    /// Hold the instructions of fixed work against a committed table.
-    Cost(cost::Args),
     /// Show what accuracy costs: errors and time over a ladder of scenes.
     Fidelity(fidelity::Args),
     /// Show what each effect of a scene changes and costs.
     Effects(effects::Args),
-    /// Run hard cases at rising severity until they break.
-    Stress(stress::Args),
-    /// Time each piece of a trial, and say how far it is from what the machine can do.
-    Bench(bench::Args),
     /// List experiments, scenes, planners, measures and effects.
     List(list::Args),
     /// Print a script with which a shell completes commands.
@@ -159,12 +148,9 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, bring: &Bring) -
         Command::Fidelity(args) => fidelity::run(&args, cli.talk),
         Command::Effects(args) => effects::run(&args, cli.talk),
         Command::Check(args) => check::run(&args, cli.talk),
-        Command::Cost(args) => cost::run(&args, cli.talk),
-        Command::Stress(args) => stress::run(&args, cli.talk),
         Command::Register(args) => register::run(&args, cli.talk),
         Command::Align(args) => align::run(&args, cli.talk),
         Command::Calibrate(args) => calibrate::run(&args),
-        Command::Bench(args) => bench::run(&args, cli.talk),
         Command::List(args) => list::run(&args),
         Command::Completions(args) => completions::run(&args, Cli::command()),
         Command::Reference(_) => print(reference().trim_end()).map(|()| Ending::Done),

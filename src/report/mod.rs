@@ -26,7 +26,6 @@ pub mod relief;
 pub mod relief_panel;
 pub mod replay;
 pub mod scan;
-pub mod severity;
 pub mod solid;
 pub mod style;
 pub mod suite;

@@ -6,15 +6,9 @@
 //!   the rest of the scene stays.
 //! * [`check`]: are planners what they were? The same trials again, held against a committed file.
 //! * [`compare`](mod@compare): planners over several runs.
-//! * [`bench`](mod@bench): how long does each piece take, and how far is it from what the machine
-//!   can do?
-//! * [`stress`]: where does it break, and does it say so? Hard cases at rising severity, each with
-//!   the law it must keep.
 
-pub mod bench;
 pub mod check;
 pub mod compare;
 pub mod effects;
 pub mod fidelity;
-pub mod stress;
 pub mod suite;

@@ -1,10 +1,12 @@
-//! Pieces of a trial, timed: what is said of them, not how fast they are.
+//! The pieces that benches time run, and their shares of what the machine can do are computed right.
 
-use crate::common::program::{fails, succeeds};
-use palpate::study::bench::{Piece, pieces, time};
-use serde_json::Value;
+#[path = "../../benches/common/pieces/mod.rs"]
+#[allow(dead_code)]
+mod pieces;
+
+use pieces::timing::time;
+use pieces::{Piece, pieces};
 use std::collections::HashSet;
-use tempfile::TempDir;
 
 #[test]
 fn every_piece_runs_and_has_a_name_of_its_own() {
@@ -26,9 +28,7 @@ fn shares_are_rates_over_those_of_the_limits() {
         |name: &str, flops, bytes| Piece { name: name.into(), flops, bytes, run: Box::new(work) };
     let mut all =
         [piece("a", 1e4, 0.0), piece("b", 0.0, 1e5), piece("c", 2e4, 5e4), piece("d", 0.0, 0.0)];
-    let mut rounds = 0;
-    let timed = time(&mut all, 5, || rounds += 1);
-    assert_eq!(rounds, 5);
+    let timed = time(&mut all, 5);
     assert_eq!((timed[0].of_product, timed[1].of_stream), (Some(1.0), Some(1.0)));
     let rate = |flops: f64| 1e-9 * flops / timed[2].time_s;
     let near = |a: Option<f64>, b: f64| (a.unwrap() / b - 1.0).abs() < 1e-9;
@@ -36,16 +36,4 @@ fn shares_are_rates_over_those_of_the_limits() {
     assert!(timed[2].of_product > Some(0.0) && timed[2].of_stream > Some(0.0));
     assert_eq!((timed[3].gflops, timed[3].of_product), (None, None));
     assert_eq!((timed[3].gbytes, timed[3].of_stream), (None, None));
-}
-
-#[test]
-fn the_program_tells_pieces_as_lines_of_json() {
-    let folder = TempDir::new().unwrap();
-    let said = succeeds(folder.path(), &["bench", "ray,", "--rounds", "1", "--json"]);
-    let lines: Vec<Value> = said.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    assert_eq!(lines.len(), 3, "{said}");
-    assert!(lines.iter().all(|line| line["time_s"].as_f64().unwrap() > 0.0));
-    assert_eq!(lines[0]["of_product"].as_f64(), Some(1.0));
-    assert!(lines[2]["gflops"].is_null());
-    fails(folder.path(), &["bench", "no such"], &["`no such`", "ray, 48 000 triangles"]);
 }

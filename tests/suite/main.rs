@@ -92,7 +92,6 @@ mod shell_elements;
 mod shell_reference;
 mod slopes;
 mod solid;
-mod stress;
 mod sweeps;
 mod twin;
 mod twin_faults;

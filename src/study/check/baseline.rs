@@ -1,10 +1,10 @@
 //! What planners were: a file of JSON lines, a header and then a line for each trial.
 
-use super::cost::Cost;
 use super::judged::{JUDGED, Span};
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
 use crate::words::hex;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -38,9 +38,9 @@ pub struct Header {
     pub trials: u32,
     /// Planners.
     pub planners: Vec<String>,
-    /// Instructions of a trial, if they were counted.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cost: Option<Cost>,
+    /// Instructions of a trial that version 0.1 counted, ignored.
+    #[serde(default, skip_serializing)]
+    cost: IgnoredAny,
 }
 
 /// A trial.
@@ -167,7 +167,7 @@ impl Baseline {
             grid: experiment.grid,
             trials: experiment.trials,
             planners: experiment.planners.clone(),
-            cost: None,
+            cost: IgnoredAny,
         };
         let lines = rows.iter().map(|row| Line::of(row, span(experiment))).collect();
         Self { header, lines }

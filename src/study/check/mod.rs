@@ -3,11 +3,8 @@
 //! First the rows themselves are compared; where they are the same bytes, nothing has changed.
 //! Otherwise new and old are paired by trial, which share seeds, and trials are added in batches
 //! until an interval that holds at any time ([`sequence`]) tells. [`judged`] lists by what.
-//! [`cost`] is apart: instructions of one trial, and [`cost_table`]: those of several experiments.
 
 pub mod baseline;
-pub mod cost;
-pub mod cost_table;
 pub mod held;
 pub mod judged;
 pub mod sequence;

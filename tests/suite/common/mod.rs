@@ -3,6 +3,7 @@
 pub mod around;
 pub mod counting;
 pub mod fake;
+pub mod fault_injector;
 #[cfg(feature = "mujoco")]
 pub mod lab;
 #[cfg(feature = "mujoco")]

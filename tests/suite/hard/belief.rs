@@ -1,15 +1,15 @@
 //! The Gaussian process on data that break others.
 
 use super::case::{Case, Outcome, all, case, require};
-use crate::gp::kernel::{Hyperparameters, SquaredExponential};
-use crate::gp::posterior::Scratch;
-use crate::gp::{Mean, Observations, Posterior};
-use crate::gp::{SearchBox, TouchNoise};
-use crate::math::optimize::Stop;
+use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
+use palpate::gp::posterior::Scratch;
+use palpate::gp::{Mean, Observations, Posterior};
+use palpate::gp::{SearchBox, TouchNoise};
+use palpate::math::optimize::Stop;
 
 static KERNEL: SquaredExponential = SquaredExponential;
 
-pub(super) const CASES: &[Case] = &[
+pub const CASES: &[Case] = &[
     case(
         "duplicate touches",
         "equal rows make the covariance singular",

@@ -6,16 +6,16 @@ use super::checked_touch::environment_of;
 use super::dynamic::{APPROACH_M_S, with_masses};
 use super::finger_on_wall::{FingerOnWall, stiffen};
 use super::solids::{mesh, wall};
-use crate::backend::{Backend, Command, Fault, Reading};
-use crate::explore::control::{Controller, Goal};
-use crate::robot::arm::ArmSettings;
-use crate::sim::Environment;
-use crate::sim::mujoco::{Dynamic, Models};
-use crate::task::Zone;
 use nalgebra::{Isometry3, Vector6};
+use palpate::backend::{Backend, Command, Fault, Reading};
+use palpate::explore::control::{Controller, Goal};
+use palpate::robot::arm::ArmSettings;
+use palpate::sim::Environment;
+use palpate::sim::mujoco::{Dynamic, Models};
+use palpate::task::Zone;
 use std::sync::Arc;
 
-pub(super) const CASES: &[Case] = &[
+pub const CASES: &[Case] = &[
     case(
         "stiff skin on a stage, at rest",
         "an explicit force blows up in steps longer than twice the square root of mass over stiffness",
@@ -70,7 +70,7 @@ const FORCE_N: f64 = 3.0;
 pub const TOLERANCE: f64 = 0.05;
 
 /// The refined run has this many steps in one; chosen: an oscillation at the limit of
-/// [`StepLimit`](crate::sim::mujoco::StepLimit) is then within a percent of the exact one.
+/// [`StepLimit`](palpate::sim::mujoco::StepLimit) is then within a percent of the exact one.
 const FINER: f64 = 8.0;
 
 /// Time pressed until the force is at rest: four times 0.2 s, in which the controller takes back
@@ -246,37 +246,27 @@ impl ForceDeviation {
     }
 }
 
-/// How much stiffer than a BioTac's a skin may be.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StiffnessMargin {
-    /// Times stiffer, the largest whose force at rest is within [`TOLERANCE`] of a refined run's,
-    /// as are all below.
-    pub times: f64,
-    /// The next that was tried and what came of it; none if all were within.
-    pub beyond: Option<(f64, String)>,
-}
-
 /// Stiffnesses at which a margin is looked for.
 const TIMES: [f64; 15] =
     [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4, 1e5, 1e6];
 
-/// The margin of the PA-10 in steps of `step_s`, `divided` as a scene's are or as given. 0 times if
-/// not even the default skin is within.
-pub fn stiffness_margin(step_s: f64, divided: bool) -> StiffnessMargin {
-    let mut margin = StiffnessMargin { times: 0.0, beyond: None };
+/// How many times stiffer than a BioTac's the skin of a PA-10 may be in steps of `step_s`, `divided`
+/// as a scene's are or as given: the largest of [`TIMES`] up to which the force at rest is within
+/// [`TOLERANCE`] of a refined run's, 0 if there is none; and the next with its result.
+pub fn stiffness_margin(step_s: f64, divided: bool) -> (f64, Option<(f64, String)>) {
+    let mut margin = 0.0;
     for times in TIMES {
         let why = match force_deviation(times, (step_s, divided), true, REST_S) {
             Ok(deviation) if deviation.is_at_rest() => {
-                margin.times = times;
+                margin = times;
                 continue;
             }
             Ok(deviation) => deviation.words(),
             Err(words) => words,
         };
-        margin.beyond = Some((times, why));
-        break;
+        return (margin, Some((times, why)));
     }
-    margin
+    (margin, None)
 }
 
 /// Finite, and at rest within [`TOLERANCE`] of a refined run: force and what it goes up and down.

@@ -2,13 +2,13 @@
 
 use super::case::{Case, Outcome, all, case, require};
 use super::finger_on_wall::{FingerOnWall, is_finite, stiffen, with_finger, with_finger_of_size};
-use crate::math::seed;
-use crate::robot::finger::TipMotion;
-use crate::sim::finger::{Effects, FingertipError};
 use nalgebra::{Isometry3, Vector3};
+use palpate::math::seed;
+use palpate::robot::finger::TipMotion;
+use palpate::sim::finger::{Effects, FingertipError};
 use rand::RngExt;
 
-pub(super) const CASES: &[Case] = &[
+pub const CASES: &[Case] = &[
     case(
         "deep press",
         "skin, fluid and core carry load one after the other",
@@ -120,7 +120,7 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// All whose loads follow from the pose alone, and friction.
-pub(super) fn effects() -> Effects {
+pub fn effects() -> Effects {
     Effects { creep: None, timing: None, ..Effects::all() }
 }
 
@@ -172,7 +172,7 @@ fn release(steps: f64, _: f64) -> Outcome {
 /// Pressed in, dragged aside and back, and released: friction and skin take work, never give it.
 fn friction_loop(coefficient: f64, period_s: f64) -> Outcome {
     let mut effects = effects();
-    effects.friction = Some(crate::sim::finger::effects::friction::FrictionEffect {
+    effects.friction = Some(palpate::sim::finger::effects::friction::FrictionEffect {
         coefficient,
         ..Default::default()
     });
@@ -232,7 +232,7 @@ fn slip(speed_m_s: f64, period_s: f64) -> Outcome {
 /// touched.
 fn slide(coefficient: f64, period_s: f64) -> Outcome {
     let mut effects = Effects { thermal: None, ..effects() };
-    effects.friction = Some(crate::sim::finger::effects::friction::FrictionEffect {
+    effects.friction = Some(palpate::sim::finger::effects::friction::FrictionEffect {
         coefficient,
         stiffness_n_m: 1.0,
         ..Default::default()
@@ -303,7 +303,7 @@ fn ticks(tick_s: f64, _: f64) -> Outcome {
 }
 
 /// Poses all around and in the wall: a finite load or a fault that says where.
-pub(super) fn poses(count: f64, effects: &Effects) -> Outcome {
+pub fn poses(count: f64, effects: &Effects) -> Outcome {
     with_finger(effects, |setup| {
         let mut rng = seed::stream(0, 0, "poses");
         let mut state = setup.untouched();
@@ -344,7 +344,7 @@ fn nan(component: f64, _: f64) -> Outcome {
 }
 
 /// A finger of other constants and size: finite, growing with depth, and repeating itself.
-pub(super) fn laws_of(stiffer: f64, size: f64, effects: &Effects) -> Outcome {
+pub fn laws_of(stiffer: f64, size: f64, effects: &Effects) -> Outcome {
     let mut effects = effects.clone();
     stiffen(&mut effects, stiffer);
     with_finger_of_size(&effects, size, |setup| {

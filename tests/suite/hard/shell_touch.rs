@@ -4,10 +4,10 @@ use super::case::{Case, case};
 use super::dynamic::{on_arm, with_masses};
 use super::shapes::{graze, slot, twins};
 use super::wall::on_wall;
-use crate::sim::Scene;
-use crate::sim::finger::effects::skin::SkinModel;
+use palpate::sim::Scene;
+use palpate::sim::finger::effects::skin::SkinModel;
 
-pub(super) const CASES: &[Case] = &[
+pub const CASES: &[Case] = &[
     case(
         "shell into a wall, with masses",
         "servos need a while to stop an arm that has met something",

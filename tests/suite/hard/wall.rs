@@ -4,19 +4,19 @@ use super::case::{Case, Outcome, case, require};
 use super::checked_touch::{CheckedTouch, environment_of, touch_solid};
 use super::finger_on_wall::stiffen;
 use super::solids::{mesh, wall};
-use crate::explore::probe::{Contact, Touch};
-use crate::robot::finger::Finger;
-use crate::sim::Scene;
-use crate::sim::finger::Effects;
-use crate::sim::finger::effects::timing::TimingEffect;
-use crate::sim::scene::Body;
-use crate::sim::simulator::Simulator;
-use crate::study::fidelity::reference_load::noise_free;
-use crate::task::Zone;
-use crate::task::touch::TouchSettings;
+use palpate::explore::probe::{Contact, Touch};
+use palpate::robot::finger::Finger;
+use palpate::sim::Scene;
+use palpate::sim::finger::Effects;
+use palpate::sim::finger::effects::timing::TimingEffect;
+use palpate::sim::scene::Body;
+use palpate::sim::simulator::Simulator;
+use palpate::study::fidelity::reference_load::noise_free;
+use palpate::task::Zone;
+use palpate::task::touch::TouchSettings;
 use std::sync::Arc;
 
-pub(super) const CASES: &[Case] = &[
+pub const CASES: &[Case] = &[
     case(
         "fast approach to a wall",
         "the finger goes on while frames agree that there is contact",
@@ -128,7 +128,7 @@ pub(super) const CASES: &[Case] = &[
 
 /// A kinematic stage with a soft finger whose point of contact is exact, before an object near
 /// the origin.
-pub(super) fn scene(period_s: f64) -> Scene {
+pub fn scene(period_s: f64) -> Scene {
     let mut effects = Effects { skin: Some(Default::default()), ..Effects::default() };
     effects.fluid = Some(Default::default());
     Scene {
@@ -151,14 +151,14 @@ fn skin(period_s: f64, times: f64) -> Scene {
     scene
 }
 
-pub(super) fn touch_wall(scene: Scene) -> CheckedTouch {
+pub fn touch_wall(scene: Scene) -> CheckedTouch {
     match mesh(wall(0.05), [0.0; 3]) {
         Some(mesh) => touch_solid(scene, mesh, &[0.0, 0.0]),
         None => CheckedTouch::not_done("no mesh"),
     }
 }
 
-pub(super) fn on_wall(scene: Scene) -> Outcome {
+pub fn on_wall(scene: Scene) -> Outcome {
     touch_wall(scene).on_surface(1e-3)
 }
 

@@ -4,12 +4,12 @@ use super::case::{Case, Outcome, all, case, require};
 use super::checked_touch::{CheckedTouch, touch_solid};
 use super::solids::{both, mesh, needle, sheet, wall};
 use super::wall::scene;
-use crate::geometry::mesh::Mesh;
-use crate::geometry::solids::{ball, block};
-use crate::sim::Scene;
 use nalgebra::Point3;
+use palpate::geometry::mesh::Mesh;
+use palpate::geometry::solids::{ball, block};
+use palpate::sim::Scene;
 
-pub(super) const CASES: &[Case] = &[
+pub const CASES: &[Case] = &[
     case(
         "graze along an edge",
         "the finger's flank meets less and less of the object",
@@ -140,13 +140,13 @@ fn on_in(scene: Scene, mesh: Option<Mesh>, target: [f64; 2], tolerance_mm: f64) 
     touch_solid(scene, mesh, &target).on_surface(1e-3 * tolerance_mm)
 }
 
-pub(super) fn graze(overlap_mm: f64, scene: Scene) -> Outcome {
+pub fn graze(overlap_mm: f64, scene: Scene) -> Outcome {
     let Some(mesh) = mesh(wall(0.03), [0.0; 3]) else { return Outcome::Wrong("no mesh".into()) };
     // Whether so little is felt is the sensor's choice; what it must not do is feel it elsewhere.
     touch_solid(scene, mesh, &[0.037 - 1e-3 * overlap_mm, 0.0]).on_surface_or_missed(1e-3)
 }
 
-pub(super) fn slot(width_mm: f64, scene: Scene) -> Outcome {
+pub fn slot(width_mm: f64, scene: Scene) -> Outcome {
     let half = 0.5e-3 * width_mm;
     let left = block([-0.03, -0.03, -0.03], [-half, 0.0, 0.03]);
     let right = block([half, -0.03, -0.03], [0.03, 0.0, 0.03]);
@@ -154,7 +154,7 @@ pub(super) fn slot(width_mm: f64, scene: Scene) -> Outcome {
     on_in(scene, mesh(both(left, right), [0.0; 3]), [0.0; 2], 1.0 + 0.5 * width_mm)
 }
 
-pub(super) fn twins(lower_mm: f64, scene: Scene) -> Outcome {
+pub fn twins(lower_mm: f64, scene: Scene) -> Outcome {
     let [left, right] = [[-0.005, -0.01], [0.005, -0.01 - 1e-3 * lower_mm]]
         .map(|[x, y]| ball(Point3::new(x, y, 0.0), 0.004, 24));
     on_in(scene, mesh(both(left, right), [0.0; 3]), [0.0; 2], 5.5)

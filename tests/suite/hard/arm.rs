@@ -4,11 +4,11 @@ use super::case::{Case, Outcome, case};
 use super::checked_touch::touch_solid;
 use super::solids::{mesh, wall};
 use super::wall::scene;
-use crate::robot::arm::ArmSettings;
-use crate::sim::Scene;
-use crate::task::Zone;
+use palpate::robot::arm::ArmSettings;
+use palpate::sim::Scene;
+use palpate::task::Zone;
 
-pub(super) const CASES: &[Case] = &[
+pub const CASES: &[Case] = &[
     case(
         "straight elbow",
         "at full reach no joint moves the tip outwards",
@@ -82,7 +82,7 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// The arm touches the middle of a small wall at `place_m`; out of reach, it says so.
-pub(super) fn reach(scene: Scene, [x, y, z]: [f64; 3], arm: ArmSettings) -> Outcome {
+pub fn reach(scene: Scene, [x, y, z]: [f64; 3], arm: ArmSettings) -> Outcome {
     let zone = Zone::new([x - 0.03, x + 0.03], Some([z - 0.03, z + 0.03]));
     let zone = Some(Zone { datum_y_m: Some(y), ..zone });
     let Some(mesh) = mesh(wall(0.03), [x, y, z]) else { return Outcome::Wrong("no mesh".into()) };

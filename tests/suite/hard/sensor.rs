@@ -4,12 +4,12 @@ use super::case::{Case, Outcome, case};
 use super::checked_touch::touch_solid_with;
 use super::solids::{mesh, wall};
 use super::wall::scene;
-use crate::backend::fault_injector::{Failure, FaultInjector};
+use crate::common::fault_injector::{Failure, FaultInjector};
 
 /// Ticks after which a sensor fails: at rest, on the way, near contact, after the touch.
 const FROM: (&[f64], usize) = (&[1e6, 120.0, 60.0, 20.0, 3.0, 0.0], 1);
 
-pub(super) const CASES: &[Case] = &[
+pub const CASES: &[Case] = &[
     case("pressure is no number", "NaN compares as no contact", "from tick", FROM, |from, p| {
         broken(Failure::NanPressure, from, p)
     }),

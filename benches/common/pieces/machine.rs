@@ -1,6 +1,6 @@
 //! What this machine can do on one thread.
 
-use super::piece::Piece;
+use super::Piece;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 

@@ -1,19 +1,19 @@
 //! One touch of a solid, and the laws that every touch must keep.
 
 use super::case::{Outcome, all, require};
-use crate::backend::trace::{Tick, Trace};
-use crate::backend::{Backend, Fault};
-use crate::explore::probe::{Contact, Probe, Touch};
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::mesh::Mesh;
-use crate::sim::environment::{EnvironmentError, Shape};
-use crate::sim::simulator::Simulator;
-use crate::sim::{Environment, Scene};
-use crate::study::fidelity::reference_load::{ReferenceLoad, reference_load};
+use palpate::backend::trace::{Tick, Trace};
+use palpate::backend::{Backend, Fault};
+use palpate::explore::probe::{Contact, Probe, Touch};
+use palpate::geometry::bvh::MeshBvh;
+use palpate::geometry::mesh::Mesh;
+use palpate::sim::environment::{EnvironmentError, Shape};
+use palpate::sim::simulator::Simulator;
+use palpate::sim::{Environment, Scene};
+use palpate::study::fidelity::reference_load::{ReferenceLoad, reference_load};
 use std::sync::Arc;
 
 /// One touch and what came of it.
-pub(super) struct CheckedTouch {
+pub struct CheckedTouch {
     /// What it returned.
     pub touch: Result<Touch, Fault>,
     environment: Option<Arc<Environment>>,
@@ -24,12 +24,12 @@ pub(super) struct CheckedTouch {
 }
 
 /// Touches `target` of `mesh`, with sensors without noise but for what the scene raises.
-pub(super) fn touch_solid(scene: Scene, mesh: Mesh, target: &[f64]) -> CheckedTouch {
+pub fn touch_solid(scene: Scene, mesh: Mesh, target: &[f64]) -> CheckedTouch {
     touch_solid_with(scene, mesh, target, |body| body)
 }
 
 /// As [`touch_solid`], with the body put into another.
-pub(super) fn touch_solid_with(
+pub fn touch_solid_with(
     scene: Scene,
     mesh: Mesh,
     target: &[f64],
@@ -67,17 +67,14 @@ pub(super) fn touch_solid_with(
 }
 
 /// `scene` with `mesh` as its object.
-pub(super) fn environment_of(
-    scene: Scene,
-    mesh: Mesh,
-) -> Result<Arc<Environment>, EnvironmentError> {
+pub fn environment_of(scene: Scene, mesh: Mesh) -> Result<Arc<Environment>, EnvironmentError> {
     let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
     Environment::around(scene, shape).map(Arc::new)
 }
 
 impl CheckedTouch {
     /// Not even begun, and why.
-    pub(super) fn not_done(why: &str) -> Self {
+    pub fn not_done(why: &str) -> Self {
         Self {
             touch: Err(Fault::Refused { values: Vec::new() }),
             environment: None,
@@ -88,7 +85,7 @@ impl CheckedTouch {
     }
 
     /// The contact, if there was one.
-    pub(super) fn contact(&self) -> Option<&Contact> {
+    pub fn contact(&self) -> Option<&Contact> {
         match &self.touch {
             Ok(Touch::Contact(contact)) => Some(contact),
             _ => None,
@@ -96,7 +93,7 @@ impl CheckedTouch {
     }
 
     /// A contact within `tolerance_m` of the mesh.
-    pub(super) fn on_surface(&self, tolerance_m: f64) -> Outcome {
+    pub fn on_surface(&self, tolerance_m: f64) -> Outcome {
         match &self.touch {
             Ok(Touch::Miss) => Outcome::Wrong("met nothing".into()),
             Ok(Touch::Overload) => Outcome::Faulted("broken off: too much pressure".into()),
@@ -105,7 +102,7 @@ impl CheckedTouch {
     }
 
     /// The same, or no contact; in either case a movement within the laws.
-    pub(super) fn on_surface_or_missed(&self, tolerance_m: f64) -> Outcome {
+    pub fn on_surface_or_missed(&self, tolerance_m: f64) -> Outcome {
         if let Some(why) = &self.refused {
             return Outcome::Faulted(why.clone());
         }
@@ -151,7 +148,7 @@ impl CheckedTouch {
 
     /// Whether `other`, moved by `by_m` along x and y, met the same within `tolerance_m` and a
     /// thousandth of the force.
-    pub(super) fn agrees(&self, other: &Self, by_m: f64, tolerance_m: f64) -> Outcome {
+    pub fn agrees(&self, other: &Self, by_m: f64, tolerance_m: f64) -> Outcome {
         let (Some(a), Some(b)) = (self.contact(), other.contact()) else { return Outcome::Stable };
         let shift_m = (b.p_wc - a.p_wc - nalgebra::Vector3::new(by_m, by_m, 0.0)).norm();
         let [force, other_n] =

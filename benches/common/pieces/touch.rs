@@ -1,17 +1,17 @@
 //! Pieces of a touch: geometry, the finger, the arm's control.
 
-use super::piece::Piece;
-use crate::explore::control::{Controller, Goal};
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::mesh::Mesh;
-use crate::geometry::solids::ball;
-use crate::geometry::sweep::Capsule;
-use crate::math::seed;
-use crate::robot::arm::ArmSettings;
-use crate::robot::finger::{Finger, TipMotion};
-use crate::sim::finger::effects::skin::{SkinEffect, SkinModel};
-use crate::sim::finger::{Effects, Fingertip, FingertipState};
+use super::Piece;
 use nalgebra::{Isometry3, Point3, Vector3};
+use palpate::explore::control::{Controller, Goal};
+use palpate::geometry::bvh::MeshBvh;
+use palpate::geometry::mesh::Mesh;
+use palpate::geometry::solids::ball;
+use palpate::geometry::sweep::Capsule;
+use palpate::math::seed;
+use palpate::robot::arm::ArmSettings;
+use palpate::robot::finger::{Finger, TipMotion};
+use palpate::sim::finger::effects::skin::{SkinEffect, SkinModel};
+use palpate::sim::finger::{Effects, Fingertip, FingertipState};
 use std::hint::black_box;
 
 /// A ball before the finger: its radius, and rings that make 48 000 triangles, as many as the bird

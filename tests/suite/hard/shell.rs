@@ -5,9 +5,9 @@ use super::case::{Case, Outcome, all, case, require};
 use super::finger_on_wall::{FingerOnWall, is_finite, with_finger};
 use super::force_law::{effects, laws_of, poses};
 use super::solids::{both, mesh, needle};
-use crate::geometry::solids::block;
-use crate::sim::finger::effects::skin::SkinModel;
-use crate::sim::finger::{Effects, FingertipError};
+use palpate::geometry::solids::block;
+use palpate::sim::finger::effects::skin::SkinModel;
+use palpate::sim::finger::{Effects, FingertipError};
 
 /// A finger a hundred times as large has a million times the volume.
 const STIFF_FLUID: &str =
@@ -22,7 +22,7 @@ const SPEED_M_S: f64 = 0.02;
 /// Part by which two ways to the same pose may differ: ten times what is measured (chosen).
 const APART: f64 = 0.02;
 
-pub(super) const CASES: &[Case] = &[
+pub const CASES: &[Case] = &[
     case(
         "shell, deep press",
         "a thin shell buckles, and in the end meets the core",
@@ -193,7 +193,7 @@ fn held(count: f64, period_s: f64) -> Outcome {
 }
 
 /// Two millimetres in, tick by tick and at once, and away.
-fn pushed_into(solid: crate::geometry::solids::Triangles) -> Outcome {
+fn pushed_into(solid: palpate::geometry::solids::Triangles) -> Outcome {
     let setup = mesh(solid, [0.0; 3]).and_then(|mesh| FingerOnWall::before(mesh, &shell(), 1.0));
     let Some(setup) = setup else { return Outcome::Wrong("no object".into()) };
     let law = || -> Result<Outcome, FingertipError> {

@@ -86,7 +86,7 @@ pub struct Verdict {
 }
 
 /// A case that is never wrong without a fault and depends on no time.
-pub(super) const fn case(
+pub const fn case(
     name: &'static str,
     why: &'static str,
     severity: &'static str,
@@ -98,18 +98,18 @@ pub(super) const fn case(
 
 impl Case {
     /// The same, run at every control period.
-    pub(super) const fn timed(self) -> Self {
+    pub const fn timed(self) -> Self {
         Self { axis: TimeAxis::Period, ..self }
     }
 
     /// The same, run at every time step.
     #[cfg(feature = "mujoco")]
-    pub(super) const fn stepped(self) -> Self {
+    pub const fn stepped(self) -> Self {
         Self { axis: TimeAxis::Step, ..self }
     }
 
     /// The same, which beyond its severities may be wrong without a fault, and `why`.
-    pub(super) const fn known(self, why: &'static str) -> Self {
+    pub const fn known(self, why: &'static str) -> Self {
         Self { known: why, ..self }
     }
 
@@ -128,12 +128,12 @@ impl Case {
 }
 
 /// Stable if `condition` is true, else wrong with `what`.
-pub(super) fn require(condition: bool, what: impl FnOnce() -> String) -> Outcome {
+pub fn require(condition: bool, what: impl FnOnce() -> String) -> Outcome {
     if condition { Outcome::Stable } else { Outcome::Wrong(what()) }
 }
 
 /// The first that is not stable.
-pub(super) fn all(outcomes: impl IntoIterator<Item = Outcome>) -> Outcome {
+pub fn all(outcomes: impl IntoIterator<Item = Outcome>) -> Outcome {
     let mut outcomes = outcomes.into_iter();
     outcomes.find(|outcome| *outcome != Outcome::Stable).unwrap_or(Outcome::Stable)
 }

@@ -1,7 +1,7 @@
 //! What pieces of the Gaussian process are made of.
 
-use crate::gp::kernel::{Hyperparameters, SquaredExponential};
-use crate::gp::{Mean, Observations, SearchBox, TouchNoise};
+use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
+use palpate::gp::{Mean, Observations, SearchBox, TouchNoise};
 
 /// The kernel of them all.
 pub static KERNEL: SquaredExponential = SquaredExponential;

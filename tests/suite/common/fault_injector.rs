@@ -1,9 +1,9 @@
 //! A body whose sensors and joints fail, to test what drives it.
 
-use super::{Backend, Capabilities, Command, Fault, Reading, Sample};
-use crate::math::seed;
-use crate::robot::finger::Frame;
-use crate::robot::finger::frame::FULL_SCALE_COUNTS;
+use palpate::backend::{Backend, Capabilities, Command, Fault, Reading, Sample};
+use palpate::math::seed;
+use palpate::robot::finger::Frame;
+use palpate::robot::finger::frame::FULL_SCALE_COUNTS;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;

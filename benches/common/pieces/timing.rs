@@ -1,6 +1,6 @@
 //! Pieces timed in turns, so that what else the machine does falls on all alike.
 
-use super::piece::Piece;
+use super::Piece;
 use std::time::Instant;
 
 /// Least time of a sample: far above a clock's tick (chosen).
@@ -23,16 +23,14 @@ pub struct Timed {
     pub of_stream: Option<f64>,
 }
 
-/// Times all of them in each of `rounds`; `tell` is called after each round. The first two are what
-/// the others are held against.
-pub fn time(pieces: &mut [Piece], rounds: usize, mut tell: impl FnMut()) -> Vec<Timed> {
+/// Times all of them in each of `rounds`. The others are held against the first two.
+pub fn time(pieces: &mut [Piece], rounds: usize) -> Vec<Timed> {
     let counts: Vec<usize> = pieces.iter_mut().map(calibrated).collect();
     let mut samples_s = vec![Vec::with_capacity(rounds); pieces.len()];
     for _ in 0..rounds {
         for ((piece, count), samples_s) in pieces.iter_mut().zip(&counts).zip(&mut samples_s) {
             samples_s.push(seconds(piece, *count) / *count as f64);
         }
-        tell();
     }
     let rates = |of: fn(&Piece) -> f64, i: usize| -> Vec<f64> {
         pieces.get(i).map_or(vec![], |piece| samples_s[i].iter().map(|s| of(piece) / s).collect())

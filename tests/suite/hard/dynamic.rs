@@ -5,11 +5,11 @@ use super::case::{Case, Outcome, case};
 use super::shapes::{graze, slot, twins};
 use super::wall;
 use super::wall::on_wall;
-use crate::robot::arm::ArmSettings;
-use crate::sim::Scene;
-use crate::sim::scene::Body;
+use palpate::robot::arm::ArmSettings;
+use palpate::sim::Scene;
+use palpate::sim::scene::Body;
 
-pub(super) const CASES: &[Case] = &[
+pub const CASES: &[Case] = &[
     case(
         "soft finger into a wall",
         "servos need a while to stop an arm that has met something",
@@ -93,10 +93,10 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Approach of the scenes with masses: the servos of the arm take 0.04 s to stop.
-pub(super) const APPROACH_M_S: f64 = 0.015;
+pub const APPROACH_M_S: f64 = 0.015;
 
 /// A soft finger on a stage with masses.
-pub(super) fn with_masses(step_s: f64) -> Scene {
+pub fn with_masses(step_s: f64) -> Scene {
     let mut scene = wall::scene(0.002);
     scene.body = Body::Dynamic;
     scene.solver.step_s = step_s;
@@ -105,7 +105,7 @@ pub(super) fn with_masses(step_s: f64) -> Scene {
 }
 
 /// The same on a PA-10 that stands as far from the origin as from an object in its own scenes.
-pub(super) fn on_arm(step_s: f64) -> Scene {
+pub fn on_arm(step_s: f64) -> Scene {
     let arm = ArmSettings { base_position_m: [0.0, 0.65, -0.5], ..ArmSettings::default() };
     Scene { arm: Some(arm), ..with_masses(step_s) }
 }

@@ -2,18 +2,18 @@
 
 use super::case::Outcome;
 use super::solids::{mesh, wall};
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::mesh::Mesh;
-use crate::math::seed;
-use crate::robot::finger::Finger;
-use crate::robot::finger::TipMotion;
-use crate::robot::finger::profile::Profile;
-use crate::sim::finger::samples::spread;
-use crate::sim::finger::{Effects, Fingertip, FingertipError, FingertipState, Load};
 use nalgebra::{Isometry3, Vector3};
+use palpate::geometry::bvh::MeshBvh;
+use palpate::geometry::mesh::Mesh;
+use palpate::math::seed;
+use palpate::robot::finger::Finger;
+use palpate::robot::finger::TipMotion;
+use palpate::robot::finger::profile::Profile;
+use palpate::sim::finger::samples::spread;
+use palpate::sim::finger::{Effects, Fingertip, FingertipError, FingertipState, Load};
 
 /// A finger over a wall, its tip pointing at it as in a touch.
-pub(super) struct FingerOnWall {
+pub struct FingerOnWall {
     tip: Fingertip,
     wall: MeshBvh,
     /// Its hull.
@@ -24,12 +24,12 @@ pub(super) struct FingerOnWall {
 
 impl FingerOnWall {
     /// With these effects; `size` times a BioTac.
-    pub(super) fn new(effects: &Effects, size: f64) -> Option<Self> {
+    pub fn new(effects: &Effects, size: f64) -> Option<Self> {
         Self::before(mesh(wall(0.05 * size), [0.0; 3])?, effects, size)
     }
 
     /// The same before another object, whose foremost point is the origin.
-    pub(super) fn before(object: Mesh, effects: &Effects, size: f64) -> Option<Self> {
+    pub fn before(object: Mesh, effects: &Effects, size: f64) -> Option<Self> {
         let standard = Finger::default();
         let finger = Finger {
             radius_m: size * standard.radius_m,
@@ -48,18 +48,18 @@ impl FingerOnWall {
     }
 
     /// Standing `depth_m` inside the wall, `x_m` beside its middle.
-    pub(super) fn at(&self, depth_m: f64, x_m: f64) -> TipMotion {
+    pub fn at(&self, depth_m: f64, x_m: f64) -> TipMotion {
         let p_wt = Vector3::new(x_m, self.touching_m - depth_m, 0.0);
         TipMotion::at(Isometry3::from_parts(p_wt.into(), self.finger.r_at()))
     }
 
     /// The state of an untouched finger.
-    pub(super) fn untouched(&self) -> FingertipState {
+    pub fn untouched(&self) -> FingertipState {
         FingertipState::new(&self.tip, &seed::stream(0, 0, "finger"))
     }
 
     /// What the wall does to it.
-    pub(super) fn press(
+    pub fn press(
         &self,
         state: &mut FingertipState,
         motion: &TipMotion,
@@ -69,13 +69,13 @@ impl FingerOnWall {
     }
 
     /// The force at a depth.
-    pub(super) fn force_n(&self, depth_m: f64) -> Result<f64, FingertipError> {
+    pub fn force_n(&self, depth_m: f64) -> Result<f64, FingertipError> {
         Ok(self.press(&mut self.untouched(), &self.at(depth_m, 0.0), 0.01)?.force_n.norm())
     }
 }
 
 /// Runs `law`; its fault is the outcome.
-pub(super) fn with_finger(
+pub fn with_finger(
     effects: &Effects,
     law: impl FnOnce(&FingerOnWall) -> Result<Outcome, FingertipError>,
 ) -> Outcome {
@@ -83,7 +83,7 @@ pub(super) fn with_finger(
 }
 
 /// The same with a finger of another size.
-pub(super) fn with_finger_of_size(
+pub fn with_finger_of_size(
     effects: &Effects,
     size: f64,
     law: impl FnOnce(&FingerOnWall) -> Result<Outcome, FingertipError>,
@@ -95,7 +95,7 @@ pub(super) fn with_finger_of_size(
 }
 
 /// Whether every number of a load is one.
-pub(super) fn is_finite(load: &Load) -> bool {
+pub fn is_finite(load: &Load) -> bool {
     let vectors = [&load.force_n, &load.torque_nm, &load.normal_t, &load.centre_t.coords];
     vectors.iter().all(|vector| vector.iter().all(|number| number.is_finite()))
         && load.energy_j.is_finite()
@@ -103,7 +103,7 @@ pub(super) fn is_finite(load: &Load) -> bool {
 }
 
 /// Multiplies everything that makes the skin resist.
-pub(super) fn stiffen(effects: &mut Effects, times: f64) {
+pub fn stiffen(effects: &mut Effects, times: f64) {
     if let Some(skin) = &mut effects.skin {
         let resists = [
             &mut skin.modulus_pa,

@@ -1,10 +1,10 @@
 //! Pieces of the Gaussian process and of the planners that ask it.
 
-use super::piece::Piece;
+use super::Piece;
 use super::sample::{KERNEL, hyperparameters, place, search_box, touches};
-use crate::gp::likelihood::Likelihood;
-use crate::gp::posterior::Scratch;
-use crate::gp::{Mean, Posterior};
+use palpate::gp::likelihood::Likelihood;
+use palpate::gp::posterior::Scratch;
+use palpate::gp::{Mean, Posterior};
 use std::hint::black_box;
 
 /// Evaluations of a climb.
@@ -17,6 +17,7 @@ pub fn pieces() -> Vec<Piece> {
     let mut pieces: Vec<Piece> = [50, 100, 200, 1000].map(likelihood).into();
     pieces.extend([50, 100].map(cold_fit));
     pieces.extend([100, 1000].into_iter().filter_map(variance));
+    pieces.extend([100, 1000].into_iter().filter_map(variance_gradient));
     pieces.extend([100, 1000].into_iter().filter_map(variances));
     pieces.extend(appended(1000));
     pieces.extend(through(500, 10_000));
@@ -65,7 +66,23 @@ fn variance(count: usize) -> Option<Piece> {
     })
 }
 
-/// The same at many places, which read the matrix together.
+/// Two triangular solves.
+fn variance_gradient(count: usize) -> Option<Piece> {
+    let posterior = posterior(count)?;
+    let (mut scratch, mut slope) = (Scratch::default(), [0.0; 2]);
+    let n = count as f64;
+    Some(Piece {
+        name: format!("variance with gradient at a place, {count} touches"),
+        flops: 2.0 * n.powi(2),
+        bytes: 8.0 * n.powi(2),
+        run: Box::new(move || {
+            let place = black_box(&[0.31, 0.47]);
+            black_box(posterior.variance_gradient(place, &mut slope, &mut scratch));
+        }),
+    })
+}
+
+/// The variance at many places, which read the matrix together.
 fn variances(count: usize) -> Option<Piece> {
     let posterior = posterior(count)?;
     let places: Vec<[f64; 2]> = (0..PLACES).map(place).collect();

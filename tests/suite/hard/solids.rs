@@ -1,16 +1,16 @@
 //! Meshes for the hard cases. Unless said otherwise the finger meets them at the plane y = 0.
 
-use crate::geometry::mesh::Mesh;
-use crate::geometry::solids::{Triangles, block};
 use nalgebra::{Isometry3, Point3, Translation3};
+use palpate::geometry::mesh::Mesh;
+use palpate::geometry::solids::{Triangles, block};
 
 /// A box of `half_m` to each side of the origin and as deep, its face at y = 0.
-pub(super) fn wall(half_m: f64) -> Triangles {
+pub fn wall(half_m: f64) -> Triangles {
     block([-half_m, -half_m, -half_m], [half_m, 0.0, half_m])
 }
 
 /// Both of two solids.
-pub(super) fn both((mut points, mut triangles): Triangles, other: Triangles) -> Triangles {
+pub fn both((mut points, mut triangles): Triangles, other: Triangles) -> Triangles {
     let offset = points.len() as u32;
     points.extend(other.0);
     triangles.extend(other.1.iter().map(|triangle| triangle.map(|i| i + offset)));
@@ -19,11 +19,7 @@ pub(super) fn both((mut points, mut triangles): Triangles, other: Triangles) -> 
 
 /// A sheet over the square of side 2 `half_m`, `columns` × `rows` cells, at height
 /// `y(x, z)`.
-pub(super) fn sheet(
-    half_m: f64,
-    [columns, rows]: [u32; 2],
-    y: impl Fn(f64, f64) -> f64,
-) -> Triangles {
+pub fn sheet(half_m: f64, [columns, rows]: [u32; 2], y: impl Fn(f64, f64) -> f64) -> Triangles {
     let along = |i: u32, count: u32| half_m * (2.0 * f64::from(i) / f64::from(count) - 1.0);
     let points = (0..=columns)
         .flat_map(|i| (0..=rows).map(move |j| (i, j)))
@@ -42,7 +38,7 @@ pub(super) fn sheet(
 }
 
 /// A pyramid whose tip is the origin and whose sides lean `half_angle_deg` from −y.
-pub(super) fn needle(half_angle_deg: f64) -> Triangles {
+pub fn needle(half_angle_deg: f64) -> Triangles {
     let (depth, half) = (0.03, 0.03 * half_angle_deg.to_radians().tan());
     let points = [
         [0.0, 0.0, 0.0],
@@ -56,7 +52,7 @@ pub(super) fn needle(half_angle_deg: f64) -> Triangles {
 }
 
 /// As a mesh, moved by `by_m`; none if nothing usable is left.
-pub(super) fn mesh((points, triangles): Triangles, by_m: [f64; 3]) -> Option<Mesh> {
+pub fn mesh((points, triangles): Triangles, by_m: [f64; 3]) -> Option<Mesh> {
     let (mesh, _) = Mesh::new(&points, &triangles).ok()?;
     Some(mesh.transformed(&Isometry3::from(Translation3::from(by_m))))
 }
