@@ -13,7 +13,7 @@ PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
 
-.PHONY: test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers growth-around wheel install-python test-python docs notebooks dist setup tools clean
+.PHONY: test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers growth-around wheel install-python test-python docs notebooks dist setup tools clean
 
 EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
 
@@ -63,10 +63,13 @@ check-planners: setup
 			--baseline experiments/baselines/$$experiment.jsonl || exit; \
 	done
 
-# What fixed work costs is what experiments/baselines/cost.toml says; skipped where there is no valgrind. Built
-# whole: parts that are compiled apart take other numbers of instructions.
+# Fixed work costs the instructions of experiments/baselines/cost.toml; skipped where there is no valgrind.
 check-cost: setup
-	CARGO_INCREMENTAL=0 cargo run --quiet --locked --features ros2 -- --quiet cost experiments/baselines/cost.toml
+	tests/cost.py
+
+# All hard cases at all severities, periods and time steps, about a minute; writes docs/hard-cases.md.
+hard-cases: setup
+	PALPATE_HARD_CASES=1 cargo test --locked --test suite hard::all_outcomes
 
 # Shards by GNU parallel and by a Slurm of one node, each skipped where it is not there.
 test-clusters: setup
@@ -151,8 +154,7 @@ lint-windows: setup
 	cargo clippy --locked --lib --bins --features render,viewer -- -D warnings
 
 bench: setup
-	cargo build --release --locked
-	$(PALPATE) bench
+	cargo bench --locked --bench limits
 	cargo bench --locked --bench kernels
 	cargo bench --locked --bench interlocks
 	cargo bench --locked --bench plant

@@ -21,7 +21,7 @@ use palpate::gp::likelihood::Likelihood;
 use palpate::gp::posterior::Scratch;
 use palpate::gp::{Mean, Posterior};
 use palpate::report::style;
-use pieces::product;
+use pieces::machine::product;
 use pieces::sample::{KERNEL, hyperparameters, search_box, touches};
 use std::hint::black_box;
 

@@ -56,6 +56,7 @@ reference
 :caption: Background
 paper
 cost
+hard-cases
 real-arm
 checks
 clusters

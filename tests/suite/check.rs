@@ -6,8 +6,6 @@ use palpate::explore::belief::Belief;
 use palpate::explore::planner::{self, Entry, Plan, PlanError, Planner};
 use palpate::math::seed;
 use palpate::study::check::baseline::Line;
-use palpate::study::check::cost::{Cost, total};
-use palpate::study::check::cost_table::CostTable;
 use palpate::study::check::judged::{JUDGED, Span};
 use palpate::study::check::sequence::Sequence;
 use palpate::study::check::verdict::of_planner;
@@ -170,64 +168,6 @@ fn a_check_says_by_its_exit_code() {
     assert!(code == Some(2) && said.contains("toy.jsonl:4:"), "{said}");
 }
 
-/// Instructions are compared where the same compiler made them; what is two percent more is worse.
-#[test]
-fn instructions_are_judged_planner_by_planner() {
-    let cost = |by: &str, counts: &[(&str, u64)]| Cost {
-        by: by.into(),
-        instructions: counts.iter().map(|(name, count)| ((*name).into(), *count)).collect(),
-    };
-    let old = cost("a", &[("active", 1000), ("gone", 1000), ("random", 1000), ("slope", 1000)]);
-    let new = cost("a", &[("active", 1021), ("new", 5), ("random", 1019), ("slope", 979)]);
-    let said = |new: &Cost| -> Vec<(String, Verdict)> {
-        new.judge(&old, 0.02).into_iter().map(|said| (said.planner, said.verdict)).collect()
-    };
-    let wanted = [
-        ("active", Verdict::Worse),
-        ("gone", Verdict::Missing),
-        ("random", Verdict::Ok),
-        ("slope", Verdict::Better),
-        ("new", Verdict::Undecided),
-    ];
-    assert_eq!(said(&new), wanted.map(|(name, verdict)| (name.to_owned(), verdict)));
-    let other = Cost { by: "b".into(), ..new };
-    assert!(said(&other).iter().all(|(_, verdict)| *verdict >= Verdict::Undecided));
-    assert_eq!(total("desc: x\nevents: Ir\nfn=(0)\n1 2\nsummary: 12345\n"), Some(12345));
-    assert_eq!(total("events: Ir\n"), None);
-}
-
-/// The same program counts the same within a thousandth, whatever else runs; skipped without
-/// valgrind.
-#[test]
-fn a_trial_is_counted_by_valgrind() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("toy.jsonl");
-    let check = |more: &[&str]| {
-        let mut arguments = vec!["--quiet", "check", "toy", "--max-trials", "2", "--cost"];
-        arguments.extend(["--set", "touches=6", "--set", "initial_touches=3", "--set"]);
-        arguments.extend(["planners=[\"random\"]", "--baseline", file.to_str().unwrap()]);
-        arguments.extend(more);
-        let output = palpate(Path::new("."), &arguments);
-        let said = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap()).concat();
-        (output.status.code(), said)
-    };
-    let (code, said) = check(&["--bless", "the first"]);
-    assert_eq!(code, Some(0), "{said}");
-    if said.contains("skipped") {
-        assert!(said.contains("apt-get install valgrind"), "{said}");
-        return;
-    }
-    let counted = Baseline::read(&file).unwrap().header.cost.unwrap().instructions["random"];
-    assert!(counted > 100_000, "{counted}");
-    let (code, said) = check(&[]);
-    assert!(code == Some(0) && said.contains("ok (2 % are borne)"), "{said}");
-    // Had it been a tenth less, it would be worse now.
-    let text = fs::read_to_string(&file).unwrap();
-    fs::write(&file, text.replace(&counted.to_string(), &(counted * 9 / 10).to_string())).unwrap();
-    let (code, said) = check(&[]);
-    assert!(code == Some(1) && said.contains("WORSE"), "{said}");
-}
-
 /// The paper's planner, but that it keeps away from the zone's border: worse on purpose.
 struct Shy {
     own: Box<dyn Planner>,
@@ -343,36 +283,4 @@ fn a_loss_of_five_percent_is_flagged_and_other_random_numbers_are_not() {
             _ => assert!(100 * flagged <= 3 * checks as usize, "{flagged}"),
         }
     }
-}
-
-/// A table of what fixed work costs is held against this program only where the numbers can be
-/// compared, and says why where not.
-#[test]
-fn counts_of_another_program_are_skipped() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("cost.toml");
-    let cost = |text: &str| {
-        fs::write(&file, text).unwrap();
-        let output = palpate(Path::new("."), &["--quiet", "cost", file.to_str().unwrap()]);
-        let said = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap()).concat();
-        (output.status.code(), said)
-    };
-    let work = "[[work]]\nexperiment = \"toy\"\n";
-    let (code, said) = cost(&format!("tolerance = 0.05\nby = \"another compiler\"\n{work}"));
-    assert!(code == Some(0) && said.contains("cost: skipped, "), "{said}");
-    let (code, said) = cost(&format!("tolerance = 2.0\n{work}"));
-    assert!(code == Some(2) && said.contains("`tolerance` = 2: allowed"), "{said}");
-    let (code, said) = cost("tolerance = 0.05\n");
-    assert!(code == Some(2) && said.contains("missing field `work`"), "{said}");
-}
-
-/// The committed table can be read, and what is written can be read again.
-#[test]
-fn the_committed_table_is_whole() {
-    let table = CostTable::read(Path::new("experiments/baselines/cost.toml")).unwrap();
-    assert!(table.work.iter().all(|work| !work.instructions.is_empty()));
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("cost.toml");
-    fs::write(&file, table.text().unwrap()).unwrap();
-    assert_eq!(CostTable::read(&file).unwrap(), table);
 }

@@ -18,6 +18,7 @@ mod collisions;
 mod commands;
 mod compare;
 mod control;
+mod cost;
 mod detection;
 mod distances;
 #[cfg(feature = "mujoco")]

@@ -4,12 +4,10 @@
 //! triad over long arrays the most bytes. To add a piece: a line in `gp` or `touch`.
 
 mod gp;
-mod machine;
+pub mod machine;
 pub mod sample;
 pub mod timing;
 mod touch;
-
-pub use machine::product;
 
 /// A piece of work that can be done again and again.
 pub struct Piece {
