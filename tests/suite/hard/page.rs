@@ -1,7 +1,7 @@
 //! `docs/hard-cases.md`: every case with its severities, periods or steps, and what was found.
 
-use super::GROUPS;
 use super::case::{Case, Outcome, TimeAxis, Verdict};
+use super::{GROUPS, cases};
 use rayon::prelude::*;
 use std::path::PathBuf;
 
@@ -16,13 +16,13 @@ Written by `make hard-cases`, which runs every case of `tests/suite/hard` at eve
 every control period or time step. [cost.md](cost.md#hard-cases) discusses what was found. `make test` runs each case at
 the hardest severity that must hold.
 
-A column *outcomes* gives the severities in rising order. Behind each stands one letter for each period or step:
+The column *outcomes* lists the severities from the easiest to the hardest. Behind each stands one letter for each period or step:
 
 | letter | outcome |
 |---|---|
 | `h` | held: the law of the case was kept |
 | `f` | fault: it ended with a fault that gives time and state, or was refused at the start |
-| `w` | wrong, without a fault, for the known reason that the line gives |
+| `w` | wrong, without a fault, for the known reason that its line gives |
 | `U` | unexplained: a fault or a broken law where the law must hold; there must be none |
 
 ";
@@ -44,11 +44,12 @@ pub fn write() -> Vec<String> {
     text += "* One letter: the case depends on neither.\n\n";
     let mut tables = String::new();
     let (mut count, mut totals, mut unexplained) = (0, [0; 4], Vec::new());
+    let mut ran = verdicts().into_iter();
     for (title, cases) in GROUPS {
         tables += &format!("\n## {title}\n\n");
         tables += "| case | severity | outcomes | must hold to | holds to | beyond |\n|---|---|---|---|---|---|\n";
         for case in *cases {
-            let verdicts = verdicts(case);
+            let verdicts: Vec<Verdict> = ran.by_ref().take(runs(case).count()).collect();
             tables += &line(case, &verdicts);
             count += 1;
             for verdict in &verdicts {
@@ -78,12 +79,17 @@ pub fn write() -> Vec<String> {
     unexplained
 }
 
-/// All runs of a case, severity by severity.
-fn verdicts(case: &Case) -> Vec<Verdict> {
-    let runs: Vec<(usize, f64)> = (0..case.severities.len())
-        .flat_map(|rank| case.axis.values_s().iter().map(move |&axis_s| (rank, axis_s)))
-        .collect();
-    runs.into_par_iter().map(|(rank, axis_s)| case.run(rank, axis_s)).collect()
+/// Severities of a case, by rank, and values of its axis.
+fn runs(case: &Case) -> impl Iterator<Item = (usize, f64)> {
+    let ranks = 0..case.severities.len();
+    ranks.flat_map(|rank| case.axis.values_s().iter().map(move |&axis_s| (rank, axis_s)))
+}
+
+/// The runs of all cases, one after the other.
+fn verdicts() -> Vec<Verdict> {
+    let all = cases().flat_map(|case| runs(case).map(move |(rank, axis_s)| (case, rank, axis_s)));
+    let all: Vec<_> = all.collect();
+    all.into_par_iter().map(|(case, rank, axis_s)| case.run(rank, axis_s)).collect()
 }
 
 const LETTERS: [&str; 4] = ["h", "f", "w", "U"];
