@@ -67,7 +67,8 @@ check-planners: setup
 check-cost: setup
 	tests/cost.py
 
-# All hard cases at all severities, periods and time steps, about a minute; writes docs/hard-cases.md.
+# All hard cases at all severities, periods and time steps, ten minutes of processor time: writes
+# docs/hard-cases.md, and fails if an outcome is unexplained.
 hard-cases: setup
 	PALPATE_HARD_CASES=1 cargo test --locked --test suite hard::all_outcomes
 

@@ -120,8 +120,8 @@ fn line(case: &Case, verdicts: &[Verdict]) -> String {
     let first = verdicts.iter().find(|verdict| verdict.outcome != Outcome::Stable);
     let mut beyond = first.map_or(String::new(), |verdict| match &verdict.outcome {
         Outcome::Stable => String::new(),
-        Outcome::Faulted(words) => format!("fault: {words}"),
-        Outcome::Wrong(words) => format!("wrong: {words}"),
+        Outcome::Faulted(words) => format!("fault: {}", cut(words)),
+        Outcome::Wrong(words) => format!("wrong: {}", cut(words)),
     });
     if verdicts.iter().any(|verdict| rank(verdict) == 2) {
         beyond += &format!(" ({})", case.known);
@@ -165,6 +165,15 @@ fn margins() -> String {
 #[cfg(not(feature = "mujoco"))]
 fn margins() -> String {
     String::new()
+}
+
+/// The start of a message: some hold a whole state.
+fn cut(words: &str) -> String {
+    const MOST: usize = 100;
+    match words.chars().count() > MOST {
+        true => words.chars().take(MOST).chain(['…']).collect(),
+        false => words.into(),
+    }
 }
 
 /// A number in few characters.
