@@ -89,9 +89,14 @@ impl Loader {
         self.table.contains_key(key)
     }
 
-    /// Takes a key out of the table, with what stands there.
+    /// Takes the dotted key out of the table, with what stands there.
     pub fn take(&mut self, key: &str) -> Option<Value> {
-        self.table.remove(key)
+        let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
+        let mut table = &mut self.table;
+        for part in steps(tables) {
+            table = table.get_mut(part)?.as_table_mut()?;
+        }
+        table.remove(last)
     }
 
     /// That `key` may not have this value.

@@ -44,4 +44,3 @@ pub mod probe;
 pub mod registration;
 pub mod silhouette;
 mod stadium;
-mod tour;
