@@ -42,5 +42,3 @@ pub mod planner;
 pub mod presence;
 pub mod probe;
 pub mod registration;
-pub mod silhouette;
-mod stadium;
