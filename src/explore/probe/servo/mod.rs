@@ -12,7 +12,7 @@ use crate::robot::arm::{ArmError, Joints};
 use crate::robot::finger::frame::FRAME_S;
 use crate::robot::sensor::{SensedContact, Sensor};
 use crate::task::touch::TouchSettings;
-use crate::task::{Approach, KeepOut};
+use crate::task::{Approach, Ball};
 use contact_monitor::{ApproachEnd, ContactMonitor};
 use nalgebra::{Isometry3, UnitVector3, Vector3};
 use reach::Leg;
@@ -184,7 +184,7 @@ impl Servo {
     /// it has tried out.
     fn travel_around(
         &mut self,
-        around: &KeepOut,
+        around: &Ball,
         approach: &Approach,
         above: Isometry3<f64>,
     ) -> Result<(), Fault> {
@@ -208,7 +208,7 @@ impl Servo {
 
     fn go_around(
         &mut self,
-        around: &KeepOut,
+        around: &Ball,
         approach: &Approach,
         to: Isometry3<f64>,
     ) -> Result<(), Fault> {
@@ -222,7 +222,7 @@ impl Servo {
 
     /// Brings all joints home together, from where an arm comes to all that it reaches; on a line
     /// that is tried out from where they really are.
-    fn go_home(&mut self, around: &KeepOut) -> Result<(), Fault> {
+    fn go_home(&mut self, around: &Ball) -> Result<(), Fault> {
         let q = self.robot.chain.joints_from(&self.q);
         let line = self.reach.as_ref().zip(q).and_then(|(reach, q)| reach.line_home(&q, around));
         let mut line = line.ok_or_else(|| self.no_way())?;
@@ -248,7 +248,7 @@ impl Servo {
 
     /// Goes straight back out of the sphere the way the finger points, where the tip is in it:
     /// after a touch that was broken off there may be something beside it.
-    fn leave(&mut self, around: &KeepOut, ahead_t: &UnitVector3<f64>) -> Result<(), Fault> {
+    fn leave(&mut self, around: &Ball, ahead_t: &UnitVector3<f64>) -> Result<(), Fault> {
         let here = self.x_wt();
         let p_wt = here.translation.vector.into();
         if around.depth_m(&p_wt) < DEEPER_M {

@@ -15,7 +15,7 @@ use crate::robot::arm::{ArmError, Joints, Kind};
 use crate::robot::capsules::capsules;
 use crate::task::approach::BEYOND_M;
 use crate::task::touch::TouchSettings;
-use crate::task::{Approach, DIRECTIONS, KeepOut, Reach, Task};
+use crate::task::{Approach, Ball, DIRECTIONS, Task};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 /// The tip in front of all that may be touched.
@@ -152,7 +152,7 @@ impl ArmReach {
     }
 
     /// Where it must keep clear, with this share of the slack.
-    fn clear(&self, around: &KeepOut, slack: f64) -> Clear {
+    fn clear(&self, around: &Ball, slack: f64) -> Clear {
         Clear::of(around, &self.robot, self.standoff_m, slack)
     }
 
@@ -182,7 +182,7 @@ impl ArmReach {
     }
 
     /// The line of the joints from `q` home, with this share of the slack; none if it is not clear.
-    fn line(&self, q: &Joints, around: &KeepOut, slack: f64) -> Option<Line> {
+    fn line(&self, q: &Joints, around: &Ball, slack: f64) -> Option<Line> {
         let chain = &self.robot.chain;
         let line = Line::new(chain, q, &chain.home, self.travel_m_s);
         self.allows(&line, &self.clear(around, slack)).then_some(line)
@@ -222,6 +222,12 @@ impl ArmReach {
         Some(stop.into_iter().chain([above]).map(Leg::Around).collect())
     }
 
+    /// Whether it can come from home to where `approach` sets out, go it to its end, and be home
+    /// again.
+    pub fn reaches(&self, approach: &Approach) -> bool {
+        self.way(&self.robot.chain.home, approach).is_some()
+    }
+
     /// The way from `q` to the stand-off of `approach`, directly or by way of home; none if the arm
     /// comes there on neither.
     pub(super) fn plan(&self, q: &Joints, approach: &Approach) -> Option<Vec<Leg>> {
@@ -234,19 +240,13 @@ impl ArmReach {
     }
 
     /// The line of the joints home from `q`, where the arm stands; none if it is not clear.
-    pub(super) fn line_home(&self, q: &Joints, around: &KeepOut) -> Option<Line> {
+    pub(super) fn line_home(&self, q: &Joints, around: &Ball) -> Option<Line> {
         self.line(q, around, NOW)
     }
 
     /// Whether the tip can go straight back out of the ball from `q`.
-    pub(super) fn leaves(&self, q: &Joints, path: Path, around: &KeepOut) -> bool {
+    pub(super) fn leaves(&self, q: &Joints, path: Path, around: &Ball) -> bool {
         self.follow(*q, [path], &self.clear(around, NOW)).is_some()
-    }
-}
-
-impl Reach for ArmReach {
-    fn reaches(&self, approach: &Approach) -> bool {
-        self.way(&self.robot.chain.home, approach).is_some()
     }
 }
 
@@ -303,7 +303,7 @@ const LATER: f64 = 1.0;
 impl Clear {
     /// Of the ball that a finger of `robot` goes `around`, at `standoff_m` from it, with
     /// this share of the slack.
-    fn of(around: &KeepOut, robot: &Robot, standoff_m: f64, slack: f64) -> Self {
+    fn of(around: &Ball, robot: &Robot, standoff_m: f64, slack: f64) -> Self {
         let radius_m = around.radius_m - standoff_m - robot.finger.bulge_m();
         let home_w = Point3::from(robot.chain.forward(&robot.chain.home).translation.vector);
         let [beyond, margin] =
@@ -432,7 +432,7 @@ mod tests {
     use super::*;
     use crate::robot::Finger;
     use crate::robot::arm::ArmSettings;
-    use crate::task::{Aim, Ball};
+    use crate::task::Aim;
 
     /// A PA-10 as it stands before the container.
     fn reach() -> (ArmReach, Approach) {

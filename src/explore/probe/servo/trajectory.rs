@@ -3,7 +3,7 @@
 use crate::explore::control::Goal;
 use crate::robot::Finger;
 use crate::robot::arm::{Chain, Joints};
-use crate::task::KeepOut;
+use crate::task::Ball;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3, Vector6};
 
 /// From the wrist's centre to the fingertip: turning, the wrist goes no faster than the tip may,
@@ -234,7 +234,7 @@ impl Round {
 /// The ways from one pose outside the sphere to another: around it, or over its top where that way
 /// would come too low.
 pub(super) fn rounds(
-    around: &KeepOut,
+    around: &Ball,
     from: Isometry3<f64>,
     to: Isometry3<f64>,
     finger: &Finger,
@@ -348,7 +348,7 @@ mod tests {
     use crate::robot::arm::ArmSettings;
     use crate::robot::arm::stage::stage;
     use crate::task::touch::TouchSettings;
-    use crate::task::{Aim, Ball, Task};
+    use crate::task::{Aim, Task};
     use proptest::prelude::*;
 
     proptest! {
