@@ -1,5 +1,6 @@
 //! From where the fingertip should be to how the joints should move.
 
+use crate::error::Invalid;
 use crate::robot::arm::{ArmError, Chain, Jacobian, Joints};
 use nalgebra::{Isometry3, Matrix6, SymmetricEigen, Vector6};
 
@@ -62,7 +63,7 @@ impl Controller {
     pub fn new(chain: Chain, period_s: f64) -> Result<Self, ArmError> {
         let usable = period_s.is_finite() && period_s > 0.0;
         let controller = Self { chain, period_s, qdot: Joints::zeros(), at: None };
-        if usable { Ok(controller) } else { Err(ArmError::NotFinite) }
+        if usable { Ok(controller) } else { Err(not_finite()) }
     }
 
     /// What it drives.
@@ -105,7 +106,7 @@ impl Controller {
         let (x_wt, jacobian) = self.kinematics(&q);
         let twist = goal.twist + correction(&x_wt, &goal.x_wt);
         let task = ResolvedRate::new(&self.chain, &q, jacobian, twist);
-        let (wanted, damping) = task.solve().ok_or(ArmError::NotFinite)?;
+        let (wanted, damping) = task.solve().ok_or_else(not_finite)?;
         self.qdot = limited(&self.chain, &q, &self.qdot, &wanted, self.period_s);
         Ok(JointMotion { qdot: self.qdot, damping, followed: task.followed(&self.qdot) })
     }
@@ -119,18 +120,24 @@ impl Controller {
         let [to, qdot] = posture;
         let wanted = qdot + (to - q) * GAIN_PER_S;
         if !wanted.iter().all(|wanted| wanted.is_finite()) {
-            return Err(ArmError::NotFinite);
+            return Err(not_finite());
         }
         self.qdot = limited(&self.chain, &q, &self.qdot, &wanted, self.period_s);
         Ok(self.qdot)
     }
 }
 
+fn not_finite() -> ArmError {
+    Invalid::new("the arm's position, goal or period is not a number").into()
+}
+
 fn positions(chain: &Chain, q: &[f64]) -> Result<Joints, ArmError> {
     let expected = chain.joints.len();
-    let joints = chain.joints_from(q).ok_or(ArmError::Joints { expected, found: q.len() })?;
+    let joints = chain.joints_from(q).ok_or_else(|| {
+        Invalid::new(format!("{} joint positions for an arm of {expected} joints", q.len()))
+    })?;
     let finite = joints.iter().all(|q| q.is_finite());
-    if finite { Ok(joints) } else { Err(ArmError::NotFinite) }
+    if finite { Ok(joints) } else { Err(not_finite()) }
 }
 
 /// From `at` to `to` as a displacement in `W`: m, then rad.
@@ -344,7 +351,7 @@ pub fn posture(chain: &Chain, x_wt: &Isometry3<f64>) -> Result<Joints, ArmError>
             let (distance, angle) =
                 (away.fixed_rows::<3>(0).norm(), away.fixed_rows::<3>(3).norm());
             if !(distance.is_finite() && angle.is_finite()) {
-                return Err(ArmError::NotFinite);
+                return Err(not_finite());
             }
             if distance + angle < NEAR {
                 return Ok(q);
@@ -353,7 +360,7 @@ pub fn posture(chain: &Chain, x_wt: &Isometry3<f64>) -> Result<Joints, ArmError>
                 nearest = (distance, angle);
             }
             let task = ResolvedRate::new(chain, &q, jacobian, shortened(away, STRIDE));
-            let (step, _) = task.solve().ok_or(ArmError::NotFinite)?;
+            let (step, _) = task.solve().ok_or_else(not_finite)?;
             q = chain.clamp(&(q + step));
         }
     }

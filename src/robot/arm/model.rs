@@ -1,7 +1,6 @@
 //! An arm's model: a file with its joints, home posture, collision capsules and topics.
 
-use super::capsule::LinkCapsule;
-use super::chain::{Joint, Joints, Kind, MAX_JOINTS};
+use super::chain::{Joint, Joints, Kind, LinkCapsule, MAX_JOINTS, Part};
 use crate::config::{Checked, ConfigError, Loader, Rules};
 use crate::files;
 use crate::math::pose::pose;
@@ -232,6 +231,7 @@ impl CapsuleModel {
     fn on(&self, link: usize) -> LinkCapsule {
         LinkCapsule {
             name: self.name.as_deref().unwrap_or(&self.link).into(),
+            part: Part::Link,
             link,
             ends: [self.from_m.into(), self.to_m.into()],
             radius_m: self.radius_m,

@@ -9,10 +9,8 @@ use crate::error::Invalid;
 use crate::explore::control::{Controller, posture};
 use crate::geometry::sweep::Capsule;
 use crate::robot::Robot;
-use crate::robot::arm::capsule::{LinkCapsule, TOOL};
 use crate::robot::arm::chain::MAX_JOINTS;
-use crate::robot::arm::{ArmError, Joints, Kind};
-use crate::robot::capsules::capsules;
+use crate::robot::arm::{ArmError, Joints, Kind, LinkCapsule, Part};
 use crate::task::approach::BEYOND_M;
 use crate::task::touch::TouchSettings;
 use crate::task::{Approach, Ball, DIRECTIONS, Task};
@@ -143,7 +141,7 @@ impl ArmReach {
             return None;
         }
         let home = robot.chain.forward(&robot.chain.home);
-        let links = capsules(robot);
+        let links = robot.capsules();
         let pairs = (0..links.len()).flat_map(|i| (0..i).map(move |k| [k, i]));
         let pairs = pairs.filter(|&[k, i]| links[k].may_meet(&links[i])).collect();
         let &TouchSettings { standoff_m, travel_m_s, approach_m_s, .. } = touch;
@@ -400,7 +398,7 @@ impl ArmReach {
         let ball = Capsule { p0_w: centre_w, p1_w: centre_w, radius_m };
         let mut far = self.links.iter().filter(|link| !link.near_base);
         (p_wt - low).inf(&(high - p_wt)).min() >= 0.0
-            && self.is_above(&frames, clear, |link| &*link.name == TOOL)
+            && self.is_above(&frames, clear, |link| link.part == Part::Tool)
             && (is_approach
                 || far.all(|link| link.at(&frames[link.link]).to_capsule_m(&ball) > 0.0))
     }
