@@ -184,10 +184,8 @@ pub fn mjcf(model: &str) -> Result<Option<String>, ConfigError> {
     }
     let Some(file) = ArmModel::load(model)?.mjcf else { return Ok(None) };
     let path = Path::new(model).with_file_name(file);
-    match files::text(&path, files::TEXT_MAX) {
-        Ok(text) => Ok(Some(text)),
-        Err(cause) => Err(ConfigError::Unreadable { path, cause }),
-    }
+    let text = files::text(&path, files::TEXT_MAX);
+    text.map(Some).map_err(|cause| ConfigError::unreadable(&path, &cause))
 }
 
 impl JointModel {

@@ -1,8 +1,7 @@
 //! From a tactile frame to the point of contact (Eq. 1 of Yi et al. 2016).
 
 use super::electrode_table;
-use super::frame::FULL_SCALE_COUNTS;
-use super::frame::{ELECTRODES, Frame};
+use super::frame::{FULL_SCALE_COUNTS, Frame};
 use super::shape::Finger;
 use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
