@@ -74,6 +74,10 @@ impl From<Ball> for Region {
     }
 }
 
+/// Whether a body can come to where an approach of a whole object sets out, go it to its end, and
+/// come back.
+type Reach = dyn Fn(&Approach) -> bool + Send + Sync;
+
 /// The complete task of the robot: everything between a planner's target and an [`Approach`].
 #[derive(Clone)]
 pub struct Task {
@@ -82,9 +86,8 @@ pub struct Task {
     finger: Finger,
     /// Nearest and farthest depth of a zone.
     depth_m: [f64; 2],
-    /// Whether a body can come to where an approach of a whole object sets out, go it to its end,
-    /// and come back; `None` for a body that reaches everything.
-    reach: Option<Arc<dyn Fn(&Approach) -> bool + Send + Sync>>,
+    /// `None` for a body that reaches everything.
+    reach: Option<Arc<Reach>>,
     /// Whether the middle of the ball is reached along the directions of each cell, found when first
     /// asked for.
     cells: Arc<[OnceLock<bool>]>,

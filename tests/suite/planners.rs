@@ -1,6 +1,7 @@
 //! Planners against what they promise.
 
 use nalgebra::{Point3, Vector3};
+use palpate::experiment::Experiment;
 use palpate::explore::belief::{Belief, HeightField};
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
@@ -293,4 +294,14 @@ fn grid_goes_from_coarse_to_fine() {
         let same = |other: &&Vec<f64>| SQUARE.distance(&place, other) < 1e-9;
         assert_eq!(places.iter().filter(same).count(), 1, "{place:?}");
     }
+}
+
+/// As `resolved.toml` of version 0.1 holds them.
+#[test]
+fn settings_of_removed_planners_are_read_and_ignored() {
+    let load = |sets: &[String]| Experiment::load("experiments/toy.toml".as_ref(), sets).unwrap();
+    assert_eq!(
+        load(&["planning.pi.margin=0.01".into(), "planning.ei.margin=0.5".into()]),
+        load(&[])
+    );
 }

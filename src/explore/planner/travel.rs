@@ -125,7 +125,7 @@ impl Travel {
             plans.push(Plan::at(*aside));
         }
         if let Some(last) = surface.asked().last() {
-            let ball = Region::from(surface.scope().ball.clone());
+            let ball = Region::from(surface.scope().ball);
             shorten(&mut plans, &Target::from(*last), &|a, b| ball.travel_m(a, b));
         }
         plans

@@ -412,7 +412,7 @@ mod tests {
             let aims = [first, second].map(|part| aim(&ball, part.try_into().unwrap()));
             let [Some(from), Some(to)] = aims else { return Ok(()) };
             let (robot, touch) = (robot(), TouchSettings::default());
-            let task = Task::new(ball.clone(), touch.clone(), &robot.finger).unwrap();
+            let task = Task::new(ball, touch.clone(), &robot.finger).unwrap();
             prop_assume!(task.reaches(&from) && task.reaches(&to));
             let approaches = [from, to].map(|aim| task.approach(&aim.into()).unwrap());
             let [from, to] = approaches.map(|approach| standoff(&robot, touch.standoff_m, &approach));
