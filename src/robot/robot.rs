@@ -20,7 +20,7 @@ impl Robot {
     pub fn capsules(&self) -> Vec<LinkCapsule> {
         let Self { chain, finger, .. } = self;
         let mut all = chain.capsules.clone();
-        // As the model draws it: from the flange to the finger's heel, twice as thick as the finger.
+        // As the model draws it: from the flange to the finger's heel, twice the finger's width.
         let mount_m = chain.tool.translation.vector.norm();
         let heel_m = (mount_m - finger.length_m).max(0.0);
         let on_flange = |z_m: f64| chain.flange * Point3::new(0.0, 0.0, z_m);

@@ -1,5 +1,5 @@
-//! The way of one touch: from where, in which direction, how far; and the ball around a whole object
-//! that is touched from any side.
+//! The way of one touch: from where, in which direction, how far; and the ball around a whole
+//! object that is touched from any side.
 
 use super::target::Aim;
 use crate::config::{Checked, Rules};

@@ -88,8 +88,8 @@ pub struct Task {
     depth_m: [f64; 2],
     /// `None` for a body that reaches everything.
     reach: Option<Arc<Reach>>,
-    /// Whether the middle of the ball is reached along the directions of each cell, found when first
-    /// asked for.
+    /// Whether the middle of the ball is reached along the directions of each cell, found when
+    /// first asked for.
     cells: Arc<[OnceLock<bool>]>,
 }
 

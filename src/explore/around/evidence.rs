@@ -1,5 +1,5 @@
-//! What touches say of the field: where it is zero and which way it grows, and where it is free. And
-//! what is believed of an object before its surface is known: a body about what was met.
+//! Observations of the field by touches: where it is zero and which way it grows, and where it is
+//! free. And the prior: a body about what was met.
 
 use super::settings::PriorShape;
 use crate::explore::probe::{Contact, Swept, Touch};

@@ -1,4 +1,5 @@
-//! Where an acquisition function is largest over a zone: DIRECT finds its hills, climbs go up side by side.
+//! Where an acquisition function is largest over a zone: DIRECT finds its hills, climbs go up side
+//! by side.
 //!
 //! The function is asked for whole lists of places: values of many cost less than many values.
 

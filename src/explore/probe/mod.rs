@@ -53,8 +53,8 @@ pub trait Probe: Send {
     }
 }
 
-/// The space that a touch has found free: where an approach along the zone's axis ended; the hull came there straight, so no surface is
-/// above its front.
+/// The space that a touch has found free: where an approach along the zone's axis ended. The hull
+/// came there straight, so no surface is above its front.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Swept {
     /// The hull.

@@ -45,8 +45,8 @@ impl Registered {
         before.map_or(self.found.correction, |before| before * self.found.correction)
     }
 
-    /// The keys of a scene's `[arm]` and `[object]` that were found (of the body a ball's centre, or
-    /// a plate's point with +y along its normal), and how sure they are, as TOML; `before` as in
+    /// The keys of a scene's `[arm]` and `[object]` that were found (of the body a ball's centre,
+    /// or a plate's point with +y along its normal), and how sure they are, as TOML; `before` as in
     /// [`tool`](Self::tool).
     pub fn tables(&self, before: Option<Isometry3<f64>>) -> String {
         let [a, b, c, d, e, f, g, h, i, ..] = self.sds;

@@ -228,8 +228,8 @@ impl Rest {
         self.variance_of += f64::from(u8::from(!first));
     }
 
-    /// How far the pressure has risen above rest, and how far all electrodes together have changed in
-    /// whichever way, in standard deviations of the normal distribution; none for a channel that
+    /// The rise of the pressure above rest, and the change of all electrodes together in whichever
+    /// way, in standard deviations of the normal distribution; none for a channel that
     /// either lacks.
     ///
     /// A channel's difference over its standard deviation, t, is Student's with as many degrees of
