@@ -12,7 +12,7 @@ use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::contact_point::locate;
 use palpate::robot::finger::plane_fit::PlaneFit;
-use palpate::robot::finger::{Detection, Detector, Finger, Frame, Tare};
+use palpate::robot::finger::{Detection, Detector, Finger, Frame};
 use palpate::sim::finger::effects::skin::{SkinEffect, SkinModel};
 use palpate::sim::finger::plate::direction_t;
 use palpate::sim::finger::{Effects, Fingertip, FingertipState};
@@ -60,15 +60,14 @@ fn touch(
             frames.push(frame);
         }
         if tare.is_none() && frames.len() == 5 {
-            tare = Some(Tare::of(&frames));
+            tare = Some(Frame::mean(&frames));
             detector.tare(&frames);
         }
         if pressed == 10 {
             break;
         }
     }
-    let mean = Tare::of(&frames[frames.len().checked_sub(5)?..]);
-    let mean = Frame { electrode_counts: mean.electrode_counts, ..Frame::default() };
+    let mean = Frame::mean(&frames[frames.len().checked_sub(5)?..]);
     let tare = tare?;
     let found = match plane_fit {
         Some(plane_fit) => plane_fit.locate(&tare, &mean)?,

@@ -84,7 +84,7 @@ impl Backend for Slides {
 }
 
 /// What is explored, and with what.
-pub fn task_and_robot() -> Result<(Task, Robot), palpate::task::TaskError> {
+pub fn task_and_robot() -> Result<(Task, Robot), palpate::error::Invalid> {
     let finger = Finger { length_m: 0.0, ..Finger::default() };
     let mut zone = Zone::new([-0.05, 0.05], Some([-0.05, 0.05]));
     // Depths run along the approach: the wall is somewhere between y = 0.03 and y = −0.03.

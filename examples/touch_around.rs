@@ -40,7 +40,7 @@ fn sweep(environment: &Arc<Environment>, count: usize) -> Result<(), Box<dyn Err
         println!("{notice}");
     }
     let task = environment.task();
-    let ball = task.ball().ok_or("the scene has no [around]")?.clone();
+    let ball = *task.ball().ok_or("the scene has no [around]")?;
     let Shape::Mesh { bvh, .. } = environment.shape() else { return Err("no mesh".into()) };
     let mut probe = simulator.probe(1)?;
     let mut ends: BTreeMap<String, usize> = BTreeMap::new();

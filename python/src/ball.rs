@@ -39,8 +39,7 @@ impl Ball {
 
     /// Whether a target, shape (6,), aims at a point of it.
     fn contains(&self, target: Vec<f64>) -> bool {
-        Target::from_numbers(&target)
-            .is_some_and(|target| Region::from(self.0.clone()).contains(&target))
+        Target::from_numbers(&target).is_some_and(|target| Region::from(self.0).contains(&target))
     }
 
     /// The target, shape (6,), that aims at a point in the world, the centre if left out, from the

@@ -188,7 +188,7 @@ impl Belief {
     /// Around an object: the ball in which it is.
     #[getter]
     fn ball(&self) -> PyResult<Ball> {
-        Ok(Ball(self.around("ball")?.scope().ball.clone()))
+        Ok(Ball(self.around("ball")?.scope().ball))
     }
 
     /// Around an object: whether the finger can be brought to what a target, shape (6,), aims at.

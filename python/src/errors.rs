@@ -31,28 +31,11 @@ fn shown(path: &Path) -> Option<String> {
 /// Of settings: file, line, key, value, and what is allowed.
 pub(crate) fn config(error: ConfigError) -> PyErr {
     let message = error.to_string();
-    let place = |origin: &Origin| match origin {
-        Origin::File { path, line } => (shown(path), line.map(|line| line.to_string())),
-        Origin::Set(_) => (None, None),
+    let (file, line) = match error.origin.as_deref() {
+        Some(Origin::File { path, line }) => (shown(path), line.map(|line| line.to_string())),
+        _ => (None, None),
     };
-    let ((file, line), key, value, allowed) = match error {
-        ConfigError::Unreadable { path, .. } => ((shown(&path), None), None, None, None),
-        ConfigError::Other { path, remedy, .. } => {
-            ((shown(&path), None), None, None, Some(remedy.to_owned()))
-        }
-        ConfigError::Syntax { origin, message } => (place(&origin), None, None, Some(message)),
-        ConfigError::UnknownKey { origin, key, allowed, .. } => {
-            (place(&origin), Some(key), None, Some(allowed.join(", ")))
-        }
-        ConfigError::Missing { origin, key } => (place(&origin), Some(key), None, None),
-        ConfigError::Invalid { origin, key, value, message } => {
-            (place(&origin), Some(key), value, Some(message))
-        }
-        ConfigError::NotAllowed { origin, key, value, allowed } => {
-            (place(&origin), Some(key), Some(value), Some(allowed))
-        }
-        ConfigError::Assignment { text } => ((None, None), None, Some(text), None),
-    };
+    let ConfigError { key, value, allowed, .. } = error;
     let fields =
         [("file", file), ("line", line), ("key", key), ("value", value), ("allowed", allowed)];
     exception("ConfigError", &message, &fields)

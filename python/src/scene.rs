@@ -168,7 +168,7 @@ impl Scene {
     /// Around an object: the ball in which it is.
     #[getter]
     fn ball(&self) -> PyResult<Ball> {
-        let ball = self.environment().task().ball().cloned();
+        let ball = self.environment().task().ball().copied();
         ball.map(Ball).ok_or_else(|| errors::not_over_zone("ball", "zone"))
     }
 

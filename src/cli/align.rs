@@ -7,7 +7,7 @@ use super::terminal::Talk;
 use super::terminal::{Ending, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::truth::cloud;
-use crate::explore::registration::icp::{Aligned, align};
+use crate::explore::registration::icp::align;
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::import::{Buffers, import_with};
 use crate::math::pose::pose;
@@ -54,16 +54,12 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     })?;
     let mesh = MeshBvh::new(mesh.0);
     let aligned = align(&mesh, &points, &pose(args.position, args.rotation))?;
-    let text = text(&aligned)?;
+    let text = format!(
+        "# Palpate {}: laid onto the mesh. [object] goes into the scene.\n\n{}",
+        env!("CARGO_PKG_VERSION"),
+        aligned.tables()
+    );
     write_whole(&args.out, &text)?;
     print(&format!("{text}\nfile: {}", args.out.display()))?;
     Ok(Ending::Done)
-}
-
-fn text(aligned: &Aligned) -> anyhow::Result<String> {
-    let version = env!("CARGO_PKG_VERSION");
-    Ok(format!(
-        "# Palpate {version}: laid onto the mesh. [object] goes into the scene.\n\n{}",
-        toml::to_string(&aligned.found())?
-    ))
 }

@@ -12,7 +12,7 @@ use crate::backend::ros::settings::{BackendKind, BackendSettings};
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, real_robot};
 use crate::explore::probe::Touch;
-use crate::explore::registration::{Design, Found, register};
+use crate::explore::registration::{Design, register};
 use crate::math::seed;
 use crate::sim::{Scene, known_body};
 use anyhow::Context;
@@ -89,16 +89,12 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let found = register(&mut *probe, &robot, touch, (&body, &design), made)?;
     bar.finish_and_clear();
     let before = scene.arm.as_ref().and_then(|arm| arm.correction());
-    let text = text(&Found::new(&found, before))?;
+    let text = format!(
+        "# Palpate {}: found by touch. [arm] goes into the scene.\n\n{}",
+        env!("CARGO_PKG_VERSION"),
+        found.tables(before)
+    );
     write_whole(&args.out, &text)?;
     print(&format!("{text}\nfile: {}", args.out.display()))?;
     Ok(Ending::Done)
-}
-
-fn text(found: &Found) -> anyhow::Result<String> {
-    let version = env!("CARGO_PKG_VERSION");
-    Ok(format!(
-        "# Palpate {version}: found by touch. [arm] goes into the scene.\n\n{}",
-        toml::to_string(found)?
-    ))
 }

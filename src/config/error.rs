@@ -2,7 +2,7 @@
 
 use crate::words::brief;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Where a value came from.
@@ -29,94 +29,64 @@ impl fmt::Display for Origin {
     }
 }
 
-/// What is wrong with a configuration.
+/// The error of a configuration: a message with its place, and its parts.
 #[derive(Debug, Error)]
-pub enum ConfigError {
-    /// The file cannot be read.
-    #[error("{}: {cause}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        cause: std::io::Error,
-    },
-    /// The file is not TOML.
-    #[error("{origin}: not valid TOML: {message}")]
-    Syntax {
-        /// Where.
-        origin: Origin,
-        /// What the parser expected.
-        message: String,
-    },
-    /// No such key.
-    #[error("{origin}: unknown key `{key}`{}; allowed here: {}", did_you_mean(nearest), allowed.join(", "))]
-    UnknownKey {
-        /// Where.
-        origin: Origin,
-        /// The key.
-        key: String,
-        /// The known key most like it.
-        nearest: Option<String>,
-        /// All keys known there.
-        allowed: Vec<String>,
-    },
-    /// A key that must be there.
-    #[error("{origin}: `{key}` is missing")]
-    Missing {
-        /// Where.
-        origin: Origin,
-        /// The key.
-        key: String,
-    },
-    /// The file is one of another kind.
-    #[error("{}: this is {found}; {remedy}", path.display())]
-    Other {
-        /// The file.
-        path: PathBuf,
-        /// What it holds.
-        found: &'static str,
-        /// What to do with it.
-        remedy: &'static str,
-    },
-    /// A value of the wrong type, or an unknown choice.
-    #[error("{origin}: `{key}`{}: {message}", shown(value))]
-    Invalid {
-        /// Where.
-        origin: Origin,
-        /// The key.
-        key: String,
-        /// The value found there.
-        value: Option<String>,
-        /// What was expected.
-        message: String,
-    },
+#[error("{message}")]
+pub struct ConfigError {
+    pub(super) message: String,
+    /// Where it stands; `None` of a `--set` that is no assignment.
+    pub origin: Option<Box<Origin>>,
+    /// The key.
+    pub key: Option<String>,
+    /// The value found there.
+    pub value: Option<String>,
+    /// What may stand there.
+    pub allowed: Option<String>,
+}
+
+impl ConfigError {
+    /// With the place and the message about it.
+    pub(super) fn new(origin: Origin, message: impl fmt::Display) -> Self {
+        let message = format!("{origin}: {message}");
+        Self { message, origin: Some(Box::new(origin)), key: None, value: None, allowed: None }
+    }
+
+    /// A file that cannot be read.
+    pub fn unreadable(path: &Path, cause: &std::io::Error) -> Self {
+        Self::new(Origin::File { path: path.into(), line: None }, cause)
+    }
+
     /// A value that is not allowed.
-    #[error("{origin}: `{key}` = {}: allowed is {allowed}", brief(value))]
-    NotAllowed {
-        /// Where.
+    pub fn not_allowed(origin: Origin, key: String, value: String, allowed: String) -> Self {
+        let message = format!("`{key}` = {}: allowed is {allowed}", brief(&value));
+        let (key, value, allowed) = (Some(key), Some(value), Some(allowed));
+        Self { key, value, allowed, ..Self::new(origin, message) }
+    }
+
+    /// A value of the wrong type, an unknown choice, or a key given twice.
+    pub(super) fn invalid(
         origin: Origin,
-        /// The key.
         key: String,
-        /// The value.
-        value: String,
-        /// What may stand there.
+        value: Option<String>,
         allowed: String,
-    },
+    ) -> Self {
+        let shown = value.as_ref().map_or(String::new(), |value| format!(" = {}", brief(value)));
+        let message = format!("`{key}`{shown}: {allowed}");
+        Self { key: Some(key), value, allowed: Some(allowed), ..Self::new(origin, message) }
+    }
+
+    /// A file that is not TOML.
+    pub(super) fn syntax(origin: Origin, expected: String) -> Self {
+        let message = format!("not valid TOML: {expected}");
+        Self { allowed: Some(expected), ..Self::new(origin, message) }
+    }
+
     /// A `--set` that is not `key=value`, or whose key leads through a value.
-    #[error(
-        "--set {}: write it as key=value, with dots between tables, as in gp.noise=[1e-4,0.1]",
-        brief(text)
-    )]
-    Assignment {
-        /// As typed.
-        text: String,
-    },
-}
-
-fn did_you_mean(nearest: &Option<String>) -> String {
-    nearest.as_ref().map_or(String::new(), |key| format!(", did you mean `{key}`?"))
-}
-
-fn shown(value: &Option<String>) -> String {
-    value.as_ref().map_or(String::new(), |value| format!(" = {}", brief(value)))
+    pub(super) fn assignment(text: &str) -> Self {
+        let message = format!(
+            "--set {}: write it as key=value, with dots between tables, as in gp.noise=[1e-4,0.1]",
+            brief(text)
+        );
+        Self { message, origin: None, key: None, value: Some(text.into()), allowed: None }
+    }
 }

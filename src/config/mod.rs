@@ -47,7 +47,8 @@ impl Loader {
     /// # Errors
     /// If it cannot be read or is not TOML.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        Self::of(path, text(path)?)
+        let text = files::text(path, files::TEXT_MAX);
+        Self::of(path, text.map_err(|cause| ConfigError::unreadable(path, &cause))?)
     }
 
     /// Takes `text`, which stands in `path`.
@@ -89,21 +90,27 @@ impl Loader {
         self.table.contains_key(key)
     }
 
-    /// Takes a key out of the table, with what stands there.
+    /// Takes the dotted key out of the table, with what stands there.
     pub fn take(&mut self, key: &str) -> Option<Value> {
-        self.table.remove(key)
+        let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
+        let mut table = &mut self.table;
+        for part in steps(tables) {
+            table = table.get_mut(part)?.as_table_mut()?;
+        }
+        table.remove(last)
     }
 
     /// That `key` may not have this value.
     pub fn not_allowed(&self, key: &str, value: &str, allowed: &str) -> ConfigError {
-        let (value, allowed) = (value.into(), allowed.into());
-        ConfigError::NotAllowed { origin: self.origin(key), key: key.into(), value, allowed }
+        ConfigError::not_allowed(self.origin(key), key.into(), value.into(), allowed.into())
     }
 
     /// That what was read is `found`, and not what was asked for.
     pub fn other(&self, found: &'static str, remedy: &'static str) -> ConfigError {
         let path = self.sources.first().map(|source| source.path.clone()).unwrap_or_default();
-        ConfigError::Other { path, found, remedy }
+        let origin = Origin::File { path, line: None };
+        let message = format!("this is {found}; {remedy}");
+        ConfigError { allowed: Some(remedy.into()), ..ConfigError::new(origin, message) }
     }
 
     /// If `key` names a file, puts that file's table in its place.
@@ -113,16 +120,11 @@ impl Loader {
     pub fn include(&mut self, key: &str) -> Result<(), ConfigError> {
         let Some(Value::String(name)) = self.table.get(key) else { return Ok(()) };
         let path = self.beside(key, Path::new(name));
-        let (table, document) =
-            text(&path).and_then(|text| parse(&path, text)).map_err(|error| match error {
-                ConfigError::Unreadable { path, cause } => ConfigError::NotAllowed {
-                    origin: self.origin(key),
-                    key: key.into(),
-                    value: format!("\"{name}\""),
-                    allowed: format!("a readable file ({}: {cause})", path.display()),
-                },
-                other => other,
-            })?;
+        let text = files::text(&path, files::TEXT_MAX).map_err(|cause| {
+            let allowed = format!("a readable file ({}: {cause})", path.display());
+            self.not_allowed(key, &format!("\"{name}\""), &allowed)
+        })?;
+        let (table, document) = parse(&path, text)?;
         self.table.insert(key.into(), Value::Table(table));
         // From here on, what stands under the key comes from the file.
         self.sets.retain(|(set, _)| set != key);
@@ -135,7 +137,7 @@ impl Loader {
     /// # Errors
     /// If it is not of that form, or its key leads through something that is not a table.
     pub fn set(&mut self, text: &str) -> Result<(), ConfigError> {
-        let refused = || ConfigError::Assignment { text: text.into() };
+        let refused = || ConfigError::assignment(text);
         let (key, value) = text.split_once('=').ok_or_else(refused)?;
         let (key, value) = (key.trim(), value.trim());
         let value = toml::from_str::<Table>(&format!("value = {value}"))
@@ -196,7 +198,7 @@ impl Loader {
             None => Ok(config),
             Some((key, value, allowed)) => {
                 let key = self.given(&key);
-                Err(ConfigError::NotAllowed { origin: self.origin(&key), key, value, allowed })
+                Err(ConfigError::not_allowed(self.origin(&key), key, value, allowed))
             }
         }
     }
@@ -209,16 +211,21 @@ impl Loader {
             let key = join(path.rsplit_once('.').map_or(".", |(parent, _)| parent), &unknown);
             let key = self.given(&key);
             let nearest = words::nearest(key.rsplit('.').next().unwrap_or(&key), &allowed);
-            return ConfigError::UnknownKey { origin: self.origin(&key), key, nearest, allowed };
+            let nearest = nearest.map_or(String::new(), |key| format!(", did you mean `{key}`?"));
+            let allowed = allowed.join(", ");
+            let message = format!("unknown key `{key}`{nearest}; allowed here: {allowed}");
+            let error = ConfigError::new(self.origin(&key), message);
+            return ConfigError { key: Some(key), allowed: Some(allowed), ..error };
         }
         if let (true, Some(missing)) = (message.starts_with("missing field"), names.next()) {
             let key = self.given(&join(path, &missing));
-            return ConfigError::Missing { origin: self.origin(&key), key };
+            let error = ConfigError::new(self.origin(&key), format!("`{key}` is missing"));
+            return ConfigError { key: Some(key), ..error };
         }
         if let (true, Some(twice)) = (message.starts_with("duplicate field"), names.next()) {
             let key = join(path, &twice);
             let message = "given by its present name and by a former one: keep one".into();
-            return ConfigError::Invalid { origin: self.origin(&key), key, value: None, message };
+            return ConfigError::invalid(self.origin(&key), key, None, message);
         }
         let key = String::from(path);
         let value = self.value(&key).map(|value| value.to_string());
@@ -226,7 +233,7 @@ impl Loader {
         let message =
             allowed.map_or_else(|| message.to_owned(), |allowed| format!("allowed is {allowed}"));
         let key = self.given(&key);
-        ConfigError::Invalid { origin: self.origin(&key), key, value, message }
+        ConfigError::invalid(self.origin(&key), key, value, message)
     }
 
     /// The names of which `key` must be one, told by asking for one that there is not.
@@ -322,11 +329,6 @@ fn line_of(document: &toml_edit::Document<String>, key: &str) -> Option<usize> {
     Some(before.matches('\n').count() + 1)
 }
 
-fn text(path: &Path) -> Result<String, ConfigError> {
-    let unreadable = |cause| ConfigError::Unreadable { path: path.into(), cause };
-    files::text(path, files::TEXT_MAX).map_err(unreadable)
-}
-
 fn parse(path: &Path, text: String) -> Result<(Table, toml_edit::Document<String>), ConfigError> {
     let document = toml_edit::Document::parse(text.clone()).map_err(|error| {
         let line = error
@@ -334,11 +336,11 @@ fn parse(path: &Path, text: String) -> Result<(Table, toml_edit::Document<String
             .and_then(|span| text.get(..span.start))
             .map(|before| before.matches('\n').count() + 1);
         let origin = Origin::File { path: path.into(), line };
-        ConfigError::Syntax { origin, message: error.message().trim().replace('\n', ", ") }
+        ConfigError::syntax(origin, error.message().trim().replace('\n', ", "))
     })?;
-    let table = toml::from_str(&text).map_err(|error| ConfigError::Syntax {
-        origin: Origin::File { path: path.into(), line: None },
-        message: error.message().into(),
+    let table = toml::from_str(&text).map_err(|error| {
+        let origin = Origin::File { path: path.into(), line: None };
+        ConfigError::syntax(origin, error.message().into())
     })?;
     Ok((table, document))
 }

@@ -4,14 +4,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::RangeInclusive;
 
-/// A violated rule: the key, the value found, what is allowed.
-pub(super) type Violation = (String, String, String);
-
 /// Checks values against what is allowed and keeps the first violation.
 #[derive(Default)]
 pub struct Rules {
     prefix: String,
-    pub(super) violation: Option<Violation>,
+    /// The first violation: the key, the value found, what is allowed.
+    pub(super) violation: Option<(String, String, String)>,
     /// What is allowed under each key, if that is asked for.
     record: Option<BTreeMap<String, String>>,
 }

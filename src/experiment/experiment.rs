@@ -85,6 +85,9 @@ const INCLUDED: [&str; 4] = ["scene", "backend", "gp", "space"];
 /// Planners that the others are held against, if nobody says which: the paper's two.
 const BASELINES: [&str; 2] = ["random", "active"];
 
+/// Planners that version 0.1 had, which sought the highest point.
+const REMOVED: [&str; 2] = ["pi", "ei"];
+
 /// Most touches that a belief is fitted to exactly: it costs the cube of their number.
 const EXACT_TOUCHES_MAX: u32 = 2000;
 
@@ -165,6 +168,8 @@ impl Experiment {
                 false => loader.read_as("gp", "space"),
             }
         }
+        // Version 0.1 wrote the settings of planners that were removed since.
+        REMOVED.iter().for_each(|planner| drop(loader.take(&format!("planning.{planner}"))));
         let mut experiment: Self = loader.finish()?;
         if experiment.backend.kind != BackendKind::Simulated {
             experiment.backend.complete(experiment.scene.arm.as_ref());
@@ -333,6 +338,11 @@ impl Checked for Experiment {
             entrant::allowed("").join(", ")
         });
         for (i, name) in self.planners.iter().enumerate() {
+            let is_removed = REMOVED.contains(&name.as_str());
+            rules.require(&format!("planners[{i}]"), format!("\"{name}\""), !is_removed, || {
+                let names = entrant::allowed(name).join(", ");
+                format!("one of {names}; pi and ei, which sought the highest point, were removed")
+            });
             rules.one_of(&format!("planners[{i}]"), name, &entrant::allowed(name));
             let first = !self.planners[..i].contains(name);
             rules.require(&format!("planners[{i}]"), name, first, || "each name once".into());

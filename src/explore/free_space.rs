@@ -19,8 +19,8 @@
 //! it then lies below the bound, there is none with the odds (1 − p) : p·Φ(z): beside an edge that
 //! the finger came to rest on there is nothing, rather than a surface far below.
 
+use super::presence::Silhouette;
 use super::probe::Swept;
-use super::silhouette::Silhouette;
 use crate::gp::means::Means;
 use crate::gp::posterior::Scratch;
 use crate::gp::{Hyperparameters, Observation, Posterior};

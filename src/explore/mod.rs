@@ -42,6 +42,3 @@ pub mod planner;
 pub mod presence;
 pub mod probe;
 pub mod registration;
-pub mod silhouette;
-mod stadium;
-mod tour;

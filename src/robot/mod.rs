@@ -1,7 +1,6 @@
 //! What is bolted on: the arm, and what a real finger has too.
 
 pub mod arm;
-pub mod capsules;
 pub mod finger;
 #[allow(clippy::module_inception)]
 mod robot;

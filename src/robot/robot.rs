@@ -1,7 +1,8 @@
 //! An arm with a finger.
 
-use super::arm::Chain;
+use super::arm::{Chain, LinkCapsule, Part};
 use super::finger::Finger;
+use nalgebra::Point3;
 
 /// What is bolted on.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,4 +13,31 @@ pub struct Robot {
     pub finger: Finger,
     /// Whether the finger has a skin that yields.
     pub is_soft: bool,
+}
+
+impl Robot {
+    /// The capsules of its arm, its adapter and its finger: what of it can bump into something.
+    pub fn capsules(&self) -> Vec<LinkCapsule> {
+        let Self { chain, finger, .. } = self;
+        let mut all = chain.capsules.clone();
+        // As the model draws it: from the flange to the finger's heel, twice the finger's width.
+        let mount_m = chain.tool.translation.vector.norm();
+        let heel_m = (mount_m - finger.length_m).max(0.0);
+        let on_flange = |z_m: f64| chain.flange * Point3::new(0.0, 0.0, z_m);
+        let link = chain.joints.len();
+        let parts = [
+            ("tool", Part::Tool, 0.0, heel_m, 2.0),
+            ("finger", Part::Finger, heel_m, mount_m, 1.0),
+        ];
+        all.extend(parts.map(|(name, part, from_m, to_m, times)| LinkCapsule {
+            name: name.into(),
+            part,
+            link,
+            near_base: false,
+            folds: false,
+            ends: [from_m, to_m].map(on_flange),
+            radius_m: times * finger.radius_m,
+        }));
+        all
+    }
 }

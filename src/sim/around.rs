@@ -1,13 +1,13 @@
 //! A whole object in a scene: the ball around it, and the task of going around it.
 
 use super::scene::Scene;
+use crate::error::Invalid;
 use crate::explore::probe::servo::ArmReach;
 use crate::geometry::mesh::Mesh;
 use crate::robot::Robot;
 use crate::robot::arm::Chain;
-use crate::task::{Around, Ball, RADIUS_M, Task, TaskError};
+use crate::task::{Approach, Around, Ball, RADIUS_M, Task};
 use nalgebra::Point3;
-use std::sync::Arc;
 use thiserror::Error;
 
 /// An object that a body cannot go around.
@@ -37,7 +37,7 @@ pub enum AroundError {
     },
     /// There is no task.
     #[error(transparent)]
-    Task(#[from] TaskError),
+    Task(#[from] Invalid),
     /// The arm would begin where the object may be.
     #[error(
         "at arm.home_deg the tip is at {:?}, {inside_m:.3} m too near to the object to go around it: move \
@@ -94,7 +94,7 @@ pub(super) fn task(
         return Err(AroundError::HomeInside { home_w, inside_m });
     }
     Ok(match ArmReach::new(&robot, touch) {
-        Some(reach) => task.within(Arc::new(reach)),
+        Some(reach) => task.within(move |approach: &Approach| reach.reaches(approach)),
         None => task,
     })
 }

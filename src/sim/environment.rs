@@ -5,6 +5,7 @@ use super::function::Function;
 use super::notice::{Notice, SizeMismatch};
 use super::scene::{Body, Object, Scene, Unit};
 use crate::config::ConfigError;
+use crate::error::Invalid;
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::error::MeshError;
 use crate::geometry::implicit::Implicit;
@@ -17,7 +18,7 @@ use crate::robot::arm::stage::{stage, stage_with_wrist};
 use crate::robot::arm::{ArmSettings, Chain, model};
 use crate::robot::finger::shape::BIOTAC_RADIUS_M;
 use crate::sim::finger::Fingertip;
-use crate::task::{Region, Task, TaskError, Zone};
+use crate::task::{Region, Task, Zone};
 use nalgebra::{Point3, Vector3};
 use std::borrow::Cow;
 use thiserror::Error;
@@ -94,7 +95,7 @@ pub enum EnvironmentError {
     Around(#[from] AroundError),
     /// The zone is not complete.
     #[error(transparent)]
-    Task(#[from] TaskError),
+    Task(#[from] Invalid),
 }
 
 impl Environment {

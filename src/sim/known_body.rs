@@ -2,7 +2,6 @@
 
 use super::environment::{Environment, EnvironmentError, Shape};
 use super::scene::{Body, Object, Scene, Unit};
-use crate::explore::registration::found::x_wo;
 use crate::explore::registration::{KnownBody, design};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::error::MeshError;
@@ -27,7 +26,7 @@ pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Envir
         return Err(EnvironmentError::Missing { part: "object" });
     }
     let ((points, triangles), half_m) = solid(body);
-    let x_wo = x_wo(body);
+    let x_wo = body.x_wo();
     let (mesh, report) =
         Mesh::new(&points, &triangles).map_err(|fault| MeshError { path: NAME.into(), fault })?;
     let (position_m, rotation_deg) = parts(&x_wo);

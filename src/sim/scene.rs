@@ -10,7 +10,7 @@ use crate::robot::arm::ArmSettings;
 use crate::robot::finger::Finger;
 use crate::robot::finger::profile::Profile;
 use crate::sim::finger::Effects;
-use crate::task::around::Around;
+use crate::task::Around;
 use crate::task::touch::TouchSettings;
 use crate::task::zone::Zone;
 use nalgebra::Isometry3;

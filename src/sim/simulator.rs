@@ -10,9 +10,10 @@ use super::simulated_finger::Shell;
 use crate::backend::delay::Delayed;
 use crate::backend::interlock::InterlockSettings;
 use crate::backend::{Backend, Fault};
+use crate::error::Invalid;
 use crate::explore::probe::Probe;
 use crate::explore::probe::interlocks::interlocked;
-use crate::explore::probe::servo::{OutOfReach, Servo, check_reach};
+use crate::explore::probe::servo::{Servo, check_reach};
 use crate::geometry::distance::OrientedBox;
 use crate::sim::Environment;
 use crate::sim::scene::Body;
@@ -86,7 +87,7 @@ impl Simulator {
     ///
     /// # Errors
     /// If it cannot.
-    pub fn check_reach(&self) -> Result<(), OutOfReach> {
+    pub fn check_reach(&self) -> Result<(), Invalid> {
         let environment = &self.environment;
         match (environment.scene().body, environment.robot()) {
             (Body::Kinematic | Body::Dynamic, Some(robot)) => {

@@ -1,18 +1,82 @@
-//! A task: where something may be touched, and how each target is.
+//! A task: the region where something may be touched, and how each target is.
 
-use super::approach::Approach;
-use super::around::{Ball, ROLLS_DEG};
-use super::reach::{Cells, Reach};
-use super::region::Region;
+use super::approach::{Approach, Ball, ROLLS_DEG};
 use super::target::{Aim, Target};
 use super::touch::TouchSettings;
 use super::zone::Zone;
+use crate::error::Invalid;
 use crate::geometry::spread::directions;
 use crate::robot::Finger;
-use nalgebra::UnitVector3;
+use nalgebra::{UnitVector3, Vector3};
 use std::fmt;
-use std::sync::Arc;
-use thiserror::Error;
+use std::sync::{Arc, OnceLock};
+
+/// Where to explore.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Region {
+    /// A rectangle or an interval, touched from one side.
+    Zone(Zone),
+    /// A ball around a whole object, touched from any side.
+    Ball(Ball),
+}
+
+impl Region {
+    /// The zone, if it is one.
+    pub fn zone(&self) -> Option<&Zone> {
+        match self {
+            Self::Zone(zone) => Some(zone),
+            Self::Ball(_) => None,
+        }
+    }
+
+    /// The ball, if it is one.
+    pub fn ball(&self) -> Option<&Ball> {
+        match self {
+            Self::Zone(_) => None,
+            Self::Ball(ball) => Some(ball),
+        }
+    }
+
+    /// Whether `target` is a place of the zone, or an aim at a point of the ball.
+    pub fn contains(&self, target: &Target) -> bool {
+        match (self, target) {
+            (Self::Zone(zone), Target::Place(place)) => zone.contains(place),
+            (Self::Ball(ball), Target::Aim(aim)) => ball.contains(aim),
+            _ => false,
+        }
+    }
+
+    /// Travel between two targets in a straight line, m: between places of the zone, or between
+    /// the points where two approaches enter the ball. 0 if one is no target of the region.
+    pub fn travel_m(&self, from: &Target, to: &Target) -> f64 {
+        match (self, from, to) {
+            (Self::Zone(_), Target::Place(from), Target::Place(to)) => {
+                from.iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+            }
+            (Self::Ball(ball), Target::Aim(from), Target::Aim(to)) => {
+                let entrance_w = |aim: &Aim| aim.p_w + aim.ahead_w.scale(ball.chord_m(aim)[0]);
+                (entrance_w(from) - entrance_w(to)).norm()
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+impl From<Zone> for Region {
+    fn from(zone: Zone) -> Self {
+        Self::Zone(zone)
+    }
+}
+
+impl From<Ball> for Region {
+    fn from(ball: Ball) -> Self {
+        Self::Ball(ball)
+    }
+}
+
+/// Whether a body can come to where an approach of a whole object sets out, go it to its end, and
+/// come back.
+type Reach = dyn Fn(&Approach) -> bool + Send + Sync;
 
 /// The complete task of the robot: everything between a planner's target and an [`Approach`].
 #[derive(Clone)]
@@ -23,19 +87,10 @@ pub struct Task {
     /// Nearest and farthest depth of a zone.
     depth_m: [f64; 2],
     /// `None` for a body that reaches everything.
-    reach: Option<Arc<dyn Reach>>,
-    cells: Cells,
-}
-
-/// What a task lacks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum TaskError {
-    /// The zone has no depth.
-    #[error(
-        "zone.depth_m is missing: nearest and farthest depth along the approach, in metres, at which \
-         there may be something to touch"
-    )]
-    NoDepth,
+    reach: Option<Arc<Reach>>,
+    /// Whether the middle of the ball is reached along the directions of each cell, found when
+    /// first asked for.
+    cells: Arc<[OnceLock<bool>]>,
 }
 
 impl Task {
@@ -47,20 +102,21 @@ impl Task {
         region: impl Into<Region>,
         touch: TouchSettings,
         finger: &Finger,
-    ) -> Result<Self, TaskError> {
+    ) -> Result<Self, Invalid> {
         let region = region.into();
         let depth_m = match &region {
-            Region::Zone(zone) => zone.depth_m.ok_or(TaskError::NoDepth)?,
+            Region::Zone(zone) => zone.depth_m.ok_or_else(no_depth)?,
             Region::Ball(_) => [0.0; 2],
         };
-        let (finger, cells) = (finger.clone(), Cells::new());
+        let (finger, cells) = (finger.clone(), cells());
         Ok(Self { region, touch, finger, depth_m, reach: None, cells })
     }
 
     /// Limits the approaches of a whole object to those that `reach` allows.
-    pub fn within(mut self, reach: Arc<dyn Reach>) -> Self {
+    pub fn within(mut self, reach: impl Fn(&Approach) -> bool + Send + Sync + 'static) -> Self {
         if self.ball().is_some() {
-            (self.reach, self.cells) = (Some(reach), Cells::new());
+            self.reach = Some(Arc::new(reach));
+            self.cells = cells();
         }
         self
     }
@@ -109,9 +165,9 @@ impl Task {
         if self.reach.is_none() && ball.lowest_m.is_none() {
             return true;
         }
-        self.cells.get(&-aim.ahead_w.into_inner(), |outward_w| {
-            self.over(ball, &Aim::against(ball.centre_w, outward_w)).is_some()
-        })
+        let cell = cell(&-aim.ahead_w.into_inner());
+        let find = || self.over(ball, &Aim::against(ball.centre_w, &middle(cell))).is_some();
+        self.cells.get(cell).is_some_and(|found| *found.get_or_init(find))
     }
 
     /// Those of `of` outward directions, spread evenly, against which the finger cannot be brought
@@ -148,7 +204,7 @@ impl Task {
             .map(|roll_deg| ball.approach(aim, finger, touch.standoff_m, roll_deg.to_radians()));
         rolled.find(|approach| {
             ball.is_free(aim, approach, finger)
-                && reach.as_ref().is_none_or(|reach| reach.reaches(approach))
+                && reach.as_ref().is_none_or(|reach| reach(approach))
         })
     }
 }
@@ -167,5 +223,66 @@ impl PartialEq for Task {
             (region.clone(), touch.clone(), finger.clone())
         };
         of(self) == of(other)
+    }
+}
+
+fn no_depth() -> Invalid {
+    Invalid::new(
+        "zone.depth_m is missing: nearest and farthest depth along the approach, in metres, at \
+         which there may be something to touch",
+    )
+}
+
+/// Directions from which an object's middle is tried, to say what is out of reach; chosen.
+pub const DIRECTIONS: usize = 64;
+
+/// Directions in cells: faces of a cube in squares.
+const PER_SIDE: usize = 8;
+const CELLS: usize = 6 * PER_SIDE * PER_SIDE;
+
+/// The cell of a direction.
+fn cell(direction: &Vector3<f64>) -> usize {
+    let axis = direction.iamax();
+    let side = usize::from(direction[axis] < 0.0);
+    let square = |other: usize| {
+        let across = direction[(axis + other) % 3] / direction[axis].abs();
+        let at = (across + 1.0) / 2.0 * PER_SIDE as f64;
+        (at.max(0.0) as usize).min(PER_SIDE - 1)
+    };
+    ((2 * axis + side) * PER_SIDE + square(1)) * PER_SIDE + square(2)
+}
+
+/// The direction in the middle of a cell.
+fn middle(cell: usize) -> Vector3<f64> {
+    let across = |square: usize| (2 * square + 1) as f64 / PER_SIDE as f64 - 1.0;
+    let (face, squares) = (cell / (PER_SIDE * PER_SIDE), cell % (PER_SIDE * PER_SIDE));
+    let (axis, side) = (face / 2, face % 2);
+    let mut direction = Vector3::zeros();
+    direction[axis] = if side == 0 { 1.0 } else { -1.0 };
+    direction[(axis + 1) % 3] = across(squares / PER_SIDE);
+    direction[(axis + 2) % 3] = across(squares % PER_SIDE);
+    direction
+}
+
+/// Cells of which none has been searched.
+fn cells() -> Arc<[OnceLock<bool>]> {
+    (0..CELLS).map(|_| OnceLock::new()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// And each cell has a part of the sphere that its middle lies in.
+    #[test]
+    fn every_direction_is_in_the_cell_that_lies_around_it() {
+        for at in 0..CELLS {
+            assert_eq!(cell(&middle(at)), at);
+        }
+        // Half the diagonal of a square in the middle of a face.
+        let widest = (2f64.sqrt() / PER_SIDE as f64).atan();
+        for direction in directions(5000) {
+            assert!(direction.angle(&middle(cell(&direction))) < widest + 1e-9);
+        }
     }
 }

@@ -14,7 +14,7 @@ use palpate::sim::environment::{EnvironmentError, Shape};
 use palpate::sim::kinematic::Kinematic;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
-use palpate::task::{Aim, Reach, Zone};
+use palpate::task::{Aim, Zone};
 use std::sync::Arc;
 
 const MIDDLE_W: [f64; 3] = [0.0, -0.65, 0.5];

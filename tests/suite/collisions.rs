@@ -5,7 +5,6 @@ use palpate::backend::interlock::InterlockSettings;
 use palpate::backend::{Command, Fault};
 use palpate::explore::probe::interlocks::interlocked;
 use palpate::geometry::distance::HalfSpace;
-use palpate::robot::capsules::capsules;
 use palpate::sim::Environment;
 use palpate::sim::mjcf;
 use palpate::sim::mjcf::Mode;
@@ -35,7 +34,7 @@ fn lower(environment: &Arc<Environment>, guarded: bool) -> (f64, Option<Fault>) 
     body.reset(1).unwrap();
     let table =
         HalfSpace { p_w: [0.0, 0.0, TABLE_M].into(), outward_w: nalgebra::Vector3::z_axis() };
-    let links: Vec<_> = capsules(&robot).into_iter().filter(|link| link.link >= 3).collect();
+    let links: Vec<_> = robot.capsules().into_iter().filter(|link| link.link >= 3).collect();
     let mut lowest_m = f64::INFINITY;
     for tick in 0..1500 {
         // The shoulder leans forwards, which carries forearm and hand down.

@@ -204,17 +204,18 @@ fn nonsense_is_an_error() {
     let mut controller = Controller::new(chain.clone(), PERIOD_S).unwrap();
     let still = Goal::still(chain.forward(&chain.home));
     let wrong = controller.step(&[0.0; 3], &still).unwrap_err();
-    assert_eq!(wrong, ArmError::Joints { expected: 7, found: 3 });
+    assert_eq!(wrong.to_string(), "3 joint positions for an arm of 7 joints");
     assert!(controller.step(&[f64::NAN; 7], &still).is_err());
     let mut nan = still;
     nan.x_wt.translation.vector.x = f64::NAN;
-    assert_eq!(controller.step(chain.home.as_slice(), &nan), Err(ArmError::NotFinite));
+    assert!(controller.step(chain.home.as_slice(), &nan).is_err());
     nan = still;
     nan.twist[4] = f64::INFINITY;
     assert!(controller.step(chain.home.as_slice(), &nan).is_err());
     assert!(posture(&chain, &nan.x_wt).is_ok());
     nan.x_wt.translation.vector.x = f64::NAN;
-    assert_eq!(posture(&chain, &nan.x_wt), Err(ArmError::NotFinite));
+    let error = posture(&chain, &nan.x_wt).unwrap_err().to_string();
+    assert!(error.ends_with("is not a number"), "{error}");
 }
 
 #[test]

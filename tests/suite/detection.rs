@@ -5,10 +5,10 @@ use palpate::config::Rules;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::math::normal::{cumulative, density};
 use palpate::math::seed::stream;
+use palpate::robot::finger::Rest;
 use palpate::robot::finger::detection::Alarm;
 use palpate::robot::finger::electrode_table::{BASELINES_COUNTS, NOISE_COUNTS};
 use palpate::robot::finger::frame::{ELECTRODES, FRAME_S};
-use palpate::robot::finger::rest::Rest;
 use palpate::robot::finger::{Detection, Detector, Finger, Frame, TipMotion};
 use palpate::sim::finger::effects::electrodes::{Common, Electrodes, ElectrodesEffect};
 use palpate::sim::finger::effects::fluid::FluidEffect;
@@ -195,7 +195,7 @@ fn a_noisy_electrode_is_learnt() {
     sensor.electrodes.worsen(9, 10.0);
     let above = |rest: &Rest, sensor: &mut Untouched| {
         let frames = sensor.frames(200);
-        frames.iter().filter(|frame| rest.evidence(frame).electrodes.unwrap() > 4.0).count()
+        frames.iter().filter(|frame| rest.evidence(frame)[1].unwrap() > 4.0).count()
     };
     assert!(above(&rest, &mut sensor) > 50);
     for _ in 0..20 {

@@ -4,8 +4,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use palpate::geometry::distance::{HalfSpace, OrientedBox};
 use palpate::geometry::sweep::Capsule;
 use palpate::robot::arm::ArmSettings;
-use palpate::robot::arm::capsule::LinkCapsule;
-use palpate::robot::capsules::capsules;
+use palpate::robot::arm::LinkCapsule;
 use palpate::robot::{Finger, Robot};
 use proptest::prelude::*;
 use std::path::Path;
@@ -115,7 +114,7 @@ fn every_shape_of_the_models_lies_within_the_capsules_of_its_link() {
     for (file, model) in [("a.xml", "pa10_a"), ("c.xml", "pa10")] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/pa10").join(file);
         let text = std::fs::read_to_string(path).unwrap();
-        let all = capsules(&robot(model));
+        let all = robot(model).capsules();
         let (mut link, mut seen) = (0, 0);
         for line in text.lines().map(str::trim) {
             if let Some((_, after)) = line.split_once("<body name=\"") {
@@ -152,7 +151,7 @@ proptest! {
         let end = chain.clamp(&(start + palpate::robot::arm::Joints::from(by)));
         let bound_m = (end - start).abs().dot(&chain.reaches_m(robot.finger.radius_m));
         let (before, after) = (chain.frames(&start), chain.frames(&end));
-        for link in capsules(&robot) {
+        for link in robot.capsules() {
             for p in link.ends {
                 let moved_m = (after[link.link] * p - before[link.link] * p).norm();
                 prop_assert!(moved_m <= bound_m + 1e-12, "{} {moved_m} {bound_m}", link.name);

@@ -4,7 +4,7 @@ use crate::common::quiet::{plane, quiet};
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
-use palpate::robot::finger::{Detection, Detector, Finger, Frame, Tare};
+use palpate::robot::finger::{Detection, Detector, Finger, Frame};
 use palpate::sim::finger::effects::electrodes::{ElectrodesEffect, counts, impedance_ohm};
 use palpate::sim::finger::effects::fluid::FluidEffect;
 use palpate::sim::finger::effects::skin::SkinEffect;
@@ -231,5 +231,5 @@ fn contact_is_found_after_enough_frames_and_lost_likewise() {
         .collect();
     assert_eq!(changes.len(), 2, "{changes:?}");
     assert!((changes[0] - 0.325).abs() < 0.01 && (changes[1] - 0.625).abs() < 0.01, "{changes:?}");
-    assert_eq!(Tare::of(&[]), Tare { electrode_counts: None, pdc_counts: None });
+    assert_eq!(Frame::mean(&[]), Frame::default());
 }

@@ -1,6 +1,7 @@
 //! Planners against what they promise.
 
 use nalgebra::{Point3, Vector3};
+use palpate::experiment::Experiment;
 use palpate::explore::belief::{Belief, HeightField};
 use palpate::explore::gp_settings::GpSettings;
 use palpate::explore::planner;
@@ -10,7 +11,7 @@ use palpate::gp::Posterior;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::posterior::Scratch;
 use palpate::gp::reduction::Reduction;
-use palpate::math::{normal, seed};
+use palpate::math::seed;
 use palpate::task::Zone;
 use rand::RngExt;
 
@@ -214,41 +215,12 @@ fn mean_sd(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> (f64, 
     (mean, belief.explorable_variance(place, &mut [], scratch).sqrt())
 }
 
-fn goal(belief: &HeightField) -> f64 {
-    let surface = belief.surface().unwrap();
-    let heights = surface.observations().heights().iter().copied();
-    heights.fold(f64::MIN, f64::max) + 0.01 * surface.hyperparameters().signal_sd
-}
-
 #[test]
 fn ucb_finds_the_highest_upper_bound() {
     finds("ucb", |belief, _| {
         Box::new(|place, scratch| {
             let (mean, sd) = mean_sd(belief, place, scratch);
             mean + 2.0 * sd
-        })
-    });
-}
-
-#[test]
-fn pi_finds_the_most_probable_improvement() {
-    finds("pi", |belief, _| {
-        let goal = goal(belief);
-        Box::new(move |place, scratch| {
-            let (mean, sd) = mean_sd(belief, place, scratch);
-            normal::cumulative((mean - goal) / sd)
-        })
-    });
-}
-
-#[test]
-fn ei_finds_the_largest_expected_improvement() {
-    finds("ei", |belief, _| {
-        let goal = goal(belief);
-        Box::new(move |place, scratch| {
-            let (mean, sd) = mean_sd(belief, place, scratch);
-            let z = (mean - goal) / sd;
-            sd * (normal::density(z) + z * normal::cumulative(z))
         })
     });
 }
@@ -322,4 +294,14 @@ fn grid_goes_from_coarse_to_fine() {
         let same = |other: &&Vec<f64>| SQUARE.distance(&place, other) < 1e-9;
         assert_eq!(places.iter().filter(same).count(), 1, "{place:?}");
     }
+}
+
+/// As `resolved.toml` of version 0.1 holds them.
+#[test]
+fn settings_of_removed_planners_are_read_and_ignored() {
+    let load = |sets: &[String]| Experiment::load("experiments/toy.toml".as_ref(), sets).unwrap();
+    assert_eq!(
+        load(&["planning.pi.margin=0.01".into(), "planning.ei.margin=0.5".into()]),
+        load(&[])
+    );
 }

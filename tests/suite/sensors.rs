@@ -8,7 +8,7 @@ use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::contact_point::locate;
 use palpate::robot::finger::frame::ELECTRODES;
-use palpate::robot::finger::{Finger, Frame, Tare};
+use palpate::robot::finger::{Finger, Frame};
 use palpate::sim::Environment;
 use palpate::sim::finger::effects::creep::{CreepEffect, Lag};
 use palpate::sim::finger::effects::electrodes::{ElectrodesEffect, impedance_ohm};
@@ -160,7 +160,7 @@ fn an_open_electrode_says_nothing() {
     (now[16], now[9]) = (1500.0, 2000.0);
     let frame = |counts| Frame { electrode_counts: Some(counts), ..Frame::default() };
     let point = |rest, now| {
-        let tare = Tare { electrode_counts: Some(rest), pdc_counts: None };
+        let tare = Frame { electrode_counts: Some(rest), ..Frame::default() };
         locate(&Finger::default(), &tare, &frame(now)).unwrap()
     };
     let sound = point(rest, now);

@@ -8,7 +8,7 @@ use palpate::math::seed::stream;
 use palpate::robot::finger::contact_point::locate;
 use palpate::robot::finger::plane_fit::PlaneFit;
 use palpate::robot::finger::profile::Profile;
-use palpate::robot::finger::{Finger, Frame, PointOfContact, Tare, TipMotion};
+use palpate::robot::finger::{Finger, Frame, PointOfContact, TipMotion};
 use palpate::sim::finger::calibration::constants::Model;
 use palpate::sim::finger::calibration::shear::{Agreement, ShearRecordings, compare};
 use palpate::sim::finger::effects::electrodes::ElectrodesEffect;
@@ -171,11 +171,11 @@ fn pac_shakes_with_the_speed_of_slip_and_the_roughness() {
 /// force, of a finger pressed on a plane with 1 to 6 N and sheared from not at all to slipping.
 fn located(
     effects: &Effects,
-    estimate: &dyn Fn(&Tare, &Frame) -> Option<PointOfContact>,
+    estimate: &dyn Fn(&Frame, &Frame) -> Option<PointOfContact>,
 ) -> (f64, f64) {
     let tip = Fingertip::new(&Finger::default(), effects);
     let bvh = plane();
-    let tare = Tare::of(&frames(effects, 0.02, &[(0.1, STILL)]));
+    let tare = Frame::mean(&frames(effects, 0.02, &[(0.1, STILL)]));
     let mut dice = Dice(11);
     let (mut squares, mut angles) = (0.0, Vec::new());
     for pitch in [-0.1, 0.1, 0.3, 0.5, 0.7] {
@@ -208,8 +208,8 @@ fn located(
 fn the_point_of_contact_is_known_under_shear() {
     let finger = Finger::default();
     let fit = PlaneFit::new(&finger);
-    let by_eq_1 = |tare: &Tare, frame: &Frame| locate(&finger, tare, frame);
-    let by_plane = |tare: &Tare, frame: &Frame| fit.locate(tare, frame);
+    let by_eq_1 = |tare: &Frame, frame: &Frame| locate(&finger, tare, frame);
+    let by_plane = |tare: &Frame, frame: &Frame| fit.locate(tare, frame);
     let smooth = Effects { friction: None, ..quiet() };
     let [eq_1, sheared] = [&smooth, &quiet()].map(|effects| located(effects, &by_eq_1));
     let [plane, plane_sheared] = [&smooth, &quiet()].map(|effects| located(effects, &by_plane));
@@ -234,7 +234,7 @@ fn a_plane_is_found_by_a_finger_of_any_size_and_without_an_electrode() {
             (load, feel.frame().unwrap())
         };
         let (_, rest) = reading(0.1, &-Vector3::z());
-        let tare = Tare::of(std::slice::from_ref(&rest));
+        let tare = Frame::mean(std::slice::from_ref(&rest));
         assert!(fit.locate(&tare, &rest).is_none());
         for towards_t in [direction_t(0.0, 0.0), direction_t(0.6, 0.4), direction_t(0.3, -0.5)] {
             let turned = Rotation3::rotation_between(&towards_t, &-Vector3::z()).unwrap();

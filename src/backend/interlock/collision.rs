@@ -8,8 +8,7 @@ use super::trip::Trip;
 use crate::geometry::distance::{HalfSpace, OrientedBox};
 use crate::geometry::sweep::Capsule;
 use crate::robot::arm::Joints;
-use crate::robot::arm::capsule::LinkCapsule;
-use crate::robot::capsules::capsules;
+use crate::robot::arm::LinkCapsule;
 use nalgebra::{Point3, Vector3};
 
 /// Stops the body before links come near to each other, to the table or to the object.
@@ -50,7 +49,7 @@ enum Other {
 
 impl Guard {
     fn new(site: &Site, settings: &InterlockSettings) -> Self {
-        let links = capsules(&site.robot);
+        let links = site.robot.capsules();
         let mut pairs = Vec::new();
         for (i, link) in links.iter().enumerate() {
             let beside = links.iter().enumerate().skip(i + 1);

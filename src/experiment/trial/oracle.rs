@@ -9,8 +9,9 @@ use crate::explore::around::ImplicitSurface;
 use crate::explore::around::Surface;
 use crate::explore::around::surface::steepness;
 use crate::explore::belief::Belief;
+use crate::explore::planner::candidates::{Candidates, free_aim};
 use crate::explore::planner::sample::any_side;
-use crate::explore::planner::search::{Candidates, Search, decided, free_aim};
+use crate::explore::planner::search::Search;
 use crate::explore::planner::{Plan, PlanningSettings};
 use crate::sim::Environment;
 use crate::sim::probe::exact;
@@ -93,7 +94,7 @@ impl Oracle {
                 let targets = self.aims(surface).into_iter().map(Target::from).collect();
                 match self.best(belief, truth, targets) {
                     Some(target) => Plan::at(target),
-                    None => decided(&any_side(surface.scope(), &mut self.search.rng), None),
+                    None => Plan::at(any_side(surface.scope(), &mut self.search.rng)),
                 }
             }
         }

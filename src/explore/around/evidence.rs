@@ -1,7 +1,10 @@
-//! What touches say of the field: where it is zero and which way it grows, and where it is free.
+//! Observations of the field by touches: where it is zero and which way it grows, and where it is
+//! free. And the prior: a body about what was met.
 
-use super::prior::Prior;
-use crate::explore::probe::{Swept, Touch};
+use super::settings::PriorShape;
+use crate::explore::probe::{Contact, Swept, Touch};
+use crate::geometry::extent::extent;
+use crate::geometry::implicit::Field;
 use crate::geometry::primitives::nearest_on_segment;
 use crate::gp::{Observation, Observations, Slope};
 use crate::task::{Aim, Approach, Ball};
@@ -10,15 +13,8 @@ use nalgebra::{Point3, Vector3};
 /// All that was met and swept.
 #[derive(Clone, Debug, Default)]
 pub struct Evidence {
-    contacts: Vec<Met>,
+    contacts: Vec<Contact>,
     ways: Vec<Way>,
-}
-
-/// A contact.
-#[derive(Clone, Debug)]
-struct Met {
-    p_w: Point3<f64>,
-    normal_w: Vector3<f64>,
 }
 
 /// The way of a fingertip that met nothing before its end.
@@ -73,7 +69,7 @@ impl Evidence {
     ) {
         let places = match touch {
             Touch::Contact(contact) => {
-                self.contacts.push(Met { p_w: contact.p_wc, normal_w: contact.normal_w });
+                self.contacts.push(contact.clone());
                 places
             }
             Touch::Miss => 2 * places,
@@ -93,7 +89,7 @@ impl Evidence {
 
     /// Points of contact in `W`, in order.
     pub fn contacts(&self) -> impl ExactSizeIterator<Item = &Point3<f64>> + Clone {
-        self.contacts.iter().map(|met| &met.p_w)
+        self.contacts.iter().map(|contact| &contact.p_wc)
     }
 
     /// How far `p_w` is from all contacts and from the hull of the fingertip on all its ways.
@@ -119,7 +115,7 @@ impl Evidence {
         noise_m: f64,
     ) -> Observations {
         let mut all = Observations::new(3);
-        for Met { p_w, normal_w } in &self.contacts {
+        for Contact { p_wc: p_w, normal_w } in &self.contacts {
             let field = prior.field(p_w);
             let gradient = normal_w - field.gradient;
             let slope = normals.then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });
@@ -139,5 +135,58 @@ impl Evidence {
             });
         }
         all
+    }
+}
+
+/// The mean of the field over space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prior {
+    /// Centre in `W` and half axes along those of `W`; none for a field of zeros.
+    body: Option<(Point3<f64>, Vector3<f64>)>,
+}
+
+/// Shortest half axis as a share of the ball's radius, so that touches on one plane leave a body;
+/// chosen.
+const THINNEST: f64 = 0.1;
+
+/// Half axis of the sphere before two contacts, as a share of the ball's radius; chosen.
+const UNKNOWN: f64 = 0.5;
+
+impl Prior {
+    /// About `contacts`, in the `ball` about them.
+    pub fn about<'a>(
+        shape: PriorShape,
+        ball: &Ball,
+        contacts: impl Iterator<Item = &'a Point3<f64>>,
+    ) -> Self {
+        let thinnest_m = THINNEST * ball.radius_m;
+        let (centre_w, radii_m) = match extent(contacts) {
+            Some([low, high]) if low != high => {
+                let radii_m = (high - low) / 2.0;
+                (nalgebra::center(&low, &high), radii_m.map(|radius_m| radius_m.max(thinnest_m)))
+            }
+            _ => (ball.centre_w, Vector3::repeat(UNKNOWN * ball.radius_m)),
+        };
+        let body = match shape {
+            PriorShape::Ellipsoid => Some((centre_w, radii_m)),
+            PriorShape::Sphere => Some((centre_w, Vector3::repeat(radii_m.product().cbrt()))),
+            PriorShape::None => None,
+        };
+        Self { body }
+    }
+
+    /// The field at `p_w`, negative inside, with its gradient: s·(|v / r|² − 1) / 2 for the offset
+    /// v from the centre, the half axes r and the least of them s. It is as smooth as any, so that
+    /// what a Gaussian process must add to it is no rougher than the object.
+    pub fn field(&self, p_w: &Point3<f64>) -> Field {
+        let Some((centre_w, radii_m)) = &self.body else {
+            return Field { value: 0.0, gradient: Vector3::zeros() };
+        };
+        let scaled = (p_w - centre_w).component_div(radii_m);
+        let least_m = radii_m.min();
+        Field {
+            value: 0.5 * least_m * (scaled.norm_squared() - 1.0),
+            gradient: scaled.component_div(radii_m) * least_m,
+        }
     }
 }

@@ -1,8 +1,7 @@
 //! What is known of a whole object after some touches: a Gaussian process over space whose zero set
 //! is the surface, negative inside (Williams & Fitzgibbon 2007).
 
-use super::evidence::Evidence;
-use super::prior::Prior;
+use super::evidence::{Evidence, Prior};
 use super::scope::Scope;
 use super::settings::SpaceSettings;
 use super::surface::Surface;

@@ -3,8 +3,6 @@
 mod evidence;
 mod grid;
 mod implicit_surface;
-mod pieces;
-mod prior;
 mod scope;
 pub mod settings;
 pub mod surface;

@@ -33,7 +33,7 @@ impl Scope {
     /// does not; that one before there are two.
     pub fn met<'a>(&self, contacts: impl Iterator<Item = &'a Point3<f64>>) -> Ball {
         let spanned = extent(contacts).filter(|[low, high]| low != high);
-        let Some(spanned) = spanned else { return self.ball.clone() };
+        let Some(spanned) = spanned else { return self.ball };
         let about = Ball::about(spanned, self.ball.lowest_m);
         let radius_m = about.radius_m.max(self.radius_m).min(self.ball.radius_m);
         Ball { radius_m, ..about }

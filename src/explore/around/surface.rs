@@ -1,8 +1,7 @@
 //! The surface that is believed: the zero set of a Gaussian process over space.
 
-use super::grid::zero_set;
-use super::pieces::touched;
-use super::prior::Prior;
+use super::evidence::Prior;
+use super::grid::{touched, zero_set};
 use super::scope::Scope;
 use crate::geometry::extent::extent;
 use crate::geometry::implicit::Field;

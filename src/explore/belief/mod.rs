@@ -34,7 +34,7 @@ impl Belief {
         match task.region() {
             Region::Zone(zone) => HeightField::new(zone.clone(), gp.clone()).into(),
             Region::Ball(ball) => {
-                let scope = Scope::new(ball.clone(), task, (finger, is_soft));
+                let scope = Scope::new(*ball, task, (finger, is_soft));
                 ImplicitSurface::new(scope, space.clone()).into()
             }
         }

@@ -6,7 +6,7 @@
 //! the lattice shares is not seen until a finer level. Around an object it is a lattice of equal
 //! areas on the sphere of directions.
 
-use super::plan::{Entry, Plan, PlanError, Planner};
+use super::plan::{Entry, Plan};
 use super::sample::sampled;
 use crate::explore::belief::Belief;
 
@@ -14,34 +14,29 @@ pub(super) const ENTRY: Entry = Entry {
     name: "grid",
     about: "a lattice from coarse to fine, no model",
     zone_only: None,
-    make: |_, _| Box::new(Grid { next_level: 0, rest: Vec::new() }),
+    make: |_, _| {
+        let mut next_level = 0;
+        // Remaining nodes of this level, the next one last: fractions 0..1.
+        let mut rest: Vec<Vec<f64>> = Vec::new();
+        Box::new(move |belief: &Belief| {
+            let target = sampled(belief, |dimension| {
+                loop {
+                    match rest.pop() {
+                        Some(node) => break node,
+                        None => {
+                            rest = lattice(dimension, next_level);
+                            next_level = (next_level + 1) % (FINEST + 1);
+                        }
+                    }
+                }
+            });
+            Ok(Plan::at(target))
+        })
+    },
 };
-
-struct Grid {
-    next_level: u32,
-    /// Remaining nodes of this level, the next one last: fractions 0..1.
-    rest: Vec<Vec<f64>>,
-}
 
 /// Finest level: beyond the most touches that a trial may have, in one dimension as in two.
 const FINEST: u32 = 11;
-
-impl Planner for Grid {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
-        let target = sampled(belief, |dimension| {
-            loop {
-                match self.rest.pop() {
-                    Some(node) => break node,
-                    None => {
-                        self.rest = lattice(dimension, self.next_level);
-                        self.next_level = (self.next_level + 1) % (FINEST + 1);
-                    }
-                }
-            }
-        });
-        Ok(Plan::at(target))
-    }
-}
 
 /// The nodes that `level` adds, last to first.
 fn lattice(dimension: usize, level: u32) -> Vec<Vec<f64>> {

@@ -3,11 +3,9 @@
 //! To add a planner: write its file here and give it a line in [`PLANNERS`].
 
 mod active;
-mod ei;
+pub mod candidates;
 mod grid;
-mod improvement;
 mod integrated_variance;
-mod pi;
 mod plan;
 mod random;
 pub mod sample;
@@ -19,7 +17,7 @@ mod sobol;
 mod travel;
 mod ucb;
 
-pub use plan::{Entry, Plan, PlanError, Planner, PlannerFactory, Stall, ZonePlanner, over_zone};
+pub use plan::{Entry, Plan, PlanError, Planner, PlannerFactory, Stall, over_zone};
 pub use sample::uniform;
 pub use settings::PlanningSettings;
 
@@ -34,8 +32,6 @@ pub const PLANNERS: &[Entry] = &[
     slope::ENTRY,
     travel::ENTRY,
     ucb::ENTRY,
-    pi::ENTRY,
-    ei::ENTRY,
 ];
 
 /// Whether `name` is that of a planner that is not built in: `MODULE:NAME`. An experiment may list

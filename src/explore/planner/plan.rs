@@ -110,23 +110,17 @@ impl From<&str> for PlanError {
     }
 }
 
-/// A planner that explores zones only, and never fails.
-pub trait ZonePlanner: Send {
-    /// The next target, inside the zone.
-    fn plan(&mut self, belief: &HeightField) -> Plan;
-}
-
-/// A [`ZonePlanner`] as a planner; around an object it names no target.
-pub fn over_zone(planner: impl ZonePlanner + 'static) -> Box<dyn Planner> {
-    Box::new(OverZone(planner))
-}
-
-struct OverZone<P>(P);
-
-impl<P: ZonePlanner> Planner for OverZone<P> {
+impl<F: FnMut(&Belief) -> Result<Plan, PlanError> + Send> Planner for F {
     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
-        Ok(self.0.plan(belief.height_field().ok_or("it explores zones only")?))
+        self(belief)
     }
+}
+
+/// A planner that explores zones only; around an object it names no target.
+pub fn over_zone(mut plan: impl FnMut(&HeightField) -> Plan + Send + 'static) -> Box<dyn Planner> {
+    Box::new(move |belief: &Belief| {
+        Ok(plan(belief.height_field().ok_or("it explores zones only")?))
+    })
 }
 
 /// A planner as an experiment file names it.

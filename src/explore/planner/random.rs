@@ -1,23 +1,12 @@
 //! Uniformly random targets: the paper's baseline.
 
-use super::plan::{Entry, Plan, PlanError, Planner};
+use super::plan::{Entry, Plan};
 use super::sample::anywhere;
 use crate::explore::belief::Belief;
-use rand_chacha::ChaCha8Rng;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "random",
     about: "uniformly random targets (the paper's baseline)",
     zone_only: None,
-    make: |_, rng| Box::new(Random { rng }),
+    make: |_, mut rng| Box::new(move |belief: &Belief| Ok(Plan::at(anywhere(belief, &mut rng)))),
 };
-
-struct Random {
-    rng: ChaCha8Rng,
-}
-
-impl Planner for Random {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
-        Ok(Plan::at(anywhere(belief, &mut self.rng)))
-    }
-}

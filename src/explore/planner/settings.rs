@@ -24,10 +24,6 @@ pub struct PlanningSettings {
     pub travel: TravelSettings,
     /// Of `ucb`.
     pub ucb: UcbSettings,
-    /// Of `pi`.
-    pub pi: ImprovementSettings,
-    /// Of `ei`.
-    pub ei: ImprovementSettings,
 }
 
 impl Default for PlanningSettings {
@@ -42,8 +38,6 @@ impl Default for PlanningSettings {
             slope: Default::default(),
             travel: Default::default(),
             ucb: Default::default(),
-            pi: Default::default(),
-            ei: Default::default(),
         }
     }
 }
@@ -148,21 +142,6 @@ impl Default for UcbSettings {
     }
 }
 
-/// Settings of `pi` and `ei`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ImprovementSettings {
-    /// What a place must exceed the highest contact by, in standard deviations of the signal.
-    pub margin: f64,
-}
-
-impl Default for ImprovementSettings {
-    /// Lizotte 2008 finds 0.01 to work well in most cases.
-    fn default() -> Self {
-        Self { margin: 0.01 }
-    }
-}
-
 impl Checked for PlanningSettings {
     fn check(&self, rules: &mut Rules) {
         rules.number("direct_evaluations", self.direct_evaluations.into(), 1.0..=1e6);
@@ -178,7 +157,5 @@ impl Checked for PlanningSettings {
         rules.number("slope.weight", self.slope.weight, 0.0..=1e3);
         rules.number("travel.tour", self.travel.tour.into(), 1.0..=100.0);
         rules.number("ucb.sds", self.ucb.sds, 0.0..=1e3);
-        rules.number("pi.margin", self.pi.margin, 0.0..=1e3);
-        rules.number("ei.margin", self.ei.margin, 0.0..=1e3);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! α(x) = σ(x)·(1 + w·|∇μ(x)| / mean|∇μ|), the mean taken over the zone.
 
-use super::plan::{Entry, Plan, ZonePlanner, over_zone};
+use super::plan::{Entry, Plan, over_zone};
 use super::search::Search;
 use super::sobol;
 use crate::explore::belief::HeightField;
@@ -13,34 +13,31 @@ pub(super) const ENTRY: Entry = Entry {
     name: "slope",
     about: "standard deviation weighted by the slope of the posterior mean",
     zone_only: Some("it follows the slope of a surface over a plane"),
-    make: |settings, rng| over_zone(Slope { search: Search::new(settings, rng) }),
+    make: |settings, rng| {
+        let mut search = Search::new(settings, rng);
+        over_zone(move |belief| plan(&mut search, belief))
+    },
 };
 
 /// Places over which the slope is averaged; chosen.
 const MEAN_PLACES: u32 = 256;
 
-struct Slope {
-    search: Search,
-}
-
-impl ZonePlanner for Slope {
-    fn plan(&mut self, belief: &HeightField) -> Plan {
-        let Some(surface) = belief.surface() else { return self.search.anywhere(belief.zone()) };
-        let mut scratch = Scratch::default();
-        let places = sobol::places(belief.zone(), MEAN_PLACES, 0);
-        let slopes = places.iter().map(|place| slope(surface, place, &mut scratch));
-        let mean = slopes.sum::<f64>() / places.len() as f64;
-        let weight = self.search.settings.slope.weight;
-        // A flat belief is steep nowhere.
-        let per_slope = if mean > 0.0 { weight / mean } else { 0.0 };
-        let score = self.search.differentiated(belief.zone(), |places| {
-            let variances = belief.explorable_variances(places, &mut []);
-            let steep = places.iter().map(|place| slope(surface, place, &mut scratch));
-            let each = variances.iter().zip(steep);
-            each.map(|(variance, slope)| variance.sqrt() * (1.0 + per_slope * slope)).collect()
-        });
-        self.search.plan(belief, score)
-    }
+fn plan(search: &mut Search, belief: &HeightField) -> Plan {
+    let Some(surface) = belief.surface() else { return search.anywhere(belief.zone()) };
+    let mut scratch = Scratch::default();
+    let places = sobol::places(belief.zone(), MEAN_PLACES, 0);
+    let slopes = places.iter().map(|place| slope(surface, place, &mut scratch));
+    let mean = slopes.sum::<f64>() / places.len() as f64;
+    let weight = search.settings.slope.weight;
+    // A flat belief is steep nowhere.
+    let per_slope = if mean > 0.0 { weight / mean } else { 0.0 };
+    let score = search.differentiated(belief.zone(), |places| {
+        let variances = belief.explorable_variances(places, &mut []);
+        let steep = places.iter().map(|place| slope(surface, place, &mut scratch));
+        let each = variances.iter().zip(steep);
+        each.map(|(variance, slope)| variance.sqrt() * (1.0 + per_slope * slope)).collect()
+    });
+    search.plan(belief, score)
 }
 
 /// |∇μ| at `place`.

@@ -1,34 +1,27 @@
 //! A scrambled Sobol sequence: evenly spread targets without any model.
 
-use super::plan::{Entry, Plan, PlanError, Planner};
+use super::plan::{Entry, Plan};
 use super::sample::sampled;
 use crate::explore::belief::Belief;
 use crate::task::Zone;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "sobol",
     about: "a scrambled Sobol sequence: evenly spread, no model (the fairer baseline)",
     zone_only: None,
-    make: |_, mut rng: ChaCha8Rng| Box::new(Sobol { seed: rng.random(), index: 0 }),
+    make: |_, mut rng| {
+        let (seed, mut index) = (rng.random(), 0);
+        Box::new(move |belief: &Belief| {
+            let target = sampled(belief, |count| {
+                let at = fractions(count, index, seed);
+                index += 1;
+                at
+            });
+            Ok(Plan::at(target))
+        })
+    },
 };
-
-struct Sobol {
-    seed: u32,
-    index: u32,
-}
-
-impl Planner for Sobol {
-    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
-        let target = sampled(belief, |count| {
-            let at = fractions(count, self.index, self.seed);
-            self.index += 1;
-            at
-        });
-        Ok(Plan::at(target))
-    }
-}
 
 /// The first `count` places of the sequence that `seed` scrambles: evenly spread, with no period in
 /// common with a surface's.

@@ -1,14 +1,15 @@
 //! Which touches of a known body tell the most of where the finger and the body stand.
 
-use super::hand_eye::{FELT, HandEyeFit, PARAMETERS, RegistrationTouch, parameters};
-use super::known_body::KnownBody;
-use super::outline::Outline;
-use super::rehearsal::rehearsed;
-use crate::backend::Fault;
+use super::hand_eye::{FELT, HandEyeFit, PARAMETERS, RegistrationTouch, parameters, undetermined};
+use super::known_body::{KnownBody, Outline};
+use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
+use crate::error::Invalid;
 use crate::explore::control::posture;
-use crate::explore::probe::servo::BEYOND_M;
-use crate::math::least_squares::{FitError, Problem, foresee, jacobian};
+use crate::explore::probe::Probe;
+use crate::explore::probe::servo::{BEYOND_M, Servo};
+use crate::math::least_squares::{Problem, foresee, jacobian};
 use crate::robot::Robot;
+use crate::robot::arm::{Chain, Joints, Kind};
 use crate::robot::finger::Finger;
 use crate::robot::finger::frame::FRAME_S;
 use crate::task::Approach;
@@ -19,7 +20,6 @@ use nalgebra::{
 };
 use rand::Rng;
 use rand::seq::SliceRandom;
-use thiserror::Error;
 
 /// Touches to make, in order, and what they would tell.
 #[derive(Clone, Debug)]
@@ -32,46 +32,6 @@ pub struct Design {
     pub undetermined: Vec<&'static str>,
     /// Condition number of the rest.
     pub condition: f64,
-}
-
-/// Why there is no good design.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum DesignError {
-    /// The robot reaches too few of the touches that would tell something.
-    #[error(
-        "the robot reaches {reached} of {tried} touches of the body, and {wanted} are wanted; a finger must be \
-         turned to find where it stands, which a stage cannot do; bring the body nearer (--at)"
-    )]
-    Unreachable {
-        /// How many it reaches.
-        reached: usize,
-        /// How many were tried.
-        tried: usize,
-        /// How many are wanted.
-        wanted: usize,
-    },
-    /// They would not determine what is sought.
-    #[error("these {touches} touches would not determine {}; make more (--touches)", lost.join(", "))]
-    Undetermined {
-        /// How many touches.
-        touches: usize,
-        /// What they would not determine.
-        lost: Vec<&'static str>,
-    },
-    /// They would determine it badly.
-    #[error(
-        "the condition number of these touches is {condition:.0}, and {CONDITION_MAX} is allowed"
-    )]
-    Poor {
-        /// Their condition number.
-        condition: f64,
-    },
-    /// The robot cannot be driven.
-    #[error(transparent)]
-    Fault(#[from] Fault),
-    /// A touch of it has no numbers.
-    #[error(transparent)]
-    Fit(#[from] FitError),
 }
 
 /// Greatest condition number of a design; chosen: a residual's error reaches no parameter more than
@@ -163,9 +123,9 @@ impl Design {
         body: &KnownBody,
         count: usize,
         rng: &mut impl Rng,
-    ) -> Result<Self, DesignError> {
+    ) -> Result<Self, Invalid> {
         if !robot.chain.turns() {
-            return Err(DesignError::Unreachable { reached: 0, tried: 0, wanted: count });
+            return Err(unreachable(0, 0, count));
         }
         let outline = Outline::of(robot);
         let free_w = free_side(robot, body);
@@ -192,9 +152,10 @@ impl Design {
         }
         let chosen = in_order(robot, chosen);
         let ways: Vec<Approach> = chosen.iter().map(Candidate::expected).collect();
-        let mut made = rehearsed(robot, &touch_settings(touch), &ways)?;
+        let mut made = rehearsed(robot, &touch_settings(touch), &ways)
+            .map_err(|fault| Invalid::new(fault.to_string()))?;
         if made.len() < count {
-            return Err(DesignError::Unreachable { reached: made.len(), tried, wanted: count });
+            return Err(unreachable(made.len(), tried, count));
         }
         made.truncate(count);
         let chosen: Vec<Candidate> = (chosen.into_iter().enumerate())
@@ -202,10 +163,11 @@ impl Design {
             .collect();
         let touches: Vec<_> = chosen.iter().map(|candidate| candidate.touch).collect();
         let fit = HandEyeFit::new(&outline, &touches);
-        let foreseen = foresee(&fit, &HandEyeFit::start(*body))?;
+        let foreseen = foresee(&fit, &HandEyeFit::start(*body))
+            .map_err(|error| Invalid::new(error.to_string()))?;
         let named = parameters(body);
         let sds = std::array::from_fn(|i| foreseen.covariance[(i, i)].sqrt() * named[i].1);
-        let lost = super::hand_eye::undetermined(&foreseen, body);
+        let lost = undetermined(&foreseen, body);
         Ok(Self {
             approaches: chosen.into_iter().map(|candidate| candidate.approach).collect(),
             sds,
@@ -218,18 +180,35 @@ impl Design {
     ///
     /// # Errors
     /// If they leave something undetermined, or determine it badly.
-    pub fn check(&self) -> Result<(), DesignError> {
+    pub fn check(&self) -> Result<(), Invalid> {
         // What the finger feels may stay unknown; where it stands may not.
         let sought = self.undetermined.iter().filter(|name| !FELT.contains(name));
         let lost: Vec<&'static str> = sought.copied().collect();
         if !lost.is_empty() {
-            return Err(DesignError::Undetermined { touches: self.approaches.len(), lost });
+            let (touches, lost) = (self.approaches.len(), lost.join(", "));
+            return Err(Invalid::new(format!(
+                "these {touches} touches would not determine {lost}"
+            ))
+            .mend("make more (--touches)"));
         }
         match self.condition <= CONDITION_MAX {
             true => Ok(()),
-            false => Err(DesignError::Poor { condition: self.condition }),
+            false => Err(Invalid::new(format!(
+                "the condition number of these touches is {:.0}, and {CONDITION_MAX} is allowed",
+                self.condition
+            ))),
         }
     }
+}
+
+fn unreachable(reached: usize, tried: usize, wanted: usize) -> Invalid {
+    Invalid::new(format!(
+        "the robot reaches {reached} of {tried} touches of the body, and {wanted} are wanted"
+    ))
+    .mend(
+        "a finger must be turned to find where it stands, which a stage cannot do; bring the body \
+         nearer (--at)",
+    )
 }
 
 /// The side from which the robot comes: from the body's centre to the fingertip at home; a plate's
@@ -360,4 +339,85 @@ fn in_order(robot: &Robot, mut left: Vec<Candidate>) -> Vec<Candidate> {
         ordered.push(candidate);
     }
     ordered
+}
+
+/// An arm in empty space: no mass, no object, no sensor.
+struct Rehearsal {
+    chain: Chain,
+    capabilities: Capabilities,
+    q: Joints,
+    reading: Reading,
+}
+
+/// Its tick; chosen: what a resolved-rate controller needs, not what a servo does.
+const PERIOD_S: f64 = 0.01;
+
+impl Rehearsal {
+    fn new(chain: &Chain) -> Self {
+        let capabilities = Capabilities::of(chain, PERIOD_S);
+        let (chain, q, reading) = (chain.clone(), chain.home, Reading::default());
+        Self { chain, capabilities, q, reading }
+    }
+
+    fn report(&mut self, qdot: &Joints) {
+        let joints = self.chain.joints.len();
+        let told = [(&mut self.reading.q, &self.q), (&mut self.reading.qdot, qdot)];
+        for (to, from) in told {
+            to.clear();
+            to.extend(from.iter().take(joints));
+        }
+    }
+}
+
+impl Backend for Rehearsal {
+    fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    fn reset(&mut self, _seed: u64) -> Result<&Reading, Fault> {
+        self.q = self.chain.home;
+        self.reading.time_s = 0.0;
+        self.report(&Joints::zeros());
+        Ok(&self.reading)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        let qdot = self.capabilities.accept(command)?;
+        self.q = self.chain.clamp(&(self.q + qdot * PERIOD_S));
+        self.reading.time_s += PERIOD_S;
+        self.report(&qdot);
+        Ok(&self.reading)
+    }
+}
+
+/// How far the rehearsed joints keep from their limits, because touches do not end exactly where
+/// they are rehearsed; chosen.
+const SLACK_RAD: f64 = 0.25;
+
+/// Those of `approaches` that `robot` can go one after the other from home, by number.
+///
+/// # Errors
+/// If the robot cannot be driven at all.
+fn rehearsed(
+    robot: &Robot,
+    touch: &TouchSettings,
+    approaches: &[Approach],
+) -> Result<Vec<usize>, Fault> {
+    let mut robot = robot.clone();
+    for joint in robot.chain.joints.iter_mut().filter(|joint| joint.kind == Kind::Revolute) {
+        joint.q_limits = [joint.q_limits[0] + SLACK_RAD, joint.q_limits[1] - SLACK_RAD];
+    }
+    // By the servo that will make them, on the arm's kinematics alone.
+    let mut left: Vec<usize> = (0..approaches.len()).collect();
+    'again: loop {
+        let body = Box::new(Rehearsal::new(&robot.chain));
+        let mut servo = Servo::new(robot.clone(), touch.clone(), body, 0)?;
+        for at in 0..left.len() {
+            if servo.touch(&approaches[left[at]]).is_err() {
+                left.remove(at);
+                continue 'again;
+            }
+        }
+        return Ok(left);
+    }
 }

@@ -7,8 +7,7 @@
 //! little, but that its tip has a corner; there the electrodes are asked too on which side they
 //! feel the body, with a gain that is fitted and as far as a finger is its own mirror image.
 
-use super::known_body::KnownBody;
-use super::outline::{Meeting, Outline};
+use super::known_body::{KnownBody, Outline};
 use crate::math::least_squares::{Problem, Solution};
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
@@ -127,11 +126,11 @@ impl Problem for HandEyeFit<'_> {
             let x_wt = touch.x_wt * state.correction;
             self.outline.meet(&state.body, &x_wt, state.give_m)
         });
-        let meetings: Vec<Meeting> = meetings.collect();
+        let meetings: Vec<(Point3<f64>, f64)> = meetings.collect();
         let depths = (meetings.iter().zip(self.touches))
-            .map(|(it, touch)| (it.short_m + touch.pressed_m) / DEPTH_SD_M);
+            .map(|((_, short_m), touch)| (short_m + touch.pressed_m) / DEPTH_SD_M);
         let sides = (self.felt.iter()).map(|&(i, felt_m)| {
-            (felt_m - state.aside_m - state.gain * meetings[i].p_t.y) / FELT_SD_M
+            (felt_m - state.aside_m - state.gain * meetings[i].0.y) / FELT_SD_M
         });
         let plausible_m = if self.outline.is_soft() { ASIDE_M } else { ASIDE_EXACT_M };
         let aside = [state.aside_m / plausible_m];

@@ -1,12 +1,11 @@
 //! Lays a cloud of contacts onto a mesh (point-to-plane, Chen and Medioni 1992).
 
-use super::found::Place;
+use super::register::pose_table;
+use crate::error::Invalid;
 use crate::geometry::bvh::MeshBvh;
 use crate::math::least_squares::{FitError, Problem, Solution, fit};
-use crate::math::pose::parts;
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use serde::Serialize;
-use thiserror::Error;
+use toml_edit::{Array, DocumentMut, Table, value};
 
 /// Where the mesh stands.
 #[derive(Clone, Debug)]
@@ -30,69 +29,22 @@ pub struct Aligned {
 }
 
 impl Aligned {
-    /// As tables of a scene, and how sure they are.
-    pub fn found(&self) -> AlignedFile {
-        let (position_m, rotation_deg) = parts(&self.x_wo);
+    /// The keys of a scene's `[object]`, and how sure they are, as TOML.
+    pub fn tables(&self) -> String {
         let [a, b, c, d, e, f] = self.sds;
-        AlignedFile {
-            object: Place { position_m, rotation_deg },
-            alignment: Alignment {
-                position_sd_m: [a, b, c],
-                turn_sd_deg: [d, e, f].map(f64::to_degrees),
-                undetermined: self
-                    .undetermined
-                    .iter()
-                    .map(|v| v.iter().copied().collect())
-                    .collect(),
-                residual_rms_m: self.rms_m,
-                points: self.used,
-                outliers: self.outliers,
-            },
-        }
+        let undetermined = self.undetermined.iter().map(|v| Array::from_iter(v.iter().copied()));
+        let mut sure = Table::new();
+        sure["position_sd_m"] = value(Array::from_iter([a, b, c]));
+        sure["turn_sd_deg"] = value(Array::from_iter([d, e, f].map(f64::to_degrees)));
+        sure["undetermined"] = value(Array::from_iter(undetermined));
+        sure["residual_rms_m"] = value(self.rms_m);
+        sure["points"] = value(self.used as i64);
+        sure["outliers"] = value(self.outliers as i64);
+        let mut tables = DocumentMut::new();
+        tables["object"] = pose_table("", &self.x_wo);
+        tables["alignment"] = sure.into();
+        tables.to_string()
     }
-}
-
-/// What an alignment found, as a file that a scene takes over.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct AlignedFile {
-    /// Keys of a scene's `[object]`.
-    pub object: Place,
-    /// How sure that is.
-    pub alignment: Alignment,
-}
-
-/// How sure an alignment is.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Alignment {
-    /// Standard deviations of the mesh's middle along the axes of the cloud's frame.
-    pub position_sd_m: [f64; 3],
-    /// Standard deviations of small turns about these axes, through the mesh's middle.
-    pub turn_sd_deg: [f64; 3],
-    /// Directions (x, y, z in units of 2 cm, turns about x, y, z in units of 0.2 rad) that the
-    /// cloud does not determine; there the mesh stays as it was.
-    pub undetermined: Vec<Vec<f64>>,
-    /// Root mean square distance of the points from the mesh.
-    pub residual_rms_m: f64,
-    /// Points used.
-    pub points: usize,
-    /// Points left out, which did not fit the others.
-    pub outliers: usize,
-}
-
-/// Why a cloud cannot be laid onto a mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum AlignError {
-    /// Too few points.
-    #[error("{count} points, and at least {least} are needed")]
-    FewPoints {
-        /// How many there are.
-        count: usize,
-        /// How many are needed.
-        least: usize,
-    },
-    /// The points cannot be fitted.
-    #[error(transparent)]
-    Fit(#[from] FitError),
 }
 
 /// Numbers of a pose; and a point more than those for a residual.
@@ -162,9 +114,10 @@ pub fn align(
     mesh: &MeshBvh,
     points_w: &[Point3<f64>],
     start: &Isometry3<f64>,
-) -> Result<Aligned, AlignError> {
+) -> Result<Aligned, Invalid> {
     if points_w.len() < LEAST {
-        return Err(AlignError::FewPoints { count: points_w.len(), least: LEAST });
+        let count = points_w.len();
+        return Err(Invalid::new(format!("{count} points, and at least {LEAST} are needed")));
     }
     let (low, high) = mesh.mesh().bounds();
     let (middle_o, size_m) = (nalgebra::center(&low, &high), (high - low).norm());
@@ -172,7 +125,7 @@ pub fn align(
     for round in 1..=ROUNDS {
         let planes_o = points_w.iter().map(|p_w| plane(mesh, &x_wo.inverse_transform_point(p_w)));
         let problem = Planes { points_w, planes_o: planes_o.collect(), middle_o };
-        let fitted = fit(&problem, &x_wo)?;
+        let fitted = fit(&problem, &x_wo).map_err(|error| Invalid::new(error.to_string()))?;
         let step = x_wo.inverse() * fitted.state;
         let moved = (step * middle_o - middle_o).norm() / size_m + step.rotation.angle();
         x_wo = fitted.state;
@@ -180,7 +133,7 @@ pub fn align(
             return Ok(told(&problem, &fitted, mesh, round));
         }
     }
-    Err(FitError::Unsettled.into())
+    Err(Invalid::new(FitError::Unsettled.to_string()))
 }
 
 /// The plane through the mesh's point nearest to `p_o`: square to the way there, or the triangle's

@@ -1,6 +1,10 @@
-//! A body whose shape is known and whose place is sought: a ball or a plate.
+//! A body whose shape is known and whose place is sought, a ball or a plate, and how the finger's
+//! outer surface meets it.
 
-use nalgebra::{Point3, UnitVector3, Vector3};
+use crate::robot::Robot;
+use crate::robot::finger::profile::Profile;
+use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
+use std::f64::consts::{PI, TAU};
 
 /// Where a known body stands in `W`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,8 +27,8 @@ pub enum KnownBody {
 
 /// How far its place could plausibly be off from where somebody says: along each axis, and in a
 /// plate's turn. Chosen: laid down against a mark.
-pub(super) const PLACE_M: f64 = 0.01;
-pub(super) const TURN_RAD: f64 = 0.1;
+const PLACE_M: f64 = 0.01;
+const TURN_RAD: f64 = 0.1;
 
 impl KnownBody {
     /// How many numbers its place has.
@@ -79,5 +83,202 @@ impl KnownBody {
             Self::Ball { .. } => [PLACE_M; 3],
             Self::Plate { .. } => [PLACE_M, TURN_RAD, TURN_RAD],
         }
+    }
+
+    /// Pose in `W` of its frame: a ball's centre, or a point of a plate whose +y is its normal.
+    pub fn x_wo(&self) -> Isometry3<f64> {
+        match self {
+            Self::Ball { centre_w, .. } => {
+                Isometry3::from_parts(centre_w.coords.into(), UnitQuaternion::identity())
+            }
+            Self::Plate { point_w, normal_w } => {
+                let turn = Rotation3::rotation_between(&Vector3::y(), normal_w);
+                let turn = turn.unwrap_or_else(|| {
+                    Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+                });
+                let turn = UnitQuaternion::from_rotation_matrix(&turn);
+                Isometry3::from_parts(point_w.coords.into(), turn)
+            }
+        }
+    }
+}
+
+/// Points along the finger and around it; chosen: a tenth of what is touched.
+const ALONG: usize = 48;
+const AROUND: usize = 64;
+
+/// Part of their distance to which a rigid finger's nearest point is refined; chosen: the square of
+/// it is what the distance is off by, in parts of a millimetre.
+const REFINED: f64 = 1e-5;
+
+/// Points that lie farther behind the foremost than this part of the radius are not met; chosen: no
+/// contact that can be read is as deep.
+const DEEPEST: f64 = 0.5;
+
+/// Steps of Newton's method on a curve that only bends one way; chosen, twice what is usual.
+const STEPS: usize = 30;
+
+/// The outer surface of the finger in `T`.
+#[derive(Clone, Debug)]
+pub struct Outline {
+    profile: Profile,
+    is_soft: bool,
+    points: Vec<Sample>,
+    /// Distance of places: m along the finger, rad around it.
+    steps: [f64; 2],
+}
+
+#[derive(Clone, Debug)]
+struct Sample {
+    /// m along the finger, rad around it.
+    place: [f64; 2],
+    p_t: Point3<f64>,
+    area_m2: f64,
+    /// Whether fluid flows under the skin there.
+    wet: bool,
+}
+
+impl Outline {
+    /// Of a soft finger, a BioTac's; of a rigid one its hull.
+    pub fn of(robot: &Robot) -> Self {
+        let profile = match robot.is_soft {
+            true => Profile::biotac(&robot.finger),
+            false => Profile::capsule(&robot.finger),
+        };
+        let (length_m, radius_m) = (profile.length_m, profile.radius_m);
+        let steps = [(length_m + radius_m) / ALONG as f64, TAU / AROUND as f64];
+        let mut outline = Self { points: Vec::new(), profile, is_soft: robot.is_soft, steps };
+        let places = (0..ALONG).flat_map(|i| (0..AROUND).map(move |j| (i as f64, j as f64)));
+        let samples = places.map(|(i, j)| {
+            let place = [(i + 0.5) * steps[0] - length_m, j * steps[1] - PI];
+            outline.sample(place)
+        });
+        outline.points = samples.collect();
+        outline
+    }
+
+    fn sample(&self, place: [f64; 2]) -> Sample {
+        let [x_m, turn] = place;
+        let [along, around] = self.edges(x_m, turn, [0.5 * self.steps[0], 0.5 * self.steps[1]]);
+        let (start, direction) = self.profile.ray(x_m, turn);
+        let wet = self.profile.layers(start.x, &direction).wet;
+        let area_m2 = along.cross(&around).norm();
+        Sample { place, p_t: self.profile.skin_t(x_m, turn), area_m2, wet }
+    }
+
+    /// From one side of a place to the other, along the finger and around it.
+    fn edges(&self, x_m: f64, turn: f64, [far_m, far]: [f64; 2]) -> [Vector3<f64>; 2] {
+        let skin_t = |x_m, turn| self.profile.skin_t(x_m, turn);
+        [
+            skin_t(x_m + far_m, turn) - skin_t(x_m - far_m, turn),
+            skin_t(x_m, turn + far) - skin_t(x_m, turn - far),
+        ]
+    }
+
+    /// The point of it at `x_m` along the finger and `turn` from −z towards +y, with its outward
+    /// normal, in `T`.
+    pub fn at(&self, x_m: f64, turn: f64) -> (Point3<f64>, UnitVector3<f64>) {
+        let [along, around] = self.edges(x_m, turn, [1e-3 * self.steps[0], 1e-3 * self.steps[1]]);
+        let (_, ray) = self.profile.ray(x_m, turn);
+        let normal = UnitVector3::try_new(along.cross(&around), 0.0).unwrap_or(ray);
+        let outward = if normal.dot(&ray) < 0.0 { -normal } else { normal };
+        (self.profile.skin_t(x_m, turn), outward)
+    }
+
+    /// The point in `T` at which it meets `body` when the fingertip stands at `x_wt`, and how far it
+    /// would have to go on until it has given way by `give_m`; negative if it has gone too far.
+    ///
+    /// A soft finger tells contact when a certain volume of liquid is displaced: that which a
+    /// sphere of its own radius displaces by going in so far, V = π r give². So a blunt place gives
+    /// way by less than a sharp one. A rigid finger gives way alike everywhere.
+    pub fn meet(&self, body: &KnownBody, x_wt: &Isometry3<f64>, give_m: f64) -> (Point3<f64>, f64) {
+        match self.is_soft {
+            true => self.meet_soft(body, x_wt, give_m),
+            false => {
+                let (p_t, distance_m) = self.nearest(body, x_wt);
+                (p_t, distance_m + give_m)
+            }
+        }
+    }
+
+    /// The volume within `level` of the body is V(level) = Σ area · max(0, level − distance).
+    fn meet_soft(
+        &self,
+        body: &KnownBody,
+        x_wt: &Isometry3<f64>,
+        give_m: f64,
+    ) -> (Point3<f64>, f64) {
+        let wet = self.points.iter().filter(|point| point.wet);
+        let mut met: Vec<(f64, &Sample)> =
+            wet.map(|point| (body.distance_m(&(x_wt * point.p_t)), point)).collect();
+        let foremost_m = met.iter().map(|(far_m, _)| *far_m).fold(f64::INFINITY, f64::min);
+        met.retain(|(far_m, _)| *far_m < foremost_m + DEEPEST * self.profile.radius_m);
+        let give_m = give_m.max(0.0);
+        let wanted_m3 = PI * self.profile.radius_m * give_m * give_m;
+        // From above, where the curve is steeper, it is never overshot.
+        let mut level_m = foremost_m + DEEPEST * self.profile.radius_m;
+        for _ in 0..STEPS {
+            let under = met.iter().filter(|(far_m, _)| *far_m < level_m);
+            let (volume_m3, area_m2) = under.fold((0.0, 0.0), |(volume, area), (far_m, point)| {
+                (volume + point.area_m2 * (level_m - far_m), area + point.area_m2)
+            });
+            if area_m2 == 0.0 || (volume_m3 - wanted_m3).abs() <= 1e-12 * wanted_m3 {
+                break;
+            }
+            level_m -= (volume_m3 - wanted_m3) / area_m2;
+        }
+        let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
+        for (far_m, point) in met.iter().filter(|(far_m, _)| *far_m < level_m) {
+            let weight = point.area_m2 * (level_m - far_m);
+            sum += point.p_t.coords * weight;
+            weights += weight;
+        }
+        let p_t = if weights > 0.0 { sum / weights } else { Vector3::zeros() };
+        (p_t.into(), level_m)
+    }
+
+    /// Its point nearest to `body` when the fingertip stands at `x_wt`, and how far that is from
+    /// it; negative inside.
+    pub fn nearest(&self, body: &KnownBody, x_wt: &Isometry3<f64>) -> (Point3<f64>, f64) {
+        let far = |p_t: &Point3<f64>| body.distance_m(&(x_wt * p_t));
+        let first = |best: ([f64; 2], f64), point: &Sample| {
+            let distance_m = far(&point.p_t);
+            if distance_m < best.1 { (point.place, distance_m) } else { best }
+        };
+        let (mut place, mut distance_m) = self.points.iter().fold(([0.0; 2], f64::INFINITY), first);
+        let at = |[x_m, turn]: [f64; 2]| {
+            let x_m = x_m.clamp(-self.profile.length_m, self.profile.radius_m);
+            self.profile.skin_t(x_m, turn)
+        };
+        let mut part = 0.5;
+        while part > REFINED {
+            let around = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+            let tried = around.map(|[along, across]| {
+                let step = [along * self.steps[0] * part, across * self.steps[1] * part];
+                let place = [place[0] + step[0], place[1] + step[1]];
+                (place, far(&at(place)))
+            });
+            let better = tried.into_iter().filter(|(_, tried_m)| *tried_m < distance_m);
+            match better.min_by(|a, b| a.1.total_cmp(&b.1)) {
+                Some(better) => (place, distance_m) = better,
+                None => part *= 0.5,
+            }
+        }
+        (at(place), distance_m)
+    }
+
+    /// Whether it gives way.
+    pub fn is_soft(&self) -> bool {
+        self.is_soft
+    }
+
+    /// From the axis to the skin at the sides.
+    pub fn radius_m(&self) -> f64 {
+        self.profile.radius_m
+    }
+
+    /// Length behind the origin of `T`.
+    pub fn length_m(&self) -> f64 {
+        self.profile.length_m
     }
 }

@@ -5,17 +5,12 @@
 //! any probe and fits what they tell. [`icp`] lays a cloud of contacts onto a mesh.
 
 pub mod design;
-pub mod found;
 pub mod hand_eye;
 pub mod icp;
-pub mod known_body;
-pub mod outline;
+mod known_body;
 mod register;
-mod rehearsal;
 
-pub use design::{Design, DesignError};
-pub use found::Found;
+pub use design::Design;
 pub use hand_eye::{HandEye, HandEyeFit, RegistrationTouch};
-pub use known_body::KnownBody;
-pub use outline::Outline;
-pub use register::{RegisterError, Registered, conclude, register};
+pub use known_body::{KnownBody, Outline};
+pub use register::{Registered, conclude, register};

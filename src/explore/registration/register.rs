@@ -4,15 +4,16 @@ use super::design::{Design, pressed_m};
 use super::hand_eye::{
     HandEye, HandEyeFit, PARAMETERS, RegistrationTouch, depths_m, parameters, undetermined,
 };
-use super::known_body::KnownBody;
-use super::outline::Outline;
+use super::known_body::{KnownBody, Outline};
 use crate::backend::Fault;
+use crate::error::Invalid;
 use crate::explore::probe::{Probe, Touch};
-use crate::math::least_squares::{FitError, fit};
+use crate::math::least_squares::fit;
+use crate::math::pose::parts;
 use crate::robot::Robot;
 use crate::task::touch::TouchSettings;
 use nalgebra::Isometry3;
-use thiserror::Error;
+use toml_edit::{Array, DocumentMut, Item, Table, value};
 
 /// What touches of a known body told.
 #[derive(Clone, Debug)]
@@ -43,39 +44,46 @@ impl Registered {
     pub fn tool(&self, before: Option<Isometry3<f64>>) -> Isometry3<f64> {
         before.map_or(self.found.correction, |before| before * self.found.correction)
     }
+
+    /// The keys of a scene's `[arm]` and `[object]` that were found (of the body a ball's centre,
+    /// or a plate's point with +y along its normal), and how sure they are, as TOML; `before` as in
+    /// [`tool`](Self::tool).
+    pub fn tables(&self, before: Option<Isometry3<f64>>) -> String {
+        let [a, b, c, d, e, f, g, h, i, ..] = self.sds;
+        let mut sure = Table::new();
+        sure["tool_position_sd_m"] = value(Array::from_iter([a, b, c]));
+        // Of small turns about the axes of the mount.
+        sure["tool_turn_sd_deg"] = value(Array::from_iter([d, e, f].map(f64::to_degrees)));
+        // Of a ball along x, y and z; of a plate along its normal, then of its tilts in rad.
+        sure["body_sd"] = value(Array::from_iter([g, h, i]));
+        sure["undetermined"] = value(Array::from_iter(self.undetermined.iter().copied()));
+        sure["residual_rms_m"] = value(self.rms_m);
+        sure["give_m"] = value(self.found.give_m);
+        sure["gain"] = value(self.found.gain);
+        sure["condition"] = value(self.condition);
+        for (key, count) in
+            [("contacts", self.contacts), ("outliers", self.outliers), ("lost", self.lost)]
+        {
+            sure[key] = value(count as i64);
+        }
+        if let Some(fault) = &self.ended {
+            sure["ended"] = value(fault.to_string());
+        }
+        let mut tables = DocumentMut::new();
+        tables["arm"] = pose_table("tool_", &self.tool(before));
+        tables["object"] = pose_table("", &self.found.body.x_wo());
+        tables["registration"] = sure.into();
+        tables.to_string()
+    }
 }
 
-/// Why nothing was found.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum RegisterError {
-    /// The body or the arm could not go on.
-    #[error("touch {touch} of {of}: {fault}")]
-    Fault {
-        /// Which touch.
-        touch: usize,
-        /// Of how many.
-        of: usize,
-        /// Why.
-        fault: Fault,
-    },
-    /// The probe does not say where the finger was.
-    #[error("this body does not say where its finger was when it touched")]
-    NoPose,
-    /// Too few touches met the body.
-    #[error(
-        "{contacts} of {of} touches met the body, and {least} are needed; is it where --at says?"
-    )]
-    FewContacts {
-        /// How many met it.
-        contacts: usize,
-        /// Of how many.
-        of: usize,
-        /// How many are needed.
-        least: usize,
-    },
-    /// The touches cannot be fitted.
-    #[error(transparent)]
-    Fit(#[from] FitError),
+/// The place and the turn of a pose as a scene's keys, which begin with `prefix`.
+pub(super) fn pose_table(prefix: &str, pose: &Isometry3<f64>) -> Item {
+    let (position_m, rotation_deg) = parts(pose);
+    let mut table = Table::new();
+    table[&format!("{prefix}position_m")] = value(Array::from_iter(position_m));
+    table[&format!("{prefix}rotation_deg")] = value(Array::from_iter(rotation_deg));
+    table.into()
 }
 
 /// Touches the body as `design` says, with the finger of `robot`, by a probe that touches as
@@ -89,7 +97,7 @@ pub fn register(
     touch: &TouchSettings,
     (body, design): (&KnownBody, &Design),
     made: &mut dyn FnMut(&Touch),
-) -> Result<Registered, RegisterError> {
+) -> Result<Registered, Invalid> {
     let of = design.approaches.len();
     let pressed_m = pressed_m(robot, touch);
     let mut touches = Vec::with_capacity(of);
@@ -105,7 +113,9 @@ pub fn register(
         made(&ending);
         made_count += 1;
         if let Touch::Contact(contact) = &ending {
-            let x_wt = probe.tip().ok_or(RegisterError::NoPose)?;
+            let x_wt = probe.tip().ok_or_else(|| {
+                Invalid::new("this body does not say where its finger was when it touched")
+            })?;
             let felt_t = Some(x_wt.inverse_transform_point(&contact.p_wc));
             touches.push(RegistrationTouch { x_wt, pressed_m, felt_t });
         }
@@ -113,8 +123,13 @@ pub fn register(
     let least = PARAMETERS;
     if touches.len() < least {
         return Err(match ended {
-            Some((touch, fault)) => RegisterError::Fault { touch, of, fault },
-            None => RegisterError::FewContacts { contacts: touches.len(), of, least },
+            Some((touch, fault)) => {
+                Invalid::new(fault.to_string()).at(format!("touch {touch} of {of}"))
+            }
+            None => Invalid::new(format!(
+                "{} of {of} touches met the body, and {least} are needed; is it where --at says?",
+                touches.len()
+            )),
         });
     }
     let told = conclude(&touches, robot, body, made_count)?;
@@ -130,10 +145,11 @@ pub fn conclude(
     robot: &Robot,
     body: &KnownBody,
     of: usize,
-) -> Result<Registered, RegisterError> {
+) -> Result<Registered, Invalid> {
     let outline = Outline::of(robot);
     let problem = HandEyeFit::new(&outline, touches);
-    let fitted = fit(&problem, &HandEyeFit::start(*body))?;
+    let fitted = fit(&problem, &HandEyeFit::start(*body))
+        .map_err(|error| Invalid::new(error.to_string()))?;
     let named = parameters(body);
     let depths_m = depths_m(&fitted, touches.len());
     let used: Vec<f64> =

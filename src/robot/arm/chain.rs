@@ -1,8 +1,10 @@
-//! A serial chain: where its tip is and how it moves.
+//! A serial chain: where its tip is and how it moves, and the capsules that move with its links.
 
-use super::capsule::LinkCapsule;
+use crate::error::Invalid;
+use crate::geometry::sweep::Capsule;
 use nalgebra::{Isometry3, Point3, SMatrix, SVector, UnitQuaternion, UnitVector3, Vector3};
 use std::sync::Arc;
+use thiserror::Error;
 
 /// Most joints of a chain.
 pub const MAX_JOINTS: usize = 7;
@@ -63,6 +65,58 @@ impl Joint {
             Kind::Prismatic => (self.origin_m + self.axis.scale(q), x.rotation),
         };
         Isometry3::from_parts((x * Point3::from(origin_m)).into(), rotation)
+    }
+}
+
+/// A part of a robot that a capsule covers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// A link of the arm.
+    Link,
+    /// The adapter between flange and finger.
+    Tool,
+    /// The finger.
+    Finger,
+}
+
+/// A capsule that moves with a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinkCapsule {
+    /// Name in messages: of its link, `tool` or `finger`.
+    pub name: Arc<str>,
+    /// The part of the robot that it covers.
+    pub part: Part,
+    /// Number of joints that move it: the place of its frame in
+    /// [`Chain::frames`].
+    pub link: usize,
+    /// Ends of its axis in that frame.
+    pub ends: [Point3<f64>; 2],
+    /// Radius.
+    pub radius_m: f64,
+    /// Whether its link is too near to the foot to come to the object or the table.
+    pub near_base: bool,
+    /// Whether what the hand carries can fold back onto it.
+    pub folds: bool,
+}
+
+impl LinkCapsule {
+    /// Where it is when its link's frame stands at `x_wl`.
+    pub fn at(&self, x_wl: &Isometry3<f64>) -> Capsule {
+        let [p0_w, p1_w] = self.ends.map(|p| x_wl * p);
+        Capsule { p0_w, p1_w, radius_m: self.radius_m }
+    }
+
+    /// Whether it can meet `other` in the joints' limits and must not: they are three joints apart.
+    /// Nearer neighbours touch where they are joined; of those one that [`folds`](Self::folds) is
+    /// met by what the hand carries.
+    pub fn may_meet(&self, other: &Self) -> bool {
+        let (near, far) = if self.link < other.link { (self, other) } else { (other, self) };
+        far.link >= near.link + 3 || (near.folds && far.is_carried())
+    }
+
+    /// Whether it is beyond the flange: the tool or the finger.
+    pub fn is_carried(&self) -> bool {
+        self.part != Part::Link
     }
 }
 
@@ -176,4 +230,20 @@ impl Chain {
         }
         (x_wt, jacobian)
     }
+}
+
+/// The error of a command or posture that cannot be computed.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ArmError {
+    /// The wrong number of joints, or a position, goal or period that is not a usable number.
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
+    /// No posture within the joint limits brings the tip there.
+    #[error("out of reach: the tip stays {distance_m} m and {angle_rad} rad away")]
+    OutOfReach {
+        /// Smallest distance found.
+        distance_m: f64,
+        /// Angle at that distance.
+        angle_rad: f64,
+    },
 }

@@ -1,7 +1,6 @@
 //! An arm's model: a file with its joints, home posture, collision capsules and topics.
 
-use super::capsule::LinkCapsule;
-use super::chain::{Joint, Joints, Kind, MAX_JOINTS};
+use super::chain::{Joint, Joints, Kind, LinkCapsule, MAX_JOINTS, Part};
 use crate::config::{Checked, ConfigError, Loader, Rules};
 use crate::files;
 use crate::math::pose::pose;
@@ -185,10 +184,8 @@ pub fn mjcf(model: &str) -> Result<Option<String>, ConfigError> {
     }
     let Some(file) = ArmModel::load(model)?.mjcf else { return Ok(None) };
     let path = Path::new(model).with_file_name(file);
-    match files::text(&path, files::TEXT_MAX) {
-        Ok(text) => Ok(Some(text)),
-        Err(cause) => Err(ConfigError::Unreadable { path, cause }),
-    }
+    let text = files::text(&path, files::TEXT_MAX);
+    text.map(Some).map_err(|cause| ConfigError::unreadable(&path, &cause))
 }
 
 impl JointModel {
@@ -232,6 +229,7 @@ impl CapsuleModel {
     fn on(&self, link: usize) -> LinkCapsule {
         LinkCapsule {
             name: self.name.as_deref().unwrap_or(&self.link).into(),
+            part: Part::Link,
             link,
             ends: [self.from_m.into(), self.to_m.into()],
             radius_m: self.radius_m,

@@ -89,7 +89,7 @@ impl ArmSettings {
         let home = self.home_deg.clone().unwrap_or_else(|| model.home());
         self.check_home(&model).map_or(Ok(()), |(key, value, allowed)| {
             let origin = Origin::File { path: (&self.model).into(), line: None };
-            Err(ConfigError::NotAllowed { origin, key: format!("arm.{key}"), value, allowed })
+            Err(ConfigError::not_allowed(origin, format!("arm.{key}"), value, allowed))
         })?;
         Ok(Chain {
             base: pose(self.base_position_m, self.base_rotation_deg),

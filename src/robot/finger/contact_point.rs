@@ -1,8 +1,7 @@
 //! From a tactile frame to the point of contact (Eq. 1 of Yi et al. 2016).
 
 use super::electrode_table;
-use super::frame::FULL_SCALE_COUNTS;
-use super::frame::{ELECTRODES, Frame};
+use super::frame::{FULL_SCALE_COUNTS, Frame};
 use super::shape::Finger;
 use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
@@ -30,35 +29,6 @@ pub enum ContactEstimate {
     Plane,
 }
 
-/// What the sensor reads untouched.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tare {
-    /// E1 to E19.
-    pub electrode_counts: Option<[f64; ELECTRODES]>,
-    /// PDC.
-    pub pdc_counts: Option<f64>,
-}
-
-impl Tare {
-    /// Means over frames without contact; a channel that one of them lacks is none.
-    pub fn of(frames: &[Frame]) -> Self {
-        let count = frames.len() as f64;
-        let mean = |value: &dyn Fn(&Frame) -> Option<f64>| {
-            let sum: Option<f64> = frames.iter().map(value).sum();
-            sum.filter(|_| count > 0.0).map(|sum| sum / count)
-        };
-        let mut electrode_counts = Some([0.0; ELECTRODES]);
-        for i in 0..ELECTRODES {
-            let electrode = mean(&|frame| frame.electrode_counts.map(|counts| counts[i]));
-            match (&mut electrode_counts, electrode) {
-                (Some(counts), Some(electrode)) => counts[i] = electrode,
-                _ => electrode_counts = None,
-            }
-        }
-        Self { electrode_counts, pdc_counts: mean(&|frame| frame.pdc_counts) }
-    }
-}
-
 /// Where the skin is touched, in `T`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointOfContact {
@@ -78,7 +48,7 @@ pub struct PointOfContact {
 /// others rise on the far side, and they would draw the centroid into the core. Their positions are
 /// a BioTac's in the size of `finger`. An open electrode says nothing. None without electrodes, or
 /// if none fell.
-pub fn locate(finger: &Finger, tare: &Tare, frame: &Frame) -> Option<PointOfContact> {
+pub fn locate(finger: &Finger, tare: &Frame, frame: &Frame) -> Option<PointOfContact> {
     let (rest, now) = (tare.electrode_counts?, frame.electrode_counts?);
     let (mut sum, mut weights, mut fall_counts) = (Vector3::zeros(), 0.0, 0.0);
     for (i, position) in electrode_table::positions_t(finger.scale()).iter().enumerate() {

@@ -52,4 +52,24 @@ impl Frame {
             .chain(pac_counts.iter().flatten());
         all.copied().all(f64::is_finite)
     }
+
+    /// Means of the electrodes and PDC over `frames`, as a tare takes them of a sensor that touches
+    /// nothing; a channel that one of them lacks is none.
+    pub fn mean(frames: &[Self]) -> Self {
+        let count = frames.len() as f64;
+        let mean = |value: &dyn Fn(&Self) -> Option<f64>| {
+            let sum: Option<f64> = frames.iter().map(value).sum();
+            sum.filter(|_| count > 0.0).map(|sum| sum / count)
+        };
+        let mut electrode_counts = Some([0.0; ELECTRODES]);
+        for i in 0..ELECTRODES {
+            let electrode = mean(&|frame| frame.electrode_counts.map(|counts| counts[i]));
+            match (&mut electrode_counts, electrode) {
+                (Some(counts), Some(electrode)) => counts[i] = electrode,
+                _ => electrode_counts = None,
+            }
+        }
+        let pdc_counts = mean(&|frame| frame.pdc_counts);
+        Self { electrode_counts, pdc_counts, ..Self::default() }
+    }
 }

@@ -5,14 +5,11 @@ pub mod contact_point;
 pub mod detection;
 pub mod electrode_table;
 pub mod frame;
-pub mod motion;
 pub mod plane_fit;
 pub mod profile;
-pub mod rest;
 pub mod shape;
 
-pub use contact_point::{PointOfContact, Tare};
-pub use detection::{Detection, Detector};
+pub use contact_point::PointOfContact;
+pub use detection::{Detection, Detector, Rest};
 pub use frame::Frame;
-pub use motion::TipMotion;
-pub use shape::Finger;
+pub use shape::{Finger, TipMotion};

@@ -5,7 +5,7 @@
 //! closes gaps on one side and opens them on the other, as no contact does, so both can be told
 //! apart. Gaps follow from counts by Z = Z0 g0/g.
 
-use super::contact_point::{OPEN_COUNTS, PointOfContact, Tare, locate};
+use super::contact_point::{OPEN_COUNTS, PointOfContact, locate};
 use super::electrode_table::{self, SPREAD_M};
 use super::frame::{ELECTRODES, FULL_SCALE_COUNTS, Frame};
 use super::profile::Profile;
@@ -137,7 +137,7 @@ impl PlaneFit {
 
     /// Where the planes that explain a frame press on average; none where Eq. 1 says nothing
     /// either.
-    pub fn locate(&self, tare: &Tare, frame: &Frame) -> Option<PointOfContact> {
+    pub fn locate(&self, tare: &Frame, frame: &Frame) -> Option<PointOfContact> {
         let found = locate(&self.finger, tare, frame)?;
         let (rest, now) = (tare.electrode_counts?, frame.electrode_counts?);
         let impedance = |counts: f64| FULL_SCALE_COUNTS / counts.max(1.0) - 1.0;

@@ -4,7 +4,7 @@ use super::sample::{Sample, Wrench};
 use super::{SensedContact, Sensor};
 use crate::robot::finger::contact_point::{self, ContactEstimate};
 use crate::robot::finger::plane_fit::PlaneFit;
-use crate::robot::finger::{Detection, Detector, Finger, Frame, Tare};
+use crate::robot::finger::{Detection, Detector, Finger, Frame};
 
 /// Finds contacts in the frames of a BioTac.
 pub struct BioTac {
@@ -14,7 +14,7 @@ pub struct BioTac {
     pressure_limit_counts: f64,
     plane_fit: Option<PlaneFit>,
     touching: bool,
-    tare: Option<Tare>,
+    tare: Option<Frame>,
     frames: Vec<Frame>,
     last_s: Option<f64>,
 }
@@ -61,7 +61,7 @@ impl Sensor for BioTac {
     }
 
     fn tare(&mut self) {
-        self.tare = Some(Tare::of(&self.frames));
+        self.tare = Some(Frame::mean(&self.frames));
         self.detector.tare(&self.frames);
         self.touching = false;
     }
@@ -94,8 +94,7 @@ impl Sensor for BioTac {
     }
 
     fn locate(&self, finger: &Finger) -> Option<SensedContact> {
-        let mean = Tare::of(&self.frames);
-        let mean = Frame { electrode_counts: mean.electrode_counts, ..Frame::default() };
+        let mean = Frame::mean(&self.frames);
         let tare = self.tare.as_ref()?;
         let mut found = contact_point::locate(finger, tare, &mean)?;
         if let Some(plane_fit) = &self.plane_fit {

@@ -50,7 +50,7 @@ pub fn belief(ball_m: f64, radius_m: f64) -> ImplicitSurface {
 pub fn belief_with(settings: SpaceSettings, ball_m: f64, radius_m: f64) -> ImplicitSurface {
     let ball = Ball { centre_w: Point3::origin(), radius_m: ball_m, lowest_m: None };
     let finger = Finger { radius_m, pitch_deg: 0.0, ..Finger::default() };
-    let task = Task::new(ball.clone(), TouchSettings::default(), &finger).unwrap();
+    let task = Task::new(ball, TouchSettings::default(), &finger).unwrap();
     ImplicitSurface::new(Scope::new(ball, &task, (&finger, false)), settings)
 }
 

@@ -9,7 +9,7 @@ use crate::geometry::mesh::Mesh;
 use crate::geometry::spread::{Spot, over_surface};
 use crate::sim::Environment;
 use crate::sim::environment::Shape;
-use crate::task::around;
+use crate::task::approach::attitude;
 use nalgebra::{Point3, UnitVector3};
 
 /// Points spread over each surface. Of ten objects of the suite against each of two wavy copies and
@@ -50,7 +50,7 @@ impl TrueShape {
             return Some(shape);
         }
         let finger = &environment.scene().finger;
-        let axis_w = |ahead_w: &UnitVector3<f64>| around::attitude(ahead_w) * finger.axis_a();
+        let axis_w = |ahead_w: &UnitVector3<f64>| attitude(ahead_w) * finger.axis_a();
         let (radius_m, lowest_m) = (finger.radius_m, ball.lowest_m);
         Some(shape.with_reach(&Reach { radius_m, axis_w: &axis_w, lowest_m }))
     }

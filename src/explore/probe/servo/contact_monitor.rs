@@ -6,18 +6,16 @@ use crate::robot::sensor::{BioTac, ForceTorqueTip, IdealSensor, SensedContact, S
 use crate::task::touch::TouchSettings;
 use nalgebra::Vector3;
 
-type MakeSensor = fn(&TouchSettings, &Finger) -> Box<dyn Sensor>;
-
 /// The sensors that a touch asks, in this order: the first that a body has decides where contacts
 /// are.
-pub(super) const SENSORS: [MakeSensor; 3] = [
-    |_, _| Box::new(IdealSensor::default()),
-    |settings, finger| {
-        let TouchSettings { detection, point, pressure_limit_counts, .. } = settings;
-        Box::new(BioTac::new(finger, detection.clone(), *point, *pressure_limit_counts))
-    },
-    |_, _| Box::new(ForceTorqueTip::default()),
-];
+fn sensors(settings: &TouchSettings, finger: &Finger) -> Vec<Box<dyn Sensor>> {
+    let TouchSettings { detection, point, pressure_limit_counts, .. } = settings;
+    vec![
+        Box::new(IdealSensor::default()),
+        Box::new(BioTac::new(finger, detection.clone(), *point, *pressure_limit_counts)),
+        Box::new(ForceTorqueTip::default()),
+    ]
+}
 
 /// What ends an approach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +41,7 @@ impl ContactMonitor {
     pub(super) fn new(settings: &TouchSettings, finger: &Finger) -> Self {
         Self {
             settings: settings.clone(),
-            sensors: SENSORS.map(|make| make(settings, finger)).into(),
+            sensors: sensors(settings, finger),
             force_n: 0.0,
             force_at_rest_n: None,
             forces: (Vector3::zeros(), 0.0),

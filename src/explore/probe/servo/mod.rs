@@ -1,32 +1,26 @@
 //! One touch by a body that moves and feels: travel, tare, approach, settle, read, retract.
 
-mod arm_reach;
 mod contact_monitor;
-mod line;
-mod pace;
-mod round;
+mod reach;
 mod trajectory;
-mod travel;
-mod tryout;
-mod way;
 
 use super::{Contact, Probe, Swept, Touch, refuse_unless_finite};
-use crate::backend::{Backend, Command, Fault, Reading};
+use crate::backend::{Backend, Command, Fault};
 use crate::explore::control::{Controller, Goal, posture};
 use crate::robot::Robot;
 use crate::robot::arm::{ArmError, Joints};
 use crate::robot::finger::frame::FRAME_S;
 use crate::robot::sensor::{SensedContact, Sensor};
-use crate::task::Approach;
 use crate::task::touch::TouchSettings;
+use crate::task::{Approach, Ball};
 use contact_monitor::{ApproachEnd, ContactMonitor};
-use nalgebra::Isometry3;
-use trajectory::Path;
+use nalgebra::{Isometry3, UnitVector3, Vector3};
+use reach::Leg;
+use trajectory::{Path, rounds};
 
 pub use crate::task::approach::BEYOND_M;
-pub use arm_reach::ArmReach;
-pub use way::{OutOfReach, check_reach};
-pub(super) use way::{standoff, turning_point};
+pub use reach::{ArmReach, check_reach};
+pub(super) use reach::{standoff, turning_point};
 
 /// A movement has arrived when the tip is this near to its end; chosen: below what a touch
 /// resolves.
@@ -35,6 +29,9 @@ const ARRIVED_M: f64 = 5e-5;
 /// A finger that is no farther beyond the stand-off goes there at once; chosen: less than any
 /// object is high.
 const DEEPER_M: f64 = 5e-3;
+
+/// Joints are home when each is this near; chosen, as for a finger that is turned.
+const HOME_RAD: f64 = 2e-3;
 
 /// Drives any [`Backend`] through touches. The same code drives simulators, recordings and the
 /// real arm: it knows the robot, how to touch, and what it is told of each touch.
@@ -45,19 +42,14 @@ pub struct Servo {
     settings: TouchSettings,
     monitor: ContactMonitor,
     command: Command,
-    state: State,
+    /// Of the last reading.
+    time_s: f64,
+    q: Vec<f64>,
     swept: Option<Swept>,
     /// Where the last contact was read.
     tip: Option<Isometry3<f64>>,
     /// Of an arm, which tries a way around an object out before it goes.
     reach: Option<ArmReach>,
-}
-
-/// What is kept of the last reading.
-#[derive(Default)]
-struct State {
-    time_s: f64,
-    q: Vec<f64>,
 }
 
 impl Servo {
@@ -74,8 +66,9 @@ impl Servo {
         body.capabilities().fit(&robot.chain)?;
         let control = Controller::new(robot.chain.clone(), body.capabilities().period_s)
             .map_err(|cause| Fault::NoCommand { time_s: 0.0, cause })?;
-        let mut state = State::default();
-        state.take(body.reset(seed)?)?;
+        let reading = body.reset(seed)?;
+        reading.check()?;
+        let (time_s, q) = (reading.time_s, reading.q.clone());
         let reach = ArmReach::new(&robot, &settings);
         Ok(Self {
             monitor: ContactMonitor::new(&settings, &robot.finger),
@@ -84,7 +77,8 @@ impl Servo {
             body,
             control,
             settings,
-            state,
+            time_s,
+            q,
             swept: None,
             tip: None,
             reach,
@@ -99,7 +93,7 @@ impl Servo {
 
     /// Pose of the fingertip by forward kinematics.
     fn x_wt(&mut self) -> Isometry3<f64> {
-        let x_wt = self.control.x_wt(&self.state.q);
+        let x_wt = self.control.x_wt(&self.q);
         x_wt.unwrap_or(self.control.chain().base)
     }
 
@@ -109,9 +103,8 @@ impl Servo {
 
     /// One tick towards `goal`.
     fn tick(&mut self, goal: &Goal) -> Result<(), Fault> {
-        let State { time_s, q } = &self.state;
-        let no_command = |cause| Fault::NoCommand { time_s: *time_s, cause };
-        let motion = self.control.step(q, goal).map_err(no_command)?;
+        let motion = self.control.step(&self.q, goal);
+        let motion = motion.map_err(|cause| Fault::NoCommand { time_s: self.time_s, cause })?;
         self.carry_out(&motion.qdot)
     }
 
@@ -119,10 +112,12 @@ impl Servo {
     fn carry_out(&mut self, qdot: &Joints) -> Result<(), Fault> {
         self.command.qdot.iter_mut().zip(qdot.iter()).for_each(|(to, from)| *to = *from);
         let reading = self.body.step(&self.command)?;
-        self.state.take(reading)?;
+        reading.check()?;
+        self.time_s = reading.time_s;
+        self.q.clone_from(&reading.q);
         self.monitor.take(reading);
         match self.monitor.last_sample_s() {
-            Some(heard_s) if self.state.time_s - heard_s > SILENCE_S => {
+            Some(heard_s) if self.time_s - heard_s > SILENCE_S => {
                 Err(Fault::Lost { time_s: heard_s })
             }
             _ => Ok(()),
@@ -156,7 +151,7 @@ impl Servo {
         loop {
             let goal = path.advance(period_s);
             self.tick(&goal)?;
-            let time_s = self.state.time_s;
+            let time_s = self.time_s;
             let deadline_s = *deadline_s.get_or_insert(time_s + path.patience_s());
             if let Some(end) = self.monitor.approach_end().filter(|_| alert) {
                 return Ok(Some(end));
@@ -185,15 +180,105 @@ impl Servo {
         self.go("the way back", back, self.settings.approach_m_s, false).map(|_| ())
     }
 
+    /// Goes around what lies between two approaches to the stand-off `above`, an arm on a way that
+    /// it has tried out.
+    fn travel_around(
+        &mut self,
+        around: &Ball,
+        approach: &Approach,
+        above: Isometry3<f64>,
+    ) -> Result<(), Fault> {
+        let ahead_t = approach.r_at.inverse() * -Vector3::y_axis();
+        self.leave(around, &ahead_t)?;
+        let legs = match &self.reach {
+            None => vec![Leg::Around(above)],
+            Some(reach) => {
+                let q = self.robot.chain.joints_from(&self.q);
+                q.and_then(|q| reach.plan(&q, approach)).ok_or_else(|| self.no_way())?
+            }
+        };
+        for leg in legs {
+            match leg {
+                Leg::Around(to) => self.go_around(around, approach, to)?,
+                Leg::Home => self.go_home(around)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn go_around(
+        &mut self,
+        around: &Ball,
+        approach: &Approach,
+        to: Isometry3<f64>,
+    ) -> Result<(), Fault> {
+        let here = self.x_wt();
+        for round in rounds(around, here, to, &self.robot.finger, &approach.r_at) {
+            let path = Path::round(round, self.settings.travel_m_s);
+            self.follow("the stand-off", path, false)?;
+        }
+        Ok(())
+    }
+
+    /// Brings all joints home together, from where an arm comes to all that it reaches; on a line
+    /// that is tried out from where they really are.
+    fn go_home(&mut self, around: &Ball) -> Result<(), Fault> {
+        let q = self.robot.chain.joints_from(&self.q);
+        let line = self.reach.as_ref().zip(q).and_then(|(reach, q)| reach.line_home(&q, around));
+        let mut line = line.ok_or_else(|| self.no_way())?;
+        let period_s = self.period_s();
+        let mut deadline_s = None;
+        loop {
+            let posture = line.advance(period_s);
+            let qdot = self.control.along(&self.q, &posture);
+            let qdot = qdot.map_err(|cause| Fault::NoCommand { time_s: self.time_s, cause })?;
+            self.carry_out(&qdot)?;
+            let (time_s, q) = (self.time_s, &self.q);
+            let deadline_s = *deadline_s.get_or_insert(time_s + line.patience_s());
+            let home = self.robot.chain.start();
+            let is_home = q.iter().zip(home).all(|(q, home)| (q - home).abs() < HOME_RAD);
+            if line.is_done() && is_home {
+                return Ok(());
+            }
+            if time_s > deadline_s {
+                return Err(Fault::Late { phase: "home", time_s, q: q.clone() });
+            }
+        }
+    }
+
+    /// Goes straight back out of the sphere the way the finger points, where the tip is in it:
+    /// after a touch that was broken off there may be something beside it.
+    fn leave(&mut self, around: &Ball, ahead_t: &UnitVector3<f64>) -> Result<(), Fault> {
+        let here = self.x_wt();
+        let p_wt = here.translation.vector.into();
+        if around.depth_m(&p_wt) < DEEPER_M {
+            return Ok(());
+        }
+        let out_w = around.entrance_w(&p_wt, &(here.rotation * ahead_t));
+        let out = Isometry3::from_parts(out_w.coords.into(), here.rotation);
+        let speed_m_s = self.settings.approach_m_s;
+        if let Some(reach) = &self.reach {
+            let path = Path::straight(here.translation.vector, out, speed_m_s);
+            let q = self.robot.chain.joints_from(&self.q);
+            if !q.is_some_and(|q| reach.leaves(&q, path, around)) {
+                return Err(self.no_way());
+            }
+        }
+        self.go("the way back", out, speed_m_s, false).map(|_| ())
+    }
+
+    fn no_way(&self) -> Fault {
+        Fault::NoWay { time_s: self.time_s, q: self.q.clone() }
+    }
+
     /// Why a movement to `to` has not ended in its time.
     fn overdue(&self, phase: &'static str, to: &Isometry3<f64>) -> Fault {
-        let State { time_s, q } = &self.state;
-        let time_s = *time_s;
+        let time_s = self.time_s;
         match posture(&self.robot.chain, to) {
             Err(ArmError::OutOfReach { distance_m, angle_rad }) => {
                 Fault::OutOfReach { phase, time_s, distance_m, angle_rad }
             }
-            _ => Fault::Late { phase, time_s, q: q.clone() },
+            _ => Fault::Late { phase, time_s, q: self.q.clone() },
         }
     }
 
@@ -202,9 +287,9 @@ impl Servo {
     fn rest(&mut self, x_wt: Isometry3<f64>, count: usize) -> Result<Option<ApproachEnd>, Fault> {
         self.monitor.forget();
         let here = Goal::still(x_wt);
-        let until_s = self.state.time_s + count as f64 * FRAME_S;
+        let until_s = self.time_s + count as f64 * FRAME_S;
         while self.monitor.collected() < count {
-            if self.monitor.last_sample_s().is_none() && self.state.time_s >= until_s {
+            if self.monitor.last_sample_s().is_none() && self.time_s >= until_s {
                 break;
             }
             self.tick(&here)?;
@@ -218,11 +303,11 @@ impl Servo {
     /// Stops, settles where contact was told, and reads it: what the finger overran while its
     /// servos stopped it is taken back, so that the depth does not depend on them.
     fn read(&mut self, approach: &Approach) -> Result<Option<Contact>, Fault> {
-        let until_s = self.state.time_s + self.settings.settle_s;
+        let until_s = self.time_s + self.settings.settle_s;
         let mut held = self.x_wt();
         let press_m = if self.robot.is_soft { self.settings.press_m } else { 0.0 };
         held.translation.vector += approach.direction_w().scale(press_m);
-        while self.state.time_s < until_s {
+        while self.time_s < until_s {
             self.tick(&Goal::still(held))?;
             if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
                 return Ok(None);
@@ -291,17 +376,6 @@ impl Probe for Servo {
     }
 
     fn time_s(&self) -> Option<f64> {
-        Some(self.state.time_s)
-    }
-}
-
-impl State {
-    /// # Errors
-    /// [`Fault::BadReading`] if a number that is acted on is none.
-    fn take(&mut self, reading: &Reading) -> Result<(), Fault> {
-        reading.check()?;
-        self.time_s = reading.time_s;
-        self.q.clone_from(&reading.q);
-        Ok(())
+        Some(self.time_s)
     }
 }

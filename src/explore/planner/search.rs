@@ -1,12 +1,13 @@
-//! Where an acquisition function is largest: DIRECT finds its hills, climbs go up side by side.
+//! Where an acquisition function is largest over a zone: DIRECT finds its hills, climbs go up side
+//! by side.
 //!
 //! The function is asked for whole lists of places: values of many cost less than many values.
 
+use super::plan::{Plan, Stall};
+use super::sample::uniform;
+use super::settings::PlanningSettings;
+use super::sobol;
 use crate::explore::belief::HeightField;
-use crate::explore::planner::plan::{Plan, Stall};
-use crate::explore::planner::sample::uniform;
-use crate::explore::planner::settings::PlanningSettings;
-use crate::explore::planner::sobol;
 use crate::gp::posterior::Scratch;
 use crate::math::climb::{Climb, Manner};
 use crate::math::direct::direct;
