@@ -5,8 +5,8 @@ use super::function::Function;
 use super::notice::{Notice, SizeMismatch};
 use super::scene::{Body, Object, Scene, Unit};
 use crate::config::ConfigError;
+use crate::error::Invalid;
 use crate::geometry::bvh::MeshBvh;
-use crate::geometry::error::MeshError;
 use crate::geometry::implicit::Implicit;
 use crate::geometry::import::import_with;
 use crate::geometry::mesh::Mesh;
@@ -51,7 +51,7 @@ pub enum Shape {
 pub enum EnvironmentError {
     /// The object's mesh is unusable.
     #[error(transparent)]
-    Mesh(#[from] MeshError),
+    Mesh(#[from] Invalid),
     /// The arm's model is unusable.
     #[error("{0}")]
     Arm(Box<ConfigError>),

@@ -1,8 +1,8 @@
 //! What is believed of an object before its surface is known: a body about what was met.
 
 use super::settings::PriorShape;
-use crate::geometry::extent::extent;
 use crate::geometry::implicit::Field;
+use crate::geometry::primitives::extent;
 use crate::task::Ball;
 use nalgebra::{Point3, Vector3};
 

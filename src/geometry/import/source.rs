@@ -1,5 +1,6 @@
 //! What every importer is given: the bytes of a file, and where else it may look.
 
+use crate::error::Invalid;
 use std::path::Path;
 
 /// Where the buffers of a glTF document may lie.
@@ -31,7 +32,9 @@ pub(super) struct Source<'a> {
 /// accepted take 1.3 GB as the longest of texts, an STL.
 pub(super) const BYTES_MAX: u64 = 2 << 30;
 
-/// A line as a message shows it: long ones cut.
-pub(super) fn cut(line: &str) -> String {
-    line.trim().chars().take(60).collect()
+/// A line of a text format that cannot be parsed, which the message shows cut if it is long; lines
+/// count from 1.
+pub(super) fn bad_line(line: usize, expected: &str, found: &str) -> Invalid {
+    let found: String = found.trim().chars().take(60).collect();
+    Invalid::new(format!("line {line}: expected {expected}, found \"{found}\""))
 }
