@@ -5,8 +5,7 @@
 
 use super::dense::Dense;
 use super::indefinite::NotPositiveDefinite;
-use crate::math::simd::{dot, widest};
-use pulp::NullaryFnOnce;
+use crate::math::simd::{dot, widest_fn};
 
 /// A lower triangular factor of growing order.
 #[derive(Clone, Debug, Default)]
@@ -58,7 +57,7 @@ impl Factor {
         let begin = self.rows.len();
         self.rows.extend_from_slice(&row[..=n]);
         let (done, new) = self.rows.split_at_mut(begin);
-        let pivot = new[n] - widest(SolveLower { rows: done, b: &mut new[..n] });
+        let pivot = new[n] - solve_lower(done, &mut new[..n]);
         let is_kept = pivot > f64::EPSILON * row[n] && pivot.is_finite();
         if !is_kept {
             self.rows.truncate(begin);
@@ -77,27 +76,18 @@ impl Factor {
 
     /// Replaces b by L⁻¹·b and returns bᵀ·A⁻¹·b.
     pub fn solve_lower(&self, b: &mut [f64]) -> f64 {
-        widest(SolveLower { rows: &self.rows, b })
+        solve_lower(&self.rows, b)
     }
 
     /// Replaces b by L⁻ᵀ·b.
     pub fn solve_upper(&self, b: &mut [f64]) {
-        widest(SolveUpper { rows: &self.rows, b });
+        solve_upper(&self.rows, b);
     }
 }
 
-/// See [`Factor::solve_lower`].
-struct SolveLower<'a> {
-    rows: &'a [f64],
-    b: &'a mut [f64],
-}
-
-impl NullaryFnOnce for SolveLower<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn call(self) -> f64 {
-        let Self { rows, b } = self;
+widest_fn! {
+    /// See [`Factor::solve_lower`].
+    fn solve_lower<'a>(rows: &'a [f64], b: &'a mut [f64]) -> f64 {
         for i in 0..b.len() {
             let row = row(rows, i);
             b[i] = (b[i] - dot(&row[..i], &b[..i])) / row[i];
@@ -106,18 +96,9 @@ impl NullaryFnOnce for SolveLower<'_> {
     }
 }
 
-/// See [`Factor::solve_upper`].
-struct SolveUpper<'a> {
-    rows: &'a [f64],
-    b: &'a mut [f64],
-}
-
-impl NullaryFnOnce for SolveUpper<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { rows, b } = self;
+widest_fn! {
+    /// See [`Factor::solve_upper`].
+    fn solve_upper<'a>(rows: &'a [f64], b: &'a mut [f64]) -> () {
         for i in (0..b.len()).rev() {
             let row = row(rows, i);
             b[i] /= row[i];

@@ -2,8 +2,7 @@
 
 use super::kernel::Kernel;
 use super::posterior::Posterior;
-use crate::math::simd::widest;
-use pulp::NullaryFnOnce;
+use crate::math::simd::widest_fn;
 
 /// A posterior's mean as weighted sums over what was observed, with buffers of its own.
 ///
@@ -73,14 +72,9 @@ impl MeanField {
         self.kernel.correlate_derivatives(&mut self.correlations, derivatives);
         let [first, second, _] = &self.derivatives;
         for (axis, slope) in gradient.iter_mut().enumerate() {
-            let terms = SlopeTerms {
-                heights: &self.heights,
-                slopes: &self.slopes[axis],
-                steps: &self.steps[axis],
-                along: &self.along,
-                derivatives: [first, second],
-            };
-            *slope = widest(terms) / self.lengths[axis];
+            let (slopes, steps) = (&self.slopes[axis], &self.steps[axis]);
+            let sum = slope_sum(&self.heights, slopes, steps, &self.along, [first, second]);
+            *slope = sum / self.lengths[axis];
         }
         self.mean + self.sum()
     }
@@ -91,46 +85,29 @@ impl MeanField {
         correlations.fill(0.0);
         along.fill(0.0);
         for (axis, (at, length)) in place.iter().zip(lengths.iter()).enumerate() {
-            widest(Walk {
-                at: at / length,
-                column: &columns[axis],
-                weights: &slopes[axis],
-                steps: &mut steps[axis],
-                r2: correlations,
-                along,
-            });
+            let observed = (&columns[axis][..], &slopes[axis][..]);
+            walk(at / length, observed, &mut steps[axis], correlations, along);
         }
     }
 
     fn sum(&self) -> f64 {
-        widest(Sum {
-            heights: &self.heights,
-            along: &self.along,
-            correlations: &self.correlations,
-            first: &self.derivatives[0],
-        })
+        height_sum(&self.heights, &self.along, &self.correlations, &self.derivatives[0])
     }
 }
 
 /// As many sums are kept side by side.
 const LANES: usize = 8;
 
-struct Walk<'a> {
-    at: f64,
-    column: &'a [f64],
-    weights: &'a [f64],
-    steps: &'a mut [f64],
-    r2: &'a mut [f64],
-    along: &'a mut [f64],
-}
-
-impl NullaryFnOnce for Walk<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { at, column, weights, steps, r2, along } = self;
-        let observed = column.iter().zip(weights);
+widest_fn! {
+    /// See [`MeanField::walk`]; observed are a column and the weights of its slopes.
+    fn walk<'a>(
+        at: f64,
+        observed: (&'a [f64], &'a [f64]),
+        steps: &'a mut [f64],
+        r2: &'a mut [f64],
+        along: &'a mut [f64],
+    ) -> () {
+        let observed = observed.0.iter().zip(observed.1);
         let found = steps.iter_mut().zip(r2.iter_mut().zip(along.iter_mut()));
         for ((x, weight), (step, (r2, along))) in observed.zip(found) {
             let u = at - x;
@@ -141,40 +118,30 @@ impl NullaryFnOnce for Walk<'_> {
     }
 }
 
-struct Sum<'a> {
-    heights: &'a [f64],
-    along: &'a [f64],
-    correlations: &'a [f64],
-    first: &'a [f64],
-}
-
-impl NullaryFnOnce for Sum<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn call(self) -> f64 {
-        let Self { heights, along, correlations, first } = self;
+widest_fn! {
+    /// Σ w·c − 2c′·(u·v).
+    fn height_sum<'a>(
+        heights: &'a [f64],
+        along: &'a [f64],
+        correlations: &'a [f64],
+        first: &'a [f64],
+    ) -> f64 {
         lanes(heights.len(), |i| heights[i] * correlations[i] - 2.0 * first[i] * along[i])
     }
 }
 
-struct SlopeTerms<'a> {
-    heights: &'a [f64],
-    slopes: &'a [f64],
-    steps: &'a [f64],
-    along: &'a [f64],
-    derivatives: [&'a [f64]; 2],
-}
-
-impl NullaryFnOnce for SlopeTerms<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn call(self) -> f64 {
-        let Self { heights, slopes, steps, along, derivatives: [first, second] } = self;
+widest_fn! {
+    /// Σ 2u·(w·c′ − 2c″·(u·v)) − 2c′·v along one axis.
+    fn slope_sum<'a>(
+        heights: &'a [f64],
+        slopes: &'a [f64],
+        steps: &'a [f64],
+        along: &'a [f64],
+        derivatives: [&'a [f64]; 2],
+    ) -> f64 {
         let count = heights.len();
         let [slopes, steps, along] = [slopes, steps, along].map(|all| &all[..count]);
-        let [first, second] = [first, second].map(|all| &all[..count]);
+        let [first, second] = derivatives.map(|all| &all[..count]);
         lanes(count, |i| {
             let bend = heights[i] * first[i] - 2.0 * second[i] * along[i];
             2.0 * (steps[i] * bend - first[i] * slopes[i])

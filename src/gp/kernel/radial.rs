@@ -1,8 +1,6 @@
 //! What a stationary kernel is: the formula of one correlation, and loops over many.
 
-use crate::math::simd::widest;
-use pulp::NullaryFnOnce;
-use std::marker::PhantomData;
+use crate::math::simd::widest_fn;
 
 /// A correlation that depends on the scaled squared distance r² = Σ_d ((a_d − b_d) / l_d)².
 ///
@@ -39,40 +37,24 @@ pub trait Kernel: Send + Sync {
     fn correlate_derivatives(&self, r2: &mut [f64], derivatives: [&mut [f64]; 3]);
 }
 
-/// Loops over the formulas of `R`, each written for the widest vectors.
-struct Correlate<'a, R>(&'a mut [f64], PhantomData<R>);
-
-impl<R: Radial> NullaryFnOnce for Correlate<'_, R> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        self.0.iter_mut().for_each(|r2| *r2 = R::correlation_slope(*r2).0);
+widest_fn! {
+    fn correlate<'a, R: Radial>(r2: &'a mut [f64]) -> () {
+        r2.iter_mut().for_each(|r2| *r2 = R::correlation_slope(*r2).0);
     }
 }
 
-struct CorrelateSlope<'a, R>(&'a mut [f64], &'a mut [f64], PhantomData<R>);
-
-impl<R: Radial> NullaryFnOnce for CorrelateSlope<'_, R> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        for (r2, slope) in self.0.iter_mut().zip(self.1) {
+widest_fn! {
+    fn correlate_slope<'a, R: Radial>(r2: &'a mut [f64], slopes: &'a mut [f64]) -> () {
+        for (r2, slope) in r2.iter_mut().zip(slopes) {
             (*r2, *slope) = R::correlation_slope(*r2);
         }
     }
 }
 
-/// The second and third derivatives.
-struct Curve<'a, R>(&'a [f64], &'a mut [f64], &'a mut [f64], PhantomData<R>);
-
-impl<R: Radial> NullaryFnOnce for Curve<'_, R> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        for (r2, (second, third)) in self.0.iter().zip(self.1.iter_mut().zip(self.2)) {
+widest_fn! {
+    /// The second and third derivatives.
+    fn curve<'a, R: Radial>(r2: &'a [f64], second: &'a mut [f64], third: &'a mut [f64]) -> () {
+        for (r2, (second, third)) in r2.iter().zip(second.iter_mut().zip(third)) {
             (*second, *third) = R::curvatures(*r2);
         }
     }
@@ -80,11 +62,11 @@ impl<R: Radial> NullaryFnOnce for Curve<'_, R> {
 
 impl<R: Radial> Kernel for R {
     fn correlate(&self, r2: &mut [f64]) {
-        widest(Correlate::<R>(r2, PhantomData));
+        correlate::<R>(r2);
     }
 
     fn correlate_slope(&self, r2: &mut [f64], slopes: &mut [f64]) {
-        widest(CorrelateSlope::<R>(r2, slopes, PhantomData));
+        correlate_slope::<R>(r2, slopes);
     }
 
     fn has_slopes(&self) -> bool {
@@ -92,7 +74,7 @@ impl<R: Radial> Kernel for R {
     }
 
     fn correlate_derivatives(&self, r2: &mut [f64], [first, second, third]: [&mut [f64]; 3]) {
-        widest(Curve::<R>(r2, second, third, PhantomData));
+        curve::<R>(r2, second, third);
         self.correlate_slope(r2, first);
     }
 }
