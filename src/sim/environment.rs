@@ -119,7 +119,7 @@ impl Environment {
         let object = scene.object.as_ref().ok_or(EnvironmentError::Missing { part: "object" })?;
         tell(&format!("reading {}", object.mesh.display()));
         let (mesh, report) =
-            import_with(&object.mesh, object.unit.metres() * object.scale, object.buffers())?;
+            import_with(&object.mesh, object.unit.metres() * object.scale, object.outside_buffers)?;
         tell("building the search tree");
         let bvh = MeshBvh::new(mesh.transformed(&object.x_wo()));
         Self::around(scene, Shape::Mesh { bvh, report: report.into() })

@@ -12,7 +12,7 @@ use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
-use super::source::{BYTES_MAX, Buffers, Source};
+use super::source::{BYTES_MAX, Source};
 use crate::error::Invalid;
 use crate::files;
 
@@ -235,7 +235,7 @@ fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, Invalid> {
     // Where it is in truth: `..` and links may lead anywhere.
     let real = path.canonicalize().map_err(unreadable)?;
     let folder = folder(source.path).map_err(unreadable)?;
-    if source.buffers == Buffers::Beside && !real.starts_with(folder) {
+    if !source.outside_buffers && !real.starts_with(folder) {
         return Err(Invalid::new(format!(
             "{} lies outside the mesh's folder; if that is meant, allow it by \
              object.outside_buffers = true in a scene, or by --outside-buffers",

@@ -13,11 +13,9 @@ use crate::files;
 mod accessor;
 mod gltf;
 mod obj;
-mod ply;
+pub mod ply;
 mod source;
 mod stl;
-
-pub use source::Buffers;
 
 use source::{BYTES_MAX, Source};
 
@@ -31,7 +29,7 @@ const FORMATS: &[(&str, fn(&Source) -> Result<RawMesh, Invalid>)] = &[
 ];
 
 /// Reads a mesh file, scales it by `metres_per_unit` and repairs it. Buffers that a glTF document
-/// refers to must lie [beside](Buffers::Beside) it.
+/// refers to must lie in its folder or below.
 ///
 /// The extension decides the format: OBJ, glTF (`.gltf` or `.glb`), STL, PLY. A glTF file is in
 /// metres by its specification; the scale multiplies all the same.
@@ -39,25 +37,26 @@ const FORMATS: &[(&str, fn(&Source) -> Result<RawMesh, Invalid>)] = &[
 /// # Errors
 /// If the file cannot be read or repaired; the place is the file.
 pub fn import(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshReport), Invalid> {
-    import_with(path, metres_per_unit, Buffers::Beside)
+    import_with(path, metres_per_unit, false)
 }
 
-/// As [`import`], with buffers where `buffers` allows them.
+/// As [`import`], with buffers of a glTF document anywhere if `outside_buffers`.
 ///
 /// # Errors
 /// As [`import`].
 pub fn import_with(
     path: &Path,
     metres_per_unit: f64,
-    buffers: Buffers,
+    outside_buffers: bool,
 ) -> Result<(Mesh, MeshReport), Invalid> {
-    read_and_repair(path, metres_per_unit, buffers).map_err(|fault| fault.at(path.display()))
+    read_and_repair(path, metres_per_unit, outside_buffers)
+        .map_err(|fault| fault.at(path.display()))
 }
 
 fn read_and_repair(
     path: &Path,
     metres_per_unit: f64,
-    buffers: Buffers,
+    outside_buffers: bool,
 ) -> Result<(Mesh, MeshReport), Invalid> {
     if !(metres_per_unit > 0.0 && metres_per_unit.is_finite()) {
         return Err(Invalid::new(format!(
@@ -74,7 +73,7 @@ fn read_and_repair(
         return Err(Invalid::new(format!("is a \".{extension}\" file; supported: {supported}")));
     };
     let bytes = files::bytes(path, BYTES_MAX).map_err(unreadable)?;
-    let mut raw = read(&Source { path, bytes: &bytes, buffers })?;
+    let mut raw = read(&Source { path, bytes: &bytes, outside_buffers })?;
     raw.scale(metres_per_unit);
     let (mesh, report) = repair(raw)?;
     let sha256 = mesh.sha256();

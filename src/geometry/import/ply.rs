@@ -18,7 +18,38 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// Reads a PLY file.
 pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
-    let bytes = unmarked(source.bytes);
+    let (vertices, faces) = elements(source.bytes)?;
+    if faces.is_empty() && !vertices.is_empty() {
+        return Err(Invalid::new(format!(
+            "holds {} points and no faces, as a scan does; to be touched it needs a surface: a mesh",
+            vertices.len()
+        )));
+    }
+    let mut raw = RawMesh::default();
+    raw.skipped_primitives = faces.iter().filter(|face| face.0.len() < 3).count();
+    let fans = faces.iter().filter_map(|Face(corners)| corners.split_first());
+    let triangles =
+        fans.flat_map(|(&hub, rim)| rim.array_windows().map(move |&[b, c]| [hub, b, c]));
+    raw.add_part("PLY", vertices.iter().map(|vertex| Point3::from(vertex.0)), triangles)?;
+    Ok(raw)
+}
+
+/// The vertices of a PLY file, in metres.
+///
+/// # Errors
+/// If it is broken, or a coordinate is not finite.
+pub fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, Invalid> {
+    let (vertices, _) = elements(bytes)?;
+    let is_lost = |vertex: &Vertex| !vertex.0.iter().all(|coordinate| coordinate.is_finite());
+    if let Some(lost) = vertices.iter().position(is_lost) {
+        let at_m = vertices[lost].0;
+        return Err(Invalid::new(format!("PLY: vertex {lost} is not finite: {at_m:?}")));
+    }
+    Ok(vertices.iter().map(|vertex| Point3::from(vertex.0)).collect())
+}
+
+fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), Invalid> {
+    let bytes = unmarked(bytes);
     let mut reader = Reader::new(bytes);
     let header = Parser::<Other>::new().read_header(&mut reader);
     let header = header.map_err(|error| fault(&error, bytes, &Encoding::Ascii))?;
@@ -54,19 +85,7 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
     if left > 0 {
         return Err(Invalid::new(format!("PLY: holds {left} bytes more than its header declares")));
     }
-    if faces.is_empty() && !vertices.is_empty() {
-        return Err(Invalid::new(format!(
-            "holds {} points and no faces, as a scan does; to be touched it needs a surface: a mesh",
-            vertices.len()
-        )));
-    }
-    let mut raw = RawMesh::default();
-    raw.skipped_primitives = faces.iter().filter(|face| face.0.len() < 3).count();
-    let fans = faces.iter().filter_map(|Face(corners)| corners.split_first());
-    let triangles =
-        fans.flat_map(|(&hub, rim)| rim.array_windows().map(move |&[b, c]| [hub, b, c]));
-    raw.add_part("PLY", vertices.iter().map(|vertex| Point3::from(vertex.0)), triangles)?;
-    Ok(raw)
+    Ok((vertices, faces))
 }
 
 /// Insists that an element has the properties it needs.

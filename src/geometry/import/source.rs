@@ -3,29 +3,13 @@
 use crate::error::Invalid;
 use std::path::Path;
 
-/// Where the buffers of a glTF document may lie.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Buffers {
-    /// In the folder of the document or below it, so that a mesh from a stranger opens no other
-    /// file.
-    #[default]
-    Beside,
-    /// Anywhere.
-    Anywhere,
-}
-
-impl Buffers {
-    /// Anywhere if `outside` is allowed.
-    pub fn outside(outside: bool) -> Self {
-        if outside { Self::Anywhere } else { Self::Beside }
-    }
-}
-
 /// A file that is read.
 pub(super) struct Source<'a> {
     pub path: &'a Path,
     pub bytes: &'a [u8],
-    pub buffers: Buffers,
+    /// Whether the buffers of a glTF document may lie outside its folder; otherwise a mesh of
+    /// unknown origin opens no other file.
+    pub outside_buffers: bool,
 }
 
 /// Most bytes of a mesh file, and of all buffers it refers to; chosen: the most triangles that are
