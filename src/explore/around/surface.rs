@@ -8,7 +8,7 @@ use crate::geometry::implicit::Field;
 use crate::geometry::mesh::Mesh;
 use crate::geometry::primitives::extent;
 use crate::gp::Posterior;
-use crate::gp::field::MeanField;
+use crate::gp::means::MeanField;
 use crate::task::Ball;
 use nalgebra::{Point3, Vector3};
 
