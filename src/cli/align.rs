@@ -9,7 +9,7 @@ use crate::experiment::store::write_whole;
 use crate::experiment::truth::cloud;
 use crate::explore::registration::icp::align;
 use crate::geometry::bvh::MeshBvh;
-use crate::geometry::import::{Buffers, import_with};
+use crate::geometry::import::import;
 use crate::math::pose::pose;
 use crate::sim::scene::Unit;
 use std::path::PathBuf;
@@ -50,7 +50,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let points = cloud::read(&args.cloud)?;
     let mesh = with_patience(talk, |tell| {
         tell(&format!("reading {}", args.mesh.display()));
-        import_with(&args.mesh, args.unit.metres() * args.scale, Buffers::outside(false))
+        import(&args.mesh, args.unit.metres() * args.scale)
     })?;
     let mesh = MeshBvh::new(mesh.0);
     let aligned = align(&mesh, &points, &pose(args.position, args.rotation))?;

@@ -5,7 +5,7 @@ use super::terminal::{Ending, print};
 use crate::experiment::experiment::is_plain;
 use crate::experiment::store::write_whole;
 use crate::geometry::bvh::MeshBvh;
-use crate::geometry::import::{Buffers, import_with};
+use crate::geometry::import::import_with;
 use crate::geometry::mesh::Mesh;
 use crate::math::pose::pose;
 use crate::sim::placement::{self, Facing, Found, Side, Up};
@@ -58,8 +58,7 @@ impl Args {
     }
 
     fn read(&self, metres_per_unit: f64) -> anyhow::Result<Mesh> {
-        let buffers = Buffers::outside(self.outside_buffers);
-        Ok(import_with(&self.mesh, metres_per_unit, buffers)?.0)
+        Ok(import_with(&self.mesh, metres_per_unit, self.outside_buffers)?.0)
     }
 
     fn is_here(&self) -> bool {

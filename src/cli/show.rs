@@ -11,7 +11,7 @@ use crate::experiment::store;
 use crate::experiment::store::Run;
 use crate::experiment::truth::Truth;
 use crate::files;
-use crate::geometry::import::{Buffers, import_with};
+use crate::geometry::import::import_with;
 use crate::geometry::spread::directions;
 use crate::report;
 use crate::report::png;
@@ -98,12 +98,11 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         Some("toml") if is_scene => scene(args, talk)?,
         Some("toml") => store::resolved(&Experiment::load(&args.path, &args.set)?),
         _ => {
-            let buffers = Buffers::outside(args.outside_buffers);
             let metres = args.unit.unwrap_or_default().metres();
             let path = args.path.display();
             let (_, report) = with_patience(talk, |tell| {
                 tell(&format!("reading {path}"));
-                import_with(&args.path, metres, buffers)
+                import_with(&args.path, metres, args.outside_buffers)
             })?;
             format!("{path}\n{report}\nto explore it: palpate new {path}")
         }

@@ -2,10 +2,11 @@
 //!
 //! A node of the hierarchy need not be opened if what is asked about cannot reach its box before
 //! the best hit so far. A point or segment has its distance to the box; a ray must pass the
-//! [`Slab`]s of the box; of a moving capsule, p0 must enter the [`SweptBox`], the [`Tube`]
+//! [`Slab`]s of the box; of a moving capsule, p0 must enter the grown box, the [`Tube`]
 //! about its axis must meet the box's ball, and the [`Wall`] ahead of it must meet the box. Each
 //! is a lower bound, so the largest of them is one too.
 
+use glam::Vec3A;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use obvhs::aabb::Aabb;
 
@@ -35,23 +36,9 @@ impl Box3 {
         Self { low: a.inf(b).inf(c).coords - centre, high: a.sup(b).sup(c).coords - centre }
     }
 
-    /// Squared distance to the box from `low` to `high`, in m².
-    #[inline]
-    pub fn distance_squared(&self, low: &Point3<f64>, high: &Point3<f64>) -> f64 {
-        let gap = (self.low - high.coords).sup(&(low.coords - self.high));
-        gap.sup(&Vector3::zeros()).norm_squared()
-    }
-}
-
-/// What a box grows by, so that a moving capsule meets the box no earlier than a ray from its end
-/// p0 meets the grown box: the Minkowski sum with the bounding box of the capsule.
-pub(super) struct SweptBox {
-    low: Vector3<f64>,
-    high: Vector3<f64>,
-}
-
-impl SweptBox {
-    pub fn new(capsule: &Capsule) -> Self {
+    /// What a box grows by, so that a moving capsule meets the box no earlier than a ray from its
+    /// end p0 meets the grown box: the Minkowski sum with the bounding box of the capsule.
+    pub fn swept(capsule: &Capsule) -> Self {
         let draw = capsule.p0_w - capsule.p1_w;
         let zero = Vector3::zeros();
         Self {
@@ -61,8 +48,15 @@ impl SweptBox {
     }
 
     #[inline]
-    pub fn grown(&self, node: &Box3) -> Box3 {
-        Box3 { low: node.low + self.low, high: node.high + self.high }
+    pub fn grown(&self, by: &Self) -> Self {
+        Self { low: self.low + by.low, high: self.high + by.high }
+    }
+
+    /// Squared distance to the box from `low` to `high`, in m².
+    #[inline]
+    pub fn distance_squared(&self, low: &Point3<f64>, high: &Point3<f64>) -> f64 {
+        let gap = (self.low - high.coords).sup(&(low.coords - self.high));
+        gap.sup(&Vector3::zeros()).norm_squared()
     }
 }
 
@@ -174,5 +168,96 @@ impl Slab {
         let (near, far) = (low.inf(&high), low.sup(&high));
         let enter = near.x.max(near.y).max(near.z).max(0.0);
         if enter <= far.x.min(far.y).min(far.z) { enter } else { f64::INFINITY }
+    }
+}
+
+// In single precision, all three coordinates at once, for queries that ask dozens of boxes and few
+// triangles. What is asked about grows, and its bound shrinks, by more than rounding moves them: no
+// bound is above the exact one.
+
+/// Twice what the operations of a bound, each of which rounds by half an ε, can be off by together.
+const ROUNDING: f32 = 5.0 * f32::EPSILON;
+
+/// A ray prepared for boxes in single precision, as [`Slab`].
+pub(super) struct SingleSlab {
+    origin: SingleBall,
+    inverse: Vec3A,
+}
+
+impl SingleSlab {
+    pub fn new(origin: &Point3<f64>, direction: &UnitVector3<f64>) -> Self {
+        // Large but finite, so that an origin in the plane of a side gives 0, not NaN.
+        let inverse = direction.map(|x| if x.abs() < 1e-30 { 1e30 } else { 1.0 / x });
+        Self { origin: SingleBall::new(origin), inverse: single(&inverse) }
+    }
+
+    /// At most the distance at which the ray enters a box, 0 from inside; infinite only if it
+    /// misses.
+    #[inline]
+    pub fn enter_m(&self, node: &Aabb) -> f64 {
+        let low = (node.min - self.origin.high) * self.inverse;
+        let high = (node.max - self.origin.low) * self.inverse;
+        let enter = low.min(high).max_element().max(0.0) * (1.0 - ROUNDING);
+        let leave = low.max(high).min_element() * (1.0 + ROUNDING);
+        if enter <= leave { f64::from(enter) } else { f64::INFINITY }
+    }
+}
+
+/// A point prepared for boxes in single precision: somewhere between two corners, which rounding
+/// makes of it.
+pub(super) struct SingleBall {
+    low: Vec3A,
+    high: Vec3A,
+}
+
+impl SingleBall {
+    pub fn new(centre: &Point3<f64>) -> Self {
+        let nearest = single(&centre.coords);
+        let slack = nearest.abs() * (2.0 * f32::EPSILON);
+        Self { low: nearest - slack, high: nearest + slack }
+    }
+
+    /// At most the squared distance to a box, in m².
+    #[inline]
+    pub fn distance_squared(&self, node: &Aabb) -> f64 {
+        let gap = (node.min - self.high).max(self.low - node.max).max(Vec3A::ZERO);
+        f64::from(gap.length_squared() * (1.0 - ROUNDING))
+    }
+}
+
+fn single(vector: &Vector3<f64>) -> Vec3A {
+    Vec3A::from(<[f32; 3]>::from(vector.map(|x| x as f32)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn coordinates(size: f64) -> impl Strategy<Value = Vector3<f64>> {
+        let any = prop_oneof![-size..size, Just(0.0), Just(size), -1e-9..1e-9f64];
+        prop::array::uniform3(any).prop_map(Vector3::from)
+    }
+
+    proptest! {
+        /// Double precision is the slow twin.
+        #[test]
+        fn no_bound_is_above_the_exact_one(
+            corner in coordinates(0.2),
+            size in coordinates(0.2),
+            (near, far) in (coordinates(0.3), coordinates(3e3)),
+            is_far in any::<bool>(),
+            towards in coordinates(1.0),
+        ) {
+            let origin = Point3::from(if is_far { far } else { near });
+            let node = Aabb::new(single(&corner), single(&(corner + size.abs())));
+            let exact = Box3::of(&node);
+            let squared = SingleBall::new(&origin).distance_squared(&node);
+            prop_assert!(squared <= exact.distance_squared(&origin, &origin));
+            let Some(direction) = UnitVector3::try_new(towards, 1e-12) else { return Ok(()) };
+            let enter_m = SingleSlab::new(&origin, &direction).enter_m(&node);
+            let exact_m = Slab::new(&origin, &direction).enter_m(&exact);
+            prop_assert!(enter_m <= exact_m, "{enter_m} is above {exact_m}");
+        }
     }
 }

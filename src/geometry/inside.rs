@@ -7,10 +7,9 @@
 //! each triangle. What that number would still tell, a surface with a face missing, is made up for:
 //! a line is looked along from both of its ends.
 
-use super::bvh::MeshBvh;
-use super::nearby::Nearby;
+use super::bounds::SingleSlab;
+use super::bvh::{MeshBvh, Nearby};
 use super::primitives::Line;
-use super::single::SingleSlab;
 use nalgebra::{Point3, UnitVector3, Vector3};
 
 /// Lines through a point that are asked. Chosen skew, so that sides along the axes are met by none

@@ -1,6 +1,6 @@
 //! The triangle mesh that can be trusted.
 
-use super::extent::extent;
+use super::primitives::extent;
 use crate::words::hex;
 use nalgebra::{Isometry3, Point3};
 use sha2::{Digest, Sha256};

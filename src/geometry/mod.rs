@@ -34,26 +34,21 @@
 //! // The nearest point of it.
 //! let nearest = mesh.closest_point(&Point3::new(0.15, 0.0, 0.0));
 //! assert!((nearest.point - Point3::new(0.1, 0.0, 0.0)).norm() < 1e-12);
-//! # Ok::<(), palpate::geometry::error::MeshFault>(())
+//! # Ok::<(), palpate::error::Invalid>(())
 //! ```
 
 mod bounds;
 pub mod bvh;
 pub mod coarse;
 pub mod distance;
-pub mod element;
-pub mod error;
-pub mod extent;
 pub mod implicit;
 pub mod import;
 pub mod inside;
 pub mod mesh;
-pub(crate) mod nearby;
 pub mod primitives;
 pub mod raw;
 pub mod repair;
 pub mod report;
-mod single;
 pub mod solids;
 pub mod spread;
 pub mod surfaces;

@@ -1,6 +1,14 @@
-//! Exact answers in f64 about one triangle: a line through it, the nearest point of it.
+//! Exact answers in f64 about points and one triangle: the box around them, a line through it, the
+//! nearest point of it.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
+
+/// Returns the least and greatest corner of the smallest axis-aligned box around `points`; `None`
+/// if there are none.
+pub fn extent<'a>(points: impl IntoIterator<Item = &'a Point3<f64>>) -> Option<[Point3<f64>; 2]> {
+    let grown = |[low, high]: [Point3<f64>; 2], p: &Point3<f64>| [low.inf(p), high.sup(p)];
+    points.into_iter().fold(None, |ends, p| Some(grown(ends.unwrap_or([*p; 2]), p)))
+}
 
 /// A line prepared for triangle tests that leave no gaps.
 ///

@@ -1,15 +1,29 @@
 //! What importers hand over: vertices and triangles nobody has checked yet.
 
+use crate::error::Invalid;
 use nalgebra::Point3;
-
-use super::element::Element;
-use super::error::MeshFault;
+use std::fmt;
 
 /// More triangles than this are refused, so that a corrupt count cannot exhaust memory.
 pub const MAX_TRIANGLES: usize = 5_000_000;
 
 /// More vertices than this are refused: three for each triangle.
 pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
+
+/// A vertex or triangle as its source knows it: number `index` (from 0) of `part`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Element {
+    /// The part of the source, such as an object's name.
+    pub part: String,
+    /// The number within that part, from 0.
+    pub index: usize,
+}
+
+impl fmt::Display for Element {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} of {}", self.index, self.part)
+    }
+}
 
 /// Vertices (metres) and triangles in parts, each part named after where it came from.
 #[derive(Clone, Debug, Default)]
@@ -32,14 +46,13 @@ impl RawMesh {
     /// Appends a part; its triangles index its own vertices.
     ///
     /// # Errors
-    /// [`MeshFault::IndexOutOfRange`], or [`MeshFault::TooLarge`] beyond [`MAX_TRIANGLES`] or
-    /// [`MAX_VERTICES`].
+    /// If an index is out of range, or beyond [`MAX_TRIANGLES`] or [`MAX_VERTICES`].
     pub fn add_part(
         &mut self,
         name: impl Into<String>,
         vertices: impl ExactSizeIterator<Item = Point3<f64>>,
         triangles: impl IntoIterator<Item = [u32; 3]>,
-    ) -> Result<(), MeshFault> {
+    ) -> Result<(), Invalid> {
         let part = Part {
             name: name.into(),
             first_vertex: self.vertices.len(),
@@ -47,16 +60,18 @@ impl RawMesh {
         };
         let (base, count) = (part.first_vertex, vertices.len());
         if count > MAX_VERTICES - base {
-            return Err(MeshFault::TooLarge { what: "vertices", limit: MAX_VERTICES });
+            return Err(Invalid::new(format!("holds more than {MAX_VERTICES} vertices")));
         }
         self.vertices.extend(vertices);
         for (number, triangle) in triangles.into_iter().enumerate() {
             if let Some(&index) = triangle.iter().find(|&&index| index as usize >= count) {
                 let triangle = Element { part: part.name, index: number };
-                return Err(MeshFault::IndexOutOfRange { triangle, index, vertices: count });
+                return Err(Invalid::new(format!(
+                    "triangle {triangle} names vertex {index}, but there are {count}"
+                )));
             }
             if self.triangles.len() == MAX_TRIANGLES {
-                return Err(MeshFault::TooLarge { what: "triangles", limit: MAX_TRIANGLES });
+                return Err(Invalid::new(format!("holds more than {MAX_TRIANGLES} triangles")));
             }
             self.triangles.push(triangle.map(|index| base as u32 + index));
         }

@@ -3,12 +3,11 @@
 use foldhash::{HashMap, HashMapExt, HashSet, HashSetExt};
 use nalgebra::Point3;
 
-use super::element::Element;
-use super::error::MeshFault;
 use super::mesh::Mesh;
-use super::raw::RawMesh;
+use super::raw::{Element, RawMesh};
 use super::report::{Finding, MeshReport};
 use super::topology::orient;
+use crate::error::Invalid;
 
 /// A coordinate beyond this, in metres, is a file read in the wrong unit.
 pub const MAX_COORDINATE_M: f64 = 1e4;
@@ -26,11 +25,13 @@ const MIN_ASPECT: f64 = 1e-12;
 /// vertices no triangle uses go.
 ///
 /// # Errors
-/// [`MeshFault::Empty`], [`MeshFault::NonFinite`], [`MeshFault::TooFar`],
-/// [`MeshFault::AllDegenerate`].
-pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), MeshFault> {
+/// If there is no triangle with an area, or a vertex is not finite or too far away.
+pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), Invalid> {
     if raw.triangles.is_empty() {
-        return Err(MeshFault::Empty { skipped_primitives: raw.skipped_primitives });
+        return Err(Invalid::new(format!(
+            "holds no triangles ({} primitives of points or lines were skipped)",
+            raw.skipped_primitives
+        )));
     }
     check_positions(&raw)?;
     let (vertices, canonical) = weld(&raw.vertices);
@@ -43,7 +44,8 @@ pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), MeshFault> {
     };
     let (mut triangles, sources) = sift(&raw, &vertices, &canonical, &mut report);
     if triangles.is_empty() {
-        return Err(MeshFault::AllDegenerate { triangles: raw.triangles.len() });
+        let count = raw.triangles.len();
+        return Err(Invalid::new(format!("all {count} triangles are degenerate")));
     }
     let topology = orient(&triangles, |triangle| {
         // Measured from a vertex, so that a mesh far from the origin loses no digits.
@@ -73,29 +75,33 @@ impl Mesh {
     pub fn new(
         vertices: &[Point3<f64>],
         triangles: &[[u32; 3]],
-    ) -> Result<(Self, MeshReport), MeshFault> {
+    ) -> Result<(Self, MeshReport), Invalid> {
         let mut raw = RawMesh::default();
         raw.add_part("the mesh", vertices.iter().copied(), triangles.iter().copied())?;
         repair(raw)
     }
 }
 
-fn check_positions(raw: &RawMesh) -> Result<(), MeshFault> {
+fn check_positions(raw: &RawMesh) -> Result<(), Invalid> {
     for (number, vertex) in raw.vertices.iter().enumerate() {
-        let coordinate_m = vertex.coords.amax();
-        let finite = vertex.iter().all(|coordinate| coordinate.is_finite());
-        if !finite {
-            let vertex_element = raw.vertex_element(number);
-            let position_m = [vertex.x, vertex.y, vertex.z];
-            return Err(MeshFault::NonFinite { vertex: vertex_element, position_m });
+        let farthest_m = vertex.coords.amax();
+        let element = || raw.vertex_element(number);
+        if !vertex.iter().all(|coordinate| coordinate.is_finite()) {
+            let at_m: [f64; 3] = vertex.coords.into();
+            return Err(Invalid::new(format!("vertex {} is not finite: {at_m:?}", element())));
         }
-        if coordinate_m > MAX_COORDINATE_M {
-            let likely_unit = [("mm", 1e-3), ("um", 1e-6)]
-                .into_iter()
-                .find(|(_, metres)| coordinate_m * metres <= MAX_COORDINATE_M)
-                .map(|(unit, _)| unit);
-            let (vertex, limit_m) = (raw.vertex_element(number), MAX_COORDINATE_M);
-            return Err(MeshFault::TooFar { vertex, coordinate_m, limit_m, likely_unit });
+        if farthest_m > MAX_COORDINATE_M {
+            let too_far = Invalid::new(format!(
+                "vertex {} lies {farthest_m:e} m from the origin, more than {MAX_COORDINATE_M} m",
+                element()
+            ));
+            let mut units = [("mm", 1e-3), ("um", 1e-6)].into_iter();
+            return Err(match units.find(|(_, metres)| farthest_m * metres <= MAX_COORDINATE_M) {
+                Some((unit, _)) => {
+                    too_far.mend(format!("for a file in {unit} say unit = \"{unit}\""))
+                }
+                None => too_far,
+            });
         }
     }
     Ok(())

@@ -4,8 +4,8 @@ use std::fmt;
 
 use nalgebra::{Point3, Vector3};
 
-use super::element::Element;
 use super::mesh::Mesh;
+use super::raw::Element;
 
 /// An object smaller than this, in metres, is too small to be touched.
 pub const MIN_TOUCHABLE_M: f64 = 1e-3;

@@ -74,43 +74,56 @@ impl Sweep {
     pub fn travel_m(&self, triangle: &[Point3<f64>; 3]) -> Option<f64> {
         let far = triangle.map(|corner| corner + self.draw);
         let is_sphere = self.draw == Vector3::zeros();
-        let mut first = First(f64::INFINITY);
-        self.base(triangle, &mut first);
+        let mut first = f64::INFINITY;
+        // The least travel that does not lie behind the start.
+        let mut offer = |travel_m: Option<f64>| {
+            if let Some(travel_m) = travel_m
+                && travel_m >= -TOUCH_M
+            {
+                first = first.min(travel_m.max(0.0));
+            }
+        };
+        self.base(triangle, &mut offer);
         if !is_sphere {
-            self.base(&far, &mut first);
+            self.base(&far, &mut offer);
         }
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
             let (a, b) = (&triangle[i], &triangle[j]);
-            first.offer(self.onto_edge(a, b));
-            first.offer(self.onto_corner(a));
+            offer(self.onto_edge(a, b));
+            offer(self.onto_corner(a));
             if !is_sphere {
-                first.offer(self.onto_edge(&far[i], &far[j]));
-                first.offer(self.onto_edge(a, &far[i]));
-                first.offer(self.onto_corner(&far[i]));
-                self.side([a, b, &far[j], &far[i]], &mut first);
+                offer(self.onto_edge(&far[i], &far[j]));
+                offer(self.onto_edge(a, &far[i]));
+                offer(self.onto_corner(&far[i]));
+                self.side([a, b, &far[j], &far[i]], &mut offer);
             }
         }
-        first.0.is_finite().then_some(first.0)
+        first.is_finite().then_some(first)
     }
 
-    fn base(&self, triangle: &[Point3<f64>; 3], first: &mut First) {
+    fn base(&self, triangle: &[Point3<f64>; 3], offer: &mut impl FnMut(Option<f64>)) {
         let [a, b, c] = triangle;
-        self.face((b - a).cross(&(c - a)), &[*triangle], first);
+        self.face((b - a).cross(&(c - a)), &[*triangle], offer);
     }
 
     /// The parallelogram an edge is drawn out to.
-    fn side(&self, [a, b, c, d]: [&Point3<f64>; 4], first: &mut First) {
+    fn side(&self, [a, b, c, d]: [&Point3<f64>; 4], offer: &mut impl FnMut(Option<f64>)) {
         let normal = (b - a).cross(&(d - a));
-        self.face(normal, &[[*a, *b, *c], [*a, *c, *d]], first);
+        self.face(normal, &[[*a, *b, *c], [*a, *c, *d]], offer);
     }
 
     /// A flat face moved by the radius towards where the capsule comes from.
-    fn face(&self, normal: Vector3<f64>, triangles: &[[Point3<f64>; 3]], first: &mut First) {
+    fn face(
+        &self,
+        normal: Vector3<f64>,
+        triangles: &[[Point3<f64>; 3]],
+        offer: &mut impl FnMut(Option<f64>),
+    ) {
         let Some(normal) = UnitVector3::try_new(normal, 0.0) else { return };
         let offset_m = -self.radius_m * normal.dot(&self.direction).signum();
         let origin = self.start - normal.scale(offset_m);
         for triangle in triangles {
-            first.offer(self.line.distance_m(&origin, triangle));
+            offer(self.line.distance_m(&origin, triangle));
         }
     }
 
@@ -143,18 +156,5 @@ impl Sweep {
     fn half_chord(&self, miss_squared: f64) -> Option<f64> {
         let squared = self.radius_m * self.radius_m - miss_squared;
         (squared >= 0.0).then(|| squared.sqrt())
-    }
-}
-
-/// The least travel offered that does not lie behind the start.
-struct First(f64);
-
-impl First {
-    fn offer(&mut self, travel_m: Option<f64>) {
-        if let Some(travel_m) = travel_m
-            && travel_m >= -TOUCH_M
-        {
-            self.0 = self.0.min(travel_m.max(0.0));
-        }
     }
 }

@@ -1,8 +1,7 @@
 //! Mean, variance and its gradient at many places: the factor is read once for sixteen of them.
 
 use super::posterior::{Posterior, Scratch};
-use crate::math::simd::widest;
-use pulp::NullaryFnOnce;
+use crate::math::simd::widest_fn;
 
 /// Belief at one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,7 +98,7 @@ impl<const N: usize> Lanes<N> {
         let mut predictions = [Prediction { mean: f64::NAN, variance: f64::NAN }; N];
         if matches!(asked, Asked::Means | Asked::Both) {
             let mean = posterior.hyperparameters().mean;
-            let sums = self.weighted(posterior.weights());
+            let sums = weighted(&self.correlations, posterior.weights());
             predictions.iter_mut().zip(sums).for_each(|(at, sum)| at.mean = mean + sum);
         }
         if !matches!(asked, Asked::Means) {
@@ -134,9 +133,7 @@ impl<const N: usize> Lanes<N> {
         }
         for (axis, length) in lengths.iter().enumerate() {
             let at: [f64; N] = std::array::from_fn(|lane| places.get(lane).unwrap_or(first)[axis]);
-            let per_length = 1.0 / length;
-            let column = observations.column(axis);
-            widest(AddSquares { r2: &mut self.correlations, at, column, per_length });
+            add_squares(&mut self.correlations, at, observations.column(axis), 1.0 / length);
         }
         let entries = self.correlations.as_flattened_mut();
         if is_sloped {
@@ -145,11 +142,6 @@ impl<const N: usize> Lanes<N> {
         } else {
             posterior.kernel().correlate(entries);
         }
-    }
-
-    /// Σ_i w_i·c_i of each lane.
-    fn weighted(&self, weights: &[f64]) -> [f64; N] {
-        widest(Weighted { correlations: &self.correlations, weights })
     }
 
     /// The gradients of the variances, after A⁻¹·k* was solved.
@@ -173,9 +165,7 @@ impl<const N: usize> Lanes<N> {
         for (axis, length) in at.length_scales.iter().enumerate() {
             let places: [f64; N] =
                 std::array::from_fn(|lane| places.get(lane).unwrap_or(&places[0])[axis]);
-            let (solved, slopes) = (&self.solved, &self.slopes);
-            let column = observations.column(axis);
-            let sums = widest(Steps { solved, slopes, at: places, column });
+            let sums = steps(&self.solved, &self.slopes, places, observations.column(axis));
             for (gradient, sum) in gradients.iter_mut().zip(sums) {
                 if let Some(slope) = gradient.get_mut(axis) {
                     *slope = -4.0 * signal2 * sum / (length * length);
@@ -185,41 +175,28 @@ impl<const N: usize> Lanes<N> {
     }
 }
 
-/// Adds ((at − x) / length)² of one axis.
-struct AddSquares<'a, const N: usize> {
-    r2: &'a mut [[f64; N]],
-    at: [f64; N],
-    column: &'a [f64],
-    per_length: f64,
-}
-
-impl<const N: usize> NullaryFnOnce for AddSquares<'_, N> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        for (r2, x) in self.r2.iter_mut().zip(self.column) {
-            for (r2, at) in r2.iter_mut().zip(&self.at) {
-                let step = (at - x) * self.per_length;
+widest_fn! {
+    /// Adds ((at − x) / length)² of one axis.
+    fn add_squares<'a, const N: usize>(
+        r2: &'a mut [[f64; N]],
+        at: [f64; N],
+        column: &'a [f64],
+        per_length: f64,
+    ) -> () {
+        for (r2, x) in r2.iter_mut().zip(column) {
+            for (r2, at) in r2.iter_mut().zip(&at) {
+                let step = (at - x) * per_length;
                 *r2 = step.mul_add(step, *r2);
             }
         }
     }
 }
 
-/// Σ_i w_i·c_i.
-struct Weighted<'a, const N: usize> {
-    correlations: &'a [[f64; N]],
-    weights: &'a [f64],
-}
-
-impl<const N: usize> NullaryFnOnce for Weighted<'_, N> {
-    type Output = [f64; N];
-
-    #[inline(always)]
-    fn call(self) -> [f64; N] {
+widest_fn! {
+    /// Σ_i w_i·c_i of each lane.
+    fn weighted<'a, const N: usize>(correlations: &'a [[f64; N]], weights: &'a [f64]) -> [f64; N] {
         let mut sums = [0.0; N];
-        for (correlations, weight) in self.correlations.iter().zip(self.weights) {
+        for (correlations, weight) in correlations.iter().zip(weights) {
             for lane in 0..N {
                 sums[lane] = weight.mul_add(correlations[lane], sums[lane]);
             }
@@ -228,24 +205,19 @@ impl<const N: usize> NullaryFnOnce for Weighted<'_, N> {
     }
 }
 
-/// Σ_i u_i·c′_i·(at − x_i) of one axis.
-struct Steps<'a, const N: usize> {
-    solved: &'a [[f64; N]],
-    slopes: &'a [[f64; N]],
-    at: [f64; N],
-    column: &'a [f64],
-}
-
-impl<const N: usize> NullaryFnOnce for Steps<'_, N> {
-    type Output = [f64; N];
-
-    #[inline(always)]
-    fn call(self) -> [f64; N] {
+widest_fn! {
+    /// Σ_i u_i·c′_i·(at − x_i) of one axis.
+    fn steps<'a, const N: usize>(
+        solved: &'a [[f64; N]],
+        slopes: &'a [[f64; N]],
+        at: [f64; N],
+        column: &'a [f64],
+    ) -> [f64; N] {
         let mut sums = [0.0; N];
-        for ((solved, slopes), x) in self.solved.iter().zip(self.slopes).zip(self.column) {
+        for ((solved, slopes), x) in solved.iter().zip(slopes).zip(column) {
             for lane in 0..N {
                 let term = solved[lane] * slopes[lane];
-                sums[lane] = term.mul_add(self.at[lane] - x, sums[lane]);
+                sums[lane] = term.mul_add(at[lane] - x, sums[lane]);
             }
         }
         sums

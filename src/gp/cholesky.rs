@@ -1,12 +1,13 @@
 //! Cholesky factor A = L·Lᵀ, stored by rows.
 //!
 //! Row i holds its i + 1 entries contiguously, so every inner loop is a dot product or a scaled
-//! addition of contiguous numbers, and a row can be appended without moving the others.
+//! addition of contiguous numbers, and a row can be appended without moving the others. Several
+//! right-hand sides are solved side by side, in lanes: a vector holds the same entry of some of
+//! them, and several rows of the factor go through them at once.
 
-use super::dense::Dense;
-use super::indefinite::NotPositiveDefinite;
-use crate::math::simd::{dot, widest};
-use pulp::NullaryFnOnce;
+use super::dense::{Dense, NotPositiveDefinite};
+use crate::math::simd::{dot, widest_fn};
+use crate::math::vector::{Vector, vectorised_fn};
 
 /// A lower triangular factor of growing order.
 #[derive(Clone, Debug, Default)]
@@ -58,7 +59,7 @@ impl Factor {
         let begin = self.rows.len();
         self.rows.extend_from_slice(&row[..=n]);
         let (done, new) = self.rows.split_at_mut(begin);
-        let pivot = new[n] - widest(SolveLower { rows: done, b: &mut new[..n] });
+        let pivot = new[n] - solve_lower(done, &mut new[..n]);
         let is_kept = pivot > f64::EPSILON * row[n] && pivot.is_finite();
         if !is_kept {
             self.rows.truncate(begin);
@@ -77,27 +78,18 @@ impl Factor {
 
     /// Replaces b by L⁻¹·b and returns bᵀ·A⁻¹·b.
     pub fn solve_lower(&self, b: &mut [f64]) -> f64 {
-        widest(SolveLower { rows: &self.rows, b })
+        solve_lower(&self.rows, b)
     }
 
     /// Replaces b by L⁻ᵀ·b.
     pub fn solve_upper(&self, b: &mut [f64]) {
-        widest(SolveUpper { rows: &self.rows, b });
+        solve_upper(&self.rows, b);
     }
 }
 
-/// See [`Factor::solve_lower`].
-struct SolveLower<'a> {
-    rows: &'a [f64],
-    b: &'a mut [f64],
-}
-
-impl NullaryFnOnce for SolveLower<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn call(self) -> f64 {
-        let Self { rows, b } = self;
+widest_fn! {
+    /// See [`Factor::solve_lower`].
+    fn solve_lower<'a>(rows: &'a [f64], b: &'a mut [f64]) -> f64 {
         for i in 0..b.len() {
             let row = row(rows, i);
             b[i] = (b[i] - dot(&row[..i], &b[..i])) / row[i];
@@ -106,18 +98,9 @@ impl NullaryFnOnce for SolveLower<'_> {
     }
 }
 
-/// See [`Factor::solve_upper`].
-struct SolveUpper<'a> {
-    rows: &'a [f64],
-    b: &'a mut [f64],
-}
-
-impl NullaryFnOnce for SolveUpper<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { rows, b } = self;
+widest_fn! {
+    /// See [`Factor::solve_upper`].
+    fn solve_upper<'a>(rows: &'a [f64], b: &'a mut [f64]) -> () {
         for i in (0..b.len()).rev() {
             let row = row(rows, i);
             b[i] /= row[i];
@@ -126,6 +109,130 @@ impl NullaryFnOnce for SolveUpper<'_> {
                 *b -= scale * l;
             }
         }
+    }
+}
+
+impl Factor {
+    /// Replaces each lane b by L⁻¹·b and returns bᵀ·A⁻¹·b of each.
+    pub(super) fn solve_lower_lanes<const N: usize>(&self, lanes: &mut [[f64; N]]) -> [f64; N] {
+        solve_lower_lanes(self, lanes)
+    }
+
+    /// Replaces each lane b by L⁻ᵀ·b.
+    pub(super) fn solve_upper_lanes<const N: usize>(&self, lanes: &mut [[f64; N]]) {
+        solve_upper_lanes(self, lanes);
+    }
+}
+
+vectorised_fn! {
+    /// Eight sums in registers hide the latency of each other.
+    fn solve_lower_lanes<'a, V: Vector, const N: usize>(
+        factor: &'a Factor,
+        lanes: &'a mut [[f64; N]],
+    ) -> [f64; N] {
+        let mut squares = [0.0; N];
+        // Lanes that a register does not hold are gone through one after the other.
+        let mut lane = 0;
+        while lane < N {
+            if V::LANES == 8 && N - lane >= 16 {
+                lower::<V, N, 2, 4>(factor, lanes, lane, &mut squares);
+                lane += 16;
+            } else {
+                lower::<V, N, 1, 8>(factor, lanes, lane, &mut squares);
+                lane += V::LANES;
+            }
+        }
+        squares
+    }
+}
+
+/// For `WIDE` vectors of lanes from `lane` on, `ROWS` rows at a time.
+#[inline(always)]
+fn lower<V: Vector, const N: usize, const WIDE: usize, const ROWS: usize>(
+    factor: &Factor,
+    lanes: &mut [[f64; N]],
+    lane: usize,
+    squares: &mut [f64; N],
+) {
+    let mut begin = 0;
+    while begin < lanes.len() {
+        let count = ROWS.min(lanes.len() - begin);
+        let (done, rest) = lanes.split_at_mut(begin);
+        // Beyond the last row the last one is repeated, and not written.
+        let rows: [&[f64]; ROWS] = std::array::from_fn(|r| factor.row(begin + r.min(count - 1)));
+        let mut sums: [[V; WIDE]; ROWS] = std::array::from_fn(|r| {
+            std::array::from_fn(|v| V::load(&rest[r.min(count - 1)][lane + v * V::LANES..]))
+        });
+        let before = rows.map(|row| &row[..begin]);
+        for (k, x) in done.iter().enumerate() {
+            let x: [V; WIDE] = std::array::from_fn(|v| V::load(&x[lane + v * V::LANES..]));
+            for r in 0..ROWS {
+                let l = V::splat(-before[r][k]);
+                for v in 0..WIDE {
+                    sums[r][v] = l.mul_add(x[v], sums[r][v]);
+                }
+            }
+        }
+        for r in 0..count {
+            for k in 0..r {
+                let l = V::splat(-rows[r][begin + k]);
+                sums[r] = std::array::from_fn(|v| l.mul_add(sums[k][v], sums[r][v]));
+            }
+            let scale = V::splat(1.0 / rows[r][begin + r]);
+            for v in 0..WIDE {
+                sums[r][v] = sums[r][v].mul(scale);
+                sums[r][v].store(&mut rest[r][lane + v * V::LANES..]);
+                let here = &mut squares[lane + v * V::LANES..];
+                sums[r][v].mul_add(sums[r][v], V::load(here)).store(here);
+            }
+        }
+        begin += count;
+    }
+}
+
+vectorised_fn! {
+    fn solve_upper_lanes<'a, V: Vector, const N: usize>(
+        factor: &'a Factor,
+        lanes: &'a mut [[f64; N]],
+    ) -> () {
+        for lane in (0..N).step_by(V::LANES) {
+            upper::<V, N, 8>(factor, lanes, lane);
+        }
+    }
+}
+
+/// For a vector of lanes from `lane` on, `ROWS` rows at a time from the last.
+#[inline(always)]
+fn upper<V: Vector, const N: usize, const ROWS: usize>(
+    factor: &Factor,
+    lanes: &mut [[f64; N]],
+    lane: usize,
+) {
+    let mut end = lanes.len();
+    while end > 0 {
+        let count = ROWS.min(end);
+        let begin = end - count;
+        let (above, block) = lanes[..end].split_at_mut(begin);
+        let rows: [&[f64]; ROWS] = std::array::from_fn(|r| factor.row(begin + r.min(count - 1)));
+        // Rows that there are not pull nothing.
+        let mut solved = [V::splat(0.0); ROWS];
+        for r in (0..count).rev() {
+            let mut sum = V::load(&block[r][lane..]);
+            for k in r + 1..count {
+                sum = V::splat(-rows[k][begin + r]).mul_add(solved[k], sum);
+            }
+            solved[r] = sum.mul(V::splat(1.0 / rows[r][begin + r]));
+            solved[r].store(&mut block[r][lane..]);
+        }
+        let rows = rows.map(|row| &row[..begin]);
+        for (k, x) in above.iter_mut().enumerate() {
+            let mut sum = V::load(&x[lane..]);
+            for r in 0..ROWS {
+                sum = V::splat(-rows[r][k]).mul_add(solved[r], sum);
+            }
+            sum.store(&mut x[lane..]);
+        }
+        end = begin;
     }
 }
 

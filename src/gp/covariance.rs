@@ -1,10 +1,17 @@
 //! The covariance of what was observed, factored with as little jitter as it needs.
+//!
+//! A Gaussian process and its derivatives are one Gaussian process (Rasmussen & Williams 2006,
+//! section 9.4; Solak et al. 2003). With the correlation c(r²), u_d = (a_d − b_d) / l_d and slopes
+//! per length scale, f_d = l_d·∂f/∂x_d, the covariances in units of the signal's variance are
+//!
+//! * cov(f(a), f(b)) = c
+//! * cov(f_d(a), f(b)) = 2·u_d·c′, and cov(f(a), f_d(b)) = −2·u_d·c′
+//! * cov(f_d(a), f_e(b)) = −4·u_d·u_e·c″ − 2·[d = e]·c′
 
-use super::correlations::{Correlations, batches};
-use super::dense::Dense;
-use super::indefinite::NotPositiveDefinite;
+use super::dense::{Dense, NotPositiveDefinite};
 use super::kernel::Kernel;
 use super::observations::{NoiseRatio, Observations};
+use std::ops::Range;
 use thiserror::Error;
 
 /// Largest jitter tried, relative to the diagonal; beyond it the data contradict the kernel.
@@ -110,4 +117,187 @@ fn with_slopes(
         }
     }
     largest
+}
+
+/// Columns of a triangle are correlated together until they hold this many entries: vector loops
+/// over single short columns would run half empty. Chosen to stay in the first-level cache.
+const BATCH: usize = 2048;
+
+/// Consecutive ranges of the columns 0..count of a lower triangle with about [`BATCH`] entries.
+pub(super) fn batches(count: usize) -> impl Iterator<Item = Range<usize>> {
+    let mut begin = 0;
+    std::iter::from_fn(move || {
+        let (first, mut entries) = (begin, 0);
+        while begin < count && (begin == first || entries + count - begin <= BATCH) {
+            entries += count - begin;
+            begin += 1;
+        }
+        (first < begin).then_some(first..begin)
+    })
+}
+
+/// The correlations of one batch, remembered until another is asked for.
+#[derive(Default)]
+pub(super) struct Correlations {
+    columns: Range<usize>,
+    length_scales: Vec<f64>,
+    entries: Vec<f64>,
+    slopes: Vec<f64>,
+    /// Buffers for observations with slopes.
+    pub(super) derivatives: DerivativeCovariance,
+    pub(super) row: Vec<f64>,
+}
+
+impl Correlations {
+    /// Correlations in `columns` of the lower triangle, column after column, each from below its
+    /// diagonal down. The observations and the kernel must be the same in every call.
+    pub(super) fn of(
+        &mut self,
+        kernel: &dyn Kernel,
+        observations: &Observations,
+        length_scales: &[f64],
+        columns: &Range<usize>,
+    ) -> &[f64] {
+        if self.columns != *columns || self.length_scales != length_scales {
+            self.measure(observations, length_scales, columns);
+            kernel.correlate(&mut self.entries);
+        }
+        &self.entries
+    }
+
+    /// The derivatives of [`of`](Self::of) with respect to the squared distances; the caller may
+    /// overwrite them.
+    pub(super) fn slopes_of(
+        &mut self,
+        kernel: &dyn Kernel,
+        observations: &Observations,
+        length_scales: &[f64],
+        columns: &Range<usize>,
+    ) -> &mut [f64] {
+        self.measure(observations, length_scales, columns);
+        self.slopes.resize(self.entries.len(), 0.0);
+        kernel.correlate_slope(&mut self.entries, &mut self.slopes);
+        &mut self.slopes
+    }
+
+    fn measure(
+        &mut self,
+        observations: &Observations,
+        length_scales: &[f64],
+        columns: &Range<usize>,
+    ) {
+        self.columns.clone_from(columns);
+        self.length_scales.clear();
+        self.length_scales.extend_from_slice(length_scales);
+        observations.distances2_below(columns.clone(), length_scales, &mut self.entries);
+    }
+}
+
+/// The correlations c of one place with the places of some observations, and their first three
+/// derivatives c′, c″, c‴ with respect to the squared distance: all that the covariances of heights
+/// and slopes are made of.
+#[derive(Clone, Debug, Default)]
+pub(super) struct DerivativeCovariance {
+    /// The one place.
+    place: Vec<f64>,
+    /// The observations are those from this one on.
+    first: usize,
+    correlations: Vec<f64>,
+    derivatives: [Vec<f64>; 3],
+}
+
+impl DerivativeCovariance {
+    /// Correlates `place` with the observations from `first` on.
+    pub(super) fn correlate(
+        &mut self,
+        kernel: &dyn Kernel,
+        observations: &Observations,
+        length_scales: &[f64],
+        place: impl Iterator<Item = f64>,
+        first: usize,
+    ) {
+        self.place.clear();
+        self.place.extend(place);
+        self.first = first;
+        let count = observations.len() - first;
+        self.correlations.resize(count, 0.0);
+        self.derivatives.iter_mut().for_each(|derivative| derivative.resize(count, 0.0));
+        let place = self.place.iter().copied();
+        observations.distances2(place, length_scales, first, &mut self.correlations);
+        let derivatives = self.derivatives.each_mut().map(Vec::as_mut_slice);
+        kernel.correlate_derivatives(&mut self.correlations, derivatives);
+    }
+
+    /// u_d of the place and observation `i`.
+    #[inline(always)]
+    fn step(&self, observations: &Observations, lengths: &[f64], i: usize, axis: usize) -> f64 {
+        (self.place[axis] - observations.column(axis)[i]) / lengths[axis]
+    }
+
+    /// Writes the covariances of the height at the place, or of its slope along `axis`, with every
+    /// number of the observations.
+    pub(super) fn covariances(
+        &self,
+        observations: &Observations,
+        length_scales: &[f64],
+        axis: Option<usize>,
+        out: &mut [f64],
+    ) {
+        let offset = observations.start(self.first);
+        let [c1, c2, _] = &self.derivatives;
+        for (k, ((c, c1), c2)) in self.correlations.iter().zip(c1).zip(c2).enumerate() {
+            let i = self.first + k;
+            let step = |axis: usize| self.step(observations, length_scales, i, axis);
+            let (start, end) = (observations.start(i) - offset, observations.start(i + 1) - offset);
+            let Some([height, slopes @ ..]) = out.get_mut(start..end) else { return };
+            match axis {
+                None => {
+                    *height = *c;
+                    for (e, slope) in slopes.iter_mut().enumerate() {
+                        *slope = -2.0 * step(e) * c1;
+                    }
+                }
+                Some(d) => {
+                    let u = step(d);
+                    *height = 2.0 * u * c1;
+                    for (e, slope) in slopes.iter_mut().enumerate() {
+                        let own = if d == e { 2.0 * c1 } else { 0.0 };
+                        *slope = -4.0 * u * step(e) * c2 - own;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds to `gradient` the derivative, with respect to the logarithm of each length scale, of
+    /// the weighted sum of the covariances of the place with observation `i`.
+    ///
+    /// With the weights w of cov(f(a), f(b)), v of cov(f_d(a), f(b)) minus those of
+    /// cov(f(a), f_d(b)), and R of cov(f_d(a), f_e(b)), row by row, the sum is
+    /// w·c + 2c′·vᵀu − 4c″·uᵀRu − 2c′·tr R, and ∂u_k/∂ln l_k = −u_k.
+    pub(super) fn add_length_gradient(
+        &self,
+        observations: &Observations,
+        lengths: &[f64],
+        i: usize,
+        (heights, slope_height, slopes): (f64, &[f64], &[f64]),
+        gradient: &mut [f64],
+    ) {
+        let dimension = lengths.len();
+        let [c1, c2, c3] = self.derivatives.each_ref().map(|all| all[i - self.first]);
+        let step = |axis: usize| self.step(observations, lengths, i, axis);
+        let pair = |d: usize, e: usize| slopes[d * dimension + e];
+        let (mut bend, mut along, mut trace) = (0.0, 0.0, 0.0);
+        for (d, weight) in slope_height.iter().enumerate() {
+            along += weight * step(d);
+            trace += pair(d, d);
+            bend += (0..dimension).map(|e| pair(d, e) * step(d) * step(e)).sum::<f64>();
+        }
+        let by_distance = heights * c1 + 2.0 * c2 * (along - trace) - 4.0 * c3 * bend;
+        for (k, slope) in gradient.iter_mut().enumerate() {
+            let u = step(k);
+            let across: f64 = (0..dimension).map(|e| (pair(k, e) + pair(e, k)) * step(e)).sum();
+            *slope += -2.0 * u * (u * by_distance + c1 * slope_height[k] - 2.0 * c2 * across);
+        }
+    }
 }

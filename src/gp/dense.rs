@@ -1,10 +1,9 @@
 //! Cholesky factorisation and inversion of a whole covariance matrix: in tiles where it fits into
 //! the cache, and by faer's blocked algorithms where it does not.
 
-use super::indefinite::NotPositiveDefinite;
 use super::tiles;
+pub use super::tiles::NotPositiveDefinite;
 use crate::math::simd::{widest, widest_dot};
-use crate::math::vector::vectorised;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
@@ -64,7 +63,7 @@ impl Dense {
     /// as none, its sign is noise. `largest` is A's largest diagonal entry.
     pub fn factor(&mut self, largest: f64) -> Result<(), NotPositiveDefinite> {
         match self.order <= TILED_MAX {
-            true => vectorised(tiles::Factor(self.matrix.as_mut()))?,
+            true => tiles::factor(self.matrix.as_mut())?,
             false => self.factor_blocked()?,
         }
         let is_lost = |i: &usize| {
@@ -127,7 +126,7 @@ impl Dense {
         }
         if self.order <= TILED_MAX {
             let (factor, upper) = (self.matrix.as_mut(), self.inverse.as_mut());
-            vectorised(tiles::Invert { factor, upper });
+            tiles::invert(factor, upper);
             return std::mem::swap(&mut self.matrix, &mut self.inverse);
         }
         invert_lower_triangular(self.inverse.as_mut(), self.matrix.as_ref(), Par::Seq);

@@ -10,8 +10,7 @@
 //! of its variance is added to its noise. The largest that is left is what the approximation loses.
 
 use super::covariance::CovarianceError;
-use super::dense::Dense;
-use super::indefinite::NotPositiveDefinite;
+use super::dense::{Dense, NotPositiveDefinite};
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::Observations;
 use super::posterior::Posterior;
@@ -55,16 +54,17 @@ impl Posterior {
         if let Some(index) = observations.first_not_finite() {
             return Err(CovarianceError::NotFinite { index });
         }
-        let Kept { indices, factor } = Kept::choose(most, kernel, &hyperparameters, observations);
+        let (indices, factor) = choose(most, kernel, &hyperparameters, observations);
         let count = indices.len();
         let kept = observations.places(&indices);
-        let told = Told::by(kernel, &hyperparameters, observations, (&kept, factor.as_ref()))?;
-        let mut dense = dense(told.covariance.as_ref());
+        let (covariance, residuals, left_variance) =
+            condition(kernel, &hyperparameters, observations, (&kept, factor.as_ref()))?;
+        let mut dense = dense(covariance.as_ref());
         let largest = 1.0 + hyperparameters.noise_ratio().height.powi(2);
         dense.factor(largest).map_err(|cause| indefinite(count, cause))?;
-        let heights = told.residuals.iter().map(|height| hyperparameters.mean + height);
+        let heights = residuals.iter().map(|height| hyperparameters.mean + height);
         let kept = kept.with_heights(heights.collect());
-        let left_sd = hyperparameters.signal_sd * told.left_variance.sqrt();
+        let left_sd = hyperparameters.signal_sd * left_variance.sqrt();
         let posterior = Self::factored(kernel, hyperparameters, kept, &dense);
         Ok(Induced { posterior, left_sd })
     }
@@ -90,55 +90,48 @@ fn indefinite(count: usize, cause: NotPositiveDefinite) -> CovarianceError {
     CovarianceError::Indefinite { count, jitter: 0.0, cause }
 }
 
-/// The touches that are kept, and the factor of the correlations of their heights.
-struct Kept {
-    indices: Vec<usize>,
-    factor: Mat<f64>,
-}
-
-impl Kept {
-    /// The most uncertain of evenly spread candidates, one after the other (a pivoted Cholesky
-    /// factorisation), until no other is uncertain.
-    fn choose(
-        most: usize,
-        kernel: &dyn Kernel,
-        hyperparameters: &Hyperparameters,
-        observations: &Observations,
-    ) -> Self {
-        let lengths = &hyperparameters.length_scales;
-        let candidates = spread(CANDIDATES * most, lengths, observations);
-        let places = observations.places(&candidates);
-        let noise2 = hyperparameters.noise_ratio().height.powi(2);
-        let enough = (NEGLIGIBLE * noise2).max(ROUNDING);
-        let mut left = vec![1.0f64; candidates.len()];
-        // Row after row of L⁻¹·K, of all candidates.
-        let mut rows: Vec<Vec<f64>> = Vec::new();
-        let mut chosen: Vec<usize> = Vec::new();
-        while chosen.len() < most {
-            let largest = (0..left.len()).max_by(|a, b| left[*a].total_cmp(&left[*b]));
-            let Some(next) = largest.filter(|next| left[*next] > enough) else { break };
-            let mut row = vec![0.0; candidates.len()];
-            places.distances2(places.place(next), lengths, 0, &mut row);
-            kernel.correlate(&mut row);
-            let scale = left[next].sqrt().recip();
-            widest(|| {
-                for known in &rows {
-                    let pulled = known[next];
-                    row.iter_mut().zip(known).for_each(|(row, known)| *row -= pulled * known);
-                }
-                for (row, left) in row.iter_mut().zip(&mut left) {
-                    *row *= scale;
-                    *left -= *row * *row;
-                }
-            });
-            left[next] = 0.0;
-            chosen.push(next);
-            rows.push(row);
-        }
-        let entry = |i: usize, j: usize| if j <= i { rows[j][chosen[i]] } else { 0.0 };
-        let factor = Mat::from_fn(chosen.len(), chosen.len(), entry);
-        Self { indices: chosen.iter().map(|&i| candidates[i]).collect(), factor }
+/// The most uncertain of evenly spread candidates, one after the other (a pivoted Cholesky
+/// factorisation), until no other is uncertain: which touches are kept, and the factor of the
+/// correlations of their heights.
+fn choose(
+    most: usize,
+    kernel: &dyn Kernel,
+    hyperparameters: &Hyperparameters,
+    observations: &Observations,
+) -> (Vec<usize>, Mat<f64>) {
+    let lengths = &hyperparameters.length_scales;
+    let candidates = spread(CANDIDATES * most, lengths, observations);
+    let places = observations.places(&candidates);
+    let noise2 = hyperparameters.noise_ratio().height.powi(2);
+    let enough = (NEGLIGIBLE * noise2).max(ROUNDING);
+    let mut left = vec![1.0f64; candidates.len()];
+    // Row after row of L⁻¹·K, of all candidates.
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    let mut chosen: Vec<usize> = Vec::new();
+    while chosen.len() < most {
+        let largest = (0..left.len()).max_by(|a, b| left[*a].total_cmp(&left[*b]));
+        let Some(next) = largest.filter(|next| left[*next] > enough) else { break };
+        let mut row = vec![0.0; candidates.len()];
+        places.distances2(places.place(next), lengths, 0, &mut row);
+        kernel.correlate(&mut row);
+        let scale = left[next].sqrt().recip();
+        widest(|| {
+            for known in &rows {
+                let pulled = known[next];
+                row.iter_mut().zip(known).for_each(|(row, known)| *row -= pulled * known);
+            }
+            for (row, left) in row.iter_mut().zip(&mut left) {
+                *row *= scale;
+                *left -= *row * *row;
+            }
+        });
+        left[next] = 0.0;
+        chosen.push(next);
+        rows.push(row);
     }
+    let entry = |i: usize, j: usize| if j <= i { rows[j][chosen[i]] } else { 0.0 };
+    let factor = Mat::from_fn(chosen.len(), chosen.len(), entry);
+    (chosen.iter().map(|&i| candidates[i]).collect(), factor)
 }
 
 /// Up to `most` touches, each the farthest from all before it in units of the length scales.
@@ -156,69 +149,59 @@ fn spread(most: usize, length_scales: &[f64], observations: &Observations) -> Ve
     chosen
 }
 
-/// What all touches tell of the kept ones.
-struct Told {
-    /// Of their heights with the errors, in units of the signal's variance.
-    covariance: Mat<f64>,
-    /// Their heights above the mean.
-    residuals: Vec<f64>,
-    /// The most that is left of any touch's variance, in units of the signal's.
-    left_variance: f64,
-}
-
-impl Told {
-    /// With `factor` the L of the correlations K = L·Lᵀ of the kept touches, V = L⁻¹·K(kept, all)
-    /// and D the noise of all touches, what they tell of L⁻¹ times the kept heights has the
-    /// precision B = V·D⁻¹·Vᵀ = R·Rᵀ; so the errors of the kept heights have the covariance W·Wᵀ
-    /// with W = L·R⁻ᵀ, and the heights are W·R⁻¹·V·D⁻¹·y.
-    fn by(
-        kernel: &dyn Kernel,
-        hyperparameters: &Hyperparameters,
-        observations: &Observations,
-        (kept, factor): (&Observations, MatRef<f64>),
-    ) -> Result<Self, CovarianceError> {
-        let count = kept.len();
-        let mut precision = Mat::<f64>::zeros(count, count);
-        let mut sums = Mat::<f64>::zeros(count, 1);
-        let mut left_variance: f64 = 0.0;
-        let mut block = Mat::<f64>::zeros(count, BLOCK);
-        for begin in (0..observations.len()).step_by(BLOCK) {
-            let length = BLOCK.min(observations.len() - begin);
-            let mut solved = block.as_mut().subcols_mut(0, length);
-            correlate(kernel, hyperparameters, (observations, begin), kept, solved.as_mut());
-            solve_lower(factor, solved.as_mut(), Par::Seq);
-            for (at, mut column) in solved.as_mut().col_iter_mut().enumerate() {
-                let i = begin + at;
-                let residual = observations.heights()[i] - hyperparameters.mean;
-                let Some(column) = column.as_mut().try_as_col_major_mut() else { continue };
-                let column = column.as_slice_mut();
-                let left = (1.0 - widest(|| dot(column, column))).max(0.0);
-                left_variance = left_variance.max(left);
-                let noise2 = observations.height_noise2(i, hyperparameters.noise_ratio()) + left;
-                let weight = noise2.sqrt().recip();
-                for (entry, sum) in column.iter_mut().zip(sums.col_as_slice_mut(0)) {
-                    *entry *= weight;
-                    *sum += *entry * (weight * residual);
-                }
+/// The covariance of the heights of the kept touches with their errors, in units of the signal's
+/// variance, their heights above the mean, and the most that is left of any touch's variance.
+///
+/// With `factor` the L of the correlations K = L·Lᵀ of the kept touches, V = L⁻¹·K(kept, all)
+/// and D the noise of all touches, what they tell of L⁻¹ times the kept heights has the
+/// precision B = V·D⁻¹·Vᵀ = R·Rᵀ; so the errors of the kept heights have the covariance W·Wᵀ
+/// with W = L·R⁻ᵀ, and the heights are W·R⁻¹·V·D⁻¹·y.
+fn condition(
+    kernel: &dyn Kernel,
+    hyperparameters: &Hyperparameters,
+    observations: &Observations,
+    (kept, factor): (&Observations, MatRef<f64>),
+) -> Result<(Mat<f64>, Vec<f64>, f64), CovarianceError> {
+    let count = kept.len();
+    let mut precision = Mat::<f64>::zeros(count, count);
+    let mut sums = Mat::<f64>::zeros(count, 1);
+    let mut left_variance: f64 = 0.0;
+    let mut block = Mat::<f64>::zeros(count, BLOCK);
+    for begin in (0..observations.len()).step_by(BLOCK) {
+        let length = BLOCK.min(observations.len() - begin);
+        let mut solved = block.as_mut().subcols_mut(0, length);
+        correlate(kernel, hyperparameters, (observations, begin), kept, solved.as_mut());
+        solve_lower(factor, solved.as_mut(), Par::Seq);
+        for (at, mut column) in solved.as_mut().col_iter_mut().enumerate() {
+            let i = begin + at;
+            let residual = observations.heights()[i] - hyperparameters.mean;
+            let Some(column) = column.as_mut().try_as_col_major_mut() else { continue };
+            let column = column.as_slice_mut();
+            let left = (1.0 - widest(|| dot(column, column))).max(0.0);
+            left_variance = left_variance.max(left);
+            let noise2 = observations.height_noise2(i, hyperparameters.noise_ratio()) + left;
+            let weight = noise2.sqrt().recip();
+            for (entry, sum) in column.iter_mut().zip(sums.col_as_slice_mut(0)) {
+                *entry *= weight;
+                *sum += *entry * (weight * residual);
             }
-            let solved = solved.as_ref();
-            add_product(&mut precision, solved, solved.transpose());
         }
-        let trace: f64 = (0..count).map(|i| precision[(i, i)]).sum();
-        (0..count).for_each(|i| precision[(i, i)] += JITTER * trace);
-        let mut root = dense(precision.as_ref());
-        root.factor(0.0).map_err(|cause| indefinite(count, cause))?;
-        let root =
-            Mat::from_fn(count, count, |i, j| if j <= i { root.column(j)[i - j] } else { 0.0 });
-        let mut transposed = factor.transpose().to_owned();
-        solve_lower(root.as_ref(), transposed.as_mut(), Par::Seq);
-        solve_lower(root.as_ref(), sums.as_mut(), Par::Seq);
-        let residuals = transposed.transpose() * &sums;
-        let mut covariance = Mat::<f64>::zeros(count, count);
-        add_product(&mut covariance, transposed.transpose(), transposed.as_ref());
-        add_product(&mut covariance, factor, factor.transpose());
-        Ok(Self { covariance, residuals: residuals.col_as_slice(0).to_vec(), left_variance })
+        let solved = solved.as_ref();
+        add_product(&mut precision, solved, solved.transpose());
     }
+    let trace: f64 = (0..count).map(|i| precision[(i, i)]).sum();
+    (0..count).for_each(|i| precision[(i, i)] += JITTER * trace);
+    let mut root = dense(precision.as_ref());
+    root.factor(0.0).map_err(|cause| indefinite(count, cause))?;
+    let root = Mat::from_fn(count, count, |i, j| if j <= i { root.column(j)[i - j] } else { 0.0 });
+    let mut transposed = factor.transpose().to_owned();
+    solve_lower(root.as_ref(), transposed.as_mut(), Par::Seq);
+    solve_lower(root.as_ref(), sums.as_mut(), Par::Seq);
+    let residuals = transposed.transpose() * &sums;
+    let mut covariance = Mat::<f64>::zeros(count, count);
+    add_product(&mut covariance, transposed.transpose(), transposed.as_ref());
+    add_product(&mut covariance, factor, factor.transpose());
+    Ok((covariance, residuals.col_as_slice(0).to_vec(), left_variance))
 }
 
 /// Writes the correlations of the kept touches with those from `begin` on, one of these a column.

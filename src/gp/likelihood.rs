@@ -1,14 +1,13 @@
 //! The log marginal likelihood of hyperparameters and its gradient.
 
-use super::correlations::{Correlations, batches};
 use super::covariance;
 use super::covariance::CovarianceError;
+use super::covariance::{Correlations, batches};
 use super::dense::Dense;
-use super::derivative_covariance::PairWeights;
 use super::kernel::{Hyperparameters, Kernel};
-use super::mean::Mean;
 use super::observations::{NoiseRatio, Observations};
-use super::range::Scale;
+use super::search_box::Mean;
+use super::search_box::Scale;
 use crate::math::simd::{widest, widest_dot};
 
 /// Scores hyperparameters against fixed observations; keeps its buffers between calls.
@@ -26,7 +25,8 @@ pub struct Likelihood<'a> {
     /// L⁻¹·y, then A⁻¹·y where a gradient is asked for.
     weights: Vec<f64>,
     scratch: Vec<f64>,
-    pair: PairWeights,
+    /// Weights of a pair of places, see [`DerivativeCovariance::add_length_gradient`].
+    pair: [Vec<f64>; 2],
     correlations: Correlations,
     factorisations: u32,
 }
@@ -62,7 +62,7 @@ impl<'a> Likelihood<'a> {
             dense: Dense::new(count),
             weights: Vec::with_capacity(count),
             scratch: Vec::with_capacity(count),
-            pair: PairWeights::default(),
+            pair: Default::default(),
             correlations: Correlations::default(),
             factorisations: 0,
         }
@@ -215,6 +215,7 @@ impl<'a> Likelihood<'a> {
         (by_length, by_noise): (&mut [f64], &mut [f64]),
     ) {
         let Self { observations, dense, weights, pair, correlations, kernel, .. } = self;
+        let [slope_height, slopes] = pair;
         let d = lengths.len();
         let change = |row: usize, column: usize| {
             let inverse = dense.inverse_column(column)[row - column];
@@ -236,20 +237,20 @@ impl<'a> Likelihood<'a> {
             derivatives.correlate(*kernel, observations, lengths, observations.place(j), j);
             for i in j + 1..observations.len() {
                 let row = observations.start(i);
-                pair.heights = change(row, column);
-                pair.slope_height.clear();
-                pair.slope_height.resize(d, 0.0);
-                pair.slopes.clear();
-                pair.slopes.resize(d * d, 0.0);
+                slope_height.clear();
+                slope_height.resize(d, 0.0);
+                slopes.clear();
+                slopes.resize(d * d, 0.0);
                 for axis in 0..observations.slope(j).len() {
-                    pair.slope_height[axis] += change(row, column + 1 + axis);
+                    slope_height[axis] += change(row, column + 1 + axis);
                 }
                 for other in 0..observations.slope(i).len() {
-                    pair.slope_height[other] -= change(row + 1 + other, column);
+                    slope_height[other] -= change(row + 1 + other, column);
                     for axis in 0..observations.slope(j).len() {
-                        pair.slopes[axis * d + other] = change(row + 1 + other, column + 1 + axis);
+                        slopes[axis * d + other] = change(row + 1 + other, column + 1 + axis);
                     }
                 }
+                let pair = (change(row, column), &slope_height[..], &slopes[..]);
                 derivatives.add_length_gradient(observations, lengths, i, pair, by_length);
             }
         }

@@ -50,47 +50,31 @@
 //! |---|---|
 //! | [`kernel`] | how alike the heights of two places are, and the hyperparameters |
 //! | [`observations`] | places, heights, and slopes if they are observed too |
-//! | [`posterior`] | mean, variance and their gradients at a place (Eq. 3 of Yi et al. 2016) |
-//! | [`batch`] | mean and variance at many places |
-//! | [`field`] | the mean of heights and slopes at very many places |
-//! | [`means`] | means at many places while observations are added |
+//! | [`posterior`], [`batch`], [`means`] | mean, variance and their gradients at a place (Eq. 3 of Yi et al. 2016), at many, at very many |
 //! | [`inducing`] | the posterior of very many touches through a few of them |
 //! | [`likelihood`] | how well hyperparameters explain the observations |
-//! | [`choice`] | which kernel explains them best |
-//! | [`fit`], [`search_box`], [`range`] | the most likely hyperparameters, and where to seek them |
+//! | [`fit`], [`search_box`] | the most likely hyperparameters and kernel, and where to seek them |
 //! | [`reduction`] | how much one more observation would tell |
-//! | [`covariance`], [`dense`], [`cholesky`] | the covariance matrix, factored whole or row by row
-//! |
+//! | [`covariance`], [`dense`], [`cholesky`] | the covariance matrix, factored whole or row by row |
 
 pub mod batch;
-pub mod choice;
 pub mod cholesky;
-mod correlations;
 pub mod covariance;
 pub mod dense;
-mod derivative_covariance;
-pub mod field;
 pub mod fit;
-pub mod indefinite;
 pub mod inducing;
 pub mod kernel;
-mod lanes;
 pub mod likelihood;
-pub mod mean;
 pub mod means;
 pub mod observations;
 pub mod posterior;
-pub mod range;
 pub mod reduction;
 mod scan;
-mod search;
 pub mod search_box;
 mod tiles;
 
 pub use fit::{Fit, Refits};
 pub use kernel::{Hyperparameters, Kernel};
-pub use mean::Mean;
 pub use observations::{NoiseRatio, Observation, Observations, Slope};
 pub use posterior::Posterior;
-pub use range::{LogNormal, Range, Scale};
-pub use search_box::{SearchBox, TouchNoise};
+pub use search_box::{LogNormal, Mean, Range, Scale, SearchBox, TouchNoise};

@@ -1,12 +1,12 @@
 //! The exact posterior of a Gaussian process, Eq. 3 of Yi et al. 2016.
 
 use super::cholesky::Factor;
-use super::correlations::Correlations;
 use super::covariance;
+use super::covariance::Correlations;
 use super::covariance::CovarianceError;
+use super::covariance::DerivativeCovariance;
 use super::dense::Dense;
-use super::derivative_covariance::DerivativeCovariance;
-use super::indefinite::NotPositiveDefinite;
+use super::dense::NotPositiveDefinite;
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::{Observation, Observations};
 use crate::math::simd::widest_dot;

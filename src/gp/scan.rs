@@ -7,9 +7,9 @@ use super::cholesky::Factor;
 use super::kernel::Kernel;
 use super::likelihood;
 use super::likelihood::ProfiledLikelihood;
-use super::mean::Mean;
 use super::observations::Observations;
-use super::range::Scale;
+use super::search_box::Mean;
+use super::search_box::Scale;
 use super::search_box::SearchBox;
 use crate::math::optimize::Bounds;
 use crate::math::simd::widest_dot;
@@ -31,36 +31,31 @@ pub(super) struct Grid {
     upper: Vec<f64>,
     /// Places per parameter, the noises last; those of lengths that are spread are one entry.
     levels: Vec<usize>,
-    spread: Spread,
-}
-
-/// Places in a unit cube, evenly spread, and which of them lie next to each.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Spread {
-    places: Vec<Vec<f64>>,
+    /// Places of the lengths that are spread, in a unit cube, and which of them lie next to each.
+    spread: Vec<Vec<f64>>,
     beside: Vec<Vec<[usize; 2]>>,
 }
 
-impl Spread {
-    /// The first of Sobol's sequence; beside each lie as many as it would have on a grid.
-    fn new(dimension: usize) -> Self {
-        let at = |index: usize, axis| f64::from(sobol_burley::sample(index as u32, axis, 0));
-        let places: Vec<Vec<f64>> = (0..SPREAD)
-            .map(|index| (0..dimension as u32).map(|axis| at(index, axis)).collect())
-            .collect();
-        let beside = |place: &Vec<f64>| {
-            let squares = |other: &Vec<f64>| -> f64 {
-                place.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum()
-            };
-            let distances: Vec<f64> = places.iter().map(squares).collect();
-            let mut order: Vec<usize> = (0..SPREAD).collect();
-            order.sort_by(|a, b| distances[*a].total_cmp(&distances[*b]));
-            // The nearest is itself.
-            order[1..].as_chunks::<2>().0.iter().copied().take(dimension).collect()
+/// The first places of Sobol's sequence in a unit cube.
+fn spread(dimension: usize) -> Vec<Vec<f64>> {
+    let at = |index: usize, axis| f64::from(sobol_burley::sample(index as u32, axis, 0));
+    let place = |index| (0..dimension as u32).map(|axis| at(index, axis)).collect();
+    (0..SPREAD).map(place).collect()
+}
+
+/// The nearest of `places` beside each: as many as it would have on a grid.
+fn beside(places: &[Vec<f64>]) -> Vec<Vec<[usize; 2]>> {
+    let nearest = |place: &Vec<f64>| {
+        let squares = |other: &Vec<f64>| -> f64 {
+            place.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum()
         };
-        let beside = places.iter().map(beside).collect();
-        Self { places, beside }
-    }
+        let distances: Vec<f64> = places.iter().map(squares).collect();
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by(|a, b| distances[*a].total_cmp(&distances[*b]));
+        // The nearest is itself.
+        order[1..].as_chunks::<2>().0.iter().copied().take(place.len()).collect()
+    };
+    places.iter().map(nearest).collect()
 }
 
 impl Grid {
@@ -72,17 +67,19 @@ impl Grid {
             _ => 5,
         };
         let is_spread = lengths > COMBINED_MAX;
-        let spread = if is_spread { Spread::new(lengths) } else { Spread::default() };
+        let spread = if is_spread { spread(lengths) } else { Vec::new() };
+        let beside = beside(&spread);
         let mut levels = if is_spread { vec![SPREAD] } else { vec![per_length; lengths] };
         for (lower, upper) in bounds.lower.iter().zip(bounds.upper).skip(lengths) {
             levels.push(((upper - lower) / NOISE_STEP).ceil().max(1.0) as usize + 1);
         }
-        Self { lower: bounds.lower.to_vec(), upper: bounds.upper.to_vec(), levels, spread }
+        let (lower, upper) = (bounds.lower.to_vec(), bounds.upper.to_vec());
+        Self { lower, upper, levels, spread, beside }
     }
 
     /// How many places have the same lengths.
     fn noises(&self, lengths: usize) -> usize {
-        let entries = if self.spread.places.is_empty() { lengths } else { 1 };
+        let entries = if self.spread.is_empty() { lengths } else { 1 };
         self.levels[entries..].iter().product()
     }
 
@@ -95,7 +92,7 @@ impl Grid {
     pub(super) fn place(&self, index: usize) -> Vec<f64> {
         let mut shares = Vec::with_capacity(self.lower.len());
         for (entry, (digit, &levels)) in digits(index, &self.levels).zip(&self.levels).enumerate() {
-            match self.spread.places.get(digit).filter(|_| entry == 0) {
+            match self.spread.get(digit).filter(|_| entry == 0) {
                 Some(place) => shares.extend(place.iter().map(|share| (*share, 1.0))),
                 None => shares.push((digit as f64, (levels.max(2) - 1) as f64)),
             }
@@ -140,11 +137,11 @@ impl Grid {
             [below, above]
         });
         let noises = values.len() / self.levels.first().copied().unwrap_or(1);
-        let spread = self.spread.beside.get(index / noises.max(1));
+        let spread = self.beside.get(index / noises.max(1));
         let spread = spread.into_iter().flatten();
         let spread =
             spread.map(move |pair| pair.map(|other| Some(values[other * noises + index % noises])));
-        let is_spread = !self.spread.beside.is_empty();
+        let is_spread = !self.beside.is_empty();
         spread.chain(along.skip(usize::from(is_spread)))
     }
 }

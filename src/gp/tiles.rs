@@ -4,24 +4,27 @@
 //! result that stays in the processor's registers (Goto & van de Geijn 2008). A search factors such
 //! matrices by the thousand, and a blocked algorithm's book-keeping would cost more than that.
 
-use super::indefinite::NotPositiveDefinite;
-use crate::math::vector::{Vector, Vectorised};
+use crate::math::vector::{Vector, vectorised_fn};
 use faer::reborrow::{Reborrow, ReborrowMut};
 use faer::{MatMut, MatRef};
 use std::ops::Range;
+use thiserror::Error;
+
+/// The matrix is not positive definite in floating point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("pivot {index} is not positive")]
+pub struct NotPositiveDefinite {
+    /// Row at which it was seen.
+    pub index: usize,
+}
 
 /// Columns that are worked on together; orders are multiples of it.
 pub(super) const WIDE: usize = 8;
 
-/// Replaces the lower triangle of A by L with A = L·Lᵀ.
-pub(super) struct Factor<'a>(pub(super) MatMut<'a, f64>);
-
-impl Vectorised for Factor<'_> {
-    type Output = Result<(), NotPositiveDefinite>;
-
-    #[inline(always)]
-    fn call<V: Vector>(self) -> Self::Output {
-        let mut matrix = self.0;
+vectorised_fn! {
+    /// Replaces the lower triangle of A by L with A = L·Lᵀ.
+    pub(super) fn factor<'a, V: Vector>(matrix: MatMut<'a, f64>) -> Result<(), NotPositiveDefinite> {
+        let mut matrix = matrix;
         let order = matrix.ncols();
         for j in (0..order).step_by(WIDE) {
             let (done, mut block) = matrix.rb_mut().split_at_col_mut(j);
@@ -36,20 +39,13 @@ impl Vectorised for Factor<'_> {
     }
 }
 
-/// Replaces the lower triangle of L by that of A⁻¹ = Y·Yᵀ with Y = L⁻ᵀ, for which there is room in
-/// `upper`.
-pub(super) struct Invert<'a> {
-    pub(super) factor: MatMut<'a, f64>,
-    pub(super) upper: MatMut<'a, f64>,
-}
-
-impl Vectorised for Invert<'_> {
-    type Output = ();
-
+vectorised_fn! {
+    /// Replaces the lower triangle of L by that of A⁻¹ = Y·Yᵀ with Y = L⁻ᵀ, for which there is room
+    /// in `upper`.
+    ///
     /// Y stands below A as the identity does: what makes L of A makes Y of it.
-    #[inline(always)]
-    fn call<V: Vector>(self) {
-        let Self { mut factor, mut upper } = self;
+    pub(super) fn invert<'a, V: Vector>(factor: MatMut<'a, f64>, upper: MatMut<'a, f64>) -> () {
+        let (mut factor, mut upper) = (factor, upper);
         let order = factor.ncols();
         for j in (0..order).step_by(WIDE) {
             let (done, mut block) = upper.rb_mut().split_at_col_mut(j);

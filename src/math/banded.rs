@@ -4,7 +4,7 @@
 //! meant for corrections whose residual is known in double precision. Rows are solved in blocks
 //! whose triangle is inverted beforehand, so that only blocks wait for each other.
 
-use super::simd::{dot, widest};
+use super::simd::{dot, widest_fn};
 
 /// Rows of a block: single-precision numbers in a vector of 256 bits.
 const LANES: usize = 8;
@@ -84,7 +84,7 @@ impl Banded {
 impl Factor {
     /// Solves A x = b in place.
     pub fn solve(&self, x: &mut [f32]) {
-        widest(Solution { factor: self, x });
+        solve(self, x);
     }
 
     /// Bytes held.
@@ -184,17 +184,9 @@ impl Triangle {
     }
 }
 
-struct Solution<'a> {
-    factor: &'a Factor,
-    x: &'a mut [f32],
-}
-
-impl pulp::NullaryFnOnce for Solution<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        self.factor.lower.solve(self.x);
-        self.factor.upper.solve(self.x);
+widest_fn! {
+    fn solve<'a>(factor: &'a Factor, x: &'a mut [f32]) -> () {
+        factor.lower.solve(x);
+        factor.upper.solve(x);
     }
 }

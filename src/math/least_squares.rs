@@ -5,6 +5,7 @@
 //! parameters that the residuals say next to nothing of, nothing moves.
 
 use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
 use thiserror::Error;
 
 /// What is fitted.
@@ -175,6 +176,34 @@ pub fn jacobian<P: Problem>(problem: &P, state: &P::State, count: usize) -> DMat
         jacobian.set_column(j, &((ahead - behind) / (2.0 * problem.difference())));
     }
     jacobian
+}
+
+/// Covariance of the parameters at `state` of a robust fit some of whose residuals err together, A⁻¹ (Σ g gᵀ) A⁻¹ · n/(n − 1) with A = JᵀWJ and the
+/// n clusters' gradients g = Σ Jᵢᵀ wᵢ rᵢ (Liang & Zeger 1986). Residuals without a cluster, those
+/// of what was believed before, count in A only. None if A has no inverse.
+pub fn clustered_covariance<P: Problem>(
+    problem: &P,
+    state: &P::State,
+    cluster: impl Fn(usize) -> Option<usize>,
+) -> Option<DMatrix<f64>> {
+    let residuals = problem.residuals(state);
+    let slopes = jacobian(problem, state, residuals.len());
+    let weights = residuals.map(huber_weight);
+    let mut weighted = slopes.clone();
+    (weighted.row_iter_mut().zip(weights.iter())).for_each(|(mut row, weight)| row *= *weight);
+    let inverse = (slopes.transpose() * &weighted).try_inverse()?;
+    let mut gradients: BTreeMap<usize, DVector<f64>> = BTreeMap::new();
+    for (i, residual) in residuals.iter().enumerate() {
+        if let Some(cluster) = cluster(i) {
+            let sum = gradients.entry(cluster).or_insert_with(|| DVector::zeros(slopes.ncols()));
+            *sum += weighted.row(i).transpose() * *residual;
+        }
+    }
+    let count = gradients.len() as f64;
+    let parameters = slopes.ncols();
+    let spread = (gradients.values())
+        .fold(DMatrix::zeros(parameters, parameters), |sum, g| sum + g * g.transpose());
+    Some(&inverse * spread * &inverse * (count / (count - 1.0).max(1.0)))
 }
 
 /// Steps until they are too short to matter. `weigh` gives each residual its weight and the whole

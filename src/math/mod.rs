@@ -2,8 +2,6 @@
 
 pub mod banded;
 pub mod climb;
-pub mod clustered;
-pub mod compass;
 pub mod direct;
 pub mod least_squares;
 pub mod normal;

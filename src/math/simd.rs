@@ -2,12 +2,50 @@
 
 use nalgebra::Vector3;
 
+/// Defines a function whose loops are compiled for the widest vectors of this processor, as those of
+/// [`widest`]. All references among its arguments have the one lifetime.
+macro_rules! widest_fn {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident<$life:lifetime> $($rest:tt)*) => {
+        $crate::math::simd::widest_fn!(
+            @ [$(#[$meta])* $vis] $name [$life] [$life] [&$life ()] $($rest)*
+        );
+    };
+    ($(#[$meta:meta])* $vis:vis fn $name:ident<$life:lifetime, const $n:ident: usize> $($rest:tt)*) => {
+        $crate::math::simd::widest_fn!(
+            @ [$(#[$meta])* $vis] $name [$life, const $n: usize] [$life, $n] [&$life ()] $($rest)*
+        );
+    };
+    ($(#[$meta:meta])* $vis:vis fn $name:ident<$life:lifetime, $kind:ident: $bound:path> $($rest:tt)*) => {
+        $crate::math::simd::widest_fn!(
+            @ [$(#[$meta])* $vis] $name [$life, $kind: $bound] [$life, $kind] [(&$life (), $kind)] $($rest)*
+        );
+    };
+    (@ [$($head:tt)*] $name:ident [$($generics:tt)*] [$($names:tt)*] [$life:ty]
+     ($($arg:ident: $of:ty),* $(,)?) -> $out:ty $body:block) => {
+        #[inline(always)]
+        $($head)* fn $name<$($generics)*>($($arg: $of),*) -> $out {
+            struct Work<$($generics)*>($($of,)* std::marker::PhantomData<$life>);
+
+            impl<$($generics)*> pulp::NullaryFnOnce for Work<$($names)*> {
+                type Output = $out;
+
+                #[inline(always)]
+                fn call(self) -> $out {
+                    let Self($($arg,)* _) = self;
+                    $body
+                }
+            }
+            $crate::math::simd::widest(Work::<$($names)*>($($arg,)* std::marker::PhantomData))
+        }
+    };
+}
+pub(crate) use widest_fn;
+
 /// Runs `work` with its loops compiled once for each vector width and the widest one chosen.
 ///
 /// What it calls must be `#[inline(always)]` to be compiled along, and so must a `work` that is
-/// long or multiplies and adds in one rounding, which is then a struct with
-/// [`pulp::NullaryFnOnce`] instead of a closure. Sums keep the order in
-/// which they are written, so that the width changes speed and not results.
+/// long or multiplies and adds in one rounding, which `widest_fn!` then writes instead of a closure.
+/// Sums keep the order in which they are written, so that the width changes speed and not results.
 #[inline(always)]
 pub fn widest<Work: pulp::NullaryFnOnce>(work: Work) -> Work::Output {
     pulp::Arch::new().dispatch(work)
@@ -29,20 +67,10 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     ((a + e) + (b + f)) + ((c + g) + (d + h)) + rest
 }
 
-/// The same with the widest vectors, where it does not stand in a loop that is compiled for them.
-#[inline(always)]
-pub fn widest_dot(a: &[f64], b: &[f64]) -> f64 {
-    widest(Dot(a, b))
-}
-
-struct Dot<'a>(&'a [f64], &'a [f64]);
-
-impl pulp::NullaryFnOnce for Dot<'_> {
-    type Output = f64;
-
-    #[inline(always)]
-    fn call(self) -> f64 {
-        dot(self.0, self.1)
+widest_fn! {
+    /// The same with the widest vectors, where it does not stand in a loop that is compiled for them.
+    pub fn widest_dot<'a>(a: &'a [f64], b: &'a [f64]) -> f64 {
+        dot(a, b)
     }
 }
 

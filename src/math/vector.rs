@@ -20,6 +20,34 @@ pub trait Vector: Copy {
     fn sub(self, b: Self) -> Self;
 }
 
+/// Defines a function that is written in vectors of the widest kind of this processor. All that it
+/// calls is `#[inline(always)]`, and all references among its arguments have the one lifetime.
+macro_rules! vectorised_fn {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident<
+        $life:lifetime, $vector:ident: Vector $(, const $n:ident: usize)?
+    >($($arg:ident: $of:ty),* $(,)?) -> $out:ty $body:block) => {
+        $(#[$meta])*
+        #[inline(always)]
+        $vis fn $name<$life $(, const $n: usize)?>($($arg: $of),*) -> $out {
+            struct Work<$life $(, const $n: usize)?>($($of,)* std::marker::PhantomData<&$life ()>);
+
+            impl<$life $(, const $n: usize)?> $crate::math::vector::Vectorised
+                for Work<$life $(, $n)?>
+            {
+                type Output = $out;
+
+                #[inline(always)]
+                fn call<$vector: $crate::math::vector::Vector>(self) -> $out {
+                    let Self($($arg,)* _) = self;
+                    $body
+                }
+            }
+            $crate::math::vector::vectorised(Work($($arg,)* std::marker::PhantomData))
+        }
+    };
+}
+pub(crate) use vectorised_fn;
+
 /// Work that is written in vectors.
 pub trait Vectorised {
     /// What it returns.

@@ -7,7 +7,6 @@ use super::scene::{Body, Object, Scene, Unit};
 use crate::config::ConfigError;
 use crate::error::Invalid;
 use crate::geometry::bvh::MeshBvh;
-use crate::geometry::error::MeshError;
 use crate::geometry::implicit::Implicit;
 use crate::geometry::import::import_with;
 use crate::geometry::mesh::Mesh;
@@ -52,7 +51,7 @@ pub enum Shape {
 pub enum EnvironmentError {
     /// The object's mesh is unusable.
     #[error(transparent)]
-    Mesh(#[from] MeshError),
+    Mesh(#[from] Invalid),
     /// The arm's model is unusable.
     #[error("{0}")]
     Arm(Box<ConfigError>),
@@ -120,7 +119,7 @@ impl Environment {
         let object = scene.object.as_ref().ok_or(EnvironmentError::Missing { part: "object" })?;
         tell(&format!("reading {}", object.mesh.display()));
         let (mesh, report) =
-            import_with(&object.mesh, object.unit.metres() * object.scale, object.buffers())?;
+            import_with(&object.mesh, object.unit.metres() * object.scale, object.outside_buffers)?;
         tell("building the search tree");
         let bvh = MeshBvh::new(mesh.transformed(&object.x_wo()));
         Self::around(scene, Shape::Mesh { bvh, report: report.into() })

@@ -4,7 +4,6 @@ use super::environment::{Environment, EnvironmentError, Shape};
 use super::scene::{Body, Object, Scene, Unit};
 use crate::explore::registration::{KnownBody, design};
 use crate::geometry::bvh::MeshBvh;
-use crate::geometry::error::MeshError;
 use crate::geometry::mesh::Mesh;
 use crate::geometry::solids::{Triangles, ball, block};
 use crate::math::pose::parts;
@@ -27,8 +26,7 @@ pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Envir
     }
     let ((points, triangles), half_m) = solid(body);
     let x_wo = body.x_wo();
-    let (mesh, report) =
-        Mesh::new(&points, &triangles).map_err(|fault| MeshError { path: NAME.into(), fault })?;
+    let (mesh, report) = Mesh::new(&points, &triangles).map_err(|fault| fault.at(NAME))?;
     let (position_m, rotation_deg) = parts(&x_wo);
     let sides_m = [-half_m, half_m];
     let zone = Zone { position_m, rotation_deg, ..Zone::new(sides_m, Some(sides_m)) };

@@ -3,7 +3,6 @@
 use super::function::Function;
 use super::solver::SolverSettings;
 use crate::config::{Checked, ConfigError, Loader, Rules, is_default};
-use crate::geometry::import::Buffers;
 use crate::geometry::surfaces;
 use crate::math::pose::pose;
 use crate::robot::arm::ArmSettings;
@@ -172,11 +171,6 @@ impl fmt::Display for Unit {
 }
 
 impl Object {
-    /// Where buffers of its mesh may lie.
-    pub fn buffers(&self) -> Buffers {
-        Buffers::outside(self.outside_buffers)
-    }
-
     /// Pose of the mesh's frame in `W`.
     pub fn x_wo(&self) -> Isometry3<f64> {
         pose(self.position_m, self.rotation_deg)

@@ -3,7 +3,7 @@
 use crate::common::shipped::toy;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::planner;
-use palpate::gp::choice::Choice;
+use palpate::gp::fit::Choice;
 use palpate::gp::kernel;
 use palpate::gp::kernel::SquaredExponential;
 use palpate::gp::likelihood::Likelihood;

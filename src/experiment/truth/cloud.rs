@@ -1,6 +1,8 @@
 //! A cloud of contacts, read back from the files of a scan.
 
+use crate::error::Invalid;
 use crate::files;
+use crate::geometry::import::ply::points;
 use nalgebra::Point3;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -16,6 +18,9 @@ pub enum CloudError {
         /// Why.
         cause: std::io::Error,
     },
+    /// It is a broken PLY file.
+    #[error(transparent)]
+    Ply(#[from] Invalid),
     /// It has no such column.
     #[error("{}: no column {column}; allowed are cloud.csv and cloud.ply of palpate scan", path.display())]
     NoColumn {
@@ -51,7 +56,7 @@ pub fn read(path: &Path) -> Result<Vec<Point3<f64>>, CloudError> {
     let text = files::text(path, u64::MAX)
         .map_err(|cause| CloudError::Unreadable { path: path.into(), cause })?;
     let points = match text.starts_with("ply") {
-        true => of_ply(path, &text)?,
+        true => points(text.as_bytes()).map_err(|error| error.at(path.display()))?,
         false => of_csv(path, &text)?,
     };
     match points.is_empty() {
@@ -79,39 +84,6 @@ fn of_csv(path: &Path, text: &str) -> Result<Vec<Point3<f64>>, CloudError> {
         }
     }
     Ok(points)
-}
-
-/// An ASCII file whose vertices begin with x, y and z, as a scan writes it.
-fn of_ply(path: &Path, text: &str) -> Result<Vec<Point3<f64>>, CloudError> {
-    let mut lines = text.lines().enumerate();
-    let (mut count, mut properties, mut is_vertex) = (0, Vec::new(), false);
-    for (_, line) in lines.by_ref() {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words[..] {
-            ["element", name, many] => {
-                is_vertex = name == "vertex";
-                count = if is_vertex { many.parse().unwrap_or(0) } else { count };
-            }
-            ["property", _, name] if is_vertex => properties.push(name.to_owned()),
-            ["end_header"] => break,
-            _ => {}
-        }
-    }
-    for (at, column) in ["x", "y", "z"].into_iter().enumerate() {
-        if properties.get(at).is_none_or(|name| name != column) {
-            return Err(CloudError::NoColumn { path: path.into(), column });
-        }
-    }
-    let point = |(i, line): (usize, &str)| {
-        let words: Vec<&str> = line.split_whitespace().take(3).collect();
-        let fields = <[&str; 3]>::try_from(words).ok().and_then(numbers);
-        fields.ok_or_else(|| CloudError::Line {
-            path: path.into(),
-            line: i + 1,
-            found: line.into(),
-        })
-    };
-    lines.take(count).map(point).collect()
 }
 
 fn numbers(fields: [&str; 3]) -> Option<Point3<f64>> {

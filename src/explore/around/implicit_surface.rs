@@ -12,7 +12,7 @@ use crate::gp::kernel;
 use crate::gp::kernel::{Kernel, Matern52};
 use crate::gp::likelihood::Likelihood;
 use crate::gp::{Hyperparameters, Mean, NoiseRatio, Observations, Posterior, Range, Scale};
-use crate::math::compass::Compass;
+use crate::math::optimize::compass;
 use crate::task::{Aim, Approach};
 use nalgebra::Point3;
 
@@ -147,13 +147,11 @@ impl ImplicitSurface {
             Scale::Best(Range::from((SIGNAL_RANGE[0] * radius_m, SIGNAL_RANGE[1] * radius_m)));
         let mut likelihood = Likelihood::new(self.kernel, Mean::Zero, observations);
         let cube = (observations.order() as f64).powi(3);
-        let compass = Compass {
-            // Each fit begins with another parameter, so that short ones see to all.
-            axis: observations.len() % begin.len(),
-            steps: [if start.is_some() { STEP_NEXT } else { STEP_FIRST }, STEP_LAST],
-            budget: (CUBES / cube).clamp(TRIED_MIN, TRIED_MAX) as u32,
-        };
-        let found = compass.climb(begin, &ranges, |logs| {
+        // Each fit begins with another parameter, so that short ones see to all.
+        let axis = observations.len() % begin.len();
+        let steps = [if start.is_some() { STEP_NEXT } else { STEP_FIRST }, STEP_LAST];
+        let budget = (CUBES / cube).clamp(TRIED_MIN, TRIED_MAX) as u32;
+        let (found, signal_sd) = compass(begin, &ranges, axis, steps, budget, |logs| {
             let (length_m, ratio) = parameters(logs);
             let found = likelihood.profile(&[length_m; 3], ratio, &signal_sd, None)?;
             Ok::<_, CovarianceError>((found.log_likelihood, found.signal_sd))
@@ -161,7 +159,7 @@ impl ImplicitSurface {
         let (length_m, ratio) = parameters(&found.x);
         Ok(Fit {
             kernel: None,
-            hyperparameters: Hyperparameters::new(found.told, vec![length_m; 3], ratio, 0.0),
+            hyperparameters: Hyperparameters::new(signal_sd, vec![length_m; 3], ratio, 0.0),
             log_likelihood: found.value,
             left_sd: None,
             factorisations: found.evaluations,

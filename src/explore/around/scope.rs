@@ -1,6 +1,6 @@
 //! What is explored, and with what: all that a belief over space and its planners are told.
 
-use crate::geometry::extent::extent;
+use crate::geometry::primitives::extent;
 use crate::robot::Finger;
 use crate::task::{Aim, Ball, Task};
 use nalgebra::Point3;

@@ -3,11 +3,11 @@
 use super::evidence::Prior;
 use super::grid::{touched, zero_set};
 use super::scope::Scope;
-use crate::geometry::extent::extent;
 use crate::geometry::implicit::Field;
 use crate::geometry::mesh::Mesh;
+use crate::geometry::primitives::extent;
 use crate::gp::Posterior;
-use crate::gp::field::MeanField;
+use crate::gp::means::MeanField;
 use crate::task::Ball;
 use nalgebra::{Point3, Vector3};
 

@@ -12,9 +12,9 @@ use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
-use super::source::{BYTES_MAX, Buffers, Source};
+use super::source::{BYTES_MAX, Source};
+use crate::error::Invalid;
 use crate::files;
-use crate::geometry::error::{BufferFault, GltfFault};
 
 /// A glTF document and the bytes of its buffers.
 pub(super) struct Document {
@@ -39,24 +39,23 @@ impl<'a> Elements<'a> {
 
 impl Document {
     /// Fetches the buffers of `root`: from the binary chunk, from data URIs, or from files.
-    pub fn load(
-        source: &Source,
-        root: Root,
-        mut chunk: Option<Vec<u8>>,
-    ) -> Result<Self, GltfFault> {
+    pub fn load(source: &Source, root: Root, mut chunk: Option<Vec<u8>>) -> Result<Self, Invalid> {
         let mut buffers = Vec::with_capacity(root.buffers.len());
         let mut left = BYTES_MAX;
         for (number, buffer) in root.buffers.iter().enumerate() {
             let bytes = match &buffer.uri {
                 Some(uri) => fetch(source, uri, left),
-                None => chunk.take().ok_or(BufferFault::NoChunk),
+                None => chunk.take().ok_or_else(|| Invalid::new("the file has no binary chunk")),
             };
             let declared = buffer.byte_length.0;
             let checked = bytes.and_then(|bytes| match bytes.len() {
-                actual if declared > actual as u64 => Err(BufferFault::Short { declared, actual }),
+                actual if declared > actual as u64 => {
+                    Err(Invalid::new(format!("{declared} bytes declared, {actual} present")))
+                }
                 _ => Ok(bytes),
             });
-            let bytes = checked.map_err(|reason| GltfFault::Buffer { buffer: number, reason })?;
+            let bytes =
+                checked.map_err(|reason| Invalid::new(format!("buffer {number}: {reason}")))?;
             // Many buffers may name one large file.
             left = left.saturating_sub(bytes.len() as u64);
             buffers.push(bytes);
@@ -65,7 +64,7 @@ impl Document {
     }
 
     /// Vertex positions.
-    pub fn positions(&self, index: Index<Accessor>) -> Result<Vec<[f32; 3]>, GltfFault> {
+    pub fn positions(&self, index: Index<Accessor>) -> Result<Vec<[f32; 3]>, Invalid> {
         let is_vec3 = |component, kind| component == ComponentType::F32 && kind == Type::Vec3;
         let values = self.values(index, "float VEC3", is_vec3)?;
         let (floats, _) = values.as_chunks::<4>();
@@ -74,21 +73,18 @@ impl Document {
     }
 
     /// Vertex indices.
-    pub fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, GltfFault> {
+    pub fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, Invalid> {
         let is_index = |component, kind| unsigned_size(component).is_some() && kind == Type::Scalar;
         let values = self.values(index, "unsigned SCALAR", is_index)?;
         let size = self.component(index)?.size();
         Ok(values.chunks_exact(size).map(unsigned).collect())
     }
 
-    fn component(&self, index: Index<Accessor>) -> Result<ComponentType, GltfFault> {
+    fn component(&self, index: Index<Accessor>) -> Result<ComponentType, Invalid> {
         let accessor = find(&self.root.accessors, "accessor", index)?;
         match accessor.component_type {
             Checked::Valid(component) => Ok(component.0),
-            Checked::Invalid => Err(GltfFault::AccessorType {
-                accessor: index.value(),
-                expected: "a known component type",
-            }),
+            Checked::Invalid => Err(wrong_type(index.value(), "a known component type")),
         }
     }
 
@@ -96,11 +92,11 @@ impl Document {
     fn values(
         &self,
         index: Index<Accessor>,
-        expected: &'static str,
+        expected: &str,
         accepts: impl Fn(ComponentType, Type) -> bool,
-    ) -> Result<Vec<u8>, GltfFault> {
+    ) -> Result<Vec<u8>, Invalid> {
         let number = index.value();
-        let wrong_type = || GltfFault::AccessorType { accessor: number, expected };
+        let wrong_type = || wrong_type(number, expected);
         let accessor = find(&self.root.accessors, "accessor", index)?;
         let component = self.component(index)?;
         let Checked::Valid(kind) = accessor.type_ else { return Err(wrong_type()) };
@@ -121,7 +117,9 @@ impl Document {
             // Zeros, to be replaced by sparse values: no bytes stand behind the count, so it may
             // not exceed those of the whole file.
             None if count > self.buffers.iter().map(Vec::len).sum::<usize>() as u64 => {
-                return Err(GltfFault::AccessorCount { accessor: number, count });
+                return Err(Invalid::new(format!(
+                    "accessor {number} declares {count} elements and no data"
+                )));
             }
             None => vec![0; count as usize * size],
         };
@@ -135,15 +133,14 @@ impl Document {
         accessor: &Accessor,
         size: usize,
         values: &mut [u8],
-    ) -> Result<(), GltfFault> {
+    ) -> Result<(), Invalid> {
         let Some(sparse) = &accessor.sparse else { return Ok(()) };
         let (places, news) = (&sparse.indices, &sparse.values);
-        let wrong_type =
-            GltfFault::AccessorType { accessor: number, expected: "unsigned sparse indices" };
-        let place_size = match places.component_type {
-            Checked::Valid(component) => unsigned_size(component.0).ok_or(wrong_type)?,
-            Checked::Invalid => return Err(wrong_type),
+        let component = match places.component_type {
+            Checked::Valid(component) => unsigned_size(component.0),
+            Checked::Invalid => None,
         };
+        let place_size = component.ok_or_else(|| wrong_type(number, "unsigned sparse indices"))?;
         let count = sparse.count.0;
         let places =
             self.elements(number, places.buffer_view, places.byte_offset.0, place_size, count)?;
@@ -151,9 +148,10 @@ impl Document {
         let elements = values.len() / size;
         for (place, new) in places.iter().map(unsigned).zip(news.iter()) {
             let old = values.chunks_exact_mut(size).nth(place as usize);
-            let sparse_index =
-                GltfFault::SparseIndex { accessor: number, index: place, count: elements };
-            old.ok_or(sparse_index)?.copy_from_slice(new);
+            let out_of_range = || {
+                Invalid::new(format!("accessor {number} replaces element {place} of {elements}"))
+            };
+            old.ok_or_else(out_of_range)?.copy_from_slice(new);
         }
         Ok(())
     }
@@ -166,7 +164,7 @@ impl Document {
         offset: u64,
         size: usize,
         count: u64,
-    ) -> Result<Elements<'_>, GltfFault> {
+    ) -> Result<Elements<'_>, Invalid> {
         let number = view.value();
         let view = find(&self.root.buffer_views, "buffer view", view)?;
         let buffer = find(&self.buffers, "buffer", view.buffer)?;
@@ -175,7 +173,12 @@ impl Document {
         let bytes = usize::try_from(end)
             .ok()
             .and_then(|end| buffer.get(start as usize..end))
-            .ok_or(GltfFault::ViewOutOfRange { view: number, end, available: buffer.len() })?;
+            .ok_or_else(|| {
+                let available = buffer.len();
+                Invalid::new(format!(
+                    "buffer view {number} reaches byte {end} of a buffer of {available}"
+                ))
+            })?;
         let stride = view.byte_stride.map_or(0, |stride| stride.0).max(size);
         let needed = match count {
             0 => 0,
@@ -183,12 +186,10 @@ impl Document {
         };
         if needed > bytes.len() as u128 {
             let available = bytes.len();
-            return Err(GltfFault::AccessorOutOfRange {
-                accessor,
-                view: number,
-                needed,
-                available,
-            });
+            return Err(Invalid::new(format!(
+                "accessor {accessor} needs {needed} bytes of buffer view {number}, which has \
+                 {available}"
+            )));
         }
         let bytes = bytes.get(offset as usize..).unwrap_or_default();
         Ok(Elements { bytes, stride, size, count: count as usize })
@@ -198,10 +199,15 @@ impl Document {
 /// The object a document's index refers to.
 pub(super) fn find<'a, T, K>(
     objects: &'a [T],
-    kind: &'static str,
+    kind: &str,
     index: Index<K>,
-) -> Result<&'a T, GltfFault> {
-    objects.get(index.value()).ok_or(GltfFault::Missing { kind, index: index.value() })
+) -> Result<&'a T, Invalid> {
+    let missing = || Invalid::new(format!("{kind} {} does not exist", index.value()));
+    objects.get(index.value()).ok_or_else(missing)
+}
+
+fn wrong_type(accessor: usize, expected: &str) -> Invalid {
+    Invalid::new(format!("accessor {accessor} must hold {expected}"))
 }
 
 fn unsigned_size(component: ComponentType) -> Option<usize> {
@@ -216,22 +222,25 @@ fn unsigned(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |number, &byte| (number << 8) | u32::from(byte))
 }
 
-fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, BufferFault> {
+fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, Invalid> {
+    let unknown = || Invalid::new("its URI is neither base64 data nor a path");
     if let Some(data) = uri.strip_prefix("data:") {
-        let (_, encoded) = data.split_once(";base64,").ok_or(BufferFault::Uri)?;
-        return Ok(STANDARD.decode(encoded)?);
+        let (_, encoded) = data.split_once(";base64,").ok_or_else(unknown)?;
+        let decoded = STANDARD.decode(encoded);
+        return decoded.map_err(|error| Invalid::new(format!("base64: {error}")));
     }
-    let name = percent_decoded(uri).ok_or(BufferFault::Uri)?;
-    if name.contains("://") {
-        return Err(BufferFault::Uri);
-    }
+    let name = percent_decoded(uri).filter(|name| !name.contains("://")).ok_or_else(unknown)?;
     let path = source.path.with_file_name("").join(&name);
-    let unreadable = |error| BufferFault::File { path: path.clone(), error };
+    let unreadable = |error| Invalid::new(format!("{} cannot be read: {error}", path.display()));
     // Where it is in truth: `..` and links may lead anywhere.
     let real = path.canonicalize().map_err(unreadable)?;
     let folder = folder(source.path).map_err(unreadable)?;
-    if source.buffers == Buffers::Beside && !real.starts_with(folder) {
-        return Err(BufferFault::Outside { path: real });
+    if !source.outside_buffers && !real.starts_with(folder) {
+        return Err(Invalid::new(format!(
+            "{} lies outside the mesh's folder; if that is meant, allow it by \
+             object.outside_buffers = true in a scene, or by --outside-buffers",
+            real.display()
+        )));
     }
     files::bytes(&real, most).map_err(unreadable)
 }

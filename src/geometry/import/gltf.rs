@@ -13,9 +13,10 @@ use nalgebra::{Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
 
 use super::accessor::{Document, find};
 use super::source::Source;
+use crate::error::Invalid;
 use crate::files::unmarked;
-use crate::geometry::error::{GltfFault, MeshFault};
 use crate::geometry::raw::RawMesh;
+use crate::words;
 
 /// Extensions with these prefixes leave the geometry alone.
 const HARMLESS_EXTENSIONS: [&str; 4] =
@@ -31,11 +32,12 @@ const UPRIGHT: Matrix4<f64> = Matrix4::new(
 );
 
 /// Reads a glTF file.
-pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
+pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
     let (root, chunk) = parse(source.bytes)?;
     let harmless = |name: &&String| HARMLESS_EXTENSIONS.iter().any(|known| name.starts_with(known));
     if let Some(name) = root.extensions_required.iter().find(|name| !harmless(name)) {
-        return Err(GltfFault::Extension(name.clone()).into());
+        let problem = format!("needs the extension \"{name}\", which is not supported");
+        return Err(Invalid::new(problem));
     }
     let document = Document::load(source, root, chunk)?;
     let mut raw = RawMesh::default();
@@ -47,27 +49,34 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
     Ok(raw)
 }
 
-fn parse(bytes: &[u8]) -> Result<(Root, Option<Vec<u8>>), GltfFault> {
+fn parse(bytes: &[u8]) -> Result<(Root, Option<Vec<u8>>), Invalid> {
     if !bytes.starts_with(b"glTF") {
-        return Ok((Root::from_slice(unmarked(bytes))?, None));
+        return Ok((root(unmarked(bytes))?, None));
     }
     // The crate subtracts the header's size from the stated length without looking.
     if let Some(&[a, b, c, d]) = bytes.get(8..12).and_then(<[u8]>::first_chunk) {
         let length = u32::from_le_bytes([a, b, c, d]);
         if length < 12 {
-            return Err(GltfFault::ContainerLength { length });
+            return Err(Invalid::new(format!(
+                "binary container: a length of {length} bytes is shorter than its header"
+            )));
         }
     }
-    let container = gltf::Glb::from_slice(bytes).map_err(GltfFault::Container)?;
-    let root = Root::from_slice(&container.json)?;
-    Ok((root, container.bin.map(Into::into)))
+    let container = gltf::Glb::from_slice(bytes)
+        .map_err(|error| Invalid::new(format!("binary container: {error}")))?;
+    Ok((root(&container.json)?, container.bin.map(Into::into)))
 }
 
-/// A node N with its pose in our upright frame S: the point p of N is `x_sn` p in S.
-type Placed = (Index<Node>, Matrix4<f64>);
+fn root(json: &[u8]) -> Result<Root, Invalid> {
+    Root::from_slice(json).map_err(|error| {
+        let (line, column) = (error.line(), error.column());
+        Invalid::new(format!("JSON: line {line}, column {column}: {}", words::json(&error)))
+    })
+}
 
-/// The nodes of the scene, parents before children.
-fn placed_nodes(root: &Root) -> Result<Vec<Placed>, GltfFault> {
+/// The nodes of the scene, parents before children, each with its pose in our upright frame S: the
+/// point p of a node N is `x_sn` p in S.
+fn placed_nodes(root: &Root) -> Result<Vec<(Index<Node>, Matrix4<f64>)>, Invalid> {
     let roots = match root.scene {
         Some(scene) => find(&root.scenes, "scene", scene)?.nodes.clone(),
         None => orphans(root)?,
@@ -78,7 +87,7 @@ fn placed_nodes(root: &Root) -> Result<Vec<Placed>, GltfFault> {
     while let Some((index, parent)) = waiting.pop() {
         let node = find(&root.nodes, "node", index)?;
         if std::mem::replace(&mut reached[index.value()], true) {
-            return Err(GltfFault::NotATree { node: index.value() });
+            return Err(not_a_tree(index.value()));
         }
         let x_sn = parent * local_pose(index, node)?;
         let children = node.children.iter().flatten().rev();
@@ -88,8 +97,12 @@ fn placed_nodes(root: &Root) -> Result<Vec<Placed>, GltfFault> {
     Ok(placed)
 }
 
-/// Nodes that are nobody's child. If every node is one, they form a cycle.
-fn orphans(root: &Root) -> Result<Vec<Index<Node>>, GltfFault> {
+fn not_a_tree(node: usize) -> Invalid {
+    Invalid::new(format!("node {node} is reached twice; nodes must form a tree"))
+}
+
+/// Nodes without a parent. If every node has one, they form a cycle.
+fn orphans(root: &Root) -> Result<Vec<Index<Node>>, Invalid> {
     let mut is_child = vec![false; root.nodes.len()];
     for &child in root.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
         find(&root.nodes, "node", child)?;
@@ -101,18 +114,20 @@ fn orphans(root: &Root) -> Result<Vec<Index<Node>>, GltfFault> {
         .map(|(node, _)| Index::new(node))
         .collect();
     if orphans.is_empty() && !is_child.is_empty() {
-        return Err(GltfFault::NotATree { node: 0 });
+        return Err(not_a_tree(0));
     }
     Ok(orphans)
 }
 
 /// The pose of a node in its parent.
-fn local_pose(index: Index<Node>, node: &Node) -> Result<Matrix4<f64>, GltfFault> {
+fn local_pose(index: Index<Node>, node: &Node) -> Result<Matrix4<f64>, Invalid> {
     if let Some(columns) = node.matrix {
         let matrix = Matrix4::from_column_slice(&columns.map(f64::from));
         let last_row = [matrix[(3, 0)], matrix[(3, 1)], matrix[(3, 2)], matrix[(3, 3)]];
         if last_row != [0.0, 0.0, 0.0, 1.0] {
-            return Err(GltfFault::NotAffine { node: index.value(), last_row });
+            return Err(Invalid::new(format!(
+                "the matrix of node {index} is not affine: its last row is {last_row:?}"
+            )));
         }
         return Ok(matrix);
     }
@@ -132,7 +147,7 @@ fn add_mesh(
     index: Index<Mesh>,
     x_sn: &Matrix4<f64>,
     raw: &mut RawMesh,
-) -> Result<(), MeshFault> {
+) -> Result<(), Invalid> {
     let mesh = find(&document.root.meshes, "mesh", index)?;
     let mirrored = x_sn.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
     for (number, primitive) in mesh.primitives.iter().enumerate() {
@@ -140,9 +155,9 @@ fn add_mesh(
             Some(name) => format!("primitive {number} of mesh {index} \"{name}\" at node {node}"),
             None => format!("primitive {number} of mesh {index} at node {node}"),
         };
-        let incomplete = |what| GltfFault::Incomplete { primitive: label.clone(), what };
+        let incomplete = |what| Invalid::new(format!("{label} has no {what}"));
         let Checked::Valid(mode) = primitive.mode else {
-            return Err(incomplete("known mode").into());
+            return Err(incomplete("known mode"));
         };
         if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
             raw.skipped_primitives += 1;
@@ -164,7 +179,7 @@ fn corners(
     document: &Document,
     primitive: &Primitive,
     vertices: usize,
-) -> Result<Vec<u32>, GltfFault> {
+) -> Result<Vec<u32>, Invalid> {
     match primitive.indices {
         Some(indices) => document.indices(indices),
         None => Ok((0..vertices as u32).collect()),

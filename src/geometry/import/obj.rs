@@ -4,13 +4,13 @@
 
 use nalgebra::Point3;
 
-use super::source::{Source, cut};
+use super::source::{Source, bad_line};
+use crate::error::Invalid;
 use crate::files::unmarked;
-use crate::geometry::error::MeshFault;
 use crate::geometry::raw::RawMesh;
 
 /// Reads an OBJ file.
-pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
+pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
     let text = geometry_only(&String::from_utf8_lossy(unmarked(source.bytes)))?;
     let options = tobj::LoadOptions {
         triangulate: true,
@@ -19,7 +19,8 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
         ..tobj::LoadOptions::default()
     };
     let (models, _) =
-        tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default()))?;
+        tobj::load_obj_buf(&mut text.as_bytes(), &options, |_| Ok(Default::default()))
+            .map_err(|error| Invalid::new(format!("OBJ: {error}")))?;
     let mut raw = RawMesh::default();
     for tobj::Model { mesh, name } in &models {
         let (positions, _) = mesh.positions.as_chunks();
@@ -33,7 +34,7 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
 /// Keeps objects, positions and the position indices of faces, and checks them where their lines
 /// are still known. tobj would overflow on the other indices of a face if they are out of range,
 /// and names no line in its errors.
-fn geometry_only(text: &str) -> Result<String, MeshFault> {
+fn geometry_only(text: &str) -> Result<String, Invalid> {
     let is_vertex = |line: &&str| line.split_whitespace().next() == Some("v");
     let vertices = text.lines().filter(is_vertex).count();
     let mut kept = String::with_capacity(text.len());
@@ -51,13 +52,13 @@ fn geometry_only(text: &str) -> Result<String, MeshFault> {
                     count += 1;
                 }
                 if count < 3 {
-                    return Err(syntax(number, "v and three numbers", line));
+                    return Err(bad_line(number, "v and three numbers", line));
                 }
             }
             Some("f") => {
                 kept.push('f');
                 if words.clone().next().is_none() {
-                    return Err(syntax(number, "f and vertex indices", line));
+                    return Err(bad_line(number, "f and vertex indices", line));
                 }
                 for word in words {
                     let index = word.split('/').next().unwrap_or_default();
@@ -80,15 +81,13 @@ fn check_index(
     index: &str,
     seen: usize,
     vertices: usize,
-) -> Result<(), MeshFault> {
-    let index: i64 = index.parse().map_err(|_| syntax(number, "f and vertex indices", line))?;
+) -> Result<(), Invalid> {
+    let index: i64 = index.parse().map_err(|_| bad_line(number, "f and vertex indices", line))?;
     let limit = if index < 0 { seen } else { vertices };
     if index == 0 || index.unsigned_abs() > limit as u64 {
-        return Err(MeshFault::FaceIndexOutOfRange { line: number, index, vertices: limit });
+        return Err(Invalid::new(format!(
+            "line {number}: vertex {index} of a face is out of range: there are {limit} vertices"
+        )));
     }
     Ok(())
-}
-
-fn syntax(line: usize, expected: &'static str, found: &str) -> MeshFault {
-    MeshFault::Line { line, expected, found: cut(found) }
 }

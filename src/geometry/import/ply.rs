@@ -6,9 +6,9 @@ use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::PropertyAccessResult::{Ignored, Set, UnsupportedType};
 use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
 
-use super::source::{Source, cut};
+use super::source::{Source, bad_line};
+use crate::error::Invalid;
 use crate::files::unmarked;
-use crate::geometry::error::{MeshFault, PlyFault};
 use crate::geometry::raw::RawMesh;
 
 /// The properties of a position.
@@ -17,8 +17,39 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// Reads a PLY file.
-pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
-    let bytes = unmarked(source.bytes);
+pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
+    let (vertices, faces) = elements(source.bytes)?;
+    if faces.is_empty() && !vertices.is_empty() {
+        return Err(Invalid::new(format!(
+            "holds {} points and no faces, as a scan does; to be touched it needs a surface: a mesh",
+            vertices.len()
+        )));
+    }
+    let mut raw = RawMesh::default();
+    raw.skipped_primitives = faces.iter().filter(|face| face.0.len() < 3).count();
+    let fans = faces.iter().filter_map(|Face(corners)| corners.split_first());
+    let triangles =
+        fans.flat_map(|(&hub, rim)| rim.array_windows().map(move |&[b, c]| [hub, b, c]));
+    raw.add_part("PLY", vertices.iter().map(|vertex| Point3::from(vertex.0)), triangles)?;
+    Ok(raw)
+}
+
+/// The vertices of a PLY file, in metres.
+///
+/// # Errors
+/// If it is broken, or a coordinate is not finite.
+pub fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, Invalid> {
+    let (vertices, _) = elements(bytes)?;
+    let is_lost = |vertex: &Vertex| !vertex.0.iter().all(|coordinate| coordinate.is_finite());
+    if let Some(lost) = vertices.iter().position(is_lost) {
+        let at_m = vertices[lost].0;
+        return Err(Invalid::new(format!("PLY: vertex {lost} is not finite: {at_m:?}")));
+    }
+    Ok(vertices.iter().map(|vertex| Point3::from(vertex.0)).collect())
+}
+
+fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), Invalid> {
+    let bytes = unmarked(bytes);
     let mut reader = Reader::new(bytes);
     let header = Parser::<Other>::new().read_header(&mut reader);
     let header = header.map_err(|error| fault(&error, bytes, &Encoding::Ascii))?;
@@ -26,7 +57,10 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
     for (name, element) in &header.elements {
         // Each takes a byte at least, unless it has no properties.
         if element.count > bytes.len() {
-            return Err(PlyFault::Count { element: name.clone(), count: element.count }.into());
+            let count = element.count;
+            return Err(Invalid::new(format!(
+                "PLY: declares {count} of element \"{name}\", more than the file has bytes"
+            )));
         }
         let has = |property: &str| element.properties.contains_key(property);
         let place = |error: ParseError| fault(&error, bytes, &header.encoding);
@@ -49,42 +83,36 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
     }
     let left = reader.into_inner().trim_ascii().len();
     if left > 0 {
-        return Err(PlyFault::Rest { left }.into());
+        return Err(Invalid::new(format!("PLY: holds {left} bytes more than its header declares")));
     }
-    if faces.is_empty() && !vertices.is_empty() {
-        return Err(MeshFault::PointsOnly { points: vertices.len() });
-    }
-    let mut raw = RawMesh::default();
-    raw.skipped_primitives = faces.iter().filter(|face| face.0.len() < 3).count();
-    let fans = faces.iter().filter_map(|Face(corners)| corners.split_first());
-    let triangles =
-        fans.flat_map(|(&hub, rim)| rim.array_windows().map(move |&[b, c]| [hub, b, c]));
-    raw.add_part("PLY", vertices.iter().map(|vertex| Point3::from(vertex.0)), triangles)?;
-    Ok(raw)
+    Ok((vertices, faces))
 }
 
 /// Insists that an element has the properties it needs.
-fn require(element: &ElementDef, has: bool, needed: &'static str) -> Result<(), PlyFault> {
+fn require(element: &ElementDef, has: bool, needed: &str) -> Result<(), Invalid> {
     match has {
         true => Ok(()),
-        false => Err(PlyFault::Lacks { element: element.name.clone(), needed }),
+        false => {
+            let name = &element.name;
+            Err(Invalid::new(format!("PLY: element \"{name}\" must have {needed}")))
+        }
     }
 }
 
 /// The fault with its line, if that lies in text.
-fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> MeshFault {
+fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> Invalid {
     match error.line().filter(|_| *encoding == Encoding::Ascii) {
         Some(line) => {
             let found = bytes.split(|&byte| byte == b'\n').nth(line.saturating_sub(1));
-            let found = cut(&String::from_utf8_lossy(found.unwrap_or_default()));
-            MeshFault::Line { line, expected: "PLY as its header declares it", found }
+            let found = String::from_utf8_lossy(found.unwrap_or_default());
+            bad_line(line, "PLY as its header declares it", &found)
         }
         None => {
             // Behind "Line 7: ": what is no text has no lines.
             let words = error.to_string();
             let message = words.split_once(": ").filter(|_| error.line().is_some());
             let message = message.map_or(words.as_str(), |(_, message)| message);
-            PlyFault::Binary(message.lines().next().unwrap_or_default().into()).into()
+            Invalid::new(format!("PLY: {}", message.lines().next().unwrap_or_default()))
         }
     }
 }

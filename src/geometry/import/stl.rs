@@ -5,9 +5,9 @@ use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use nalgebra::Point3;
 use stl_io::{Triangle, create_stl_reader};
 
-use super::source::{Source, cut};
+use super::source::{Source, bad_line};
+use crate::error::Invalid;
 use crate::files::unmarked;
-use crate::geometry::error::MeshFault;
 use crate::geometry::raw::RawMesh;
 
 /// Bytes before the triangles of a binary file: a text, then how many there are.
@@ -20,13 +20,13 @@ const STATEMENTS: &str = "solid, then facets (facet normal, outer loop, three ti
                           three finite numbers, endloop, endfacet), then endsolid";
 
 /// Reads an STL file.
-pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
+pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
     let mut raw = RawMesh::default();
     if is_binary(source.bytes)? {
         // Its own text may begin as if all of it were text.
         let bytes = [&[0; HEADER - 4], &source.bytes[HEADER - 4..]].concat();
         let triangles = create_stl_reader(&mut Cursor::new(bytes)).and_then(Iterator::collect);
-        add(triangles.map_err(MeshFault::Stl)?, &mut raw)?;
+        add(triangles.map_err(|error| Invalid::new(format!("STL: {error}")))?, &mut raw)?;
         return Ok(raw);
     }
     let text = plain(&String::from_utf8_lossy(unmarked(source.bytes)));
@@ -40,7 +40,7 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
             let found = read.lines().last().filter(|line| !line.is_empty());
             let found = found.unwrap_or("the end of the file");
             let line = lines_before + read.lines().count();
-            MeshFault::Line { line, expected: STATEMENTS, found: cut(found) }
+            bad_line(line, STATEMENTS, found)
         })?;
         add(triangles, &mut raw)?;
         lines_before += solid.lines().count();
@@ -50,17 +50,20 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, MeshFault> {
 
 /// Whether a file is binary. One as long as its number of triangles asks for is; another is told
 /// by how a text begins, and if it is no text, it is cut short or padded.
-fn is_binary(bytes: &[u8]) -> Result<bool, MeshFault> {
+fn is_binary(bytes: &[u8]) -> Result<bool, Invalid> {
     let is_text = unmarked(bytes).trim_ascii_start().to_ascii_lowercase().starts_with(b"solid");
     let count = bytes.get(HEADER - 4..HEADER).and_then(<[u8]>::first_chunk);
     let count = count.map(|&bytes| u32::from_le_bytes(bytes));
-    let needed = HEADER as u64 + TRIANGLE * u64::from(count.unwrap_or(0));
-    match needed == bytes.len() as u64 {
+    let count = count.unwrap_or(0);
+    let needed = HEADER as u64 + TRIANGLE * u64::from(count);
+    let actual = bytes.len();
+    match needed == actual as u64 {
         true => Ok(true),
         false if is_text => Ok(false),
-        false => {
-            Err(MeshFault::StlLength { count: count.unwrap_or(0), needed, actual: bytes.len() })
-        }
+        false => Err(Invalid::new(format!(
+            "STL: {actual} bytes, which is no text that begins with \"solid\", and binary with \
+             {count} triangles takes {needed}"
+        ))),
     }
 }
 
@@ -111,7 +114,7 @@ impl Seek for Lines<'_> {
     }
 }
 
-fn add(triangles: Vec<Triangle>, raw: &mut RawMesh) -> Result<(), MeshFault> {
+fn add(triangles: Vec<Triangle>, raw: &mut RawMesh) -> Result<(), Invalid> {
     let corners: Vec<_> = triangles.iter().flat_map(|triangle| triangle.vertices).collect();
     let positions = corners.iter().map(|corner| Point3::from(corner.0.map(f64::from)));
     let corners = (0..corners.len() as u32).step_by(3);

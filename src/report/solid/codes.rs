@@ -1,6 +1,6 @@
 //! A mesh as text of few bytes.
 
-use crate::geometry::extent::extent;
+use crate::geometry::primitives::extent;
 use crate::report::explorer::code::encode;
 use anyhow::ensure;
 use base64::Engine;

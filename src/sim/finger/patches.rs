@@ -2,8 +2,8 @@
 
 use super::samples::SkinSample;
 use crate::geometry::bvh::MeshBvh;
+use crate::geometry::bvh::Nearby;
 use crate::geometry::mesh::Mesh;
-use crate::geometry::nearby::Nearby;
 use crate::geometry::sweep::Capsule;
 use crate::robot::finger::profile::Profile;
 use nalgebra::{Isometry3, Point3, Vector3};

@@ -3,8 +3,7 @@
 use super::constants::{Constant, Model};
 use super::problem::Calibration;
 use super::session::Session;
-use crate::math::clustered::covariance;
-use crate::math::least_squares::{FitError, Problem, robust};
+use crate::math::least_squares::{FitError, Problem, clustered_covariance, robust};
 use crate::sim::finger::recording::Recording;
 use nalgebra::DVector;
 
@@ -113,7 +112,7 @@ fn lowest(problem: &Calibration) -> Result<DVector<f64>, FitError> {
 }
 
 fn estimates(problem: &Calibration, state: &DVector<f64>, model: &Model) -> Vec<Estimate> {
-    let covariance = covariance(problem, state, |i| problem.electrode(i));
+    let covariance = clustered_covariance(problem, state, |i| problem.electrode(i));
     let of = |(i, constant): (usize, &&'static Constant)| {
         let variance = covariance.as_ref().map_or(f64::INFINITY, |all| all[(i, i)]);
         Estimate {

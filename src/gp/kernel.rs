@@ -1,0 +1,253 @@
+//! Stationary kernels with one length scale per input (automatic relevance determination): the
+//! formula of one correlation, and loops over many.
+
+use super::observations::NoiseRatio;
+use crate::math::simd::{exp_of_negative, widest_fn};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Every kernel by name; one line adds one.
+pub const KERNELS: &[(&str, &dyn Kernel)] = &[
+    ("squared_exponential", &SquaredExponential),
+    ("matern_52", &Matern52),
+    ("matern_32", &Matern32),
+];
+
+/// The kernel called `name`.
+pub fn by_name(name: &str) -> Option<&'static dyn Kernel> {
+    KERNELS.iter().find(|(known, _)| *known == name).map(|(_, kernel)| *kernel)
+}
+
+/// What a fit chooses: k(a, b) = signal_sd² · c(r²(a, b)) + noise_sd² · [a is b].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Hyperparameters {
+    /// Standard deviation of the surface around its mean, in the unit of the heights.
+    pub signal_sd: f64,
+    /// Distance over which heights stay alike, one per input, in the unit of the inputs.
+    pub length_scales: Vec<f64>,
+    /// Standard deviation of one touch's error, in the unit of the heights.
+    pub noise_sd: f64,
+    /// Standard deviation of an observed slope's error; 0 where no slopes are observed.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub slope_noise_sd: f64,
+    /// Height that the belief returns to away from all observations.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub mean: f64,
+}
+
+impl Hyperparameters {
+    /// From the noise in units of the signal.
+    pub fn new(signal_sd: f64, length_scales: Vec<f64>, noise: NoiseRatio, mean: f64) -> Self {
+        Self {
+            signal_sd,
+            length_scales,
+            noise_sd: noise.height * signal_sd,
+            slope_noise_sd: noise.slope * signal_sd,
+            mean,
+        }
+    }
+
+    /// The noise in units of the signal.
+    pub fn noise_ratio(&self) -> NoiseRatio {
+        let [height, slope] =
+            [self.noise_sd, self.slope_noise_sd].map(|noise_sd| noise_sd / self.signal_sd);
+        NoiseRatio { height, slope }
+    }
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+/// exp(−r²/2), Eq. 2 of Yi et al. 2016: infinitely smooth surfaces.
+#[derive(Clone, Copy, Debug)]
+pub struct SquaredExponential;
+
+impl Radial for SquaredExponential {
+    #[inline(always)]
+    fn correlation_slope(r2: f64) -> (f64, f64) {
+        let correlation = exp_of_negative(-0.5 * r2);
+        (correlation, -0.5 * correlation)
+    }
+
+    const HAS_SLOPES: bool = true;
+
+    #[inline(always)]
+    fn curvatures(r2: f64) -> (f64, f64) {
+        let correlation = exp_of_negative(-0.5 * r2);
+        (0.25 * correlation, -0.125 * correlation)
+    }
+}
+
+/// The Matérn kernel (1 + √3·r)·exp(−√3·r) (Rasmussen & Williams 2006, Eq. 4.17): surfaces with one
+/// derivative.
+#[derive(Clone, Copy, Debug)]
+pub struct Matern32;
+
+impl Radial for Matern32 {
+    #[inline(always)]
+    fn correlation_slope(r2: f64) -> (f64, f64) {
+        let s = (3.0 * r2).sqrt();
+        let decay = exp_of_negative(-s);
+        (bounded((1.0 + s) * decay), -1.5 * decay)
+    }
+}
+
+/// The Matérn kernel (1 + √5·r + 5r²/3)·exp(−√5·r): surfaces with two derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct Matern52;
+
+impl Radial for Matern52 {
+    #[inline(always)]
+    fn correlation_slope(r2: f64) -> (f64, f64) {
+        let s = (5.0 * r2).sqrt();
+        let decay = exp_of_negative(-s);
+        let correlation = bounded((1.0 + s + s * s / 3.0) * decay);
+        (correlation, bounded(-5.0 / 6.0 * (1.0 + s) * decay))
+    }
+
+    const HAS_SLOPES: bool = true;
+
+    #[inline(always)]
+    fn curvatures(r2: f64) -> (f64, f64) {
+        let s = (5.0 * r2).sqrt();
+        let decay = exp_of_negative(-s);
+        (25.0 / 12.0 * decay, -125.0 / 24.0 * decay / s.max(f64::MIN_POSITIVE.sqrt()))
+    }
+}
+
+/// 0 where ∞·0 gave NaN: at distances whose square overflows.
+#[inline(always)]
+fn bounded(value: f64) -> f64 {
+    if value.is_nan() { 0.0 } else { value }
+}
+
+/// A correlation that depends on the scaled squared distance r² = Σ_d ((a_d − b_d) / l_d)².
+///
+/// A new kernel is a type with this trait and one line in [`KERNELS`].
+pub trait Radial: Send + Sync {
+    /// Correlation c(r²), with c(0) = 1, and its derivative dc/d(r²). Branch-free and
+    /// `#[inline(always)]`, so that loops over it are vectorised.
+    fn correlation_slope(r2: f64) -> (f64, f64);
+
+    /// Whether its surfaces have slopes that vary continuously, so that one slope tells of others
+    /// near by. Then it has [`curvatures`](Self::curvatures).
+    const HAS_SLOPES: bool = false;
+
+    /// The second and third derivative of c with respect to r². The third may stand at 0 for any
+    /// number: it is multiplied by r⁴.
+    #[inline(always)]
+    fn curvatures(_r2: f64) -> (f64, f64) {
+        (0.0, 0.0)
+    }
+}
+
+/// A kernel, many distances at a time.
+pub trait Kernel: Send + Sync {
+    /// Replaces each r² by c(r²).
+    fn correlate(&self, r2: &mut [f64]);
+
+    /// Replaces each r² by c(r²) and writes dc/d(r²) into `slopes`.
+    fn correlate_slope(&self, r2: &mut [f64], slopes: &mut [f64]);
+
+    /// Whether slopes can be observed with it, see [`Radial::HAS_SLOPES`].
+    fn has_slopes(&self) -> bool;
+
+    /// Replaces each r² by c(r²) and writes its first three derivatives with respect to r².
+    fn correlate_derivatives(&self, r2: &mut [f64], derivatives: [&mut [f64]; 3]);
+}
+
+widest_fn! {
+    fn correlate<'a, R: Radial>(r2: &'a mut [f64]) -> () {
+        r2.iter_mut().for_each(|r2| *r2 = R::correlation_slope(*r2).0);
+    }
+}
+
+widest_fn! {
+    fn correlate_slope<'a, R: Radial>(r2: &'a mut [f64], slopes: &'a mut [f64]) -> () {
+        for (r2, slope) in r2.iter_mut().zip(slopes) {
+            (*r2, *slope) = R::correlation_slope(*r2);
+        }
+    }
+}
+
+widest_fn! {
+    /// The second and third derivatives.
+    fn curve<'a, R: Radial>(r2: &'a [f64], second: &'a mut [f64], third: &'a mut [f64]) -> () {
+        for (r2, (second, third)) in r2.iter().zip(second.iter_mut().zip(third)) {
+            (*second, *third) = R::curvatures(*r2);
+        }
+    }
+}
+
+impl<R: Radial> Kernel for R {
+    fn correlate(&self, r2: &mut [f64]) {
+        correlate::<R>(r2);
+    }
+
+    fn correlate_slope(&self, r2: &mut [f64], slopes: &mut [f64]) {
+        correlate_slope::<R>(r2, slopes);
+    }
+
+    fn has_slopes(&self) -> bool {
+        R::HAS_SLOPES
+    }
+
+    fn correlate_derivatives(&self, r2: &mut [f64], [first, second, third]: [&mut [f64]; 3]) {
+        curve::<R>(r2, second, third);
+        self.correlate_slope(r2, first);
+    }
+}
+
+impl dyn Kernel {
+    /// Prior variance of a slope per length scale, −2·c′(0), in units of the signal's variance.
+    pub fn slope_variance(&self) -> f64 {
+        let mut slope = [0.0];
+        self.correlate_slope(&mut [0.0], &mut slope);
+        -2.0 * slope[0]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kernel_is_one_at_zero_falls_and_has_its_central_difference_as_slope() {
+        for (name, kernel) in KERNELS {
+            let at = |r2: f64| {
+                let (mut value, mut slope) = ([r2], [0.0]);
+                kernel.correlate_slope(&mut value, &mut slope);
+                let mut alone = [r2];
+                kernel.correlate(&mut alone);
+                assert_eq!(alone, value, "{name}");
+                (value[0], slope[0])
+            };
+            assert_eq!(at(0.0).0, 1.0, "{name}");
+            let mut last = 1.0;
+            for i in 1..200 {
+                let r2 = 0.05 * f64::from(i);
+                let (value, slope) = at(r2);
+                assert!(value > 0.0 && value < last, "{name} at {r2}");
+                last = value;
+                let twin = (at(r2 + 1e-6).0 - at(r2 - 1e-6).0) / 2e-6;
+                assert!((slope - twin).abs() < 1e-8, "{name} at {r2}: {slope} {twin}");
+            }
+            if kernel.has_slopes() {
+                let [below, here, above] = [-1e-4, 0.0, 1e-4].map(|by| {
+                    let mut value = [0.3 + by];
+                    let [mut first, mut second, mut third] = [[0.0]; 3];
+                    let derivatives = [&mut first[..], &mut second, &mut third];
+                    kernel.correlate_derivatives(&mut value, derivatives);
+                    assert_eq!((value[0], first[0]), at(0.3 + by), "{name}");
+                    [first[0], second[0], third[0]]
+                });
+                for order in 0..2 {
+                    let twin = (above[order] - below[order]) / 2e-4;
+                    assert!((here[order + 1] - twin).abs() < 1e-6, "{name}: {here:?} {twin}");
+                }
+            }
+            assert!(at(1e9).0 < 1e-300 && at(f64::MAX).0 == 0.0, "{name}");
+        }
+    }
+}
