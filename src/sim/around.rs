@@ -87,7 +87,7 @@ pub(super) fn task(
     let task = Task::new(ball, touch.clone(), finger)?;
     let Some(arm) = arm else { return Ok(task) };
     let robot =
-        Robot { chain: arm.clone(), finger: finger.clone(), is_soft: scene.effects.is_soft() };
+        Robot { chain: arm.clone(), finger: finger.clone(), is_soft: scene.effects.skin.is_some() };
     let home_w = robot.chain.forward(&robot.chain.home).translation.vector.into();
     let inside_m = around.depth_m(&home_w);
     if inside_m > 0.0 {

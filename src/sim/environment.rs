@@ -138,7 +138,7 @@ impl Environment {
             notices.push(Notice::DefaultFinger);
         }
         let is_biotac = scene.finger.radius_m == BIOTAC_RADIUS_M;
-        if scene.body.moves() && scene.effects.is_soft() && !is_biotac {
+        if scene.body.moves() && scene.effects.skin.is_some() && !is_biotac {
             notices.push(Notice::ScaledFinger(scene.finger.radius_m));
         }
         if let (Some(around), Shape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
@@ -180,7 +180,7 @@ impl Environment {
             return Err(EnvironmentError::Missing { part: "`mjcf` in its arm's model" });
         }
         let fingertip =
-            (scene.effects.is_soft()).then(|| Fingertip::new(&scene.finger, &scene.effects));
+            scene.effects.skin.is_some().then(|| Fingertip::new(&scene.finger, &scene.effects));
         Ok(Self { scene, shape, task, arm, arm_mjcf, fingertip, notices })
     }
 

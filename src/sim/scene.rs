@@ -287,10 +287,6 @@ impl Checked for Scene {
              body = \"cast\"; without any [effects] it has a BioTac's)"
                 .into()
         });
-        let stepped = self.body == Body::Dynamic || self.effects.flex.is_none();
-        rules.require("effects.flex", "(given)", stepped, || {
-            "no flex: only body = \"dynamic\" is stepped by MuJoCo".into()
-        });
         let bumps = self.body == Body::Dynamic || self.effects.collision.is_none();
         rules.require("effects.collision", "(given)", bumps, || {
             "no collision: only links of body = \"dynamic\" are kept apart by MuJoCo".into()
@@ -356,7 +352,7 @@ impl Scene {
     /// Whether MuJoCo lets the finger collide with the object: it does where no skin says what the
     /// object does to it.
     pub fn collides(&self) -> bool {
-        self.body == Body::Dynamic && !self.effects.is_soft()
+        self.body == Body::Dynamic && self.effects.skin.is_none()
     }
 
     /// Fastest approach at which contact is told before skin and fluid are used up in front of the

@@ -15,24 +15,9 @@ use std::sync::Arc;
 /// Forces below this have no place; far below any that is detected (chosen).
 const LEAST_FORCE_N: f64 = 1e-6;
 
-/// A skin that is stepped in its own simulation: that of `[effects.flex]`.
-pub trait Shell: Send {
-    /// Brings it to rest, away from any object.
-    fn reset(&mut self);
-
-    /// Goes on by `dt_s`, to the pose `x_wt` at its end, against the object that stands in `W`: the
-    /// load on it, and how far it lies inwards at each point where it is read; none at rest.
-    ///
-    /// # Errors
-    /// [`Fault::Diverged`] with the largest displacement (m) and speed (m/s) of a node,
-    /// [`Fault::Inside`] if the object is where the skin does not yield.
-    fn step(&mut self, x_wt: &Isometry3<f64>, dt_s: f64) -> Result<(Load, &[f64]), Fault>;
-}
-
 /// The finger's state during one trial.
 pub struct SimulatedFinger {
     environment: Arc<Environment>,
-    shell: Option<Box<dyn Shell>>,
     /// Pose of `T` in the frame of the force/torque sensor.
     x_mt: Isometry3<f64>,
     drawn: Drawn,
@@ -65,23 +50,14 @@ impl SimulatedFinger {
         Some(Self {
             x_mt: environment.chain()?.tool,
             drawn: Drawn::new(&environment, environment.fingertip()?, seed),
-            shell: None,
             load: Load::default(),
             has_sensor: effects.fluid.is_some() && effects.electrodes.is_some(),
             environment,
         })
     }
 
-    /// Puts a simulated skin on; without it the finger feels with its `[effects.skin]`.
-    pub fn wear(&mut self, shell: Box<dyn Shell>) {
-        self.shell = Some(shell);
-    }
-
     /// Forgets everything.
     pub fn reset(&mut self, seed: u64) {
-        if let Some(shell) = &mut self.shell {
-            shell.reset();
-        }
         if let Some(tip) = self.environment.fingertip() {
             self.drawn = Drawn::new(&self.environment, tip, seed);
             self.load = Load::default();
@@ -92,7 +68,7 @@ impl SimulatedFinger {
     ///
     /// # Errors
     /// [`Fault::Diverged`] if the motion is not finite, [`Fault::Inside`] if the object encloses
-    /// the tip; and those of the [`Shell`].
+    /// the tip.
     pub fn step(&mut self, motion: &TipMotion, dt_s: f64) -> Result<Wrench, Fault> {
         let Drawn { own, state, misplaced, .. } = &mut self.drawn;
         let tip = own.as_deref().or(self.environment.fingertip());
@@ -100,11 +76,7 @@ impl SimulatedFinger {
             return Ok(Wrench::default());
         };
         let motion = misplaced.as_ref().map_or(*motion, |misplaced| misplaced.motion(motion));
-        self.load = match &mut self.shell {
-            Some(shell) => state.step_loaded(tip, shell.step(&motion.x_wt, dt_s)?, &motion, dt_s),
-            None => state.step(tip, bvh, &motion, dt_s),
-        }
-        .map_err(fault)?;
+        self.load = state.step(tip, bvh, &motion, dt_s).map_err(fault)?;
         let wrench = Wrench { force_n: self.load.force_n, torque_nm: self.load.torque_nm };
         Ok(misplaced.as_ref().map_or(wrench, |misplaced| wrench.moved(&misplaced.finger)))
     }

@@ -6,7 +6,6 @@ use super::kinematic::Kinematic;
 use super::mujoco;
 use super::notice::{Notice, OutOfSides};
 use super::probe::exact;
-use super::simulated_finger::Shell;
 use crate::backend::delay::Delayed;
 use crate::backend::interlock::InterlockSettings;
 use crate::backend::{Backend, Fault};
@@ -94,18 +93,6 @@ impl Simulator {
             }
             _ => Ok(()),
         }
-    }
-
-    /// A skin of finite elements, at rest; none if the scene's finger has none.
-    ///
-    /// # Errors
-    /// If there is no memory for its state.
-    pub fn shell(&self) -> Result<Option<Box<dyn Shell>>, Fault> {
-        #[cfg(feature = "mujoco")]
-        if let Some(models) = &self.models {
-            return models.shell(&self.environment).map_err(Fault::from);
-        }
-        Ok(None)
     }
 
     /// The probe that the scene's body asks for; `seed` is all the randomness of its sensors.

@@ -32,10 +32,6 @@ mod finger;
 mod finger_parts;
 mod finger_signals;
 mod fit;
-#[cfg(feature = "mujoco")]
-mod flex;
-#[cfg(feature = "mujoco")]
-mod flex_material;
 mod floors;
 mod folders;
 mod formats;

@@ -5,12 +5,10 @@ use super::counter::count;
 use super::effects::effect::Step;
 use super::effects::electrodes::Electrodes;
 use super::effects::friction::Bristle;
-use super::effects::skin::{Pressed, Skin, SkinEffect};
+use super::effects::skin::{Pressed, Skin};
 use super::effects::variation::Sensor;
 use super::effects::{EffectStates, Effects};
-use super::lattice::Lattice;
 use super::load::{Load, PressError};
-use super::samples::spread;
 use super::shear::Shear;
 use crate::geometry::bvh::MeshBvh;
 use crate::robot::finger::TipMotion;
@@ -27,7 +25,6 @@ const LONGEST_STEP_S: f64 = 1.0;
 #[derive(Clone, Debug)]
 pub struct Fingertip {
     skin: Option<Skin>,
-    lattice: Option<Lattice>,
     electrodes: Option<Electrodes>,
     shear: Option<Shear>,
     effects: Effects,
@@ -39,19 +36,13 @@ impl Fingertip {
         let profile = Profile::biotac(finger);
         let cavity_pa_m3 = effects.fluid.as_ref().map_or(0.0, |fluid| fluid.stiffness_pa_m3);
         let skin = effects.skin.as_ref().map(|skin| Skin::new(&profile, skin, cavity_pa_m3));
-        // Electrodes sense a shell through as many points as a default skin has.
-        let shell = effects.flex.as_ref().map(|flex| {
-            let samples = spread(&profile, SkinEffect::default().samples);
-            (Lattice::new(&profile, [flex.along, flex.around], &samples), samples)
-        });
-        let samples = skin.as_ref().map(Skin::samples).or(shell.as_ref().map(|(_, all)| &all[..]));
+        let samples = skin.as_ref().map(Skin::samples);
         let electrodes = (effects.electrodes.as_ref().zip(samples))
             .map(|(effect, samples)| Electrodes::new(effect, samples, profile.scale()));
         let sheared = effects.friction.as_ref().and(electrodes.as_ref()).zip(samples);
         Self {
             shear: sheared.map(|(electrodes, samples)| Shear::new(electrodes, samples)),
             skin,
-            lattice: shell.map(|(lattice, _)| lattice),
             electrodes,
             effects: effects.clone(),
         }
@@ -74,11 +65,6 @@ impl Fingertip {
     /// Its skin.
     pub fn skin(&self) -> Option<&Skin> {
         self.skin.as_ref()
-    }
-
-    /// Its skin as a shell.
-    pub fn lattice(&self) -> Option<&Lattice> {
-        self.lattice.as_ref()
     }
 
     /// Its electrodes.
@@ -126,8 +112,6 @@ pub enum FingertipError {
 pub struct FingertipState {
     time_s: f64,
     pressed: Option<Pressed>,
-    /// How far a skin that is simulated elsewhere moved inwards at each sample; empty at rest.
-    shell_m: Vec<f64>,
     effects: EffectStates,
     converter: Option<Converter>,
 }
@@ -138,7 +122,6 @@ impl FingertipState {
         let mut state = Self {
             time_s: 0.0,
             pressed: tip.skin.as_ref().map(Skin::relaxed),
-            shell_m: Vec::new(),
             effects: EffectStates::new(&tip.effects),
             converter: None,
         };
@@ -170,8 +153,10 @@ impl FingertipState {
         motion: &TipMotion,
         dt_s: f64,
     ) -> Result<Load, FingertipError> {
-        self.accept(motion, dt_s)?;
         let time_s = self.time_s;
+        if !motion.is_finite() || !(0.0..=LONGEST_STEP_S).contains(&dt_s) {
+            return Err(FingertipError::NotFinite { time_s, dt_s, motion: Box::new(*motion) });
+        }
         let load = match (&tip.skin, &mut self.pressed) {
             (Some(skin), Some(pressed)) => {
                 count("skin");
@@ -187,32 +172,6 @@ impl FingertipState {
             _ => Load::default(),
         };
         Ok(self.advance(tip, load, motion, dt_s))
-    }
-
-    /// The same for a skin that is simulated elsewhere: `load` is what the object does to it at the
-    /// end of the step, `inward_m` how far it then lies inwards at each sample of the
-    /// [`Lattice`]; empty at rest.
-    ///
-    /// # Errors
-    /// If a number is not finite.
-    pub fn step_loaded(
-        &mut self,
-        tip: &Fingertip,
-        (load, inward_m): (Load, &[f64]),
-        motion: &TipMotion,
-        dt_s: f64,
-    ) -> Result<Load, FingertipError> {
-        self.accept(motion, dt_s)?;
-        self.shell_m.clear();
-        self.shell_m.extend_from_slice(inward_m);
-        Ok(self.advance(tip, load, motion, dt_s))
-    }
-
-    fn accept(&self, motion: &TipMotion, dt_s: f64) -> Result<(), FingertipError> {
-        if motion.is_finite() && (0.0..=LONGEST_STEP_S).contains(&dt_s) {
-            return Ok(());
-        }
-        Err(FingertipError::NotFinite { time_s: self.time_s, dt_s, motion: Box::new(*motion) })
     }
 
     /// What follows from the load on the skin.
@@ -246,7 +205,7 @@ impl FingertipState {
             signals.warming_c_s = heat.warming_c_s();
             conductivity = heat.conductivity(thermal);
         }
-        let moved_m = self.pressed.as_ref().map_or(&self.shell_m[..], Pressed::moved_m);
+        let moved_m = self.pressed.as_ref().map_or(&[][..], Pressed::moved_m);
         if let Some(electrodes) = &tip.electrodes {
             count("electrodes");
             let mut closed = electrodes.closed(moved_m);

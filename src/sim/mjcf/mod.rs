@@ -7,11 +7,8 @@ mod mesh;
 mod robot;
 mod scenery;
 mod sdf;
-mod shell;
 mod surroundings;
 mod text;
-
-pub use shell::{elasticity, flex};
 
 use super::collision::Collision;
 use super::environment::Environment;

@@ -1,4 +1,4 @@
-//! MuJoCo as a library: compiling models, the plant that steps one, and the shell of a skin.
+//! MuJoCo as a library: compiling models, and the plant that steps one.
 
 mod contact;
 mod dynamic;
@@ -8,7 +8,6 @@ mod models;
 #[cfg(feature = "render")]
 pub mod picture;
 mod plant;
-mod shell;
 mod substeps;
 #[cfg(feature = "viewer")]
 pub mod window;
@@ -16,7 +15,6 @@ pub mod window;
 pub use dynamic::Dynamic;
 pub use models::Models;
 pub use plant::Plant;
-pub use shell::FlexShell;
 pub use substeps::{StepLimit, Substeps};
 
 use crate::backend::Fault;

@@ -1,12 +1,11 @@
 //! What MuJoCo compiles of an environment, once for all trials.
 
-use super::{FlexShell, ModelError, Substeps, compile};
+use super::{ModelError, Substeps, compile};
 use crate::sim::Environment;
 use crate::sim::collision::Collision;
 use crate::sim::environment::Shape;
 use crate::sim::mjcf;
 use crate::sim::mjcf::Mode;
-use crate::sim::simulated_finger::Shell;
 use mujoco_rs::wrappers::MjModel;
 use std::sync::Arc;
 
@@ -15,8 +14,6 @@ use std::sync::Arc;
 pub struct Models {
     /// The arm or stage.
     pub plant: Arc<MjModel>,
-    /// The skin of `[effects.flex]`.
-    pub flex: Option<Arc<MjModel>>,
     /// How the scene's time step was divided, and why; none if it was not.
     pub substeps: Option<Substeps>,
 }
@@ -48,19 +45,7 @@ impl Models {
         check_inside(environment)?;
         let text = mjcf::scene(environment, Mode::Dynamic { step_s });
         let plant = Arc::new(compile(&text.ok_or(ModelError::Lacks { part: "an object" })?)?);
-        Ok(Self { plant, flex: FlexShell::model(environment)?, substeps: None })
-    }
-
-    /// The skin of `[effects.flex]`, at rest; none if the scene has none.
-    ///
-    /// # Errors
-    /// If memory is short.
-    pub fn shell(
-        &self,
-        environment: &Arc<Environment>,
-    ) -> Result<Option<Box<dyn Shell>>, ModelError> {
-        let Some(model) = &self.flex else { return Ok(None) };
-        Ok(Some(Box::new(FlexShell::new(Arc::clone(environment), Arc::clone(model))?)))
+        Ok(Self { plant, substeps: None })
     }
 }
 

@@ -67,8 +67,8 @@ impl Effect for FluidEffect {
 
     fn start(&self) {}
 
-    fn complete() -> Option<Self> {
-        Some(Self { vibration: Some(VibrationEffect::default()), ..Self::default() })
+    fn complete() -> Self {
+        Self { vibration: Some(VibrationEffect::default()), ..Self::default() }
     }
 
     /// All of it, and its vibration, which brings the fluid with it.

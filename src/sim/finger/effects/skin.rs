@@ -167,7 +167,7 @@ impl Skin {
     pub fn new(profile: &Profile, effect: &SkinEffect, cavity_pa_m3: f64) -> Self {
         let mut samples = spread(profile, effect.samples);
         let cells = [effect.along, effect.around];
-        let lattice = (effect.model == SkinModel::Shell).then(|| Lattice::new(profile, cells, &[]));
+        let lattice = (effect.model == SkinModel::Shell).then(|| Lattice::new(profile, cells));
         if let Some(lattice) = &lattice {
             samples.retain(|sample| !sample.layers.wet);
             samples.splice(0..0, lattice.samples(profile));

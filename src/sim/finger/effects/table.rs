@@ -17,15 +17,15 @@ macro_rules! effects {
         }
 
         impl Effects {
-            /// Every effect with its defaults; of the two skins the cheap one.
+            /// Every effect with its defaults.
             pub fn all() -> Self {
-                Self { $($name: <$Effect>::complete(),)* }
+                Self { $($name: Some(<$Effect>::complete()),)* }
             }
 
             /// Whether a tactile frame has anything in it.
             pub fn sends_frames(&self) -> bool {
                 let fills = [$(<$Effect>::FILLS_FRAMES && self.$name.is_some(),)*];
-                self.is_soft() && fills.contains(&true)
+                self.skin.is_some() && fills.contains(&true)
             }
 
             /// Takes out every effect that means nothing without one that is not there.
@@ -57,7 +57,6 @@ macro_rules! effects {
                         rules.table(stringify!($name), effect);
                     }
                 )*
-                self.check_skins(rules);
                 let filling = [$((stringify!($name), <$Effect>::FILLS_FRAMES),)*];
                 $(
                     let fits = self.$name.is_none() || self.supports(<$Effect>::NEEDS);
