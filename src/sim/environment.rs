@@ -137,6 +137,9 @@ impl Environment {
             scene.effects = effects;
             notices.push(Notice::DefaultFinger);
         }
+        if !scene.effects.moved_keys.is_empty() {
+            notices.push(Notice::MovedKeys(scene.effects.moved_keys.clone()));
+        }
         let is_biotac = scene.finger.radius_m == BIOTAC_RADIUS_M;
         if scene.body.moves() && scene.effects.skin.is_some() && !is_biotac {
             notices.push(Notice::ScaledFinger(scene.finger.radius_m));

@@ -15,6 +15,8 @@ pub enum Notice {
     Size(SizeMismatch),
     /// A soft finger without tables was given those of a BioTac.
     DefaultFinger,
+    /// Keys of the sensor's constants that stand in the scene's effects, as in version 0.1.
+    MovedKeys(Vec<String>),
     /// A soft finger of another radius than the BioTac's, m.
     ScaledFinger(f64),
     /// The finger cannot be brought to a whole object from some sides.
@@ -30,6 +32,12 @@ impl fmt::Display for Notice {
             Self::DefaultFinger => f.write_str(
                 "the scene names no effects: its finger has the default [effects.skin], \
                  [effects.fluid] and [effects.electrodes]",
+            ),
+            Self::MovedKeys(keys) => write!(
+                f,
+                "{}: constants of the sensor, which this version still reads here; put them into the table \
+                 [effects.sensor] or a file named by effects.sensor, as `palpate calibrate` writes it",
+                keys.join(", ")
             ),
             Self::ScaledFinger(radius_m) => write!(
                 f,

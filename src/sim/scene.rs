@@ -10,6 +10,7 @@ use crate::robot::arm::ArmSettings;
 use crate::robot::finger::Finger;
 use crate::robot::finger::profile::Profile;
 use crate::sim::finger::Effects;
+use crate::sim::finger::effects::constants;
 use crate::task::around::Around;
 use crate::task::touch::TouchSettings;
 use crate::task::zone::Zone;
@@ -390,8 +391,20 @@ impl Scene {
             ));
         }
         sets.iter().try_for_each(|set| loader.set(set))?;
-        loader.resolve_path("object.mesh");
-        loader.resolve_path_ending("arm.model", ".toml");
-        loader.finish()
+        let moved_keys = Self::resolve(&mut loader, "")?;
+        let mut scene: Self = loader.finish()?;
+        scene.effects.moved_keys = moved_keys;
+        Ok(scene)
+    }
+
+    /// Makes the paths of a scene under `prefix` absolute, and puts the constants of its sensor into
+    /// its effects; returns the keys of constants that stand in the effects themselves.
+    ///
+    /// # Errors
+    /// If the sensor's file cannot be read, or holds what is not allowed.
+    pub fn resolve(loader: &mut Loader, prefix: &str) -> Result<Vec<String>, ConfigError> {
+        loader.resolve_path(&format!("{prefix}object.mesh"));
+        loader.resolve_path_ending(&format!("{prefix}arm.model"), ".toml");
+        constants::load(loader, &format!("{prefix}effects"))
     }
 }

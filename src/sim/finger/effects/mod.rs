@@ -5,6 +5,7 @@
 //! switch and row in a study of effects follow from that line.
 
 pub mod collision;
+pub mod constants;
 pub mod creep;
 pub mod effect;
 pub mod electrodes;

@@ -6,20 +6,44 @@
 macro_rules! effects {
     ($($(#[$doc:meta])* $name:ident: $Effect:ty,)*) => {
         /// One optional table each; an absent one has no state and costs no work.
-        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+        #[derive(Clone, Debug, Default, PartialEq, serde::Deserialize, schemars::JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct Effects {
+            /// Constants of the sensor: `"biotac"`, a file like `models/biotac.toml`, or a table of
+            /// those that differ. They become the effects' own when a scene is read.
+            pub sensor: Option<String>,
             $(
                 $(#[$doc])*
-                #[serde(skip_serializing_if = "Option::is_none")]
                 pub $name: Option<$Effect>,
             )*
+            /// Keys of constants that the scene has in its effects, as in version 0.1.
+            #[serde(skip)]
+            pub moved_keys: Vec<String>,
+        }
+
+        impl serde::Serialize for Effects {
+            /// Constants that are not the BioTac's are in the table `sensor`.
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                let mut tables = toml::Table::new();
+                $(
+                    if let Some(effect) = &self.$name {
+                        let table = toml::Value::try_from(effect);
+                        let table = table.map_err(serde::ser::Error::custom)?;
+                        tables.insert(stringify!($name).into(), table);
+                    }
+                )*
+                let (mut settings, constants) = constants::split(tables);
+                if !constants.is_empty() {
+                    settings.insert("sensor".into(), toml::Value::Table(constants));
+                }
+                settings.serialize(serializer)
+            }
         }
 
         impl Effects {
             /// Every effect with its defaults.
             pub fn all() -> Self {
-                Self { $($name: Some(<$Effect>::complete()),)* }
+                Self { $($name: Some(<$Effect>::complete()),)* ..Self::default() }
             }
 
             /// Whether a tactile frame has anything in it.
