@@ -1,12 +1,11 @@
 //! What never changes during a trial, shared by all threads.
 
-use super::around::{self, AroundError};
+use super::around;
 use super::function::Function;
 use super::notice::{Notice, SizeMismatch};
 use super::scene::{Body, Object, Scene, Unit};
-use crate::config::ConfigError;
+use crate::error::Invalid;
 use crate::geometry::bvh::MeshBvh;
-use crate::geometry::error::MeshError;
 use crate::geometry::implicit::Implicit;
 use crate::geometry::import::import_with;
 use crate::geometry::mesh::Mesh;
@@ -17,10 +16,9 @@ use crate::robot::arm::stage::{stage, stage_with_wrist};
 use crate::robot::arm::{ArmSettings, Chain, model};
 use crate::robot::finger::shape::BIOTAC_RADIUS_M;
 use crate::sim::finger::Fingertip;
-use crate::task::{Region, Task, TaskError, Zone};
+use crate::task::{Region, Task, Zone};
 use nalgebra::{Point3, Vector3};
 use std::borrow::Cow;
-use thiserror::Error;
 
 /// A scene with its mesh loaded and its search tree built.
 pub struct Environment {
@@ -46,55 +44,14 @@ pub enum Shape {
     },
 }
 
-/// A scene that cannot be built.
-#[derive(Debug, Error)]
-pub enum EnvironmentError {
-    /// The object's mesh is unusable.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// The arm's model is unusable.
-    #[error("{0}")]
-    Arm(Box<ConfigError>),
-    /// The scene lacks the part its body needs.
-    #[error("the scene has no {part}, which its body needs")]
-    Missing {
-        /// The part.
-        part: &'static str,
-    },
-    /// The object lies wholly beside the zone, or before or behind its depth range.
-    #[error(
-        "the object has no surface in the zone: in the zone's frame it spans x {} to {} m, z {} to {} m and \
-         depth {} to {} m{}", x_m[0], x_m[1], z_m[0], z_m[1], depth_m[0], depth_m[1],
-        size.map(|size| format!("; {size}")).unwrap_or_default()
-    )]
-    OutsideZone {
-        /// The object's extent.
-        x_m: [f64; 2],
-        /// The object's extent.
-        z_m: [f64; 2],
-        /// The object's extent.
-        depth_m: [f64; 2],
-        /// How its size differs from the zone's, if it does much.
-        size: Option<SizeMismatch>,
-    },
-    /// The object reaches out of the zone's depth range towards the finger, which would set out
-    /// inside it.
-    #[error(
-        "zone.depth_m begins at {near_m} m, but over the zone the object begins at {front_m} m: allowed is a \
-         nearest depth of at most that"
-    )]
-    InFront {
-        /// Nearest depth that the zone gives.
-        near_m: f64,
-        /// Where the object is first met.
-        front_m: f64,
-    },
-    /// The object cannot be gone around.
-    #[error(transparent)]
-    Around(#[from] AroundError),
-    /// The zone is not complete.
-    #[error(transparent)]
-    Task(#[from] TaskError),
+/// A scene that lacks `part`.
+pub(super) fn missing(part: &str) -> Invalid {
+    Invalid::new(format!("the scene has no {part}, which its body needs"))
+}
+
+/// The error with the message of another.
+pub(super) fn invalid(error: impl std::fmt::Display) -> Invalid {
+    Invalid::new(error.to_string())
 }
 
 impl Environment {
@@ -102,7 +59,7 @@ impl Environment {
     ///
     /// # Errors
     /// If the mesh is unusable or lies wholly outside the zone.
-    pub fn build(scene: Scene) -> Result<Self, EnvironmentError> {
+    pub fn build(scene: Scene) -> Result<Self, Invalid> {
         Self::build_telling(scene, &|_| ())
     }
 
@@ -111,15 +68,16 @@ impl Environment {
     ///
     /// # Errors
     /// As [`build`](Self::build).
-    pub fn build_telling(scene: Scene, tell: &dyn Fn(&str)) -> Result<Self, EnvironmentError> {
+    pub fn build_telling(scene: Scene, tell: &dyn Fn(&str)) -> Result<Self, Invalid> {
         if scene.body == Body::Function {
-            let function = scene.function.ok_or(EnvironmentError::Missing { part: "function" })?;
+            let function = scene.function.ok_or_else(|| missing("function"))?;
             return Self::around(scene, Shape::Function(function));
         }
-        let object = scene.object.as_ref().ok_or(EnvironmentError::Missing { part: "object" })?;
+        let object = scene.object.as_ref().ok_or_else(|| missing("object"))?;
         tell(&format!("reading {}", object.mesh.display()));
         let (mesh, report) =
-            import_with(&object.mesh, object.unit.metres() * object.scale, object.buffers())?;
+            import_with(&object.mesh, object.unit.metres() * object.scale, object.buffers())
+                .map_err(invalid)?;
         tell("building the search tree");
         let bvh = MeshBvh::new(mesh.transformed(&object.x_wo()));
         Self::around(scene, Shape::Mesh { bvh, report: report.into() })
@@ -129,10 +87,9 @@ impl Environment {
     ///
     /// # Errors
     /// If the shape lies wholly outside the zone.
-    pub fn around(mut scene: Scene, shape: Shape) -> Result<Self, EnvironmentError> {
+    pub fn around(mut scene: Scene, shape: Shape) -> Result<Self, Invalid> {
         let mut notices = Vec::new();
-        let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose();
-        let arm = arm.map_err(|error| EnvironmentError::Arm(error.into()))?;
+        let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose().map_err(invalid)?;
         if let Cow::Owned(effects) = scene.felt_effects() {
             scene.effects = effects;
             notices.push(Notice::DefaultFinger);
@@ -149,7 +106,7 @@ impl Environment {
             let task = around::task(&scene, arm.as_ref(), ball, bvh.mesh())?;
             return Self::of(scene, shape, (task, arm), notices);
         }
-        let zone = scene.zone.as_mut().ok_or(EnvironmentError::Missing { part: "zone" })?;
+        let zone = scene.zone.as_mut().ok_or_else(|| missing("zone"))?;
         let extent = extent(zone, &shape);
         let depth_m = *zone.depth_m.get_or_insert([-extent.high.y, -extent.low.y]);
         if let Shape::Mesh { bvh, .. } = &shape {
@@ -163,7 +120,7 @@ impl Environment {
             }
         }
         zone.datum_y_m.get_or_insert(0.0);
-        let task = Task::new(zone.clone(), scene.touch.clone(), &scene.finger)?;
+        let task = Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?;
         Self::of(scene, shape, (task, arm), notices)
     }
 
@@ -172,15 +129,13 @@ impl Environment {
         shape: Shape,
         (task, arm): (Task, Option<Chain>),
         notices: Vec<Notice>,
-    ) -> Result<Self, EnvironmentError> {
+    ) -> Result<Self, Invalid> {
         let arm_mjcf = match &scene.arm {
-            Some(settings) => {
-                model::mjcf(&settings.model).map_err(|error| EnvironmentError::Arm(error.into()))?
-            }
+            Some(settings) => model::mjcf(&settings.model).map_err(invalid)?,
             None => None,
         };
         if scene.body == Body::Dynamic && scene.arm.is_some() && arm_mjcf.is_none() {
-            return Err(EnvironmentError::Missing { part: "`mjcf` in its arm's model" });
+            return Err(missing("`mjcf` in its arm's model"));
         }
         let fingertip =
             scene.effects.skin.is_some().then(|| Fingertip::new(&scene.finger, &scene.effects));
@@ -331,17 +286,22 @@ fn check_overlap(
     [near_m, far_m]: [f64; 2],
     Extent { low, high }: &Extent,
     size: Option<SizeMismatch>,
-) -> Result<(), EnvironmentError> {
+) -> Result<(), Invalid> {
     let [x, z] = [zone.x_m, zone.z_m.unwrap_or([0.0; 2])];
     let is_beside = x[1] < low.x || x[0] > high.x || z[1] < low.z || z[0] > high.z;
     let is_before_or_behind = -high.y > far_m || -low.y < near_m;
     match is_beside || is_before_or_behind {
-        true => Err(EnvironmentError::OutsideZone {
-            x_m: [low.x, high.x],
-            z_m: [low.z, high.z],
-            depth_m: [-high.y, -low.y],
-            size,
-        }),
+        true => Err(Invalid::new(format!(
+            "the object has no surface in the zone: in the zone's frame it spans x {} to {} m, z {} \
+             to {} m and depth {} to {} m{}",
+            low.x,
+            high.x,
+            low.z,
+            high.z,
+            -high.y,
+            -low.y,
+            size.map(|size| format!("; {size}")).unwrap_or_default()
+        ))),
         false => Ok(()),
     }
 }
@@ -361,17 +321,15 @@ fn met_m(zone: &Zone, bvh: &MeshBvh, [from_m, to_m]: [f64; 2]) -> impl Iterator<
 
 /// Over the zone nothing of the object, which begins at a depth of `object_m`, may be in front of
 /// the nearest depth.
-fn check_front(
-    zone: &Zone,
-    bvh: &MeshBvh,
-    near_m: f64,
-    object_m: f64,
-) -> Result<(), EnvironmentError> {
+fn check_front(zone: &Zone, bvh: &MeshBvh, near_m: f64, object_m: f64) -> Result<(), Invalid> {
     if near_m <= object_m {
         return Ok(());
     }
     match met_m(zone, bvh, [object_m - CLEARANCE_M, near_m]).reduce(f64::min) {
-        Some(front_m) if front_m < near_m => Err(EnvironmentError::InFront { near_m, front_m }),
+        Some(front_m) if front_m < near_m => Err(Invalid::new(format!(
+            "zone.depth_m begins at {near_m} m, but over the zone the object begins at {front_m} m: \
+             allowed is a nearest depth of at most that"
+        ))),
         _ => Ok(()),
     }
 }

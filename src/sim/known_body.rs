@@ -1,7 +1,8 @@
 //! A ball or a plate in place of a scene's object, for a robot that registers itself.
 
-use super::environment::{Environment, EnvironmentError, Shape};
+use super::environment::{Environment, Shape, invalid, missing};
 use super::scene::{Body, Object, Scene, Unit};
+use crate::error::Invalid;
 use crate::explore::registration::found::x_wo;
 use crate::explore::registration::{KnownBody, design};
 use crate::geometry::bvh::MeshBvh;
@@ -22,14 +23,15 @@ const PLATE_M: [f64; 2] = [0.1, 0.02];
 ///
 /// # Errors
 /// If the scene's body touches no object.
-pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, EnvironmentError> {
+pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Invalid> {
     if scene.body == Body::Function {
-        return Err(EnvironmentError::Missing { part: "object" });
+        return Err(missing("object"));
     }
     let ((points, triangles), half_m) = solid(body);
     let x_wo = x_wo(body);
-    let (mesh, report) =
-        Mesh::new(&points, &triangles).map_err(|fault| MeshError { path: NAME.into(), fault })?;
+    let built =
+        Mesh::new(&points, &triangles).map_err(|fault| MeshError { path: NAME.into(), fault });
+    let (mesh, report) = built.map_err(invalid)?;
     let (position_m, rotation_deg) = parts(&x_wo);
     let sides_m = [-half_m, half_m];
     let zone = Zone { position_m, rotation_deg, ..Zone::new(sides_m, Some(sides_m)) };

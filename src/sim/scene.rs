@@ -10,7 +10,7 @@ use crate::robot::arm::ArmSettings;
 use crate::robot::finger::Finger;
 use crate::robot::finger::profile::Profile;
 use crate::sim::finger::Effects;
-use crate::sim::finger::effects::constants;
+use crate::sim::finger::effects::sensor;
 use crate::task::around::Around;
 use crate::task::touch::TouchSettings;
 use crate::task::zone::Zone;
@@ -405,6 +405,6 @@ impl Scene {
     pub fn resolve(loader: &mut Loader, prefix: &str) -> Result<Vec<String>, ConfigError> {
         loader.resolve_path(&format!("{prefix}object.mesh"));
         loader.resolve_path_ending(&format!("{prefix}arm.model"), ".toml");
-        constants::load(loader, &format!("{prefix}effects"))
+        sensor::load(loader, &format!("{prefix}effects"))
     }
 }

@@ -8,7 +8,7 @@ use crate::sim::Environment;
 use crate::sim::environment::Shape;
 use crate::sim::finger::effects::registration::Registration;
 use crate::sim::finger::effects::wrench::Gauge;
-use crate::sim::finger::{Fingertip, FingertipError, FingertipState, Load};
+use crate::sim::finger::{Fingertip, FingertipState, Load};
 use nalgebra::{Isometry3, Vector6};
 use std::sync::Arc;
 
@@ -67,8 +67,7 @@ impl SimulatedFinger {
     /// Goes on by `dt_s`, to `motion` at its end; what the object does to the finger then, in `T`.
     ///
     /// # Errors
-    /// [`Fault::Diverged`] if the motion is not finite, [`Fault::Inside`] if the object encloses
-    /// the tip.
+    /// As [`FingertipState::step`].
     pub fn step(&mut self, motion: &TipMotion, dt_s: f64) -> Result<Wrench, Fault> {
         let Drawn { own, state, misplaced, .. } = &mut self.drawn;
         let tip = own.as_deref().or(self.environment.fingertip());
@@ -76,7 +75,7 @@ impl SimulatedFinger {
             return Ok(Wrench::default());
         };
         let motion = misplaced.as_ref().map_or(*motion, |misplaced| misplaced.motion(motion));
-        self.load = state.step(tip, bvh, &motion, dt_s).map_err(fault)?;
+        self.load = state.step(tip, bvh, &motion, dt_s)?;
         let wrench = Wrench { force_n: self.load.force_n, torque_nm: self.load.torque_nm };
         Ok(misplaced.as_ref().map_or(wrench, |misplaced| wrench.moved(&misplaced.finger)))
     }
@@ -157,18 +156,5 @@ impl Drawn {
             drawn.misplaced.get_or_insert(still).finger *= sensor.attitude;
         }
         drawn
-    }
-}
-
-fn fault(error: FingertipError) -> Fault {
-    match error {
-        FingertipError::NotFinite { time_s, motion, .. } => {
-            let parts = [motion.x_wt.translation.vector, motion.linear_w, motion.angular_w];
-            let state = parts.iter().flat_map(|part| part.iter().copied()).collect();
-            Fault::Diverged { time_s, state }
-        }
-        FingertipError::Inside { time_s, motion } => {
-            Fault::Inside { time_s, p_wt: motion.x_wt.translation.vector.into() }
-        }
     }
 }

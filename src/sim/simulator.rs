@@ -9,6 +9,7 @@ use super::probe::exact;
 use crate::backend::delay::Delayed;
 use crate::backend::interlock::InterlockSettings;
 use crate::backend::{Backend, Fault};
+use crate::error::Invalid;
 use crate::explore::probe::Probe;
 use crate::explore::probe::interlocks::interlocked;
 use crate::explore::probe::servo::{OutOfReach, Servo, check_reach};
@@ -16,7 +17,6 @@ use crate::geometry::distance::OrientedBox;
 use crate::sim::Environment;
 use crate::sim::scene::Body;
 use std::sync::Arc;
-use thiserror::Error;
 
 /// An environment with everything ready to put bodies into it.
 #[derive(Clone)]
@@ -26,27 +26,12 @@ pub struct Simulator {
     models: Option<mujoco::Models>,
 }
 
-/// An environment that no body can be put into.
-#[derive(Debug, Error)]
-pub enum SimulatorError {
-    /// Its physics cannot be simulated.
-    #[cfg(feature = "mujoco")]
-    #[error(transparent)]
-    Model(#[from] mujoco::ModelError),
-    /// This build lacks what the scene's body needs.
-    #[error("body = \"{body}\" needs a build with the feature `mujoco`")]
-    NotBuilt {
-        /// The body.
-        body: &'static str,
-    },
-}
-
 impl Simulator {
     /// Compiles what the scene's body needs.
     ///
     /// # Errors
     /// If it cannot be simulated as the scene asks.
-    pub fn new(environment: Arc<Environment>) -> Result<Self, SimulatorError> {
+    pub fn new(environment: Arc<Environment>) -> Result<Self, Invalid> {
         #[cfg(feature = "mujoco")]
         {
             let moved = environment.scene().body == Body::Dynamic;
@@ -55,7 +40,9 @@ impl Simulator {
         }
         #[cfg(not(feature = "mujoco"))]
         match environment.scene().body {
-            Body::Dynamic => Err(SimulatorError::NotBuilt { body: Body::Dynamic.name() }),
+            Body::Dynamic => {
+                Err(Invalid::new("body = \"dynamic\" needs a build with the feature `mujoco`"))
+            }
             _ => Ok(Self { environment }),
         }
     }

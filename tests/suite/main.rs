@@ -76,6 +76,7 @@ mod reproducible;
 mod rigid;
 mod scenes;
 mod seeking;
+mod sensor_file;
 mod sensors;
 mod servo;
 mod shape;

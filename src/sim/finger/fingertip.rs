@@ -10,13 +10,13 @@ use super::effects::variation::Sensor;
 use super::effects::{EffectStates, Effects};
 use super::load::{Load, PressError};
 use super::shear::Shear;
+use crate::backend::Fault;
 use crate::geometry::bvh::MeshBvh;
 use crate::robot::finger::TipMotion;
 use crate::robot::finger::frame::Frame;
 use crate::robot::finger::profile::Profile;
 use crate::robot::finger::shape::Finger;
 use rand_chacha::ChaCha8Rng;
-use thiserror::Error;
 
 /// Longest step: beyond it a frame's signals would be mostly interpolated (chosen).
 const LONGEST_STEP_S: f64 = 1.0;
@@ -84,29 +84,6 @@ impl Fingertip {
     }
 }
 
-/// Why a step was refused; the trial's state is as before.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum FingertipError {
-    /// A number is NaN or infinite, or the step is negative or longer than a second.
-    #[error("at {time_s} s: a step of {dt_s} s with {motion:?} is not finite")]
-    NotFinite {
-        /// Since the start of the trial.
-        time_s: f64,
-        /// The step.
-        dt_s: f64,
-        /// What it was asked with.
-        motion: Box<TipMotion>,
-    },
-    /// The object encloses the fingertip's centre.
-    #[error("at {time_s} s: the fingertip's centre is inside the object with {motion:?}")]
-    Inside {
-        /// Since the start of the trial.
-        time_s: f64,
-        /// What it was asked with.
-        motion: Box<TipMotion>,
-    },
-}
-
 /// What one fingertip feels during one trial.
 #[derive(Clone, Debug)]
 pub struct FingertipState {
@@ -145,27 +122,26 @@ impl FingertipState {
     /// Goes on by `dt_s`, to `motion` at its end, against an object that stands in `W`.
     ///
     /// # Errors
-    /// If a number is not finite or the finger's centre is inside the object.
+    /// [`Fault::Diverged`] if a number is not finite or the step is longer than a second,
+    /// [`Fault::Inside`] if the object encloses the fingertip's centre; the state is as before.
     pub fn step(
         &mut self,
         tip: &Fingertip,
         object: &MeshBvh,
         motion: &TipMotion,
         dt_s: f64,
-    ) -> Result<Load, FingertipError> {
+    ) -> Result<Load, Fault> {
         let time_s = self.time_s;
         if !motion.is_finite() || !(0.0..=LONGEST_STEP_S).contains(&dt_s) {
-            return Err(FingertipError::NotFinite { time_s, dt_s, motion: Box::new(*motion) });
+            return Err(diverged(time_s, motion));
         }
         let load = match (&tip.skin, &mut self.pressed) {
             (Some(skin), Some(pressed)) => {
                 count("skin");
                 skin.press(object, &motion.x_wt, pressed).map_err(|error| match error {
-                    PressError::NotFinite => {
-                        FingertipError::NotFinite { time_s, dt_s, motion: Box::new(*motion) }
-                    }
+                    PressError::NotFinite => diverged(time_s, motion),
                     PressError::Inside => {
-                        FingertipError::Inside { time_s, motion: Box::new(*motion) }
+                        Fault::Inside { time_s, p_wt: motion.x_wt.translation.vector.into() }
                     }
                 })?
             }
@@ -216,4 +192,10 @@ impl FingertipState {
         }
         signals
     }
+}
+
+fn diverged(time_s: f64, motion: &TipMotion) -> Fault {
+    let parts = [motion.x_wt.translation.vector, motion.linear_w, motion.angular_w];
+    let state = parts.iter().flat_map(|part| part.iter().copied()).collect();
+    Fault::Diverged { time_s, state }
 }

@@ -30,5 +30,5 @@ pub mod shell;
 pub mod stiffness;
 
 pub use effects::Effects;
-pub use fingertip::{Fingertip, FingertipError, FingertipState};
+pub use fingertip::{Fingertip, FingertipState};
 pub use load::Load;

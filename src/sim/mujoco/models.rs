@@ -1,6 +1,7 @@
 //! What MuJoCo compiles of an environment, once for all trials.
 
-use super::{ModelError, Substeps, compile};
+use super::{Substeps, compile, lacking};
+use crate::error::Invalid;
 use crate::sim::Environment;
 use crate::sim::collision::Collision;
 use crate::sim::environment::Shape;
@@ -24,7 +25,7 @@ impl Models {
     /// # Errors
     /// If MuJoCo refuses the scene, no step is short enough for its skin, or the object has no
     /// inside where the scene's collision needs one.
-    pub fn new(environment: &Environment) -> Result<Self, ModelError> {
+    pub fn new(environment: &Environment) -> Result<Self, Invalid> {
         let step_s = environment.scene().solver.step_s;
         let whole = Self::at(environment, step_s)?;
         match Substeps::needed(environment, &whole.plant)? {
@@ -41,20 +42,23 @@ impl Models {
     /// # Errors
     /// If MuJoCo refuses the scene, or the object has no inside where the scene's collision needs
     /// one.
-    pub fn at(environment: &Environment, step_s: f64) -> Result<Self, ModelError> {
+    pub fn at(environment: &Environment, step_s: f64) -> Result<Self, Invalid> {
         check_inside(environment)?;
         let text = mjcf::scene(environment, Mode::Dynamic { step_s });
-        let plant = Arc::new(compile(&text.ok_or(ModelError::Lacks { part: "an object" })?)?);
+        let plant = Arc::new(compile(&text.ok_or_else(|| lacking("an object"))?)?);
         Ok(Self { plant, substeps: None })
     }
 }
 
 /// Without an inside a distance has no sign.
-fn check_inside(environment: &Environment) -> Result<(), ModelError> {
+fn check_inside(environment: &Environment) -> Result<(), Invalid> {
     let Shape::Mesh { report, .. } = environment.shape() else { return Ok(()) };
     let edges = report.border_edges.count + report.non_manifold_edges.count;
     match environment.scene().solver.collision {
-        Some(Collision::Sdf) if edges > 0 => Err(ModelError::Open { edges }),
+        Some(Collision::Sdf) if edges > 0 => Err(Invalid::new(format!(
+            "solver.collision = \"sdf\" needs a closed mesh, but this one has {edges} edges that are \
+             not shared by two triangles"
+        ))),
         _ => Ok(()),
     }
 }

@@ -3,10 +3,11 @@
 use super::case::{Outcome, all, require};
 use crate::backend::trace::{Tick, Trace};
 use crate::backend::{Backend, Fault};
+use crate::error::Invalid;
 use crate::explore::probe::{Contact, Probe, Touch};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::mesh::Mesh;
-use crate::sim::environment::{EnvironmentError, Shape};
+use crate::sim::environment::Shape;
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use crate::study::fidelity::reference_load::{ReferenceLoad, reference_load};
@@ -67,10 +68,7 @@ pub(super) fn touch_solid_with(
 }
 
 /// `scene` with `mesh` as its object.
-pub(super) fn environment_of(
-    scene: Scene,
-    mesh: Mesh,
-) -> Result<Arc<Environment>, EnvironmentError> {
+pub(super) fn environment_of(scene: Scene, mesh: Mesh) -> Result<Arc<Environment>, Invalid> {
     let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
     Environment::around(scene, shape).map(Arc::new)
 }

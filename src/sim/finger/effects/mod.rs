@@ -12,6 +12,7 @@ pub mod electrodes;
 pub mod fluid;
 pub mod friction;
 pub mod registration;
+pub mod sensor;
 pub mod skin;
 pub mod switch;
 mod table;
