@@ -166,7 +166,7 @@ impl Simulation {
 
     /// What of the experiment may not be meant.
     pub fn notices(&self) -> Vec<String> {
-        let scene = self.simulator.notices().into_iter().map(|notice| notice.to_string());
+        let scene = self.simulator.notices().into_iter();
         let truth = notice::of_truth(self.task().zone(), &self.truth).into_iter();
         let left_out = self.left_out.map(Notice::FromScan).into_iter();
         let shape = self.shape.as_ref().and_then(notice::of_shape);

@@ -2,7 +2,7 @@
 
 use super::around;
 use super::function::Function;
-use super::notice::{Notice, SizeMismatch};
+use super::notice;
 use super::scene::{Body, Object, Scene, Unit};
 use crate::error::Invalid;
 use crate::geometry::bvh::MeshBvh;
@@ -28,7 +28,7 @@ pub struct Environment {
     arm: Option<Chain>,
     arm_mjcf: Option<String>,
     fingertip: Option<Fingertip>,
-    notices: Vec<Notice>,
+    notices: Vec<String>,
 }
 
 /// What is touched.
@@ -92,14 +92,14 @@ impl Environment {
         let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose().map_err(invalid)?;
         if let Cow::Owned(effects) = scene.felt_effects() {
             scene.effects = effects;
-            notices.push(Notice::DefaultFinger);
+            notices.push(notice::DEFAULT_FINGER.into());
         }
         if !scene.effects.moved_keys.is_empty() {
-            notices.push(Notice::MovedKeys(scene.effects.moved_keys.clone()));
+            notices.push(notice::moved_keys(&scene.effects.moved_keys));
         }
         let is_biotac = scene.finger.radius_m == BIOTAC_RADIUS_M;
         if scene.body.moves() && scene.effects.skin.is_some() && !is_biotac {
-            notices.push(Notice::ScaledFinger(scene.finger.radius_m));
+            notices.push(notice::scaled_finger(scene.finger.radius_m));
         }
         if let (Some(around), Shape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
             let ball = around::ball(around, bvh.mesh())?;
@@ -108,13 +108,13 @@ impl Environment {
         }
         let zone = scene.zone.as_mut().ok_or_else(|| missing("zone"))?;
         let extent = extent(zone, &shape);
-        let depth_m = *zone.depth_m.get_or_insert([-extent.high.y, -extent.low.y]);
+        let depth_m = *zone.depth_m.get_or_insert([-extent[1].y, -extent[0].y]);
         if let Shape::Mesh { bvh, .. } = &shape {
             let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
-            let size = SizeMismatch::between(zone, unit, (&extent.low, &extent.high));
-            check_overlap(zone, depth_m, &extent, size)?;
-            check_front(zone, bvh, depth_m[0], -extent.high.y)?;
-            notices.extend(size.map(Notice::Size));
+            let size = notice::size_mismatch(zone, unit, &extent);
+            check_overlap(zone, depth_m, &extent, size.as_deref())?;
+            check_front(zone, bvh, depth_m[0], -extent[1].y)?;
+            notices.extend(size);
             if zone.datum_y_m.is_none() {
                 zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
             }
@@ -128,7 +128,7 @@ impl Environment {
         scene: Scene,
         shape: Shape,
         (task, arm): (Task, Option<Chain>),
-        notices: Vec<Notice>,
+        notices: Vec<String>,
     ) -> Result<Self, Invalid> {
         let arm_mjcf = match &scene.arm {
             Some(settings) => model::mjcf(&settings.model).map_err(invalid)?,
@@ -143,7 +143,7 @@ impl Environment {
     }
 
     /// What may not be meant.
-    pub fn notices(&self) -> &[Notice] {
+    pub fn notices(&self) -> &[String] {
         &self.notices
     }
 
@@ -253,29 +253,20 @@ impl Environment {
     }
 }
 
-/// Smallest and largest coordinates in the frame of a zone.
-struct Extent {
-    low: Point3<f64>,
-    high: Point3<f64>,
-}
-
-/// What a shape spans in the frame of `zone`.
-fn extent(zone: &Zone, shape: &Shape) -> Extent {
+/// Smallest and largest coordinates of a shape in the frame of `zone`.
+fn extent(zone: &Zone, shape: &Shape) -> [Point3<f64>; 2] {
     match shape {
         Shape::Function(function) => {
             let [low, high] = function.heights_m().map(|height_m| zone.datum_y_m() + height_m);
             let [at_low, at_high] = [0.0, 1.0].map(|end| zone.at(&[end, end]));
-            Extent { low: zone.local(&at_low, low), high: zone.local(&at_high, high) }
+            [zone.local(&at_low, low), zone.local(&at_high, high)]
         }
         Shape::Mesh { bvh, .. } => {
             let x_zw = zone.x_wz().inverse();
-            let nothing = Extent {
-                low: Point3::from([f64::INFINITY; 3]),
-                high: Point3::from([f64::NEG_INFINITY; 3]),
-            };
-            bvh.mesh().vertices().iter().fold(nothing, |Extent { low, high }, p_w| {
+            let nothing = [f64::INFINITY, f64::NEG_INFINITY].map(|end| Point3::from([end; 3]));
+            bvh.mesh().vertices().iter().fold(nothing, |[low, high], p_w| {
                 let p_z = x_zw * p_w;
-                Extent { low: low.inf(&p_z), high: high.sup(&p_z) }
+                [low.inf(&p_z), high.sup(&p_z)]
             })
         }
     }
@@ -284,8 +275,8 @@ fn extent(zone: &Zone, shape: &Shape) -> Extent {
 fn check_overlap(
     zone: &Zone,
     [near_m, far_m]: [f64; 2],
-    Extent { low, high }: &Extent,
-    size: Option<SizeMismatch>,
+    [low, high]: &[Point3<f64>; 2],
+    size: Option<&str>,
 ) -> Result<(), Invalid> {
     let [x, z] = [zone.x_m, zone.z_m.unwrap_or([0.0; 2])];
     let is_beside = x[1] < low.x || x[0] > high.x || z[1] < low.z || z[0] > high.z;

@@ -32,15 +32,7 @@ struct Drawn {
     own: Option<Box<Fingertip>>,
     state: FingertipState,
     gauge: Option<Gauge>,
-    misplaced: Option<Misplaced>,
-}
-
-/// Errors of registration.
-struct Misplaced {
-    /// Pose of the finger's own `T` in that of the kinematics.
-    finger: Isometry3<f64>,
-    /// From where the object is to where it is believed to be, in `W`.
-    object: Isometry3<f64>,
+    misplaced: Option<Registration>,
 }
 
 impl SimulatedFinger {
@@ -115,19 +107,6 @@ impl SimulatedFinger {
     }
 }
 
-impl Misplaced {
-    /// How the finger moves before the object where that is believed to be.
-    fn motion(&self, motion: &TipMotion) -> TipMotion {
-        let Self { finger, object } = self;
-        let aside_w = motion.x_wt.rotation * finger.translation.vector;
-        TipMotion {
-            x_wt: object * motion.x_wt * finger,
-            linear_w: object.rotation * (motion.linear_w + motion.angular_w.cross(&aside_w)),
-            angular_w: object.rotation * motion.angular_w,
-        }
-    }
-}
-
 impl Drawn {
     fn new(environment: &Environment, tip: &Fingertip, seed: u64) -> Self {
         let stream = |purpose| seed::stream(seed, 0, purpose);
@@ -146,13 +125,14 @@ impl Drawn {
             let error = Registration::new(effect, &mut stream("registration"));
             let x_wo = object.x_wo();
             let correction = scene.arm.as_ref().and_then(|arm| arm.correction());
-            drawn.misplaced = Some(Misplaced {
+            drawn.misplaced = Some(Registration {
                 finger: effect.fixed(correction).map_or(error.finger, |fixed| fixed * error.finger),
                 object: x_wo * error.object.inverse() * x_wo.inverse(),
             });
         }
         if let Some(sensor) = &sensor {
-            let still = Misplaced { finger: Isometry3::identity(), object: Isometry3::identity() };
+            let still =
+                Registration { finger: Isometry3::identity(), object: Isometry3::identity() };
             drawn.misplaced.get_or_insert(still).finger *= sensor.attitude;
         }
         drawn

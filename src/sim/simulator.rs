@@ -4,7 +4,7 @@
 use super::kinematic::Kinematic;
 #[cfg(feature = "mujoco")]
 use super::mujoco;
-use super::notice::{Notice, OutOfSides};
+use super::notice;
 use super::probe::exact;
 use crate::backend::delay::Delayed;
 use crate::backend::interlock::InterlockSettings;
@@ -53,17 +53,18 @@ impl Simulator {
     }
 
     /// What of the scene may not be meant, and what is simulated otherwise than it asks.
-    pub fn notices(&self) -> Vec<Notice> {
+    pub fn notices(&self) -> Vec<String> {
         let mut notices = self.environment.notices().to_vec();
         let foot_w = self.environment.chain().map(|chain| match self.environment.scene().arm {
             Some(_) => chain.base.translation.vector.into(),
             None => chain.forward(&chain.home).translation.vector.into(),
         });
-        let sides = foot_w.and_then(|foot_w| OutOfSides::of(self.environment.task(), &foot_w));
-        notices.extend(sides.map(Notice::Sides));
+        let sides =
+            foot_w.and_then(|foot_w| notice::out_of_sides(self.environment.task(), &foot_w));
+        notices.extend(sides);
         #[cfg(feature = "mujoco")]
         if let Some(substeps) = self.models.as_ref().and_then(|models| models.substeps.as_ref()) {
-            notices.push(Notice::Steps(substeps.to_string()));
+            notices.push(substeps.to_string());
         }
         notices
     }

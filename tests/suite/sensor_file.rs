@@ -79,8 +79,7 @@ fn constants_in_effects_are_still_read() {
     assert_eq!(given.effects.skin.as_ref().unwrap().flatten_pa_m, 2e6);
     assert_eq!(given.effects.moved_keys, ["effects.skin.flatten_pa_m"]);
     let environment = Environment::build(given).unwrap();
-    let notices: Vec<String> =
-        environment.notices().iter().map(|notice| notice.to_string()).collect();
+    let notices = environment.notices();
     assert!(
         notices.iter().any(|notice| notice.contains("effects.skin.flatten_pa_m")),
         "{notices:?}"

@@ -2,7 +2,6 @@
 
 mod contact;
 mod dynamic;
-mod implicit_gain;
 mod joint_servo;
 mod models;
 #[cfg(feature = "render")]
@@ -46,6 +45,6 @@ pub fn compile(mjcf: &str) -> Result<MjModel, Invalid> {
     });
     let mut model = MjModel::from_xml_string(mjcf)
         .map_err(|cause| Invalid::new(format!("MuJoCo refuses the scene: {cause}")))?;
-    implicit_gain::embed(&mut model);
+    joint_servo::embed(&mut model);
     Ok(model)
 }

@@ -1,8 +1,8 @@
 //! The arm or stage with its velocity servos, gravity and friction, one step at a time.
 
 use super::contact;
-use super::implicit_gain::embedded;
 use super::joint_servo::JointServo;
+use super::joint_servo::embedded;
 use crate::backend::{Fault, IdealContact, Wrench};
 use crate::robot::arm::Joints;
 use crate::robot::arm::chain::MAX_JOINTS;

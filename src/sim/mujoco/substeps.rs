@@ -4,7 +4,7 @@ use super::{Plant, lacking};
 use crate::error::Invalid;
 use crate::sim::Environment;
 use crate::sim::environment::invalid;
-use crate::sim::finger::stiffness;
+use crate::sim::finger::plate;
 use mujoco_rs::wrappers::MjModel;
 use std::fmt::{Display, Formatter, Result as Written};
 use std::sync::Arc;
@@ -54,7 +54,7 @@ impl StepLimit {
         let mass_kg = plant.tip_mass_kg();
         let towards_t = scene.finger.ahead_t();
         let force_n = scene.touch.force_limit_n;
-        let stiffness_n_m = stiffness::largest_n_m(skin, &towards_t, force_n);
+        let stiffness_n_m = plate::largest_stiffness_n_m(skin, &towards_t, force_n);
         let limit_s = (mass_kg / stiffness_n_m).sqrt();
         Ok(Some(Self { force_n, stiffness_n_m, mass_kg, limit_s }))
     }
