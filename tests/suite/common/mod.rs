@@ -5,7 +5,6 @@ pub mod counting;
 pub mod fake;
 #[cfg(feature = "mujoco")]
 pub mod lab;
-#[cfg(feature = "mujoco")]
 pub mod program;
 pub mod quiet;
 pub mod rig;
