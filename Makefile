@@ -161,7 +161,6 @@ bench: setup
 	cargo bench --locked --bench plant
 	cargo bench --locked --bench dynamic
 	cargo bench --locked --bench contact
-	cargo bench --locked --bench flex
 
 # How far the electrodes' point of contact lies from the exact one.
 contacts: setup

@@ -12,7 +12,7 @@ pub(crate) use palpate::explore::belief::Belief as Known;
 /// Returns an empty belief over what `environment` explores, with default settings.
 pub(crate) fn nothing(environment: &Environment) -> Known {
     let scene = environment.scene();
-    let finger = (&scene.finger, scene.effects.is_soft());
+    let finger = (&scene.finger, scene.effects.skin.is_some());
     Known::new(environment.task(), finger, &GpSettings::default(), &SpaceSettings::default())
 }
 

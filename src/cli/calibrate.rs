@@ -7,12 +7,13 @@ use crate::sim::finger::calibration::fit::{Fit, Free, fit};
 use crate::sim::finger::calibration::score::{HeldOut, Score, between, leave_one_out};
 use crate::sim::finger::calibration::session::Session;
 use crate::sim::finger::calibration::shear::{ShearRecordings, Sheared, compare};
-use crate::sim::finger::effects::Effects;
 use crate::sim::finger::effects::friction::FrictionEffect;
+use crate::sim::finger::effects::sensor;
 use crate::sim::finger::effects::skin::SkinModel;
 use crate::sim::finger::recording::{Recording, Recordings};
 use crate::{files, words};
 use anyhow::{Context, anyhow};
+use clap::ValueEnum;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
@@ -22,6 +23,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Examples:
   palpate calibrate tests/data/biotac_flat_plate.json
+  palpate calibrate tests/data/biotac_flat_plate.json --out sensor.toml
   palpate calibrate tests/data/biotac_flat_plate.json --attitude-only
   palpate calibrate tests/data/biotac_flat_plate.json --shear tests/data/biotac_shear.json
   palpate calibrate tests/data/biotac_flat_plate.json --model shell")]
@@ -39,6 +41,10 @@ pub struct Args {
     /// How the skin passes load on.
     #[arg(long, value_enum, default_value_t)]
     model: Skin,
+    /// Write the constants fitted to all sensors into this file, which a scene names by
+    /// effects.sensor.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["attitude_only", "shear"])]
+    out: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Default, clap::ValueEnum)]
@@ -83,11 +89,24 @@ pub fn run(args: &Args) -> anyhow::Result<Ending> {
         let all: Vec<&Recording> = sensors.iter().collect();
         let fit = fit(&start, &all, free).with_context(refused)?;
         print(&format!("constants fitted to {}", names(sensors.iter().map(|s| &s.sensor))))?;
-        print(&constants(&fit, &held_out))?;
+        print(&estimates(&fit, &held_out))?;
         for (session, recording) in fit.sessions.iter().zip(sensors) {
             print(&format!("  {}: {}", recording.sensor, held_at(session)))?;
         }
-        print(&format!("\n{}", toml::to_string(&Tables { effects: fit.model.effects() })?))?;
+        let text = format!(
+            "# Constants of the sensor for model = \"{}\" of [effects.skin], fitted by palpate calibrate \
+             to {name}.\n# What is not here is as in models/biotac.toml.\n{}",
+            args.model.to_possible_value().map_or(String::new(), |model| model.get_name().into()),
+            sensor::text(&fit.model.effects())?
+        );
+        match &args.out {
+            Some(path) => {
+                std::fs::write(path, text)
+                    .with_context(|| format!("cannot write {}", path.display()))?;
+                print(&format!("\nwritten to {}", path.display()))?;
+            }
+            None => print(&format!("\n{text}"))?,
+        }
     }
     Ok(Ending::Done)
 }
@@ -123,19 +142,13 @@ fn sheared(found: &Sheared, stiffness_n_m: f64) -> String {
     format!("sensor {sensor} with a skin of {stiffness_n_m} N/m\n{table}{}\n", told.join("\n"))
 }
 
-/// As they stand in a scene.
-#[derive(serde::Serialize)]
-struct Tables {
-    effects: Effects,
-}
-
 fn told(held: &HeldOut) -> String {
     let from = match held.others.is_empty() {
         true => "the constants of a scene without settings".into(),
         false => format!("constants fitted to {}", names(held.others.iter())),
     };
     let mut text = format!("sensor {} with {from}\n", held.sensor);
-    text += &constants(&held.fit, &[]);
+    text += &estimates(&held.fit, &[]);
     for session in &held.fit.sessions {
         text += &format!("  its own: {}\n", held_at(session));
     }
@@ -148,7 +161,7 @@ fn told(held: &HeldOut) -> String {
 }
 
 /// The constants of a fit; `held_out` are those without one sensor each.
-fn constants(fit: &Fit, held_out: &[HeldOut]) -> String {
+fn estimates(fit: &Fit, held_out: &[HeldOut]) -> String {
     let mut text = String::new();
     for found in &fit.estimates {
         text += &format!("  {:22} {:.2e} */÷ {:.2}", found.key, found.value, found.factor);

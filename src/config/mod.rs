@@ -175,13 +175,15 @@ impl Loader {
         let path = std::path::absolute(&path).unwrap_or(path);
         let text = tidy(&path).to_string_lossy().into_owned();
         let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
-        let mut table = Some(&mut self.table);
-        for part in tables.split('.').filter(|part| !part.is_empty()) {
-            table = table.and_then(|table| table.get_mut(part)?.as_table_mut());
-        }
-        if let Some(table) = table {
+        if let Some(table) = self.table_mut(tables) {
             table.insert(last.into(), Value::String(text));
         }
+    }
+
+    /// The table under the dotted `key`, the outermost if it is empty.
+    pub fn table_mut(&mut self, key: &str) -> Option<&mut Table> {
+        let mut parts = steps(key);
+        parts.try_fold(&mut self.table, |table, part| table.get_mut(part)?.as_table_mut())
     }
 
     /// Fills in defaults and checks everything.
@@ -252,7 +254,8 @@ impl Loader {
         words::allowed(error.inner().message()).filter(|_| error.path().to_string() == key)
     }
 
-    fn value(&self, key: &str) -> Option<&Value> {
+    /// The value under the dotted `key`.
+    pub fn value(&self, key: &str) -> Option<&Value> {
         let mut parts = steps(key);
         let mut value = self.table.get(parts.next()?)?;
         for part in parts {

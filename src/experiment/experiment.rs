@@ -157,9 +157,8 @@ impl Experiment {
         files.iter().try_for_each(|set| loader.set(set))?;
         INCLUDED.iter().try_for_each(|key| loader.include(key))?;
         others.iter().try_for_each(|set| loader.set(set))?;
-        loader.resolve_path("scene.object.mesh");
+        let moved_keys = Scene::resolve(&mut loader, "scene.")?;
         loader.resolve_path("truth.scan");
-        loader.resolve_path_ending("scene.arm.model", ".toml");
         if loader.has_value("scene.around") {
             // Version 0.1 wrote the settings of a zone's belief here as well, all of them.
             let is_of_zone = ["gp.mean", "gp.signal", "gp.free_space"];
@@ -171,6 +170,7 @@ impl Experiment {
         // Version 0.1 wrote the settings of planners that were removed since.
         REMOVED.iter().for_each(|planner| drop(loader.take(&format!("planning.{planner}"))));
         let mut experiment: Self = loader.finish()?;
+        experiment.scene.effects.moved_keys = moved_keys;
         if experiment.backend.kind != BackendKind::Simulated {
             experiment.backend.complete(experiment.scene.arm.as_ref());
         }

@@ -4,6 +4,7 @@ use crate::backend::ros::arm::Lab;
 use crate::backend::ros::fault::LinkFault;
 use crate::backend::ros::settings::BackendKind;
 use crate::backend::{Backend, Fault};
+use crate::error::Invalid;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::notice;
@@ -22,8 +23,7 @@ use crate::explore::probe::Probe;
 use crate::explore::probe::servo::Servo;
 use crate::math::seed;
 use crate::sim::Environment;
-use crate::sim::environment::EnvironmentError;
-use crate::sim::simulator::{Simulator, SimulatorError};
+use crate::sim::simulator::Simulator;
 use crate::task::Task;
 use rand::RngExt;
 use std::sync::Arc;
@@ -51,12 +51,9 @@ pub enum SimulationError {
     /// It moves a real robot and lacks settings that protect it.
     #[error(transparent)]
     MissingForRobot(#[from] MissingForRobot),
-    /// Its scene cannot be built.
+    /// Its scene cannot be built, or its body cannot be made.
     #[error(transparent)]
-    Environment(#[from] EnvironmentError),
-    /// Its body cannot be made.
-    #[error(transparent)]
-    Simulator(#[from] SimulatorError),
+    Invalid(#[from] Invalid),
     /// The scan that is its truth cannot be read.
     #[error(transparent)]
     Cloud(#[from] CloudError),
@@ -169,7 +166,7 @@ impl Simulation {
 
     /// What of the experiment may not be meant.
     pub fn notices(&self) -> Vec<String> {
-        let scene = self.simulator.notices().into_iter().map(|notice| notice.to_string());
+        let scene = self.simulator.notices().into_iter();
         let truth = notice::of_truth(self.task().zone(), &self.truth).into_iter();
         let left_out = self.left_out.map(Notice::FromScan).into_iter();
         let shape = self.shape.as_ref().and_then(notice::of_shape);

@@ -22,7 +22,8 @@ pub struct Cell {
 
 /// Whether `value` of `key` is a file's name; an arm's model may be one.
 fn is_file(key: &str, value: &str) -> bool {
-    FILES.contains(&key) || (key == "scene.arm.model" && value.ends_with(".toml"))
+    FILES.contains(&key)
+        || (["scene.arm.model", "scene.effects.sensor"].contains(&key) && value.ends_with(".toml"))
 }
 
 /// The combinations of the file at `path`, the last key's values in a row; none without a sweep.

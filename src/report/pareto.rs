@@ -17,13 +17,12 @@ use crate::study::fidelity::step_in_contact;
 type RungFamily = (fn(&Rung) -> bool, &'static str, &'static str);
 
 /// The first that fits counts.
-const FAMILIES: [RungFamily; 6] = [
+const FAMILIES: [RungFamily; 5] = [
     (|rung| rung.senses == Senses::None, "#000000", "rigid"),
     (|rung| rung.senses == Senses::Dry, "#e69f00", "soft skin"),
     (|rung| rung.senses == Senses::Fluid, "#56b4e9", "and fluid"),
     (|rung| rung.shell.is_some(), "#009e73", "the same, a thin shell"),
-    (|rung| rung.flex.is_none(), "#0072b2", "and electrodes"),
-    (|_| true, "#cc79a7", "the same, of finite elements"),
+    (|_| true, "#0072b2", "and electrodes"),
 ];
 
 /// An error that is drawn over the time of a touch.

@@ -128,7 +128,7 @@ pub fn belief(
     let ball = scene.around.as_ref().and_then(|around| around.ball());
     let ball = ball.context("the ball of [around] is not written out")?;
     let task = Task::new(ball, scene.touch.clone(), &scene.finger)?;
-    let scope = Scope::new(ball, &task, (&scene.finger, scene.effects.is_soft()));
+    let scope = Scope::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
     let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
     for touch in touches {
         let aim = touch.target.aim().context("a target that is no aim")?;

@@ -1,10 +1,9 @@
 //! What never changes during a trial, shared by all threads.
 
-use super::around::{self, AroundError};
+use super::around;
 use super::function::Function;
-use super::notice::{Notice, SizeMismatch};
+use super::notice;
 use super::scene::{Body, Object, Scene, Unit};
-use crate::config::ConfigError;
 use crate::error::Invalid;
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::implicit::Implicit;
@@ -20,7 +19,6 @@ use crate::sim::finger::Fingertip;
 use crate::task::{Region, Task, Zone};
 use nalgebra::{Point3, Vector3};
 use std::borrow::Cow;
-use thiserror::Error;
 
 /// A scene with its mesh loaded and its search tree built.
 pub struct Environment {
@@ -30,7 +28,7 @@ pub struct Environment {
     arm: Option<Chain>,
     arm_mjcf: Option<String>,
     fingertip: Option<Fingertip>,
-    notices: Vec<Notice>,
+    notices: Vec<String>,
 }
 
 /// What is touched.
@@ -46,55 +44,14 @@ pub enum Shape {
     },
 }
 
-/// A scene that cannot be built.
-#[derive(Debug, Error)]
-pub enum EnvironmentError {
-    /// The object's mesh is unusable.
-    #[error(transparent)]
-    Mesh(#[from] Invalid),
-    /// The arm's model is unusable.
-    #[error("{0}")]
-    Arm(Box<ConfigError>),
-    /// The scene lacks the part its body needs.
-    #[error("the scene has no {part}, which its body needs")]
-    Missing {
-        /// The part.
-        part: &'static str,
-    },
-    /// The object lies wholly beside the zone, or before or behind its depth range.
-    #[error(
-        "the object has no surface in the zone: in the zone's frame it spans x {} to {} m, z {} to {} m and \
-         depth {} to {} m{}", x_m[0], x_m[1], z_m[0], z_m[1], depth_m[0], depth_m[1],
-        size.map(|size| format!("; {size}")).unwrap_or_default()
-    )]
-    OutsideZone {
-        /// The object's extent.
-        x_m: [f64; 2],
-        /// The object's extent.
-        z_m: [f64; 2],
-        /// The object's extent.
-        depth_m: [f64; 2],
-        /// How its size differs from the zone's, if it does much.
-        size: Option<SizeMismatch>,
-    },
-    /// The object reaches out of the zone's depth range towards the finger, which would set out
-    /// inside it.
-    #[error(
-        "zone.depth_m begins at {near_m} m, but over the zone the object begins at {front_m} m: allowed is a \
-         nearest depth of at most that"
-    )]
-    InFront {
-        /// Nearest depth that the zone gives.
-        near_m: f64,
-        /// Where the object is first met.
-        front_m: f64,
-    },
-    /// The object cannot be gone around.
-    #[error(transparent)]
-    Around(#[from] AroundError),
-    /// The zone is not complete.
-    #[error(transparent)]
-    Task(#[from] Invalid),
+/// A scene that lacks `part`.
+pub(super) fn missing(part: &str) -> Invalid {
+    Invalid::new(format!("the scene has no {part}, which its body needs"))
+}
+
+/// The error with the message of another.
+pub(super) fn invalid(error: impl std::fmt::Display) -> Invalid {
+    Invalid::new(error.to_string())
 }
 
 impl Environment {
@@ -102,7 +59,7 @@ impl Environment {
     ///
     /// # Errors
     /// If the mesh is unusable or lies wholly outside the zone.
-    pub fn build(scene: Scene) -> Result<Self, EnvironmentError> {
+    pub fn build(scene: Scene) -> Result<Self, Invalid> {
         Self::build_telling(scene, &|_| ())
     }
 
@@ -111,12 +68,12 @@ impl Environment {
     ///
     /// # Errors
     /// As [`build`](Self::build).
-    pub fn build_telling(scene: Scene, tell: &dyn Fn(&str)) -> Result<Self, EnvironmentError> {
+    pub fn build_telling(scene: Scene, tell: &dyn Fn(&str)) -> Result<Self, Invalid> {
         if scene.body == Body::Function {
-            let function = scene.function.ok_or(EnvironmentError::Missing { part: "function" })?;
+            let function = scene.function.ok_or_else(|| missing("function"))?;
             return Self::around(scene, Shape::Function(function));
         }
-        let object = scene.object.as_ref().ok_or(EnvironmentError::Missing { part: "object" })?;
+        let object = scene.object.as_ref().ok_or_else(|| missing("object"))?;
         tell(&format!("reading {}", object.mesh.display()));
         let (mesh, report) =
             import_with(&object.mesh, object.unit.metres() * object.scale, object.outside_buffers)?;
@@ -129,38 +86,40 @@ impl Environment {
     ///
     /// # Errors
     /// If the shape lies wholly outside the zone.
-    pub fn around(mut scene: Scene, shape: Shape) -> Result<Self, EnvironmentError> {
+    pub fn around(mut scene: Scene, shape: Shape) -> Result<Self, Invalid> {
         let mut notices = Vec::new();
-        let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose();
-        let arm = arm.map_err(|error| EnvironmentError::Arm(error.into()))?;
+        let arm = scene.arm.as_ref().map(ArmSettings::chain).transpose().map_err(invalid)?;
         if let Cow::Owned(effects) = scene.felt_effects() {
             scene.effects = effects;
-            notices.push(Notice::DefaultFinger);
+            notices.push(notice::DEFAULT_FINGER.into());
+        }
+        if !scene.effects.moved_keys.is_empty() {
+            notices.push(notice::moved_keys(&scene.effects.moved_keys));
         }
         let is_biotac = scene.finger.radius_m == BIOTAC_RADIUS_M;
-        if scene.body.moves() && scene.effects.is_soft() && !is_biotac {
-            notices.push(Notice::ScaledFinger(scene.finger.radius_m));
+        if scene.body.moves() && scene.effects.skin.is_some() && !is_biotac {
+            notices.push(notice::scaled_finger(scene.finger.radius_m));
         }
         if let (Some(around), Shape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
             let ball = around::ball(around, bvh.mesh())?;
             let task = around::task(&scene, arm.as_ref(), ball, bvh.mesh())?;
             return Self::of(scene, shape, (task, arm), notices);
         }
-        let zone = scene.zone.as_mut().ok_or(EnvironmentError::Missing { part: "zone" })?;
+        let zone = scene.zone.as_mut().ok_or_else(|| missing("zone"))?;
         let extent = extent(zone, &shape);
-        let depth_m = *zone.depth_m.get_or_insert([-extent.high.y, -extent.low.y]);
+        let depth_m = *zone.depth_m.get_or_insert([-extent[1].y, -extent[0].y]);
         if let Shape::Mesh { bvh, .. } = &shape {
             let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
-            let size = SizeMismatch::between(zone, unit, (&extent.low, &extent.high));
-            check_overlap(zone, depth_m, &extent, size)?;
-            check_front(zone, bvh, depth_m[0], -extent.high.y)?;
-            notices.extend(size.map(Notice::Size));
+            let size = notice::size_mismatch(zone, unit, &extent);
+            check_overlap(zone, depth_m, &extent, size.as_deref())?;
+            check_front(zone, bvh, depth_m[0], -extent[1].y)?;
+            notices.extend(size);
             if zone.datum_y_m.is_none() {
                 zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
             }
         }
         zone.datum_y_m.get_or_insert(0.0);
-        let task = Task::new(zone.clone(), scene.touch.clone(), &scene.finger)?;
+        let task = Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?;
         Self::of(scene, shape, (task, arm), notices)
     }
 
@@ -168,24 +127,22 @@ impl Environment {
         scene: Scene,
         shape: Shape,
         (task, arm): (Task, Option<Chain>),
-        notices: Vec<Notice>,
-    ) -> Result<Self, EnvironmentError> {
+        notices: Vec<String>,
+    ) -> Result<Self, Invalid> {
         let arm_mjcf = match &scene.arm {
-            Some(settings) => {
-                model::mjcf(&settings.model).map_err(|error| EnvironmentError::Arm(error.into()))?
-            }
+            Some(settings) => model::mjcf(&settings.model).map_err(invalid)?,
             None => None,
         };
         if scene.body == Body::Dynamic && scene.arm.is_some() && arm_mjcf.is_none() {
-            return Err(EnvironmentError::Missing { part: "`mjcf` in its arm's model" });
+            return Err(missing("`mjcf` in its arm's model"));
         }
         let fingertip =
-            (scene.effects.is_soft()).then(|| Fingertip::new(&scene.finger, &scene.effects));
+            scene.effects.skin.is_some().then(|| Fingertip::new(&scene.finger, &scene.effects));
         Ok(Self { scene, shape, task, arm, arm_mjcf, fingertip, notices })
     }
 
     /// What may not be meant.
-    pub fn notices(&self) -> &[Notice] {
+    pub fn notices(&self) -> &[String] {
         &self.notices
     }
 
@@ -295,29 +252,20 @@ impl Environment {
     }
 }
 
-/// Smallest and largest coordinates in the frame of a zone.
-struct Extent {
-    low: Point3<f64>,
-    high: Point3<f64>,
-}
-
-/// What a shape spans in the frame of `zone`.
-fn extent(zone: &Zone, shape: &Shape) -> Extent {
+/// Smallest and largest coordinates of a shape in the frame of `zone`.
+fn extent(zone: &Zone, shape: &Shape) -> [Point3<f64>; 2] {
     match shape {
         Shape::Function(function) => {
             let [low, high] = function.heights_m().map(|height_m| zone.datum_y_m() + height_m);
             let [at_low, at_high] = [0.0, 1.0].map(|end| zone.at(&[end, end]));
-            Extent { low: zone.local(&at_low, low), high: zone.local(&at_high, high) }
+            [zone.local(&at_low, low), zone.local(&at_high, high)]
         }
         Shape::Mesh { bvh, .. } => {
             let x_zw = zone.x_wz().inverse();
-            let nothing = Extent {
-                low: Point3::from([f64::INFINITY; 3]),
-                high: Point3::from([f64::NEG_INFINITY; 3]),
-            };
-            bvh.mesh().vertices().iter().fold(nothing, |Extent { low, high }, p_w| {
+            let nothing = [f64::INFINITY, f64::NEG_INFINITY].map(|end| Point3::from([end; 3]));
+            bvh.mesh().vertices().iter().fold(nothing, |[low, high], p_w| {
                 let p_z = x_zw * p_w;
-                Extent { low: low.inf(&p_z), high: high.sup(&p_z) }
+                [low.inf(&p_z), high.sup(&p_z)]
             })
         }
     }
@@ -326,19 +274,24 @@ fn extent(zone: &Zone, shape: &Shape) -> Extent {
 fn check_overlap(
     zone: &Zone,
     [near_m, far_m]: [f64; 2],
-    Extent { low, high }: &Extent,
-    size: Option<SizeMismatch>,
-) -> Result<(), EnvironmentError> {
+    [low, high]: &[Point3<f64>; 2],
+    size: Option<&str>,
+) -> Result<(), Invalid> {
     let [x, z] = [zone.x_m, zone.z_m.unwrap_or([0.0; 2])];
     let is_beside = x[1] < low.x || x[0] > high.x || z[1] < low.z || z[0] > high.z;
     let is_before_or_behind = -high.y > far_m || -low.y < near_m;
     match is_beside || is_before_or_behind {
-        true => Err(EnvironmentError::OutsideZone {
-            x_m: [low.x, high.x],
-            z_m: [low.z, high.z],
-            depth_m: [-high.y, -low.y],
-            size,
-        }),
+        true => Err(Invalid::new(format!(
+            "the object has no surface in the zone: in the zone's frame it spans x {} to {} m, z {} \
+             to {} m and depth {} to {} m{}",
+            low.x,
+            high.x,
+            low.z,
+            high.z,
+            -high.y,
+            -low.y,
+            size.map(|size| format!("; {size}")).unwrap_or_default()
+        ))),
         false => Ok(()),
     }
 }
@@ -358,17 +311,15 @@ fn met_m(zone: &Zone, bvh: &MeshBvh, [from_m, to_m]: [f64; 2]) -> impl Iterator<
 
 /// Over the zone nothing of the object, which begins at a depth of `object_m`, may be in front of
 /// the nearest depth.
-fn check_front(
-    zone: &Zone,
-    bvh: &MeshBvh,
-    near_m: f64,
-    object_m: f64,
-) -> Result<(), EnvironmentError> {
+fn check_front(zone: &Zone, bvh: &MeshBvh, near_m: f64, object_m: f64) -> Result<(), Invalid> {
     if near_m <= object_m {
         return Ok(());
     }
     match met_m(zone, bvh, [object_m - CLEARANCE_M, near_m]).reduce(f64::min) {
-        Some(front_m) if front_m < near_m => Err(EnvironmentError::InFront { near_m, front_m }),
+        Some(front_m) if front_m < near_m => Err(Invalid::new(format!(
+            "zone.depth_m begins at {near_m} m, but over the zone the object begins at {front_m} m: \
+             allowed is a nearest depth of at most that"
+        ))),
         _ => Ok(()),
     }
 }

@@ -1,7 +1,8 @@
 //! A ball or a plate in place of a scene's object, for a robot that registers itself.
 
-use super::environment::{Environment, EnvironmentError, Shape};
+use super::environment::{Environment, Shape, missing};
 use super::scene::{Body, Object, Scene, Unit};
+use crate::error::Invalid;
 use crate::explore::registration::{KnownBody, design};
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::mesh::Mesh;
@@ -20,9 +21,9 @@ const PLATE_M: [f64; 2] = [0.1, 0.02];
 ///
 /// # Errors
 /// If the scene's body touches no object.
-pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, EnvironmentError> {
+pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Invalid> {
     if scene.body == Body::Function {
-        return Err(EnvironmentError::Missing { part: "object" });
+        return Err(missing("object"));
     }
     let ((points, triangles), half_m) = solid(body);
     let x_wo = body.x_wo();

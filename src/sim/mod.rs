@@ -10,7 +10,7 @@ pub mod known_body;
 pub mod mjcf;
 #[cfg(feature = "mujoco")]
 pub mod mujoco;
-pub mod notice;
+mod notice;
 pub mod placement;
 pub mod probe;
 pub mod reach;

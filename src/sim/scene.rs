@@ -9,6 +9,7 @@ use crate::robot::arm::ArmSettings;
 use crate::robot::finger::Finger;
 use crate::robot::finger::profile::Profile;
 use crate::sim::finger::Effects;
+use crate::sim::finger::effects::sensor;
 use crate::task::Around;
 use crate::task::touch::TouchSettings;
 use crate::task::zone::Zone;
@@ -281,10 +282,6 @@ impl Checked for Scene {
              body = \"cast\"; without any [effects] it has a BioTac's)"
                 .into()
         });
-        let stepped = self.body == Body::Dynamic || self.effects.flex.is_none();
-        rules.require("effects.flex", "(given)", stepped, || {
-            "no flex: only body = \"dynamic\" is stepped by MuJoCo".into()
-        });
         let bumps = self.body == Body::Dynamic || self.effects.collision.is_none();
         rules.require("effects.collision", "(given)", bumps, || {
             "no collision: only links of body = \"dynamic\" are kept apart by MuJoCo".into()
@@ -350,7 +347,7 @@ impl Scene {
     /// Whether MuJoCo lets the finger collide with the object: it does where no skin says what the
     /// object does to it.
     pub fn collides(&self) -> bool {
-        self.body == Body::Dynamic && !self.effects.is_soft()
+        self.body == Body::Dynamic && self.effects.skin.is_none()
     }
 
     /// Fastest approach at which contact is told before skin and fluid are used up in front of the
@@ -388,8 +385,20 @@ impl Scene {
             ));
         }
         sets.iter().try_for_each(|set| loader.set(set))?;
-        loader.resolve_path("object.mesh");
-        loader.resolve_path_ending("arm.model", ".toml");
-        loader.finish()
+        let moved_keys = Self::resolve(&mut loader, "")?;
+        let mut scene: Self = loader.finish()?;
+        scene.effects.moved_keys = moved_keys;
+        Ok(scene)
+    }
+
+    /// Makes the paths of a scene under `prefix` absolute, and puts the constants of its sensor into
+    /// its effects; returns the keys of constants that stand in the effects themselves.
+    ///
+    /// # Errors
+    /// If the sensor's file cannot be read, or holds what is not allowed.
+    pub fn resolve(loader: &mut Loader, prefix: &str) -> Result<Vec<String>, ConfigError> {
+        loader.resolve_path(&format!("{prefix}object.mesh"));
+        loader.resolve_path_ending(&format!("{prefix}arm.model"), ".toml");
+        sensor::load(loader, &format!("{prefix}effects"))
     }
 }

@@ -8,31 +8,16 @@ use crate::sim::Environment;
 use crate::sim::environment::Shape;
 use crate::sim::finger::effects::registration::Registration;
 use crate::sim::finger::effects::wrench::Gauge;
-use crate::sim::finger::{Fingertip, FingertipError, FingertipState, Load};
+use crate::sim::finger::{Fingertip, FingertipState, Load};
 use nalgebra::{Isometry3, Vector6};
 use std::sync::Arc;
 
 /// Forces below this have no place; far below any that is detected (chosen).
 const LEAST_FORCE_N: f64 = 1e-6;
 
-/// A skin that is stepped in its own simulation: that of `[effects.flex]`.
-pub trait Shell: Send {
-    /// Brings it to rest, away from any object.
-    fn reset(&mut self);
-
-    /// Goes on by `dt_s`, to the pose `x_wt` at its end, against the object that stands in `W`: the
-    /// load on it, and how far it lies inwards at each point where it is read; none at rest.
-    ///
-    /// # Errors
-    /// [`Fault::Diverged`] with the largest displacement (m) and speed (m/s) of a node,
-    /// [`Fault::Inside`] if the object is where the skin does not yield.
-    fn step(&mut self, x_wt: &Isometry3<f64>, dt_s: f64) -> Result<(Load, &[f64]), Fault>;
-}
-
 /// The finger's state during one trial.
 pub struct SimulatedFinger {
     environment: Arc<Environment>,
-    shell: Option<Box<dyn Shell>>,
     /// Pose of `T` in the frame of the force/torque sensor.
     x_mt: Isometry3<f64>,
     drawn: Drawn,
@@ -47,15 +32,7 @@ struct Drawn {
     own: Option<Box<Fingertip>>,
     state: FingertipState,
     gauge: Option<Gauge>,
-    misplaced: Option<Misplaced>,
-}
-
-/// Errors of registration.
-struct Misplaced {
-    /// Pose of the finger's own `T` in that of the kinematics.
-    finger: Isometry3<f64>,
-    /// From where the object is to where it is believed to be, in `W`.
-    object: Isometry3<f64>,
+    misplaced: Option<Registration>,
 }
 
 impl SimulatedFinger {
@@ -65,23 +42,14 @@ impl SimulatedFinger {
         Some(Self {
             x_mt: environment.chain()?.tool,
             drawn: Drawn::new(&environment, environment.fingertip()?, seed),
-            shell: None,
             load: Load::default(),
             has_sensor: effects.fluid.is_some() && effects.electrodes.is_some(),
             environment,
         })
     }
 
-    /// Puts a simulated skin on; without it the finger feels with its `[effects.skin]`.
-    pub fn wear(&mut self, shell: Box<dyn Shell>) {
-        self.shell = Some(shell);
-    }
-
     /// Forgets everything.
     pub fn reset(&mut self, seed: u64) {
-        if let Some(shell) = &mut self.shell {
-            shell.reset();
-        }
         if let Some(tip) = self.environment.fingertip() {
             self.drawn = Drawn::new(&self.environment, tip, seed);
             self.load = Load::default();
@@ -91,8 +59,7 @@ impl SimulatedFinger {
     /// Goes on by `dt_s`, to `motion` at its end; what the object does to the finger then, in `T`.
     ///
     /// # Errors
-    /// [`Fault::Diverged`] if the motion is not finite, [`Fault::Inside`] if the object encloses
-    /// the tip; and those of the [`Shell`].
+    /// As [`FingertipState::step`].
     pub fn step(&mut self, motion: &TipMotion, dt_s: f64) -> Result<Wrench, Fault> {
         let Drawn { own, state, misplaced, .. } = &mut self.drawn;
         let tip = own.as_deref().or(self.environment.fingertip());
@@ -100,11 +67,7 @@ impl SimulatedFinger {
             return Ok(Wrench::default());
         };
         let motion = misplaced.as_ref().map_or(*motion, |misplaced| misplaced.motion(motion));
-        self.load = match &mut self.shell {
-            Some(shell) => state.step_loaded(tip, shell.step(&motion.x_wt, dt_s)?, &motion, dt_s),
-            None => state.step(tip, bvh, &motion, dt_s),
-        }
-        .map_err(fault)?;
+        self.load = state.step(tip, bvh, &motion, dt_s)?;
         let wrench = Wrench { force_n: self.load.force_n, torque_nm: self.load.torque_nm };
         Ok(misplaced.as_ref().map_or(wrench, |misplaced| wrench.moved(&misplaced.finger)))
     }
@@ -144,19 +107,6 @@ impl SimulatedFinger {
     }
 }
 
-impl Misplaced {
-    /// How the finger moves before the object where that is believed to be.
-    fn motion(&self, motion: &TipMotion) -> TipMotion {
-        let Self { finger, object } = self;
-        let aside_w = motion.x_wt.rotation * finger.translation.vector;
-        TipMotion {
-            x_wt: object * motion.x_wt * finger,
-            linear_w: object.rotation * (motion.linear_w + motion.angular_w.cross(&aside_w)),
-            angular_w: object.rotation * motion.angular_w,
-        }
-    }
-}
-
 impl Drawn {
     fn new(environment: &Environment, tip: &Fingertip, seed: u64) -> Self {
         let stream = |purpose| seed::stream(seed, 0, purpose);
@@ -175,28 +125,16 @@ impl Drawn {
             let error = Registration::new(effect, &mut stream("registration"));
             let x_wo = object.x_wo();
             let correction = scene.arm.as_ref().and_then(|arm| arm.correction());
-            drawn.misplaced = Some(Misplaced {
+            drawn.misplaced = Some(Registration {
                 finger: effect.fixed(correction).map_or(error.finger, |fixed| fixed * error.finger),
                 object: x_wo * error.object.inverse() * x_wo.inverse(),
             });
         }
         if let Some(sensor) = &sensor {
-            let still = Misplaced { finger: Isometry3::identity(), object: Isometry3::identity() };
+            let still =
+                Registration { finger: Isometry3::identity(), object: Isometry3::identity() };
             drawn.misplaced.get_or_insert(still).finger *= sensor.attitude;
         }
         drawn
-    }
-}
-
-fn fault(error: FingertipError) -> Fault {
-    match error {
-        FingertipError::NotFinite { time_s, motion, .. } => {
-            let parts = [motion.x_wt.translation.vector, motion.linear_w, motion.angular_w];
-            let state = parts.iter().flat_map(|part| part.iter().copied()).collect();
-            Fault::Diverged { time_s, state }
-        }
-        FingertipError::Inside { time_s, motion } => {
-            Fault::Inside { time_s, p_wt: motion.x_wt.translation.vector.into() }
-        }
     }
 }

@@ -4,9 +4,8 @@
 use super::kinematic::Kinematic;
 #[cfg(feature = "mujoco")]
 use super::mujoco;
-use super::notice::{Notice, OutOfSides};
+use super::notice;
 use super::probe::exact;
-use super::simulated_finger::Shell;
 use crate::backend::delay::Delayed;
 use crate::backend::interlock::InterlockSettings;
 use crate::backend::{Backend, Fault};
@@ -18,7 +17,6 @@ use crate::geometry::distance::OrientedBox;
 use crate::sim::Environment;
 use crate::sim::scene::Body;
 use std::sync::Arc;
-use thiserror::Error;
 
 /// An environment with everything ready to put bodies into it.
 #[derive(Clone)]
@@ -28,27 +26,12 @@ pub struct Simulator {
     models: Option<mujoco::Models>,
 }
 
-/// An environment that no body can be put into.
-#[derive(Debug, Error)]
-pub enum SimulatorError {
-    /// Its physics cannot be simulated.
-    #[cfg(feature = "mujoco")]
-    #[error(transparent)]
-    Model(#[from] mujoco::ModelError),
-    /// This build lacks what the scene's body needs.
-    #[error("body = \"{body}\" needs a build with the feature `mujoco`")]
-    NotBuilt {
-        /// The body.
-        body: &'static str,
-    },
-}
-
 impl Simulator {
     /// Compiles what the scene's body needs.
     ///
     /// # Errors
     /// If it cannot be simulated as the scene asks.
-    pub fn new(environment: Arc<Environment>) -> Result<Self, SimulatorError> {
+    pub fn new(environment: Arc<Environment>) -> Result<Self, Invalid> {
         #[cfg(feature = "mujoco")]
         {
             let moved = environment.scene().body == Body::Dynamic;
@@ -57,7 +40,9 @@ impl Simulator {
         }
         #[cfg(not(feature = "mujoco"))]
         match environment.scene().body {
-            Body::Dynamic => Err(SimulatorError::NotBuilt { body: Body::Dynamic.name() }),
+            Body::Dynamic => {
+                Err(Invalid::new("body = \"dynamic\" needs a build with the feature `mujoco`"))
+            }
             _ => Ok(Self { environment }),
         }
     }
@@ -68,17 +53,18 @@ impl Simulator {
     }
 
     /// What of the scene may not be meant, and what is simulated otherwise than it asks.
-    pub fn notices(&self) -> Vec<Notice> {
+    pub fn notices(&self) -> Vec<String> {
         let mut notices = self.environment.notices().to_vec();
         let foot_w = self.environment.chain().map(|chain| match self.environment.scene().arm {
             Some(_) => chain.base.translation.vector.into(),
             None => chain.forward(&chain.home).translation.vector.into(),
         });
-        let sides = foot_w.and_then(|foot_w| OutOfSides::of(self.environment.task(), &foot_w));
-        notices.extend(sides.map(Notice::Sides));
+        let sides =
+            foot_w.and_then(|foot_w| notice::out_of_sides(self.environment.task(), &foot_w));
+        notices.extend(sides);
         #[cfg(feature = "mujoco")]
         if let Some(substeps) = self.models.as_ref().and_then(|models| models.substeps.as_ref()) {
-            notices.push(Notice::Steps(substeps.to_string()));
+            notices.push(substeps.to_string());
         }
         notices
     }
@@ -95,18 +81,6 @@ impl Simulator {
             }
             _ => Ok(()),
         }
-    }
-
-    /// A skin of finite elements, at rest; none if the scene's finger has none.
-    ///
-    /// # Errors
-    /// If there is no memory for its state.
-    pub fn shell(&self) -> Result<Option<Box<dyn Shell>>, Fault> {
-        #[cfg(feature = "mujoco")]
-        if let Some(models) = &self.models {
-            return models.shell(&self.environment).map_err(Fault::from);
-        }
-        Ok(None)
     }
 
     /// The probe that the scene's body asks for; `seed` is all the randomness of its sensors.

@@ -5,12 +5,13 @@ use crate::common::shapes::sphere_mesh;
 use crate::common::shipped::{contact, environment, scene};
 use nalgebra::{Point3, Vector3};
 use palpate::backend::{Backend, Fault};
+use palpate::error::Invalid;
 use palpate::explore::probe::servo::ArmReach;
 use palpate::explore::probe::{Probe, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::report::MeshReport;
 use palpate::geometry::spread::direction;
-use palpate::sim::environment::{EnvironmentError, Shape};
+use palpate::sim::environment::Shape;
 use palpate::sim::kinematic::Kinematic;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
@@ -21,7 +22,7 @@ const MIDDLE_W: [f64; 3] = [0.0, -0.65, 0.5];
 const RADIUS_M: f64 = 0.05;
 
 /// A sphere in place of the object of `scene`.
-fn with_sphere(scene: Scene) -> Result<Arc<Environment>, EnvironmentError> {
+fn with_sphere(scene: Scene) -> Result<Arc<Environment>, Invalid> {
     let bvh = MeshBvh::new(sphere_mesh(MIDDLE_W.into(), RADIUS_M, 60));
     let report = Box::<MeshReport>::default();
     Environment::around(scene, Shape::Mesh { bvh, report }).map(Arc::new)

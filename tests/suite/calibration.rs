@@ -8,7 +8,7 @@ use palpate::sim::finger::calibration::fit::{Free, fit};
 use palpate::sim::finger::calibration::score::{HeldOut, Score, leave_one_out};
 use palpate::sim::finger::calibration::session::Session;
 use palpate::sim::finger::effects::electrodes::{counts, impedance_ohm};
-use palpate::sim::finger::recording::{Recording, RecordingError, Recordings};
+use palpate::sim::finger::recording::{Recording, Recordings};
 
 fn recordings() -> Recordings {
     serde_json::from_str(include_str!("../data/biotac_flat_plate.json")).unwrap()
@@ -110,7 +110,8 @@ fn what_no_sensor_can_say_is_refused_by_name() {
     assert!(told(|of| of.near_normal_loads[0].mean_normal_force_n = 0.0).contains("more than 0"));
     assert!(told(|of| of.near_normal_loads.clear()).contains("near_normal_loads is empty"));
     let empty = Recordings { note: String::new(), sensors: Vec::new() };
-    assert_eq!(empty.check(), Err(RecordingError::Empty { field: "sensors".into() }));
+    let error = empty.check().unwrap_err().to_string();
+    assert_eq!(error, "sensors is empty: allowed is at least one entry");
     assert_eq!(fit(&coarse(), &[], Free::Sessions), Err(FitError::Empty));
 }
 

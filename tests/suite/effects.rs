@@ -39,14 +39,12 @@ fn a_switch_is_what_it_says() {
     }
 }
 
-/// Every key of the scene's `[effects]` can be switched, but for the second skin.
+/// Every key of the scene's `[effects]` can be switched.
 #[test]
 fn every_effect_of_a_scene_has_its_switch() {
-    let mut effects = Effects::all();
-    effects.flex = Some(Default::default());
-    let keys = toml::Table::try_from(&effects).unwrap();
+    let keys = toml::Table::try_from(Effects::all()).unwrap();
     let switches = Effects::switches();
-    for key in keys.keys().filter(|key| *key != "flex") {
+    for key in keys.keys() {
         let whole = switches.iter().find(|switch| switch.name == *key).unwrap();
         assert!(whole.is_on(&Effects::all()), "{key}");
         let mut without = Effects::all();
@@ -54,7 +52,7 @@ fn every_effect_of_a_scene_has_its_switch() {
         assert!(!toml::Table::try_from(&without).unwrap().contains_key(key), "{key}");
     }
     let wholes = switches.iter().filter(|switch| !switch.name.contains('.')).count();
-    assert_eq!(wholes + 1, keys.len());
+    assert_eq!(wholes, keys.len());
 }
 
 /// What is dropped for want of what it needs is what a scene with it would be refused for.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::common::shapes::*;
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use palpate::backend::Fault;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::seed::stream;
@@ -16,7 +17,7 @@ use palpate::sim::finger::column::Column;
 use palpate::sim::finger::effects::skin::{Skin, SkinEffect};
 use palpate::sim::finger::load::PressError;
 use palpate::sim::finger::plate::direction_t;
-use palpate::sim::finger::{Effects, Fingertip, FingertipError, FingertipState, Load};
+use palpate::sim::finger::{Effects, Fingertip, FingertipState, Load};
 use proptest::prelude::*;
 
 const CAVITY_PA_M3: f64 = 1e13;
@@ -293,12 +294,12 @@ fn bad_numbers_and_a_finger_inside_are_errors_that_leave_the_state() {
     wild.angular_w.z = f64::INFINITY;
     for (motion, dt_s) in [(nan, 1e-3), (wild, 1e-3), (good, f64::NAN), (good, -1.0)] {
         let error = feel.step(&tip, &bvh, &motion, dt_s).unwrap_err();
-        assert!(matches!(error, FingertipError::NotFinite { .. }), "{error}");
+        assert!(matches!(error, Fault::Diverged { .. }), "{error}");
         assert!(error.to_string().contains("0.001 s"), "{error}");
     }
     let deep = TipMotion::at(over(Vector3::new(0.0, 0.0, -0.03), &-Vector3::z()));
     let error = feel.step(&tip, &bvh, &deep, 1e-3).unwrap_err();
-    assert!(matches!(error, FingertipError::Inside { time_s: 0.001, .. }), "{error}");
+    assert!(matches!(error, Fault::Inside { time_s: 0.001, .. }), "{error}");
     assert_eq!(feel.step(&tip, &bvh, &good, 1e-3).unwrap(), felt);
 }
 

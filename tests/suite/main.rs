@@ -33,10 +33,6 @@ mod finger;
 mod finger_parts;
 mod finger_signals;
 mod fit;
-#[cfg(feature = "mujoco")]
-mod flex;
-#[cfg(feature = "mujoco")]
-mod flex_material;
 mod floors;
 mod folders;
 mod formats;
@@ -81,6 +77,7 @@ mod reproducible;
 mod rigid;
 mod scenes;
 mod seeking;
+mod sensor_file;
 mod sensors;
 mod servo;
 mod shape;

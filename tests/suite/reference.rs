@@ -26,7 +26,8 @@ fn no_setting_is_left_out() {
     for key in [
         "scene.zone.depth_m",
         "scene.touch.detection.threshold_counts",
-        "scene.effects.fluid.vibration.noise_counts",
+        "scene.effects.sensor",
+        "scene.effects.fluid.vibration",
         "gp.prior.length_scale.median",
         "planning.slope.weight",
         "report.baselines",

@@ -61,7 +61,7 @@ struct Other {
 
 impl Other {
     fn new(cells: [usize; 2]) -> Self {
-        let lattice = Lattice::new(&Profile::biotac(&Finger::default()), cells, &[]);
+        let lattice = Lattice::new(&Profile::biotac(&Finger::default()), cells);
         let nodes = lattice.nodes();
         let held: Vec<bool> = nodes.iter().map(|node| node.clamped).collect();
         let material = Material {

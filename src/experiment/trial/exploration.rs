@@ -37,7 +37,7 @@ impl<'a> Exploration<'a> {
     ) -> Result<Self, String> {
         let stream = |purpose| seed::stream(experiment.seed, trial.into(), purpose);
         let scene = truth.environment.scene();
-        let finger = (&scene.finger, scene.effects.is_soft());
+        let finger = (&scene.finger, scene.effects.skin.is_some());
         let (gp, space) = (&experiment.gp, &experiment.space);
         let belief = Belief::new(truth.environment.task(), finger, gp, space);
         let (is_around, name) = (belief.implicit_surface().is_some(), entrant.name());

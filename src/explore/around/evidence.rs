@@ -3,8 +3,8 @@
 
 use super::settings::PriorShape;
 use crate::explore::probe::{Contact, Swept, Touch};
-use crate::geometry::primitives::extent;
 use crate::geometry::implicit::Field;
+use crate::geometry::primitives::extent;
 use crate::geometry::primitives::nearest_on_segment;
 use crate::gp::{Observation, Observations, Slope};
 use crate::task::{Aim, Approach, Ball};

@@ -5,20 +5,18 @@ use super::counter::count;
 use super::effects::effect::Step;
 use super::effects::electrodes::Electrodes;
 use super::effects::friction::Bristle;
-use super::effects::skin::{Pressed, Skin, SkinEffect};
+use super::effects::skin::{Pressed, Skin};
 use super::effects::variation::Sensor;
 use super::effects::{EffectStates, Effects};
-use super::lattice::Lattice;
 use super::load::{Load, PressError};
-use super::samples::spread;
 use super::shear::Shear;
+use crate::backend::Fault;
 use crate::geometry::bvh::MeshBvh;
 use crate::robot::finger::TipMotion;
 use crate::robot::finger::frame::Frame;
 use crate::robot::finger::profile::Profile;
 use crate::robot::finger::shape::Finger;
 use rand_chacha::ChaCha8Rng;
-use thiserror::Error;
 
 /// Longest step: beyond it a frame's signals would be mostly interpolated (chosen).
 const LONGEST_STEP_S: f64 = 1.0;
@@ -27,7 +25,6 @@ const LONGEST_STEP_S: f64 = 1.0;
 #[derive(Clone, Debug)]
 pub struct Fingertip {
     skin: Option<Skin>,
-    lattice: Option<Lattice>,
     electrodes: Option<Electrodes>,
     shear: Option<Shear>,
     effects: Effects,
@@ -39,19 +36,13 @@ impl Fingertip {
         let profile = Profile::biotac(finger);
         let cavity_pa_m3 = effects.fluid.as_ref().map_or(0.0, |fluid| fluid.stiffness_pa_m3);
         let skin = effects.skin.as_ref().map(|skin| Skin::new(&profile, skin, cavity_pa_m3));
-        // Electrodes sense a shell through as many points as a default skin has.
-        let shell = effects.flex.as_ref().map(|flex| {
-            let samples = spread(&profile, SkinEffect::default().samples);
-            (Lattice::new(&profile, [flex.along, flex.around], &samples), samples)
-        });
-        let samples = skin.as_ref().map(Skin::samples).or(shell.as_ref().map(|(_, all)| &all[..]));
+        let samples = skin.as_ref().map(Skin::samples);
         let electrodes = (effects.electrodes.as_ref().zip(samples))
             .map(|(effect, samples)| Electrodes::new(effect, samples, profile.scale()));
         let sheared = effects.friction.as_ref().and(electrodes.as_ref()).zip(samples);
         Self {
             shear: sheared.map(|(electrodes, samples)| Shear::new(electrodes, samples)),
             skin,
-            lattice: shell.map(|(lattice, _)| lattice),
             electrodes,
             effects: effects.clone(),
         }
@@ -76,11 +67,6 @@ impl Fingertip {
         self.skin.as_ref()
     }
 
-    /// Its skin as a shell.
-    pub fn lattice(&self) -> Option<&Lattice> {
-        self.lattice.as_ref()
-    }
-
     /// Its electrodes.
     pub fn electrodes(&self) -> Option<&Electrodes> {
         self.electrodes.as_ref()
@@ -98,36 +84,11 @@ impl Fingertip {
     }
 }
 
-/// Why a step was refused; the trial's state is as before.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum FingertipError {
-    /// A number is NaN or infinite, or the step is negative or longer than a second.
-    #[error("at {time_s} s: a step of {dt_s} s with {motion:?} is not finite")]
-    NotFinite {
-        /// Since the start of the trial.
-        time_s: f64,
-        /// The step.
-        dt_s: f64,
-        /// What it was asked with.
-        motion: Box<TipMotion>,
-    },
-    /// The object encloses the fingertip's centre.
-    #[error("at {time_s} s: the fingertip's centre is inside the object with {motion:?}")]
-    Inside {
-        /// Since the start of the trial.
-        time_s: f64,
-        /// What it was asked with.
-        motion: Box<TipMotion>,
-    },
-}
-
 /// What one fingertip feels during one trial.
 #[derive(Clone, Debug)]
 pub struct FingertipState {
     time_s: f64,
     pressed: Option<Pressed>,
-    /// How far a skin that is simulated elsewhere moved inwards at each sample; empty at rest.
-    shell_m: Vec<f64>,
     effects: EffectStates,
     converter: Option<Converter>,
 }
@@ -138,7 +99,6 @@ impl FingertipState {
         let mut state = Self {
             time_s: 0.0,
             pressed: tip.skin.as_ref().map(Skin::relaxed),
-            shell_m: Vec::new(),
             effects: EffectStates::new(&tip.effects),
             converter: None,
         };
@@ -162,57 +122,32 @@ impl FingertipState {
     /// Goes on by `dt_s`, to `motion` at its end, against an object that stands in `W`.
     ///
     /// # Errors
-    /// If a number is not finite or the finger's centre is inside the object.
+    /// [`Fault::Diverged`] if a number is not finite or the step is longer than a second,
+    /// [`Fault::Inside`] if the object encloses the fingertip's centre; the state is as before.
     pub fn step(
         &mut self,
         tip: &Fingertip,
         object: &MeshBvh,
         motion: &TipMotion,
         dt_s: f64,
-    ) -> Result<Load, FingertipError> {
-        self.accept(motion, dt_s)?;
+    ) -> Result<Load, Fault> {
         let time_s = self.time_s;
+        if !motion.is_finite() || !(0.0..=LONGEST_STEP_S).contains(&dt_s) {
+            return Err(diverged(time_s, motion));
+        }
         let load = match (&tip.skin, &mut self.pressed) {
             (Some(skin), Some(pressed)) => {
                 count("skin");
                 skin.press(object, &motion.x_wt, pressed).map_err(|error| match error {
-                    PressError::NotFinite => {
-                        FingertipError::NotFinite { time_s, dt_s, motion: Box::new(*motion) }
-                    }
+                    PressError::NotFinite => diverged(time_s, motion),
                     PressError::Inside => {
-                        FingertipError::Inside { time_s, motion: Box::new(*motion) }
+                        Fault::Inside { time_s, p_wt: motion.x_wt.translation.vector.into() }
                     }
                 })?
             }
             _ => Load::default(),
         };
         Ok(self.advance(tip, load, motion, dt_s))
-    }
-
-    /// The same for a skin that is simulated elsewhere: `load` is what the object does to it at the
-    /// end of the step, `inward_m` how far it then lies inwards at each sample of the
-    /// [`Lattice`]; empty at rest.
-    ///
-    /// # Errors
-    /// If a number is not finite.
-    pub fn step_loaded(
-        &mut self,
-        tip: &Fingertip,
-        (load, inward_m): (Load, &[f64]),
-        motion: &TipMotion,
-        dt_s: f64,
-    ) -> Result<Load, FingertipError> {
-        self.accept(motion, dt_s)?;
-        self.shell_m.clear();
-        self.shell_m.extend_from_slice(inward_m);
-        Ok(self.advance(tip, load, motion, dt_s))
-    }
-
-    fn accept(&self, motion: &TipMotion, dt_s: f64) -> Result<(), FingertipError> {
-        if motion.is_finite() && (0.0..=LONGEST_STEP_S).contains(&dt_s) {
-            return Ok(());
-        }
-        Err(FingertipError::NotFinite { time_s: self.time_s, dt_s, motion: Box::new(*motion) })
     }
 
     /// What follows from the load on the skin.
@@ -246,7 +181,7 @@ impl FingertipState {
             signals.warming_c_s = heat.warming_c_s();
             conductivity = heat.conductivity(thermal);
         }
-        let moved_m = self.pressed.as_ref().map_or(&self.shell_m[..], Pressed::moved_m);
+        let moved_m = self.pressed.as_ref().map_or(&[][..], Pressed::moved_m);
         if let Some(electrodes) = &tip.electrodes {
             count("electrodes");
             let mut closed = electrodes.closed(moved_m);
@@ -257,4 +192,10 @@ impl FingertipState {
         }
         signals
     }
+}
+
+fn diverged(time_s: f64, motion: &TipMotion) -> Fault {
+    let parts = [motion.x_wt.translation.vector, motion.linear_w, motion.angular_w];
+    let state = parts.iter().flat_map(|part| part.iter().copied()).collect();
+    Fault::Diverged { time_s, state }
 }

@@ -1,5 +1,4 @@
-//! The skin over the fluid as triangles: where its nodes are, and what their motion is at the
-//! points of the skin over which electrodes sense.
+//! The skin over the fluid as triangles.
 
 use super::samples::SkinSample;
 use crate::robot::finger::profile::Profile;
@@ -30,9 +29,6 @@ pub struct Node {
 pub struct Lattice {
     nodes: Vec<Node>,
     triangles: Vec<[usize; 3]>,
-    thickness_m: f64,
-    /// For each sample, nodes and their shares in its motion; none on the back.
-    shares: Vec<Option<[(usize, f64); 4]>>,
 }
 
 /// Stations along the finger times angles around it; all angles meet in the apex.
@@ -61,38 +57,19 @@ impl Grid {
     fn turn(&self, j: usize) -> f64 {
         PI * (j as f64 / self.around as f64 - 0.5)
     }
-
-    /// The four nodes around a place of the skin with their bilinear weights.
-    fn shares(&self, x_m: f64, turn: f64) -> [(usize, f64); 4] {
-        let i = self.stations_m.partition_point(|&station_m| station_m <= x_m);
-        let i = i.clamp(1, self.stations_m.len() - 1) - 1;
-        let [low_m, high_m] = [self.stations_m[i], self.stations_m[i + 1]];
-        let along = ((x_m - low_m) / (high_m - low_m)).clamp(0.0, 1.0);
-        let turned = ((turn / PI + 0.5) * self.around as f64).clamp(0.0, self.around as f64);
-        let j = (turned as usize).min(self.around - 1);
-        let across = turned - j as f64;
-        [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(di, dj)| {
-            let weight_along = if di == 0 { 1.0 - along } else { along };
-            let weight_across = if dj == 0 { 1.0 - across } else { across };
-            (self.node(i + di, j + dj), weight_along * weight_across)
-        })
-    }
 }
 
 impl Lattice {
-    /// The shell of this shape with so many cells along and around it, an even number of these,
-    /// read at `samples`.
-    pub fn new(profile: &Profile, cells: [usize; 2], samples: &[SkinSample]) -> Self {
+    /// The shell of this shape with so many cells along and around it, an even number of these.
+    pub fn new(profile: &Profile, cells: [usize; 2]) -> Self {
         let grid = Grid::new(profile, cells);
         let last = grid.stations_m.len() - 1;
-        let mut thickness_m = 0.0;
         let mut nodes = Vec::new();
         for (i, &x_m) in grid.stations_m.iter().enumerate() {
             let angles = if i == last { 0..=0 } else { 0..=grid.around };
             for j in angles {
                 let (start, direction) = profile.ray(x_m, grid.turn(j));
                 let layers = profile.layers(start.x, &direction);
-                thickness_m = layers.skin_m;
                 nodes.push(Node {
                     point: start + direction.scale(layers.outer_m - layers.skin_m / 2.0),
                     start,
@@ -122,12 +99,7 @@ impl Lattice {
                 [p, q, r].into_iter().for_each(|k| nodes[k].area_m2 += area_m2 / 3.0);
             }
         }
-        let shares = samples.iter().map(|sample| {
-            let d = &sample.direction;
-            let x_m = if sample.start.x < 0.0 { sample.start.x } else { profile.radius_m * d.x };
-            sample.layers.wet.then(|| grid.shares(x_m, d.y.atan2(-d.z)))
-        });
-        Self { shares: shares.collect(), nodes, triangles, thickness_m }
+        Self { nodes, triangles }
     }
 
     /// Its nodes.
@@ -149,19 +121,5 @@ impl Lattice {
             normal: UnitVector3::try_new(node.area_m2, 0.0).unwrap_or(node.direction),
             area_m2: node.area_m2.norm(),
         })
-    }
-
-    /// Thickness of the skin.
-    pub fn thickness_m(&self) -> f64 {
-        self.thickness_m
-    }
-
-    /// How far each sample's point of the skin moved inwards, given how far each node did.
-    pub fn inward_m(&self, nodes_m: &[f64], samples_m: &mut Vec<f64>) {
-        let node_m = |&(k, share): &(usize, f64)| share * nodes_m.get(k).copied().unwrap_or(0.0);
-        samples_m.clear();
-        samples_m.extend(
-            self.shares.iter().map(|shares| shares.iter().flatten().map(node_m).sum::<f64>()),
-        );
     }
 }

@@ -1,7 +1,6 @@
 //! What an object does to the finger.
 
 use nalgebra::{Point3, Vector3};
-use thiserror::Error;
 
 /// The contact in one pose, in `T`; all zero without one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,12 +28,10 @@ pub struct Load {
 }
 
 /// Why a pose has no load.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PressError {
     /// A number in the pose is NaN or infinite.
-    #[error("the pose is not finite")]
     NotFinite,
     /// The object encloses the origin of `T`: the finger is farther in than its skin is thick.
-    #[error("the fingertip's centre is inside the object")]
     Inside,
 }

@@ -2,16 +2,15 @@
 //!
 //! `effects` has the table of them and each in a file of its own, the skin first. `profile` and
 //! `samples` say where skin and fluid of a BioTac are, `patches` which of them may meet an object.
-//! `column` is the law of one column of skin over fluid over core, `cavity` couples columns by the
-//! fluid's pressure, `foundation` is a skin of them; `shell` carries load to its neighbours
+//! `column` is the law of one column of skin over fluid over core, `foundation` a skin of them that
+//! the fluid's pressure couples; `shell` carries load to its neighbours
 //! instead, over the triangles of `lattice`. `fingertip` puts together the effects that a scene
 //! names, `shear` says what the electrodes feel of friction,
 //! `converter` makes tactile frames of what they sense, `counter` counts how often each did
-//! its work. `plate` presses the finger on a flat plate, `calibration` fits the constants to a
-//! `recording` of it, `stiffness` asks it how stiff the skin is.
+//! its work. `plate` presses the finger on a flat plate and says how stiff the skin is, `calibration` fits
+//! the constants to a `recording` of it.
 
 pub mod calibration;
-mod cavity;
 pub mod column;
 mod converter;
 pub mod counter;
@@ -27,8 +26,7 @@ pub mod recording;
 pub mod samples;
 pub mod shear;
 pub mod shell;
-pub mod stiffness;
 
 pub use effects::Effects;
-pub use fingertip::{Fingertip, FingertipError, FingertipState};
+pub use fingertip::{Fingertip, FingertipState};
 pub use load::Load;

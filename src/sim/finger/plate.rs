@@ -22,6 +22,13 @@ const NEAR_M: f64 = 1e-10;
 const TRIES: usize = 60;
 const HALVINGS: usize = 4;
 
+/// Presses between the first touch and the largest force (chosen: the law is linear between
+/// kinks, and force doubles in a fraction of this way).
+const PRESSES: u32 = 200;
+
+/// Halvings by which the depth of the largest force is found: to a billionth of the finger.
+const DEPTH_HALVINGS: u32 = 30;
+
 /// A fingertip over a flat plate.
 pub struct Plate {
     skin: Skin,
@@ -127,7 +134,7 @@ pub fn direction_t(pitch_rad: f64, roll_rad: f64) -> Vector3<f64> {
 }
 
 /// A plate in the plane z = 0.
-pub(super) fn flat() -> Option<MeshBvh> {
+fn flat() -> Option<MeshBvh> {
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     let corners = corners.map(|(x, y)| Point3::new(PLATE_M * x, PLATE_M * y, 0.0));
     let (mesh, _) = Mesh::new(&corners, &[[0, 1, 2], [0, 2, 3]]).ok()?;
@@ -140,4 +147,31 @@ pub fn pose(towards_t: &Vector3<f64>, height_m: f64) -> Isometry3<f64> {
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
     let origin_w = Vector3::new(0.0, 0.0, height_m);
     Isometry3::from_parts(origin_w.into(), UnitQuaternion::from_rotation_matrix(&turn))
+}
+
+/// Largest slope of force over depth, in N/m, with a flat plate pressed on the skin across
+/// `towards_t` up to `force_n`; 0 if the skin cannot be pressed.
+pub fn largest_stiffness_n_m(skin: &Skin, towards_t: &Vector3<f64>, force_n: f64) -> f64 {
+    let Some(bvh) = flat() else { return 0.0 };
+    let mut pressed = skin.relaxed();
+    let reach_m = skin.samples().iter().map(|sample| sample.point().coords.dot(towards_t));
+    let top_m = reach_m.fold(0.0, f64::max);
+    let mut pushed_n = |depth_m: f64| {
+        let x_wt = pose(towards_t, top_m - depth_m);
+        let load = skin.press(&bvh, &x_wt, &mut pressed).ok()?;
+        Some(-load.force_n.dot(towards_t))
+    };
+    // A plate that encloses the fingertip's centre is deeper than any force.
+    let (mut low_m, mut high_m) = (0.0, top_m);
+    for _ in 0..DEPTH_HALVINGS {
+        let middle_m = 0.5 * (low_m + high_m);
+        match pushed_n(middle_m) {
+            Some(pushed_n) if pushed_n < force_n => low_m = middle_m,
+            _ => high_m = middle_m,
+        }
+    }
+    let step_m = low_m / f64::from(PRESSES);
+    let forces = (0..=PRESSES).map_while(|press| pushed_n(step_m * f64::from(press)));
+    let forces: Vec<f64> = forces.collect();
+    forces.windows(2).map(|pair| (pair[1] - pair[0]) / step_m).fold(0.0, f64::max)
 }

@@ -1,8 +1,8 @@
 //! Recordings of fingers pressed on a flat plate.
 
+use crate::error::Invalid;
 use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use serde::Deserialize;
-use thiserror::Error;
 
 /// Recordings of one or more sensors.
 #[derive(Clone, Debug, Deserialize)]
@@ -44,33 +44,12 @@ pub struct Bin {
 /// Greatest force that a BioTac takes (SynTouch BioTac SP manual).
 const FORCE_MAX_N: f64 = 250.0;
 
-/// What a recording may not hold.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum RecordingError {
-    /// There is nothing in a list.
-    #[error("{field} is empty: allowed is at least one entry")]
-    Empty {
-        /// The list.
-        field: String,
-    },
-    /// A number is outside what its sensor can say.
-    #[error("{field} = {value}: allowed is more than 0 and less than {below}")]
-    OutOfRange {
-        /// The number's place in the file.
-        field: String,
-        /// The number.
-        value: f64,
-        /// What it must stay below.
-        below: f64,
-    },
-}
-
 impl Recordings {
     /// Whether every number can be one of a sensor's.
     ///
     /// # Errors
     /// The first that cannot.
-    pub fn check(&self) -> Result<(), RecordingError> {
+    pub fn check(&self) -> Result<(), Invalid> {
         filled("sensors", self.sensors.len())?;
         for (i, recording) in self.sensors.iter().enumerate() {
             recording.check(&format!("sensors[{i}]"))?;
@@ -80,7 +59,7 @@ impl Recordings {
 }
 
 impl Recording {
-    fn check(&self, field: &str) -> Result<(), RecordingError> {
+    fn check(&self, field: &str) -> Result<(), Invalid> {
         let rest = format!("{field}.no_contact_median_counts");
         within(&rest, &self.no_contact_median_counts, FULL_SCALE_COUNTS)?;
         let loads = format!("{field}.near_normal_loads");
@@ -95,19 +74,23 @@ impl Recording {
 }
 
 /// Whether `force_n` can be on a BioTac.
-pub(super) fn force(field: &str, force_n: f64) -> Result<(), RecordingError> {
+pub(super) fn force(field: &str, force_n: f64) -> Result<(), Invalid> {
     within(field, &[force_n], FORCE_MAX_N)
 }
 
 /// Whether a list has something in it.
-pub(super) fn filled(field: &str, count: usize) -> Result<(), RecordingError> {
-    if count > 0 { Ok(()) } else { Err(RecordingError::Empty { field: field.into() }) }
+pub(super) fn filled(field: &str, count: usize) -> Result<(), Invalid> {
+    match count {
+        0 => Err(Invalid::new(format!("{field} is empty")).allowed("at least one entry")),
+        _ => Ok(()),
+    }
 }
 
-fn within(field: &str, values: &[f64], below: f64) -> Result<(), RecordingError> {
+fn within(field: &str, values: &[f64], below: f64) -> Result<(), Invalid> {
     let bad = values.iter().position(|&value| !(value > 0.0 && value < below));
     bad.map_or(Ok(()), |i| {
         let field = if values.len() > 1 { format!("{field}[{i}]") } else { field.into() };
-        Err(RecordingError::OutOfRange { field, value: values[i], below })
+        let allowed = format!("more than 0 and less than {below}");
+        Err(Invalid::new(field).value(values[i]).allowed(allowed))
     })
 }

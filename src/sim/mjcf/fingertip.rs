@@ -1,7 +1,7 @@
 //! What a BioTac looks like: the pad that senses, and the nail that holds the skin on its back.
 
-use super::mesh;
 use super::text::pose;
+use super::text::surface;
 use crate::robot::finger::Finger;
 use crate::robot::finger::profile::{CORE_M, Profile};
 use nalgebra::Isometry3;
@@ -53,7 +53,7 @@ fn asset(profile: &Profile, name: &str, begins: f64) -> String {
         false => vec![[here, here + 1, apex]],
     });
     let tip = std::iter::once(profile.skin_t(profile.radius_m, begins));
-    mesh::surface(name, rows.chain(tip), faces)
+    surface(name, rows.chain(tip), faces)
 }
 
 #[cfg(test)]

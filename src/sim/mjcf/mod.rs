@@ -2,22 +2,16 @@
 
 mod fingertip;
 mod height_field;
-mod hull;
-mod mesh;
 mod robot;
 mod scenery;
-mod sdf;
-mod shell;
-mod surroundings;
 mod text;
-
-pub use shell::{elasticity, flex};
 
 use super::collision::Collision;
 use super::environment::Environment;
+use super::scene::Scene;
 use super::solver::Integrator;
 use std::fmt::Write;
-use text::list;
+use text::{CONTACT, TABLE, list, mesh_asset};
 
 /// Time step of a model that is only looked at; chosen, the period of the PA-10's servo.
 const PICTURE_STEP_S: f64 = 0.002;
@@ -62,7 +56,7 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     let bumps = !shown && environment.scene().effects.collision.is_some();
     let scenery = match shown {
         true => scenery::scenery(mesh, environment.task(), &chain),
-        false if bumps => obstacle(environment)? + &surroundings::surroundings(environment.scene()),
+        false if bumps => obstacle(environment)? + &table(environment.scene()),
         false if collides => obstacle(environment)?,
         false => String::new(),
     };
@@ -102,13 +96,47 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     Some(text)
 }
 
-/// What collides with a finger without skin; one line and one file to add a geometry.
+/// What collides with a finger without skin.
 fn obstacle(environment: &Environment) -> Option<String> {
     match environment.scene().solver.collision.unwrap_or_default() {
         Collision::HeightField => height_field::obstacle(environment),
-        Collision::Hull => hull::obstacle(environment),
-        Collision::Sdf => sdf::obstacle(environment),
+        Collision::Hull => hull(environment),
+        Collision::Sdf => sdf(environment),
     }
+}
+
+/// The object as the convex hull of its mesh, which MuJoCo computes: every hollow is filled.
+fn hull(environment: &Environment) -> Option<String> {
+    let asset = mesh_asset(environment.mesh()?, "object");
+    Some(format!(
+        r#"  <asset>{asset}</asset>
+  <worldbody><geom name="object" type="mesh" mesh="object" {CONTACT}/></worldbody>
+"#
+    ))
+}
+
+/// The object as the signed distance field of its mesh, interpolated in MuJoCo's octree, with the
+/// options of the search for contact.
+fn sdf(environment: &Environment) -> Option<String> {
+    let sdf = environment.scene().solver.sdf.clone().unwrap_or_default();
+    let asset = mesh_asset(environment.mesh()?, "object");
+    Some(format!(
+        r#"  <option sdf_iterations="{}" sdf_initpoints="{}"/>
+  <asset>{asset}</asset>
+  <worldbody><geom name="object" type="sdf" mesh="object" {CONTACT}/></worldbody>
+"#,
+        sdf.iterations, sdf.initpoints,
+    ))
+}
+
+/// The table of `[effects.collision]`.
+fn table(scene: &Scene) -> String {
+    let Some(collision) = &scene.effects.collision else { return String::new() };
+    let place = list([0.0, 0.0, collision.table_m]);
+    format!(
+        r#"  <worldbody><geom name="table" type="plane" pos="{place}" size="3 3 .1" {TABLE}/></worldbody>
+"#
+    )
 }
 
 /// As MJCF spells it.

@@ -1,7 +1,6 @@
 //! What stands around: the object on its board, the floor, the camera, the lights.
 
-use super::mesh::asset;
-use super::text::{list, pose};
+use super::text::{list, mesh_asset, pose};
 use crate::geometry::mesh::Mesh;
 use crate::robot::arm::Chain;
 use crate::task::{Task, Zone};
@@ -55,7 +54,7 @@ pub(super) fn scenery(mesh: &Mesh, task: &Task, chain: &Chain) -> String {
     // A free camera, that of a viewer, starts there too: the direction it looks in.
     let azimuth = (-BESIDE.y).atan2(-BESIDE.x).to_degrees();
     let elevation = (-BESIDE.z).atan2(BESIDE.xy().norm()).to_degrees();
-    let asset = asset(mesh, "object");
+    let asset = mesh_asset(mesh, "object");
     format!(
         r#"  <statistic center="{between}" extent="{size}"/>
   <visual>

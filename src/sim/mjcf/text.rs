@@ -1,6 +1,7 @@
 //! Pieces of MJCF that several parts write.
 
-use nalgebra::Isometry3;
+use crate::geometry::mesh::Mesh;
+use nalgebra::{Isometry3, Point3};
 use std::fmt::Display;
 
 /// Attributes of the two geoms that collide: without friction, yielding as mount and gears of an
@@ -26,4 +27,21 @@ pub(super) fn list<T: Display>(numbers: impl IntoIterator<Item = T>) -> String {
 pub(super) fn pose(x: &Isometry3<f64>) -> String {
     let q = x.rotation.quaternion();
     format!(r#"pos="{}" quat="{}""#, list(x.translation.vector.iter()), list([q.w, q.i, q.j, q.k]))
+}
+
+/// `mesh` as an asset called `name`; MuJoCo keeps its numbers in single precision, about its
+/// centre of mass.
+pub(super) fn mesh_asset(mesh: &Mesh, name: &str) -> String {
+    surface(name, mesh.vertices().iter().copied(), mesh.triangles().iter().copied())
+}
+
+/// A mesh asset of any vertices and triangles.
+pub(super) fn surface<Index: Display>(
+    name: &str,
+    vertices: impl IntoIterator<Item = Point3<f64>>,
+    triangles: impl IntoIterator<Item = [Index; 3]>,
+) -> String {
+    let vertices = list(vertices.into_iter().flat_map(|p| [p.x, p.y, p.z]));
+    let faces = list(triangles.into_iter().flatten());
+    format!(r#"<mesh name="{name}" inertia="shell" vertex="{vertices}" face="{faces}"/>"#)
 }

@@ -34,14 +34,10 @@ impl Dynamic {
     pub fn new(environment: &Arc<Environment>, models: &Models) -> Result<Self, Fault> {
         let chain = environment.chain().ok_or(Fault::Lacks { part: "an object" })?;
         let period_s = environment.scene().period_s();
-        let mut finger = SimulatedFinger::new(Arc::clone(environment), 0);
-        if let (Some(finger), Some(shell)) = (&mut finger, models.shell(environment)?) {
-            finger.wear(shell);
-        }
         let mut body = Self {
             capabilities: Capabilities::of(&chain, period_s),
             plant: Plant::new(Arc::clone(&models.plant))?,
-            finger,
+            finger: SimulatedFinger::new(Arc::clone(environment), 0),
             wrench: Wrench::default(),
             steps: (period_s / models.plant.opt().timestep).round() as u32,
             tick: 0,

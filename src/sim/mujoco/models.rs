@@ -1,12 +1,12 @@
 //! What MuJoCo compiles of an environment, once for all trials.
 
-use super::{FlexShell, ModelError, Substeps, compile};
+use super::{Substeps, compile, lacking};
+use crate::error::Invalid;
 use crate::sim::Environment;
 use crate::sim::collision::Collision;
 use crate::sim::environment::Shape;
 use crate::sim::mjcf;
 use crate::sim::mjcf::Mode;
-use crate::sim::simulated_finger::Shell;
 use mujoco_rs::wrappers::MjModel;
 use std::sync::Arc;
 
@@ -15,8 +15,6 @@ use std::sync::Arc;
 pub struct Models {
     /// The arm or stage.
     pub plant: Arc<MjModel>,
-    /// The skin of `[effects.flex]`.
-    pub flex: Option<Arc<MjModel>>,
     /// How the scene's time step was divided, and why; none if it was not.
     pub substeps: Option<Substeps>,
 }
@@ -27,7 +25,7 @@ impl Models {
     /// # Errors
     /// If MuJoCo refuses the scene, no step is short enough for its skin, or the object has no
     /// inside where the scene's collision needs one.
-    pub fn new(environment: &Environment) -> Result<Self, ModelError> {
+    pub fn new(environment: &Environment) -> Result<Self, Invalid> {
         let step_s = environment.scene().solver.step_s;
         let whole = Self::at(environment, step_s)?;
         match Substeps::needed(environment, &whole.plant)? {
@@ -44,32 +42,23 @@ impl Models {
     /// # Errors
     /// If MuJoCo refuses the scene, or the object has no inside where the scene's collision needs
     /// one.
-    pub fn at(environment: &Environment, step_s: f64) -> Result<Self, ModelError> {
+    pub fn at(environment: &Environment, step_s: f64) -> Result<Self, Invalid> {
         check_inside(environment)?;
         let text = mjcf::scene(environment, Mode::Dynamic { step_s });
-        let plant = Arc::new(compile(&text.ok_or(ModelError::Lacks { part: "an object" })?)?);
-        Ok(Self { plant, flex: FlexShell::model(environment)?, substeps: None })
-    }
-
-    /// The skin of `[effects.flex]`, at rest; none if the scene has none.
-    ///
-    /// # Errors
-    /// If memory is short.
-    pub fn shell(
-        &self,
-        environment: &Arc<Environment>,
-    ) -> Result<Option<Box<dyn Shell>>, ModelError> {
-        let Some(model) = &self.flex else { return Ok(None) };
-        Ok(Some(Box::new(FlexShell::new(Arc::clone(environment), Arc::clone(model))?)))
+        let plant = Arc::new(compile(&text.ok_or_else(|| lacking("an object"))?)?);
+        Ok(Self { plant, substeps: None })
     }
 }
 
 /// Without an inside a distance has no sign.
-fn check_inside(environment: &Environment) -> Result<(), ModelError> {
+fn check_inside(environment: &Environment) -> Result<(), Invalid> {
     let Shape::Mesh { report, .. } = environment.shape() else { return Ok(()) };
     let edges = report.border_edges.count + report.non_manifold_edges.count;
     match environment.scene().solver.collision {
-        Some(Collision::Sdf) if edges > 0 => Err(ModelError::Open { edges }),
+        Some(Collision::Sdf) if edges > 0 => Err(Invalid::new(format!(
+            "solver.collision = \"sdf\" needs a closed mesh, but this one has {edges} edges that are \
+             not shared by two triangles"
+        ))),
         _ => Ok(()),
     }
 }

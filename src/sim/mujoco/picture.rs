@@ -1,50 +1,28 @@
 //! A picture of a model, drawn off-screen through EGL: no window and no display is needed.
 
+use crate::error::Invalid;
 use mujoco_rs::renderer::{MjRenderer, RendererError, png::Compression};
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 use mujoco_rs::wrappers::mj_visualization::MjvCamera;
-use std::io;
 use std::path::Path;
-use thiserror::Error;
-
-/// Why there is no picture.
-#[derive(Debug, Error)]
-pub enum PictureError {
-    /// The model has no such camera.
-    #[error("the model has no camera \"{camera}\"")]
-    Camera {
-        /// Its name.
-        camera: String,
-    },
-    /// There is no memory for the model's state.
-    #[error("no memory for the state of the MuJoCo model")]
-    Memory,
-    /// OpenGL cannot be used.
-    #[error("cannot draw: {cause}; this needs EGL (Debian: libegl1 and libgl1-mesa-dri)")]
-    Draw {
-        /// What it says.
-        cause: RendererError,
-    },
-    /// The file cannot be written.
-    #[error("cannot write the picture: {cause}")]
-    Write {
-        /// What the system says.
-        cause: io::Error,
-    },
-}
 
 /// Draws `model` at its first keyframe, or at q = 0 without one, as `camera` sees it, and writes
 /// it to `path` as PNG in the size of the model's off-screen buffer.
 ///
 /// # Errors
 /// If the camera is unknown, EGL is missing or the file cannot be written.
-pub fn picture(model: &MjModel, camera: &str, path: &Path) -> Result<(), PictureError> {
+pub fn picture(model: &MjModel, camera: &str, path: &Path) -> Result<(), Invalid> {
     let id = model
         .name_to_id(MjtObjBase::mjOBJ_CAMERA, camera)
-        .ok_or_else(|| PictureError::Camera { camera: camera.into() })?;
-    let draw = |cause| PictureError::Draw { cause };
-    let mut data = MjData::try_new(model).map_err(|_| PictureError::Memory)?;
+        .ok_or_else(|| Invalid::new(format!("the model has no camera \"{camera}\"")))?;
+    let draw = |cause: RendererError| {
+        Invalid::new(format!(
+            "cannot draw: {cause}; this needs EGL (Debian: libegl1 and libgl1-mesa-dri)"
+        ))
+    };
+    let mut data = MjData::try_new(model)
+        .map_err(|_| Invalid::new("no memory for the state of the MuJoCo model"))?;
     if model.nkey() > 0 {
         // Key 0 exists.
         let _ = data.reset_keyframe(0);
@@ -58,7 +36,7 @@ pub fn picture(model: &MjModel, camera: &str, path: &Path) -> Result<(), Picture
     renderer.sync_data(&mut data).map_err(draw)?;
     renderer.render().map_err(draw)?;
     renderer.save_rgb(path).map_err(|cause| match cause {
-        RendererError::IoError(cause) => PictureError::Write { cause },
-        cause => PictureError::Draw { cause },
+        RendererError::IoError(cause) => Invalid::new(format!("cannot write the picture: {cause}")),
+        cause => draw(cause),
     })
 }

@@ -1,9 +1,8 @@
 //! The arm or stage with its velocity servos, gravity and friction, one step at a time.
 
-use super::ModelError;
 use super::contact;
-use super::implicit_gain::embedded;
 use super::joint_servo::JointServo;
+use super::joint_servo::embedded;
 use crate::backend::{Fault, IdealContact, Wrench};
 use crate::robot::arm::Joints;
 use crate::robot::arm::chain::MAX_JOINTS;
@@ -39,9 +38,9 @@ impl Plant {
     ///
     /// # Errors
     /// If `model` is not one of a robot with a finger, or memory is short.
-    pub fn new(model: Arc<MjModel>) -> Result<Self, ModelError> {
+    pub fn new(model: Arc<MjModel>) -> Result<Self, Fault> {
         let part = |kind, name: &'static str| {
-            model.name_to_id(kind, name).ok_or(ModelError::Lacks { part: name })
+            model.name_to_id(kind, name).ok_or(Fault::Lacks { part: name })
         };
         let tip = part(MjtObjBase::mjOBJ_SITE, "tip")?;
         let mount = part(MjtObjBase::mjOBJ_SITE, "mount")?;
@@ -49,11 +48,11 @@ impl Plant {
         let joints = model.nv() as usize;
         let driven = model.nq() as usize == joints && model.nu() as usize == joints;
         if !driven || joints > MAX_JOINTS {
-            return Err(ModelError::Lacks { part: "one servo for each of at most 7 joints" });
+            return Err(Fault::Lacks { part: "one servo for each of at most 7 joints" });
         }
         // Six numbers: the force, then the torque.
         if ![0, 6].contains(&model.nsensordata()) {
-            return Err(ModelError::Lacks { part: "a force and a torque sensor, or neither" });
+            return Err(Fault::Lacks { part: "a force and a torque sensor, or neither" });
         }
         let mut kv = Joints::zeros();
         let mut limit = Joints::zeros();
@@ -77,7 +76,7 @@ impl Plant {
         };
         let x_tm = local(tip).inv_mul(&local(mount));
         let staged = model.opt().integrator == MjtIntegrator::mjINT_RK4 as i32;
-        let data = MjData::try_new(Arc::clone(&model)).map_err(|_| ModelError::Memory)?;
+        let data = MjData::try_new(Arc::clone(&model)).map_err(|_| Fault::NoMemory)?;
         Ok(Self {
             data,
             servo: JointServo::new(kv, limit),

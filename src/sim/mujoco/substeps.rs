@@ -1,8 +1,10 @@
 //! How finely the scene's time step must be divided for the skin's force.
 
-use super::{ModelError, Plant};
+use super::{Plant, lacking};
+use crate::error::Invalid;
 use crate::sim::Environment;
-use crate::sim::finger::stiffness;
+use crate::sim::environment::invalid;
+use crate::sim::finger::plate;
 use mujoco_rs::wrappers::MjModel;
 use std::fmt::{Display, Formatter, Result as Written};
 use std::sync::Arc;
@@ -43,16 +45,16 @@ impl StepLimit {
     ///
     /// # Errors
     /// If the model is not one of a robot with a finger.
-    pub fn of(environment: &Environment, model: &Arc<MjModel>) -> Result<Option<Self>, ModelError> {
+    pub fn of(environment: &Environment, model: &Arc<MjModel>) -> Result<Option<Self>, Invalid> {
         let scene = environment.scene();
         let skin = environment.fingertip().and_then(|tip| tip.skin());
         let (Some(skin), Some(chain)) = (skin, environment.chain()) else { return Ok(None) };
-        let mut plant = Plant::new(Arc::clone(model))?;
-        plant.reset(chain.start()).map_err(|_| ModelError::Lacks { part: "a home" })?;
+        let mut plant = Plant::new(Arc::clone(model)).map_err(invalid)?;
+        plant.reset(chain.start()).map_err(|_| lacking("a home"))?;
         let mass_kg = plant.tip_mass_kg();
         let towards_t = scene.finger.ahead_t();
         let force_n = scene.touch.force_limit_n;
-        let stiffness_n_m = stiffness::largest_n_m(skin, &towards_t, force_n);
+        let stiffness_n_m = plate::largest_stiffness_n_m(skin, &towards_t, force_n);
         let limit_s = (mass_kg / stiffness_n_m).sqrt();
         Ok(Some(Self { force_n, stiffness_n_m, mass_kg, limit_s }))
     }
@@ -66,7 +68,7 @@ impl Substeps {
     pub fn needed(
         environment: &Environment,
         model: &Arc<MjModel>,
-    ) -> Result<Option<Self>, ModelError> {
+    ) -> Result<Option<Self>, Invalid> {
         let step_s = environment.scene().solver.step_s;
         let Some(limit) = StepLimit::of(environment, model)? else { return Ok(None) };
         match limit.limit_s {
@@ -74,7 +76,9 @@ impl Substeps {
             limit_s if limit_s >= SHORTEST_S => {
                 Ok(Some(Self { count: (step_s / limit_s).ceil() as u32, step_s, limit }))
             }
-            _ => Err(ModelError::Stiff { step_s, limit }),
+            _ => Err(Invalid::new(format!(
+                "solver.step_s = {step_s} is too long, and cannot be divided so finely: {limit}"
+            ))),
         }
     }
 }

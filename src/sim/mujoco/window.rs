@@ -1,7 +1,8 @@
 //! A window that shows a model in the posture that something else gives it: MuJoCo's viewer.
 
-use super::{ModelError, compile};
+use super::{compile, lacking};
 use crate::backend::watched::Seen;
+use crate::error::Invalid;
 use crate::sim::Environment;
 use crate::sim::mjcf;
 use crate::sim::mjcf::Mode;
@@ -10,7 +11,6 @@ use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtGeom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, PoisonError};
-use thiserror::Error;
 
 /// Most marks that are drawn, the latest ones; as many as an experiment has touches at most.
 const MARKS_MAX: usize = 2000;
@@ -18,26 +18,6 @@ const MARKS_MAX: usize = 2000;
 /// Radius and colour of a mark; chosen.
 const MARK_M: f64 = 0.002;
 const MARK_RGBA: [f32; 4] = [0.84, 0.37, 0.0, 1.0];
-
-/// Why there is no window.
-#[derive(Debug, Error)]
-pub enum WindowError {
-    /// There is no model to show.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// There is no memory for the model's state.
-    #[error("no memory for the state of the MuJoCo model")]
-    Memory,
-    /// There is no display, or OpenGL cannot be used on it.
-    #[error("cannot open a window: {cause}; this needs X11 or Wayland with OpenGL")]
-    Display {
-        /// What the viewer says.
-        cause: MjViewerError,
-    },
-    /// The display offers nothing to draw on.
-    #[error("cannot open a window: the display has no OpenGL configuration")]
-    Configuration,
-}
 
 /// An open window. Only the main thread may have one.
 pub struct Window {
@@ -50,16 +30,19 @@ impl Window {
     ///
     /// # Errors
     /// If the environment has nothing to show, or there is no display with OpenGL.
-    pub fn open(environment: &Environment, title: &str) -> Result<Self, WindowError> {
+    pub fn open(environment: &Environment, title: &str) -> Result<Self, Invalid> {
         let picture = mjcf::scene(environment, Mode::Picture);
-        let picture = picture.ok_or(ModelError::Lacks { part: "an object" })?;
+        let picture = picture.ok_or_else(|| lacking("an object"))?;
         let model = Arc::new(compile(&picture)?);
-        let data = MjData::try_new(Arc::clone(&model)).map_err(|_| WindowError::Memory)?;
+        let data = MjData::try_new(Arc::clone(&model))
+            .map_err(|_| Invalid::new("no memory for the state of the MuJoCo model"))?;
         let builder = MjViewer::builder().window_name(title.to_owned()).max_user_geoms(MARKS_MAX);
         // The viewer panics on a display without configurations.
         let viewer = catch_unwind(AssertUnwindSafe(|| builder.build_passive(&model)))
-            .map_err(|_| WindowError::Configuration)?
-            .map_err(|cause| WindowError::Display { cause })?;
+            .map_err(|_| {
+                Invalid::new("cannot open a window: the display has no OpenGL configuration")
+            })?
+            .map_err(no_display)?;
         Ok(Self { viewer, data })
     }
 
@@ -72,7 +55,7 @@ impl Window {
     ///
     /// # Errors
     /// If the display fails.
-    pub fn draw(&mut self, seen: &Seen) -> Result<(), WindowError> {
+    pub fn draw(&mut self, seen: &Seen) -> Result<(), Invalid> {
         if seen.q.len() == self.data.qpos().len() {
             self.data.qpos_mut().copy_from_slice(&seen.q);
         }
@@ -92,6 +75,10 @@ impl Window {
             }
         }
         drop(state);
-        self.viewer.render().map_err(|cause| WindowError::Display { cause })
+        self.viewer.render().map_err(no_display)
     }
+}
+
+fn no_display(cause: MjViewerError) -> Invalid {
+    Invalid::new(format!("cannot open a window: {cause}; this needs X11 or Wayland with OpenGL"))
 }

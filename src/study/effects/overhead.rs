@@ -2,12 +2,13 @@
 //! out by hand in which nothing can be switched.
 
 use crate::backend::{Reading, Wrench};
+use crate::error::Invalid;
 use crate::experiment::statistics::{median, median_interval};
 use crate::geometry::bvh::MeshBvh;
 use crate::math::seed;
 use crate::robot::finger::frame::FRAME_S;
 use crate::robot::finger::{Frame, TipMotion};
-use crate::sim::environment::{EnvironmentError, Shape};
+use crate::sim::environment::Shape;
 use crate::sim::finger::effects::fluid::FluidEffect;
 use crate::sim::finger::effects::skin::{Pressed, Skin};
 use crate::sim::finger::load::PressError;
@@ -73,7 +74,7 @@ pub fn overheads(
     scene: &Scene,
     poses: &[TipMotion],
     pairs: usize,
-) -> Result<Option<[Ratio; 2]>, EnvironmentError> {
+) -> Result<Option<[Ratio; 2]>, Invalid> {
     let Effects { skin, fluid, .. } = &scene.effects;
     let fluid = fluid.clone().unwrap_or_default();
     let fluid = FluidEffect { vibration: None, ..fluid };

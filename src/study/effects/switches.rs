@@ -22,12 +22,12 @@ pub fn switches() -> Vec<Switch<Scene>> {
 /// `scene` with one switch the other way round, and without what then has nothing to act on.
 pub fn switched(scene: &Scene, switch: &Switch<Scene>) -> Scene {
     let mut scene = scene.clone();
-    let (was_soft, was_on) = (scene.effects.is_soft(), switch.is_on(&scene));
+    let (was_soft, was_on) = (scene.effects.skin.is_some(), switch.is_on(&scene));
     let had_masses = scene.body == Body::Dynamic;
     switch.set(&mut scene, !was_on);
     scene.effects.drop_unsupported();
     // A finger that has lost its skin is a rigid hull, and the simplest touch with one is a cast.
-    if was_soft && !scene.effects.is_soft() {
+    if was_soft && scene.effects.skin.is_none() {
         scene.body = Body::Cast;
     }
     let Scene { body, effects, solver, .. } = &mut scene;

@@ -32,11 +32,6 @@ const fn shell(cells: [usize; 2], period_s: f64) -> Rung {
     Rung { shell: Some(cells), ..kinematic(Senses::Full, 0, period_s) }
 }
 
-/// A skin of finite elements, so many along and around.
-const fn flex(cells: [usize; 2]) -> Rung {
-    Rung { flex: Some(cells), ..dynamic(0, 0.002).at(FEW) }
-}
-
 /// The ladder; one line to add a rung. The last is the reference.
 pub const RUNGS: &[Rung] = &[
     Rung::new(Body::Cast, Senses::None, 0, 0.01),
@@ -69,8 +64,6 @@ pub const RUNGS: &[Rung] = &[
     shell([24, 16], 0.01),
     shell([24, 16], 0.002),
     shell([36, 24], 0.002),
-    flex([12, 8]),
-    flex([18, 12]),
     kinematic(Senses::Full, 1000, 0.005),
     kinematic(Senses::Full, 2000, 0.002),
     kinematic(Senses::Full, 4000, 0.001),

@@ -57,7 +57,6 @@ pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<Reference
     };
     let zone = environment.task().zone()?;
     let height_m = |tick: &Tick| zone.height_m(&tick.motion.x_wt.translation.vector.into());
-    let mut shell = simulator.shell().ok()?;
     let deepest_m = ticks.iter().map(height_m).fold(f64::INFINITY, f64::min);
     let last = ticks.iter().rposition(|tick| height_m(tick) <= deepest_m + STILL_M)?;
     let mut state = FingertipState::new(tip, &seed::stream(0, 0, "finger"));
@@ -67,13 +66,7 @@ pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<Reference
     for tick in &ticks[..=last] {
         let dt_s = (tick.time_s - before_s).max(0.0);
         before_s = tick.time_s;
-        load = match &mut shell {
-            Some(shell) => {
-                let pressed = shell.step(&tick.motion.x_wt, dt_s).ok()?;
-                state.step_loaded(tip, pressed, &tick.motion, dt_s).ok()?
-            }
-            None => state.step(tip, bvh, &tick.motion, dt_s).ok()?,
-        };
+        load = state.step(tip, bvh, &tick.motion, dt_s).ok()?;
         while let Some(frame) = state.frame() {
             rest.get_or_insert_with(|| frame.clone());
             now = frame;

@@ -2,7 +2,6 @@
 
 use crate::sim::Scene;
 use crate::sim::collision::Collision;
-use crate::sim::finger::effects::flex::FlexEffect;
 use crate::sim::finger::effects::skin::SkinModel;
 use crate::sim::scene::Body;
 use crate::sim::solver::Integrator;
@@ -31,8 +30,6 @@ pub struct Rung {
     pub samples: usize,
     /// Cells along and around of a skin that is a thin shell.
     pub shell: Option<[usize; 2]>,
-    /// Cells along and around of a skin of finite elements.
-    pub flex: Option<[usize; 2]>,
     /// Duration of a control tick, and of a step of a body with masses.
     pub period_s: f64,
     /// How a body with masses is integrated.
@@ -55,7 +52,6 @@ impl Rung {
             senses,
             samples,
             shell: None,
-            flex: None,
             period_s,
             integrator: Integrator::ImplicitFast,
             collision: None,
@@ -102,15 +98,13 @@ impl Rung {
         }
         scene.touch.approach_m_s = self.approach_m_s.unwrap_or(scene.touch.approach_m_s);
         let effects = &mut scene.effects;
-        let flex = effects.flex.take().unwrap_or_default();
         let [skin, fluid, electrodes] = match self.senses {
             Senses::None => [false; 3],
             Senses::Dry => [true, false, false],
             Senses::Fluid => [true, true, false],
             Senses::Full => [true; 3],
         };
-        keep(&mut effects.skin, skin && self.flex.is_none());
-        effects.flex = self.flex.map(|[along, around]| FlexEffect { along, around, ..flex });
+        keep(&mut effects.skin, skin);
         keep(&mut effects.fluid, fluid);
         keep(&mut effects.electrodes, electrodes);
         if let Some(skin) = &mut effects.skin {
@@ -140,7 +134,6 @@ impl Rung {
             words.extend(self.collision.map(|collision| collision.name().into()));
             words.extend((self.samples > 0).then(|| self.samples.to_string()));
             words.extend(self.shell.map(|[along, around]| format!("shell {along} × {around}")));
-            words.extend(self.flex.map(|[along, around]| format!("flex {along} × {around}")));
             words.push(format!("{} ms", 1e3 * self.period_s));
         }
         if self.integrator != Integrator::default() {

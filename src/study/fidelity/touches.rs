@@ -3,6 +3,7 @@
 use super::reference_load::{ReferenceLoad, noise_free, reference_load};
 use crate::backend::Fault;
 use crate::backend::trace::Trace;
+use crate::error::Invalid;
 use crate::experiment::statistics::median;
 use crate::experiment::truth::Truth;
 use crate::explore::belief::HeightField;
@@ -11,8 +12,7 @@ use crate::explore::planner;
 use crate::explore::planner::{PlannerFactory, PlanningSettings};
 use crate::explore::probe::{Contact, Probe, Touch};
 use crate::math::seed;
-use crate::sim::environment::EnvironmentError;
-use crate::sim::simulator::{Simulator, SimulatorError};
+use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use crate::task::{Approach, Target};
 use std::sync::Arc;
@@ -53,12 +53,9 @@ pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Target> {
 /// Why nothing can be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
-    /// A scene cannot be built.
+    /// A scene cannot be built, or its body cannot be simulated as the scene asks.
     #[error(transparent)]
-    Environment(#[from] EnvironmentError),
-    /// Its body cannot be simulated as the scene asks.
-    #[error(transparent)]
-    Simulator(#[from] SimulatorError),
+    Invalid(#[from] Invalid),
     /// A body cannot be brought to its start.
     #[error(transparent)]
     Fault(#[from] Fault),

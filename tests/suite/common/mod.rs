@@ -6,9 +6,6 @@ pub mod fake;
 pub mod fault_injector;
 #[cfg(feature = "mujoco")]
 pub mod lab;
-#[cfg(feature = "mujoco")]
-#[allow(dead_code)] // The bench of finite elements uses the rest.
-pub mod presses;
 pub mod program;
 pub mod quiet;
 pub mod rig;

@@ -3,10 +3,11 @@
 use super::case::{Outcome, all, require};
 use palpate::backend::trace::{Tick, Trace};
 use palpate::backend::{Backend, Fault};
+use palpate::error::Invalid;
 use palpate::explore::probe::{Contact, Probe, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
-use palpate::sim::environment::{EnvironmentError, Shape};
+use palpate::sim::environment::Shape;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
 use palpate::study::fidelity::reference_load::{ReferenceLoad, reference_load};
@@ -67,7 +68,7 @@ pub fn touch_solid_with(
 }
 
 /// `scene` with `mesh` as its object.
-pub fn environment_of(scene: Scene, mesh: Mesh) -> Result<Arc<Environment>, EnvironmentError> {
+pub fn environment_of(scene: Scene, mesh: Mesh) -> Result<Arc<Environment>, Invalid> {
     let shape = Shape::Mesh { bvh: MeshBvh::new(mesh), report: Box::default() };
     Environment::around(scene, shape).map(Arc::new)
 }

@@ -3,6 +3,7 @@
 use super::case::Outcome;
 use super::solids::{mesh, wall};
 use nalgebra::{Isometry3, Vector3};
+use palpate::backend::Fault;
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::math::seed;
@@ -10,7 +11,7 @@ use palpate::robot::finger::Finger;
 use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::profile::Profile;
 use palpate::sim::finger::samples::spread;
-use palpate::sim::finger::{Effects, Fingertip, FingertipError, FingertipState, Load};
+use palpate::sim::finger::{Effects, Fingertip, FingertipState, Load};
 
 /// A finger over a wall, its tip pointing at it as in a touch.
 pub struct FingerOnWall {
@@ -64,12 +65,12 @@ impl FingerOnWall {
         state: &mut FingertipState,
         motion: &TipMotion,
         dt_s: f64,
-    ) -> Result<Load, FingertipError> {
+    ) -> Result<Load, Fault> {
         state.step(&self.tip, &self.wall, motion, dt_s)
     }
 
     /// The force at a depth.
-    pub fn force_n(&self, depth_m: f64) -> Result<f64, FingertipError> {
+    pub fn force_n(&self, depth_m: f64) -> Result<f64, Fault> {
         Ok(self.press(&mut self.untouched(), &self.at(depth_m, 0.0), 0.01)?.force_n.norm())
     }
 }
@@ -77,7 +78,7 @@ impl FingerOnWall {
 /// Runs `law`; its fault is the outcome.
 pub fn with_finger(
     effects: &Effects,
-    law: impl FnOnce(&FingerOnWall) -> Result<Outcome, FingertipError>,
+    law: impl FnOnce(&FingerOnWall) -> Result<Outcome, Fault>,
 ) -> Outcome {
     with_finger_of_size(effects, 1.0, law)
 }
@@ -86,7 +87,7 @@ pub fn with_finger(
 pub fn with_finger_of_size(
     effects: &Effects,
     size: f64,
-    law: impl FnOnce(&FingerOnWall) -> Result<Outcome, FingertipError>,
+    law: impl FnOnce(&FingerOnWall) -> Result<Outcome, Fault>,
 ) -> Outcome {
     match FingerOnWall::new(effects, size) {
         Some(setup) => law(&setup).unwrap_or_else(|fault| Outcome::Faulted(fault.to_string())),

@@ -3,9 +3,10 @@
 use super::case::{Case, Outcome, all, case, require};
 use super::finger_on_wall::{FingerOnWall, is_finite, stiffen, with_finger, with_finger_of_size};
 use nalgebra::{Isometry3, Vector3};
+use palpate::backend::Fault;
 use palpate::math::seed;
 use palpate::robot::finger::TipMotion;
-use palpate::sim::finger::{Effects, FingertipError};
+use palpate::sim::finger::Effects;
 use rand::RngExt;
 
 pub const CASES: &[Case] = &[
@@ -315,7 +316,7 @@ pub fn poses(count: f64, effects: &Effects) -> Outcome {
             match setup.press(&mut state, &motion, 0.001) {
                 Ok(load) if is_finite(&load) => {}
                 Ok(load) => return Ok(Outcome::Wrong(format!("{load:?} at {p_wt:?}"))),
-                Err(FingertipError::Inside { .. }) if p_wt.y < 0.0 => {}
+                Err(Fault::Inside { .. }) if p_wt.y < 0.0 => {}
                 Err(error) => return Ok(Outcome::Wrong(error.to_string())),
             }
         }

@@ -5,9 +5,10 @@ use super::case::{Case, Outcome, all, case, require};
 use super::finger_on_wall::{FingerOnWall, is_finite, with_finger};
 use super::force_law::{effects, laws_of, poses};
 use super::solids::{both, mesh, needle};
+use palpate::backend::Fault;
 use palpate::geometry::solids::block;
+use palpate::sim::finger::Effects;
 use palpate::sim::finger::effects::skin::SkinModel;
-use palpate::sim::finger::{Effects, FingertipError};
 
 /// A finger a hundred times as large has a million times the volume.
 const STIFF_FLUID: &str =
@@ -196,7 +197,7 @@ fn held(count: f64, period_s: f64) -> Outcome {
 fn pushed_into(solid: palpate::geometry::solids::Triangles) -> Outcome {
     let setup = mesh(solid, [0.0; 3]).and_then(|mesh| FingerOnWall::before(mesh, &shell(), 1.0));
     let Some(setup) = setup else { return Outcome::Wrong("no object".into()) };
-    let law = || -> Result<Outcome, FingertipError> {
+    let law = || -> Result<Outcome, Fault> {
         let (mut slow, mut most_n) = (setup.untouched(), 0.0);
         for tick in 1..=(2e-3 / TICK_M) as u32 {
             let motion = setup.at(TICK_M * f64::from(tick), 0.0);

@@ -4,10 +4,11 @@ use super::bench::Bench;
 use super::constants::Model;
 use super::fit::{Free, fit};
 use super::session::Session;
+use crate::error::Invalid;
 use crate::math::least_squares::FitError;
 use crate::robot::finger::frame::ELECTRODES;
 use crate::sim::finger::effects::friction::FrictionEffect;
-use crate::sim::finger::recording::{Recording, RecordingError, filled, force};
+use crate::sim::finger::recording::{Recording, filled, force};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
@@ -45,7 +46,7 @@ impl ShearRecordings {
     ///
     /// # Errors
     /// The first that cannot.
-    pub fn check(&self) -> Result<(), RecordingError> {
+    pub fn check(&self) -> Result<(), Invalid> {
         filled("sensors", self.sensors.len())?;
         for (i, of) in self.sensors.iter().enumerate() {
             force(&format!("sensors[{i}].mean_normal_force_n"), of.mean_normal_force_n)?;

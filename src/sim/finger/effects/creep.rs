@@ -1,34 +1,19 @@
 //! Silicone that gives way in time: a skin held as it is pushes less and less, and on the way back
 //! less than on the way in.
 
+use super::constants::effect;
 use super::effect::{Effect, OnLoad};
-use crate::config::{Checked, Rules};
 use crate::sim::finger::load::Load;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// Table `[creep]`: the skin as a standard linear solid. The fluid's share goes with it; gaps
-/// follow the object as ever.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct CreepEffect {
-    /// By this part a sudden load exceeds what stays of it.
-    pub part: f64,
-    /// Time constant with which that goes away.
-    pub time_constant_s: f64,
-}
-
-impl Default for CreepEffect {
-    /// Chosen: a soft silicone that loses a tenth of its load within seconds.
-    fn default() -> Self {
-        Self { part: 0.1, time_constant_s: 2.0 }
-    }
-}
-
-impl Checked for CreepEffect {
-    fn check(&self, rules: &mut Rules) {
-        rules.number("part", self.part, 0.0..=10.0);
-        rules.number("time_constant_s", self.time_constant_s, 1e-3..=1e6);
+effect! {
+    /// Table `[creep]`: the skin as a standard linear solid. The fluid's share goes with it; gaps
+    /// follow the object as ever.
+    CreepEffect in "creep"
+    constants {
+        /// By this part a sudden load exceeds what stays of it.
+        part: f64, 0.0..=10.0;
+        /// Time constant with which that goes away.
+        time_constant_s: f64, 1e-3..=1e6;
     }
 }
 

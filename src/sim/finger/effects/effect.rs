@@ -27,9 +27,9 @@ pub trait Effect: Checked + Clone + Default + 'static {
     /// What it remembers at the start of a trial.
     fn start(&self) -> Self::State;
 
-    /// Its part of a finger with every effect; none if another stands for it.
-    fn complete() -> Option<Self> {
-        Some(Self::default())
+    /// Its part of a finger with every effect.
+    fn complete() -> Self {
+        Self::default()
     }
 
     /// What of it can be switched: all of it, unless it says more.
@@ -55,7 +55,7 @@ pub struct Step<'a> {
 pub enum Needs {
     /// It stands alone.
     Nothing,
-    /// A skin of either kind.
+    /// A skin.
     Skin,
     /// A tactile frame with something in it.
     Frames,

@@ -1,15 +1,13 @@
 //! The impedance electrodes: where the fluid over one grows thin, its counts fall.
 
+use super::constants::effect;
 use super::effect::Effect;
 use super::skin::Pressed;
-use crate::config::{Checked, Rules};
 use crate::robot::finger::electrode_table;
 use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use crate::sim::finger::noise::normal;
 use crate::sim::finger::samples::SkinSample;
 use rand::Rng;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// The resistor an electrode divides its voltage with (SynTouch BioTac SP manual, §5.1).
 const LOAD_OHM: f64 = 10e3;
@@ -21,56 +19,26 @@ const FILM: f64 = 1.0 / 40.0;
 /// Samples farther than this many spreads do not count.
 const REACH: f64 = 3.0;
 
-/// Table `[electrodes]`: 19 impedances through the fluid.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ElectrodesEffect {
-    /// What E1 to E19 read untouched.
-    pub baseline_counts: [f64; ELECTRODES],
-    /// Standard deviation of the patch of fluid an electrode senses.
-    pub spread_m: f64,
-    /// Power p in Z = Z0 (g0/g)^p.
-    pub exponent: f64,
-    /// White noise, as a factor on the recorded standard deviations; 0 is none.
-    pub noise: f64,
-    /// Correlation of that noise between any two electrodes, which share their excitation.
-    pub noise_correlation: f64,
-    /// Random walk shared by all electrodes, in counts per root second; 0 is none.
-    pub drift_counts: f64,
-    /// Whether counts are whole numbers.
-    pub quantise: bool,
-    /// Whether counts stay within the converter's 0 to 4095.
-    pub clip: bool,
-}
-
-impl Default for ElectrodesEffect {
-    /// Baselines and noise: MiaoLi/syntouchcontact recordings, sensor F2. The recorded standard
-    /// deviations contain drift; three quarters of them match the differences between frames
-    /// (2.1 to 5.8 counts). Correlation: 0.26 to 0.34 on average over pairs of the same. Drift: 6
-    /// to 16 counts over 11 s. Spread: fitted by `calibration` to the same sensor on a flat plate.
-    /// Exponent: the gap's resistance grows with its inverse.
-    fn default() -> Self {
-        Self {
-            baseline_counts: electrode_table::BASELINES_COUNTS,
-            spread_m: electrode_table::SPREAD_M,
-            exponent: 1.0,
-            noise: 0.75,
-            noise_correlation: 0.3,
-            drift_counts: 3.0,
-            quantise: true,
-            clip: true,
-        }
-    }
-}
-
-impl Checked for ElectrodesEffect {
-    fn check(&self, rules: &mut Rules) {
-        rules.numbers("baseline_counts", &self.baseline_counts, 1.0..=FULL_SCALE_COUNTS - 1.0);
-        rules.number("spread_m", self.spread_m, 1e-5..=1e-1);
-        rules.number("exponent", self.exponent, 0.1..=10.0);
-        rules.number("noise", self.noise, 0.0..=1e3);
-        rules.number("noise_correlation", self.noise_correlation, 0.0..=1.0);
-        rules.number("drift_counts", self.drift_counts, 0.0..=1e3);
+effect! {
+    /// Table `[electrodes]`: 19 impedances through the fluid.
+    ElectrodesEffect in "electrodes"
+    constants {
+        /// What E1 to E19 read untouched.
+        baseline_counts: [f64; ELECTRODES], 1.0..=FULL_SCALE_COUNTS - 1.0;
+        /// Standard deviation of the patch of fluid an electrode senses.
+        spread_m: f64, 1e-5..=1e-1;
+        /// Power p in Z = Z0 (g0/g)^p.
+        exponent: f64, 0.1..=10.0;
+        /// White noise, as a factor on the recorded standard deviations; 0 is none.
+        noise: f64, 0.0..=1e3;
+        /// Correlation of that noise between any two electrodes, which share their excitation.
+        noise_correlation: f64, 0.0..=1.0;
+        /// Random walk shared by all electrodes, in counts per root second; 0 is none.
+        drift_counts: f64, 0.0..=1e3;
+        /// Whether counts are whole numbers.
+        quantise: bool, ..;
+        /// Whether counts stay within the converter's 0 to 4095.
+        clip: bool, ..;
     }
 }
 

@@ -1,13 +1,12 @@
 //! What the pressure sensor makes of the fluid: PDC (static) and PAC (vibration).
 
+use super::constants::effect;
 use super::effect::Effect;
 use super::switch::Switch;
-use crate::config::{Checked, Rules};
+use crate::config::Rules;
 use crate::robot::finger::frame::FULL_SCALE_COUNTS;
 use crate::sim::finger::noise::normal;
 use rand::Rng;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Pressure per count of PDC (SynTouch BioTac SP manual).
@@ -16,47 +15,29 @@ const PDC_PA: f64 = 36.5;
 /// Pressure per count of PAC (same).
 const PAC_PA: f64 = 0.37;
 
-/// Table `[fluid]`: the liquid under the skin and the sensor of its pressure.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FluidEffect {
-    /// Pressure per volume the fluid is compressed by, in Pa/m³.
-    pub stiffness_pa_m3: f64,
-    /// PDC at rest.
-    pub baseline_counts: f64,
-    /// White noise of PDC; 0 is none.
-    pub noise_counts: f64,
-    /// Whether counts are whole numbers from 0 to 4095.
-    pub quantise: bool,
-    /// PAC; without it the sensor does not send it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub vibration: Option<VibrationEffect>,
-}
-
-impl Default for FluidEffect {
-    /// Stiffness: chosen, 10 kPa compress hoses and bubbles by 1 mm³, little beside the 100 mm³
-    /// that 2 N displace. Baseline: chosen amid 1326 to 2695 (recordings of
-    /// RuihanGao/BioTacSP_setup and I-Quotient-Robotics/syntouch_btd_decode), noise from the same:
-    /// up to half a count.
-    fn default() -> Self {
-        Self {
-            stiffness_pa_m3: 1e13,
-            baseline_counts: 2000.0,
-            noise_counts: 0.5,
-            quantise: true,
-            vibration: None,
-        }
+effect! {
+    /// Table `[fluid]`: the liquid under the skin and the sensor of its pressure.
+    FluidEffect in "fluid"
+    settings checked by check_vibration {
+        /// PAC; without it the sensor does not send it.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        vibration: Option<VibrationEffect> = None,
+    }
+    constants {
+        /// Pressure per volume the fluid is compressed by, in Pa/m³.
+        stiffness_pa_m3: f64, 1e6..=1e20;
+        /// PDC at rest.
+        baseline_counts: f64, 0.0..=FULL_SCALE_COUNTS;
+        /// White noise of PDC; 0 is none.
+        noise_counts: f64, 0.0..=1e3;
+        /// Whether counts are whole numbers from 0 to 4095.
+        quantise: bool, ..;
     }
 }
 
-impl Checked for FluidEffect {
-    fn check(&self, rules: &mut Rules) {
-        rules.number("stiffness_pa_m3", self.stiffness_pa_m3, 1e6..=1e20);
-        rules.number("baseline_counts", self.baseline_counts, 0.0..=FULL_SCALE_COUNTS);
-        rules.number("noise_counts", self.noise_counts, 0.0..=1e3);
-        if let Some(vibration) = &self.vibration {
-            rules.table("vibration", vibration);
-        }
+fn check_vibration(fluid: &FluidEffect, rules: &mut Rules) {
+    if let Some(vibration) = &fluid.vibration {
+        rules.table("vibration", vibration);
     }
 }
 
@@ -67,8 +48,8 @@ impl Effect for FluidEffect {
 
     fn start(&self) {}
 
-    fn complete() -> Option<Self> {
-        Some(Self { vibration: Some(VibrationEffect::default()), ..Self::default() })
+    fn complete() -> Self {
+        Self { vibration: Some(VibrationEffect::default()), ..Self::default() }
     }
 
     /// All of it, and its vibration, which brings the fluid with it.
@@ -83,34 +64,18 @@ impl Effect for FluidEffect {
     }
 }
 
-/// Table `[fluid.vibration]`: the amplified, band-passed pressure at 2.2 kHz.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct VibrationEffect {
-    /// PAC at rest.
-    pub baseline_counts: f64,
-    /// White noise; 0 is none.
-    pub noise_counts: f64,
-    /// Slower changes are taken out.
-    pub high_pass_hz: f64,
-    /// Faster ones too.
-    pub low_pass_hz: f64,
-}
-
-impl Default for VibrationEffect {
-    /// Baseline: SynTouch QuickStart guide, 2020 to 2035. Noise: RuihanGao/BioTacSP_setup, 2.8 to
-    /// 3.0 between frames. Band: SynTouch BioTac SP manual.
-    fn default() -> Self {
-        Self { baseline_counts: 2028.0, noise_counts: 3.0, high_pass_hz: 10.0, low_pass_hz: 1040.0 }
-    }
-}
-
-impl Checked for VibrationEffect {
-    fn check(&self, rules: &mut Rules) {
-        rules.number("baseline_counts", self.baseline_counts, 0.0..=FULL_SCALE_COUNTS);
-        rules.number("noise_counts", self.noise_counts, 0.0..=1e3);
-        rules.number("high_pass_hz", self.high_pass_hz, 1e-3..=1e4);
-        rules.number("low_pass_hz", self.low_pass_hz, 1e-3..=1e5);
+effect! {
+    /// Table `[fluid.vibration]`: the amplified, band-passed pressure at 2.2 kHz.
+    VibrationEffect in "fluid.vibration"
+    constants {
+        /// PAC at rest.
+        baseline_counts: f64, 0.0..=FULL_SCALE_COUNTS;
+        /// White noise; 0 is none.
+        noise_counts: f64, 0.0..=1e3;
+        /// Slower changes are taken out.
+        high_pass_hz: f64, 1e-3..=1e4;
+        /// Faster ones too.
+        low_pass_hz: f64, 1e-3..=1e5;
     }
 }
 

@@ -4,43 +4,25 @@
 //! which the electrodes feel ([`Shear`](crate::sim::finger::shear::Shear)). While it slips, the
 //! object's texture makes the fluid vibrate.
 
+use super::constants::effect;
 use super::effect::{Effect, OnLoad};
-use crate::config::{Checked, Rules};
 use crate::sim::finger::load::Load;
 use nalgebra::{Isometry3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Slower than this the skin creeps and does not slip (chosen): far below any speed of a touch,
 /// far above what rounding at Coulomb's limit makes of a finger at rest.
 const SLIP_M_S: f64 = 1e-5;
 
-/// Table `[friction]`: tangential force of the skin, its shear over the core, and slip.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FrictionEffect {
-    /// Coulomb's coefficient.
-    pub coefficient: f64,
-    /// Tangential stiffness of the skin on the core, in N/m.
-    pub stiffness_n_m: f64,
-    /// Roughness of the object: the power of the pressure's noise, in Pa², per m/s of slip.
-    pub roughness_pa2_s_m: f64,
-}
-
-impl Default for FrictionEffect {
-    /// Coefficient: NVlabs/biotac_sim. Stiffness: with it the electrodes answer lateral force as in
-    /// MiaoLi/syntouchcontact's recordings (`palpate calibrate --shear`: F2 alone has 2050 N/m,
-    /// F1 1830). Roughness: chosen, 10 Pa at 20 mm/s, ten times PAC's own noise.
-    fn default() -> Self {
-        Self { coefficient: 0.783, stiffness_n_m: 2000.0, roughness_pa2_s_m: 5000.0 }
-    }
-}
-
-impl Checked for FrictionEffect {
-    fn check(&self, rules: &mut Rules) {
-        rules.number("coefficient", self.coefficient, 0.0..=10.0);
-        rules.number("stiffness_n_m", self.stiffness_n_m, 1.0..=1e9);
-        rules.number("roughness_pa2_s_m", self.roughness_pa2_s_m, 0.0..=1e9);
+effect! {
+    /// Table `[friction]`: tangential force of the skin, its shear over the core, and slip.
+    FrictionEffect in "friction"
+    constants {
+        /// Coulomb's coefficient.
+        coefficient: f64, 0.0..=10.0;
+        /// Tangential stiffness of the skin on the core, in N/m.
+        stiffness_n_m: f64, 1.0..=1e9;
+        /// Roughness of the object: the power of the pressure's noise, in Pa², per m/s of slip.
+        roughness_pa2_s_m: f64, 0.0..=1e9;
     }
 }
 

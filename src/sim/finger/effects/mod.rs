@@ -5,13 +5,14 @@
 //! switch and row in a study of effects follow from that line.
 
 pub mod collision;
+pub mod constants;
 pub mod creep;
 pub mod effect;
 pub mod electrodes;
-pub mod flex;
 pub mod fluid;
 pub mod friction;
 pub mod registration;
+pub mod sensor;
 pub mod skin;
 pub mod switch;
 mod table;
@@ -30,8 +31,6 @@ use switch::Switch;
 table::effects! {
     /// A soft skin; without it there is no load and no tactile frame.
     skin: skin::SkinEffect,
-    /// A skin of finite elements instead of that one.
-    flex: flex::FlexEffect,
     /// Liquid under the skin and its pressure; without it the finger is dry and its skin's
     /// points do not know of each other.
     fluid: fluid::FluidEffect,
@@ -66,23 +65,13 @@ impl Effects {
         }
     }
 
-    /// Whether there is a skin of either kind.
-    pub fn is_soft(&self) -> bool {
-        self.skin.is_some() || self.flex.is_some()
-    }
-
     /// Whether what `needs` asks for is there.
     fn supports(&self, needs: Needs) -> bool {
         match needs {
             Needs::Nothing => true,
-            Needs::Skin => self.is_soft(),
+            Needs::Skin => self.skin.is_some(),
             Needs::Frames => self.sends_frames(),
         }
-    }
-
-    fn check_skins(&self, rules: &mut Rules) {
-        let one = self.skin.is_none() || self.flex.is_none();
-        rules.require("flex", "(given)", one, || "no [flex] beside a [skin]: one skin".into());
     }
 }
 

@@ -3,6 +3,7 @@
 use super::effect::Effect;
 use crate::config::{Checked, Rules};
 use crate::math::pose::pose;
+use crate::robot::finger::TipMotion;
 use crate::sim::finger::noise::normal;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::Rng;
@@ -86,11 +87,23 @@ impl Effect for RegistrationEffect {
 pub struct Registration {
     /// Pose of the finger's own `T` in the `T` of the kinematics.
     pub finger: Isometry3<f64>,
-    /// From where the object is believed to be to where it is, in its own frame.
+    /// From where the object is believed to be to where it is, in its own frame; of
+    /// [`motion`](Self::motion) the way back, in `W`.
     pub object: Isometry3<f64>,
 }
 
 impl Registration {
+    /// How the finger moves before the object where that is believed to be.
+    pub fn motion(&self, motion: &TipMotion) -> TipMotion {
+        let Self { finger, object } = self;
+        let aside_w = motion.x_wt.rotation * finger.translation.vector;
+        TipMotion {
+            x_wt: object * motion.x_wt * finger,
+            linear_w: object.rotation * (motion.linear_w + motion.angular_w.cross(&aside_w)),
+            angular_w: object.rotation * motion.angular_w,
+        }
+    }
+
     /// Drawn by `rng`.
     pub fn new(effect: &RegistrationEffect, rng: &mut impl Rng) -> Self {
         let mut drawn = |place_m: f64, angle_deg: f64| {

@@ -1,12 +1,13 @@
 //! The soft skin against the exact mesh: an elastic foundation, or a shell, over the fluid.
 
+use super::constants::effect;
 use super::effect::{Effect, Needs};
-use crate::config::{Checked, Rules};
+use crate::config::Rules;
 use crate::geometry::bvh::MeshBvh;
 use crate::robot::finger::profile::Profile;
-use crate::sim::finger::cavity::SkinContact;
 use crate::sim::finger::column::Column;
 use crate::sim::finger::foundation::Foundation;
+use crate::sim::finger::foundation::SkinContact;
 use crate::sim::finger::lattice::Lattice;
 use crate::sim::finger::load::{Load, PressError};
 use crate::sim::finger::patches::{Patches, Vicinity, key};
@@ -36,66 +37,41 @@ pub enum SkinModel {
     Shell,
 }
 
-/// Table `[skin]`: a soft skin against the exact mesh.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct SkinEffect {
-    /// How the skin passes load on.
-    pub model: SkinModel,
-    /// Points of the skin; of a shell those on the back.
-    pub samples: usize,
-    /// A shell's cells along the finger, half of them over the cylinder and half over the tip's
-    /// arc.
-    pub along: usize,
-    /// A shell's cells around the finger, from nail to nail; even.
-    pub around: usize,
-    /// Modulus of the skin, in Pa: of columns in compression between object and fluid only.
-    pub modulus_pa: f64,
-    /// Poisson's ratio of a shell.
-    pub poisson: f64,
-    /// Stiffness of the membrane against being flattened, in Pa per metre.
-    pub flatten_pa_m: f64,
-    /// Stiffness of the membrane against being blown up, in Pa per metre.
-    pub inflate_pa_m: f64,
-    /// Stiffness of the core and of the ridges inside the skin, once the gap is closed.
-    pub core_pa_m: f64,
-}
-
-impl Default for SkinEffect {
-    /// Modulus E: NVlabs/biotac_sim. Inflation: that of a thin-walled tube, E t / R², with the
-    /// skin's thickness t = 1.6 mm and the sides' radius R = 7 mm. Flattening and core: fitted by
-    /// `calibration` to the MiaoLi/syntouchcontact recordings of sensor F2 on a flat plate. The fit
-    /// is flat: half or twice a value costs a few counts. Poisson's ratio: NVlabs/biotac_sim.
-    /// Cells: chosen, within 8 % of the force of 36 × 24 at 1 mm.
-    fn default() -> Self {
-        Self {
-            model: SkinModel::Columns,
-            samples: 500,
-            along: 24,
-            around: 16,
-            modulus_pa: 1.552e6,
-            poisson: 0.3165,
-            flatten_pa_m: 3.5e6,
-            inflate_pa_m: 5.07e7,
-            core_pa_m: 1.4e9,
-        }
+effect! {
+    /// Table `[skin]`: a soft skin against the exact mesh.
+    SkinEffect in "skin"
+    settings checked by check_resolution {
+        /// How the skin passes load on.
+        model: SkinModel = SkinModel::Columns,
+        /// Points of the skin; of a shell those on the back.
+        samples: usize = 500,
+        /// A shell's cells along the finger, half of them over the cylinder and half over the tip's
+        /// arc.
+        along: usize = 24,
+        /// A shell's cells around the finger, from nail to nail; even.
+        around: usize = 16,
+    }
+    constants {
+        /// Modulus of the skin, in Pa: of columns in compression between object and fluid only.
+        modulus_pa: f64, 1e3..=1e9;
+        /// Poisson's ratio of a shell.
+        poisson: f64, 0.0..=0.49;
+        /// Stiffness of the membrane against being flattened, in Pa per metre.
+        flatten_pa_m: f64, 1e3..=1e12;
+        /// Stiffness of the membrane against being blown up, in Pa per metre.
+        inflate_pa_m: f64, 1e5..=1e12;
+        /// Stiffness of the core and of the ridges inside the skin, once the gap is closed.
+        core_pa_m: f64, 1e3..=1e12;
     }
 }
 
-impl Checked for SkinEffect {
-    fn check(&self, rules: &mut Rules) {
-        rules.require("samples", self.samples, (10..=100_000).contains(&self.samples), || {
-            "10 to 100000".into()
-        });
-        rules.require("along", self.along, (4..=48).contains(&self.along), || "4 to 48".into());
-        let even = self.around.is_multiple_of(2) && (4..=32).contains(&self.around);
-        rules.require("around", self.around, even, || "an even number, 4 to 32".into());
-        rules.number("modulus_pa", self.modulus_pa, 1e3..=1e9);
-        rules.number("poisson", self.poisson, 0.0..=0.49);
-        rules.number("flatten_pa_m", self.flatten_pa_m, 1e3..=1e12);
-        rules.number("inflate_pa_m", self.inflate_pa_m, 1e5..=1e12);
-        rules.number("core_pa_m", self.core_pa_m, 1e3..=1e12);
-    }
+fn check_resolution(skin: &SkinEffect, rules: &mut Rules) {
+    rules.require("samples", skin.samples, (10..=100_000).contains(&skin.samples), || {
+        "10 to 100000".into()
+    });
+    rules.require("along", skin.along, (4..=48).contains(&skin.along), || "4 to 48".into());
+    let even = skin.around.is_multiple_of(2) && (4..=32).contains(&skin.around);
+    rules.require("around", skin.around, even, || "an even number, 4 to 32".into());
 }
 
 impl SkinEffect {
@@ -167,7 +143,7 @@ impl Skin {
     pub fn new(profile: &Profile, effect: &SkinEffect, cavity_pa_m3: f64) -> Self {
         let mut samples = spread(profile, effect.samples);
         let cells = [effect.along, effect.around];
-        let lattice = (effect.model == SkinModel::Shell).then(|| Lattice::new(profile, cells, &[]));
+        let lattice = (effect.model == SkinModel::Shell).then(|| Lattice::new(profile, cells));
         if let Some(lattice) = &lattice {
             samples.retain(|sample| !sample.layers.wet);
             samples.splice(0..0, lattice.samples(profile));

@@ -6,26 +6,50 @@
 macro_rules! effects {
     ($($(#[$doc:meta])* $name:ident: $Effect:ty,)*) => {
         /// One optional table each; an absent one has no state and costs no work.
-        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+        #[derive(Clone, Debug, Default, PartialEq, serde::Deserialize, schemars::JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct Effects {
+            /// Constants of the sensor: `"biotac"`, a file like `models/biotac.toml`, or a table of
+            /// those that differ. They become the effects' own when a scene is read.
+            pub sensor: Option<String>,
             $(
                 $(#[$doc])*
-                #[serde(skip_serializing_if = "Option::is_none")]
                 pub $name: Option<$Effect>,
             )*
+            /// Keys of constants that the scene has in its effects, as in version 0.1.
+            #[serde(skip)]
+            pub moved_keys: Vec<String>,
+        }
+
+        impl serde::Serialize for Effects {
+            /// Constants that are not the BioTac's are in the table `sensor`.
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                let mut tables = toml::Table::new();
+                $(
+                    if let Some(effect) = &self.$name {
+                        let table = toml::Value::try_from(effect);
+                        let table = table.map_err(serde::ser::Error::custom)?;
+                        tables.insert(stringify!($name).into(), table);
+                    }
+                )*
+                let (mut settings, constants) = constants::split(tables);
+                if !constants.is_empty() {
+                    settings.insert("sensor".into(), toml::Value::Table(constants));
+                }
+                settings.serialize(serializer)
+            }
         }
 
         impl Effects {
-            /// Every effect with its defaults; of the two skins the cheap one.
+            /// Every effect with its defaults.
             pub fn all() -> Self {
-                Self { $($name: <$Effect>::complete(),)* }
+                Self { $($name: Some(<$Effect>::complete()),)* ..Self::default() }
             }
 
             /// Whether a tactile frame has anything in it.
             pub fn sends_frames(&self) -> bool {
                 let fills = [$(<$Effect>::FILLS_FRAMES && self.$name.is_some(),)*];
-                self.is_soft() && fills.contains(&true)
+                self.skin.is_some() && fills.contains(&true)
             }
 
             /// Takes out every effect that means nothing without one that is not there.
@@ -57,7 +81,6 @@ macro_rules! effects {
                         rules.table(stringify!($name), effect);
                     }
                 )*
-                self.check_skins(rules);
                 let filling = [$((stringify!($name), <$Effect>::FILLS_FRAMES),)*];
                 $(
                     let fits = self.$name.is_none() || self.supports(<$Effect>::NEEDS);

@@ -1,12 +1,10 @@
 //! The thermistor in a heated finger: TDC (temperature) and TAC (its change).
 
+use super::constants::effect;
 use super::effect::{Effect, OnLoad};
-use crate::config::{Checked, Rules};
 use crate::robot::finger::frame::FULL_SCALE_COUNTS;
 use crate::sim::finger::noise::normal;
 use rand::Rng;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// TAC's units: K/s per count (SynTouch BioTac SP manual).
@@ -15,65 +13,30 @@ const TAC_C_S: f64 = 1e-3;
 /// Lower end of TAC's band (same); a change slower than this is sent as it is.
 const TAC_HZ: f64 = 0.45;
 
-/// Table `[thermal]`: a warm finger that a cold object cools.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ThermalEffect {
-    /// The fluid's temperature when a trial starts.
-    pub start_c: f64,
-    /// Temperature the finger's own heat brings the fluid to.
-    pub finger_c: f64,
-    /// The object's temperature.
-    pub object_c: f64,
-    /// Time constant of the fluid.
-    pub time_constant_s: f64,
-    /// Contact area that brings the fluid half-way to the object's temperature.
-    pub half_area_m2: f64,
-    /// The fluid's conductivity grows by this part per kelvin; electrodes drift with it.
-    pub conductivity_per_k: f64,
-    /// TAC at a constant temperature.
-    pub tac_baseline_counts: f64,
-    /// White noise of TDC; 0 is none.
-    pub tdc_noise_counts: f64,
-    /// White noise of TAC; 0 is none.
-    pub tac_noise_counts: f64,
-    /// Whether counts are whole numbers from 0 to 4095.
-    pub quantise: bool,
-}
-
-impl Default for ThermalEffect {
-    /// Temperatures: within the 25.7 to 35.3 °C a warming BioTac showed (mattmongeon's BioTac
-    /// page); the object's: a room. Noise and TAC's baseline:
-    /// I-Quotient-Robotics/syntouch_btd_decode and RuihanGao/BioTacSP_setup recordings. Time
-    /// constant and area: chosen so that a contact of 100 mm² moves TAC by the recorded 57 counts.
-    /// Conductivity: 2 % per kelvin, as salt water (chosen).
-    fn default() -> Self {
-        Self {
-            start_c: 31.0,
-            finger_c: 31.0,
-            object_c: 22.0,
-            time_constant_s: 30.0,
-            half_area_m2: 1e-3,
-            conductivity_per_k: 0.02,
-            tac_baseline_counts: 2053.0,
-            tdc_noise_counts: 0.4,
-            tac_noise_counts: 1.0,
-            quantise: true,
-        }
-    }
-}
-
-impl Checked for ThermalEffect {
-    fn check(&self, rules: &mut Rules) {
-        rules.number("start_c", self.start_c, -50.0..=150.0);
-        rules.number("finger_c", self.finger_c, -50.0..=150.0);
-        rules.number("object_c", self.object_c, -50.0..=150.0);
-        rules.number("time_constant_s", self.time_constant_s, 1e-3..=1e6);
-        rules.number("half_area_m2", self.half_area_m2, 1e-9..=1.0);
-        rules.number("conductivity_per_k", self.conductivity_per_k, -0.01..=0.1);
-        rules.number("tac_baseline_counts", self.tac_baseline_counts, 0.0..=FULL_SCALE_COUNTS);
-        rules.number("tdc_noise_counts", self.tdc_noise_counts, 0.0..=1e3);
-        rules.number("tac_noise_counts", self.tac_noise_counts, 0.0..=1e3);
+effect! {
+    /// Table `[thermal]`: a warm finger that a cold object cools.
+    ThermalEffect in "thermal"
+    constants {
+        /// The fluid's temperature when a trial starts.
+        start_c: f64, -50.0..=150.0;
+        /// Temperature the finger's own heat brings the fluid to.
+        finger_c: f64, -50.0..=150.0;
+        /// The object's temperature.
+        object_c: f64, -50.0..=150.0;
+        /// Time constant of the fluid.
+        time_constant_s: f64, 1e-3..=1e6;
+        /// Contact area that brings the fluid half-way to the object's temperature.
+        half_area_m2: f64, 1e-9..=1.0;
+        /// The fluid's conductivity grows by this part per kelvin; electrodes drift with it.
+        conductivity_per_k: f64, -0.01..=0.1;
+        /// TAC at a constant temperature.
+        tac_baseline_counts: f64, 0.0..=FULL_SCALE_COUNTS;
+        /// White noise of TDC; 0 is none.
+        tdc_noise_counts: f64, 0.0..=1e3;
+        /// White noise of TAC; 0 is none.
+        tac_noise_counts: f64, 0.0..=1e3;
+        /// Whether counts are whole numbers from 0 to 4095.
+        quantise: bool, ..;
     }
 }
 

@@ -1,46 +1,32 @@
 //! When a BioTac samples which channel, and when its frames arrive.
 
+use super::constants::effect;
 use super::effect::{Effect, Needs};
 use super::switch::Switch;
 use crate::backend::delay::DELAY_MAX_S;
-use crate::config::{Checked, Rules};
+use crate::config::Rules;
 use crate::robot::finger::frame::ELECTRODES;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// A delay of commands that is more than a control tick of any body (chosen).
 const LONG_DELAY_S: f64 = 0.02;
 
-/// Table `[timing]`: channels are sampled one after the other, frames arrive in batches, commands
-/// late. Without it a frame is sampled at once, every 10 ms, and arrives then, and a command holds
-/// from the tick on in which it is given.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct TimingEffect {
-    /// Frames that arrive together, when the last of them is complete.
-    pub batch_frames: usize,
-    /// From a command to its effect, rounded to whole control periods.
-    pub control_delay_s: f64,
-}
-
-impl Default for TimingEffect {
-    /// Batch: SynTouch C library manual, 5 frames, 50 ms. Delay: chosen, a cycle of the PA-10's
-    /// servo driver.
-    fn default() -> Self {
-        Self { batch_frames: 5, control_delay_s: 0.002 }
+effect! {
+    /// Table `[timing]`: channels are sampled one after the other, frames arrive in batches, commands
+    /// late. Without it a frame is sampled at once, every 10 ms, and arrives then, and a command holds
+    /// from the tick on in which it is given.
+    TimingEffect in "timing"
+    settings checked by check_delay {
+        /// From a command to its effect, rounded to whole control periods.
+        control_delay_s: f64 = 0.002,
+    }
+    constants {
+        /// Frames that arrive together, when the last of them is complete.
+        batch_frames: usize, 1..=100;
     }
 }
 
-impl Checked for TimingEffect {
-    fn check(&self, rules: &mut Rules) {
-        rules.require(
-            "batch_frames",
-            self.batch_frames,
-            (1..=100).contains(&self.batch_frames),
-            || "1 to 100".into(),
-        );
-        rules.number("control_delay_s", self.control_delay_s, 0.0..=DELAY_MAX_S);
-    }
+fn check_delay(timing: &TimingEffect, rules: &mut Rules) {
+    rules.number("control_delay_s", timing.control_delay_s, 0.0..=DELAY_MAX_S);
 }
 
 impl Effect for TimingEffect {

@@ -1,77 +1,40 @@
 //! How one sensor differs from the next, and today's session from yesterday's.
 
+use super::constants::effect;
 use super::effect::Effect;
 use super::electrodes::{ElectrodesEffect, counts, impedance_ohm};
 use super::skin::SkinEffect;
-use crate::config::{Checked, Rules};
 use crate::robot::finger::frame::ELECTRODES;
 use crate::sim::finger::noise::normal;
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::{Rng, RngExt};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// What an open electrode reads: as little as a scene may say.
 const OPEN_COUNTS: f64 = 1.0;
 
-/// Table `[variation]`: another sensor of the kind in each trial. Every number is a standard
-/// deviation about what the scene says, of a logarithm unless it is of an angle; or a probability.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct VariationEffect {
-    /// Of each electrode's resistance at rest.
-    pub resistance: f64,
-    /// Of the fluid's conductivity, common to all electrodes of a session.
-    pub offset: f64,
-    /// Of what the electrodes make of their gaps, common to all.
-    pub gain: f64,
-    /// Of the rate at which the electrodes drift.
-    pub drift: f64,
-    /// Of the fingertip on its mount, in degrees about each axis.
-    pub attitude_deg: f64,
-    /// Of the silicone's stiffness, in `[skin]`.
-    pub stiffness: f64,
-    /// Probability that an electrode of the sensor is open.
-    pub dead: f64,
-    /// Probability that one is noisy.
-    pub noisy: f64,
-    /// How many times as noisy that is.
-    pub noisy_factor: f64,
-}
-
-impl Default for VariationEffect {
-    /// From MiaoLi/syntouchcontact's recordings of three sensors. Resistance: their medians
-    /// without contact. Offset: two untouched sensors (0.07, 0.15) and two pressed ones in sessions
-    /// after those. Gain: F1 against F2 as `palpate calibrate` has them. Drift: walks of 3, 4 and 9
-    /// counts per root second about the first. Attitude: F1 against F2 on the plate, where the
-    /// hand's is in it too. Stiffness: chosen, about two points of Shore hardness. Electrodes:
-    /// chosen; one of the three sensors drops out at times.
-    fn default() -> Self {
-        Self {
-            resistance: 0.06,
-            offset: 0.12,
-            gain: 0.1,
-            drift: 0.6,
-            attitude_deg: 2.0,
-            stiffness: 0.1,
-            dead: 0.1,
-            noisy: 0.1,
-            noisy_factor: 10.0,
-        }
-    }
-}
-
-impl Checked for VariationEffect {
-    fn check(&self, rules: &mut Rules) {
-        rules.number("resistance", self.resistance, 0.0..=1.0);
-        rules.number("offset", self.offset, 0.0..=1.0);
-        rules.number("gain", self.gain, 0.0..=1.0);
-        rules.number("drift", self.drift, 0.0..=2.0);
-        rules.number("attitude_deg", self.attitude_deg, 0.0..=45.0);
-        rules.number("stiffness", self.stiffness, 0.0..=1.0);
-        rules.number("dead", self.dead, 0.0..=1.0);
-        rules.number("noisy", self.noisy, 0.0..=1.0);
-        rules.number("noisy_factor", self.noisy_factor, 1.0..=1e3);
+effect! {
+    /// Table `[variation]`: another sensor of the kind in each trial. Every number is a standard
+    /// deviation about what the scene says, of a logarithm unless it is of an angle; or a probability.
+    VariationEffect in "variation"
+    constants {
+        /// Of each electrode's resistance at rest.
+        resistance: f64, 0.0..=1.0;
+        /// Of the fluid's conductivity, common to all electrodes of a session.
+        offset: f64, 0.0..=1.0;
+        /// Of what the electrodes make of their gaps, common to all.
+        gain: f64, 0.0..=1.0;
+        /// Of the rate at which the electrodes drift.
+        drift: f64, 0.0..=2.0;
+        /// Of the fingertip on its mount, in degrees about each axis.
+        attitude_deg: f64, 0.0..=45.0;
+        /// Of the silicone's stiffness, in `[skin]`.
+        stiffness: f64, 0.0..=1.0;
+        /// Probability that an electrode of the sensor is open.
+        dead: f64, 0.0..=1.0;
+        /// Probability that one is noisy.
+        noisy: f64, 0.0..=1.0;
+        /// How many times as noisy that is.
+        noisy_factor: f64, 1.0..=1e3;
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::membrane::{Membrane, Push, Settled};
 use super::sheet::Material;
-use crate::sim::finger::cavity::{Balance, SkinContact};
 use crate::sim::finger::column::{Column, Response};
+use crate::sim::finger::foundation::{Balance, SkinContact};
 use crate::sim::finger::lattice::Lattice;
 
 /// A shell among the samples of a skin; never changes.

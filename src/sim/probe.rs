@@ -1,4 +1,4 @@
-//! Sweeps the finger's hull along the approach to first contact on the exact mesh.
+//! Probes whose scenes ask for no dynamics.
 
 use crate::backend::Fault;
 use crate::explore::probe::{Contact, Probe, Swept, Touch, refuse_unless_finite};
@@ -11,7 +11,45 @@ use crate::task::approach::BEYOND_M;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;
 
-/// Touches the exact mesh with the rigid hull.
+/// Touches whatever stands in `environment`, exactly and at once.
+pub fn exact(environment: Arc<Environment>) -> Box<dyn Probe> {
+    match environment.shape() {
+        Shape::Function(_) => Box::new(FunctionProbe::new(environment)),
+        Shape::Mesh { .. } => Box::new(Cast::new(environment)),
+    }
+}
+
+/// Touches the scene's function.
+pub struct FunctionProbe {
+    environment: Arc<Environment>,
+}
+
+impl FunctionProbe {
+    /// In `environment`.
+    pub fn new(environment: Arc<Environment>) -> Self {
+        Self { environment }
+    }
+}
+
+impl Probe for FunctionProbe {
+    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+        refuse_unless_finite(approach)?;
+        let (Shape::Function(function), Some(zone)) =
+            (self.environment.shape(), self.environment.task().zone())
+        else {
+            return Ok(Touch::Miss);
+        };
+        let place = zone.place(&approach.p_near_w);
+        let x_m = place[0];
+        let normal_z = Vector3::new(-function.slope(x_m), 1.0, 0.0).normalize();
+        Ok(Touch::Contact(Contact {
+            p_wc: zone.point(&place, function.height_m(x_m)),
+            normal_w: zone.x_wz().rotation * normal_z,
+        }))
+    }
+}
+
+/// Sweeps the finger's hull along the approach to first contact on the exact mesh.
 pub struct Cast {
     environment: Arc<Environment>,
     swept: Option<Swept>,

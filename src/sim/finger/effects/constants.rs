@@ -1,0 +1,179 @@
+//! The constants of effects, which stand in the file of a sensor and not in a scene.
+//!
+//! In memory an effect holds its constants beside its settings.
+
+use crate::config::Rules;
+use serde::de::DeserializeOwned;
+use std::ops::{RangeFull, RangeInclusive};
+use std::sync::LazyLock;
+use toml::{Table, Value};
+
+/// The sensors that come with Palpate: names and files.
+pub const SENSORS: [(&str, &str); 1] = [("biotac", include_str!("../../../../models/biotac.toml"))];
+
+/// The tables of the BioTac's file.
+pub(super) static BIOTAC: LazyLock<Table> =
+    LazyLock::new(|| toml::from_str(SENSORS[0].1).unwrap_or_default());
+
+/// Value of a constant in the BioTac's file, by the dotted name of its table and its key.
+pub(super) fn constant<T: DeserializeOwned + Default>(table: &str, key: &str) -> T {
+    let table = table.split('.').try_fold(&*BIOTAC, |table, part| table.get(part)?.as_table());
+    let value = table.and_then(|table| table.get(key)).cloned();
+    value.and_then(|value| value.try_into().ok()).unwrap_or_default()
+}
+
+/// A type of constants with what limits one.
+pub(super) trait Constant {
+    /// The values that are allowed.
+    type Allowed;
+
+    /// Checks the constant under `key`.
+    fn check(&self, key: &str, allowed: Self::Allowed, rules: &mut Rules);
+}
+
+impl Constant for f64 {
+    type Allowed = RangeInclusive<f64>;
+
+    fn check(&self, key: &str, allowed: Self::Allowed, rules: &mut Rules) {
+        rules.number(key, *self, allowed);
+    }
+}
+
+impl<const N: usize> Constant for [f64; N] {
+    type Allowed = RangeInclusive<f64>;
+
+    fn check(&self, key: &str, allowed: Self::Allowed, rules: &mut Rules) {
+        rules.numbers(key, self, allowed);
+    }
+}
+
+impl Constant for usize {
+    type Allowed = RangeInclusive<usize>;
+
+    fn check(&self, key: &str, allowed: Self::Allowed, rules: &mut Rules) {
+        rules.require(key, self, allowed.contains(self), || {
+            format!("{} to {}", allowed.start(), allowed.end())
+        });
+    }
+}
+
+impl Constant for bool {
+    type Allowed = RangeFull;
+
+    fn check(&self, _: &str, _: RangeFull, _: &mut Rules) {}
+}
+
+/// Makes the type of an effect from its settings, which a scene gives, and its constants, which the
+/// sensor's file gives under the name of a table. `checked by` names the rules of the settings.
+macro_rules! effect {
+    (
+        $(#[$doc:meta])*
+        $Effect:ident in $table:literal
+        $(settings checked by $check:path {
+            $($(#[$setting_doc:meta])* $setting:ident: $Setting:ty = $default:expr,)*
+        })?
+        constants {
+            $($(#[$constant_doc:meta])* $constant:ident: $Constant:ty, $allowed:expr;)*
+        }
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $Effect {
+            $($($(#[$setting_doc])* pub $setting: $Setting,)*)?
+            $($(#[$constant_doc])* #[schemars(skip)] pub $constant: $Constant,)*
+        }
+
+        impl Default for $Effect {
+            /// Constants are those of `models/biotac.toml`, which names their sources.
+            fn default() -> Self {
+                use crate::sim::finger::effects::constants::constant;
+                Self {
+                    $($($setting: $default,)*)?
+                    $($constant: constant($table, stringify!($constant)),)*
+                }
+            }
+        }
+
+        impl crate::config::Checked for $Effect {
+            fn check(&self, rules: &mut crate::config::Rules) {
+                use crate::sim::finger::effects::constants::Constant;
+                $($check(self, rules);)?
+                $(Constant::check(&self.$constant, stringify!($constant), $allowed, rules);)*
+            }
+        }
+    };
+}
+pub(super) use effect;
+
+/// Splits the tables of effects into settings and those constants that are not the BioTac's.
+pub(super) fn split(effects: Table) -> (Table, Table) {
+    split_by(effects, &BIOTAC)
+}
+
+fn split_by(effects: Table, biotac: &Table) -> (Table, Table) {
+    let (mut settings, mut constants) = (Table::new(), Table::new());
+    for (key, value) in effects {
+        match (biotac.get(&key), value) {
+            (Some(Value::Table(biotac)), Value::Table(inner)) => {
+                let (own, others) = split_by(inner, biotac);
+                if !others.is_empty() {
+                    constants.insert(key.clone(), Value::Table(others));
+                }
+                settings.insert(key, Value::Table(own));
+            }
+            (Some(known), value) if *known != value => drop(constants.insert(key, value)),
+            (Some(_), _) => {}
+            (None, value) => drop(settings.insert(key, value)),
+        }
+    }
+    (settings, constants)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::finger::Effects;
+
+    /// Keys of effects that are no constants.
+    const SETTINGS: [&str; 5] =
+        ["skin.model", "skin.samples", "skin.along", "skin.around", "timing.control_delay_s"];
+
+    fn unknown(effects: &Table, biotac: &Table, prefix: &str, found: &mut Vec<String>) {
+        for (key, value) in effects {
+            let path = format!("{prefix}{key}");
+            match (biotac.get(key), value) {
+                (Some(Value::Table(biotac)), Value::Table(inner)) => {
+                    unknown(inner, biotac, &format!("{path}."), found);
+                }
+                (Some(_), _) => {}
+                (None, _) if SETTINGS.contains(&path.as_str()) => {}
+                (None, _) => found.push(path),
+            }
+        }
+    }
+
+    /// A constant that is missing in the file would be 0.
+    #[test]
+    fn every_constant_stands_in_the_file() {
+        let settings = Effects::all();
+        let mut whole = Table::new();
+        for (name, value) in [
+            ("skin", Table::try_from(&settings.skin)),
+            ("fluid", Table::try_from(&settings.fluid)),
+            ("electrodes", Table::try_from(&settings.electrodes)),
+            ("creep", Table::try_from(&settings.creep)),
+            ("thermal", Table::try_from(&settings.thermal)),
+            ("friction", Table::try_from(&settings.friction)),
+            ("wrench", Table::try_from(&settings.wrench)),
+            ("variation", Table::try_from(&settings.variation)),
+            ("timing", Table::try_from(&settings.timing)),
+        ] {
+            whole.insert(name.into(), Value::Table(value.unwrap()));
+        }
+        let mut found = Vec::new();
+        unknown(&whole, &BIOTAC, "", &mut found);
+        assert!(found.is_empty(), "{found:?}");
+        assert_eq!(split(whole).1, Table::new());
+    }
+}

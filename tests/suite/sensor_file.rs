@@ -1,0 +1,115 @@
+//! The file with the constants of a sensor, and scenes of version 0.1 that had them in their effects.
+
+use palpate::experiment::Experiment;
+use palpate::experiment::store::resolved;
+use palpate::sim::{Environment, Scene};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+}
+
+fn scene(sets: &[&str]) -> Result<Scene, String> {
+    let sets: Vec<String> = sets.iter().map(|set| (*set).into()).collect();
+    Scene::load(&path("scenes/container_finger.toml"), &sets).map_err(|error| error.to_string())
+}
+
+/// A folder with this sensor's file, and the assignment that names it.
+fn sensor(text: &str) -> (TempDir, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("sensor.toml");
+    std::fs::write(&file, text).unwrap();
+    (folder, format!("effects.sensor={}", file.display()))
+}
+
+/// A file changes the constants of the effects that are on, and switches none on.
+#[test]
+fn a_file_gives_the_constants_of_a_scene() {
+    let shipped = scene(&[]).unwrap();
+    let text =
+        "[skin]\nflatten_pa_m = 1.8e6\n[electrodes]\nnoise = 0\n[friction]\ncoefficient = 1\n";
+    let (_folder, set) = sensor(text);
+    let given = scene(&[&set]).unwrap();
+    let [was, is] = [&shipped, &given].map(|scene| &scene.effects);
+    assert_eq!(is.skin.as_ref().unwrap().flatten_pa_m, 1.8e6);
+    assert_eq!(is.electrodes.as_ref().unwrap().noise, 0.0);
+    assert_eq!(is.skin.as_ref().unwrap().core_pa_m, was.skin.as_ref().unwrap().core_pa_m);
+    assert!(is.friction.is_none() && is.moved_keys.is_empty());
+    assert_eq!(scene(&["effects.sensor=biotac"]).unwrap(), shipped);
+    assert_eq!(scene(&["effects.sensor=models/biotac.toml"]).unwrap(), shipped);
+    let inline = scene(&["effects.sensor={skin={flatten_pa_m=1.8e6}, electrodes={noise=0.0}}"]);
+    assert_eq!(inline.unwrap(), given);
+}
+
+/// Errors name the sensor's file, its line and key, the value and what is allowed.
+#[test]
+fn what_is_wrong_with_a_file_is_said_with_its_place() {
+    for (text, said) in [
+        ("[skin]\npoisson = 0.7", "sensor.toml:2: `skin.poisson` = 0.7: allowed is 0 to 0.49"),
+        (
+            "[skin]\nflaten_pa_m = 1e6",
+            "sensor.toml:2: unknown key `skin.flaten_pa_m`, did you mean",
+        ),
+        ("[skin]\nsamples = 100", "settings of effects stand in the scene"),
+        ("[fluid]\nquantise = 3", "sensor.toml:2: `fluid.quantise` = 3"),
+        ("skin =", "not valid TOML"),
+    ] {
+        let (_folder, set) = sensor(text);
+        let error = scene(&[&set]).unwrap_err();
+        assert!(error.contains(said), "{error}");
+    }
+    for (set, said) in [
+        ("effects.sensor=none.toml", "allowed is a readable file"),
+        ("effects.sensor=takktile", "\"takktile\": allowed is \"biotac\", or a file"),
+        ("effects.flex={}", "removed: the skins are model = \"columns\" and model = \"shell\""),
+    ] {
+        let error = scene(&[set]).unwrap_err();
+        assert!(error.contains(said), "{error}");
+    }
+}
+
+/// Constants in the effects themselves win over the file, with one note; those that change nothing
+/// need none.
+#[test]
+fn constants_in_effects_are_still_read() {
+    let (_folder, set) = sensor("[skin]\nflatten_pa_m = 1.8e6");
+    let old = "effects.skin.flatten_pa_m=2e6";
+    let given = scene(&[&set, old, "effects.skin.core_pa_m=1.4e9"]).unwrap();
+    assert_eq!(given.effects.skin.as_ref().unwrap().flatten_pa_m, 2e6);
+    assert_eq!(given.effects.moved_keys, ["effects.skin.flatten_pa_m"]);
+    let environment = Environment::build(given).unwrap();
+    let notices = environment.notices();
+    assert!(
+        notices.iter().any(|notice| notice.contains("effects.skin.flatten_pa_m")),
+        "{notices:?}"
+    );
+    assert!(scene(&["effects.skin.flatten_pa_m=3.5e6"]).unwrap().effects.moved_keys.is_empty());
+}
+
+/// `resolved.toml` holds the constants that differ and can be run again without the sensor's file;
+/// that of version 0.1, which had all of them in the effects, is the same experiment.
+#[test]
+fn resolved_experiments_hold_what_differs() {
+    let read = |text: &str| {
+        Experiment::parse(&path("experiments/resolved.toml"), text.into(), &[]).unwrap()
+    };
+    let plain = Experiment::load(&path("experiments/container_finger.toml"), &[]).unwrap();
+    let written = resolved(&plain);
+    assert!(!written.contains("modulus_pa") && written.contains("samples"), "{written}");
+    assert_eq!(read(&written), plain);
+    let old = written.replace(
+        "[scene.effects.skin]\n",
+        "[scene.effects.skin]\nmodulus_pa = 1552000.0\nflatten_pa_m = 3500000.0\n",
+    );
+    assert_ne!(old, written);
+    assert_eq!(read(&old), plain);
+    let (folder, set) = sensor("[skin]\nflatten_pa_m = 1.8e6");
+    let experiment = path("experiments/container_finger.toml");
+    let other = Experiment::load(&experiment, &[format!("scene.{set}")]).unwrap();
+    drop(folder);
+    let written = resolved(&other);
+    assert!(written.contains("[scene.effects.sensor.skin]\nflatten_pa_m = 1800000.0"), "{written}");
+    assert_eq!(read(&written), other);
+    assert_ne!(other, plain);
+}
