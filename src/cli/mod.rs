@@ -1,5 +1,6 @@
 //! The command line.
 
+mod accuracy;
 mod align;
 mod bench;
 mod calibrate;
@@ -9,15 +10,12 @@ mod columns;
 mod compare;
 mod completions;
 mod cost;
-mod effects;
 mod export;
-mod fidelity;
 mod find;
 mod host;
 mod known_body;
 mod list;
 mod merge;
-mod needs;
 mod new;
 mod output;
 mod patience;
@@ -36,7 +34,6 @@ mod suite;
 mod terminal;
 mod twin;
 mod watch;
-mod within;
 
 pub use host::Bring;
 
@@ -68,7 +65,7 @@ Examples:
   palpate export runs/bird --planner active --out bird.ply
   palpate suite experiments/suite/six.toml  planners on objects that differ: who is better where
   palpate check toy --baseline experiments/baselines/toy.jsonl
-  palpate fidelity scenes/bird_finger.toml --tolerance 0.2mm
+  palpate accuracy scenes/bird_finger.toml --tolerance 0.2mm
   palpate stress                            hard cases until they break
 
 Exit codes: 0 done, 1 a test failed, 2 could not (the message says why), 3 undecided, 130 interrupted; run the same command \
@@ -106,10 +103,8 @@ enum Command {
     Check(check::Args),
     /// Hold the instructions of fixed work against a committed table.
     Cost(cost::Args),
-    /// Show what accuracy costs: errors and time over a ladder of scenes.
-    Fidelity(fidelity::Args),
-    /// Show what each effect of a scene changes and costs.
-    Effects(effects::Args),
+    /// Show what accuracy costs: error and time of a scene's levels and effects.
+    Accuracy(accuracy::Args),
     /// Run hard cases at rising severity until they break.
     Stress(stress::Args),
     /// Time each piece of a trial, and say how far it is from what the machine can do.
@@ -156,8 +151,7 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, bring: &Bring) -
         Command::Watch(args) => watch::run(&args, cli.talk),
         Command::Twin(args) => twin::run(&args, cli.talk),
         Command::Export(args) => export::run(&args),
-        Command::Fidelity(args) => fidelity::run(&args, cli.talk),
-        Command::Effects(args) => effects::run(&args, cli.talk),
+        Command::Accuracy(args) => accuracy::run(&args, cli.talk),
         Command::Check(args) => check::run(&args, cli.talk),
         Command::Cost(args) => cost::run(&args, cli.talk),
         Command::Stress(args) => stress::run(&args, cli.talk),

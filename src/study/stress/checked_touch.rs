@@ -9,7 +9,7 @@ use crate::geometry::mesh::Mesh;
 use crate::sim::environment::{EnvironmentError, Shape};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
-use crate::study::fidelity::reference_load::{ReferenceLoad, reference_load};
+use crate::study::accuracy::touches::{ReferenceLoad, reference_load};
 use std::sync::Arc;
 
 /// One touch and what came of it.

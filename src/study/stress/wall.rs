@@ -11,7 +11,7 @@ use crate::sim::finger::Effects;
 use crate::sim::finger::effects::timing::TimingEffect;
 use crate::sim::scene::Body;
 use crate::sim::simulator::Simulator;
-use crate::study::fidelity::reference_load::noise_free;
+use crate::study::accuracy::touches::noise_free;
 use crate::task::Zone;
 use crate::task::touch::TouchSettings;
 use std::sync::Arc;

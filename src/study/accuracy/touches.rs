@@ -1,0 +1,282 @@
+//! Touches of a scene without sensor noise, so that only the model differs: contacts, loads, times.
+
+use crate::backend::Fault;
+use crate::backend::trace::{Tick, Ticks, Trace};
+use crate::experiment::statistics::median;
+use crate::experiment::truth::Truth;
+use crate::explore::belief::HeightField;
+use crate::explore::gp_settings::GpSettings;
+use crate::explore::planner;
+use crate::explore::planner::{PlannerFactory, PlanningSettings};
+use crate::explore::probe::{Contact, Probe, Touch};
+use crate::math::seed;
+use crate::robot::finger::frame::ELECTRODES;
+use crate::robot::finger::{Frame, TipMotion};
+use crate::sim::environment::Shape;
+use crate::sim::finger::FingertipState;
+use crate::sim::simulator::Simulator;
+use crate::sim::{Environment, Scene};
+use crate::task::{Approach, Target};
+use rayon::prelude::*;
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A touch is repeated until it has taken this long: far above the clock's grain.
+const LEAST_S: f64 = 0.02;
+
+/// Most repetitions of a touch.
+const REPEATS: u32 = 1000;
+
+/// Touches of one trial: after so many a finger's heat and drift have shown.
+// heuristic: an experiment's trials have ten touches or more.
+const TRIAL: usize = 10;
+
+/// The finger still stands where it was deepest as long as it is within this: far above rounding,
+/// far below a tick of any approach.
+const STILL_M: f64 = 1e-7;
+
+/// Targets in trials of ten.
+#[derive(Clone, Debug)]
+pub struct Trials {
+    targets: Vec<Vec<Target>>,
+    first: u64,
+}
+
+impl Trials {
+    /// `count` targets of the scene's zone, evenly spread; the first trial has number `first`.
+    /// Another `first` is another sequence of targets.
+    pub fn new(scene: &Scene, count: usize, first: u64) -> Self {
+        let targets = targets(scene, count, first);
+        Self { targets: targets.chunks(TRIAL).map(<[_]>::to_vec).collect(), first }
+    }
+
+    /// All targets.
+    pub fn targets(&self) -> Vec<Target> {
+        self.targets.concat()
+    }
+
+    /// Touches them in a [`noise_free`] scene, trial by trial.
+    ///
+    /// # Errors
+    /// If the body cannot be simulated or brought to its start.
+    pub fn touch(&self, environment: &Arc<Environment>) -> anyhow::Result<Vec<Touches>> {
+        let simulator = Simulator::new(Arc::clone(environment))?;
+        let trials = self.targets.par_iter().enumerate();
+        Ok(trials
+            .map(|(i, targets)| touch_all(&simulator, targets, self.first + i as u64))
+            .collect::<Result<_, Fault>>()?)
+    }
+}
+
+/// Evenly spread places of the scene's zone.
+pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Target> {
+    let Some(zone) = scene.zone.clone() else { return Vec::new() };
+    let belief = HeightField::new(zone, GpSettings::default()).into();
+    let Some(entry) = planner::by_name("sobol") else { return Vec::new() };
+    let random = seed::stream(seed, 0, "targets");
+    let mut sobol = entry.make(&PlanningSettings::default(), random);
+    (0..count).filter_map(|_| Some(sobol.plan(&belief).ok()?.target)).collect()
+}
+
+/// Results of the touches of one trial.
+#[derive(Debug, Default)]
+pub struct Touches {
+    /// The contact of each touch; `None` after a miss or a fault.
+    pub contacts: Vec<Option<Contact>>,
+    /// The load on the finger when each contact was read.
+    pub loads: Vec<Option<ReferenceLoad>>,
+    /// Simulated time of each touch of a body that moves.
+    pub simulated_s: Vec<f64>,
+    /// Touches that ended in a fault.
+    pub faults: usize,
+}
+
+/// Touches every target with the simulator of a [`noise_free`] scene.
+///
+/// # Errors
+/// If the body cannot be brought to its start.
+pub fn touch_all(simulator: &Simulator, targets: &[Target], seed: u64) -> Result<Touches, Fault> {
+    let environment = simulator.environment();
+    let (mut probe, ticks): (Box<dyn Probe>, _) = match (simulator.body()?, environment.chain()) {
+        (Some(body), Some(chain)) => {
+            let (trace, ticks) = Trace::new(body, chain);
+            (Box::new(simulator.servo(Box::new(trace), seed)?), ticks)
+        }
+        _ => (simulator.probe(seed)?, Ticks::default()),
+    };
+    let mut touches = Touches::default();
+    for target in targets {
+        let outcome = environment.task().approach(target).map(|approach| probe.touch(&approach));
+        touches.faults += usize::from(matches!(outcome, Some(Err(_))));
+        let contact = match outcome {
+            Some(Ok(Touch::Contact(contact))) => Some(contact),
+            _ => None,
+        };
+        let ticks = ticks.take();
+        if let (Some(first), Some(last)) = (ticks.first(), ticks.last()) {
+            touches.simulated_s.push(last.time_s - first.time_s);
+        }
+        touches.loads.push(contact.as_ref().and_then(|_| reference_load(simulator, &ticks)));
+        touches.contacts.push(contact);
+    }
+    Ok(touches)
+}
+
+/// The load on the finger at the end of its rest on the object.
+#[derive(Clone, Debug)]
+pub struct ReferenceLoad {
+    /// Pose and motion of the fingertip.
+    pub motion: TipMotion,
+    /// Magnitude of the force.
+    pub force_n: f64,
+    /// Rise of the static pressure.
+    pub pdc_counts: Option<f64>,
+    /// Change of each electrode.
+    pub electrode_counts: Option<[f64; ELECTRODES]>,
+}
+
+/// `scene` with sensors that add no noise, do not drift and do not round.
+pub fn noise_free(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    let effects = &mut scene.effects;
+    if let Some(electrodes) = &mut effects.electrodes {
+        (electrodes.noise, electrodes.drift_counts, electrodes.quantise) = (0.0, 0.0, false);
+    }
+    if let Some(fluid) = &mut effects.fluid {
+        (fluid.noise_counts, fluid.quantise) = (0.0, false);
+        if let Some(vibration) = &mut fluid.vibration {
+            vibration.noise_counts = 0.0;
+        }
+    }
+    if let Some(thermal) = &mut effects.thermal {
+        (thermal.tdc_noise_counts, thermal.tac_noise_counts) = (0.0, 0.0);
+        thermal.quantise = false;
+    }
+    scene
+}
+
+/// Leads a fresh finger of a [`noise_free`] scene along the movement in `ticks` once more; returns
+/// its load at the end of its rest on the object, or `None` without a skin or a contact.
+pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<ReferenceLoad> {
+    let environment = simulator.environment();
+    let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape()) else {
+        return None;
+    };
+    let zone = environment.task().zone()?;
+    let height_m = |tick: &Tick| zone.height_m(&tick.motion.x_wt.translation.vector.into());
+    let mut shell = simulator.shell().ok()?;
+    let deepest_m = ticks.iter().map(height_m).fold(f64::INFINITY, f64::min);
+    let last = ticks.iter().rposition(|tick| height_m(tick) <= deepest_m + STILL_M)?;
+    let mut state = FingertipState::new(tip, &seed::stream(0, 0, "finger"));
+    let mut before_s = ticks.first()?.time_s;
+    let (mut rest, mut now) = (None, Frame::default());
+    let mut load = Default::default();
+    for tick in &ticks[..=last] {
+        let dt_s = (tick.time_s - before_s).max(0.0);
+        before_s = tick.time_s;
+        load = match &mut shell {
+            Some(shell) => {
+                let pressed = shell.step(&tick.motion.x_wt, dt_s).ok()?;
+                state.step_loaded(tip, pressed, &tick.motion, dt_s).ok()?
+            }
+            None => state.step(tip, bvh, &tick.motion, dt_s).ok()?,
+        };
+        while let Some(frame) = state.frame() {
+            rest.get_or_insert_with(|| frame.clone());
+            now = frame;
+        }
+    }
+    let rest = rest.unwrap_or_default();
+    let electrode_counts = (now.electrode_counts.zip(rest.electrode_counts))
+        .map(|(now, rest)| std::array::from_fn(|i| now[i] - rest[i]));
+    Some(ReferenceLoad {
+        motion: ticks[last].motion,
+        force_n: load.force_n.norm(),
+        pdc_counts: now.pdc_counts.zip(rest.pdc_counts).map(|(now, rest)| now - rest),
+        electrode_counts,
+    })
+}
+
+/// Median wall time of a touch of `scene`, its sensors as noisy as they are.
+///
+/// # Errors
+/// If the scene cannot be built or its body not be brought to its start.
+pub fn wall_time_s(scene: &Scene, targets: &[Target]) -> anyhow::Result<Option<f64>> {
+    let environment = Arc::new(Environment::build(scene.clone())?);
+    let mut probe = Simulator::new(Arc::clone(&environment))?.probe(0)?;
+    let approaches = targets.iter().filter_map(|target| environment.task().approach(target));
+    let walls_s: Vec<f64> = approaches.map(|it| repeated_s(probe.as_mut(), &it)).collect();
+    Ok(median(&walls_s))
+}
+
+/// Mean wall time of a touch over as many as take long enough to be measured.
+fn repeated_s(probe: &mut dyn Probe, approach: &Approach) -> f64 {
+    let (mut taken_s, mut count) = (0.0, 0);
+    while taken_s < LEAST_S && count < REPEATS {
+        taken_s += once_s(probe, approach);
+        count += 1;
+    }
+    taken_s / f64::from(count)
+}
+
+/// Wall times of `pairs` of touches, one of each scene: interleaved, so that other load of the machine
+/// falls on both alike.
+///
+/// # Errors
+/// If a scene cannot be built or its body not be brought to its start.
+pub fn paired_times_s(
+    scenes: [&Scene; 2],
+    targets: &[Target],
+    pairs: usize,
+) -> anyhow::Result<Vec<[f64; 2]>> {
+    let open = |scene: &Scene| -> anyhow::Result<_> {
+        let environment = Arc::new(Environment::build(scene.clone())?);
+        Ok((Simulator::new(Arc::clone(&environment))?.probe(0)?, environment))
+    };
+    let mut opened = [open(scenes[0])?, open(scenes[1])?];
+    let mut times_s = Vec::with_capacity(pairs);
+    for (i, target) in targets.iter().cycle().take(pairs).enumerate() {
+        let mut pair_s = [f64::NAN; 2];
+        // Which goes first alternates: the second finds the caches warm.
+        for k in [i % 2, (i + 1) % 2] {
+            let (probe, environment) = &mut opened[k];
+            let Some(approach) = environment.task().approach(target) else { continue };
+            pair_s[k] = once_s(probe.as_mut(), &approach);
+        }
+        times_s.push(pair_s);
+    }
+    times_s.retain(|[a, b]| (a + b).is_finite());
+    Ok(times_s)
+}
+
+fn once_s(probe: &mut dyn Probe, approach: &Approach) -> f64 {
+    let begun = Instant::now();
+    let _ = black_box(probe.touch(approach));
+    begun.elapsed().as_secs_f64()
+}
+
+/// Bytes of a finger's skin, electrodes and one trial's memory of them; the mesh and its tree, which
+/// all variants of a scene share, are left out.
+pub fn finger_bytes(environment: &Environment) -> usize {
+    let Some(tip) = environment.fingertip() else { return 0 };
+    tip.bytes() + FingertipState::new(tip, &seed::stream(0, 0, "finger")).bytes()
+}
+
+/// Root mean square error of the surface believed after these touches; `None` if nothing can be
+/// fitted.
+pub fn surface_rmse_m(
+    scene: &Scene,
+    targets: &[Target],
+    touches: &[Touches],
+    truth: &Truth,
+) -> Option<f64> {
+    let mut belief = HeightField::new(scene.zone.clone()?, GpSettings::default());
+    let contacts = touches.iter().flat_map(|touches| &touches.contacts);
+    for (target, contact) in targets.iter().zip(contacts) {
+        let touch = contact.clone().map_or(Touch::Miss, Touch::Contact);
+        belief.observe(target.place()?, &touch);
+    }
+    let (_, surface) = belief.refit().ok()?;
+    Some(truth.compare(surface)?.rmse_m)
+}
