@@ -7,13 +7,13 @@ use super::legend::{Legend, Swatch};
 use super::style;
 use super::style::{FAINT_INK, INK, PAPER, SMALL_PX};
 use crate::experiment::statistics::mean;
+use crate::study::accuracy::comparison::Comparison;
 use crate::study::accuracy::convergence::Order;
 use crate::study::accuracy::deviation::Spread;
-use crate::study::accuracy::level::{Level, Senses};
-use crate::study::accuracy::levels::Levels;
+use crate::study::accuracy::level::Level;
 use crate::study::accuracy::variant::Variant;
 
-/// The colour and name of a level, by Okabe and Ito; those of a shell are the fourth.
+/// The colour, by Okabe and Ito, and the name of a level's senses, then those of a shell.
 const FAMILIES: [(&str, &str); 5] = [
     ("#000000", "rigid"),
     ("#e69f00", "soft skin"),
@@ -34,24 +34,31 @@ const TOP_PX: f64 = 66.0;
 const LINE_PX: f64 = 18.0;
 const NAME_PX: f64 = 140.0;
 
-/// Draws the figure; `None` without a variant that differs from its reference.
-pub fn draw(levels: &Levels, effects: &[Variant]) -> Option<String> {
-    let rows = if levels.variants.is_empty() { 0.0 } else { 2.0 };
-    let lines_px = effects.len() as f64 * LINE_PX;
-    let effects_px = if effects.is_empty() { 0.0 } else { lines_px + 84.0 };
-    let height_px = TOP_PX + rows * ROW_PX + effects_px - 30.0;
-    let mut canvas = Canvas::new(LEFT_PX + 3.0 * STEP_PX - 60.0, height_px);
-    if rows > 0.0 {
+/// Draws levels and effects, as far as they were compared; `None` without a variant that differs from
+/// its reference.
+pub fn draw(
+    levels: Option<&Comparison>,
+    orders: &[Order],
+    effects: Option<&Comparison>,
+) -> Option<String> {
+    let top_px = if levels.is_some() { TOP_PX + 2.0 * ROW_PX } else { TOP_PX };
+    let lines_px = effects.map_or(0.0, |effects| effects.variants.len() as f64 * LINE_PX);
+    let bottom_px = if effects.is_some() { 54.0 } else { -30.0 };
+    let mut canvas = Canvas::new(LEFT_PX + 3.0 * STEP_PX - 60.0, top_px + lines_px + bottom_px);
+    if let Some(levels) = levels {
         draw_levels(&mut canvas, levels)?;
     }
-    if !effects.is_empty() {
-        let top = TOP_PX + rows * ROW_PX;
-        draw_effects(&mut canvas, effects, Area { top, height: lines_px, ..area(0, 0) })?;
+    for (column, order) in orders.iter().enumerate() {
+        draw_order(&mut canvas, order, area(column, 1));
+    }
+    if let Some(effects) = effects {
+        let first = Area { top: top_px, height: lines_px, ..area(0, 0) };
+        draw_effects(&mut canvas, &effects.variants, first)?;
     }
     Some(canvas.finish())
 }
 
-fn draw_levels(canvas: &mut Canvas, levels: &Levels) -> Option<()> {
+fn draw_levels(canvas: &mut Canvas, levels: &Comparison) -> Option<()> {
     let entries: Vec<_> = (FAMILIES.iter())
         .map(|(colour, words)| (Swatch::Circle(point(colour)), *words))
         .chain([
@@ -63,11 +70,7 @@ fn draw_levels(canvas: &mut Canvas, levels: &Levels) -> Option<()> {
     Legend::new(LEFT_PX + 2.0 * STEP_PX + PANEL_PX.0, entries).draw(canvas, [LEFT_PX, 20.0]);
     draw_cost(canvas, levels, (0, 1e-3, "contact off the reference's (mm)"), |it| it.contact_m)?;
     draw_cost(canvas, levels, (1, 1.0, "force off the reference's (N)"), |it| it.force_n)?;
-    draw_cost(canvas, levels, (2, 1e-3, "contact off the true surface (mm)"), |it| it.off_truth_m)?;
-    for (column, order) in levels.orders.iter().enumerate() {
-        draw_order(canvas, order, area(column, 1));
-    }
-    Some(())
+    draw_cost(canvas, levels, (2, 1e-3, "contact off the true surface (mm)"), |it| it.off_truth_m)
 }
 
 fn area(column: usize, row: usize) -> Area {
@@ -77,61 +80,48 @@ fn area(column: usize, row: usize) -> Area {
 }
 
 fn colour(level: &Level) -> &'static str {
-    match (level.senses, level.shell) {
-        (_, Some(_)) => FAMILIES[4].0,
-        (Senses::Rigid, _) => FAMILIES[0].0,
-        (Senses::Dry, _) => FAMILIES[1].0,
-        (Senses::Fluid, _) => FAMILIES[2].0,
-        (Senses::Full, _) => FAMILIES[3].0,
-    }
+    let family = if level.shell.is_some() { 4 } else { level.senses as usize };
+    FAMILIES[family].0
 }
 
 /// Draws an error over the wall time of a touch.
 fn draw_cost(
     canvas: &mut Canvas,
-    levels: &Levels,
+    levels: &Comparison,
     (column, unit, words): (usize, f64, &str),
     measure: fn(&Variant) -> Option<Spread>,
 ) -> Option<()> {
     let area = area(column, 0);
-    let is_reference = |it: &Variant| it.level.is_some_and(|level| level.is_reference());
-    let mut points: Vec<(f64, Bar, Option<Level>)> = (levels.variants.iter())
-        .filter(|variant| !is_reference(variant))
-        .filter_map(|variant| {
-            let spread = measure(variant)?;
-            let bar = (spread.mean / unit, spread.interval.map(|value| value / unit));
-            Some((1e3 * variant.wall_s?, bar, variant.level))
-        })
+    let mut points: Vec<(f64, Bar, &Variant)> = (levels.variants.iter())
+        .filter_map(|variant| Some((1e3 * variant.wall_s?, bar(measure(variant)?, unit), variant)))
         .collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let ends =
         points.iter().flat_map(|(_, (mean, [low, high]), _)| [low.max(0.3 * mean), *high, *mean]);
-    let times_ms = levels.variants.iter().filter_map(|variant| Some(1e3 * variant.wall_s?));
+    let reference_ms = 1e3 * levels.reference.wall_s?;
+    let times_ms = points.iter().map(|(time_ms, ..)| *time_ms).chain([reference_ms]);
     let panel = Panel { area, x: Axis::log(times_ms)?, y: Axis::log(ends)? };
     panel.frame(canvas);
     panel.label(canvas, "", "wall time of a touch (ms)", words);
     canvas.clipped(area, |canvas| {
         let mut least = f64::INFINITY;
-        let front = points.iter().filter(|(_, (error, _), _)| {
-            let is_better = *error > 0.0 && *error < least;
-            least = if is_better { *error } else { least };
-            is_better
-        });
-        let corners: Vec<_> = front.map(|(time, (error, _), _)| panel.at(*time, *error)).collect();
-        canvas.line(corners, &style::dashed(INK, 1.3, "5 3"));
-        for (time_ms, (error, interval), level) in &points {
-            let colour = level.as_ref().map_or(INK, colour);
+        let mut corners = Vec::new();
+        for (time_ms, (error, interval), variant) in &points {
+            if *error > 0.0 && *error < least {
+                least = *error;
+                corners.push(panel.at(*time_ms, least));
+            }
+            let colour = variant.level.as_ref().map_or(INK, colour);
             let ends = interval.map(|value| panel.at(*time_ms, value.max(1e-9)));
             canvas.line(ends, &style::stroke(colour, 1.2));
-            match level {
+            match variant.level {
                 Some(_) => canvas.circle(panel.at(*time_ms, *error), 3.6, &point(colour)),
                 None => canvas.diamond(panel.at(*time_ms, *error), &style::stroke(INK, 1.3)),
             }
         }
-        for variant in levels.variants.iter().filter(|variant| is_reference(variant)) {
-            let x = panel.at(1e3 * variant.wall_s.unwrap_or(f64::NAN), 1.0)[0];
-            canvas.line([[x, area.top], [x, area.bottom()]], &reference_line());
-        }
+        canvas.line(corners, &style::dashed(INK, 1.3, "5 3"));
+        let x = panel.at(reference_ms, 1.0)[0];
+        canvas.line([[x, area.top], [x, area.bottom()]], &reference_line());
     });
     Some(())
 }
@@ -160,29 +150,25 @@ fn draw_order(canvas: &mut Canvas, order: &Order, area: Area) {
 
 /// Draws each effect as a line: how far contacts move, the time of a touch, and the verdict's change.
 fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option<()> {
-    let percent = |ratio: f64| 100.0 * (ratio - 1.0);
-    let contact_mm = |variant: &Variant| -> Option<Bar> {
-        let spread = variant.contact_m?;
-        Some((1e3 * spread.mean, spread.interval.map(|m| 1e3 * m)))
-    };
     let time = |variant: &Variant| -> Option<Bar> {
         let ratio = variant.time_ratio?;
-        Some((percent(ratio), variant.time_ratio_interval.unwrap_or([ratio; 2]).map(percent)))
+        let interval = variant.time_ratio_interval.unwrap_or([ratio; 2]);
+        Some((100.0 * (ratio - 1.0), interval.map(|ratio| 100.0 * (ratio - 1.0))))
     };
     let verdict_mm = |variant: &Variant| -> Option<Bar> {
         let change = variant.verdict_change_m?;
         Some((1e3 * change.mean, change.interval.unwrap_or([change.mean; 2]).map(|m| 1e3 * m)))
     };
     let panels: [(&dyn Fn(&Variant) -> Option<Bar>, &str); 3] = [
-        (&contact_mm, "contact moves (mm)"),
+        (&|variant| Some(bar(variant.contact_m?, 1e-3)), "contact moves (mm)"),
         (&time, "time of a touch changes (%)"),
         (&verdict_mm, "active − random RMSE changes (mm)"),
     ];
-    for (column, (bar, words)) in panels.into_iter().enumerate() {
+    for (column, (measure, words)) in panels.into_iter().enumerate() {
         let inset = if column == 0 { NAME_PX } else { 0.0 };
         let left = first.left + column as f64 * STEP_PX + inset;
         let area = Area { left, width: first.width - inset, ..first };
-        let bars = effects.iter().filter_map(bar);
+        let bars = effects.iter().filter_map(measure);
         let ends = bars.flat_map(|(_, interval)| interval).chain([0.0]);
         // So few ticks that there are none: the lines have names.
         let y = Axis::linear(0.5, effects.len() as f64 + 0.5, 1e-6);
@@ -195,13 +181,17 @@ fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option
                 let at = [area.left - 7.0, panel.at(0.0, y)[1] + 4.0];
                 canvas.text(at, &variant.name, SMALL_PX, Anchor::End);
             }
-            if let Some((value, interval)) = bar(variant) {
+            if let Some((value, interval)) = measure(variant) {
                 canvas.line(interval.map(|x| panel.at(x, y)), &style::stroke(INK, 1.2));
                 canvas.circle(panel.at(value, y), 3.6, &point(FAMILIES[3].0));
             }
         }
     }
     Some(())
+}
+
+fn bar(spread: Spread, unit: f64) -> Bar {
+    (spread.mean / unit, spread.interval.map(|value| value / unit))
 }
 
 fn reference_line() -> String {

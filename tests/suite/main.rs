@@ -2,6 +2,7 @@
 
 mod common;
 
+mod accuracy;
 mod all_around;
 mod allocation;
 mod approach;
@@ -25,7 +26,6 @@ mod dynamic;
 mod effects;
 mod examples;
 mod experiments;
-mod fidelity;
 mod figures;
 mod files;
 mod finger;

@@ -1,7 +1,7 @@
 //! The order in which the error of the force falls with the resolution, everything else being held.
 
 use super::level::{Level, Senses};
-use super::touches::{Touches, noise_free, targets, touch_all};
+use super::touches::{Trials, noise_free};
 use crate::backend::Command;
 use crate::experiment::statistics::mean;
 use crate::robot::finger::TipMotion;
@@ -13,19 +13,19 @@ use crate::sim::{Environment, Scene};
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Time steps compared with the last. A stage takes 20 ms to stop from an approach of 20 mm/s, and
-/// longer steps than a quarter of that do not resolve it.
-const PERIODS_S: [f64; 5] = [0.005, 0.002, 0.001, 0.0005, 0.000125];
+/// Ticks per second compared with the last. A stage takes 20 ms to stop from an approach of 20 mm/s,
+/// and longer ticks than a quarter of that do not resolve it.
+const TICKS_PER_S: [f64; 5] = [200.0, 500.0, 1000.0, 2000.0, 8000.0];
 
 /// Points of the skins compared with the last.
-const SAMPLES: [usize; 8] = [60, 125, 250, 500, 1000, 2000, 8000, 32000];
+const SAMPLES: [f64; 8] = [60.0, 125.0, 250.0, 500.0, 1000.0, 2000.0, 8000.0, 32000.0];
 
 /// Points of the skin in the comparisons of steps, where they cancel.
 const STEPPED_SAMPLES: usize = 250;
 
-/// Steps in contact compared with the last: the longest that is allowed, halved again and again, and
-/// an eighth of the shortest.
-const STEPS_S: [f64; 6] = [2e-3, 1e-3, 0.5e-3, 0.25e-3, 0.125e-3, 0.015_625e-3];
+/// Steps per second in contact compared with the last: from those of the longest step that is
+/// allowed, doubled again and again, then eightfold.
+const STEPS_PER_S: [f64; 6] = [500.0, 1000.0, 2000.0, 4000.0, 8000.0, 64000.0];
 
 /// Control tick in contact: commands change with it, whatever the step.
 const PERIOD_S: f64 = 2e-3;
@@ -55,18 +55,23 @@ pub struct Order {
 }
 
 impl Order {
-    /// Returns the order by which forces approach those of the last, finest resolution; `None`
-    /// without any.
-    fn new([name, axis]: [&'static str; 2], mut forces_n: Vec<(f64, Vec<f64>)>) -> Option<Self> {
-        let (_, finest_n) = forces_n.pop()?;
-        let error_n = |forces_n: &[f64]| {
+    /// Returns the order in which the forces at some resolutions approach those at the last; `None`
+    /// where there are none.
+    fn new(
+        [name, axis]: [&'static str; 2],
+        resolutions: &[f64],
+        forces_n: impl FnMut(f64) -> anyhow::Result<Option<Vec<f64>>>,
+    ) -> anyhow::Result<Option<Self>> {
+        let forces_n = resolutions.iter().copied().map(forces_n);
+        let forces_n: Option<Vec<Vec<f64>>> = forces_n.collect::<anyhow::Result<_>>()?;
+        let Some(mut forces_n) = forces_n else { return Ok(None) };
+        let finest_n = forces_n.pop().unwrap_or_default();
+        let error_n = |forces_n: &Vec<f64>| {
             let errors_n = forces_n.iter().zip(&finest_n).map(|(a, b)| (a - b).abs());
             mean(&errors_n.filter(|error_n| error_n.is_finite()).collect::<Vec<_>>())
         };
-        let errors: Vec<(f64, f64)> = forces_n
-            .iter()
-            .map(|(resolution, forces_n)| (*resolution, error_n(forces_n)))
-            .collect();
+        let errors: Vec<(f64, f64)> =
+            resolutions.iter().copied().zip(forces_n.iter().map(error_n)).collect();
         let (x, y): (Vec<f64>, Vec<f64>) = (errors.iter())
             .filter(|(_, error)| *error > 0.0)
             .map(|(at, error)| (at.ln(), error.ln()))
@@ -74,26 +79,8 @@ impl Order {
         let (x0, y0) = (mean(&x), mean(&y));
         let above: f64 = x.iter().zip(&y).map(|(x, y)| (x - x0) * (y - y0)).sum();
         let below: f64 = x.iter().map(|x| (x - x0).powi(2)).sum();
-        Some(Self { name, axis, errors, observed: -above / below, expected: 1.0 })
+        Ok(Some(Self { name, axis, errors, observed: -above / below, expected: 1.0 }))
     }
-}
-
-/// All orders, with `count` touches; `reference` are those of the finest level.
-///
-/// # Errors
-/// If a scene cannot be built or simulated.
-pub fn orders(
-    scene: &Scene,
-    (count, seed): (usize, u64),
-    reference: &[Touches],
-) -> anyhow::Result<Vec<Order>> {
-    let poses: Vec<TipMotion> = (reference.iter())
-        .flat_map(|touches| touches.loads.iter().flatten())
-        .map(|load| load.motion)
-        .collect();
-    let orders =
-        [in_time_step(scene, (count, seed))?, in_samples(scene, &poses)?, in_contact(scene)?];
-    Ok(orders.into_iter().flatten().collect())
 }
 
 /// In the time step: a dry finger stops up to a tick after the force that is detected as contact, so
@@ -101,18 +88,14 @@ pub fn orders(
 ///
 /// # Errors
 /// If the touches cannot be made.
-pub fn in_time_step(scene: &Scene, (count, seed): (usize, u64)) -> anyhow::Result<Option<Order>> {
-    let targets = targets(scene, count, seed);
-    let mut forces_n = Vec::new();
-    for period_s in PERIODS_S {
-        let level = Level::new(Body::Kinematic, Senses::Dry, STEPPED_SAMPLES, period_s);
+pub fn in_time_step(scene: &Scene, trials: &Trials) -> anyhow::Result<Option<Order>> {
+    Order::new(["time step", "ticks per second"], &TICKS_PER_S, |ticks_per_s| {
+        let level = Level::new(Body::Kinematic, Senses::Dry, STEPPED_SAMPLES, 1.0 / ticks_per_s);
         let environment = Arc::new(Environment::build(noise_free(&level.apply(scene)))?);
-        let touches = touch_all(&Simulator::new(environment)?, &targets, seed)?;
-        let force_n =
-            touches.loads.iter().map(|load| load.as_ref().map_or(f64::NAN, |it| it.force_n));
-        forces_n.push((1.0 / period_s, force_n.collect()));
-    }
-    Ok(Order::new(["time step", "ticks per second"], forces_n))
+        let touches = trials.touch(&environment)?;
+        let loads = touches.iter().flat_map(|touches| &touches.loads);
+        Ok(Some(loads.map(|load| load.as_ref().map_or(f64::NAN, |it| it.force_n)).collect()))
+    })
 }
 
 /// In the points of the skin, pressed as in `poses`: a midpoint rule over an area has an error of the
@@ -121,22 +104,20 @@ pub fn in_time_step(scene: &Scene, (count, seed): (usize, u64)) -> anyhow::Resul
 /// # Errors
 /// If a scene cannot be built.
 pub fn in_samples(scene: &Scene, poses: &[TipMotion]) -> anyhow::Result<Option<Order>> {
-    let mut forces_n = Vec::new();
-    for samples in SAMPLES {
-        let level = Level::new(Body::Kinematic, Senses::Fluid, samples, 0.01);
+    Order::new(["points of the skin"; 2], &SAMPLES, |samples| {
+        let level = Level::new(Body::Kinematic, Senses::Fluid, samples as usize, 0.01);
         let environment = Environment::build(level.apply(scene))?;
         let (Some(skin), Shape::Mesh { bvh, .. }) =
             (environment.fingertip().and_then(|tip| tip.skin()), environment.shape())
         else {
-            continue;
+            return Ok(None);
         };
         let mut pressed = skin.relaxed();
         let force_n = |pose: &TipMotion| {
             skin.press(bvh, &pose.x_wt, &mut pressed).map_or(f64::NAN, |load| load.force_n.norm())
         };
-        forces_n.push((samples as f64, poses.iter().map(force_n).collect()));
-    }
-    Ok(Order::new(["points of the skin"; 2], forces_n))
+        Ok(Some(poses.iter().map(force_n).collect()))
+    })
 }
 
 /// In the step of a dry finger on a stage with masses, pressed 1 mm into the middle of the zone by
@@ -153,15 +134,10 @@ pub fn in_contact(scene: &Scene) -> anyhow::Result<Option<Order>> {
     }
     let mut scene = noise_free(&level.apply(scene));
     scene.arm = None;
-    let mut forces_n = Vec::new();
-    for step_s in STEPS_S {
-        scene.solver.step_s = step_s;
-        match pressed(&Arc::new(Environment::build(scene.clone())?))? {
-            Some(force_n) => forces_n.push((1.0 / step_s, force_n)),
-            None => return Ok(None),
-        }
-    }
-    Ok(Order::new(["step in contact", "steps per second"], forces_n))
+    Order::new(["step in contact", "steps per second"], &STEPS_PER_S, |steps_per_s| {
+        scene.solver.step_s = 1.0 / steps_per_s;
+        pressed(&Arc::new(Environment::build(scene.clone())?))
+    })
 }
 
 /// The force after each tick while the finger is pressed.

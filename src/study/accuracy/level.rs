@@ -8,7 +8,7 @@ use crate::sim::solver::Integrator;
 use serde::Serialize;
 
 /// The part of the finger that a level simulates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Senses {
     /// A rigid hull.
@@ -105,8 +105,10 @@ pub const LEVELS: &[Level] = &[
     kinematic(Senses::Full, 32000, 0.00025),
 ];
 
-/// How many levels, the last of [`LEVELS`], approach the reference.
-pub const CONVERGING: usize = 6;
+/// The levels that approach the reference.
+pub fn converging() -> impl Iterator<Item = Level> {
+    LEVELS[LEVELS.len() - 6..LEVELS.len() - 1].iter().copied()
+}
 
 impl Level {
     /// A level with the settings that every body has.
@@ -126,17 +128,6 @@ impl Level {
     /// Whether this build can simulate it.
     pub fn is_built(&self) -> bool {
         cfg!(feature = "mujoco") || self.body != Body::Dynamic
-    }
-
-    /// Whether it is the reference.
-    pub fn is_reference(&self) -> bool {
-        LEVELS.last() == Some(self)
-    }
-
-    /// The most targets that it touches: a touch with a signed distance field takes seconds, and a
-    /// Sobol sequence begins with places all over the zone.
-    pub fn targets_max(&self) -> usize {
-        if self.collision == Some(Collision::Sdf) { 8 } else { usize::MAX }
     }
 
     /// `scene` with this level's changes; every other setting stays.
@@ -159,10 +150,9 @@ impl Level {
         }
         let effects = &mut scene.effects;
         effects.flex = None;
-        let has = |senses: &[Senses]| senses.contains(&self.senses);
         keep(&mut effects.skin, self.senses != Senses::Rigid);
-        keep(&mut effects.fluid, has(&[Senses::Fluid, Senses::Full]));
-        keep(&mut effects.electrodes, has(&[Senses::Full]));
+        keep(&mut effects.fluid, self.senses >= Senses::Fluid);
+        keep(&mut effects.electrodes, self.senses == Senses::Full);
         match (&mut effects.skin, self.shell) {
             (Some(skin), Some(cells)) => {
                 skin.model = SkinModel::Shell;

@@ -2,7 +2,6 @@
 
 use crate::backend::Fault;
 use crate::backend::trace::{Tick, Ticks, Trace};
-use crate::experiment::statistics::median;
 use crate::experiment::truth::Truth;
 use crate::explore::belief::HeightField;
 use crate::explore::gp_settings::GpSettings;
@@ -16,17 +15,15 @@ use crate::sim::environment::Shape;
 use crate::sim::finger::FingertipState;
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
-use crate::task::{Approach, Target};
+use crate::task::Target;
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A touch is repeated until it has taken this long: far above the clock's grain.
-const LEAST_S: f64 = 0.02;
-
-/// Most repetitions of a touch.
-const REPEATS: u32 = 1000;
+/// Test places along each side of the zone for the error of a believed surface.
+// heuristic: 2 mm apart on the scenes of the paper.
+const GRID: usize = 41;
 
 /// Touches of one trial: after so many a finger's heat and drift have shown.
 // heuristic: an experiment's trials have ten touches or more.
@@ -198,62 +195,36 @@ pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<Reference
     })
 }
 
-/// Median wall time of a touch of `scene`, its sensors as noisy as they are.
-///
-/// # Errors
-/// If the scene cannot be built or its body not be brought to its start.
-pub fn wall_time_s(scene: &Scene, targets: &[Target]) -> anyhow::Result<Option<f64>> {
-    let environment = Arc::new(Environment::build(scene.clone())?);
-    let mut probe = Simulator::new(Arc::clone(&environment))?.probe(0)?;
-    let approaches = targets.iter().filter_map(|target| environment.task().approach(target));
-    let walls_s: Vec<f64> = approaches.map(|it| repeated_s(probe.as_mut(), &it)).collect();
-    Ok(median(&walls_s))
-}
-
-/// Mean wall time of a touch over as many as take long enough to be measured.
-fn repeated_s(probe: &mut dyn Probe, approach: &Approach) -> f64 {
-    let (mut taken_s, mut count) = (0.0, 0);
-    while taken_s < LEAST_S && count < REPEATS {
-        taken_s += once_s(probe, approach);
-        count += 1;
-    }
-    taken_s / f64::from(count)
-}
-
-/// Wall times of `pairs` of touches, one of each scene: interleaved, so that other load of the machine
-/// falls on both alike.
+/// Wall times of touches of each scene, its sensors as noisy as they are: in turn, so that other load
+/// of the machine falls on all alike.
 ///
 /// # Errors
 /// If a scene cannot be built or its body not be brought to its start.
-pub fn paired_times_s(
-    scenes: [&Scene; 2],
+pub fn wall_times_s<const N: usize>(
+    scenes: [&Scene; N],
     targets: &[Target],
-    pairs: usize,
-) -> anyhow::Result<Vec<[f64; 2]>> {
-    let open = |scene: &Scene| -> anyhow::Result<_> {
+    rounds: usize,
+) -> anyhow::Result<Vec<[f64; N]>> {
+    let mut probes = Vec::new();
+    for scene in scenes {
         let environment = Arc::new(Environment::build(scene.clone())?);
-        Ok((Simulator::new(Arc::clone(&environment))?.probe(0)?, environment))
-    };
-    let mut opened = [open(scenes[0])?, open(scenes[1])?];
-    let mut times_s = Vec::with_capacity(pairs);
-    for (i, target) in targets.iter().cycle().take(pairs).enumerate() {
-        let mut pair_s = [f64::NAN; 2];
-        // Which goes first alternates: the second finds the caches warm.
-        for k in [i % 2, (i + 1) % 2] {
-            let (probe, environment) = &mut opened[k];
-            let Some(approach) = environment.task().approach(target) else { continue };
-            pair_s[k] = once_s(probe.as_mut(), &approach);
-        }
-        times_s.push(pair_s);
+        probes.push((Simulator::new(Arc::clone(&environment))?.probe(0)?, environment));
     }
-    times_s.retain(|[a, b]| (a + b).is_finite());
+    let mut times_s = Vec::with_capacity(rounds);
+    for (round, target) in targets.iter().cycle().take(rounds).enumerate() {
+        let mut walls_s = [f64::NAN; N];
+        // Which goes first alternates: the second finds the caches warm.
+        for k in (0..N).map(|k| (k + round) % N) {
+            let (probe, environment) = &mut probes[k];
+            let Some(approach) = environment.task().approach(target) else { continue };
+            let begun = Instant::now();
+            let _ = black_box(probe.touch(&approach));
+            walls_s[k] = begun.elapsed().as_secs_f64();
+        }
+        times_s.push(walls_s);
+    }
+    times_s.retain(|walls_s| walls_s.iter().all(|wall_s| wall_s.is_finite()));
     Ok(times_s)
-}
-
-fn once_s(probe: &mut dyn Probe, approach: &Approach) -> f64 {
-    let begun = Instant::now();
-    let _ = black_box(probe.touch(approach));
-    begun.elapsed().as_secs_f64()
 }
 
 /// Bytes of a finger's skin, electrodes and one trial's memory of them; the mesh and its tree, which
@@ -264,19 +235,19 @@ pub fn finger_bytes(environment: &Environment) -> usize {
 }
 
 /// Root mean square error of the surface believed after these touches; `None` if nothing can be
-/// fitted.
+/// fitted or the truth is unknown.
 pub fn surface_rmse_m(
-    scene: &Scene,
+    environment: &Environment,
     targets: &[Target],
     touches: &[Touches],
-    truth: &Truth,
 ) -> Option<f64> {
-    let mut belief = HeightField::new(scene.zone.clone()?, GpSettings::default());
+    let zone = environment.task().zone()?.clone();
+    let mut belief = HeightField::new(zone, GpSettings::default());
     let contacts = touches.iter().flat_map(|touches| &touches.contacts);
     for (target, contact) in targets.iter().zip(contacts) {
         let touch = contact.clone().map_or(Touch::Miss, Touch::Contact);
         belief.observe(target.place()?, &touch);
     }
     let (_, surface) = belief.refit().ok()?;
-    Some(truth.compare(surface)?.rmse_m)
+    Some(Truth::sample(environment, GRID).compare(surface)?.rmse_m)
 }

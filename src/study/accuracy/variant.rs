@@ -1,10 +1,12 @@
 //! A variant of a scene: its errors and its price.
 
 use super::deviation::{Quantity, Share, Spread};
-use super::level::Level;
+use super::level::{LEVELS, Level};
+use super::switches::{switched, switches};
 use super::tolerance::{Origin, Tolerance};
-use super::touches::{Touches, Trials, finger_bytes, noise_free};
+use super::touches::{Touches, Trials, finger_bytes, noise_free, surface_rmse_m};
 use super::verdict::Relevance;
+use crate::config::Rules;
 use crate::experiment::statistics::{Paired, median};
 use crate::explore::probe::Contact;
 use crate::sim::environment::Shape;
@@ -15,11 +17,8 @@ use std::sync::Arc;
 /// Share of the touches that may be beyond a tolerance.
 pub const ALLOWED: f64 = 0.05;
 
-/// Seed of the first trial on held-out targets: no other study of a scene has as many trials.
-pub(super) const HELD_OUT: u64 = 1_000_000;
-
 /// The name of the scene itself among its variants.
-pub const AS_IT_IS: &str = "the scene as it is";
+const AS_IT_IS: &str = "the scene as it is";
 
 /// A variant of a scene, compared with its reference: the finest level for a level, the scene as it
 /// is for a switched effect.
@@ -29,6 +28,8 @@ pub struct Variant {
     pub name: String,
     /// The level, if it is one.
     pub level: Option<Level>,
+    /// The effect that is switched, if one is.
+    pub effect: Option<String>,
     /// Targets touched.
     pub touches: usize,
     /// Touches that found a contact.
@@ -45,11 +46,11 @@ pub struct Variant {
     pub pdc_counts: Option<Spread>,
     /// Root mean square difference over the electrodes.
     pub electrode_counts: Option<Spread>,
-    /// Error of the surface believed after all touches of a level.
+    /// Error of the surface believed after all touches.
     pub surface_rmse_m: Option<f64>,
     /// Median wall time of a touch.
     pub wall_s: Option<f64>,
-    /// Wall time of a touch over that of the scene as it is: the median of interleaved pairs.
+    /// Wall time of a touch over that of the reference: the median of interleaved pairs.
     pub time_ratio: Option<f64>,
     /// 95 % interval of `time_ratio`.
     pub time_ratio_interval: Option<[f64; 2]>,
@@ -68,10 +69,43 @@ pub struct Variant {
 }
 
 impl Variant {
+    /// The reference, which is the finest level, then `scene` as it is and every other level that this
+    /// build can simulate.
+    pub fn levels(scene: &Scene) -> Vec<(Self, Scene)> {
+        let of_level = |level: &Level| {
+            let variant = Self { level: Some(*level), ..Self::named(level.name()) };
+            (variant, level.apply(scene))
+        };
+        let mut variants: Vec<_> = LEVELS.iter().filter(|it| it.is_built()).map(of_level).collect();
+        variants.rotate_right(1);
+        variants.insert(1, (Self::named(AS_IT_IS.into()), scene.clone()));
+        variants
+    }
+
+    /// The reference, which is `scene` as it is, then the same with each effect switched alone: those
+    /// that it has, and all others that its body can have.
+    pub fn effects(scene: &Scene) -> Vec<(Self, Scene)> {
+        let mut variants = vec![(Self::named(AS_IT_IS.into()), scene.clone())];
+        for switch in switches() {
+            let (is_on, other) = (switch.is_on(scene), switched(scene, &switch));
+            if is_on || Rules::hold(&other) {
+                let name = format!("{} {}", if is_on { "without" } else { "with" }, switch.name);
+                let effect = Some(switch.name);
+                variants.push((Self { effect, ..Self::named(name) }, other));
+            }
+        }
+        variants
+    }
+
+    /// A variant that is not measured yet.
+    pub fn named(name: String) -> Self {
+        Self { name, ..Self::default() }
+    }
+
     /// Touches the targets with `scene` and compares with the touches of the reference, or with
     /// themselves where there are none.
-    pub(super) fn measure(
-        name: String,
+    pub(super) fn measured(
+        self,
         scene: &Scene,
         trials: &Trials,
         reference: Option<&[Touches]>,
@@ -95,7 +129,6 @@ impl Variant {
             contacts.iter().filter_map(|contact| off_surface_m(&environment, contact));
         let simulated_s: Vec<f64> = touches.iter().flat_map(|it| it.simulated_s.clone()).collect();
         let variant = Self {
-            name,
             touches: touches.iter().map(|touches| touches.contacts.len()).sum(),
             contacts: contacts.len(),
             faults: touches.iter().map(|touches| touches.faults).sum(),
@@ -104,10 +137,11 @@ impl Variant {
             force_n: spread(Quantity::Force),
             pdc_counts: spread(Quantity::Pressure),
             electrode_counts: spread(Quantity::Electrodes),
+            surface_rmse_m: surface_rmse_m(&environment, &trials.targets(), &touches),
             simulated_s: median(&simulated_s),
             finger_bytes: finger_bytes(&environment),
             beyond,
-            ..Self::default()
+            ..self
         };
         Ok((variant, touches))
     }
@@ -139,24 +173,6 @@ impl Variant {
             None => self.p95(tolerance.quantity, origin).is_some_and(is_within),
         }
     }
-}
-
-/// The cheapest scene that stays within a tolerance.
-#[derive(Serialize)]
-pub struct Cheapest {
-    /// The scene.
-    #[serde(skip)]
-    pub scene: Scene,
-    /// Its errors on the touches or trials that it was selected on.
-    pub selected: Variant,
-    /// Its errors on held-out ones.
-    pub held_out: Variant,
-    /// Whether it stays within the tolerance there.
-    pub is_confirmed: bool,
-    /// Wall time of a touch of the reference over that of this scene.
-    pub speedup: Option<f64>,
-    /// 95 % interval of `speedup`.
-    pub speedup_interval: Option<[f64; 2]>,
 }
 
 /// Distance of a contact from the true surface: the analytic one, or else the mesh.

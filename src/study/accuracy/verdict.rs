@@ -78,8 +78,9 @@ pub fn advantages_m(
     Ok(trials.into_par_iter().map(advantage).collect())
 }
 
-/// The mean difference of those trials in which both values are known.
-pub fn difference(a: &[Option<f64>], b: &[Option<f64>]) -> Option<Paired> {
-    let pairs: Vec<(f64, f64)> = a.iter().zip(b).filter_map(|(a, b)| (*a).zip(*b)).collect();
-    Paired::new(&pairs, 0)
+/// The mean of `a`, or of how much it is above `b` in those trials in which both are known.
+pub fn difference(a: &[Option<f64>], b: Option<&[Option<f64>]>) -> Option<Paired> {
+    let other = |i: usize| b.map_or(Some(0.0), |b| b[i]);
+    let pairs = a.iter().enumerate().filter_map(|(i, a)| (*a).zip(other(i)));
+    Paired::new(&pairs.collect::<Vec<_>>(), 0)
 }
