@@ -15,8 +15,8 @@ use palpate::sim::mujoco::Models;
 use palpate::sim::probe::rest;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
-use palpate::study::fidelity::spread::Spread;
-use palpate::study::fidelity::touches;
+use palpate::study::accuracy::deviation::Spread;
+use palpate::study::accuracy::touches;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -97,7 +97,7 @@ fn errors(environment: &Environment, truth: &[Rest], found: &[Rest]) -> String {
         environment.nearest_true_point(&found.p_wc).map(|nearest| (nearest - found.p_wc).norm())
     });
     let cells = |errors_m: Vec<f64>| {
-        let spread = Spread::of(&errors_m).unwrap_or_default();
+        let spread = Spread::of(errors_m.iter().copied()).unwrap_or_default();
         let median = median(&errors_m).unwrap_or(f64::NAN);
         [median, spread.p95, spread.max].map(|m| format!("{:.4}", 1e3 * m)).join(" | ")
     };

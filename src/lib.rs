@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | 9 | [`cli`] | commands |
 //! | 8 | [`report`] | tables, figures, the page: drawn from rows and studies |
-//! | 7 | [`study`] | fidelity, effects, checks, comparisons: questions asked of many touches |
+//! | 7 | [`study`] | accuracy, checks, comparisons: questions asked of many touches |
 //! | 6 | [`experiment`] | experiment, trial, runner, store, measures, statistics, truth |
 //! | 6 | [`twin`] | a simulated arm behind a laboratory's topics |
 //! | 5 | [`sim`] | what only a simulator knows: object, effects, physics of the finger, bodies |

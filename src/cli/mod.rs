@@ -1,20 +1,18 @@
 //! The command line.
 
+mod accuracy;
 mod align;
 mod calibrate;
 mod check;
 mod columns;
 mod compare;
 mod completions;
-mod effects;
 mod export;
-mod fidelity;
 mod find;
 mod host;
 mod known_body;
 mod list;
 mod merge;
-mod needs;
 mod new;
 mod output;
 mod patience;
@@ -32,7 +30,6 @@ mod suite;
 mod terminal;
 mod twin;
 mod watch;
-mod within;
 
 pub use host::Bring;
 
@@ -64,7 +61,7 @@ Examples:
   palpate export runs/bird --planner active --out bird.ply
   palpate suite experiments/suite/six.toml  planners on objects that differ: who is better where
   palpate check toy --baseline experiments/baselines/toy.jsonl
-  palpate fidelity scenes/bird_finger.toml --tolerance 0.2mm
+  palpate accuracy scenes/bird_finger.toml --tolerance 0.2mm
 
 Exit codes: 0 done, 1 a test failed, 2 could not (the message says why), 3 undecided, 130 interrupted; run the same command \
 again to continue.";
@@ -99,10 +96,8 @@ enum Command {
     Export(export::Args),
     /// Hold planners against what they were: better, ok, worse, or undecided.
     Check(check::Args),
-    /// Show what accuracy costs: errors and time over a ladder of scenes.
-    Fidelity(fidelity::Args),
-    /// Show what each effect of a scene changes and costs.
-    Effects(effects::Args),
+    /// Show what accuracy costs: error and time of a scene's levels and effects.
+    Accuracy(accuracy::Args),
     /// List experiments, scenes, planners, measures and effects.
     List(list::Args),
     /// Print a script with which a shell completes commands.
@@ -145,8 +140,7 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, bring: &Bring) -
         Command::Watch(args) => watch::run(&args, cli.talk),
         Command::Twin(args) => twin::run(&args, cli.talk),
         Command::Export(args) => export::run(&args),
-        Command::Fidelity(args) => fidelity::run(&args, cli.talk),
-        Command::Effects(args) => effects::run(&args, cli.talk),
+        Command::Accuracy(args) => accuracy::run(&args, cli.talk),
         Command::Check(args) => check::run(&args, cli.talk),
         Command::Register(args) => register::run(&args, cli.talk),
         Command::Align(args) => align::run(&args, cli.talk),

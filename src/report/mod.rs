@@ -1,5 +1,6 @@
 //! Tables, figures and the page of a run, drawn from its rows: nothing is run again.
 
+pub mod accuracy;
 pub mod axes;
 pub mod camera;
 pub mod canvas;
@@ -16,7 +17,6 @@ pub mod legend;
 pub mod number;
 pub mod object_panel;
 pub mod page;
-pub mod pareto;
 pub mod pdf;
 pub mod png;
 pub mod points;

@@ -1,14 +1,11 @@
 //! Questions asked of many touches.
 //!
-//! * [`fidelity`]: what does accuracy cost? The same touches over a ladder of scenes, from a rigid
-//!   hull that is swept to a fine skin at a fine time step.
-//! * [`effects`]: what does each piece of physics change, and what does it cost? One is switched,
-//!   the rest of the scene stays.
+//! * [`accuracy`]: what does accuracy cost? Variants of a scene, coarser, finer, or with an effect
+//!   switched, against a reference: error, time, and the cheapest scene within a tolerance.
 //! * [`check`]: are planners what they were? The same trials again, held against a committed file.
 //! * [`compare`](mod@compare): planners over several runs.
 
+pub mod accuracy;
 pub mod check;
 pub mod compare;
-pub mod effects;
-pub mod fidelity;
 pub mod suite;

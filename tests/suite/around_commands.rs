@@ -70,7 +70,7 @@ fn planners_around_an_object_are_held_against_what_they_were() {
 #[test]
 fn what_goes_over_a_zone_refuses_a_whole_object() {
     let folder = around();
-    for command in ["scan", "fidelity", "effects"] {
+    for command in ["scan", "accuracy"] {
         fails(folder.path(), &[command, "scene.toml"], &["scene.toml: [around]", "[zone]"]);
     }
     let shown = succeeds(folder.path(), &["show", "scene.toml"]);

@@ -35,7 +35,7 @@ fn experiments_and_scenes_are_found_by_name() {
 fn shells_are_told_how_to_complete() {
     for shell in ["bash", "zsh", "fish"] {
         let script = succeeds(Path::new("."), &["completions", shell]);
-        assert!(script.contains("fidelity") && script.contains("no-report"), "{shell}");
+        assert!(script.contains("accuracy") && script.contains("no-report"), "{shell}");
     }
 }
 

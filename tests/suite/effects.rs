@@ -1,4 +1,4 @@
-//! What the table of effects promises.
+//! Effects and their switches.
 
 use crate::common::shipped;
 use palpate::math::seed;
@@ -10,8 +10,7 @@ use palpate::sim::finger::effects::switch::Switch;
 use palpate::sim::finger::{Effects, FingertipState};
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
-use palpate::study::effects::overhead::BareFinger;
-use palpate::study::effects::{switched, switches};
+use palpate::study::accuracy::switches::{switched, switches};
 use std::sync::Arc;
 
 fn scene(sets: &[&str]) -> Scene {
@@ -118,30 +117,27 @@ fn an_effect_that_is_off_has_no_state_and_does_no_work() {
     }
 }
 
-/// The twin that times are compared with does what the finger does with all else switched off: the
-/// same loads to the bit and the same frames, so that comparing their times compares nothing else.
+/// A finger without effects but its skin and fluid does what these do, and nothing else: the loads of
+/// the skin to the bit, and frames of pressure alone. `benches/finger.rs` times both.
 #[test]
-fn the_bare_twin_feels_what_the_finger_feels() {
-    let scene = scene(&["effects={skin={}, fluid={}}"]);
-    let environment = Environment::build(scene.clone()).unwrap();
+fn a_finger_without_effects_feels_what_its_skin_feels() {
+    let environment =
+        shipped::environment("container_finger.toml", &["effects={skin={}, fluid={}}"]);
     let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip().unwrap(), environment.shape())
     else {
         panic!()
     };
-    let rng = seed::stream(0, 0, "test");
-    let fluid = scene.effects.fluid.unwrap();
-    let mut twin = BareFinger::new(tip.skin().unwrap(), fluid, &rng);
-    let mut finger = FingertipState::new(tip, &rng);
+    let skin = tip.skin().unwrap();
+    let mut relaxed = skin.relaxed();
+    let mut finger = FingertipState::new(tip, &seed::stream(0, 0, "test"));
     let mut x_wt = environment.chain().unwrap().forward(&environment.chain().unwrap().home);
     let mut pressed = 0;
     for _ in 0..300 {
         x_wt.translation.y -= 1e-4;
-        let motion = TipMotion::at(x_wt);
-        let load = finger.step(tip, bvh, &motion, FRAME_S).unwrap();
-        assert_eq!(twin.press(bvh, &motion).unwrap(), load);
-        let (own, frame) = (twin.frame(&load), finger.frame().unwrap());
-        assert!((own.time_s - frame.time_s).abs() < 1e-9, "{} {}", own.time_s, frame.time_s);
-        assert_eq!(own.pdc_counts, frame.pdc_counts);
+        let load = finger.step(tip, bvh, &TipMotion::at(x_wt), FRAME_S).unwrap();
+        assert_eq!(skin.press(bvh, &x_wt, &mut relaxed).unwrap(), load);
+        let frame = finger.frame().unwrap();
+        assert!(frame.pdc_counts.is_some());
         assert_eq!((frame.electrode_counts, frame.pac_counts), (None, None));
         pressed += i32::from(load.force_n.norm() > 0.0);
         if load.force_n.norm() > 5.0 {

@@ -2,6 +2,7 @@
 
 mod common;
 
+mod accuracy;
 mod all_around;
 mod allocation;
 mod approach;
@@ -26,7 +27,6 @@ mod dynamic;
 mod effects;
 mod examples;
 mod experiments;
-mod fidelity;
 mod figures;
 mod files;
 mod finger;

@@ -1,11 +1,13 @@
-//! What a scene is said to call for, where theory says what it does.
+//! The effects that a scene needs, where theory says what they do.
 
 use crate::common::program::{fails, palpate};
 use palpate::sim::Scene;
-use palpate::study::effects::need::FullScene;
-use palpate::study::effects::share::Share;
-use palpate::study::effects::yardstick::Need;
-use palpate::study::effects::{full, switches};
+use palpate::study::accuracy::comparison::{Comparison, Effort};
+use palpate::study::accuracy::deviation::Share;
+use palpate::study::accuracy::switches::{full, switches};
+use palpate::study::accuracy::tolerance::Criterion;
+use palpate::study::accuracy::variant::Variant;
+use palpate::study::accuracy::verdict::Relevance;
 use std::fs;
 use tempfile::TempDir;
 
@@ -39,14 +41,21 @@ fn folder(slope_deg: f64, more: &str) -> TempDir {
 }
 
 /// Whether `effect` is needed on a plane; touches of one trial are ten.
-fn need(slope_deg: f64, more: &str, (effect, tolerance): (&str, &str), touches: usize) -> Need {
+fn need(
+    slope_deg: f64,
+    more: &str,
+    (effect, tolerance): (&str, &str),
+    touches: usize,
+) -> Relevance {
     let folder = folder(slope_deg, more);
     let scene = Scene::load(&folder.path().join("scene.toml"), &[]).unwrap();
-    let whole = FullScene::new(scene, tolerance.parse().unwrap(), touches).unwrap();
-    let switch = switches().into_iter().find(|switch| switch.name == effect).unwrap();
-    let judged = whole.judge(&switch).unwrap();
-    println!("{effect} at {slope_deg} deg: {:?}", judged.off);
-    judged.need
+    let criterion = Criterion::Touches(tolerance.parse().unwrap());
+    let effort = Effort { touches, pairs: 2, trials: 0, trial_touches: 1, seed: 0 };
+    let mut variants = Variant::effects(&scene).into_iter();
+    let mut whole = Comparison::new(variants.next().unwrap(), effort, Some(criterion)).unwrap();
+    whole.add(variants.find(|(it, _)| it.effect.as_deref() == Some(effect)).unwrap()).unwrap();
+    println!("{effect} at {slope_deg} deg: {:?}", whole.variants[0].beyond);
+    whole.variants[0].relevance.unwrap()
 }
 
 /// Coulomb: on a slope beyond the friction cone, atan 0.783 = 38°, the skin slips and friction adds
@@ -55,8 +64,8 @@ fn need(slope_deg: f64, more: &str, (effect, tolerance): (&str, &str), touches: 
 #[test]
 fn friction_is_needed_on_a_slope_beyond_its_cone() {
     for more in ["", "[effects.friction]"] {
-        assert_eq!(need(50.0, more, ("friction", "0.03N"), 80), Need::Needed);
-        assert_eq!(need(0.0, more, ("friction", "0.03N"), 80), Need::NotNeeded);
+        assert_eq!(need(50.0, more, ("friction", "0.03N"), 80), Relevance::Needed);
+        assert_eq!(need(0.0, more, ("friction", "0.03N"), 80), Relevance::NotNeeded);
     }
 }
 
@@ -66,27 +75,26 @@ fn friction_is_needed_on_a_slope_beyond_its_cone() {
 #[test]
 fn heat_is_needed_in_a_finger_that_warms_up() {
     let cold = "[effects.thermal]\nstart_c = 15.0\nfinger_c = 40.0\ntime_constant_s = 5.0";
-    assert_eq!(need(0.0, cold, ("thermal", "20counts"), 80), Need::Needed);
-    assert_eq!(need(0.0, "[effects.thermal]", ("thermal", "20counts"), 80), Need::NotNeeded);
+    assert_eq!(need(0.0, cold, ("thermal", "20counts"), 80), Relevance::Needed);
+    assert_eq!(need(0.0, "[effects.thermal]", ("thermal", "20counts"), 80), Relevance::NotNeeded);
 }
 
 /// None of ten touches beyond the tolerance may be one in four of all.
 #[test]
 fn few_touches_cannot_tell() {
-    assert_eq!(need(0.0, "[effects.thermal]", ("thermal", "20counts"), 10), Need::CannotTell);
-    assert_eq!(need(50.0, "[effects.friction]", ("friction", "0.03N"), 10), Need::Needed);
+    assert_eq!(need(0.0, "[effects.thermal]", ("thermal", "20counts"), 10), Relevance::Undecided);
+    assert_eq!(need(50.0, "[effects.friction]", ("friction", "0.03N"), 10), Relevance::Needed);
 }
 
 /// A dry finger that tells contact by a force sensor of such noise is refused, so the fluid is named
 /// and needed, whatever it changes.
 #[test]
 fn what_a_scene_is_refused_without_is_needed() {
-    assert_eq!(need(0.0, "[effects.wrench]", ("fluid", "1000mm"), 10), Need::Needed);
+    assert_eq!(need(0.0, "[effects.wrench]", ("fluid", "1000mm"), 10), Relevance::Needed);
     let names = |more: &str| -> Vec<String> {
         let folder = folder(0.0, more);
         let scene = Scene::load(&folder.path().join("scene.toml"), &[]).unwrap();
-        let whole = FullScene::new(scene, "1mm".parse().unwrap(), 1).unwrap();
-        whole.switches().into_iter().map(|switch| switch.name).collect()
+        Variant::effects(&scene).into_iter().filter_map(|(variant, _)| variant.effect).collect()
     };
     let kinematic = names("[effects.wrench]");
     assert!(
@@ -120,51 +128,65 @@ fn the_full_scene_is_one_that_is_accepted() {
 fn the_cheapest_scene_is_written_and_held_against_the_full_one() {
     let folder = folder(0.0, "[effects.thermal]\n[effects.friction]");
     let folder = folder.path();
-    let mut arguments = vec!["--quiet", "effects", "scene.toml", "--tolerance", "0.05mm"];
-    arguments.extend(["--touches=80", "--fresh=20", "--pairs=2", "--out", "less.toml"]);
+    let mut arguments = vec!["--quiet", "accuracy", "scene.toml", "--tolerance", "0.05mm"];
+    arguments.extend([
+        "--touches=80",
+        "--fresh=20",
+        "--pairs=2",
+        "--against=scene",
+        "--out",
+        "less",
+    ]);
     let output = palpate(folder, &arguments);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     println!("{text}");
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     for name in ["thermal", "friction"] {
-        let line = text.lines().find(|line| line.starts_with(name)).unwrap();
-        assert!(line.contains("on") && line.ends_with(" not needed"), "{line}");
+        let name = format!("without {name}");
+        let line = text.lines().find(|line| line.starts_with(&name)).unwrap();
+        assert!(line.ends_with(" not needed"), "{line}");
     }
-    let electrodes = text.lines().find(|line| line.starts_with("electrodes ")).unwrap();
+    let electrodes = text.lines().find(|line| line.starts_with("without electrodes ")).unwrap();
     assert!(electrodes.ends_with("  needed"), "{electrodes}");
     assert!(text.contains("of 20 beyond") && text.contains("this one build"), "{text}");
-    let [whole, less] =
-        ["scene.toml", "less.toml"].map(|name| Scene::load(&folder.join(name), &[]).unwrap());
+    let [whole, less] = ["scene.toml", "less/cheapest.toml"]
+        .map(|name| Scene::load(&folder.join(name), &[]).unwrap());
     assert!(less.effects.thermal.is_none() && less.effects.friction.is_none());
     let mut same = whole;
     (same.effects.thermal, same.effects.friction) = (None, None);
     assert_eq!(same, less);
     for wrong in ["2 feet", "verdikt", "verdict 1mm", "verdict:1N", "verdict:0mm"] {
         let named = ["--tolerance", "0.2mm", "verdict:0.1mm", wrong];
-        fails(folder, &["effects", "scene.toml", "--tolerance", wrong], &named);
+        fails(folder, &["accuracy", "scene.toml", "--tolerance", wrong], &named);
     }
+    let text = fs::read_to_string(folder.join("less/accuracy.json")).unwrap();
+    let study: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(study["cheapest"]["is_confirmed"].as_bool().unwrap());
+    assert_eq!(study["effects"]["variants"][0]["name"], "without skin");
+    assert!(folder.join("less/accuracy.png").is_file());
     // What is there is not replaced, unless Palpate wrote it.
-    fs::write(folder.join("mine.toml"), "body = \"cast\"\n").unwrap();
+    fs::create_dir(folder.join("mine")).unwrap();
+    fs::write(folder.join("mine/cheapest.toml"), "body = \"cast\"\n").unwrap();
     let last = arguments.len() - 1;
-    arguments[last] = "mine.toml";
-    fails(folder, &arguments, &["mine.toml", "--force"]);
+    arguments[last] = "mine";
+    fails(folder, &arguments, &["mine", "--force"]);
 }
 
 /// What is said of a change is where its interval lies about the margin.
 #[test]
 fn a_change_is_needed_beyond_the_margin_and_not_within() {
-    let need = |low: f64, high: f64| Need::of_change(Some([low, high]), Some(1.0));
+    let need = |low: f64, high: f64| Relevance::of_change(Some([low, high]), Some(1.0));
     for (low, high) in [(-0.9, 0.9), (0.0, 0.0), (0.2, 0.5)] {
-        assert_eq!(need(low, high), Need::NotNeeded);
+        assert_eq!(need(low, high), Relevance::NotNeeded);
     }
     for (low, high) in [(1.1, 5.0), (-3.0, -1.1)] {
-        assert_eq!(need(low, high), Need::Needed);
+        assert_eq!(need(low, high), Relevance::Needed);
     }
     for (low, high) in [(0.5, 1.5), (-2.0, 0.0), (-2.0, 2.0)] {
-        assert_eq!(need(low, high), Need::CannotTell);
+        assert_eq!(need(low, high), Relevance::Undecided);
     }
-    assert_eq!(Need::of_change(None, Some(1.0)), Need::CannotTell);
-    assert_eq!(Need::of_change(Some([0.0, 0.0]), None), Need::CannotTell);
+    assert_eq!(Relevance::of_change(None, Some(1.0)), Relevance::Undecided);
+    assert_eq!(Relevance::of_change(Some([0.0, 0.0]), None), Relevance::Undecided);
 }
 
 /// Vibration moves no contact, so it changes no verdict, at any margin; electrodes, which err where
@@ -173,8 +195,14 @@ fn a_change_is_needed_beyond_the_margin_and_not_within() {
 fn a_verdict_calls_for_what_changes_it() {
     let folder = folder(20.0, "[effects.fluid.vibration]");
     let folder = folder.path();
-    let mut arguments = vec!["--quiet", "effects", "scene.toml", "--trials=6", "--pairs=2"];
-    arguments.extend(["--trial-touches=9", "--fresh=4", "--out=less.toml", "--tolerance"]);
+    let mut arguments = vec!["--quiet", "accuracy", "scene.toml", "--trials=6", "--pairs=2"];
+    arguments.extend([
+        "--trial-touches=9",
+        "--touches=10",
+        "--fresh=4",
+        "--out=less",
+        "--tolerance",
+    ]);
     let run = |within: &'static str| {
         let output = palpate(folder, &[&arguments[..], &[within]].concat());
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -183,17 +211,18 @@ fn a_verdict_calls_for_what_changes_it() {
         text
     };
     let said = |text: &str, name: &str| {
-        let line = text.lines().find(|line| line.split_whitespace().next() == Some(name)).unwrap();
+        let is_it = |line: &&str| line.split_whitespace().nth(1) == Some(name);
+        let line = text.lines().find(is_it).unwrap();
         line.trim_end().to_owned()
     };
     let text = run("verdict:0.001um");
     let vibration = said(&text, "fluid.vibration");
     assert!(vibration.contains(" 0.000 [0.000, 0.000] ") && vibration.ends_with(" not needed"));
     assert!(!said(&text, "electrodes").ends_with("not needed"));
-    assert!(text.contains("without fluid.vibration\n") && text.contains("it stays within"));
-    assert!(text.contains("in 6 trials") && text.contains("in 4 fresh trials"));
+    assert!(text.contains(", without fluid.vibration\n") && text.contains("it stays within"));
+    assert!(text.contains("in 6 trials") && text.contains("in 4 trials"));
     assert!(text.contains("this one build"));
-    let less = Scene::load(&folder.join("less.toml"), &[]).unwrap();
+    let less = Scene::load(&folder.join("less/cheapest.toml"), &[]).unwrap();
     assert!(less.effects.fluid.unwrap().vibration.is_none() && less.effects.electrodes.is_some());
     // Within a metre nothing matters.
     let text = run("verdict:1000mm");
@@ -202,10 +231,10 @@ fn a_verdict_calls_for_what_changes_it() {
 
 /// Touches that all planners share make no difference between them.
 #[test]
-fn where_nobody_wins_there_is_no_verdict_to_change() {
+fn where_neither_planner_wins_there_is_no_verdict_to_change() {
     let folder = folder(0.0, "");
-    let arguments = ["effects", "scene.toml", "--trials=4", "--trial-touches=5", "--tolerance"];
-    let wants = ["in 4 trials", "nobody wins", "verdict:0.1mm", "--trials"];
+    let arguments = ["accuracy", "scene.toml", "--trials=4", "--trial-touches=5", "--tolerance"];
+    let wants = ["in 4 trials", "neither planner wins", "verdict:0.1mm", "--trials"];
     fails(folder.path(), &[&arguments[..], &["verdict"]].concat(), &wants);
 }
 

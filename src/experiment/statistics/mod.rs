@@ -161,7 +161,7 @@ pub fn percentiles_95(mut found: Vec<f64>) -> [f64; 2] {
 }
 
 /// How one planner's errors differ from another's in the same trials.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Paired {
     /// How many trials both finished.
     pub trials: usize,

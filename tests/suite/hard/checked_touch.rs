@@ -10,7 +10,7 @@ use palpate::geometry::mesh::Mesh;
 use palpate::sim::environment::Shape;
 use palpate::sim::simulator::Simulator;
 use palpate::sim::{Environment, Scene};
-use palpate::study::fidelity::reference_load::{ReferenceLoad, reference_load};
+use palpate::study::accuracy::touches::{ReferenceLoad, reference_load};
 use std::sync::Arc;
 
 /// One touch and what came of it.

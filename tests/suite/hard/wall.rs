@@ -11,7 +11,7 @@ use palpate::sim::finger::Effects;
 use palpate::sim::finger::effects::timing::TimingEffect;
 use palpate::sim::scene::Body;
 use palpate::sim::simulator::Simulator;
-use palpate::study::fidelity::reference_load::noise_free;
+use palpate::study::accuracy::touches::noise_free;
 use palpate::task::Zone;
 use palpate::task::touch::TouchSettings;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What of a scene can be switched: every effect of the finger, its arm, and the masses.
+//! Switches of a scene: every effect of the finger, its arm, and the masses.
 
 use crate::config::Rules;
 use crate::sim::Scene;

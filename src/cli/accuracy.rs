@@ -1,0 +1,358 @@
+//! `palpate accuracy`.
+
+use super::columns::{NONE, aligned_rows, cell, duration, without_empty};
+use super::find::{SCENES, find};
+use super::output::{Force, make_folder};
+use super::prepare::needs_zone;
+use super::progress::{progress_bar, step, stop_on_interrupt};
+use super::terminal::{Ending, Talk, print};
+use crate::experiment::statistics::Paired;
+use crate::experiment::store::write_whole;
+use crate::report::number::with_interval;
+use crate::report::{accuracy, files};
+use crate::sim::Scene;
+use crate::study::accuracy::comparison::{Cheapest, Comparison, Effort};
+use crate::study::accuracy::deviation::{Quantity, Share, Spread};
+use crate::study::accuracy::switches::full;
+use crate::study::accuracy::tolerance::{Criterion, Origin};
+use crate::study::accuracy::variant::Variant;
+use anyhow::{bail, ensure};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  palpate accuracy scenes/bird_finger.toml                   every level and every effect
+  palpate accuracy scenes/bird_finger.toml --against reference --tolerance 0.2mm
+                                                  the cheapest level within 0.2 mm of the finest
+  palpate accuracy scenes/bird_pa10.toml --against scene --tolerance 1mm
+                                                  the effects that the scene needs, and the cheapest
+                                                  scene within 1 mm of it
+  palpate accuracy scenes/bird_finger.toml --against scene --tolerance 0.1N --full
+  palpate accuracy scenes/container_finger.toml --tolerance verdict
+                                                  the effects needed so that planners compare alike
+
+Variants of the scene touch the same targets without sensor noise, so that only the model differs. A
+level is a coarser or finer simulation, compared with the reference, the finest level, and with the
+object's true surface. An effect is switched alone and compared with the scene as it is; touches are
+timed in interleaved pairs.
+
+A tolerance holds for 95 % of the touches: in mm or um of the point of contact, N of force, or counts of
+the electrodes. An effect is needed if, switched alone, it takes more of them beyond the tolerance, not
+needed if it does not, by the 95 % interval of that share; at least 72 touches are needed to decide. With
+--tolerance verdict it is needed if it changes the comparison of active with random by more than the
+margin: the one given (verdict:0.1mm), or the end of the scene's own interval that is nearest to zero.
+
+The cheapest scene is compared again on held-out targets or trials; exit code 1 if it does not stay within
+the tolerance there. Ctrl-C keeps the variants that are done.")]
+pub(super) struct Args {
+    /// Scene (TOML) with an object.
+    scene: PathBuf,
+    /// Change one setting: a dotted key and a TOML value; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Compare effects with the scene as it is, or levels with the reference or the truth
+    /// [default: both; with --tolerance verdict scene].
+    #[arg(long, value_name = "ORIGIN")]
+    against: Option<Origin>,
+    /// Touches of each variant [default: 24 of a level, 120 of an effect].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=1000))]
+    touches: Option<u16>,
+    /// Seed of the targets.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    seed: u16,
+    /// Pairs of touches that are timed with each effect.
+    #[arg(long, default_value_t = 200, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
+    pairs: u16,
+    /// Trials of each planner with each effect, 0 for none
+    /// [default: 10, with a tolerance of touches 0, with --tolerance verdict 40].
+    #[arg(long, value_name = "N")]
+    trials: Option<u16>,
+    /// Touches of a trial.
+    #[arg(long, default_value_t = 30, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=500))]
+    trial_touches: u16,
+    /// Write the cheapest scene within this error, or with the same verdict on planners.
+    #[arg(long, value_name = "0.2mm|0.1N|20counts|verdict")]
+    tolerance: Option<Criterion>,
+    /// Held-out targets or trials that the cheapest scene is tried on
+    /// [default: 200 targets for effects, else as many as are compared].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10000))]
+    fresh: Option<u16>,
+    /// Switch effects in the scene with every effect that its body can have.
+    #[arg(long)]
+    full: bool,
+    /// Folder for the results [default: runs/accuracy-SCENE].
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    force: Force,
+}
+
+/// Touches of each level, where not given: the finest takes seconds for each.
+const LEVEL_TOUCHES: u16 = 24;
+
+/// Touches with each effect, where not given: one of them beyond the tolerance is few enough.
+const EFFECT_TOUCHES: u16 = 120;
+
+/// Held-out targets of the scene without effects, where not given.
+// heuristic: 5 of them beyond the tolerance are still few enough.
+const FRESH: u16 = 200;
+
+/// The source of every interval.
+const ONE_BUILD: &str = "\
+intervals: 95 %, over touches, trials and timings of this one build; another build of the program may
+place its code so that times differ by some percent more";
+
+pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+    let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
+    needs_zone(&scene, &args.scene)?;
+    let path = args.scene.display();
+    ensure!(scene.object.is_some(), "{path}: levels and effects need a scene with an object");
+    let is_verdict = matches!(args.tolerance, Some(Criterion::Verdict(_)));
+    let is_of_effects = args.against == Some(Origin::Scene);
+    let has_levels = !is_of_effects && !is_verdict;
+    let has_effects = (is_of_effects || args.against.is_none()) && scene.body.moves();
+    if !has_levels && !has_effects {
+        let body = scene.body.name();
+        ensure!(
+            scene.body.moves(),
+            "{path}: body = \"{body}\" has no effects; effects need body = \"kinematic\""
+        );
+        bail!("--against: a verdict is that of the scene; allowed is --against scene");
+    }
+    let origin =
+        args.against.unwrap_or(if has_effects { Origin::Scene } else { Origin::Reference });
+    let is_of_contact =
+        |it| !matches!(it, Criterion::Touches(it) if it.quantity != Quantity::Contact);
+    ensure!(
+        origin != Origin::Truth || args.tolerance.is_none_or(is_of_contact),
+        "--against truth: true forces are unknown; allowed is a tolerance in mm or um"
+    );
+    let name = args.scene.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+    let out = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("runs/accuracy-{name}")));
+    args.force.claim_folder(&out, "accuracy.json")?;
+    make_folder(&out)?;
+
+    let stop = stop_on_interrupt("touches")?;
+    let is_stopped = || stop.load(Ordering::Relaxed);
+    let (mut levels, mut effects, mut orders) = (None, None, Vec::new());
+    if has_levels {
+        let effort = effort(args, LEVEL_TOUCHES, false);
+        let compared = compare(Variant::levels(&scene), effort, args.tolerance, (talk, &stop))?;
+        if !is_stopped() {
+            orders = compared.orders(&scene)?;
+        }
+        print(&format!("levels; the reference is the finest:\n{}", table(&compared)))?;
+        let words = ["does NOT shrink", "shrinks"];
+        if let Some(is_converging) = compared.is_converging() {
+            let words = words[usize::from(is_converging)];
+            print(&format!("towards the reference the error of the force {words} at every step"))?;
+        }
+        for order in &orders {
+            print(&format!(
+                "order of convergence in the {}: {:.2} observed, {} expected",
+                order.name, order.observed, order.expected
+            ))?;
+        }
+        levels = Some(compared);
+    }
+    if has_effects && !is_stopped() {
+        let scene = if args.full { full(&scene) } else { scene.clone() };
+        let effort = effort(args, EFFECT_TOUCHES, true);
+        let compared = compare(Variant::effects(&scene), effort, args.tolerance, (talk, &stop))?;
+        let within =
+            compared.criterion.map_or(String::new(), |it| format!(", within {}", words(it)));
+        print(&format!(
+            "effects{within}; one that is switched on is needed where the real finger has it:"
+        ))?;
+        print(&format!("{}{ONE_BUILD}", table(&compared)))?;
+        effects = Some(compared);
+    }
+    let compared = if origin == Origin::Scene { &effects } else { &levels };
+    let mut cheapest = None;
+    if let (Some(tolerance), Some(compared), false) = (args.tolerance, compared, is_stopped()) {
+        for origin in [Origin::Reference, Origin::Truth] {
+            print_cheapest_level(levels.as_ref(), tolerance, origin)?;
+        }
+        let (selected, fresh) = match tolerance {
+            _ if origin == Origin::Scene => (compared.without_unneeded()?, Some(FRESH)),
+            Criterion::Touches(tolerance) => (compared.cheapest(&tolerance, origin), None),
+            Criterion::Verdict(_) => (None, None),
+        };
+        let fresh = args.fresh.or(fresh.filter(|_| !is_verdict));
+        let confirm = |selected| compared.confirm(selected, origin, fresh);
+        cheapest = selected.map(confirm).transpose()?;
+    }
+    let study = serde_json::json!({
+        "scene": name, "levels": levels, "orders": orders, "effects": effects, "cheapest": cheapest,
+    });
+    write_whole(&out.join("accuracy.json"), &serde_json::to_string_pretty(&study)?)?;
+    if let Some(svg) = accuracy::draw(levels.as_ref(), &orders, effects.as_ref()) {
+        files::write(&out.join("accuracy"), &svg)?;
+    }
+    print(&format!("results and figure in {}", out.display()))?;
+    if is_stopped() {
+        return Ok(Ending::Interrupted);
+    }
+    let Some(criterion) = compared.as_ref().and_then(|compared| compared.criterion) else {
+        return Ok(Ending::Done);
+    };
+    let within = format!("{} from {}", words(criterion), origin.name());
+    let Some(cheapest) = cheapest else {
+        ensure!(origin == Origin::Scene, "no level is within {within}: no scene is written");
+        print(&format!("nothing that the scene has can be left out within {within}"))?;
+        return Ok(Ending::Done);
+    };
+    let described = described(&cheapest, criterion, origin);
+    let described =
+        format!("cheapest within {within}: {name}, {}\n{described}", cheapest.selected.name);
+    let head: String = described.lines().map(|line| format!("# {line}\n")).collect();
+    let path = out.join("cheapest.toml");
+    let scene = toml::to_string(&cheapest.scene)?;
+    write_whole(&path, &format!("# Written by palpate accuracy.\n{head}\n{scene}"))?;
+    print(&format!("{described}\nscene: {}", path.display()))?;
+    Ok(if cheapest.is_confirmed { Ending::Done } else { Ending::Failed })
+}
+
+fn effort(args: &Args, touches: u16, is_of_effects: bool) -> Effort {
+    let trials = match args.tolerance {
+        None => 10,
+        Some(Criterion::Touches(_)) => 0,
+        Some(Criterion::Verdict(_)) => 40,
+    };
+    Effort {
+        touches: args.touches.unwrap_or(touches).into(),
+        pairs: if is_of_effects { args.pairs.into() } else { 0 },
+        trials: if is_of_effects { args.trials.unwrap_or(trials).into() } else { 0 },
+        trial_touches: args.trial_touches.into(),
+        seed: args.seed.into(),
+    }
+}
+
+/// Measures variants, of which the first is the reference, until Ctrl-C.
+fn compare(
+    variants: Vec<(Variant, Scene)>,
+    effort: Effort,
+    criterion: Option<Criterion>,
+    (talk, stop): (Talk, &AtomicBool),
+) -> anyhow::Result<Comparison> {
+    let bar = progress_bar(talk, "accuracy", "variants", variants.len() as u64, 0);
+    let mut variants = variants.into_iter();
+    let Some(reference) = variants.next() else {
+        bail!("no variant of the scene can be simulated")
+    };
+    let mut comparison = Comparison::new(reference, effort, criterion)?;
+    step(talk, &bar);
+    for variant in variants.take_while(|_| !stop.load(Ordering::Relaxed)) {
+        comparison.add(variant)?;
+        step(talk, &bar);
+    }
+    bar.finish_and_clear();
+    Ok(comparison)
+}
+
+fn words(criterion: Criterion) -> String {
+    match criterion {
+        Criterion::Touches(it) => format!("{it} of the {}", it.quantity.name()),
+        Criterion::Verdict(m) => format!("{:.3} mm of active less random", 1e3 * m.unwrap_or(0.0)),
+    }
+}
+
+/// Prints the cheapest level within a tolerance of touches, or how near the levels come to it.
+fn print_cheapest_level(
+    levels: Option<&Comparison>,
+    criterion: Criterion,
+    origin: Origin,
+) -> anyhow::Result<()> {
+    let (Some(levels), Criterion::Touches(tolerance)) = (levels, criterion) else { return Ok(()) };
+    let of = origin.name();
+    if let Some((level, _)) = levels.cheapest(&tolerance, origin) {
+        let time = duration(level.wall_s.unwrap_or(f64::NAN));
+        print(&format!(
+            "cheapest level within {tolerance} of {of}: {}, {time} a touch",
+            level.name
+        ))?;
+    } else if let Some(least) = levels.error_min(&tolerance, origin) {
+        let least = tolerance.shown(least);
+        print(&format!("no level within {tolerance} of {of}: 95 % within {least} at best"))?;
+    }
+    Ok(())
+}
+
+/// The errors of the cheapest scene where it was selected and on held-out touches or trials.
+fn described(cheapest: &Cheapest, criterion: Criterion, origin: Origin) -> String {
+    let errors = |variant: &Variant| match criterion {
+        Criterion::Touches(tolerance) => {
+            let p95 = variant.p95(tolerance.quantity, origin);
+            let p95 = p95.map_or("nothing is comparable".into(), |p95| tolerance.shown(p95));
+            format!("95 % of {} touches are within {p95}", variant.touches)
+                + &variant.beyond.map_or(String::new(), |share| format!(", {}", beyond(&share)))
+        }
+        Criterion::Verdict(_) => {
+            let [verdict, change] = [variant.verdict_m, variant.verdict_change_m];
+            let trials = change.map_or(0, |change| change.trials);
+            let [verdict, change] = [verdict, change].map(paired);
+            format!("active less random is {verdict} mm in {trials} trials, a change of {change}")
+        }
+    };
+    let Cheapest { selected, held_out, is_confirmed, .. } = cheapest;
+    let stays = if *is_confirmed { "it stays" } else { "it is NOT shown to stay" };
+    let interval = held_out.time_ratio_interval.map(|[low, high]| [1.0 / high, 1.0 / low]);
+    let speedup = held_out.time_ratio.map_or(f64::NAN, |ratio| 1.0 / ratio);
+    format!(
+        "where it was selected, {}\nheld out, {}: {stays} within the tolerance\n{} times as fast as the \
+         reference\n{ONE_BUILD}",
+        errors(selected),
+        errors(held_out),
+        with_interval(speedup, interval, &|times| format!("{times:.2}")),
+    )
+}
+
+/// The columns of both tables; those without a value are left out.
+const COLUMNS: [(&str, fn(&Variant) -> String); 17] = [
+    ("variant", |it| it.name.clone()),
+    ("off truth mm: mean", |it| mean(it.off_truth_m, 1e-3, 3)),
+    ("95 %", |it| cell(it.off_truth_m.map(|spread| 1e3 * spread.p95), 3)),
+    ("max", |it| cell(it.off_truth_m.map(|spread| 1e3 * spread.max), 3)),
+    ("off reference mm: mean", |it| mean(it.contact_m, 1e-3, 3)),
+    ("95 %", |it| cell(it.contact_m.map(|spread| 1e3 * spread.p95), 3)),
+    ("force N", |it| mean(it.force_n, 1.0, 4)),
+    ("electrodes counts", |it| mean(it.electrode_counts, 1.0, 2)),
+    ("surface RMSE mm", |it| cell(it.surface_rmse_m.map(|m| 1e3 * m), 3)),
+    ("a touch", |it| it.wall_s.map_or(NONE.into(), duration)),
+    ("x real time", |it| cell(it.real_time_factor(), 1)),
+    ("time", |it| {
+        it.time_ratio.map_or(NONE.into(), |ratio| {
+            with_interval(ratio, it.time_ratio_interval, &|it| {
+                format!("{:+.1} %", 100.0 * (it - 1.0))
+            })
+        })
+    }),
+    ("finger bytes", |it| if it.touches > 0 { it.finger_bytes.to_string() } else { NONE.into() }),
+    ("active - random RMSE mm", |it| paired(it.verdict_m)),
+    ("change", |it| paired(it.verdict_change_m)),
+    ("beyond the tolerance", |it| it.beyond.as_ref().map_or(NONE.into(), beyond)),
+    ("so it is", |it| it.relevance.map_or(NONE, |relevance| relevance.words()).into()),
+];
+
+fn table(comparison: &Comparison) -> String {
+    let mut lines = vec![COLUMNS.map(|(head, _)| head.to_string()).to_vec()];
+    let variants = [&comparison.reference].into_iter().chain(&comparison.variants);
+    lines.extend(variants.map(|it| COLUMNS.map(|(_, shown)| shown(it)).to_vec()));
+    aligned_rows(&without_empty(lines))
+}
+
+fn mean(spread: Option<Spread>, unit: f64, decimals: usize) -> String {
+    cell(spread.map(|spread| spread.mean / unit), decimals)
+}
+
+fn paired(paired: Option<Paired>) -> String {
+    let Some(paired) = paired else { return NONE.into() };
+    with_interval(paired.mean, paired.interval, &|m| format!("{:.3}", 1e3 * m))
+}
+
+fn beyond(share: &Share) -> String {
+    let [low, high] = share.interval.map(|share| 100.0 * share);
+    format!("{} of {} beyond, [{low:.1}, {high:.1}] %", share.count, share.of)
+}

@@ -1,0 +1,203 @@
+//! The cost of accuracy: errors of the levels over wall time, their fall with the resolution, and
+//! the effects one by one.
+
+use super::axes::{Axis, Panel};
+use super::canvas::{Anchor, Area, Canvas};
+use super::legend::{Legend, Swatch};
+use super::style;
+use super::style::{FAINT_INK, INK, PAPER, SMALL_PX};
+use crate::experiment::statistics::mean;
+use crate::study::accuracy::comparison::Comparison;
+use crate::study::accuracy::convergence::Order;
+use crate::study::accuracy::deviation::Spread;
+use crate::study::accuracy::level::Level;
+use crate::study::accuracy::variant::Variant;
+
+/// The colour, by Okabe and Ito, and the name of a level's senses, then those of a shell.
+const FAMILIES: [(&str, &str); 5] = [
+    ("#000000", "rigid"),
+    ("#e69f00", "soft skin"),
+    ("#56b4e9", "and fluid"),
+    ("#0072b2", "and electrodes"),
+    ("#009e73", "the same, a thin shell"),
+];
+
+/// A number of a variant with its interval.
+type Bar = (f64, [f64; 2]);
+
+const PANEL_PX: (f64, f64) = (350.0, 270.0);
+const LEFT_PX: f64 = 74.0;
+const STEP_PX: f64 = 446.0;
+const ROW_PX: f64 = 354.0;
+const TOP_PX: f64 = 66.0;
+/// Height of an effect's line, and room for its name.
+const LINE_PX: f64 = 18.0;
+const NAME_PX: f64 = 140.0;
+
+/// Draws levels and effects, as far as they were compared; `None` without a variant that differs from
+/// its reference.
+pub fn draw(
+    levels: Option<&Comparison>,
+    orders: &[Order],
+    effects: Option<&Comparison>,
+) -> Option<String> {
+    let top_px = if levels.is_some() { TOP_PX + 2.0 * ROW_PX } else { TOP_PX };
+    let lines_px = effects.map_or(0.0, |effects| effects.variants.len() as f64 * LINE_PX);
+    let bottom_px = if effects.is_some() { 54.0 } else { -30.0 };
+    let mut canvas = Canvas::new(LEFT_PX + 3.0 * STEP_PX - 60.0, top_px + lines_px + bottom_px);
+    if let Some(levels) = levels {
+        draw_levels(&mut canvas, levels)?;
+    }
+    for (column, order) in orders.iter().enumerate() {
+        draw_order(&mut canvas, order, area(column, 1));
+    }
+    if let Some(effects) = effects {
+        let first = Area { top: top_px, height: lines_px, ..area(0, 0) };
+        draw_effects(&mut canvas, &effects.variants, first)?;
+    }
+    Some(canvas.finish())
+}
+
+fn draw_levels(canvas: &mut Canvas, levels: &Comparison) -> Option<()> {
+    let entries: Vec<_> = (FAMILIES.iter())
+        .map(|(colour, words)| (Swatch::Circle(point(colour)), *words))
+        .chain([
+            (Swatch::Diamond(INK), "the scene as it is"),
+            (Swatch::Line(style::dashed(INK, 1.3, "5 3")), "front"),
+            (Swatch::Line(reference_line()), "time of the reference"),
+        ])
+        .collect();
+    Legend::new(LEFT_PX + 2.0 * STEP_PX + PANEL_PX.0, entries).draw(canvas, [LEFT_PX, 20.0]);
+    draw_cost(canvas, levels, (0, 1e-3, "contact off the reference's (mm)"), |it| it.contact_m)?;
+    draw_cost(canvas, levels, (1, 1.0, "force off the reference's (N)"), |it| it.force_n)?;
+    draw_cost(canvas, levels, (2, 1e-3, "contact off the true surface (mm)"), |it| it.off_truth_m)
+}
+
+fn area(column: usize, row: usize) -> Area {
+    let left = LEFT_PX + column as f64 * STEP_PX;
+    let top = TOP_PX + row as f64 * ROW_PX;
+    Area { left, top, width: PANEL_PX.0, height: PANEL_PX.1 }
+}
+
+fn colour(level: &Level) -> &'static str {
+    let family = if level.shell.is_some() { 4 } else { level.senses as usize };
+    FAMILIES[family].0
+}
+
+/// Draws an error over the wall time of a touch.
+fn draw_cost(
+    canvas: &mut Canvas,
+    levels: &Comparison,
+    (column, unit, words): (usize, f64, &str),
+    measure: fn(&Variant) -> Option<Spread>,
+) -> Option<()> {
+    let area = area(column, 0);
+    let mut points: Vec<(f64, Bar, &Variant)> = (levels.variants.iter())
+        .filter_map(|variant| Some((1e3 * variant.wall_s?, bar(measure(variant)?, unit), variant)))
+        .collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let ends =
+        points.iter().flat_map(|(_, (mean, [low, high]), _)| [low.max(0.3 * mean), *high, *mean]);
+    let reference_ms = 1e3 * levels.reference.wall_s?;
+    let times_ms = points.iter().map(|(time_ms, ..)| *time_ms).chain([reference_ms]);
+    let panel = Panel { area, x: Axis::log(times_ms)?, y: Axis::log(ends)? };
+    panel.frame(canvas);
+    panel.label(canvas, "", "wall time of a touch (ms)", words);
+    canvas.clipped(area, |canvas| {
+        let mut least = f64::INFINITY;
+        let mut corners = Vec::new();
+        for (time_ms, (error, interval), variant) in &points {
+            if *error > 0.0 && *error < least {
+                least = *error;
+                corners.push(panel.at(*time_ms, least));
+            }
+            let colour = variant.level.as_ref().map_or(INK, colour);
+            let ends = interval.map(|value| panel.at(*time_ms, value.max(1e-9)));
+            canvas.line(ends, &style::stroke(colour, 1.2));
+            match variant.level {
+                Some(_) => canvas.circle(panel.at(*time_ms, *error), 3.6, &point(colour)),
+                None => canvas.diamond(panel.at(*time_ms, *error), &style::stroke(INK, 1.3)),
+            }
+        }
+        canvas.line(corners, &style::dashed(INK, 1.3, "5 3"));
+        let x = panel.at(reference_ms, 1.0)[0];
+        canvas.line([[x, area.top], [x, area.bottom()]], &reference_line());
+    });
+    Some(())
+}
+
+fn draw_order(canvas: &mut Canvas, order: &Order, area: Area) {
+    let (x, y): (Vec<f64>, Vec<f64>) = order.errors.iter().copied().unzip();
+    let (Some(x_axis), Some(y_axis)) = (Axis::log(x), Axis::log(y)) else { return };
+    let panel = Panel { area, x: x_axis, y: y_axis };
+    panel.frame(canvas);
+    let words = format!("order {:.2}; dashed: {}", order.observed, order.expected);
+    panel.label(canvas, &words, order.axis, "mean error of the force (N)");
+    // The line of the expected order through the middle of the measured points.
+    let logs: Vec<f64> = (order.errors.iter())
+        .map(|(at, error)| error.ln() + order.expected * at.ln())
+        .filter(|log| log.is_finite())
+        .collect();
+    let middle = mean(&logs);
+    let line: Vec<(f64, f64)> = (order.errors.iter())
+        .map(|(at, _)| (*at, (middle - order.expected * at.ln()).exp()))
+        .collect();
+    panel.curve(canvas, &line, &style::dashed(FAINT_INK, 1.3, "5 3"));
+    for (at, error) in &order.errors {
+        canvas.circle(panel.at(*at, *error), 3.6, &point(FAMILIES[4].0));
+    }
+}
+
+/// Draws each effect as a line: how far contacts move, the time of a touch, and the verdict's change.
+fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option<()> {
+    let time = |variant: &Variant| -> Option<Bar> {
+        let ratio = variant.time_ratio?;
+        let interval = variant.time_ratio_interval.unwrap_or([ratio; 2]);
+        Some((100.0 * (ratio - 1.0), interval.map(|ratio| 100.0 * (ratio - 1.0))))
+    };
+    let verdict_mm = |variant: &Variant| -> Option<Bar> {
+        let change = variant.verdict_change_m?;
+        Some((1e3 * change.mean, change.interval.unwrap_or([change.mean; 2]).map(|m| 1e3 * m)))
+    };
+    let panels: [(&dyn Fn(&Variant) -> Option<Bar>, &str); 3] = [
+        (&|variant| Some(bar(variant.contact_m?, 1e-3)), "contact moves (mm)"),
+        (&time, "time of a touch changes (%)"),
+        (&verdict_mm, "active − random RMSE changes (mm)"),
+    ];
+    for (column, (measure, words)) in panels.into_iter().enumerate() {
+        let inset = if column == 0 { NAME_PX } else { 0.0 };
+        let left = first.left + column as f64 * STEP_PX + inset;
+        let area = Area { left, width: first.width - inset, ..first };
+        let bars = effects.iter().filter_map(measure);
+        let ends = bars.flat_map(|(_, interval)| interval).chain([0.0]);
+        // So few ticks that there are none: the lines have names.
+        let y = Axis::linear(0.5, effects.len() as f64 + 0.5, 1e-6);
+        let panel = Panel { area, x: Axis::around(ends, 0.05, 5.0)?, y };
+        panel.frame(canvas);
+        panel.label(canvas, "", words, "");
+        for (line, variant) in effects.iter().enumerate() {
+            let y = (effects.len() - line) as f64;
+            if column == 0 {
+                let at = [area.left - 7.0, panel.at(0.0, y)[1] + 4.0];
+                canvas.text(at, &variant.name, SMALL_PX, Anchor::End);
+            }
+            if let Some((value, interval)) = measure(variant) {
+                canvas.line(interval.map(|x| panel.at(x, y)), &style::stroke(INK, 1.2));
+                canvas.circle(panel.at(value, y), 3.6, &point(FAMILIES[3].0));
+            }
+        }
+    }
+    Some(())
+}
+
+fn bar(spread: Spread, unit: f64) -> Bar {
+    (spread.mean / unit, spread.interval.map(|value| value / unit))
+}
+
+fn reference_line() -> String {
+    style::dashed(FAINT_INK, 1.0, "2 3")
+}
+
+fn point(colour: &str) -> String {
+    format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".7""#)
+}

@@ -1,0 +1,277 @@
+//! Variants of a scene compared with a reference, and the cheapest of them within a tolerance.
+
+use super::convergence::{Order, in_contact, in_samples, in_time_step};
+use super::level::converging;
+use super::switches::{switched, switches};
+use super::tolerance::{Criterion, Origin, Tolerance};
+use super::touches::{Touches, Trials, wall_times_s};
+use super::variant::{ALLOWED, Variant};
+use super::verdict::{Relevance, advantages_m, difference};
+use crate::config::Rules;
+use crate::experiment::statistics::{median, median_interval};
+use crate::robot::finger::TipMotion;
+use crate::sim::Scene;
+use anyhow::{Context, bail};
+use serde::Serialize;
+
+/// Seed of held-out targets and trials: no comparison has as many.
+const HELD_OUT: u32 = 1_000_000;
+
+/// The number of measurements of each variant.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Touches compared.
+    pub touches: usize,
+    /// Touches timed, each beside one of the reference; 0 to time each target once, alone.
+    pub pairs: usize,
+    /// Trials of each planner.
+    pub trials: u32,
+    /// Touches of each of these.
+    pub trial_touches: u32,
+    /// Seed of the targets and number of the first trial.
+    pub seed: u32,
+}
+
+/// A reference and the variants compared with it.
+#[derive(Serialize)]
+pub struct Comparison {
+    /// The reference.
+    pub reference: Variant,
+    /// The variants.
+    pub variants: Vec<Variant>,
+    /// The criterion, with the margin that is used.
+    #[serde(skip)]
+    pub criterion: Option<Criterion>,
+    #[serde(skip)]
+    scenes: Vec<Scene>,
+    #[serde(skip)]
+    scene: Scene,
+    #[serde(skip)]
+    effort: Effort,
+    #[serde(skip)]
+    trials: Trials,
+    #[serde(skip)]
+    touches: Vec<Touches>,
+    #[serde(skip)]
+    advantages_m: Vec<Option<f64>>,
+}
+
+/// The cheapest scene that stays within a tolerance.
+#[derive(Serialize)]
+pub struct Cheapest {
+    /// The scene.
+    #[serde(skip)]
+    pub scene: Scene,
+    /// Its errors on the touches or trials that it was selected on.
+    pub selected: Variant,
+    /// Its errors on held-out ones.
+    pub held_out: Variant,
+    /// Whether it stays within the tolerance there.
+    pub is_confirmed: bool,
+}
+
+impl Comparison {
+    /// Measures the reference. The default margin of a verdict is the end of its interval nearest to
+    /// zero: a smaller change cannot reverse it.
+    ///
+    /// # Errors
+    /// If the scene cannot be built, or its verdict is the criterion and undecided.
+    pub fn new(
+        (reference, scene): (Variant, Scene),
+        effort: Effort,
+        criterion: Option<Criterion>,
+    ) -> anyhow::Result<Self> {
+        let trials = Trials::new(&scene, effort.touches, effort.seed.into());
+        let (mut reference, touches) = reference.measured(&scene, &trials, None, None)?;
+        let rounds = if effort.pairs == 0 { effort.touches } else { effort.pairs };
+        reference.wall_s = median(&wall_times_s([&scene], &trials.targets(), rounds)?.concat());
+        let advantages_m = advantages(&scene, effort)?;
+        reference.verdict_m = difference(&advantages_m, None);
+        let criterion = match criterion {
+            Some(Criterion::Verdict(m)) => Some(Criterion::Verdict(Some(margin_m(m, &reference)?))),
+            other => other,
+        };
+        let (variants, scenes) = Default::default();
+        Ok(Self {
+            reference,
+            variants,
+            criterion,
+            scenes,
+            scene,
+            effort,
+            trials,
+            touches,
+            advantages_m,
+        })
+    }
+
+    /// Measures another variant and adds it.
+    ///
+    /// # Errors
+    /// If its scene cannot be built.
+    pub fn add(&mut self, (variant, scene): (Variant, Scene)) -> anyhow::Result<()> {
+        let mut variant = self.measured(variant, &scene)?;
+        variant.relevance = self.relevance(&variant).filter(|_| variant.effect.is_some());
+        self.variants.push(variant);
+        self.scenes.push(scene);
+        Ok(())
+    }
+
+    /// A scene that is refused is not measured.
+    fn measured(&self, variant: Variant, scene: &Scene) -> anyhow::Result<Variant> {
+        if !Rules::hold(scene) {
+            return Ok(variant);
+        }
+        let tolerance = match &self.criterion {
+            Some(Criterion::Touches(tolerance)) => Some(tolerance),
+            _ => None,
+        };
+        let (variant, _) = variant.measured(scene, &self.trials, Some(&self.touches), tolerance)?;
+        let targets = self.trials.targets();
+        let (walls_s, ratios): (Vec<f64>, Vec<f64>) = match self.effort.pairs {
+            0 => (wall_times_s([scene], &targets, self.effort.touches)?.concat(), Vec::new()),
+            pairs => (wall_times_s([&self.scene, scene], &targets, pairs)?.iter())
+                .map(|[reference_s, wall_s]| (*wall_s, wall_s / reference_s))
+                .unzip(),
+        };
+        let advantages_m = advantages(scene, self.effort)?;
+        // Where many trials do not end, the rest are no comparison.
+        let ended = self.advantages_m.iter().flatten().count() as f64;
+        let change = difference(&advantages_m, Some(&self.advantages_m))
+            .filter(|change| change.trials as f64 >= (1.0 - ALLOWED) * ended);
+        Ok(Variant {
+            wall_s: median(&walls_s),
+            time_ratio: median(&ratios),
+            time_ratio_interval: median_interval(&ratios, 0),
+            verdict_m: difference(&advantages_m, None),
+            verdict_change_m: change,
+            ..variant
+        })
+    }
+
+    /// Whether the reference needs what the variant lacks; nothing comparable means that it does.
+    fn relevance(&self, variant: &Variant) -> Option<Relevance> {
+        let needed = Some(Relevance::Needed);
+        match self.criterion? {
+            Criterion::Touches(_) => match variant.beyond.map(|beyond| beyond.interval) {
+                Some([_, high]) if high < ALLOWED => Some(Relevance::NotNeeded),
+                Some([low, _]) if low <= ALLOWED => Some(Relevance::Undecided),
+                _ => needed,
+            },
+            Criterion::Verdict(margin_m) => variant
+                .verdict_change_m
+                .map_or(needed, |change| Some(Relevance::of_change(change.interval, margin_m))),
+        }
+    }
+
+    /// The cheapest variant of which 95 % of the touches stay within the tolerance.
+    pub fn cheapest(&self, tolerance: &Tolerance, origin: Origin) -> Option<(Variant, Scene)> {
+        let is_within = |variant: &Variant| variant.stays_within(tolerance, origin);
+        let time_s = |variant: &Variant| variant.wall_s.unwrap_or(f64::INFINITY);
+        let within = self.variants.iter().zip(&self.scenes).filter(|(it, _)| is_within(it));
+        let cheapest = within.min_by(|(a, _), (b, _)| time_s(a).total_cmp(&time_s(b)));
+        cheapest.map(|(variant, scene)| (variant.clone(), scene.clone()))
+    }
+
+    /// The smallest error that 95 % of the touches of a variant stay within.
+    pub fn error_min(&self, tolerance: &Tolerance, origin: Origin) -> Option<f64> {
+        let errors = self.variants.iter().filter_map(|it| it.p95(tolerance.quantity, origin));
+        errors.min_by(f64::total_cmp)
+    }
+
+    /// The reference without effects that it does not need: the most expensive is left out first, as
+    /// long as all that are left out are together not needed either; `None` if none can be.
+    ///
+    /// # Errors
+    /// If a scene cannot be built.
+    pub fn without_unneeded(&self) -> anyhow::Result<Option<(Variant, Scene)>> {
+        let is_spare = |variant: &Variant| self.relevance(variant) == Some(Relevance::NotNeeded);
+        let mut spare: Vec<&Variant> = self.variants.iter().filter(|it| is_spare(it)).collect();
+        let ratio = |variant: &Variant| variant.time_ratio.unwrap_or(f64::NAN);
+        spare.sort_by(|a, b| ratio(a).total_cmp(&ratio(b)));
+        let mut best: Option<(Variant, Scene)> = None;
+        for effect in spare.iter().filter_map(|variant| variant.effect.as_ref()) {
+            let (name, scene) = match &best {
+                Some((variant, scene)) => (format!("{}, {effect}", variant.name), scene),
+                None => (format!("without {effect}"), &self.scene),
+            };
+            let mut on = switches().into_iter().filter(|switch| switch.is_on(scene));
+            let Some(switch) = on.find(|switch| switch.name == *effect) else { continue };
+            let less = switched(scene, &switch);
+            let variant = self.measured(Variant::named(name), &less)?;
+            best = is_spare(&variant).then_some((variant, less)).or(best);
+        }
+        Ok(best)
+    }
+
+    /// Compares what was selected with the reference on `count` held-out targets or trials.
+    ///
+    /// # Errors
+    /// If a scene cannot be built.
+    pub fn confirm(
+        &self,
+        (selected, scene): (Variant, Scene),
+        origin: Origin,
+        count: Option<u16>,
+    ) -> anyhow::Result<Cheapest> {
+        let mut effort = Effort { seed: self.effort.seed + HELD_OUT, ..self.effort };
+        match self.criterion {
+            Some(Criterion::Verdict(_)) => effort.trials = count.map_or(effort.trials, u32::from),
+            _ => effort.touches = count.map_or(effort.touches, usize::from),
+        }
+        let reference = (self.reference.clone(), self.scene.clone());
+        let fresh = Self::new(reference, effort, self.criterion)?;
+        let unmeasured = Variant::named(selected.name.clone());
+        let mut held_out = fresh.measured(unmeasured, &scene)?;
+        let ratio = held_out.wall_s.zip(fresh.reference.wall_s).map(|(wall, other)| wall / other);
+        held_out.time_ratio = held_out.time_ratio.or(ratio);
+        let is_confirmed = match &self.criterion {
+            Some(Criterion::Touches(it)) => held_out.stays_within(it, origin),
+            _ => self.relevance(&held_out) == Some(Relevance::NotNeeded),
+        };
+        Ok(Cheapest { scene, selected, held_out, is_confirmed })
+    }
+
+    /// The orders in which the errors of the levels of `scene` fall: in the time step, in the points
+    /// of the skin, and in the step of a body with masses.
+    ///
+    /// # Errors
+    /// If a scene cannot be built or simulated.
+    pub fn orders(&self, scene: &Scene) -> anyhow::Result<Vec<Order>> {
+        let loads = self.touches.iter().flat_map(|touches| touches.loads.iter().flatten());
+        let poses: Vec<TipMotion> = loads.map(|load| load.motion).collect();
+        let in_time_step = in_time_step(scene, &self.trials)?;
+        let orders = [in_time_step, in_samples(scene, &poses)?, in_contact(scene)?];
+        Ok(orders.into_iter().flatten().collect())
+    }
+
+    /// Whether each of the levels that approach the reference is nearer to it than the one before, in
+    /// the mean force; `None` if one is not measured.
+    pub fn is_converging(&self) -> Option<bool> {
+        let error_n = |level| {
+            let variant = self.variants.iter().find(|variant| variant.level == Some(level))?;
+            Some(variant.force_n?.mean)
+        };
+        let errors_n = converging().map(error_n).collect::<Option<Vec<f64>>>()?;
+        Some(errors_n.is_sorted_by(|a, b| a >= b))
+    }
+}
+
+fn advantages(scene: &Scene, effort: Effort) -> anyhow::Result<Vec<Option<f64>>> {
+    advantages_m(scene, effort.seed..effort.seed + effort.trials, effort.trial_touches)
+}
+
+fn margin_m(stated: Option<f64>, reference: &Variant) -> anyhow::Result<f64> {
+    let verdict = reference.verdict_m;
+    let verdict = verdict.context("no trial of active and random ended: nothing is compared")?;
+    match (stated, verdict.interval) {
+        (Some(margin_m), _) => Ok(margin_m),
+        (None, Some([low, high])) if low > 0.0 || high < 0.0 => Ok(low.abs().min(high.abs())),
+        _ => bail!(
+            "neither planner wins in {} trials (active less random: {:.3} mm): state the change that \
+             matters, as --tolerance verdict:0.1mm, or take more --trials",
+            verdict.trials,
+            1e3 * verdict.mean
+        ),
+    }
+}

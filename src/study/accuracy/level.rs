@@ -1,0 +1,207 @@
+//! Fidelity levels: named changes to a scene, from a swept hull to a fine skin at a fine time step.
+
+use crate::sim::Scene;
+use crate::sim::collision::Collision;
+use crate::sim::finger::effects::skin::SkinModel;
+use crate::sim::scene::Body;
+use crate::sim::solver::Integrator;
+use serde::Serialize;
+
+/// The part of the finger that a level simulates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Senses {
+    /// A rigid hull.
+    Rigid,
+    /// A soft skin without fluid; the point of contact is exact.
+    Dry,
+    /// Fluid under it, whose pressure detects contact.
+    Fluid,
+    /// And electrodes, which locate it.
+    Full,
+}
+
+/// A fidelity level.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Level {
+    /// The body that carries out a touch.
+    pub body: Body,
+    /// The part of the finger that is simulated.
+    pub senses: Senses,
+    /// Points of the skin's foundation; 0 for another skin.
+    pub samples: usize,
+    /// Cells along and around of a skin that is a thin shell.
+    pub shell: Option<[usize; 2]>,
+    /// Duration of a control tick, and of a step of a body with masses.
+    pub period_s: f64,
+    /// Integrator of a body with masses.
+    pub integrator: Integrator,
+    /// Geometry that a rigid finger with masses collides with.
+    pub collision: Option<Collision>,
+    /// Whether a PA-10 carries the finger; else the scene's arm does.
+    pub on_pa10: bool,
+}
+
+/// Fastest approach of a rigid finger with masses: stopped at once, it ends in an overload from
+/// about 5 mm/s on (`docs/dynamic.md`).
+const RIGID_M_S: f64 = 0.005;
+
+const fn kinematic(senses: Senses, samples: usize, period_s: f64) -> Level {
+    Level::new(Body::Kinematic, senses, samples, period_s)
+}
+
+const fn dynamic(samples: usize, period_s: f64) -> Level {
+    Level::new(Body::Dynamic, Senses::Full, samples, period_s)
+}
+
+const fn rigid(collision: Collision) -> Level {
+    let level = Level::new(Body::Dynamic, Senses::Rigid, 0, 0.002);
+    Level { collision: Some(collision), ..level }
+}
+
+const fn shell(cells: [usize; 2], period_s: f64) -> Level {
+    Level { shell: Some(cells), ..kinematic(Senses::Full, 0, period_s) }
+}
+
+/// All levels, one a line. The last six approach the last, the reference, in points and time step at
+/// once: how far each is from it says whether it has converged. They begin with ticks shorter than a
+/// tactile frame: ticks as long as a frame see every frame at the instant it is sampled.
+pub const LEVELS: &[Level] = &[
+    Level::new(Body::Cast, Senses::Rigid, 0, 0.01),
+    rigid(Collision::Hull),
+    rigid(Collision::HeightField),
+    rigid(Collision::Sdf),
+    kinematic(Senses::Dry, 60, 0.01),
+    kinematic(Senses::Dry, 125, 0.01),
+    kinematic(Senses::Dry, 500, 0.01),
+    kinematic(Senses::Dry, 2000, 0.01),
+    kinematic(Senses::Fluid, 125, 0.01),
+    kinematic(Senses::Fluid, 500, 0.01),
+    kinematic(Senses::Fluid, 2000, 0.01),
+    kinematic(Senses::Full, 60, 0.01),
+    kinematic(Senses::Full, 125, 0.01),
+    kinematic(Senses::Full, 250, 0.01),
+    kinematic(Senses::Full, 500, 0.02),
+    kinematic(Senses::Full, 500, 0.01),
+    kinematic(Senses::Full, 500, 0.005),
+    kinematic(Senses::Full, 500, 0.002),
+    kinematic(Senses::Full, 500, 0.001),
+    dynamic(500, 0.002),
+    Level { on_pa10: true, ..dynamic(500, 0.002) },
+    dynamic(500, 0.001),
+    Level { integrator: Integrator::Implicit, ..dynamic(500, 0.001) },
+    Level { integrator: Integrator::Euler, ..dynamic(500, 0.001) },
+    Level { integrator: Integrator::Rk4, ..dynamic(500, 0.001) },
+    dynamic(500, 0.0005),
+    shell([12, 8], 0.01),
+    shell([24, 16], 0.01),
+    shell([24, 16], 0.002),
+    shell([36, 24], 0.002),
+    kinematic(Senses::Full, 1000, 0.005),
+    kinematic(Senses::Full, 2000, 0.002),
+    kinematic(Senses::Full, 4000, 0.001),
+    kinematic(Senses::Full, 8000, 0.0005),
+    kinematic(Senses::Full, 16000, 0.00025),
+    kinematic(Senses::Full, 32000, 0.00025),
+];
+
+/// The levels that approach the reference.
+pub fn converging() -> impl Iterator<Item = Level> {
+    LEVELS[LEVELS.len() - 6..LEVELS.len() - 1].iter().copied()
+}
+
+impl Level {
+    /// A level with the settings that every body has.
+    pub const fn new(body: Body, senses: Senses, samples: usize, period_s: f64) -> Self {
+        Self {
+            body,
+            senses,
+            samples,
+            shell: None,
+            period_s,
+            integrator: Integrator::ImplicitFast,
+            collision: None,
+            on_pa10: false,
+        }
+    }
+
+    /// Whether this build can simulate it.
+    pub fn is_built(&self) -> bool {
+        cfg!(feature = "mujoco") || self.body != Body::Dynamic
+    }
+
+    /// `scene` with this level's changes; every other setting stays.
+    pub fn apply(&self, scene: &Scene) -> Scene {
+        let mut scene = scene.clone();
+        scene.body = self.body;
+        scene.touch.period_s = Some(self.period_s);
+        let solver = &mut scene.solver;
+        if self.body == Body::Dynamic {
+            solver.step_s = self.period_s;
+            solver.integrator = self.integrator;
+        }
+        solver.collision = self.collision;
+        solver.sdf = solver.sdf.take().filter(|_| self.collision == Some(Collision::Sdf));
+        if self.on_pa10 {
+            scene.arm.get_or_insert_default();
+        }
+        if self.collision.is_some() {
+            scene.touch.approach_m_s = RIGID_M_S;
+        }
+        let effects = &mut scene.effects;
+        keep(&mut effects.skin, self.senses != Senses::Rigid);
+        keep(&mut effects.fluid, self.senses >= Senses::Fluid);
+        keep(&mut effects.electrodes, self.senses == Senses::Full);
+        match (&mut effects.skin, self.shell) {
+            (Some(skin), Some(cells)) => {
+                skin.model = SkinModel::Shell;
+                [skin.along, skin.around] = cells;
+            }
+            (Some(skin), None) => {
+                skin.model = SkinModel::Columns;
+                skin.samples = self.samples;
+            }
+            (None, _) => *effects = Default::default(),
+        }
+        if !effects.sends_frames() {
+            effects.timing = None;
+        }
+        scene
+    }
+
+    /// The name in tables.
+    pub fn name(&self) -> String {
+        let mut words = vec![self.body.name().to_string()];
+        if self.body != Body::Cast {
+            words.push(self.senses.name().into());
+            words.extend(self.collision.map(|collision| collision.name().into()));
+            words.extend((self.samples > 0).then(|| self.samples.to_string()));
+            words.extend(self.shell.map(|[along, around]| format!("shell {along} × {around}")));
+            words.push(format!("{} ms", 1e3 * self.period_s));
+        }
+        if self.integrator != Integrator::default() {
+            words.push(self.integrator.name().into());
+        }
+        if self.on_pa10 {
+            words.push("PA-10".into());
+        }
+        words.extend(self.collision.map(|_| format!("at {} mm/s", 1e3 * RIGID_M_S)));
+        words.join(" ")
+    }
+}
+
+impl Senses {
+    /// The name in tables and legends.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rigid => "rigid",
+            Self::Dry => "dry",
+            Self::Fluid => "fluid",
+            Self::Full => "full",
+        }
+    }
+}
+
+fn keep<T: Default>(effect: &mut Option<T>, wanted: bool) {
+    *effect = wanted.then(|| effect.take().unwrap_or_default());
+}

@@ -1,0 +1,246 @@
+//! Touches of a scene without sensor noise, so that only the model differs: contacts, loads, times.
+
+use crate::backend::Fault;
+use crate::backend::trace::{Tick, Ticks, Trace};
+use crate::experiment::truth::Truth;
+use crate::explore::belief::HeightField;
+use crate::explore::gp_settings::GpSettings;
+use crate::explore::planner;
+use crate::explore::planner::{PlannerFactory, PlanningSettings};
+use crate::explore::probe::{Contact, Probe, Touch};
+use crate::math::seed;
+use crate::robot::finger::frame::ELECTRODES;
+use crate::robot::finger::{Frame, TipMotion};
+use crate::sim::environment::Shape;
+use crate::sim::finger::FingertipState;
+use crate::sim::simulator::Simulator;
+use crate::sim::{Environment, Scene};
+use crate::task::Target;
+use rayon::prelude::*;
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Test places along each side of the zone for the error of a believed surface.
+// heuristic: 2 mm apart on the scenes of the paper.
+const GRID: usize = 41;
+
+/// Touches of one trial: after so many a finger's heat and drift have shown.
+// heuristic: an experiment's trials have ten touches or more.
+const TRIAL: usize = 10;
+
+/// The finger still stands where it was deepest as long as it is within this: far above rounding,
+/// far below a tick of any approach.
+const STILL_M: f64 = 1e-7;
+
+/// Targets in trials of ten.
+#[derive(Clone, Debug)]
+pub struct Trials {
+    targets: Vec<Vec<Target>>,
+    first: u64,
+}
+
+impl Trials {
+    /// `count` targets of the scene's zone, evenly spread; the first trial has number `first`.
+    /// Another `first` is another sequence of targets.
+    pub fn new(scene: &Scene, count: usize, first: u64) -> Self {
+        let targets = targets(scene, count, first);
+        Self { targets: targets.chunks(TRIAL).map(<[_]>::to_vec).collect(), first }
+    }
+
+    /// All targets.
+    pub fn targets(&self) -> Vec<Target> {
+        self.targets.concat()
+    }
+
+    /// Touches them in a [`noise_free`] scene, trial by trial.
+    ///
+    /// # Errors
+    /// If the body cannot be simulated or brought to its start.
+    pub fn touch(&self, environment: &Arc<Environment>) -> anyhow::Result<Vec<Touches>> {
+        let simulator = Simulator::new(Arc::clone(environment))?;
+        let trials = self.targets.par_iter().enumerate();
+        Ok(trials
+            .map(|(i, targets)| touch_all(&simulator, targets, self.first + i as u64))
+            .collect::<Result<_, Fault>>()?)
+    }
+}
+
+/// Evenly spread places of the scene's zone.
+pub fn targets(scene: &Scene, count: usize, seed: u64) -> Vec<Target> {
+    let Some(zone) = scene.zone.clone() else { return Vec::new() };
+    let belief = HeightField::new(zone, GpSettings::default()).into();
+    let Some(entry) = planner::by_name("sobol") else { return Vec::new() };
+    let random = seed::stream(seed, 0, "targets");
+    let mut sobol = entry.make(&PlanningSettings::default(), random);
+    (0..count).filter_map(|_| Some(sobol.plan(&belief).ok()?.target)).collect()
+}
+
+/// Results of the touches of one trial.
+#[derive(Debug, Default)]
+pub struct Touches {
+    /// The contact of each touch; `None` after a miss or a fault.
+    pub contacts: Vec<Option<Contact>>,
+    /// The load on the finger when each contact was read.
+    pub loads: Vec<Option<ReferenceLoad>>,
+    /// Simulated time of each touch of a body that moves.
+    pub simulated_s: Vec<f64>,
+    /// Touches that ended in a fault.
+    pub faults: usize,
+}
+
+/// Touches every target with the simulator of a [`noise_free`] scene.
+///
+/// # Errors
+/// If the body cannot be brought to its start.
+pub fn touch_all(simulator: &Simulator, targets: &[Target], seed: u64) -> Result<Touches, Fault> {
+    let environment = simulator.environment();
+    let (mut probe, ticks): (Box<dyn Probe>, _) = match (simulator.body()?, environment.chain()) {
+        (Some(body), Some(chain)) => {
+            let (trace, ticks) = Trace::new(body, chain);
+            (Box::new(simulator.servo(Box::new(trace), seed)?), ticks)
+        }
+        _ => (simulator.probe(seed)?, Ticks::default()),
+    };
+    let mut touches = Touches::default();
+    for target in targets {
+        let outcome = environment.task().approach(target).map(|approach| probe.touch(&approach));
+        touches.faults += usize::from(matches!(outcome, Some(Err(_))));
+        let contact = match outcome {
+            Some(Ok(Touch::Contact(contact))) => Some(contact),
+            _ => None,
+        };
+        let ticks = ticks.take();
+        if let (Some(first), Some(last)) = (ticks.first(), ticks.last()) {
+            touches.simulated_s.push(last.time_s - first.time_s);
+        }
+        touches.loads.push(contact.as_ref().and_then(|_| reference_load(simulator, &ticks)));
+        touches.contacts.push(contact);
+    }
+    Ok(touches)
+}
+
+/// The load on the finger at the end of its rest on the object.
+#[derive(Clone, Debug)]
+pub struct ReferenceLoad {
+    /// Pose and motion of the fingertip.
+    pub motion: TipMotion,
+    /// Magnitude of the force.
+    pub force_n: f64,
+    /// Rise of the static pressure.
+    pub pdc_counts: Option<f64>,
+    /// Change of each electrode.
+    pub electrode_counts: Option<[f64; ELECTRODES]>,
+}
+
+/// `scene` with sensors that add no noise, do not drift and do not round.
+pub fn noise_free(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    let effects = &mut scene.effects;
+    if let Some(electrodes) = &mut effects.electrodes {
+        (electrodes.noise, electrodes.drift_counts, electrodes.quantise) = (0.0, 0.0, false);
+    }
+    if let Some(fluid) = &mut effects.fluid {
+        (fluid.noise_counts, fluid.quantise) = (0.0, false);
+        if let Some(vibration) = &mut fluid.vibration {
+            vibration.noise_counts = 0.0;
+        }
+    }
+    if let Some(thermal) = &mut effects.thermal {
+        (thermal.tdc_noise_counts, thermal.tac_noise_counts) = (0.0, 0.0);
+        thermal.quantise = false;
+    }
+    scene
+}
+
+/// Leads a fresh finger of a [`noise_free`] scene along the movement in `ticks` once more; returns
+/// its load at the end of its rest on the object, or `None` without a skin or a contact.
+pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<ReferenceLoad> {
+    let environment = simulator.environment();
+    let (tip, Shape::Mesh { bvh, .. }) = (environment.fingertip()?, environment.shape()) else {
+        return None;
+    };
+    let zone = environment.task().zone()?;
+    let height_m = |tick: &Tick| zone.height_m(&tick.motion.x_wt.translation.vector.into());
+    let deepest_m = ticks.iter().map(height_m).fold(f64::INFINITY, f64::min);
+    let last = ticks.iter().rposition(|tick| height_m(tick) <= deepest_m + STILL_M)?;
+    let mut state = FingertipState::new(tip, &seed::stream(0, 0, "finger"));
+    let mut before_s = ticks.first()?.time_s;
+    let (mut rest, mut now) = (None, Frame::default());
+    let mut load = Default::default();
+    for tick in &ticks[..=last] {
+        let dt_s = (tick.time_s - before_s).max(0.0);
+        before_s = tick.time_s;
+        load = state.step(tip, bvh, &tick.motion, dt_s).ok()?;
+        while let Some(frame) = state.frame() {
+            rest.get_or_insert_with(|| frame.clone());
+            now = frame;
+        }
+    }
+    let rest = rest.unwrap_or_default();
+    let electrode_counts = (now.electrode_counts.zip(rest.electrode_counts))
+        .map(|(now, rest)| std::array::from_fn(|i| now[i] - rest[i]));
+    Some(ReferenceLoad {
+        motion: ticks[last].motion,
+        force_n: load.force_n.norm(),
+        pdc_counts: now.pdc_counts.zip(rest.pdc_counts).map(|(now, rest)| now - rest),
+        electrode_counts,
+    })
+}
+
+/// Wall times of touches of each scene, its sensors as noisy as they are: in turn, so that other load
+/// of the machine falls on all alike.
+///
+/// # Errors
+/// If a scene cannot be built or its body not be brought to its start.
+pub fn wall_times_s<const N: usize>(
+    scenes: [&Scene; N],
+    targets: &[Target],
+    rounds: usize,
+) -> anyhow::Result<Vec<[f64; N]>> {
+    let mut probes = Vec::new();
+    for scene in scenes {
+        let environment = Arc::new(Environment::build(scene.clone())?);
+        probes.push((Simulator::new(Arc::clone(&environment))?.probe(0)?, environment));
+    }
+    let mut times_s = Vec::with_capacity(rounds);
+    for (round, target) in targets.iter().cycle().take(rounds).enumerate() {
+        let mut walls_s = [f64::NAN; N];
+        // Which goes first alternates: the second finds the caches warm.
+        for k in (0..N).map(|k| (k + round) % N) {
+            let (probe, environment) = &mut probes[k];
+            let Some(approach) = environment.task().approach(target) else { continue };
+            let begun = Instant::now();
+            let _ = black_box(probe.touch(&approach));
+            walls_s[k] = begun.elapsed().as_secs_f64();
+        }
+        times_s.push(walls_s);
+    }
+    times_s.retain(|walls_s| walls_s.iter().all(|wall_s| wall_s.is_finite()));
+    Ok(times_s)
+}
+
+/// Bytes of a finger's skin, electrodes and one trial's memory of them; the mesh and its tree, which
+/// all variants of a scene share, are left out.
+pub fn finger_bytes(environment: &Environment) -> usize {
+    let Some(tip) = environment.fingertip() else { return 0 };
+    tip.bytes() + FingertipState::new(tip, &seed::stream(0, 0, "finger")).bytes()
+}
+
+/// Root mean square error of the surface believed after these touches; `None` if nothing can be
+/// fitted or the truth is unknown.
+pub fn surface_rmse_m(
+    environment: &Environment,
+    targets: &[Target],
+    touches: &[Touches],
+) -> Option<f64> {
+    let zone = environment.task().zone()?.clone();
+    let mut belief = HeightField::new(zone, GpSettings::default());
+    let contacts = touches.iter().flat_map(|touches| &touches.contacts);
+    for (target, contact) in targets.iter().zip(contacts) {
+        let touch = contact.clone().map_or(Touch::Miss, Touch::Contact);
+        belief.observe(target.place()?, &touch);
+    }
+    let (_, surface) = belief.refit().ok()?;
+    Some(Truth::sample(environment, GRID).compare(surface)?.rmse_m)
+}

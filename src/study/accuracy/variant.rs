@@ -1,0 +1,186 @@
+//! A variant of a scene: its errors and its price.
+
+use super::deviation::{Quantity, Share, Spread};
+use super::level::{LEVELS, Level};
+use super::switches::{switched, switches};
+use super::tolerance::{Origin, Tolerance};
+use super::touches::{Touches, Trials, finger_bytes, noise_free, surface_rmse_m};
+use super::verdict::Relevance;
+use crate::config::Rules;
+use crate::experiment::statistics::{Paired, median};
+use crate::explore::probe::Contact;
+use crate::sim::environment::Shape;
+use crate::sim::{Environment, Scene};
+use serde::Serialize;
+use std::sync::Arc;
+
+/// Share of the touches that may be beyond a tolerance.
+pub const ALLOWED: f64 = 0.05;
+
+/// The name of the scene itself among its variants.
+const AS_IT_IS: &str = "the scene as it is";
+
+/// A variant of a scene, compared with its reference: the finest level for a level, the scene as it
+/// is for a switched effect.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Variant {
+    /// The name in tables.
+    pub name: String,
+    /// The level, if it is one.
+    pub level: Option<Level>,
+    /// The effect that is switched, if one is.
+    pub effect: Option<String>,
+    /// Targets touched.
+    pub touches: usize,
+    /// Touches that found a contact.
+    pub contacts: usize,
+    /// Touches that ended in a fault.
+    pub faults: usize,
+    /// Distance of the contacts from the true surface.
+    pub off_truth_m: Option<Spread>,
+    /// Distance of the contacts from those of the reference.
+    pub contact_m: Option<Spread>,
+    /// Difference of the force.
+    pub force_n: Option<Spread>,
+    /// Difference of the rise of the static pressure.
+    pub pdc_counts: Option<Spread>,
+    /// Root mean square difference over the electrodes.
+    pub electrode_counts: Option<Spread>,
+    /// Error of the surface believed after all touches.
+    pub surface_rmse_m: Option<f64>,
+    /// Median wall time of a touch.
+    pub wall_s: Option<f64>,
+    /// Wall time of a touch over that of the reference: the median of interleaved pairs.
+    pub time_ratio: Option<f64>,
+    /// 95 % interval of `time_ratio`.
+    pub time_ratio_interval: Option<[f64; 2]>,
+    /// Median simulated time of a touch.
+    pub simulated_s: Option<f64>,
+    /// Bytes of the finger.
+    pub finger_bytes: usize,
+    /// RMSE of `active` minus that of `random`, m.
+    pub verdict_m: Option<Paired>,
+    /// The same minus that of the scene as it is, trial by trial.
+    pub verdict_change_m: Option<Paired>,
+    /// Touches beyond the tolerance.
+    pub beyond: Option<Share>,
+    /// Whether the scene needs the effect that is switched.
+    pub relevance: Option<Relevance>,
+}
+
+impl Variant {
+    /// The reference, which is the finest level, then `scene` as it is and every other level that this
+    /// build can simulate.
+    pub fn levels(scene: &Scene) -> Vec<(Self, Scene)> {
+        let of_level = |level: &Level| {
+            let variant = Self { level: Some(*level), ..Self::named(level.name()) };
+            (variant, level.apply(scene))
+        };
+        let mut variants: Vec<_> = LEVELS.iter().filter(|it| it.is_built()).map(of_level).collect();
+        variants.rotate_right(1);
+        variants.insert(1, (Self::named(AS_IT_IS.into()), scene.clone()));
+        variants
+    }
+
+    /// The reference, which is `scene` as it is, then the same with each effect switched alone: those
+    /// that it has, and all others that its body can have.
+    pub fn effects(scene: &Scene) -> Vec<(Self, Scene)> {
+        let mut variants = vec![(Self::named(AS_IT_IS.into()), scene.clone())];
+        for switch in switches() {
+            let (is_on, other) = (switch.is_on(scene), switched(scene, &switch));
+            if is_on || Rules::hold(&other) {
+                let name = format!("{} {}", if is_on { "without" } else { "with" }, switch.name);
+                let effect = Some(switch.name);
+                variants.push((Self { effect, ..Self::named(name) }, other));
+            }
+        }
+        variants
+    }
+
+    /// A variant that is not measured yet.
+    pub fn named(name: String) -> Self {
+        Self { name, ..Self::default() }
+    }
+
+    /// Touches the targets with `scene` and compares with the touches of the reference, or with
+    /// themselves where there are none.
+    pub(super) fn measured(
+        self,
+        scene: &Scene,
+        trials: &Trials,
+        reference: Option<&[Touches]>,
+        tolerance: Option<&Tolerance>,
+    ) -> anyhow::Result<(Self, Vec<Touches>)> {
+        let environment = Arc::new(Environment::build(noise_free(scene))?);
+        let touches = trials.touch(&environment)?;
+        let reference = reference.unwrap_or(&touches);
+        let deviations = |quantity: Quantity| quantity.deviations(&touches, reference);
+        let spread = |quantity| Spread::of(deviations(quantity).concat().into_iter().flatten());
+        let beyond = tolerance.and_then(|tolerance| {
+            let is_beyond = |error: &Option<f64>| error.is_some_and(|it| it > tolerance.size());
+            let trials = deviations(tolerance.quantity).into_iter();
+            Share::of(
+                &trials.map(|trial| trial.iter().map(is_beyond).collect()).collect::<Vec<_>>(),
+            )
+        });
+        let contacts: Vec<&Contact> =
+            touches.iter().flat_map(|touches| touches.contacts.iter().flatten()).collect();
+        let off_truth_m =
+            contacts.iter().filter_map(|contact| off_surface_m(&environment, contact));
+        let simulated_s: Vec<f64> = touches.iter().flat_map(|it| it.simulated_s.clone()).collect();
+        let variant = Self {
+            touches: touches.iter().map(|touches| touches.contacts.len()).sum(),
+            contacts: contacts.len(),
+            faults: touches.iter().map(|touches| touches.faults).sum(),
+            off_truth_m: Spread::of(off_truth_m),
+            contact_m: spread(Quantity::Contact),
+            force_n: spread(Quantity::Force),
+            pdc_counts: spread(Quantity::Pressure),
+            electrode_counts: spread(Quantity::Electrodes),
+            surface_rmse_m: surface_rmse_m(&environment, &trials.targets(), &touches),
+            simulated_s: median(&simulated_s),
+            finger_bytes: finger_bytes(&environment),
+            beyond,
+            ..self
+        };
+        Ok((variant, touches))
+    }
+
+    /// Simulated time over wall time.
+    pub fn real_time_factor(&self) -> Option<f64> {
+        Some(self.simulated_s? / self.wall_s?)
+    }
+
+    /// The error that 95 % of the touches stay within, in m, N or counts; `None` where it is not
+    /// known: of the truth only the surface is.
+    pub fn p95(&self, quantity: Quantity, origin: Origin) -> Option<f64> {
+        let spread = match (origin, quantity) {
+            (Origin::Truth, Quantity::Contact) => self.off_truth_m,
+            (Origin::Truth, _) => None,
+            (_, Quantity::Contact) => self.contact_m,
+            (_, Quantity::Force) => self.force_n,
+            (_, Quantity::Pressure) => self.pdc_counts,
+            (_, Quantity::Electrodes) => self.electrode_counts,
+        };
+        spread.map(|spread| spread.p95)
+    }
+
+    /// Whether 95 % of the touches stay within the tolerance; one without a counterpart does not.
+    pub fn stays_within(&self, tolerance: &Tolerance, origin: Origin) -> bool {
+        let is_within = |error: f64| error <= tolerance.size();
+        match self.beyond.filter(|_| origin != Origin::Truth) {
+            Some(beyond) => beyond.count as f64 <= ALLOWED * (beyond.of - 1) as f64,
+            None => self.p95(tolerance.quantity, origin).is_some_and(is_within),
+        }
+    }
+}
+
+/// Distance of a contact from the true surface: the analytic one, or else the mesh.
+fn off_surface_m(environment: &Environment, contact: &Contact) -> Option<f64> {
+    let p_wc = contact.p_wc;
+    match (environment.nearest_true_point(&p_wc), environment.shape()) {
+        (Some(nearest), _) => Some((nearest - p_wc).norm()),
+        (None, Shape::Mesh { bvh, .. }) => Some(bvh.closest_point(&p_wc).distance_m),
+        (None, Shape::Function(_)) => None,
+    }
+}
