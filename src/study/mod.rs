@@ -17,4 +17,3 @@ pub mod compare;
 pub mod effects;
 pub mod fidelity;
 pub mod stress;
-pub mod suite;

@@ -1,6 +1,6 @@
 //! Errors against touches, Fig. 4 of Yi et al. 2016.
 
-use super::figure::Figure;
+use super::Figure;
 use crate::experiment::measure::metrics;
 use crate::experiment::measure::{Aggregate, MEASURES, Measure, R, Scale};
 use crate::experiment::statistics::curve_table;
@@ -9,7 +9,7 @@ use crate::experiment::statistics::summary::CurvePoint;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Panel};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{Legend, Swatch};
+use crate::report::legend::{Swatch, sheet};
 use crate::report::style;
 use crate::report::style::FAINT_INK;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
@@ -42,9 +42,6 @@ const LEFT_PX: f64 = 70.0;
 const PANEL: (f64, f64) = (446.0, 262.0);
 const GAP: (f64, f64) = (96.0, 78.0);
 
-/// A planner's colour and curve.
-type Curve = (&'static str, Vec<CurvePoint>);
-
 /// A measure after some touches: (touches, value, what is dotted beside it, its band), in the unit
 /// it is shown in.
 type Reading = (f64, f64, Option<f64>, Option<[f64; 2]>);
@@ -54,7 +51,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         return Ok(None);
     }
     let planners = &run.experiment.planners;
-    let curves: Vec<Curve> = planners
+    let curves: Vec<(&str, Vec<CurvePoint>)> = planners
         .iter()
         .map(|planner| (style::planner(planners, planner), planner))
         .map(|(colour, planner)| (colour, summary::curve(&run.experiment, &run.rows, planner)))
@@ -77,11 +74,12 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         .zip(planners)
         .map(|((colour, _), name)| (Swatch::Line(style::stroke(colour, 2.4)), name.as_str()));
     let dashed = constant.map(|_| (Swatch::Line(constant_line()), "R of any constant"));
-    let legend = Legend::new(WIDTH - 2.0 * LEFT_PX, swatches.chain(dashed));
-    let top = 66.0 + legend.more_px();
     let rows = shown.len().div_ceil(2) as f64;
-    let mut canvas = Canvas::new(WIDTH, top - 12.0 + rows * (PANEL.1 + GAP.1));
-    legend.draw(&mut canvas, [LEFT_PX, 20.0]);
+    let size = [WIDTH, 66.0 - 12.0 + rows * (PANEL.1 + GAP.1)];
+    let legend_px = WIDTH - 2.0 * LEFT_PX;
+    let entries = swatches.chain(dashed);
+    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (legend_px, ""), entries);
+    let top = 66.0 + more_px;
     for (i, measure) in shown.into_iter().enumerate() {
         let (column, row) = ((i % 2) as f64, (i / 2) as f64);
         let area = Area {
@@ -101,7 +99,7 @@ fn draw_measure(
     area: Area,
     run: &Run,
     measure: &Measure,
-    (x, curves, constant): (&Axis, &[Curve], Option<f64>),
+    (x, curves, constant): (&Axis, &[(&str, Vec<CurvePoint>)], Option<f64>),
 ) {
     let read: Vec<(&str, Vec<Reading>)> = curves
         .iter()
