@@ -1,5 +1,5 @@
-//! Planners over several runs, as tables, figures and a page: which is better on which object, by how
-//! much, and what it took.
+//! Planners over several runs, as tables, figures and a page: which is better on which object, by
+//! how much, and what it took.
 
 use super::axes::{Axis, Panel};
 use super::canvas::Area;

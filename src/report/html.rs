@@ -26,8 +26,8 @@ pub(super) fn wide(content: &str, what: &str) -> String {
     )
 }
 
-/// A section of a page with a title, unless that is empty, and a note below its body; empty without a
-/// body.
+/// A section of a page with a title, unless that is empty, and a note below its body; empty without
+/// a body.
 pub(super) fn section(title: &str, body: &str, note: &str) -> String {
     if body.is_empty() {
         return String::new();

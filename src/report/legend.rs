@@ -48,9 +48,9 @@ impl<'a> Legend<'a> {
     }
 }
 
-/// A sheet of `size` with a legend, the middle of its first row's left end at `at`, drawn in a group of
-/// `attributes`; it grows by the rows that the legend needs behind the first, which are returned in
-/// pixels.
+/// A sheet of `size` with a legend, the middle of its first row's left end at `at`, drawn in a
+/// group of `attributes`; it grows by the rows that the legend needs behind the first, which are
+/// returned in pixels.
 pub fn sheet<'a>(
     [width, height]: [f64; 2],
     at: PointPx,

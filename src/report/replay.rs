@@ -106,8 +106,8 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// Whether the belief is drawn at each of `places`: a Gaussian process says something everywhere,
-    /// also where the zone looks past the object.
+    /// Whether the belief is drawn at each of `places`: a Gaussian process says something
+    /// everywhere, also where the zone looks past the object.
     pub fn is_drawn<'p>(&self, places: impl IntoIterator<Item = &'p [f64]>) -> Vec<bool> {
         self.belief.presence().silhouette().is_likely(places)
     }

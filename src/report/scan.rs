@@ -82,7 +82,8 @@ const LEFT_PX: f64 = 20.0;
 /// Places along each side of the zone's rim; more would not show.
 const PLACES: usize = 90;
 
-/// Draws the object in the zone's frame, with the zone's rim on it, into `area`, its heights above the datum coloured along `axis`.
+/// Draws the object in the zone's frame, with the zone's rim on it, into `area`, its heights above
+/// the datum coloured along `axis`.
 fn draw_object(
     canvas: &mut Canvas,
     area: Area,

@@ -122,8 +122,8 @@ impl Column {
 }
 
 impl Cell {
-    /// With what the interval of an estimate establishes in which `direction` is better and both are
-    /// as good at `even`.
+    /// With what the interval of an estimate establishes in which `direction` is better and both
+    /// are as good at `even`.
     pub fn judged(self, interval: Option<[f64; 2]>, even: f64, direction: Direction) -> Self {
         match verdict(interval, even, direction) {
             Some(word) => Self::Verdict(Box::new(self), word),
@@ -210,8 +210,8 @@ impl Table {
         Self { columns: columns.into_iter().collect(), rows: Vec::new() }
     }
 
-    /// A cell for every row and column, behind a column of the rows' names; rows and columns without
-    /// any are left out.
+    /// A cell for every row and column, behind a column of the rows' names; rows and columns
+    /// without any are left out.
     pub fn cross<R, C>(
         corner: impl Into<String>,
         rows: impl IntoIterator<Item = (String, R)>,

@@ -39,8 +39,8 @@ pub struct Contender {
     pub results: Vec<ObjectResult>,
 }
 
-/// Results of a planner's finished trials on one object; empty if it did not explore it. Efforts are
-/// counted after the initial touches, beliefs are rated after the last touch.
+/// Results of a planner's finished trials on one object; empty if it did not explore it. Efforts
+/// are counted after the initial touches, beliefs are rated after the last touch.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjectResult {
     /// Scores of the trials that the reference finished too.
@@ -222,8 +222,9 @@ pub fn profile(contender: &Contender, score: f64) -> f64 {
     mean(&shares)
 }
 
-/// Geometric mean of scores over objects, each object counted once, with the interval of a bootstrap
-/// over trials, drawn within each object; none where an object has no score, or there is none.
+/// Geometric mean of scores over objects, each object counted once, with the interval of a
+/// bootstrap over trials, drawn within each object; none where an object has no score, or there is
+/// none.
 pub fn geometric(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
     if strata.is_empty() || strata.iter().any(|scores| scores.is_empty()) {
         return None;

@@ -22,8 +22,8 @@ fn compared(random: &[f64], own: &[f64], oracle: &[f64]) -> Compared {
 }
 
 proptest! {
-    /// Random closes nothing of its gap and the oracle all, who is halfway in each trial half of it,
-    /// and the unit of the errors does not matter.
+    /// Random closes nothing of its gap and the oracle all, who is halfway in each trial half of
+    /// it, and the unit of the errors does not matter.
     #[test]
     fn a_gap_is_closed_from_random_to_the_oracle(
         random in prop::collection::vec(1.0..9.0_f64, 2..20),

@@ -1,4 +1,5 @@
-//! Beliefs of whole objects on the page, as figures and as files: what is written is what was given.
+//! Beliefs of whole objects on the page, as figures and as files: what is written is what was
+//! given.
 
 use crate::common::solids::{nets, ring, ring_m, sequence};
 use crate::figures::reads_well;

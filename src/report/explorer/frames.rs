@@ -1,6 +1,6 @@
 //! What the explorer shows: beliefs on a grid after many touch counts, in few bytes.
 
-use super::counts;
+use super::shell::counts;
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::TouchRow;
 use crate::gp::batch::Prediction;
@@ -34,9 +34,9 @@ struct Belief {
     deviations_m: Vec<f64>,
 }
 
-/// The data of the trial that the report draws, replayed, with the names of the planners in it and the
-/// number of the first one's frames; lengths are in the unit of the page. `None` if there is nothing
-/// to show.
+/// The data of the trial that the report draws, replayed, with the names of the planners in it and
+/// the number of the first one's frames; lengths are in the unit of the page. `None` if there is
+/// nothing to show.
 pub(super) fn data(run: &Run) -> anyhow::Result<Option<(Value, Vec<&str>, usize)>> {
     let experiment = &run.experiment;
     let Some(zone) = &experiment.scene.zone else { return Ok(None) };

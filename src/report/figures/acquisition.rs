@@ -1,7 +1,7 @@
 //! Where the belief is unsure and what touching there changes, Fig. 6 of Yi et al. 2016.
 
 use super::curves;
-use super::{Figure, miss_entry};
+use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
 use crate::explore::belief::HeightField;
 use crate::gp::posterior::Scratch;

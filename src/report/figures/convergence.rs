@@ -1,6 +1,6 @@
 //! Errors against touches, Fig. 4 of Yi et al. 2016.
 
-use super::Figure;
+use super::figure::Figure;
 use crate::experiment::measure::metrics;
 use crate::experiment::measure::{Aggregate, MEASURES, Measure, R, Scale};
 use crate::experiment::statistics::curve_table;

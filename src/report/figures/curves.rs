@@ -1,6 +1,6 @@
 //! Beliefs of a curve after some touches, Fig. 3 of Yi et al. 2016.
 
-use super::{Figure, miss_entry};
+use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
 use crate::gp::posterior::Scratch;
 use crate::report::axes::{Axis, Length, MM, Panel};

@@ -1,6 +1,6 @@
 //! Believed whole objects, planner by planner and touch by touch.
 
-use super::Figure;
+use super::figure::Figure;
 use crate::experiment::store::Run;
 use crate::report::solid::figure;
 use crate::report::whole;

@@ -1,6 +1,6 @@
 //! Beliefs of a surface after some touches, Figs. 5 and 7 of Yi et al. 2016.
 
-use super::{Figure, miss_entry};
+use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::TouchRow;
 use crate::gp::posterior::Scratch;

@@ -1,6 +1,6 @@
 //! Where the finger was sent and where it met the object, seen along the approach.
 
-use super::{Figure, miss_entry};
+use super::figure::{Figure, miss_entry};
 use crate::experiment::statistics::summary::median_shift_m;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, Panel};

@@ -107,8 +107,8 @@ fn belief(view: &View, canvas: &mut Canvas, (sequence, count): (&Sequence, u32),
     });
 }
 
-/// A touch: a point where it met the object, hollow if that is hidden; a diamond where it was sent if
-/// it met nothing, which may be beside all that is drawn.
+/// A touch: a point where it met the object, hollow if that is hidden; a diamond where it was sent
+/// if it met nothing, which may be beside all that is drawn.
 fn mark(view: &View, canvas: &mut Canvas, touch: &Touch, relief: &Relief, is_last: bool) {
     let colour = if touch.is_initial { INITIAL } else { LATER };
     let p_w = touch.contact_w.unwrap_or(touch.aim_w).coords;

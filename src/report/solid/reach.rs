@@ -22,8 +22,8 @@ const MARKS: [&str; 2] = ["#0072b2", "#d55e00"];
 const LEGEND: [&str; 2] = ["#b2becd", "#d55e00"];
 
 /// An object from the front and from behind, as SVG: `spots` are points spread over it, and whether
-/// the finger can touch each, empty if that is not known; `sides` are where the finger sets out on its
-/// way to the middle, and whether it can be brought there. Everything is in `W` and metres.
+/// the finger can touch each, empty if that is not known; `sides` are where the finger sets out on
+/// its way to the middle, and whether it can be brought there. Everything is in `W` and metres.
 pub fn picture(
     mesh: &Mesh,
     spots: &[(Point3<f64>, bool)],

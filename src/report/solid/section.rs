@@ -1,5 +1,5 @@
-//! The section of the page: a believed surface touch by touch, to turn and to colour; lengths are in
-//! millimetres, and meshes are coded as text of few bytes.
+//! The section of the page: a believed surface touch by touch, to turn and to colour; lengths are
+//! in millimetres, and meshes are coded as text of few bytes.
 
 use super::{Frame, Sequence, Touch};
 use crate::geometry::coarse::coarse;
@@ -8,7 +8,7 @@ use crate::geometry::mesh::Mesh;
 use crate::geometry::solids::Triangles;
 use crate::report::axes::{self, MM};
 use crate::report::explorer::frames::{encode, short};
-use crate::report::explorer::{self, PARTS, Shell};
+use crate::report::explorer::shell::{self, PARTS, Shell};
 use crate::report::style;
 use anyhow::ensure;
 use base64::Engine;
@@ -28,7 +28,7 @@ const COLOURS: [(&str, &str); 2] = [("deviation", "σ"), ("error", "error")];
 /// last among them, where the surfaces of `planners` planners have about `triangles` triangles
 /// each.
 pub fn counts(first: u32, last: u32, planners: usize, triangles: usize) -> Vec<u32> {
-    explorer::counts(first, last, BYTES_OF_TRIANGLE * planners * triangles)
+    shell::counts(first, last, BYTES_OF_TRIANGLE * planners * triangles)
 }
 
 /// The section as HTML; empty if no planner has a belief to show. `trial` is said in words, and

@@ -1,5 +1,5 @@
-//! The curves of a run as tables: of the page, of the terminal and as a file; and what a publication
-//! says beside what came out.
+//! The curves of a run as tables: of the page, of the terminal and as a file; and what a
+//! publication says beside what came out.
 
 use super::titled;
 use crate::experiment::measure::{self, MEASURES, Measure};
@@ -60,7 +60,8 @@ pub fn text(run: &Run) -> String {
     text.trim_end().into()
 }
 
-/// The table of `summary.csv`: a row for each planner and each of its touch counts that `is_wanted`.
+/// The table of `summary.csv`: a row for each planner and each of its touch counts that
+/// `is_wanted`.
 pub fn file(run: &Run, is_wanted: impl Fn(u32) -> bool) -> Table {
     let names = ["planner", "touches", "trials"].map(String::from).into_iter();
     let names = names.chain(columns(&run.experiment, &run.rows));
