@@ -70,7 +70,7 @@ pub(super) fn write(
     compared: &Compared,
 ) -> anyhow::Result<PathBuf> {
     let page = folder.join(PAGE);
-    write_whole(&page, &html(name, question, compared))?;
+    write_whole(&page, html(name, question, compared))?;
     file(compared).write_csv(&folder.join("suite.csv"))?;
     Ok(page)
 }

@@ -91,7 +91,20 @@ pub fn png(svg: &str) -> anyhow::Result<Vec<u8>> {
 /// If it is not an SVG, or has no size.
 pub fn pdf(svg: &str) -> anyhow::Result<Vec<u8>> {
     let drawn = svg2pdf::to_pdf(&tree(svg)?, Default::default(), Default::default());
-    let mut bytes = drawn.map_err(|error| anyhow!("it cannot be drawn: {error}"))?;
-    bytes.extend(SIGNED);
-    Ok(bytes)
+    let drawn = drawn.map_err(|error| anyhow!("it cannot be drawn: {error}"))?;
+    Ok([&in_order(&drawn), SIGNED].concat())
+}
+
+/// The same PDF with the entries of each dictionary of resources in order: svg2pdf writes them in
+/// the order of a hash map, another one each time. No entry changes its length, so that every object
+/// stays where the table of objects says.
+fn in_order(pdf: &[u8]) -> Vec<u8> {
+    // As in `/gs0 7 0 R`.
+    let is_entry = |line: &[u8]| {
+        let words: Vec<&str> = str::from_utf8(line).unwrap_or("").split_whitespace().collect();
+        matches!(words[..], [name, id, "0", "R"] if name.starts_with('/') && id.parse::<u32>().is_ok())
+    };
+    let mut lines: Vec<&[u8]> = pdf.split(|byte| *byte == b'\n').collect();
+    lines.chunk_by_mut(|a, b| is_entry(a) && is_entry(b)).for_each(<[&[u8]]>::sort);
+    lines.join(&b'\n')
 }

@@ -229,7 +229,7 @@ fn a_pdf_is_a_page_of_the_size_of_the_drawing_with_words() {
         let numbers = |text: &str| -> Vec<f32> {
             text.split_whitespace().map(|number| number.parse().unwrap()).collect()
         };
-        let page = text.split("/MediaBox[").nth(1).unwrap().split(']').next().unwrap();
+        let page = text.split("/MediaBox [").nth(1).unwrap().split(']').next().unwrap();
         assert_eq!(numbers(page), [0.0, 0.0, size.width(), size.height()], "{name}");
         assert!(pdf(&svg).unwrap() == bytes, "{name}");
     }

@@ -42,6 +42,9 @@ const LEFT_PX: f64 = 70.0;
 const PANEL: (f64, f64) = (446.0, 262.0);
 const GAP: (f64, f64) = (96.0, 78.0);
 
+/// A planner's colour and curve.
+type Curve = (&'static str, Vec<CurvePoint>);
+
 /// A measure after some touches: (touches, value, what is dotted beside it, its band), in the unit
 /// it is shown in.
 type Reading = (f64, f64, Option<f64>, Option<[f64; 2]>);
@@ -51,7 +54,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         return Ok(None);
     }
     let planners = &run.experiment.planners;
-    let curves: Vec<(&str, Vec<CurvePoint>)> = planners
+    let curves: Vec<Curve> = planners
         .iter()
         .map(|planner| (style::planner(planners, planner), planner))
         .map(|(colour, planner)| (colour, summary::curve(&run.experiment, &run.rows, planner)))
@@ -99,7 +102,7 @@ fn draw_measure(
     area: Area,
     run: &Run,
     measure: &Measure,
-    (x, curves, constant): (&Axis, &[(&str, Vec<CurvePoint>)], Option<f64>),
+    (x, curves, constant): (&Axis, &[Curve], Option<f64>),
 ) {
     let read: Vec<(&str, Vec<Reading>)> = curves
         .iter()
