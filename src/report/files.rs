@@ -96,8 +96,8 @@ pub fn pdf(svg: &str) -> anyhow::Result<Vec<u8>> {
 }
 
 /// The same PDF with the entries of each dictionary of resources in order: svg2pdf writes them in
-/// the order of a hash map, another one each time. No entry changes its length, so that every object
-/// stays where the table of objects says.
+/// the order of a hash map, another one each time. No entry changes its length, so that every
+/// object stays where the table of objects says.
 fn in_order(pdf: &[u8]) -> Vec<u8> {
     // As in `/gs0 7 0 R`.
     let is_entry = |line: &[u8]| {
