@@ -3,8 +3,9 @@
 
 use palpate::report::axes::{Axis, Panel};
 use palpate::report::canvas::{Area, Canvas};
+use palpate::report::files::png;
 use palpate::report::legend::{Legend, Swatch};
-use palpate::report::{png, style};
+use palpate::report::style;
 use std::path::Path;
 use std::time::Instant;
 
@@ -93,7 +94,7 @@ pub fn print(unit: &str, curves: &[Curve]) {
 pub fn draw(name: &str, panels: &[(&str, &[Curve])]) -> anyhow::Result<()> {
     if let Some(svg) = drawn(panels) {
         let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
-        std::fs::write(docs.join(name).with_extension("png"), png::render(&svg)?)?;
+        std::fs::write(docs.join(name).with_extension("png"), png(&svg)?)?;
         std::fs::write(docs.join(name).with_extension("svg"), svg)?;
     }
     Ok(())

@@ -1,31 +1,10 @@
 //! Tables on the terminal.
 
+pub(super) use crate::report::table::aligned as aligned_rows;
+
 /// Cells in aligned columns: the first to the left, the others to the right.
 pub(super) fn aligned<const N: usize>(lines: &[[String; N]]) -> String {
     aligned_rows(lines)
-}
-
-/// As [`aligned`], of lines that have as many cells as the first.
-pub(super) fn aligned_rows(lines: &[impl AsRef<[String]>]) -> String {
-    let columns = lines.first().map_or(0, |line| line.as_ref().len());
-    let width = |column| {
-        let cells = lines.iter().filter_map(|line| line.as_ref().get(column));
-        cells.map(|cell: &String| cell.chars().count()).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    let mut text = String::new();
-    for line in lines {
-        let mut row = String::new();
-        for (column, (cell, width)) in line.as_ref().iter().zip(&widths).enumerate() {
-            row += &match column {
-                0 => format!("{cell:<width$}"),
-                _ => format!("  {cell:>width$}"),
-            };
-        }
-        text += row.trim_end();
-        text.push('\n');
-    }
-    text
 }
 
 /// `lines`, the first of them the head, without the columns that have no value in any line.

@@ -5,7 +5,6 @@ use super::terminal::{Ending, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
 use crate::gp::posterior::Scratch;
-use crate::report::known;
 use crate::report::points::Points;
 use crate::report::replay::{self, Replay};
 use crate::report::{figures, files, style, whole};
@@ -177,7 +176,7 @@ fn chosen(run: &Run, args: &Args) -> anyhow::Result<u32> {
 fn mesh(run: &Run, args: &Args, replay: &Replay, grid: usize) -> Points {
     let zone = replay.belief.zone();
     let places = zone.grid(grid);
-    let known = known::over(replay, places.iter().map(Vec::as_slice));
+    let known = replay.is_drawn(places.iter().map(Vec::as_slice));
     // The vertex that a place becomes, if it becomes one.
     let mut count = 0..;
     let vertices: Vec<Option<usize>> =

@@ -26,7 +26,6 @@ mod report;
 mod run;
 mod scan;
 mod show;
-mod suite;
 mod terminal;
 mod twin;
 mod watch;
@@ -59,7 +58,7 @@ Examples:
   palpate watch scenes/bird_pa10.toml       watch a trial in a window
   palpate twin experiments/container_pa10.toml   a stand-in for the real arm, over ROS 2
   palpate export runs/bird --planner active --out bird.ply
-  palpate suite experiments/suite/six.toml  planners on objects that differ: who is better where
+  palpate run experiments/suite/six.toml    planners on objects that differ: who is better where
   palpate check toy --baseline experiments/baselines/toy.jsonl
   palpate accuracy scenes/bird_finger.toml --tolerance 0.2mm
 
@@ -80,8 +79,6 @@ enum Command {
     Merge(merge::Args),
     /// Hold planners against each other over several runs.
     Compare(compare::Args),
-    /// Run planners on a suite of objects: one table and one page.
-    Suite(suite::Args),
     /// Draw a run's figures and page again from its rows.
     Report(report::Args),
     /// Say what a mesh, scene, experiment or run folder holds.
@@ -133,7 +130,6 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, bring: &Bring) -
         Command::Plan(args) => plan::run(&args, cli.talk),
         Command::Merge(args) => merge::run(&args),
         Command::Compare(args) => compare::run(&args),
-        Command::Suite(args) => suite::run(&args, cli.talk, bring),
         Command::Report(args) => report::run(&args),
         Command::Show(args) => show::run(&args, cli.talk),
         Command::Scan(args) => scan::run(&args, cli.talk),

@@ -1,9 +1,9 @@
 //! `palpate reference`.
 
-use crate::report::reference::{fields, measures, rows, settings};
-use crate::report::suite::SuiteRecord;
-use crate::report::tables::comparison::ComparisonRecord;
-use crate::report::tables::equal_error::EqualErrorRecord;
+use crate::report::compare;
+use crate::report::reference::{columns, measures, rows, settings};
+use crate::report::tables::comparison::{comparison_file, equal_error_file};
+use crate::study::compare::Compared;
 use clap::Command;
 
 #[derive(clap::Args)]
@@ -28,9 +28,9 @@ pub(super) fn text(program: &Command) -> String {
         commands(program),
         settings(),
         measures(),
-        fields::<ComparisonRecord>(),
-        fields::<EqualErrorRecord>(),
-        fields::<SuiteRecord>(),
+        columns(&comparison_file(&[])),
+        columns(&equal_error_file(&[])),
+        columns(&compare::file(&Compared::default())),
         rows(),
     )
 }

@@ -1,5 +1,6 @@
 //! `palpate run`.
 
+use super::compare;
 use super::find::{EXPERIMENTS, find};
 use super::host::Bring;
 use super::prepare::{bound_threads, ready, simulation};
@@ -17,8 +18,9 @@ use crate::experiment::trial::row::TrialId;
 use crate::explore::planner;
 use crate::files;
 use crate::report;
+use crate::study::compare::compare;
 use anyhow::{Context, bail};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -28,12 +30,17 @@ Examples:
   palpate run experiments/container.toml
   palpate run experiments/toy.toml --out runs/noisy --set gp.noise='[0.01, 1]' --set trials=200
   palpate run runs/toy/resolved.toml --out runs/again    the same run again, to the byte
+  palpate run experiments/suite/six.toml                 planners on objects that differ
   palpate run toy --shard 3/8                            an eighth of the trials: palpate merge
 
 Press Ctrl-C to stop after the trials in hand; the same command continues where it stopped.
 On a finished run, more trials or other planners are run beside those that are there, and trials or
 planners that are no longer listed are kept, but not shown; `question` and `report.…` only draw it
-again. Whatever else is changed wants another folder (--out) or a new start (--fresh).";
+again. Whatever else is changed wants another folder (--out) or a new start (--fresh).
+
+Of an experiment with a [sweep], each combination is a run in runs/NAME; they are compared in units of the errors of sobol (or
+of the first baseline), over all and one by one: tables, the page suite.html and the numbers suite.csv. `palpate compare` does
+the same in units of another planner's.";
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -49,8 +56,22 @@ pub(super) struct Args {
     /// `palpate` of the Python package.
     #[arg(long, value_name = "NAME")]
     planner: Vec<String>,
-    #[command(flatten)]
-    how: How,
+    /// Threads; 0 means all cores. Results do not depend on it.
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
+    /// Throw away what an earlier run left in the folder.
+    #[arg(long)]
+    fresh: bool,
+    /// Run every N-th trial only, the I-th of N shards, in runs/NAME-I-of-N; `palpate merge` puts
+    /// them together.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Record every tick of every trial in recordings/PLANNER-TRIAL.mcap of the run's folder.
+    #[arg(long)]
+    record: bool,
+    /// Clear what the side of a real arm has latched, before it is moved: the operator's to say.
+    #[arg(long)]
+    clear_fault: bool,
     /// Write rows and summary only, no figures.
     #[arg(long)]
     no_report: bool,
@@ -59,31 +80,17 @@ pub(super) struct Args {
     json: bool,
 }
 
-/// How trials are run, whatever is made of them.
-#[derive(clap::Args, Default)]
-pub(super) struct How {
-    /// Threads; 0 means all cores. Results do not depend on it.
-    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
-    pub(super) threads: u16,
-    /// Throw away what an earlier run left in the folder.
-    #[arg(long)]
-    pub(super) fresh: bool,
-    /// Run every N-th trial only, the I-th of N shards, in runs/NAME-I-of-N; `palpate merge` puts
-    /// them together.
-    #[arg(long, value_name = "I/N")]
-    pub(super) shard: Option<Shard>,
-    /// Record every tick of every trial in recordings/PLANNER-TRIAL.mcap of the run's folder.
-    #[arg(long)]
-    pub(super) record: bool,
-    /// Clear what the side of a real arm has latched, before it is moved: the operator's to say.
-    #[arg(long)]
-    pub(super) clear_fault: bool,
+impl Args {
+    /// The end of a folder's name that tells a shard.
+    fn suffix(&self) -> String {
+        self.shard.map(|it| format!("-{}-of-{}", it.index, it.count)).unwrap_or_default()
+    }
 }
 
 pub(super) fn run(args: &Args, talk: Talk, bring: &Bring) -> anyhow::Result<Ending> {
     let path = find(&args.experiment, EXPERIMENTS)?;
     let cells = cells(&path)?;
-    bound_threads(args.how.threads)?;
+    bound_threads(args.threads)?;
     let mut stop = None;
     if cells.is_empty() {
         let out = args.out.clone();
@@ -93,14 +100,53 @@ pub(super) fn run(args: &Args, talk: Talk, bring: &Bring) -> anyhow::Result<Endi
     // All of them are looked at before the first is run.
     let load = |cell| with_planners(args, |sets| Experiment::load_cell(&path, cell, sets));
     let experiments = cells.iter().map(load).collect::<Result<Vec<_>, _>>()?;
+    let first = experiments[0].clone();
+    let name = first.name.strip_suffix(&cells[0].label).unwrap_or(&first.name);
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(name));
+    let mut paths = Vec::new();
     for experiment in experiments {
-        let out = args.out.as_ref().map(|out| out.join(&experiment.name));
-        match run_one(args, experiment, out, &mut stop, (talk, bring))? {
+        let part = if args.out.is_none() { args.suffix() } else { String::new() };
+        paths.push(folder.join(format!("{}{part}", experiment.name)));
+        match run_one(args, experiment, paths.last().cloned(), &mut stop, (talk, bring))? {
             Ending::Done => (),
             other => return Ok(other),
         }
     }
+    if args.shard.is_none() {
+        compare_cells(args, (&first, name), &folder, paths)?;
+    }
     Ok(Ending::Done)
+}
+
+/// The planner in whose errors the cells of a sweep are compared, if it is run.
+const REFERENCE: &str = "sobol";
+
+/// Compares the finished runs of a sweep: tables on the terminal, and a page in its folder.
+fn compare_cells(
+    args: &Args,
+    (first, name): (&Experiment, &str),
+    folder: &Path,
+    paths: Vec<PathBuf>,
+) -> anyhow::Result<()> {
+    let read = |path: PathBuf| anyhow::Ok((path.display().to_string(), Run::read(&path)?));
+    let runs: Vec<(String, Run)> = paths.into_iter().map(read).collect::<Result<_, _>>()?;
+    let is_usual = first.planners.iter().any(|planner| planner == REFERENCE);
+    let against = if is_usual { REFERENCE } else { first.baselines()[0] };
+    // Cells of other planners, or without a truth, have nothing in common.
+    let Ok(mut compared) = compare(&runs, against) else { return Ok(()) };
+    for object in &mut compared.objects {
+        let label = object.strip_prefix(name).unwrap_or(object);
+        *object = label.trim_start_matches("-scene").trim_start_matches('-').to_owned();
+    }
+    let mut text = compare::text(&compared);
+    if !args.no_report {
+        let page = compare::write(folder, (name, &first.question), &compared)?;
+        text += &format!("\npage: {}", page.display());
+    }
+    if !args.json {
+        print(&text)?;
+    }
+    Ok(())
 }
 
 /// What `load` reads with the settings asked for, and the planners that are to be run too.
@@ -120,8 +166,8 @@ fn with_planners(
 }
 
 /// What stands in a run's folder after it was run.
-pub(super) struct Made {
-    pub(super) path: PathBuf,
+struct Made {
+    path: PathBuf,
     /// How many trials, and how long they took.
     words: String,
     tally: Tally,
@@ -136,7 +182,7 @@ impl Made {
     }
 
     /// How it ended; says on standard error how many trials failed and why the first did.
-    pub(super) fn ending(&self, talk: Talk) -> Ending {
+    fn ending(&self, talk: Talk) -> Ending {
         let Tally { trials, failed, first } = &self.tally;
         let all_failed = *trials > 0 && failed == trials;
         if let Some((TrialId { trial, planner }, reason)) = first {
@@ -157,8 +203,8 @@ impl Made {
 }
 
 /// Runs what is not there yet.
-pub(super) fn make(
-    how: &How,
+fn make(
+    args: &Args,
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
@@ -170,27 +216,26 @@ pub(super) fn make(
     let simulation = simulation(experiment, talk)?;
     let mut simulation = simulation.with_planners(own.into_iter().flatten().collect());
     let experiment = simulation.experiment();
-    if how.record && !experiment.scene.body.moves() && !simulation.is_real() {
+    if args.record && !experiment.scene.body.moves() && !simulation.is_real() {
         let body = experiment.scene.body.name();
         bail!(
             "--record: body = \"{body}\" touches without moving, so that there is nothing to record; \
              allowed are \"kinematic\" and \"dynamic\""
         );
     }
-    if how.shard.is_some() && simulation.is_real() {
+    if args.shard.is_some() && simulation.is_real() {
         bail!("--shard: a real arm makes one trial after another; leave it out");
     }
     let path = out.unwrap_or_else(|| {
-        let part = how.shard.map(|it| format!("-{}-of-{}", it.index, it.count));
-        PathBuf::from("runs").join(format!("{}{}", experiment.name, part.unwrap_or_default()))
+        PathBuf::from("runs").join(format!("{}{}", experiment.name, args.suffix()))
     });
     let content = Content::of(&simulation)?;
     let (mut folder, done) =
-        RunFolder::open(&path, experiment, simulation.truth(), &content, how.fresh)?;
+        RunFolder::open(&path, experiment, simulation.truth(), &content, args.fresh)?;
     // Before an arm is looked for: another program may hold the folder, or a fault may want an
     // operator.
     if simulation.is_real() {
-        if let Some(reason) = folder.journal()?.halted().filter(|_| !how.clear_fault) {
+        if let Some(reason) = folder.journal()?.halted().filter(|_| !args.clear_fault) {
             bail!(
                 "{}: the run was halted by a fault: {reason}\nlook at the arm, then go on with \
                  --clear-fault, or use --fresh to start again",
@@ -198,12 +243,12 @@ pub(super) fn make(
             );
         }
         if let Some(lab) = simulation.connect()? {
-            ready(&lab, how.clear_fault)?;
+            ready(&lab, args.clear_fault)?;
         }
     }
     let simulation = simulation;
     let experiment = simulation.experiment();
-    let recorded = how.record.then_some(path.as_path());
+    let recorded = args.record.then_some(path.as_path());
     if recorded.is_some() {
         let folder = path.join(RECORDINGS);
         files::make_folder(&folder).with_context(|| folder.display().to_string())?;
@@ -216,13 +261,13 @@ pub(super) fn make(
     // One that cannot be brought is no harm where all its trials are there.
     let why = |error: RunError| lacking.into_iter().find_map(Result::err).unwrap_or(error.into());
     let mut jobs = runner::jobs(&simulation, &done).map_err(why)?;
-    if let Some(shard) = how.shard {
+    if let Some(shard) = args.shard {
         shard.keep(&mut jobs);
     }
     let total = (done.len() + jobs.len()) as u64;
     let bar = touches_bar(talk, experiment, [jobs.len(), done.len()]);
     let begun = Instant::now();
-    let threads = how.threads.into();
+    let threads = args.threads.into();
     let tick = |progress: Progress| touch_step(talk, &bar, experiment, progress);
     let outcome = match simulation.is_real() {
         true => {
@@ -252,10 +297,10 @@ fn run_one(
     stop: &mut Option<Arc<AtomicBool>>,
     (talk, bring): (Talk, &Bring),
 ) -> anyhow::Result<Ending> {
-    let made = make(&args.how, experiment, out, stop, (talk, bring))?;
+    let made = make(args, experiment, out, stop, (talk, bring))?;
     let Made { path, words, total, halt, .. } = &made;
     // A part of a run is not looked at: its rows need not fit into memory.
-    if args.how.shard.is_some() {
+    if args.shard.is_some() {
         print(&format!("{words}\nrows in {}", path.display()))?;
         return Ok(made.ending(talk));
     }

@@ -14,8 +14,8 @@ use crate::files;
 use crate::geometry::import::import_with;
 use crate::geometry::spread::directions;
 use crate::report;
-use crate::report::png;
-use crate::report::solid::{self, Reached};
+use crate::report::files::png;
+use crate::report::solid;
 use crate::sim::environment::Shape;
 use crate::sim::scene::Unit;
 use crate::sim::{Environment, Scene, mjcf};
@@ -66,32 +66,33 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let extension = args.path.extension().and_then(|extension| extension.to_str());
     let is_scene = extension == Some("toml") && !is_experiment(&args.path);
-    let files = [("--mjcf", &args.mjcf), ("--png", &args.png), ("--render", &args.render)];
-    for (option, file) in files {
-        let Some(file) = file else { continue };
-        if !is_scene {
-            bail!("{option} goes with a scene (.toml), and {} is none", args.path.display());
+    let is_toml = extension == Some("toml");
+    let is_folder = args.path.is_dir();
+    let is_mesh = !is_toml && !is_folder;
+    let options = [
+        ("--mjcf", args.mjcf.is_some(), is_scene, "a scene (.toml)"),
+        ("--png", args.png.is_some(), is_scene, "a scene (.toml)"),
+        ("--render", args.render.is_some(), is_scene, "a scene (.toml)"),
+        ("--json", args.json, is_folder, "a run's folder"),
+        ("--set", !args.set.is_empty(), is_toml, "a scene or an experiment (.toml)"),
+        ("--outside-buffers", args.outside_buffers, is_mesh, "a mesh"),
+        ("--unit", args.unit.is_some(), is_mesh, "a mesh"),
+    ];
+    for (option, is_given, is_allowed, what) in options {
+        if is_given && !is_allowed {
+            let instead = match option {
+                "--outside-buffers" => "; a scene says object.outside_buffers = true".into(),
+                "--unit" => "; a scene names the unit of its own: object.unit".into(),
+                _ => format!(", and {} is none", args.path.display()),
+            };
+            bail!("{option} goes with {what}{instead}");
         }
-        args.force.claim(file)?;
     }
-    if args.json && !args.path.is_dir() {
-        bail!("--json goes with a run's folder, and {} is none", args.path.display());
+    for file in [&args.mjcf, &args.png, &args.render].into_iter().flatten() {
+        args.force.claim(file)?;
     }
     if !args.path.exists() {
         bail!("{}: no such file or folder", args.path.display());
-    }
-    let is_toml = extension == Some("toml");
-    if args.outside_buffers && (is_toml || args.path.is_dir()) {
-        bail!("--outside-buffers goes with a mesh; a scene says object.outside_buffers = true");
-    }
-    if args.unit.is_some() && (is_toml || args.path.is_dir()) {
-        bail!("--unit goes with a mesh; a scene names the unit of its own: object.unit");
-    }
-    if !args.set.is_empty() && !is_toml {
-        bail!(
-            "--set goes with a scene or an experiment (.toml), and {} is none",
-            args.path.display()
-        );
     }
     let text = match extension {
         _ if args.path.is_dir() => run_folder(&Run::read(&args.path)?, args.json),
@@ -147,11 +148,11 @@ fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
             Some((ball, shape)) => what_is_reached(ball, shape.as_ref(), &environment),
             None => environment.mesh().and_then(|mesh| {
                 let height_m = |place: &[f64]| environment.true_height_m(place);
-                report::zone::picture(environment.task().zone()?, mesh, &height_m)
+                report::scan::zone_picture(environment.task().zone()?, mesh, &height_m)
             }),
         };
         let svg = svg.context("--png: this scene has no object to draw")?;
-        store::write_whole(path, png::render(&svg)?)?;
+        store::write_whole(path, png(&svg)?)?;
         text += &format!("picture: {}\n", path.display());
     }
     if let Some(model) = mjcf::scene(&environment, mjcf::Mode::Picture) {
@@ -225,7 +226,7 @@ fn what_is_reached(
     };
     let sides: Vec<(Point3<f64>, bool)> = directions(DIRECTIONS).map(side).collect();
     let spots = shape?.reached();
-    Some(solid::picture(&Reached { mesh: environment.mesh()?, spots: &spots, sides: &sides }))
+    Some(solid::picture(environment.mesh()?, &spots, &sides))
 }
 
 #[cfg(feature = "mujoco")]

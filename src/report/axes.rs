@@ -27,24 +27,12 @@ impl Length {
     }
 }
 
-/// How values lie between the ends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    Linear,
-    Log,
-    /// Around zero, and finer towards it: by the inverse hyperbolic sine.
-    Fine,
-}
-
-/// Share of the end of a fine axis up to which it is about linear; chosen.
-const FINE_SHARE: f64 = 0.03;
-
 /// A range of values along one side of a panel.
 #[derive(Clone, Debug)]
 pub struct Axis {
     low: f64,
     high: f64,
-    kind: Kind,
+    is_log: bool,
     aim: f64,
     /// The smallest step from one tick to the next.
     step_min: f64,
@@ -54,7 +42,7 @@ impl Axis {
     /// From `low` to `high`, with about `aim` ticks.
     pub fn linear(low: f64, high: f64, aim: f64) -> Self {
         let (low, high) = if high > low { (low, high) } else { (low - 0.5, low + 0.5) };
-        Self { low, high, kind: Kind::Linear, aim, step_min: 0.0 }
+        Self { low, high, is_log: false, aim, step_min: 0.0 }
     }
 
     /// The same for what is counted: ticks are whole numbers.
@@ -73,13 +61,7 @@ impl Axis {
     pub fn log(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let (low, high) = range(values.into_iter().filter(|&value| value > 0.0))?;
         let [low, high] = [low / 1.25, high * 1.25];
-        Some(Self { low, high, kind: Kind::Log, aim: 5.0, step_min: 0.0 })
-    }
-
-    /// From −`most` to `most` and finer towards zero, so that errors of different size are told
-    /// apart on one axis.
-    pub fn fine(most: f64) -> Self {
-        Self { kind: Kind::Fine, ..Self::linear(-most, most, 5.0) }
+        Some(Self { low, high, is_log: true, aim: 5.0, step_min: 0.0 })
     }
 
     /// The same middle with a range `times` as long.
@@ -95,23 +77,15 @@ impl Axis {
 
     /// How far along `value` lies, 0 to 1 between the ends.
     pub fn fraction(&self, value: f64) -> f64 {
-        match self.kind {
-            Kind::Log => (value / self.low).ln() / (self.high / self.low).ln(),
-            Kind::Linear => (value - self.low) / (self.high - self.low),
-            Kind::Fine => {
-                let fine = (value / (FINE_SHARE * self.high)).asinh();
-                0.5 + 0.5 * fine / FINE_SHARE.recip().asinh()
-            }
+        match self.is_log {
+            true => (value / self.low).ln() / (self.high / self.low).ln(),
+            false => (value - self.low) / (self.high - self.low),
         }
     }
 
     /// Values to label, with their labels.
     pub fn ticks(&self) -> Vec<(f64, String)> {
-        match self.kind {
-            Kind::Log => self.log_ticks(),
-            Kind::Linear => self.linear_ticks(),
-            Kind::Fine => self.fine_ticks(),
-        }
+        if self.is_log { self.log_ticks() } else { self.linear_ticks() }
     }
 
     /// As many of them as stand apart along a side of this length, where each needs `room_px`.
@@ -167,15 +141,6 @@ impl Axis {
             .filter(|(value, _)| (self.low..=self.high).contains(value))
             .collect()
     }
-
-    /// Powers of ten, and three times as much, down to where the axis is linear, and zero.
-    fn fine_ticks(&self) -> Vec<(f64, String)> {
-        let powers = (-12..=12).flat_map(|power| [1.0, 3.0].map(|digit| digit * 10f64.powi(power)));
-        let is_shown = |value: &f64| (FINE_SHARE * self.high..=self.high).contains(value);
-        let above: Vec<f64> = powers.filter(is_shown).collect();
-        let below = above.iter().rev().map(|value| -value);
-        below.chain([0.0]).chain(above.iter().copied()).map(|v| (v, rounded(v))).collect()
-    }
 }
 
 /// Smallest and largest of the finite values.
@@ -222,6 +187,12 @@ impl Panel {
         };
         let (x, y) = (stretched(x, width), stretched(y, height));
         Self { area: Area { width, height, ..most }, x, y }
+    }
+
+    /// The same with its top left elsewhere.
+    pub fn moved(&self, left: f64, top: f64) -> Self {
+        let area = Area { left, top, ..self.area };
+        Self { area, x: self.x.clone(), y: self.y.clone() }
     }
 
     /// Where a value lies on the sheet.
@@ -294,6 +265,13 @@ impl Panel {
     }
 }
 
+/// A [`colour_bar`] of heights above a datum, in a unit.
+pub fn height_bar(canvas: &mut Canvas, area: Area, unit: Length, heights_m: [f64; 2]) {
+    let [low, high] = heights_m.map(|height_m| height_m * unit.per_m);
+    let words = format!("height above the datum ({})", unit.symbol);
+    colour_bar(canvas, area, &Axis::linear(low, high, 6.0), &words, |t| style::height(t, 1.0));
+}
+
 /// A horizontal bar of colours with its scale below.
 pub fn colour_bar(
     canvas: &mut Canvas,
@@ -316,26 +294,4 @@ pub fn colour_bar(
         canvas.text([x, area.bottom() + 17.0], &label, SMALL_PX, Anchor::Middle);
     }
     canvas.text([area.left - 10.0, area.bottom() - 1.0], words, TEXT_PX, Anchor::End);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Axis;
-
-    /// The law of the inverse hyperbolic sine: odd, as steep at zero as it says, the ends at the
-    /// ends.
-    #[test]
-    fn a_fine_axis_is_odd_and_finer_towards_zero() {
-        let axis = Axis::fine(20.0);
-        let at = |value| axis.fraction(value);
-        assert_eq!([at(-20.0), at(0.0), at(20.0)], [0.0, 0.5, 1.0]);
-        for value in [0.01, 0.3, 5.0, 19.0] {
-            assert!((at(value) + at(-value) - 1.0).abs() < 1e-15);
-            assert!(at(value) - 0.5 > 0.5 * value / 20.0);
-        }
-        let steepness = (at(1e-6) - 0.5) / 1e-6;
-        assert!((steepness * 2.0 * 0.6 * (1.0f64 / 0.03).asinh() - 1.0).abs() < 1e-6);
-        let labels: Vec<String> = axis.ticks().into_iter().map(|(_, label)| label).collect();
-        assert_eq!(labels, ["−10", "−3", "−1", "0", "1", "3", "10"]);
-    }
 }

@@ -28,45 +28,29 @@ impl Camera {
         Self { right, up: toward.cross(&right), toward, scale: 1.0, shift: [0.0, 0.0] }
     }
 
-    /// The same with all `points` as large as fits into `area`, in its middle.
-    pub fn fitted(self, points: impl Iterator<Item = Vector3<f64>>, area: Area) -> Self {
-        let ends = self.ends(points);
-        let scale = scale(ends, area);
-        self.placed(ends, scale, area)
-    }
-
     /// How many pixels a metre may have, so that all `points` fit into `area`.
-    pub fn scale(&self, points: impl Iterator<Item = Vector3<f64>>, area: Area) -> f64 {
-        scale(self.ends(points), area)
+    pub fn scale(&self, points: &[Vector3<f64>], area: Area) -> f64 {
+        let [low, high] = self.ends(points);
+        (area.width / (high[0] - low[0])).min(area.height / (high[1] - low[1]))
     }
 
     /// The same with so many pixels a metre, and all `points` about the middle of `area`.
-    pub fn scaled(
-        self,
-        px_per_m: f64,
-        points: impl Iterator<Item = Vector3<f64>>,
-        area: Area,
-    ) -> Self {
-        let ends = self.ends(points);
-        self.placed(ends, px_per_m, area)
+    pub fn scaled(self, px_per_m: f64, points: &[Vector3<f64>], area: Area) -> Self {
+        let ([low, high], centre) = (self.ends(points), area.centre());
+        let shift = std::array::from_fn(|i| centre[i] - px_per_m * 0.5 * (low[i] + high[i]));
+        Self { scale: px_per_m, shift, ..self }
     }
 
     /// The corners of a rectangle around points, with one pixel a metre about the sheet's corner.
-    fn ends(&self, points: impl Iterator<Item = Vector3<f64>>) -> [PointPx; 2] {
+    fn ends(&self, points: &[Vector3<f64>]) -> [PointPx; 2] {
         let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
-        for at in points.map(|point| [point.dot(&self.right), -point.dot(&self.up)]) {
+        for at in points.iter().map(|point| [point.dot(&self.right), -point.dot(&self.up)]) {
             for i in 0..2 {
                 low[i] = low[i].min(at[i]);
                 high[i] = high[i].max(at[i]);
             }
         }
         [low, high]
-    }
-
-    fn placed(self, [low, high]: [PointPx; 2], scale: f64, area: Area) -> Self {
-        let centre = area.centre();
-        let shift = std::array::from_fn(|i| centre[i] - scale * 0.5 * (low[i] + high[i]));
-        Self { scale, shift, ..self }
     }
 
     /// Where a point in metres lies on the sheet.
@@ -86,8 +70,4 @@ impl Camera {
     pub fn sees(&self, normal: &Vector3<f64>) -> bool {
         normal.dot(&self.toward) > 0.0
     }
-}
-
-fn scale([low, high]: [PointPx; 2], area: Area) -> f64 {
-    (area.width / (high[0] - low[0])).min(area.height / (high[1] - low[1]))
 }

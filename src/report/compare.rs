@@ -1,60 +1,259 @@
-//! Performance profiles: which share of the trials has how small an error.
+//! Planners over several runs, as tables, figures and a page: which is better on which object, by
+//! how much, and what it took.
 
 use super::axes::{Axis, Panel};
-use super::canvas::{Area, Canvas};
-use super::legend::{Legend, Swatch};
-use super::style;
-use super::style::FAINT_INK;
-use crate::study::compare::{Compared, profile};
+use super::canvas::Area;
+use super::findings::HONEST;
+use super::html::{page, section, wide};
+use super::legend::{Swatch, sheet};
+use super::style::{self, FAINT_INK};
+use super::table::{Cell, Column, Table, verdict};
+use crate::experiment::measure::Direction;
+use crate::experiment::measure::outline::TENTHS;
+use crate::experiment::statistics::equal_error::Estimate;
+use crate::experiment::statistics::mean;
+use crate::experiment::trial::entrant::ORACLE;
+use crate::study::compare::{
+    Compared, Contender, FLOOR, ObjectResult, gap_closed, geometric, improvement, interquartile,
+    profile,
+};
 
-const PANEL_PX: Area = Area { left: 70.0, top: 60.0, width: 460.0, height: 300.0 };
+/// The seed of all bootstraps.
+const SEED: u64 = 0;
 
-/// Steps of a curve; chosen, finer than the eye.
-const STEPS: u32 = 300;
+/// A contender's error in units of the reference's on one object.
+fn error_on(contender: &Contender, object: usize) -> Option<Estimate> {
+    geometric(&[&contender.results[object].scores], SEED)
+}
 
-/// Draws them; none without a score.
-pub fn draw(compared: &Compared, against: &str) -> Option<String> {
-    let Sheet { mut canvas, area, strokes } = Sheet::new(compared, PANEL_PX);
-    let scores = compared.contenders.iter().flat_map(|it| it.scores.iter().flatten().copied());
+fn judged(error: Option<Estimate>) -> Cell {
+    let interval = error.and_then(|error| error.interval);
+    Cell::from(error).judged(interval, 1.0, Direction::Less)
+}
+
+/// A row for each planner: over all objects.
+pub fn overall(compared: &Compared) -> Table {
+    let count = compared.objects.len();
+    let mut table = Table::new([
+        Column::new("planner"),
+        Column::new("error"),
+        Column::new("better on"),
+        Column::new("worse on"),
+        Column::new("gap closed").unit("%", 100.0).decimals(0),
+        Column::new("missed").unit("%", 100.0).decimals(1),
+        Column::new("stalled").unit("%", 100.0).decimals(1),
+        Column::new("travel").unit("m", 1.0).decimals(2),
+        Column::new("in the band"),
+        Column::new("Brier").decimals(3),
+        Column::new("IoU").decimals(3),
+        Column::new(format!("better than {}", compared.against)).decimals(2),
+    ]);
+    let all: Vec<usize> = (0..count).collect();
+    let reference = compared.contenders.iter().find(|it| it.name == compared.against);
+    for contender in &compared.contenders {
+        let on = |word: &str| {
+            let intervals = all.iter().map(|object| error_on(contender, *object)?.interval);
+            let verdicts = intervals.map(|it| verdict(it, 1.0, Direction::Less));
+            Cell::from(format!("{} of {count}", verdicts.filter(|it| *it == Some(word)).count()))
+        };
+        let mean_of = |of: fn(&ObjectResult) -> Option<f64>| {
+            let values: Vec<f64> = contender.results.iter().filter_map(of).collect();
+            Cell::from((!values.is_empty()).then(|| mean(&values)))
+        };
+        let coverages = contender.results.iter().filter_map(|result| result.coverage);
+        let honest = coverages.filter(|share| HONEST.contains(share)).count();
+        table.rows.push(vec![
+            contender.name.as_str().into(),
+            judged(geometric(&contender.scores(), SEED)),
+            on("better"),
+            on("worse"),
+            gap_closed(compared, contender, &all, SEED).into(),
+            mean_of(|result| result.missed),
+            mean_of(|result| result.stalled),
+            mean_of(|result| result.travel_m),
+            format!("{honest} of {count}").into(),
+            mean_of(|result| result.brier),
+            mean_of(|result| result.iou),
+            reference.and_then(|reference| improvement(contender, reference)).into(),
+        ]);
+    }
+    table.without_empty()
+}
+
+/// A row for each object, a column for each planner: geometric means.
+pub fn each(compared: &Compared) -> Table {
+    let rows = compared.objects.iter().enumerate().map(|(object, name)| (name.clone(), object));
+    let columns = compared.contenders.iter().map(|it| (Column::new(&it.name), it)).collect();
+    let cell =
+        |object: &usize, contender: &&Contender| Some(judged(Some(error_on(contender, *object)?)));
+    Table::cross("object", rows, columns, cell)
+}
+
+/// A row for each planner, a column for each object and one for all: interquartile means.
+pub fn interquartiles(compared: &Compared) -> Table {
+    let rows = compared.contenders.iter().map(|it| (it.name.clone(), it.scores()));
+    let objects = compared.objects.iter().enumerate();
+    let mut columns: Vec<(Column, Option<usize>)> =
+        objects.map(|(object, name)| (Column::new(name), Some(object))).collect();
+    columns.push((Column::new("all"), None));
+    Table::cross("interquartile mean", rows, columns, |scores: &Vec<&[f64]>, object| {
+        let found = match object {
+            Some(object) => interquartile(&[scores[*object]], SEED),
+            None => interquartile(scores, SEED),
+        };
+        found.map(Cell::from)
+    })
+}
+
+/// A note on the numbers.
+pub fn note(against: &str) -> String {
+    format!(
+        "Errors are exp(mean log error over the touches after the initial ones) in units of {against}'s \
+         in the same trial: the geometric mean over trials and objects, with the 95 % interval of a \
+         bootstrap over trials. Less is better; better and worse: the interval excludes 1. The gap is \
+         that from {FLOOR} to {ORACLE}, which looks at the truth, in mean log error. Missed: touches \
+         that met nothing; stalled: plans that the planner's own rule could not decide. After the last touch: on \
+         how many objects the band of 95 % holds 90 to 98 % of the truth; and where the object does not \
+         fill its zone, the mean squared error of the probability that a place has a surface (Brier), and \
+         the silhouette's intersection over union (IoU). Last: the probability that a trial is better \
+         than one of {against}."
+    )
+}
+
+/// The page.
+pub fn html(name: &str, question: &str, compared: &Compared) -> String {
+    let over_all =
+        section("Over all objects", &overall(compared).html("named"), &note(&compared.against));
+    let each = section("Object by object", &each(compared).html("named"), "");
+    let figure = |id: &str, svg: Option<String>, caption: &str| {
+        svg.map_or(String::new(), |svg| {
+            let svg = wide(&svg, "figure");
+            format!("<figure id=\"{id}\">\n{svg}<figcaption>{caption}</figcaption>\n</figure>\n")
+        })
+    };
+    let profiles = figure(
+        "profiles",
+        profiles(compared),
+        "Which share of the trials has how small an error, averaged over the objects; further left is \
+         better.",
+    );
+    let reliability = figure(
+        "reliability",
+        reliability(compared),
+        "Of the places that are given a probability of a surface, how many have one; on the diagonal the \
+         belief is honest.",
+    );
+    page("Palpate suite", name, question, &[over_all, profiles, reliability, each].concat())
+}
+
+/// The table of `suite.csv`: a row per object and planner.
+pub fn file(compared: &Compared) -> Table {
+    let mut table = Table::new([
+        Column::new("object").note("Which object."),
+        Column::new("planner").note("Which planner."),
+        Column::new("trials")
+            .note("Its trials that were finished, and have one of the reference beside them."),
+        Column::new("error")
+            .note("Geometric mean of its error in units of the reference's.")
+            .interval(),
+        Column::new("gap_closed")
+            .note("Share of the way from random to the oracle, in mean log error."),
+        Column::new("missed").note("Share of the touches after the initial ones that met nothing."),
+        Column::new("stalled")
+            .note("Share of these touches that the planner's own rule could not decide."),
+        Column::new("travel_m").note("Mean lateral travel of a trial."),
+        Column::new("coverage").note("Share of the truth in the 95 % band after the last touch."),
+        Column::new("presence_brier")
+            .note("Mean squared error of the probability of a surface then."),
+        Column::new("silhouette_iou").note("Intersection over union of the silhouettes then."),
+    ]);
+    for (object, name) in compared.objects.iter().enumerate() {
+        for contender in &compared.contenders {
+            let result = &contender.results[object];
+            let gap = gap_closed(compared, contender, &[object], SEED);
+            table.rows.push(vec![
+                name.as_str().into(),
+                contender.name.as_str().into(),
+                result.scores.len().into(),
+                error_on(contender, object).into(),
+                gap.map(|gap| gap.value).into(),
+                result.missed.into(),
+                result.stalled.into(),
+                result.travel_m.into(),
+                result.coverage.into(),
+                result.brier.into(),
+                result.iou.into(),
+            ]);
+        }
+    }
+    table
+}
+
+/// Performance profiles: which share of the trials has how small an error; none without a score.
+pub fn profiles(compared: &Compared) -> Option<String> {
+    // Finer than the eye.
+    const STEPS: u32 = 300;
+    let scores = compared.contenders.iter().flat_map(Contender::scores).flatten().copied();
     let x = Axis::log(scores.chain([1.0]))?;
     let (low, high) = x.range();
+    let at = |i: u32| low * (high / low).powf(f64::from(i) / f64::from(STEPS));
+    let curves = compared.contenders.iter().map(|contender| -> Vec<(f64, f64)> {
+        (0..=STEPS).map(|i| (at(i), profile(contender, at(i)))).collect()
+    });
+    let area = Area { left: 70.0, top: 60.0, width: 460.0, height: 300.0 };
+    let x_name = format!("error over the touches, in units of {}'s", compared.against);
+    let names = [x_name.as_str(), "share of the trials"];
+    Some(draw(compared, (area, x, names), curves.collect(), [[1.0, 0.0], [1.0, 1.0]]))
+}
+
+/// Reliability over all objects: of the places that are given a probability of a surface, how many
+/// have one; none where every object fills its zone.
+fn reliability(compared: &Compared) -> Option<String> {
+    let curves: Vec<_> = compared.contenders.iter().map(reliability_curve).collect();
+    let area = Area { left: 70.0, top: 60.0, width: 300.0, height: 300.0 };
+    let names = ["probability of a surface, in tenths", "share that has one"];
+    let is_known = curves.iter().any(|curve| !curve.is_empty());
+    let axes = (area, Axis::linear(0.0, 1.0, 6.0), names);
+    is_known.then(|| draw(compared, axes, curves, [[0.0, 0.0], [1.0, 1.0]]))
+}
+
+/// The middle of each tenth, and the share of its places that have a surface.
+fn reliability_curve(contender: &Contender) -> Vec<(f64, f64)> {
+    /// Fewest places of a point, over all objects and trials. heuristic: 50 tell a share to 7 %.
+    const PLACES_MIN: u32 = 50;
+    let share = |tenth: usize| {
+        let counts = contender.results.iter().map(|result| result.reliability[tenth]);
+        let [all, there] =
+            counts.fold([0, 0], |[all, there], [more, of_them]| [all + more, there + of_them]);
+        let middle = (tenth as f64 + 0.5) / TENTHS as f64;
+        (all >= PLACES_MIN).then(|| (middle, f64::from(there) / f64::from(all)))
+    };
+    (0..TENTHS).filter_map(share).collect()
+}
+
+/// One panel with a curve for each contender, whose names are above it, and a dashed line of
+/// reference.
+fn draw(
+    compared: &Compared,
+    (area, x, [x_name, y_name]): (Area, Axis, [&str; 2]),
+    curves: Vec<Vec<(f64, f64)>>,
+    reference: [[f64; 2]; 2],
+) -> String {
+    let names: Vec<String> = compared.contenders.iter().map(|it| it.name.clone()).collect();
+    let stroke = |name: &String| style::stroke(style::planner(&names, name), 2.0);
+    let strokes: Vec<String> = names.iter().map(stroke).collect();
+    let swatches = strokes.iter().cloned().map(Swatch::Line);
+    let entries = swatches.zip(names.iter().map(String::as_str));
+    let size = [area.right() + 20.0, area.bottom() + 50.0];
+    let (mut canvas, more_px) = sheet(size, [area.left, 22.0], (area.width, ""), entries);
+    let area = Area { top: area.top + more_px, ..area };
     let panel = Panel { area, x, y: Axis::linear(0.0, 1.0, 6.0) };
     panel.frame(&mut canvas);
-    canvas.line([panel.at(1.0, 0.0), panel.at(1.0, 1.0)], &style::dashed(FAINT_INK, 1.0, "4 3"));
-    for (contender, stroke) in compared.contenders.iter().zip(&strokes) {
-        let at = |i: u32| low * (high / low).powf(f64::from(i) / f64::from(STEPS));
-        let curve: Vec<(f64, f64)> =
-            (0..=STEPS).map(|i| (at(i), profile(contender, at(i)))).collect();
-        panel.curve(&mut canvas, &curve, stroke);
+    let ends = reference.map(|[x, y]| panel.at(x, y));
+    canvas.line(ends, &style::dashed(FAINT_INK, 1.0, "4 3"));
+    for (curve, stroke) in curves.iter().zip(&strokes) {
+        panel.curve(&mut canvas, curve, stroke);
     }
-    panel.name_axes(
-        &mut canvas,
-        &format!("error over the touches, in units of {against}'s"),
-        "share of the trials",
-    );
-    Some(canvas.finish())
-}
-
-/// A drawing of one panel with a curve for each contender, whose names stand above it.
-pub(super) struct Sheet {
-    pub(super) canvas: Canvas,
-    /// Of the panel, below the names.
-    pub(super) area: Area,
-    /// Of each contender's curve.
-    pub(super) strokes: Vec<String>,
-}
-
-impl Sheet {
-    /// With room for a panel of this size and its axes.
-    pub(super) fn new(compared: &Compared, panel_px: Area) -> Self {
-        let names: Vec<String> = compared.contenders.iter().map(|it| it.name.clone()).collect();
-        let stroke = |name: &String| style::stroke(style::planner(&names, name), 2.0);
-        let strokes: Vec<String> = names.iter().map(stroke).collect();
-        let swatches = strokes.iter().cloned().map(Swatch::Line);
-        let legend = Legend::new(panel_px.width, swatches.zip(names.iter().map(String::as_str)));
-        let area = Area { top: panel_px.top + legend.more_px(), ..panel_px };
-        let mut canvas = Canvas::new(area.right() + 20.0, area.bottom() + 50.0);
-        legend.draw(&mut canvas, [area.left, 22.0]);
-        Self { canvas, area, strokes }
-    }
+    panel.name_axes(&mut canvas, x_name, y_name);
+    canvas.finish()
 }

@@ -1,22 +1,44 @@
 //! A drawing as files beside each other: SVG, PNG and PDF.
+//!
+//! PNG and PDF are drawn with a font that is part of this program, so they have the same bytes on
+//! every machine.
 
-use super::{pdf, png};
 use crate::experiment::store::write_whole;
 use crate::files;
-use anyhow::Context;
+use anyhow::{Context, anyhow};
+use png::{ColorType, Encoder};
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::{Options, Tree, fontdb};
 use std::io;
 use std::path::Path;
+use std::sync::{Arc, LazyLock};
 
-/// What a drawing is written as.
+/// The formats of a drawing, as file extensions.
 pub const FORMATS: [&str; 3] = ["svg", "png", "pdf"];
 
-/// Writes a drawing in every format; of `path` the extension is replaced.
+/// Pixels of a PNG per unit of the drawing.
+pub const PNG_SCALE: f32 = 2.0;
+
+/// A comment behind the end of a PDF, which readers pass over.
+const SIGNED: &[u8] = b"\n% drawn by Palpate\n";
+
+static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
+    let mut fonts = fontdb::Database::new();
+    fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
+    let family = fonts.faces().next().and_then(|face| face.families.first());
+    if let Some((family, _)) = family.cloned() {
+        fonts.set_sans_serif_family(family);
+    }
+    Arc::new(fonts)
+});
+
+/// Writes a drawing in every format; the extension of `path` is replaced.
 ///
 /// # Errors
 /// If it is not an SVG, or a file cannot be written.
 pub fn write(path: &Path, svg: &str) -> anyhow::Result<()> {
     write_whole(&path.with_extension("svg"), svg)?;
-    for (extension, bytes) in [("png", png::render(svg)), ("pdf", pdf::render(svg))] {
+    for (extension, bytes) in [("png", png(svg)), ("pdf", pdf(svg))] {
         let path = path.with_extension(extension);
         let place = || path.display().to_string();
         write_whole(&path, bytes.with_context(place)?)?;
@@ -30,4 +52,59 @@ pub fn write(path: &Path, svg: &str) -> anyhow::Result<()> {
 /// If a file is there and cannot be removed.
 pub fn remove(path: &Path) -> io::Result<()> {
     FORMATS.iter().try_for_each(|extension| files::remove(&path.with_extension(extension)))
+}
+
+/// The parsed tree of an SVG.
+///
+/// # Errors
+/// If it is not an SVG.
+pub fn tree(svg: &str) -> anyhow::Result<Tree> {
+    let options = Options { fontdb: FONTS.clone(), ..Options::default() };
+    Ok(Tree::from_str(svg, &options)?)
+}
+
+/// An SVG as PNG, at [`PNG_SCALE`], with the name of the program that drew it.
+///
+/// # Errors
+/// If it is not an SVG, or too large for memory.
+pub fn png(svg: &str) -> anyhow::Result<Vec<u8>> {
+    let tree = tree(svg)?;
+    let size = tree.size().to_int_size().scale_by(PNG_SCALE).context("it has no size")?;
+    let mut pixels = Pixmap::new(size.width(), size.height()).context("it is too large")?;
+    resvg::render(&tree, Transform::from_scale(PNG_SCALE, PNG_SCALE), &mut pixels.as_mut());
+    let rgba = pixels.pixels().iter().flat_map(|pixel| {
+        let colour = pixel.demultiply();
+        [colour.red(), colour.green(), colour.blue(), colour.alpha()]
+    });
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, size.width(), size.height());
+    encoder.set_color(ColorType::Rgba);
+    encoder.add_text_chunk("Software".into(), "Palpate".into())?;
+    encoder.write_header()?.write_image_data(&rgba.collect::<Vec<u8>>())?;
+    Ok(bytes)
+}
+
+/// An SVG as PDF, with lines as lines and words as words: a page of the size of the drawing, one
+/// point for each unit.
+///
+/// # Errors
+/// If it is not an SVG, or has no size.
+pub fn pdf(svg: &str) -> anyhow::Result<Vec<u8>> {
+    let drawn = svg2pdf::to_pdf(&tree(svg)?, Default::default(), Default::default());
+    let drawn = drawn.map_err(|error| anyhow!("it cannot be drawn: {error}"))?;
+    Ok([&in_order(&drawn), SIGNED].concat())
+}
+
+/// The same PDF with the entries of each dictionary of resources in order: svg2pdf writes them in
+/// the order of a hash map, another one each time. No entry changes its length, so that every
+/// object stays where the table of objects says.
+fn in_order(pdf: &[u8]) -> Vec<u8> {
+    // As in `/gs0 7 0 R`.
+    let is_entry = |line: &[u8]| {
+        let words: Vec<&str> = str::from_utf8(line).unwrap_or("").split_whitespace().collect();
+        matches!(words[..], [name, id, "0", "R"] if name.starts_with('/') && id.parse::<u32>().is_ok())
+    };
+    let mut lines: Vec<&[u8]> = pdf.split(|byte| *byte == b'\n').collect();
+    lines.chunk_by_mut(|a, b| is_entry(a) && is_entry(b)).for_each(<[&[u8]]>::sort);
+    lines.join(&b'\n')
 }

@@ -1,13 +1,16 @@
-//! What a run found, in words and numbers taken from its rows.
+//! What a run found, in words and numbers taken from its rows, and what it decides.
 
 use super::number::{digits, with_error};
+use super::table::verdict;
 use crate::experiment::measure;
+use crate::experiment::measure::Direction;
 use crate::experiment::measure::metrics::constant_r;
 use crate::experiment::measure::{
     CENTRED_R, CHAMFER, COVERAGE, EDGE_RMSE, Measure, R, REPEATABILITY, RMSE,
     VERIFICATION_COVERAGE, VERIFICATION_RMSE,
 };
 use crate::experiment::notice;
+use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::statistics::summary;
 use crate::experiment::statistics::summary::CurvePoint;
 use crate::experiment::store::Run;
@@ -27,7 +30,7 @@ pub fn notices(run: &Run) -> Vec<String> {
 /// Sentences, the most important first.
 pub fn sentences(run: &Run) -> Vec<String> {
     let planners = &run.experiment.planners;
-    let curves: Vec<(&str, Vec<CurvePoint>)> = planners
+    let curves: Vec<Curve> = planners
         .iter()
         .map(|name| (name.as_str(), summary::curve(&run.experiment, &run.rows, name)))
         .filter(|(_, points)| !points.is_empty())
@@ -52,15 +55,26 @@ pub fn sentences(run: &Run) -> Vec<String> {
         .map_or(String::new(), |score| format!(" (a constant height scores {score:.3})"));
     let goal = format!("a mean R of {R_FOUND}{constant}");
     let is_found = |point: &CurvePoint| point.of(&R).is_some_and(|r| r.mean >= R_FOUND);
-    sentences.push(needed(run, &curves, &goal, is_found));
+    sentences.extend(needed(run, &curves, &goal, is_found));
     sentences.extend(against_baseline(run, &curves));
-    sentences.push(honesty(&curves));
+    sentences.extend(honesty(&curves));
     sentences
 }
 
-/// How the last beliefs stand verification and repeated touches, where there were any.
-fn verified(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<String> {
-    let told = curves.iter().filter_map(|(name, points)| {
+/// A planner's name with its curve.
+type Curve<'a> = (&'a str, Vec<CurvePoint>);
+
+/// Words on each planner that has some, behind its name; `None` if no planner has.
+fn each(curves: &[Curve], words: impl Fn(&[CurvePoint]) -> Option<String>) -> Option<Vec<String>> {
+    let found =
+        curves.iter().filter_map(|(name, points)| Some(format!("{name} {}", words(points)?)));
+    let found: Vec<String> = found.collect();
+    (!found.is_empty()).then_some(found)
+}
+
+/// Agreement of the last beliefs with verification and repeated touches, where there were any.
+fn verified(run: &Run, curves: &[Curve]) -> Option<String> {
+    let words = |points: &[CurvePoint]| {
         let point = points.last().filter(|point| point.touches == run.experiment.touches)?;
         let rmse = median(point, &VERIFICATION_RMSE).map(|rmse| {
             let share = point.of(&VERIFICATION_COVERAGE).map_or(String::new(), |share| {
@@ -71,65 +85,53 @@ fn verified(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<String> {
         let again = median(point, &REPEATABILITY);
         let again = again.map(|again| format!("repeated touches differ by {again} mm"));
         let parts: Vec<String> = rmse.into_iter().chain(again).collect();
-        (!parts.is_empty()).then(|| format!("{name} {}", parts.join("; ")))
-    });
-    let told: Vec<String> = told.collect();
-    (!told.is_empty()).then(|| {
-        format!(
-            "At verification touches, which the last belief predicted and did not learn from: {}.",
-            told.join(" · ")
-        )
-    })
+        (!parts.is_empty()).then(|| parts.join("; "))
+    };
+    let found = each(curves, words)?.join(" · ");
+    Some(format!(
+        "At verification touches, which the last belief predicted and did not learn from: {found}."
+    ))
 }
 
 /// Scores at the last drawn touch count that any planner reached.
-fn scores(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<String> {
-    let at =
-        |points: &[CurvePoint], count: u32| points.iter().find(|p| p.touches == count).cloned();
+fn scores(run: &Run, curves: &[Curve]) -> Option<String> {
     let counts = run.experiment.drawn_touch_counts();
-    let count = counts
-        .into_iter()
-        .rev()
-        .find(|&count| curves.iter().any(|(_, points)| at(points, count).is_some()))?;
-    let told: Vec<String> = curves
-        .iter()
-        .filter_map(|(name, points)| {
-            let point = at(points, count)?;
-            let mean = |measure: &Measure| {
-                let summary = point.of(measure)?;
-                Some(with_error(measure, summary.mean, summary.error))
-            };
-            let (r, centred) = (mean(&R)?, mean(&CENTRED_R)?);
-            let rmse = median(&point, &RMSE)?;
-            let edge = median(&point, &EDGE_RMSE).map_or(String::new(), |edge| {
-                format!(", {edge} mm in the outer tenth of the zone")
-            });
-            Some(format!("{name} {r} (centred {centred}, median RMSE {rmse} mm{edge})"))
-        })
-        .collect();
-    (!told.is_empty())
-        .then(|| format!("After {count} touches the mean R (Eq. 5) is: {}.", told.join("; ")))
+    let is_reached = |count: &u32| curves.iter().any(|(_, points)| at(points, *count).is_some());
+    let count = counts.into_iter().rev().find(is_reached)?;
+    let words = |points: &[CurvePoint]| {
+        let point = at(points, count)?;
+        let mean = |measure: &Measure| {
+            let summary = point.of(measure)?;
+            Some(with_error(measure, summary.mean, summary.error))
+        };
+        let (r, centred, rmse) = (mean(&R)?, mean(&CENTRED_R)?, median(point, &RMSE)?);
+        let edge = median(point, &EDGE_RMSE)
+            .map_or(String::new(), |edge| format!(", {edge} mm in the outer tenth of the zone"));
+        Some(format!("{r} (centred {centred}, median RMSE {rmse} mm{edge})"))
+    };
+    let found = each(curves, words)?.join("; ");
+    Some(format!("After {count} touches the mean R (Eq. 5) is: {found}."))
 }
 
-/// How near the believed shapes of whole objects are after the last touch that is drawn.
-fn shapes(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<String> {
+/// Nearness of the believed shapes of whole objects after the last touch that is drawn.
+fn shapes(run: &Run, curves: &[Curve]) -> Option<String> {
     let count = run.experiment.drawn_touch_counts().into_iter().next_back()?;
-    let told: Vec<String> = curves
-        .iter()
-        .filter_map(|(name, points)| {
-            let point = points.iter().find(|point| point.touches == count)?;
-            let of = |id: &str| Some(point.of(measure::by_id(id)?)?.mean);
-            let share = digits(100.0 * of("chamfer_share")?);
-            let chamfer = median(point, &CHAMFER)?;
-            let (f_1, f_3) = (100.0 * of("f_1")?, 100.0 * of("f_3")?);
-            Some(format!(
-                "{name} {share} % of the diagonal (median {chamfer} mm; F {f_1:.0} at 1 %, {f_3:.0} at 3 %)"
-            ))
-        })
-        .collect();
-    (!told.is_empty()).then(|| {
-        format!("After {count} touches the mean Chamfer distance is: {}.", told.join("; "))
-    })
+    let words = |points: &[CurvePoint]| {
+        let point = at(points, count)?;
+        let of = |id: &str| Some(point.of(measure::by_id(id)?)?.mean);
+        let (share, chamfer) = (digits(100.0 * of("chamfer_share")?), median(point, &CHAMFER)?);
+        let (f_1, f_3) = (100.0 * of("f_1")?, 100.0 * of("f_3")?);
+        Some(format!(
+            "{share} % of the diagonal (median {chamfer} mm; F {f_1:.0} at 1 %, {f_3:.0} at 3 %)"
+        ))
+    };
+    let found = each(curves, words)?.join("; ");
+    Some(format!("After {count} touches the mean Chamfer distance is: {found}."))
+}
+
+/// A curve after `count` touches.
+fn at(points: &[CurvePoint], count: u32) -> Option<&CurvePoint> {
+    points.iter().find(|point| point.touches == count)
 }
 
 /// The median of an error, in the unit it is shown in.
@@ -137,25 +139,22 @@ fn median(point: &CurvePoint, measure: &Measure) -> Option<String> {
     Some(digits(measure.unit.per_si * point.of(measure)?.median))
 }
 
-/// After how many touches each planner meets a goal, and keeps meeting it.
+/// The touches after which each planner meets a goal, and keeps meeting it.
 fn needed(
     run: &Run,
-    curves: &[(&str, Vec<CurvePoint>)],
+    curves: &[Curve],
     goal: &str,
     is_met: impl Fn(&CurvePoint) -> bool,
-) -> String {
-    let told: Vec<String> = curves
-        .iter()
-        .map(|(name, points)| match summary::met_from(points, &is_met) {
-            Some(touches) => format!("{name} {touches}"),
-            None => format!("{name} not within {}", run.experiment.touches),
-        })
-        .collect();
-    format!("Touches needed for {goal}: {}.", told.join(", "))
+) -> Option<String> {
+    let words = |points: &[CurvePoint]| match summary::met_from(points, &is_met) {
+        Some(touches) => Some(touches.to_string()),
+        None => Some(format!("not within {}", run.experiment.touches)),
+    };
+    Some(format!("Touches needed for {goal}: {}.", each(curves, words)?.join(", ")))
 }
 
-/// How soon the others are as near the truth as the first baseline is at its end.
-fn against_baseline(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<String> {
+/// The touches that the others need to be as near the truth as the first baseline is at its end.
+fn against_baseline(run: &Run, curves: &[Curve]) -> Option<String> {
     let name = *run.experiment.baselines().first()?;
     let error = run.experiment.error();
     let compared = curves.iter().map(|(planner, points)| {
@@ -172,7 +171,7 @@ fn against_baseline(run: &Run, curves: &[(&str, Vec<CurvePoint>)]) -> Option<Str
         median(last, error)?
     );
     let is_met = |point: &CurvePoint| point.of(error).is_some_and(|it| it.median <= error_m);
-    (!others.is_empty()).then(|| needed(run, &others, &goal, is_met))
+    needed(run, &others, &goal, is_met)
 }
 
 /// Shares of the truth that a 95 % band may hold and still count as honest; chosen.
@@ -183,17 +182,100 @@ pub(super) fn share_in_band(points: &[CurvePoint]) -> Option<f64> {
     Some(points.last()?.of(&COVERAGE)?.mean)
 }
 
-/// Whether the beliefs know how far they are off after the last touch.
-fn honesty(curves: &[(&str, Vec<CurvePoint>)]) -> String {
-    let shares = curves.iter().filter_map(|(name, points)| {
-        let share = share_in_band(points)?;
-        let verdict = match share {
-            share if HONEST.contains(&share) => "",
-            share if share < *HONEST.start() => " (too sure)",
-            _ => " (too unsure)",
-        };
-        Some(format!("{name} {:.0} %{verdict}", 100.0 * share))
+/// The shares of the truth that the bands of the last beliefs hold.
+fn honesty(curves: &[Curve]) -> Option<String> {
+    let words = |points: &[CurvePoint]| Some(format!("{:.0} %", 100.0 * share_in_band(points)?));
+    let shares = each(curves, words)?.join(", ");
+    Some(format!("Of the truth the 95 % band of the last belief holds: {shares}."))
+}
+
+/// The verdict on a run in words: only what its intervals establish; empty without a belief.
+pub fn verdicts(run: &Run, analysis: &Analysis) -> Vec<String> {
+    let baselines = run.experiment.baselines();
+    let baseline = baselines.first().copied().unwrap_or_default();
+    nearness(run, analysis, baseline)
+        .into_iter()
+        .chain(effort(run, analysis, baseline))
+        .chain(trust(run))
+        .collect()
+}
+
+/// The planners that are nearer the truth after the last touch than the first baseline.
+fn nearness(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
+    let found = analysis.comparisons.iter();
+    let found =
+        found.filter(|it| it.baseline == baseline && it.measure.id == run.experiment.error().id);
+    let verdicts =
+        found.map(|it| (it.planner, verdict(it.paired.interval, 0.0, it.measure.direction)));
+    let words = [
+        format!("nearer the truth than {baseline}"),
+        format!("farther from the truth than {baseline}"),
+        format!("not told apart from {baseline}"),
+    ];
+    let clauses = clauses(&sorted(verdicts.collect())?, ["is", "are"], words);
+    Some(format!("After {} touches {clauses}.", run.experiment.touches))
+}
+
+/// The planners that need fewer touches than the first baseline for the error that it ends with.
+fn effort(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
+    let found = analysis.equal_errors.iter();
+    let found =
+        found.filter(|it| it.baseline == baseline && it.measure.id == run.experiment.error().id);
+    let verdicts = found.map(|it| (it.planner, verdict(it.ratio.interval, 1.0, Direction::Less)));
+    let words = ["fewer touches", "more touches", "about as many, as far as these trials tell"];
+    let clauses = clauses(&sorted(verdicts.collect())?, ["needs", "need"], words.map(String::from));
+    Some(format!("For the error that {baseline} reaches, {clauses}."))
+}
+
+/// The planners whose last bands hold as much of the truth as they say.
+fn trust(run: &Run) -> Option<String> {
+    let shares = run.experiment.planners.iter().filter_map(|name| {
+        let points = summary::curve(&run.experiment, &run.rows, name);
+        Some((name.as_str(), share_in_band(&points)?))
     });
-    let shares: Vec<String> = shares.collect();
-    format!("Of the truth the 95 % band of the last belief holds: {}.", shares.join(", "))
+    let shares: Vec<(&str, f64)> = shares.collect();
+    let with = |is_it: fn(f64) -> bool| -> Vec<&str> {
+        shares.iter().filter(|(_, share)| is_it(*share)).map(|(name, _)| *name).collect()
+    };
+    let which = [
+        with(|share| HONEST.contains(&share)),
+        with(|share| share < *HONEST.start()),
+        with(|share| share > *HONEST.end()),
+    ];
+    let words = [
+        "about as far off as it says",
+        "too sure of itself",
+        "less sure of itself than it could be",
+    ];
+    let clauses = clauses(&which, ["is", "is"], words.map(String::from));
+    (!shares.is_empty()).then(|| format!("The last belief of {clauses}."))
+}
+
+/// Planners that are better, worse and neither; `None` without planners.
+fn sorted<'a>(verdicts: Vec<(&'a str, Option<&'static str>)>) -> Option<[Vec<&'a str>; 3]> {
+    let with = |word: Option<&str>| -> Vec<&'a str> {
+        verdicts.iter().filter(|(_, it)| *it == word).map(|(name, _)| *name).collect()
+    };
+    (!verdicts.is_empty()).then(|| [Some("better"), Some("worse"), None].map(with))
+}
+
+/// A clause for each group of planners that is not empty.
+fn clauses(groups: &[Vec<&str>; 3], [one, many]: [&str; 2], words: [String; 3]) -> String {
+    let said = groups.iter().zip(words).filter(|(names, _)| !names.is_empty());
+    let clauses: Vec<String> = said
+        .map(|(names, words)| {
+            let verb = if names.len() == 1 { one } else { many };
+            format!("{} {verb} {words}", listed(names))
+        })
+        .collect();
+    clauses.join("; ")
+}
+
+/// a, b and c.
+fn listed(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [name] => (*name).into(),
+        [names @ .., last] => format!("{} and {last}", names.join(", ")),
+    }
 }

@@ -2,7 +2,6 @@
 
 use super::canvas::escape;
 use super::style::ON_DARK;
-use super::tables::{Cell, Table, Verdict};
 
 /// A page of this kind about something called `name`; `question` may be empty.
 pub(super) fn page(kind: &str, name: &str, question: &str, body: &str) -> String {
@@ -20,34 +19,6 @@ pub(super) fn page(kind: &str, name: &str, question: &str, body: &str) -> String
     )
 }
 
-/// A table whose words stand in its first column (`named`), its second (`counted`) or its first
-/// four (`told`).
-pub(super) fn table_body(table: &Table, class: &str) -> String {
-    let head: String =
-        table.header.iter().map(|words| format!("<th>{}</th>", escape(words))).collect();
-    let lines: String = (table.lines.iter())
-        .map(|line| line.iter().enumerate().map(|(i, it)| cell(i, it)).collect::<String>())
-        .map(|cells| format!("<tr>{cells}</tr>\n"))
-        .collect();
-    wide(
-        &format!(
-            "<table class=\"{class}\">\n<thead><tr>{head}</tr></thead>\n\
-             <tbody>\n{lines}</tbody>\n</table>"
-        ),
-        "table",
-    )
-}
-
-/// A cell; the first one is the head of its line.
-fn cell(index: usize, Cell { words, verdict }: &Cell) -> String {
-    let words = escape(words);
-    match verdict.map(Verdict::word) {
-        _ if index == 0 => format!("<th scope=\"row\">{words}</th>"),
-        Some(verdict) => format!("<td class=\"{verdict}\">{words}: {verdict}</td>"),
-        None => format!("<td>{words}</td>"),
-    }
-}
-
 /// What scrolls in its own box where the page is narrower, by keyboard too.
 pub(super) fn wide(content: &str, what: &str) -> String {
     format!(
@@ -55,8 +26,13 @@ pub(super) fn wide(content: &str, what: &str) -> String {
     )
 }
 
-/// A section of the page: its head, its body, and what is to be known of that.
+/// A section of a page with a title, unless that is empty, and a note below its body; empty without
+/// a body.
 pub(super) fn section(title: &str, body: &str, note: &str) -> String {
+    if body.is_empty() {
+        return String::new();
+    }
+    let title = if title.is_empty() { String::new() } else { format!("<h2>{title}</h2>\n") };
     format!("<section>\n{title}{body}<p class=\"note\">{}</p>\n</section>\n", escape(note))
 }
 

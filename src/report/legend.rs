@@ -2,7 +2,7 @@
 
 use super::canvas::{Anchor, Area, Canvas, PointPx};
 use super::style;
-use super::style::TEXT_PX;
+use super::style::{INITIAL, LATER, TEXT_PX};
 
 /// From one row to the next.
 const ROW_PX: f64 = 20.0;
@@ -48,7 +48,38 @@ impl<'a> Legend<'a> {
     }
 }
 
-/// What a legend shows beside its words.
+/// A sheet of `size` with a legend, the middle of its first row's left end at `at`, drawn in a
+/// group of `attributes`; it grows by the rows that the legend needs behind the first, which are
+/// returned in pixels.
+pub fn sheet<'a>(
+    [width, height]: [f64; 2],
+    at: PointPx,
+    (width_px, attributes): (f64, &str),
+    entries: impl IntoIterator<Item = (Swatch, &'a str)>,
+) -> (Canvas, f64) {
+    let legend = Legend::new(width_px, entries);
+    let more_px = legend.more_px();
+    let mut canvas = Canvas::new(width, height + more_px);
+    match attributes {
+        "" => legend.draw(&mut canvas, at),
+        attributes => canvas.grouped(attributes, |canvas| legend.draw(canvas, at)),
+    }
+    (canvas, more_px)
+}
+
+/// The entry of touches that met nothing.
+pub const MISS: (Swatch, &str) = (Swatch::Diamond(LATER), "touch that met nothing");
+
+/// The entries of touches on a surface that may hide them.
+pub fn touch_entries() -> [(Swatch, &'static str); 3] {
+    [
+        (Swatch::Circle(style::visible(INITIAL)), "initial touch"),
+        (Swatch::Circle(style::visible(LATER)), "later touch"),
+        (Swatch::Circle(style::hidden(LATER)), "behind the surface"),
+    ]
+}
+
+/// A mark in a legend.
 pub enum Swatch {
     /// A line with these attributes.
     Line(String),

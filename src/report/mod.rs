@@ -12,30 +12,21 @@ pub mod files;
 pub mod findings;
 pub mod heat_map;
 mod html;
-pub mod known;
 pub mod legend;
 pub mod number;
-pub mod object_panel;
 pub mod page;
-pub mod pdf;
-pub mod png;
 pub mod points;
 pub mod reference;
-pub mod reliability;
 pub mod relief;
-pub mod relief_panel;
 pub mod replay;
 pub mod scan;
 pub mod solid;
 pub mod style;
-pub mod suite;
+pub mod table;
 pub mod tables;
-pub mod tree;
-pub mod verdict;
 pub mod whole;
-pub mod zone;
 
-pub use figures::{Drawing, FIGURES, Figure};
+pub use figures::{FIGURES, Figure};
 
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
@@ -47,9 +38,12 @@ use std::path::Path;
 /// # Errors
 /// If a file cannot be written.
 pub fn write_tables(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()> {
-    tables::summary::write(run, folder)?;
-    tables::comparison::write(&analysis.comparisons, folder)?;
-    tables::equal_error::write(&analysis.equal_errors, folder)
+    let Analysis { comparisons, equal_errors } = analysis;
+    tables::summary::file(run, |_| true).write_csv(&folder.join("summary.csv"))?;
+    let comparison = tables::comparison::comparison_file(comparisons);
+    comparison.write_csv(&folder.join("comparison.csv"))?;
+    let equal_error = tables::comparison::equal_error_file(equal_errors);
+    equal_error.write_csv(&folder.join("equal_error.csv"))
 }
 
 /// Draws everything into the run's folder: `figures/*.svg`, the same as `.png` and `.pdf`,
@@ -69,7 +63,7 @@ pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()
             Some(svg) => files::write(&path, svg)?,
             None => files::remove(&path).with_context(|| path.display().to_string())?,
         }
-        drawings.extend(svg.map(|svg| Drawing { figure, svg }));
+        drawings.extend(svg.map(|svg| (figure, svg)));
     }
     let text = |name| crate::files::text(&folder.join(name), crate::files::TEXT_MAX).ok();
     let (settings, manifest) = (text(RESOLVED), text(MANIFEST));

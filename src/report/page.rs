@@ -1,13 +1,13 @@
 //! The page of a run: one file that needs nothing beside it.
 
 use super::canvas::escape;
-use super::figures::Drawing;
+use super::figures::Figure;
 use super::files::FORMATS;
 use super::findings;
 use super::html;
-use super::html::{section, table_body, wide};
-use super::tables::{Table, claims, comparison, equal_error, summary};
-use super::verdict;
+use super::html::{section, wide};
+use super::table::Table;
+use super::tables::{comparison, summary};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::Run;
 
@@ -30,19 +30,22 @@ const FAILURES_TOLD: usize = 10;
 pub fn html(
     run: &Run,
     analysis: &Analysis,
-    drawings: &[Drawing],
+    drawings: &[(&Figure, String)],
     explorer: &str,
     [settings, manifest]: [Option<&str>; 2],
 ) -> String {
+    let equal = comparison::equal_errors(run, &analysis.equal_errors);
+    let against = comparison::comparisons(run, &analysis.comparisons);
     let parts = [
         notices(&findings::notices(run)),
         explorer.into(),
         found(run, analysis),
-        claims_table(run),
-        summary_table(run),
-        comparison_tables(run, analysis),
+        tables("The paper, and here", &[summary::claims(run)], "told", summary::CLAIMS_NOTE),
+        tables("", &[summary::table(run)], "counted", &summary::note(run)),
+        tables("Touches to equal error", &equal, "named", &comparison::equal_errors_note(run)),
+        tables("Planner against planner", &against, "named", &comparison::comparisons_note(run)),
         events(run),
-        drawings.iter().map(|drawing| figure(run, drawing)).collect(),
+        drawings.iter().map(|(it, svg)| figure(run, it, svg)).collect(),
         details("Every setting, defaults written out", settings),
         details("What ran it", manifest),
         raw_files(drawings),
@@ -61,7 +64,7 @@ fn notices(sentences: &[String]) -> String {
 
 /// The verdict in words, then its numbers.
 fn found(run: &Run, analysis: &Analysis) -> String {
-    let verdict = match verdict::sentences(run, analysis).join(" ") {
+    let verdict = match findings::verdicts(run, analysis).join(" ") {
         words if words.is_empty() => words,
         words => format!("<p class=\"verdict\">{}</p>\n", escape(&words)),
     };
@@ -70,35 +73,10 @@ fn found(run: &Run, analysis: &Analysis) -> String {
     format!("<section>\n<h2>Found</h2>\n{verdict}{numbers}</section>\n")
 }
 
-fn claims_table(run: &Run) -> String {
-    let body = claims::table(run).map(|table| table_body(&table, "told"));
-    body.map_or(String::new(), |body| {
-        section("<h2>The paper, and here</h2>\n", &body, claims::NOTE)
-    })
-}
-
-fn summary_table(run: &Run) -> String {
-    let table = summary::table(run);
-    match table.lines.is_empty() {
-        true => String::new(),
-        false => section("", &table_body(&table, "counted"), &summary::note(run)),
-    }
-}
-
-fn comparison_tables(run: &Run, analysis: &Analysis) -> String {
-    let Analysis { comparisons, equal_errors } = analysis;
-    let against = comparison::tables(run, comparisons);
-    let against = (against, comparison::note(run), "Planner against planner");
-    let equal = equal_error::tables(run, equal_errors);
-    let equal = (equal, equal_error::note(run), "Touches to equal error");
-    let section = |(tables, note, title): (Vec<Table>, String, &str)| {
-        let bodies: String = tables.iter().map(|table| table_body(table, "named")).collect();
-        match bodies.is_empty() {
-            true => String::new(),
-            false => section(&format!("<h2>{title}</h2>\n"), &bodies, &note),
-        }
-    };
-    section(equal) + &section(against)
+/// A section of tables of one class; empty if none of them has a row.
+fn tables(title: &str, tables: &[Table], class: &str, note: &str) -> String {
+    let with_rows = tables.iter().filter(|table| !table.rows.is_empty());
+    section(title, &with_rows.map(|table| table.html(class)).collect::<String>(), note)
 }
 
 fn events(run: &Run) -> String {
@@ -114,15 +92,15 @@ fn events(run: &Run) -> String {
     format!("<section>\n<h2>What else happened</h2>\n<ul>\n{items}</ul>\n</section>\n")
 }
 
-fn figure(run: &Run, drawing: &Drawing) -> String {
-    let name = drawing.figure.name;
+fn figure(run: &Run, figure: &Figure, svg: &str) -> String {
+    let name = figure.name;
     let links = FORMATS
         .map(|format| format!("<a href=\"figures/{name}.{format}\">{}</a>", format.to_uppercase()));
     format!(
         "<figure id=\"{name}\">\n{}<figcaption>{} <span class=\"files\">{}</span>\
          </figcaption>\n</figure>\n",
-        wide(&drawing.svg, "figure"),
-        escape(&(drawing.figure.caption)(run)),
+        wide(svg, "figure"),
+        escape(&(figure.caption)(run)),
         links.join(" "),
     )
 }
@@ -134,7 +112,7 @@ fn details(summary: &str, text: Option<&str>) -> String {
     })
 }
 
-fn raw_files(drawings: &[Drawing]) -> String {
+fn raw_files(drawings: &[(&Figure, String)]) -> String {
     let mut items: String = RAW
         .iter()
         .map(|(file, what)| format!("<li><a href=\"{file}\">{file}</a>: {what}</li>\n"))

@@ -4,6 +4,7 @@ use crate::config::Rules;
 use crate::experiment::Experiment;
 use crate::experiment::measure::{Direction, MEASURES};
 use crate::experiment::trial::row::TrialRow;
+use crate::report::table::{Cell, Column, Table};
 use schemars::{JsonSchema, schema_for};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -56,31 +57,28 @@ pub fn settings() -> String {
     let schema = schema_for!(Experiment).to_value();
     let mut walk = Walk { root: &schema, allowed: allowed(), found: Vec::new() };
     walk.table("", &schema);
+    let table_of =
+        |setting: &Setting| setting.key.rsplit_once('.').map_or("", |(it, _)| it).to_owned();
     let mut text = String::new();
-    let mut table = None;
-    for setting in &walk.found {
-        let here = setting.key.rsplit_once('.').map_or("", |(table, _)| table);
-        if table != Some(here) {
-            let title = match here {
-                "" => "the experiment".into(),
-                AROUND => "`gp`, around a whole object".into(),
-                _ => format!("`{here}`"),
-            };
-            text += &format!(
-                "\n### {title}\n\n| key | type | default | allowed | what |\n|---|---|---|---|---|\n"
-            );
-            table = Some(here);
-        }
-        let Setting { key, kind, default, allowed, words } = setting;
-        let key = match here {
-            AROUND => key.replacen(AROUND, "gp", 1),
-            _ => key.clone(),
+    for settings in walk.found.chunk_by(|a, b| table_of(a) == table_of(b)) {
+        let here = table_of(&settings[0]);
+        let title = match here.as_str() {
+            "" => "the experiment".into(),
+            AROUND => "`gp`, around a whole object".into(),
+            _ => format!("`{here}`"),
         };
-        let code =
-            |text: &Option<String>| text.as_ref().map_or(String::new(), |t| format!("`{t}`"));
-        let allowed = allowed.clone().unwrap_or_default();
-        text +=
-            &format!("| `{key}` | {kind} | {} | {allowed} | {} |\n", code(default), cell(words));
+        let mut table = Table::new(["key", "type", "default", "allowed", "what"].map(Column::new));
+        for Setting { key, kind, default, allowed, words } in settings {
+            let key = match here.as_str() {
+                AROUND => key.replacen(AROUND, "gp", 1),
+                _ => key.clone(),
+            };
+            let default = default.as_ref().map_or(String::new(), |text| format!("`{text}`"));
+            let allowed = allowed.clone().unwrap_or_default();
+            let cells = [format!("`{key}`"), kind.clone(), default, allowed, plain(words)];
+            table.rows.push(cells.map(Cell::from).into());
+        }
+        text += &format!("\n### {title}\n\n{}", table.markdown());
     }
     text
 }
@@ -190,53 +188,61 @@ fn words(property: &Value, inner: &Value) -> String {
     text.split("\n\n").next().unwrap_or("").into()
 }
 
-fn cell(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|")
+/// Text without line breaks.
+fn plain(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// The table of measures as Markdown: what `summary.csv` holds of each.
 pub fn measures() -> String {
-    let mut text = String::from(
-        "| measure | what | in files | better | columns of `summary.csv` |\n|---|---|---|---|---|\n",
-    );
+    let heads = ["measure", "what", "in files", "better", "columns of `summary.csv`"];
+    let mut table = Table::new(heads.map(Column::new));
     for measure in MEASURES {
         let better = match measure.direction {
             Direction::Less => "less",
             Direction::More => "more",
             Direction::Neither => "neither",
         };
-        let columns = measure.columns();
-        let columns: Vec<String> = columns.iter().map(|name| format!("`{name}`")).collect();
+        let columns: Vec<String> =
+            measure.columns().iter().map(|name| format!("`{name}`")).collect();
         let unit = measure.unit.suffix.trim_start_matches('_');
-        let title = cell(measure.title);
-        text += &format!(
-            "| `{}` | {title} | {unit} | {better} | {} |\n",
-            measure.id,
-            columns.join(", ")
-        );
+        let id = format!("`{}`", measure.id);
+        let cells = [id, plain(measure.title), unit.into(), better.into(), columns.join(", ")];
+        table.rows.push(cells.map(Cell::from).into());
     }
-    text
+    table.markdown()
+}
+
+/// Fields with what they hold, as Markdown.
+fn fields<'a>(fields: impl IntoIterator<Item = (&'a String, String)>) -> String {
+    let mut table = Table::new(["field", "what"].map(Column::new));
+    for (name, words) in fields {
+        table.rows.push(vec![format!("`{name}`").into(), plain(&words).into()]);
+    }
+    table.markdown()
+}
+
+/// The columns of a table in files as Markdown.
+pub fn columns(table: &Table) -> String {
+    fields(table.file_columns().iter().map(|(name, note)| (name, (*note).into())))
 }
 
 /// The fields of a file's records as Markdown.
-pub fn fields<T: JsonSchema>() -> String {
+fn record<T: JsonSchema>() -> String {
     let schema = schema_for!(T).to_value();
-    let mut text = String::from("| field | what |\n|---|---|\n");
-    for (name, property) in schema["properties"].as_object().into_iter().flatten() {
-        text += &format!("| `{name}` | {} |\n", cell(&words(property, &Value::Null)));
-    }
-    text
+    let properties = schema["properties"].as_object().into_iter().flatten();
+    fields(properties.map(|(name, property)| (name, words(property, &Value::Null))))
 }
 
 /// The fields of a line of `trials.jsonl`, of each of its touches and of their parts.
 pub fn rows() -> String {
-    let touch = fields::<crate::experiment::trial::row::TouchRow>();
-    let metrics = fields::<crate::experiment::measure::metrics::Metrics>();
-    let shape = fields::<crate::experiment::measure::shape::ShapeMetrics>();
-    let fit = fields::<crate::gp::fit::Fit>();
+    let touch = record::<crate::experiment::trial::row::TouchRow>();
+    let metrics = record::<crate::experiment::measure::metrics::Metrics>();
+    let shape = record::<crate::experiment::measure::shape::ShapeMetrics>();
+    let fit = record::<crate::gp::fit::Fit>();
     format!(
         "{}\nEach of `touches`:\n\n{touch}\nIts `metrics`:\n\n{metrics}\nIts `shape`:\n\n{shape}\n\
          Its `fit`:\n\n{fit}",
-        fields::<TrialRow>()
+        record::<TrialRow>()
     )
 }

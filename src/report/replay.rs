@@ -7,9 +7,11 @@ use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::explore::belief::HeightField;
 use crate::explore::probe::{Contact, Swept, Touch};
 use crate::gp::Posterior;
+use crate::report::canvas::{Canvas, PointPx};
 use crate::report::number::digits;
+use crate::report::style::{self, INITIAL, LATER};
 use crate::task::Zone;
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use nalgebra::{Point3, Vector3};
 
 /// One planner's belief after some touches of the trial that the report draws.
@@ -35,6 +37,20 @@ impl<'a> Replay<'a> {
     /// If the recorded touches do not belong to the zone or cannot be conditioned on.
     pub fn new(run: &'a Run, planner: &str, count: u32) -> anyhow::Result<Option<Self>> {
         row(run, planner).map_or(Ok(None), |row| Self::of(&run.experiment, row, count))
+    }
+
+    /// The same with a score in words, also where there is no belief.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn scored(
+        run: &'a Run,
+        planner: &str,
+        count: u32,
+    ) -> anyhow::Result<(Option<Self>, String)> {
+        let replay = Self::new(run, planner, count)?;
+        let score = replay.as_ref().map_or("not reached in this trial".into(), Self::score);
+        Ok((replay, score))
     }
 
     /// The belief of the trial `row` after `count` touches; none if it ended before, or had no fit
@@ -88,6 +104,83 @@ impl<'a> Replay<'a> {
             let rmse_mm = digits(1e3 * metrics.rmse_m);
             format!("R {:.4}, centred {centred}, RMSE {rmse_mm} mm", metrics.r)
         })
+    }
+
+    /// Whether the belief is drawn at each of `places`: a Gaussian process says something
+    /// everywhere, also where the zone looks past the object.
+    pub fn is_drawn<'p>(&self, places: impl IntoIterator<Item = &'p [f64]>) -> Vec<bool> {
+        self.belief.presence().silhouette().is_likely(places)
+    }
+
+    /// Draws its touches on a flat panel: a cross where a touch met something, a diamond of this
+    /// stroke width where it did not; `at` maps a place, and a height where there is one.
+    pub fn draw_marks(
+        &self,
+        canvas: &mut Canvas,
+        width: f64,
+        at: impl Fn(&[f64], Option<f64>) -> PointPx,
+    ) {
+        for (touch, is_initial) in self.marks() {
+            let colour = if is_initial { INITIAL } else { LATER };
+            match contact(self.belief.zone(), touch) {
+                Some((place, height_m)) => canvas.cross(at(&place, Some(height_m)), colour),
+                None => {
+                    let at = at(&touch.target.numbers(), None);
+                    canvas.diamond(at, &style::stroke(colour, width));
+                }
+            }
+        }
+    }
+}
+
+/// A caption's sentence on where beliefs are drawn; empty where the surface is everywhere.
+pub fn drawn_words(run: &Run) -> &'static str {
+    match run.truth.count() < run.truth.places.len() {
+        true => {
+            " A belief is drawn where its touches make a surface likelier than none, and all of it \
+             as long as each has met something."
+        }
+        false => "",
+    }
+}
+
+/// Some places of the test grid: every so many along each side, x varying fastest.
+pub struct Grid<'a> {
+    /// Places along each side.
+    pub side: usize,
+    /// The places, with the true height at each.
+    pub places: Vec<(&'a [f64], Option<f64>)>,
+}
+
+impl<'a> Grid<'a> {
+    /// At most `most` places along each side of a zone of this dimension.
+    ///
+    /// # Errors
+    /// If the truth is not of the experiment's grid.
+    pub fn new(run: &'a Run, dimension: usize, most: usize) -> anyhow::Result<Self> {
+        let (side, truth) = (run.experiment.grid as usize, &run.truth);
+        ensure!(
+            side > 1 && truth.places.len() == side.pow(dimension as u32),
+            "the true surface has {} places on a grid of {side} along each side",
+            truth.places.len()
+        );
+        let steps = (side - 1).min(most - 1);
+        let picked: Vec<usize> = (0..=steps).map(|i| i * (side - 1) / steps).collect();
+        let rows = if dimension == 1 { &[0][..] } else { &picked };
+        let indices = rows.iter().flat_map(|j| picked.iter().map(move |i| j * side + i));
+        let at = |index: usize| (truth.places[index].as_slice(), truth.heights_m[index]);
+        Ok(Self { side: picked.len(), places: indices.map(at).collect() })
+    }
+
+    /// The places alone.
+    pub fn places(&self) -> impl Iterator<Item = &'a [f64]> {
+        self.places.iter().map(|(place, _)| *place)
+    }
+
+    /// The coordinates along one side.
+    pub fn along(&self, side: usize) -> Vec<f64> {
+        let step = if side == 0 { 1 } else { self.side };
+        (0..self.side).map(|i| self.places[i * step].0[side]).collect()
     }
 }
 

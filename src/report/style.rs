@@ -3,6 +3,8 @@
 //! The categorical colours are those of Okabe and Ito, which differ for every kind of colour
 //! vision; the colour map of deviations is viridis.
 
+use serde_json::{Value, json};
+
 /// Generic family, so that a browser takes its own and the PNG the embedded font.
 pub const FONT: &str = "sans-serif";
 /// Size of ordinary text in pixels.
@@ -82,6 +84,17 @@ pub const ON_DARK: [(&str, &str); 19] = [
 pub fn on_both(colour: &'static str) -> [&'static str; 2] {
     let dark = ON_DARK.iter().find(|(light, _)| *light == colour).map(|(_, dark)| *dark);
     [colour, dark.unwrap_or(colour)]
+}
+
+/// The colours of a moving picture of touches, for its script.
+pub fn touch_colours() -> Value {
+    json!({
+        "deviation": DEVIATION,
+        "error": ERROR,
+        "truth": TRUTH_RGB,
+        "initial": on_both(INITIAL),
+        "later": on_both(LATER),
+    })
 }
 
 /// Attributes of a line.

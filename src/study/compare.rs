@@ -1,25 +1,32 @@
-//! Planners over several runs, after rliable (Agarwal et al. 2021): interquartile means with
-//! stratified bootstrap, probability of improvement, performance profiles.
+//! Planners over several runs: errors in units of one planner's, objects won and lost, the share of
+//! what could be gained, and performance profiles, after rliable (Agarwal et al. 2021).
 //!
 //! An object is an experiment's name. A trial's score on it is its error over the trial's span,
-//! exp(mean log RMSE), in units of what a reference planner has in the same trial, so that objects
-//! of different sizes count alike. Less is better, and the reference has 1.
+//! exp(mean log RMSE), in units of the reference planner's in the same trial, so that objects of
+//! different sizes count alike. Less is better, and the reference has 1.
 
 use super::check::baseline::span;
 use super::check::judged::JUDGED;
+use crate::error::Invalid;
 use crate::experiment::measure::outline::TENTHS;
+use crate::experiment::statistics::equal_error::Estimate;
 use crate::experiment::statistics::{mean, percentiles_95, resampled_within};
 use crate::experiment::store::Run;
+use crate::experiment::trial::entrant::ORACLE;
 use crate::experiment::trial::row::{TouchRow, TrialRow, of_planner};
 use std::collections::HashMap;
-use thiserror::Error;
 
-/// Scores of planners on objects.
-#[derive(Clone, Debug, PartialEq)]
+/// The planner that gains nothing; the [`ORACLE`] gains all that can be.
+pub const FLOOR: &str = "random";
+
+/// Results of planners on objects.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Compared {
+    /// The planner whose errors are the unit.
+    pub against: String,
     /// Names of the objects.
     pub objects: Vec<String>,
-    /// Who is compared.
+    /// The planners compared.
     pub contenders: Vec<Contender>,
 }
 
@@ -28,181 +35,140 @@ pub struct Compared {
 pub struct Contender {
     /// Its name.
     pub name: String,
-    /// Scores of its trials on each object; none on one that it did not explore.
-    pub scores: Vec<Vec<f64>>,
-    /// What that took on each object.
-    pub spent: Vec<Option<Spent>>,
-    /// What the belief said of itself on each object.
-    pub said: Vec<Said>,
+    /// Its results on each object.
+    pub results: Vec<ObjectResult>,
 }
 
-/// What a planner's trials of one object took, after the initial touches.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spent {
+/// Results of a planner's finished trials on one object; empty if it did not explore it. Efforts
+/// are counted after the initial touches, beliefs are rated after the last touch.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ObjectResult {
+    /// Scores of the trials that the reference finished too.
+    pub scores: Vec<f64>,
     /// Share of the touches that met nothing.
-    pub missed: f64,
-    /// Share of the plans that its own rule could not decide.
-    pub stalled: f64,
+    pub missed: Option<f64>,
+    /// Share of the plans that the planner's own rule could not decide.
+    pub stalled: Option<f64>,
     /// Mean lateral travel of a trial.
-    pub travel_m: f64,
-}
-
-/// How honest the beliefs of a planner's trials of one object were after the last touch, each a
-/// mean over the trials that know it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Said {
-    /// Share of the truth in the 95 % band.
+    pub travel_m: Option<f64>,
+    /// Mean share of the truth in the 95 % band.
     pub coverage: Option<f64>,
-    /// Brier score of where there is a surface.
+    /// Mean Brier score of the probability of a surface.
     pub brier: Option<f64>,
-    /// Intersection over union of the silhouettes.
+    /// Mean intersection over union of the silhouettes.
     pub iou: Option<f64>,
     /// Places given a probability of a surface in each tenth, and those of them that have one.
     pub reliability: [[u32; 2]; TENTHS],
 }
 
-/// What cannot be compared.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum CompareError {
-    /// A run lacks the planner that others are held against.
-    #[error("{run}: has no trials of \"{against}\" that others could be held against (--against)")]
-    NoReference {
-        /// The run's folder.
-        run: String,
-        /// The planner.
-        against: String,
-    },
-    /// Two runs of one name do not share their trials.
-    #[error(
-        "{run} and {first} are both \"{name}\", but seed, touches or grid differ: their trials do not pair"
-    )]
-    Unpaired {
-        /// One.
-        run: String,
-        /// The other.
-        first: String,
-        /// Their experiment's name.
-        name: String,
-    },
+impl Contender {
+    /// Its scores on each object.
+    pub fn scores(&self) -> Vec<&[f64]> {
+        self.results.iter().map(|result| result.scores.as_slice()).collect()
+    }
 }
 
-/// Of runs with their folders' names, in units of the planner `against`.
+/// Compares runs, each with its folder's name, in units of the planner `against`.
 ///
 /// # Errors
-/// If the first run of an object lacks that planner.
-pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, CompareError> {
+/// If the first run of an object lacks that planner, or runs of one name do not share their trials.
+pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Invalid> {
     let mut objects: Vec<String> = Vec::new();
     let mut units: Vec<HashMap<u32, f64>> = Vec::new();
     let mut contenders: Vec<Contender> = Vec::new();
-    let names: Vec<&str> = runs.iter().map(|(_, run)| run.experiment.name.as_str()).collect();
     for (folder, run) in runs {
         let name = &run.experiment.name;
-        let index = objects.iter().position(|object| object == name);
+        let of_name = || runs.iter().filter(|(_, other)| other.experiment.name == *name);
         let pairing = |run: &Run| {
             let it = &run.experiment;
             (it.seed, it.initial_touches, it.touches, it.grid)
         };
-        let first = runs.iter().find(|(_, other)| other.experiment.name == *name);
-        if let Some((first, other)) = first
-            && pairing(other) != pairing(run)
-        {
-            let (run, first, name) = (folder.clone(), first.clone(), name.clone());
-            return Err(CompareError::Unpaired { run, first, name });
+        if let Some((first, _)) = of_name().find(|(_, other)| pairing(other) != pairing(run)) {
+            let problem = format!(
+                "{folder} and {first} are both \"{name}\", but seed, touches or grid differ: their \
+                 trials do not pair"
+            );
+            return Err(Invalid::new(problem));
         }
-        let index = match index {
-            Some(index) => index,
-            None => {
-                let unit = logs(run, against);
-                if unit.is_empty() {
-                    let (run, against) = (folder.clone(), against.into());
-                    return Err(CompareError::NoReference { run, against });
-                }
-                objects.push(name.clone());
-                units.push(unit);
-                for contender in &mut contenders {
-                    contender.scores.push(Vec::new());
-                    contender.spent.push(None);
-                    contender.said.push(Said::default());
-                }
-                objects.len() - 1
+        let known = objects.iter().position(|object| object == name);
+        let index = known.unwrap_or(objects.len());
+        if known.is_none() {
+            let unit = logs(run, against);
+            if unit.is_empty() {
+                let problem = format!(
+                    "has no trials of \"{against}\" that others could be held against (--against)"
+                );
+                return Err(Invalid::new(problem).at(folder));
             }
-        };
-        let is_one_of_several = names.iter().filter(|other| *other == name).count() > 1;
+            objects.push(name.clone());
+            units.push(unit);
+        }
         for planner in &run.experiment.planners {
-            let label = match is_one_of_several {
-                true => format!("{planner} ({folder})"),
-                false => planner.clone(),
+            let label = match of_name().count() {
+                1 => planner.clone(),
+                _ => format!("{planner} ({folder})"),
             };
-            let unit = &units[index];
-            let mut scores: Vec<(u32, f64)> = logs(run, planner)
-                .into_iter()
-                .filter_map(|(trial, log)| Some((trial, (log - unit.get(&trial)?).exp())))
-                .collect();
-            scores.sort_by_key(|(trial, _)| *trial);
             let place = contenders.iter().position(|it| it.name == label).unwrap_or_else(|| {
-                let scores = vec![Vec::new(); objects.len()];
-                let (spent, said) =
-                    (vec![None; objects.len()], vec![Said::default(); objects.len()]);
-                contenders.push(Contender { name: label, scores, spent, said });
+                contenders.push(Contender { name: label, results: Vec::new() });
                 contenders.len() - 1
             });
-            contenders[place].scores[index] = scores.into_iter().map(|(_, score)| score).collect();
-            contenders[place].spent[index] = spent(run, planner);
-            contenders[place].said[index] = said(run, planner);
+            let results = &mut contenders[place].results;
+            results.resize(objects.len(), ObjectResult::default());
+            results[index] = result(run, planner, &units[index]);
         }
     }
-    Ok(Compared { objects, contenders })
+    for contender in &mut contenders {
+        contender.results.resize(objects.len(), ObjectResult::default());
+    }
+    Ok(Compared { against: against.into(), objects, contenders })
 }
 
-/// Mean log RMSE of a planner's whole trials.
+/// Mean log RMSE of a planner's finished trials.
 fn logs(run: &Run, planner: &str) -> HashMap<u32, f64> {
     let span = span(&run.experiment);
     let of = JUDGED[0].of;
-    let whole = of_planner(&run.rows, planner).filter(|row| row.failure.is_none());
-    whole.filter_map(|row| Some((row.trial, of(row, span)?))).collect()
+    let finished = of_planner(&run.rows, planner).filter(|row| row.failure.is_none());
+    finished.filter_map(|row| Some((row.trial, of(row, span)?))).collect()
 }
 
-/// What a planner's whole trials took; none of none.
-fn spent(run: &Run, planner: &str) -> Option<Spent> {
-    let experiment = &run.experiment;
-    let whole: Vec<&TrialRow> =
+/// The results of a planner in units of `unit`, the mean log RMSE of the reference's trials.
+fn result(run: &Run, planner: &str, unit: &HashMap<u32, f64>) -> ObjectResult {
+    let finished: Vec<&TrialRow> =
         of_planner(&run.rows, planner).filter(|row| row.failure.is_none()).collect();
-    let planned = || {
-        let initial = experiment.initial_touches as usize;
-        whole.iter().flat_map(move |row| row.touches.iter().skip(initial))
+    let mut logs: Vec<(u32, f64)> = logs(run, planner).into_iter().collect();
+    logs.sort_by_key(|(trial, _)| *trial);
+    let score = |(trial, log): (u32, f64)| Some((log - unit.get(&trial)?).exp());
+    let some_mean = |values: Vec<f64>| (!values.is_empty()).then(|| mean(&values));
+    let at_end = |of: fn(&TouchRow) -> Option<f64>| {
+        some_mean(finished.iter().filter_map(|row| row.touches.last().and_then(of)).collect())
     };
-    let share = |count: usize| count as f64 / planned().count().max(1) as f64;
-    let travels: Vec<f64> = whole.iter().filter_map(|row| row.path_m(experiment.touches)).collect();
-    (!whole.is_empty()).then(|| Spent {
-        missed: share(planned().filter(|touch| touch.contact.is_none() && !touch.overload).count()),
-        stalled: share(planned().filter(|touch| touch.stall.is_some()).count()),
-        travel_m: mean(&travels),
-    })
-}
-
-/// What a planner's whole trials said of themselves at their end.
-fn said(run: &Run, planner: &str) -> Said {
-    let whole = || of_planner(&run.rows, planner).filter(|row| row.failure.is_none());
-    let over_trials = |of: fn(&TouchRow) -> Option<f64>| {
-        let values: Vec<f64> = whole().filter_map(|row| row.touches.last().and_then(of)).collect();
-        (!values.is_empty()).then(|| mean(&values))
+    let initial = run.experiment.initial_touches as usize;
+    let planned = || finished.iter().flat_map(|row| row.touches.iter().skip(initial));
+    let share = |is_counted: fn(&&TouchRow) -> bool| {
+        let count = planned().filter(is_counted).count();
+        (!finished.is_empty()).then(|| count as f64 / planned().count().max(1) as f64)
     };
+    let travels = finished.iter().filter_map(|row| row.path_m(run.experiment.touches));
     let mut reliability = [[0; 2]; TENTHS];
-    let outlines = whole().filter_map(|row| row.touches.last()?.outline.as_ref());
+    let outlines = finished.iter().filter_map(|row| row.touches.last()?.outline.as_ref());
     for counted in outlines.filter_map(|outline| outline.reliability) {
         for (sums, counts) in reliability.iter_mut().zip(counted) {
             sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
         }
     }
-    Said {
-        coverage: over_trials(|touch| touch.metrics.as_ref()?.coverage),
-        brier: over_trials(|touch| Some(touch.outline.as_ref()?.brier)),
-        iou: over_trials(|touch| Some(touch.outline.as_ref()?.iou)),
+    ObjectResult {
+        scores: logs.into_iter().filter_map(score).collect(),
+        missed: share(|touch| touch.contact.is_none() && !touch.overload),
+        stalled: share(|touch| touch.stall.is_some()),
+        travel_m: some_mean(travels.collect()),
+        coverage: at_end(|touch| touch.metrics.as_ref()?.coverage),
+        brier: at_end(|touch| Some(touch.outline.as_ref()?.brier)),
+        iou: at_end(|touch| Some(touch.outline.as_ref()?.iou)),
         reliability,
     }
 }
 
-/// Mean of the middle half; none of nothing.
+/// Mean of the middle half; `None` for an empty slice.
 pub fn interquartile_mean(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -213,7 +179,7 @@ pub fn interquartile_mean(values: &[f64]) -> Option<f64> {
 
 /// The interquartile mean over all strata, with the 95 % interval of a bootstrap that draws within
 /// each; none where a stratum is empty.
-pub fn interquartile(strata: &[&[f64]], seed: u64) -> Option<(f64, [f64; 2])> {
+pub fn interquartile(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
     if strata.is_empty() || strata.iter().any(|stratum| stratum.is_empty()) {
         return None;
     }
@@ -227,13 +193,16 @@ pub fn interquartile(strata: &[&[f64]], seed: u64) -> Option<(f64, [f64; 2])> {
         interquartile_mean(&sample)
     });
     let found = found.into_iter().flatten().collect();
-    Some((interquartile_mean(&strata.concat())?, percentiles_95(found)))
+    Some(Estimate {
+        value: interquartile_mean(&strata.concat())?,
+        interval: Some(percentiles_95(found)),
+    })
 }
 
 /// The probability that a trial of `one` is better than one of `other`, averaged over the objects
 /// that both explored; a tie is half.
 pub fn improvement(one: &Contender, other: &Contender) -> Option<f64> {
-    let shares: Vec<f64> = (one.scores.iter().zip(&other.scores))
+    let shares: Vec<f64> = (one.scores().into_iter().zip(other.scores()))
         .filter(|(a, b)| !a.is_empty() && !b.is_empty())
         .map(|(a, b)| {
             let won = |x: f64, y: f64| if x == y { 0.5 } else { f64::from(u8::from(x < y)) };
@@ -246,9 +215,72 @@ pub fn improvement(one: &Contender, other: &Contender) -> Option<f64> {
 
 /// The share of trials, averaged over objects, with a score of at most `score`.
 pub fn profile(contender: &Contender, score: f64) -> f64 {
-    let strata = contender.scores.iter().filter(|scores| !scores.is_empty());
+    let strata = contender.scores().into_iter().filter(|scores| !scores.is_empty());
     let shares: Vec<f64> = strata
         .map(|scores| scores.iter().filter(|it| **it <= score).count() as f64 / scores.len() as f64)
         .collect();
     mean(&shares)
+}
+
+/// Geometric mean of scores over objects, each object counted once, with the interval of a
+/// bootstrap over trials, drawn within each object; none where an object has no score, or there is
+/// none.
+pub fn geometric(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
+    if strata.is_empty() || strata.iter().any(|scores| scores.is_empty()) {
+        return None;
+    }
+    let logs: Vec<Vec<f64>> = strata.iter().map(|scores| log_scores(scores)).collect();
+    let of = |picks: &[Vec<usize>]| mean_of_means(&logs, picks).exp();
+    Some(estimate(&counts(&logs), seed, of))
+}
+
+/// Share of the way from [`FLOOR`] to the [`ORACLE`] that a contender comes, in log error averaged
+/// over objects: (floor − contender) / (floor − ceiling). Trials are drawn together, for they are
+/// of the same start. None where one of the three lacks an object of `objects`, has another number
+/// of trials, or no way is left to go.
+pub fn gap_closed(
+    compared: &Compared,
+    contender: &Contender,
+    objects: &[usize],
+    seed: u64,
+) -> Option<Estimate> {
+    let named = |name: &str| compared.contenders.iter().find(|it| it.name == name);
+    let of = |it: &Contender| -> Vec<Vec<f64>> {
+        objects.iter().map(|object| log_scores(&it.results[*object].scores)).collect()
+    };
+    let [floor, own, ceiling] = [of(named(FLOOR)?), of(contender), of(named(ORACLE)?)];
+    let sizes = counts(&floor);
+    if sizes.contains(&0) || counts(&own) != sizes || counts(&ceiling) != sizes {
+        return None;
+    }
+    let share = |picks: &[Vec<usize>]| {
+        let [floor, own, ceiling] = [&floor, &own, &ceiling].map(|it| mean_of_means(it, picks));
+        (floor - own) / (floor - ceiling)
+    };
+    let found = estimate(&sizes, seed, share);
+    let ends = found.interval.iter().flatten();
+    ends.chain([&found.value]).all(|number| number.is_finite()).then_some(found)
+}
+
+fn log_scores(scores: &[f64]) -> Vec<f64> {
+    scores.iter().map(|score| score.ln()).collect()
+}
+
+fn counts(strata: &[Vec<f64>]) -> Vec<usize> {
+    strata.iter().map(Vec::len).collect()
+}
+
+/// The mean over strata of the means of their picked trials.
+fn mean_of_means(strata: &[Vec<f64>], picks: &[Vec<usize>]) -> f64 {
+    let means = strata.iter().zip(picks).map(|(values, picks)| {
+        picks.iter().map(|pick| values[*pick]).sum::<f64>() / picks.len() as f64
+    });
+    mean(&means.collect::<Vec<_>>())
+}
+
+/// A statistic of all trials of strata of these sizes, with its 95 % bootstrap interval.
+fn estimate(sizes: &[usize], seed: u64, of: impl Fn(&[Vec<usize>]) -> f64) -> Estimate {
+    let all: Vec<Vec<usize>> = sizes.iter().map(|size| (0..*size).collect()).collect();
+    let found = resampled_within(sizes, (seed, "suite"), &of);
+    Estimate { value: of(&all), interval: Some(percentiles_95(found)) }
 }

@@ -8,4 +8,3 @@
 pub mod accuracy;
 pub mod check;
 pub mod compare;
-pub mod suite;

@@ -1,20 +1,17 @@
 //! Planners over several runs.
 
 use crate::common::program::palpate;
+use palpate::experiment::statistics::equal_error::Estimate;
 use palpate::study::compare::{
-    Contender, Said, improvement, interquartile, interquartile_mean, profile,
+    Contender, ObjectResult, improvement, interquartile, interquartile_mean, profile,
 };
 use proptest::prelude::*;
 use std::fs;
 use std::path::Path;
 
 fn contender(scores: &[f64]) -> Contender {
-    Contender {
-        name: "it".into(),
-        scores: vec![scores.to_vec()],
-        spent: vec![None],
-        said: vec![Said::default()],
-    }
+    let result = ObjectResult { scores: scores.to_vec(), ..ObjectResult::default() };
+    Contender { name: "it".into(), results: vec![result] }
 }
 
 #[test]
@@ -25,7 +22,8 @@ fn the_interquartile_mean_is_the_textbooks() {
     assert_eq!(interquartile_mean(&[7.0]), Some(7.0));
     assert_eq!(interquartile_mean(&[]), None);
     assert_eq!(interquartile(&[&[1.0, 1.0], &[]], 0), None);
-    assert_eq!(interquartile(&[&[2.0; 9], &[2.0; 4]], 0), Some((2.0, [2.0, 2.0])));
+    let equal = interquartile(&[&[2.0; 9], &[2.0; 4]], 0).unwrap();
+    assert_eq!((equal.value, equal.interval), (2.0, Some([2.0, 2.0])));
 }
 
 proptest! {
@@ -39,7 +37,8 @@ proptest! {
         let both = improvement(&one, &other).unwrap() + improvement(&other, &one).unwrap();
         prop_assert!((both - 1.0).abs() < 1e-12);
         prop_assert_eq!(improvement(&one, &one), Some(0.5));
-        let (mean, [low, high]) = interquartile(&[&a, &b], 3).unwrap();
+        let Estimate { value: mean, interval } = interquartile(&[&a, &b], 3).unwrap();
+        let [low, high] = interval.unwrap();
         prop_assert!(low <= high && (0.1..=9.0).contains(&mean));
         let shares: Vec<f64> = (0..=90).map(|i| profile(&one, f64::from(i) * 0.1)).collect();
         prop_assert!(shares.is_sorted() && shares[0] == 0.0 && shares[90] == 1.0);
@@ -68,11 +67,18 @@ fn runs_are_compared_from_the_command_line() {
         (output.status.code(), said)
     };
     let svg = at("profiles.svg");
-    let (code, said) = compare(&[&at("one"), &at("other"), "--svg", &svg]);
+    let out = at("both");
+    let (code, said) = compare(&[&at("one"), &at("other"), "--svg", &svg, "--out", &out]);
     assert_eq!(code, Some(0), "{said}");
-    let random = said.lines().find(|line| line.starts_with("random")).unwrap();
-    assert!(random.ends_with("0.50") && random.contains("1.00 [1.00, 1.00]"), "{said}");
+    let of_random = said.lines().filter(|line| line.starts_with("random"));
+    let [means, over_all] = of_random.collect::<Vec<_>>()[..] else { panic!("{said}") };
+    assert!(means.matches("1.00 [1.00, 1.00]").count() == 3, "{said}");
+    assert!(over_all.ends_with("0.50") && over_all.contains("1.00 [1.00, 1.00]"), "{said}");
     assert!(fs::read_to_string(&svg).unwrap().starts_with("<svg"));
+    let page = fs::read_to_string(folder.path().join("both/suite.html")).unwrap();
+    assert!(page.contains("better than random") && page.contains("<svg"));
+    let csv = fs::read_to_string(folder.path().join("both/suite.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + 2 * 2, "{csv}");
     let (code, said) = compare(&[&at("one"), &at("two")]);
     assert!(code == Some(0) && said.contains(&format!("active ({})", at("two"))), "{said}");
     let (code, said) = compare(&[&at("one"), &at("apart")]);

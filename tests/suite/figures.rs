@@ -3,11 +3,11 @@
 
 use crate::common::runs::{CURVE, SURFACE, run, tip_behind};
 use palpate::experiment::store::Run;
-use palpate::report::known;
+use palpate::report::FIGURES;
+use palpate::report::files::{pdf, tree};
 use palpate::report::legend::{Legend, Swatch};
 use palpate::report::replay::Replay;
 use palpate::report::style::{self, ON_DARK};
-use palpate::report::{FIGURES, pdf, tree};
 use resvg::usvg::{Group, Node, Rect};
 
 /// Every figure of a run that applies, by name.
@@ -57,14 +57,14 @@ fn texts(svg: &str) -> Vec<(String, Rect)> {
         }
     }
     let mut found = Vec::new();
-    walk(tree::read(svg).unwrap().root(), &mut found);
+    walk(tree(svg).unwrap().root(), &mut found);
     found
 }
 
 /// By the metrics of the font that pictures are drawn with: nothing written is cut off or printed
 /// over.
 pub fn reads_well(name: &str, svg: &str) {
-    let size = tree::read(svg).unwrap().size();
+    let size = tree(svg).unwrap().size();
     let texts = texts(svg);
     assert!(texts.len() > 5, "{name}");
     for (i, (words, one)) in texts.iter().enumerate() {
@@ -170,7 +170,7 @@ fn every_measure_has_a_band_from_the_first_belief_on() {
 fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     let run = run(SURFACE);
     let replay = Replay::new(&run, "active", 20).unwrap().unwrap();
-    let is_known = |place: &[f64]| known::over(&replay, [place])[0];
+    let is_known = |place: &[f64]| replay.is_drawn([place])[0];
     let mut missed = 0;
     for touch in replay.touches {
         missed += usize::from(touch.contact.is_none());
@@ -183,7 +183,7 @@ fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     assert!(missed > 0);
     // The object ends at 46 mm on both sides.
     let places = run.truth.places.iter().map(Vec::as_slice);
-    let drawn = known::over(&replay, places.clone());
+    let drawn = replay.is_drawn(places.clone());
     assert!(places.zip(&drawn).all(|(place, drawn)| *drawn || place[0].abs() > 0.03));
     assert!(drawn.iter().any(|drawn| !drawn));
     // Of an object that every touch meets, everything is drawn.
@@ -191,7 +191,7 @@ fn a_belief_is_drawn_where_its_touches_make_a_surface_likely() {
     full.rows.iter_mut().for_each(|row| row.touches.retain(|touch| touch.contact.is_some()));
     let replay = Replay::new(&full, "active", 8).unwrap().unwrap();
     let places = full.truth.places.iter().map(Vec::as_slice);
-    assert!(known::over(&replay, places).iter().all(|drawn| *drawn));
+    assert!(replay.is_drawn(places).iter().all(|drawn| *drawn));
 }
 
 /// One place keeps its surface, or there would be no range of heights: hardly anything is left.
@@ -221,19 +221,19 @@ fn nothing_is_drawn_of_a_belief_without_a_surface() {
 #[test]
 fn a_pdf_is_a_page_of_the_size_of_the_drawing_with_words() {
     for (name, svg) in figures(&run(SURFACE)) {
-        let bytes = pdf::render(&svg).unwrap();
+        let bytes = pdf(&svg).unwrap();
         let text = String::from_utf8_lossy(&bytes);
         assert!(text.starts_with("%PDF-"), "{name}");
         assert!(text.contains("/Font"), "{name}: words are drawn as outlines");
-        let size = tree::read(&svg).unwrap().size();
+        let size = tree(&svg).unwrap().size();
         let numbers = |text: &str| -> Vec<f32> {
             text.split_whitespace().map(|number| number.parse().unwrap()).collect()
         };
-        let page = text.split("/MediaBox[").nth(1).unwrap().split(']').next().unwrap();
+        let page = text.split("/MediaBox [").nth(1).unwrap().split(']').next().unwrap();
         assert_eq!(numbers(page), [0.0, 0.0, size.width(), size.height()], "{name}");
-        assert!(pdf::render(&svg).unwrap() == bytes, "{name}");
+        assert!(pdf(&svg).unwrap() == bytes, "{name}");
     }
-    assert!(pdf::render("<p>").is_err());
+    assert!(pdf("<p>").is_err());
 }
 
 /// Relative luminance as WCAG 2.2 defines it.

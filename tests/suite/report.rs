@@ -9,7 +9,7 @@ use palpate::experiment::statistics::analysis::Analysis;
 use palpate::experiment::store::Run;
 use palpate::report;
 use palpate::report::axes::Axis;
-use palpate::report::png;
+use palpate::report::files::PNG_SCALE;
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::{Options, Tree};
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,7 +51,7 @@ fn figures_are_whole() {
             assert!(svg.len() < 2_000_000, "{name}: {} bytes", svg.len());
             let size = Tree::from_str(svg, &Options::default()).unwrap().size();
             let pixels = Pixmap::decode_png(&files[&format!("{name}.png")]).unwrap();
-            let expected = [size.width(), size.height()].map(|side| (png::SCALE * side) as u32);
+            let expected = [size.width(), size.height()].map(|side| (PNG_SCALE * side) as u32);
             assert_eq!([pixels.width(), pixels.height()], expected, "{name}");
         }
     }

@@ -1,4 +1,5 @@
-//! Beliefs of whole objects on the page, as figures and as files: what is written is what was given.
+//! Beliefs of whole objects on the page, as figures and as files: what is written is what was
+//! given.
 
 use crate::common::solids::{nets, ring, ring_m, sequence};
 use crate::figures::reads_well;
@@ -9,8 +10,8 @@ use nalgebra::Point3;
 use palpate::geometry::coarse::coarse;
 use palpate::geometry::import::import;
 use palpate::geometry::mesh::Mesh;
-use palpate::report::png;
-use palpate::report::solid::{Colour, Frame, Sequence, Side, counts, figure, section};
+use palpate::report::files::png;
+use palpate::report::solid::{Frame, Sequence, counts, figure, section};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -166,12 +167,10 @@ fn the_same_is_written_every_time_and_no_name_ends_the_script() {
     assert_eq!(html.matches("<script").count(), plain.matches("<script").count());
     assert!(!html.contains("</SCRIPT") && !html.contains("<!--"));
     assert_eq!(data(&html)["planners"][0]["name"], given[0].planner.as_str());
-    let figure = |given: &[Sequence]| {
-        figure(given, Some(&truth), &[5, 12], &[Side::Front], Colour::Error).unwrap().unwrap()
-    };
+    let figure = |given: &[Sequence]| figure(given, Some(&truth), &[5, 12]).unwrap().unwrap();
     let svg = figure(&given);
     assert!(svg == figure(&given) && !svg.contains("<script"));
-    assert!(png::render(&svg).unwrap() == png::render(&svg).unwrap());
+    assert!(png(&svg).unwrap() == png(&svg).unwrap());
 }
 
 /// A frame in 1.6 MB, whatever there is; the first and the last count are kept.
@@ -205,7 +204,7 @@ fn what_does_not_fit_together_is_refused() {
         let mut given = sequences();
         alter(&mut given[1].frames[0]);
         let told = section(&given, None, 0).unwrap_err();
-        let drawn = figure(&given, None, &[4], &[Side::Front], Colour::Deviation).unwrap_err();
+        let drawn = figure(&given, None, &[4]).unwrap_err();
         assert_eq!(format!("{told:#}"), format!("{drawn:#}"));
         format!("{told:#}")
     };
@@ -223,9 +222,7 @@ fn nothing_and_little_can_be_shown() {
     let none = Sequence { frames: Vec::new(), ..sequence("none", 6, 0.02) };
     assert_eq!(section(&[], None, 0).unwrap(), "");
     assert_eq!(section(slice::from_ref(&none), Some(&ring()), 0).unwrap(), "");
-    let drawn = |of: Sequence, counts: &[u32]| {
-        figure(&[of], None, counts, &[Side::Front], Colour::Deviation).unwrap()
-    };
+    let drawn = |of: Sequence, counts: &[u32]| figure(&[of], None, counts).unwrap();
     assert_eq!(drawn(none, &[6]), None);
     let mut bare = sequence("bare", 6, 0.02);
     bare.frames[0] = Frame { touches: 4, ..Frame::default() };
@@ -237,19 +234,14 @@ fn nothing_and_little_can_be_shown() {
 #[test]
 fn a_figure_reads_well_and_has_a_panel_for_each_count_and_side() {
     let (given, truth) = (sequences(), ring());
-    for (sides, colour, words) in [
-        (&[Side::Front][..], Colour::Deviation, "standard deviation σ (mm)"),
-        (&[Side::Front, Side::Behind], Colour::Error, "error: inside the true surface | outside"),
-    ] {
-        for counts in [&[4, 8, 12][..], &[12], &[5, 99]] {
-            let svg = figure(&given, Some(&truth), counts, sides, colour).unwrap().unwrap();
-            reads_well("solid", &svg);
-            assert!(svg.contains(words));
-            let panels = 2 * sides.len() * (counts.len() + 1);
-            assert_eq!(svg.matches("<tspan font-weight=\"bold\">").count(), panels);
-            let lacking = svg.matches("no belief after so many").count();
-            assert_eq!(lacking, 2 * sides.len() * usize::from(counts.contains(&99)));
-        }
+    for counts in [&[4, 8, 12][..], &[12], &[5, 99]] {
+        let svg = figure(&given, Some(&truth), counts).unwrap().unwrap();
+        reads_well("solid", &svg);
+        assert!(svg.contains("standard deviation σ (mm)"));
+        let panels = 2 * 2 * (counts.len() + 1);
+        assert_eq!(svg.matches("<tspan font-weight=\"bold\">").count(), panels);
+        let lacking = svg.matches("no belief after so many").count();
+        assert_eq!(lacking, 2 * 2 * usize::from(counts.contains(&99)));
     }
 }
 

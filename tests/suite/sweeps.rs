@@ -29,7 +29,7 @@ fn a_sweep_is_a_run_for_each_combination() {
     let run = |arguments: &[&str]| ended(&mut command(folder.path(), arguments), "a sweep");
     let output = run(&["--quiet", "run", "small.toml", "--no-report"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let rows = |label: &str| Run::read(&at("runs").join(format!("small{label}"))).unwrap();
+    let rows = |label: &str| Run::read(&at("runs/small").join(format!("small{label}"))).unwrap();
     let [first, same, third, _] = std::array::from_fn(|i| rows(&labels[i]));
     assert_eq!(first.rows, same.rows, "the scenes are the same");
     assert_eq!(first.experiment.seed, third.experiment.seed);

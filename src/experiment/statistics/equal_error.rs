@@ -21,7 +21,7 @@ pub fn errors() -> impl Iterator<Item = &'static Measure> {
 
 /// A number with its 95 % bootstrap interval, which a single trial does not have; infinite where
 /// the goal is not met.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// Of all trials.
     pub value: f64,

@@ -1,21 +1,19 @@
 //! What the explorer shows: beliefs on a grid after many touch counts, in few bytes.
 
-use super::code::Code;
-use super::shell;
+use super::shell::counts;
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::TouchRow;
 use crate::gp::batch::Prediction;
 use crate::report::axes;
 use crate::report::axes::{Axis, Length};
-use crate::report::known;
 use crate::report::relief::Space;
-use crate::report::replay;
-use crate::report::replay::Replay;
+use crate::report::replay::{self, Grid, Replay};
 use crate::report::style;
 use crate::task::Zone;
-use anyhow::ensure;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
-use serde::Serialize;
+use serde_json::{Value, json};
 
 /// Most places along the side of a curve and of a surface; chosen as what shows at the size of the
 /// page.
@@ -27,53 +25,6 @@ const MARGIN: [f64; 2] = [0.3, 0.08];
 /// Deviations smaller than this share of the largest are shown as that; chosen.
 const LEAST_SHARE: f64 = 1e-4;
 
-/// Everything; lengths are in the unit of the page.
-#[derive(Serialize)]
-pub(super) struct Data {
-    unit: &'static str,
-    x: Vec<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    z: Option<Vec<f64>>,
-    /// Ends of the heights drawn, and how much they are stretched.
-    space: [f64; 2],
-    stretch: f64,
-    /// Ends of what the codes of heights and of deviations stand for.
-    height_range: [f64; 2],
-    deviation_range: [f64; 2],
-    truth: String,
-    initial_touches: u32,
-    colours: Colours,
-    planners: Vec<Planner>,
-}
-
-#[derive(Serialize)]
-struct Colours {
-    height: &'static [[f64; 3]],
-    deviation: &'static [[f64; 3]],
-    error: &'static [[f64; 3]],
-    truth: [f64; 3],
-    initial: [&'static str; 2],
-    later: [&'static str; 2],
-}
-
-#[derive(Serialize)]
-struct Planner {
-    name: String,
-    /// Its colour on light and on dark paper.
-    colours: [&'static str; 2],
-    /// (x, height, z) of each touch, or of its target if it met nothing.
-    contacts: Vec<(f64, Option<f64>, Option<f64>)>,
-    frames: Vec<Frame>,
-}
-
-#[derive(Serialize)]
-struct Frame {
-    touches: u32,
-    score: String,
-    mean: String,
-    deviation: String,
-}
-
 /// A belief on the grid, in metres.
 struct Belief {
     touches: u32,
@@ -83,23 +34,10 @@ struct Belief {
     deviations_m: Vec<f64>,
 }
 
-impl Data {
-    pub(super) fn is_surface(&self) -> bool {
-        self.z.is_some()
-    }
-
-    /// Frames of the first planner.
-    pub(super) fn frames(&self) -> usize {
-        self.planners.first().map_or(0, |planner| planner.frames.len())
-    }
-
-    pub(super) fn planners(&self) -> impl Iterator<Item = &str> {
-        self.planners.iter().map(|planner| planner.name.as_str())
-    }
-}
-
-/// Replays the trial that the report draws; none if there is nothing to show.
-pub(super) fn data(run: &Run) -> anyhow::Result<Option<Data>> {
+/// The data of the trial that the report draws, replayed, with the names of the planners in it and
+/// the number of the first one's frames; lengths are in the unit of the page. `None` if there is
+/// nothing to show.
+pub(super) fn data(run: &Run) -> anyhow::Result<Option<(Value, Vec<&str>, usize)>> {
     let experiment = &run.experiment;
     let Some(zone) = &experiment.scene.zone else { return Ok(None) };
     let kind = zone.dimension() - 1;
@@ -107,100 +45,78 @@ pub(super) fn data(run: &Run) -> anyhow::Result<Option<Data>> {
     let heights_m = replay::heights_m(run, names.iter().copied());
     let Some(axis) = Axis::around(heights_m, MARGIN[kind], 5.0) else { return Ok(None) };
     let grid = Grid::new(run, zone.dimension(), PLACES_MAX[kind])?;
-    let places: Vec<&[f64]> =
-        grid.indices.iter().map(|&index| run.truth.places[index].as_slice()).collect();
+    let places: Vec<&[f64]> = grid.places().collect();
     let (first, last) = (experiment.initial_touches, experiment.touches);
-    let counts = shell::counts(first, last, BYTES_OF_PLACE * names.len() * places.len());
+    let touch_counts = counts(first, last, BYTES_OF_PLACE * names.len() * places.len());
     let mut beliefs = Vec::new();
     for &name in &names {
-        let read = counts.par_iter().map(|&count| belief(run, name, count, &places));
+        let read = touch_counts.par_iter().map(|&count| belief(run, name, count, &places));
         let read: Vec<Option<Belief>> = read.collect::<anyhow::Result<_>>()?;
         let read: Vec<Belief> = read.into_iter().flatten().collect();
         if !read.is_empty() {
             beliefs.push((name, read));
         }
     }
-    let deviations = || beliefs.iter().flat_map(|(_, read)| read).flat_map(|b| &b.deviations_m);
-    let Some((least, most)) = axes::range(deviations().copied()) else { return Ok(None) };
+    let all_m = || beliefs.iter().flat_map(|(_, read)| read).flat_map(|b| &b.deviations_m);
+    let Some((least, most)) = axes::range(all_m().copied()) else { return Ok(None) };
     let (low, high) = axis.range();
     let span = high - low;
     let unit = Length::of(zone);
-    let code = Code {
-        height_m: [low - span, high + span],
-        deviation_m: [least.max(LEAST_SHARE * most).max(f64::MIN_POSITIVE), most],
+    // The ends of the codes of heights and of deviations, which are along their logarithm.
+    let height_range_m = [low - span, high + span];
+    let deviation_range_m = [least.max(LEAST_SHARE * most).max(f64::MIN_POSITIVE), most];
+    let heights = |heights_m: &mut dyn Iterator<Item = Option<f64>>| {
+        let [low, high] = height_range_m;
+        encode(heights_m.map(|it| (it.unwrap_or(f64::NAN) - low) / (high - low)))
+    };
+    let deviations = |deviations_m: &[f64]| {
+        let [least, most] = deviation_range_m;
+        encode(deviations_m.iter().map(|it| (it / least).ln() / (most / least).ln()))
     };
     let in_unit = |ends: [f64; 2]| ends.map(|end| end * unit.per_m);
     let axis = |side: usize| -> Vec<f64> {
-        let step = if side == 0 { 1 } else { grid.picked.len() };
-        let along = (0..grid.picked.len()).map(|i| places[i * step][side] * unit.per_m);
-        along.map(short).collect()
+        grid.along(side).into_iter().map(|at_m| short(at_m * unit.per_m)).collect()
     };
-    let truth = grid.indices.iter().map(|&index| run.truth.heights_m[index].unwrap_or(f64::NAN));
     let stretch = zone
         .z_m
         .map(|z_m| Space { x_m: zone.x_m, z_m, height_m: [low, high] }.stretch())
         .unwrap_or(1.0);
-    let planners = beliefs.iter().map(|(name, read)| Planner {
-        name: (*name).into(),
-        colours: style::on_both(style::planner(&experiment.planners, name)),
-        contacts: replay::row(run, name)
-            .map_or(&[][..], |row| &row.touches)
-            .iter()
-            .map(|touch| contact(zone, touch, unit))
-            .collect(),
-        frames: read
-            .iter()
-            .map(|belief| Frame {
-                touches: belief.touches,
-                score: belief.score.clone(),
-                mean: code.heights(belief.means_m.iter().map(|mean_m| mean_m.unwrap_or(f64::NAN))),
-                deviation: code.deviations(&belief.deviations_m),
-            })
-            .collect(),
+    let touches = |name: &str| replay::row(run, name).map_or(&[][..], |row| &row.touches);
+    let frame = |belief: &Belief| {
+        json!({
+            "touches": belief.touches,
+            "score": belief.score,
+            "mean": heights(&mut belief.means_m.iter().copied()),
+            "deviation": deviations(&belief.deviations_m),
+        })
+    };
+    let planner = |(name, read): &(&str, Vec<Belief>)| {
+        let contacts = touches(name).iter().map(|touch| contact(zone, touch, unit));
+        json!({
+            "name": name,
+            "colours": style::on_both(style::planner(&experiment.planners, name)),
+            "contacts": contacts.collect::<Vec<_>>(),
+            "frames": read.iter().map(frame).collect::<Vec<_>>(),
+        })
+    };
+    let mut colours = style::touch_colours();
+    colours["height"] = json!(style::HEIGHT);
+    let data = json!({
+        "unit": unit.symbol,
+        "x": axis(0),
+        "z": zone.z_m.map(|_| axis(1)),
+        // The ends of the heights drawn, and how much they are stretched.
+        "space": in_unit([low, high]),
+        "stretch": stretch,
+        "height_range": in_unit(height_range_m),
+        "deviation_range": in_unit(deviation_range_m),
+        "truth": heights(&mut grid.places.iter().map(|(_, height_m)| *height_m)),
+        "initial_touches": experiment.initial_touches,
+        "colours": colours,
+        "planners": beliefs.iter().map(planner).collect::<Vec<_>>(),
     });
-    Ok(Some(Data {
-        unit: unit.symbol,
-        x: axis(0),
-        z: zone.z_m.map(|_| axis(1)),
-        space: in_unit([low, high]),
-        stretch,
-        height_range: in_unit(code.height_m),
-        deviation_range: in_unit(code.deviation_m),
-        truth: code.heights(truth),
-        initial_touches: experiment.initial_touches,
-        colours: Colours {
-            height: &style::HEIGHT,
-            deviation: &style::DEVIATION,
-            error: &style::ERROR,
-            truth: style::TRUTH_RGB,
-            initial: style::on_both(style::INITIAL),
-            later: style::on_both(style::LATER),
-        },
-        planners: planners.collect(),
-    }))
-}
-
-/// Some of the places of the test grid: every so many along each side.
-struct Grid {
-    /// Which along a side.
-    picked: Vec<usize>,
-    /// Which of all, x varying fastest.
-    indices: Vec<usize>,
-}
-
-impl Grid {
-    fn new(run: &Run, dimension: usize, most: usize) -> anyhow::Result<Self> {
-        let (side, count) = (run.experiment.grid as usize, run.truth.places.len());
-        ensure!(
-            side > 1 && count == side.pow(dimension as u32),
-            "the true surface has {count} places on a grid of {side} along each side"
-        );
-        let steps = (side - 1).min(most - 1);
-        let picked: Vec<usize> = (0..=steps).map(|i| i * (side - 1) / steps).collect();
-        let rows = if dimension == 1 { &[0][..] } else { &picked };
-        let indices = rows.iter().flat_map(|j| picked.iter().map(move |i| j * side + i)).collect();
-        Ok(Self { picked, indices })
-    }
+    let planners = beliefs.iter().map(|(name, _)| *name).collect();
+    Ok(Some((data, planners, beliefs[0].1.len())))
 }
 
 fn belief(
@@ -211,7 +127,7 @@ fn belief(
 ) -> anyhow::Result<Option<Belief>> {
     let Some(replay) = Replay::new(run, planner, touches)? else { return Ok(None) };
     let predictions = replay.surface.predict(places.iter().copied());
-    let known = known::over(&replay, places.iter().copied());
+    let known = replay.is_drawn(places.iter().copied());
     let drawn = |(known, prediction): (&bool, &Prediction)| known.then_some(prediction.mean);
     Ok(Some(Belief {
         touches,
@@ -229,7 +145,16 @@ fn contact(zone: &Zone, touch: &TouchRow, unit: Length) -> (f64, Option<f64>, Op
     (coordinate(0).unwrap_or(0.0), height, coordinate(1))
 }
 
-/// A number with no more digits than show.
-fn short(value: f64) -> f64 {
+/// A number with no more digits than show; one that is not finite becomes null in JSON.
+pub fn short(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
+}
+
+/// Numbers from 0 to 1 as text: sixteen bits each, the lower eight first; the highest code is none.
+pub fn encode(shares: impl Iterator<Item = f64>) -> String {
+    let code = |share: f64| match share.is_nan() {
+        true => u16::MAX,
+        false => (65534.0 * share.clamp(0.0, 1.0)).round() as u16,
+    };
+    STANDARD.encode(shares.flat_map(|share| code(share).to_le_bytes()).collect::<Vec<u8>>())
 }

@@ -3,16 +3,13 @@
 //! It is drawn by a few hundred lines of script of our own. A plotting library would add three to
 //! four megabytes to every page, and still leave the touches behind a surface to be told apart.
 
-pub(super) mod code;
-mod frames;
+pub(super) mod frames;
 pub(super) mod shell;
 
-use super::known;
+use super::replay::drawn_words;
 use crate::experiment::store::Run;
-use shell::Shell;
+use shell::{PARTS, Shell};
 
-/// What views of surfaces share.
-pub(super) const PARTS: &str = include_str!("parts.js");
 const SCRIPTS: [&str; 4] =
     [PARTS, include_str!("relief.js"), include_str!("curve.js"), include_str!("heights.js")];
 
@@ -24,24 +21,24 @@ const COLOURS: [(&str, &str); 3] = [("height", "height"), ("deviation", "σ"), (
 /// # Errors
 /// If the recorded touches do not belong to the zone or cannot be conditioned on.
 pub fn section(run: &Run) -> anyhow::Result<String> {
-    let Some(data) = frames::data(run)? else { return Ok(String::new()) };
+    let Some((data, planners, frames)) = frames::data(run)? else { return Ok(String::new()) };
     // In a curve the truth hides nothing, so there it is shown from the start.
-    let (class, colours, is_shown, help) = match data.is_surface() {
-        true => ("surface", &COLOURS[..], false, HELP),
-        false => ("curve", &[][..], true, "Drag the slider, or use the arrow keys."),
+    let (class, colours, is_shown, help) = match data["z"].is_null() {
+        true => ("curve", &[][..], true, "Drag the slider, or use the arrow keys."),
+        false => ("surface", &COLOURS[..], false, HELP),
     };
     let shell = Shell {
-        planners: data.planners().collect(),
+        planners,
         colours,
         truth: Some(is_shown),
         class,
-        frames: data.frames(),
+        frames,
         note: format!(
             "Trial {}. Blue: the {} initial touches; red: those the planner chose; the last one is \
              larger.{} {help}",
             run.experiment.report.trial,
             run.experiment.initial_touches,
-            known::words(run)
+            drawn_words(run)
         ),
         scripts: &SCRIPTS,
     };

@@ -1,8 +1,10 @@
-//! What stands around a picture that moves: choices, slider, words, data, script.
+//! The frame of a moving picture: choices, slider, words, data, script.
 
 use crate::report::canvas::escape;
 use serde::Serialize;
 
+/// What views of surfaces share.
+pub const PARTS: &str = include_str!("parts.js");
 const CONTROLS: &str = include_str!("explorer.js");
 const STYLE: &str = include_str!("explorer.css");
 

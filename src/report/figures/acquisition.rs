@@ -8,10 +8,8 @@ use crate::gp::posterior::Scratch;
 use crate::report::axes::{Axis, Length, Panel, colour_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::heat_map::HeatMap;
-use crate::report::known;
-use crate::report::legend::{Legend, Swatch};
-use crate::report::replay;
-use crate::report::replay::Replay;
+use crate::report::legend::{Swatch, sheet};
+use crate::report::replay::{Replay, drawn_words};
 use crate::report::style;
 use crate::report::style::{INITIAL, LATER};
 use crate::task::Zone;
@@ -26,7 +24,7 @@ fn caption(run: &Run) -> String {
          was found. Crosses are points of contact, which may lie beside their targets.{} \
          Corresponds to Fig. 6 of the paper.",
         run.experiment.report.trial,
-        known::words(run)
+        drawn_words(run)
     )
 }
 
@@ -94,28 +92,18 @@ fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) ->
         replays.iter().map(|replay| readings(zone.grid(STEPS), replay)).collect();
     let all = read.iter().flatten().map(|(_, sd_m, _)| sd_m * unit.per_m);
     let (_, largest) = Axis::around(all.chain([0.0]), 0.12, 4.0)?.range();
-    let mut entries = vec![
-        (Swatch::Line(style::stroke(style::TRUTH, 2.0)), "true surface"),
-        (Swatch::Line(style::stroke(style::INK, 1.6)), "posterior mean"),
-        (Swatch::Band(style::INK), "95 % band"),
-        (Swatch::Cross(INITIAL), "initial touch"),
-        (Swatch::Cross(LATER), "later touch"),
-        (Swatch::Circle(ring(style::MAXIMUM)), "largest deviation found"),
-    ];
-    entries.extend(miss_entry(run));
+    let found = (Swatch::Circle(ring(style::MAXIMUM)), "largest deviation found");
     let step_px = CURVE_PX.0 + GAPS_PX.0;
     let width = LEFT_PX + replays.len() as f64 * step_px;
-    let legend = Legend::new(width - LEFT_PX, entries);
-    let top = TOP_PX + legend.more_px();
-    let most = Area { left: LEFT_PX, top, width: CURVE_PX.0, height: CURVE_PX.1 };
+    let most = Area { left: LEFT_PX, top: TOP_PX, width: CURVE_PX.0, height: CURVE_PX.1 };
     let shape = curves::belief_panel(zone, curves::height_axis(run, unit)?, most, EQUAL_HEIGHT_PX);
-    let height = shape.area.bottom() + GAPS_PX.1 + CURVE_PX.2 + 56.0;
-    let mut canvas = Canvas::new(width, height);
-    legend.draw(&mut canvas, [LEFT_PX, 20.0]);
+    let size = [width, shape.area.bottom() + GAPS_PX.1 + CURVE_PX.2 + 56.0];
+    let entries = curves::entries(run, [found]);
+    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (width - LEFT_PX, ""), entries);
     for (column, (replay, read)) in replays.iter().zip(&read).enumerate() {
-        let area = Area { left: LEFT_PX + column as f64 * step_px, ..shape.area };
-        let above = Panel { area, x: shape.x.clone(), y: shape.y.clone() };
-        let area = Area { top: area.bottom() + GAPS_PX.1, height: CURVE_PX.2, ..area };
+        let above = shape.moved(LEFT_PX + column as f64 * step_px, TOP_PX + more_px);
+        let top = above.area.bottom() + GAPS_PX.1;
+        let area = Area { top, height: CURVE_PX.2, ..above.area };
         let below = Panel { area, x: shape.x.clone(), y: Axis::linear(0.0, largest, 4.0) };
         draw_column(&mut canvas, run, planner, (replay, read), [above, below]);
     }
@@ -124,7 +112,7 @@ fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) ->
 
 fn readings(places: Vec<Vec<f64>>, replay: &Replay) -> Vec<Reading> {
     let mut scratch = Scratch::default();
-    let drawn = known::over(replay, places.iter().map(Vec::as_slice));
+    let drawn = replay.is_drawn(places.iter().map(Vec::as_slice));
     let read = |(place, is_drawn): (Vec<f64>, bool)| {
         let sd_m = deviation_m(&replay.belief, &place, &mut scratch);
         (place, sd_m, is_drawn)
@@ -180,8 +168,9 @@ fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> O
     let shape = Panel::equal(most, Axis::linear(x[0], x[1], 5.0), Axis::linear(z[0], z[1], 6.0));
     let step_px = (shape.area.width + 84.0).max(MAP_STEP_PX);
     let width = LEFT_PX + 2.0 * step_px;
-    let legend = Legend::new(width - LEFT_PX, entries);
-    let shape = Panel { area: Area { top: TOP_PX + legend.more_px(), ..shape.area }, ..shape };
+    let size = [width, shape.area.bottom() + 108.0];
+    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (width - LEFT_PX, ""), entries);
+    let shape = shape.moved(LEFT_PX, TOP_PX + more_px);
     // The zone's part of a panel, all of it unless the zone is far from square.
     let [[left, bottom], [right, top]] = [shape.at(x[0], z[0]), shape.at(x[1], z[1])];
     let map_area = Area { left, top, width: right - left, height: bottom - top };
@@ -196,26 +185,16 @@ fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> O
         .collect();
     let largest = maps.iter().map(HeatMap::largest).fold(0.0, f64::max);
     let scale = Axis::linear(0.0, largest, 5.0);
-    let mut canvas = Canvas::new(width, shape.area.bottom() + 108.0);
-    legend.draw(&mut canvas, [LEFT_PX, 20.0]);
     for (column, (replay, map)) in replays.iter().zip(&maps).enumerate() {
-        let moved = |area: Area| Area { left: area.left + column as f64 * step_px, ..area };
-        let panel = Panel { area: moved(shape.area), x: shape.x.clone(), y: shape.y.clone() };
+        let area = Area { left: map_area.left + column as f64 * step_px, ..map_area };
+        let panel = shape.moved(LEFT_PX + column as f64 * step_px, shape.area.top);
         panel.frame(&mut canvas);
-        map.draw(&mut canvas, moved(map_area), |value| style::deviation(scale.fraction(value)));
+        map.draw(&mut canvas, area, |value| style::deviation(scale.fraction(value)));
         let words = |name: &str| format!("{name} ({})", unit.symbol);
         panel.label(&mut canvas, &title(planner, replay), &words("x"), &words("z"));
         let on_map = |place: &[f64]| panel.at(place[0] * unit.per_m, place[1] * unit.per_m);
         canvas.clipped(panel.area, |canvas| {
-            for (touch, is_initial) in replay.marks() {
-                let colour = if is_initial { INITIAL } else { LATER };
-                match replay::contact(zone, touch) {
-                    Some((place, _)) => canvas.cross(on_map(&place), colour),
-                    None => {
-                        canvas.diamond(on_map(&touch.target.numbers()), &style::stroke(colour, 1.6))
-                    }
-                }
-            }
+            replay.draw_marks(canvas, 1.6, |place, _| on_map(place));
             if let Some(place) = maximum(replay, map.places(zone)) {
                 canvas.circle(on_map(&place), 7.0, &style::stroke(style::PAPER, 5.0));
                 canvas.circle(on_map(&place), 7.0, &ring(style::MAXIMUM));

@@ -9,7 +9,7 @@ use crate::experiment::statistics::summary::CurvePoint;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Panel};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{Legend, Swatch};
+use crate::report::legend::{Swatch, sheet};
 use crate::report::style;
 use crate::report::style::FAINT_INK;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
@@ -77,11 +77,12 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         .zip(planners)
         .map(|((colour, _), name)| (Swatch::Line(style::stroke(colour, 2.4)), name.as_str()));
     let dashed = constant.map(|_| (Swatch::Line(constant_line()), "R of any constant"));
-    let legend = Legend::new(WIDTH - 2.0 * LEFT_PX, swatches.chain(dashed));
-    let top = 66.0 + legend.more_px();
     let rows = shown.len().div_ceil(2) as f64;
-    let mut canvas = Canvas::new(WIDTH, top - 12.0 + rows * (PANEL.1 + GAP.1));
-    legend.draw(&mut canvas, [LEFT_PX, 20.0]);
+    let size = [WIDTH, 66.0 - 12.0 + rows * (PANEL.1 + GAP.1)];
+    let legend_px = WIDTH - 2.0 * LEFT_PX;
+    let entries = swatches.chain(dashed);
+    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (legend_px, ""), entries);
+    let top = 66.0 + more_px;
     for (i, measure) in shown.into_iter().enumerate() {
         let (column, row) = ((i % 2) as f64, (i / 2) as f64);
         let area = Area {

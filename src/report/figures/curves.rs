@@ -5,10 +5,8 @@ use crate::experiment::store::Run;
 use crate::gp::posterior::Scratch;
 use crate::report::axes::{Axis, Length, MM, Panel};
 use crate::report::canvas::{Anchor, Area, Canvas};
-use crate::report::known;
-use crate::report::legend::{Legend, Swatch};
-use crate::report::replay;
-use crate::report::replay::Replay;
+use crate::report::legend::{Swatch, sheet};
+use crate::report::replay::{self, Replay, drawn_words};
 use crate::report::style;
 use crate::report::style::{FAINT_INK, INITIAL, INK, LATER, SMALL_PX, TRUTH};
 use crate::task::Zone;
@@ -22,7 +20,7 @@ fn caption(run: &Run) -> String {
          Corresponds to Fig. 3 of the paper.",
         run.experiment.report.trial,
         run.experiment.initial_touches,
-        known::words(run)
+        drawn_words(run)
     )
 }
 
@@ -49,23 +47,16 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let step = (PANEL.0 + GAP.0, panel.area.height + GAP.1);
     let (columns, rows) = (counts.len() as f64, planners.len() as f64);
     let width = MARGIN.0 + columns * step.0;
-    let legend = Legend::new(width - MARGIN.0, entries(run));
-    let top = MARGIN.1 + legend.more_px();
-    let mut canvas = Canvas::new(width, top + rows * step.1);
-    legend.draw(&mut canvas, [MARGIN.0, 20.0]);
+    let size = [width, MARGIN.1 + rows * step.1];
+    let (mut canvas, more_px) =
+        sheet(size, [MARGIN.0, 20.0], (width - MARGIN.0, ""), entries(run, []));
+    let top = MARGIN.1 + more_px;
     for (row, planner) in planners.iter().enumerate() {
         for (column, &count) in counts.iter().enumerate() {
-            let area = Area {
-                left: MARGIN.0 + column as f64 * step.0,
-                top: top + row as f64 * step.1,
-                ..panel.area
-            };
-            let panel = Panel { area, x: panel.x.clone(), y: panel.y.clone() };
-            let replay = Replay::new(run, planner, count)?;
-            let score = match &replay {
-                Some(replay) => replay.score(),
-                None => "not reached in this trial".into(),
-            };
+            let left = MARGIN.0 + column as f64 * step.0;
+            let panel = panel.moved(left, top + row as f64 * step.1);
+            let area = panel.area;
+            let (replay, score) = Replay::scored(run, planner, count)?;
             let is_last_row = row + 1 == planners.len();
             panel.frame(&mut canvas);
             let x_label = if is_last_row { format!("x ({})", unit.symbol) } else { String::new() };
@@ -102,16 +93,19 @@ pub(super) fn height_axis(run: &Run, unit: Length) -> Option<Axis> {
     Axis::around(heights_m.map(|height_m| height_m * unit.per_m), 0.4, 5.0)
 }
 
-fn entries(run: &Run) -> Vec<(Swatch, &'static str)> {
-    let mut entries = vec![
+/// The entries of a legend for [`draw_belief`], with `more` behind those of touches.
+pub(super) fn entries(
+    run: &Run,
+    more: impl IntoIterator<Item = (Swatch, &'static str)>,
+) -> impl Iterator<Item = (Swatch, &'static str)> {
+    let entries = [
         (Swatch::Line(style::stroke(TRUTH, 2.0)), "true surface"),
         (Swatch::Line(style::stroke(INK, 1.6)), "posterior mean"),
         (Swatch::Band(INK), "95 % band"),
         (Swatch::Cross(INITIAL), "initial touch"),
         (Swatch::Cross(LATER), "later touch"),
     ];
-    entries.extend(miss_entry(run));
-    entries
+    entries.into_iter().chain(more).chain(miss_entry(run))
 }
 
 /// The belief in `panel`: band, truth, mean, touches.
@@ -122,8 +116,7 @@ pub(super) fn draw_belief(
     replay: &Replay,
     colour: &str,
 ) {
-    let zone = replay.belief.zone();
-    let per_m = Length::of(zone).per_m;
+    let per_m = Length::of(replay.belief.zone()).per_m;
     let belief = read(replay);
     let band: Vec<(f64, f64, f64)> = belief
         .iter()
@@ -139,18 +132,10 @@ pub(super) fn draw_belief(
         belief.iter().map(|&(x, mean, _)| (x * per_m, mean * per_m)).collect();
     panel.curve(canvas, &mean, &style::stroke(INK, 1.5));
     canvas.clipped(panel.area, |canvas| {
-        for (touch, is_initial) in replay.marks() {
-            let colour = if is_initial { INITIAL } else { LATER };
-            match replay::contact(zone, touch) {
-                Some((place, height)) => {
-                    canvas.cross(panel.at(place[0] * per_m, height * per_m), colour);
-                }
-                None => {
-                    let [x, _] = panel.at(touch.target.numbers()[0] * per_m, 0.0);
-                    canvas.diamond([x, panel.area.bottom() - 6.0], &style::stroke(colour, 1.3));
-                }
-            }
-        }
+        replay.draw_marks(canvas, 1.3, |place, height| match height {
+            Some(height) => panel.at(place[0] * per_m, height * per_m),
+            None => [panel.at(place[0] * per_m, 0.0)[0], panel.area.bottom() - 6.0],
+        });
     });
 }
 
@@ -158,7 +143,7 @@ pub(super) fn draw_belief(
 fn read(replay: &Replay) -> Vec<(f64, f64, f64)> {
     let mut scratch = Scratch::default();
     let places = replay.belief.zone().grid(STEPS);
-    let drawn = known::over(replay, places.iter().map(Vec::as_slice));
+    let drawn = replay.is_drawn(places.iter().map(Vec::as_slice));
     (places.iter().zip(drawn))
         .map(|(place, is_drawn)| match is_drawn {
             true => {

@@ -1,8 +1,7 @@
-//! What a figure of a run is.
+//! A figure of a run.
 
 use crate::experiment::store::Run;
-use crate::report::legend::Swatch;
-use crate::report::style::LATER;
+use crate::report::legend::{MISS, Swatch};
 
 /// Something that is drawn from a run.
 pub struct Figure {
@@ -14,17 +13,9 @@ pub struct Figure {
     pub draw: fn(&Run) -> anyhow::Result<Option<String>>,
 }
 
-/// A figure of one run as it was drawn.
-pub struct Drawing {
-    /// Which figure.
-    pub figure: &'static Figure,
-    /// Its SVG.
-    pub svg: String,
-}
-
-/// What a legend says of touches that met nothing, if there are any.
+/// The entry of a legend for touches that met nothing, if there are any.
 pub(super) fn miss_entry(run: &Run) -> Option<(Swatch, &'static str)> {
     let mut touches = run.rows.iter().flat_map(|row| &row.touches);
     let is_missed = touches.any(|touch| touch.contact.is_none());
-    is_missed.then_some((Swatch::Diamond(LATER), "touch that met nothing"))
+    is_missed.then_some(MISS)
 }

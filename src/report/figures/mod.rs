@@ -8,7 +8,7 @@ mod solids;
 mod surfaces;
 mod targets;
 
-pub use figure::{Drawing, Figure};
+pub use figure::Figure;
 pub use solids::FIGURE as SOLIDS;
 pub use surfaces::FIGURE as SURFACES;
 

@@ -2,7 +2,7 @@
 
 use super::figure::Figure;
 use crate::experiment::store::Run;
-use crate::report::solid::{Colour, Side, figure};
+use crate::report::solid::figure;
 use crate::report::whole;
 
 /// The figure; none of a run over a zone.
@@ -27,5 +27,5 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let sequences =
         whole::sequences(run, &run.experiment.drawn_planners(), &counts, truth.as_ref())?;
     let mesh = truth.as_ref().map(|bvh| &**bvh.mesh());
-    figure(&sequences, mesh, &counts, &[Side::Front, Side::Behind], Colour::Deviation)
+    figure(&sequences, mesh, &counts)
 }

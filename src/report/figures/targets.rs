@@ -4,8 +4,8 @@ use super::figure::{Figure, miss_entry};
 use crate::experiment::statistics::summary::median_shift_m;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, Panel};
-use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{Legend, Swatch};
+use crate::report::canvas::Area;
+use crate::report::legend::{Swatch, sheet};
 use crate::report::number::digits;
 use crate::report::replay;
 use crate::report::style;
@@ -63,19 +63,15 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let Area { width: panel_px, height: panel_height_px, .. } = shape.area;
     let step_px = panel_px + 84.0;
     let width = (LEFT_PX + rows.len() as f64 * step_px).max(WIDTH_MIN_PX);
-    let legend = Legend::new(width - LEFT_PX, entries);
-    let top = TOP_PX + legend.more_px();
-    let mut canvas = Canvas::new(width, top + panel_height_px + 60.0);
-    legend.draw(&mut canvas, [LEFT_PX, 20.0]);
+    let size = [width, TOP_PX + panel_height_px + 60.0];
+    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (width - LEFT_PX, ""), entries);
     for (column, row) in rows.iter().enumerate() {
-        let left = LEFT_PX + column as f64 * step_px;
-        let area = Area { left, top, ..shape.area };
-        let panel = Panel { area, x: shape.x.clone(), y: shape.y.clone() };
+        let panel = shape.moved(LEFT_PX + column as f64 * step_px, TOP_PX + more_px);
         panel.frame(&mut canvas);
         let [x, z] = ["x", "z"].map(|name| format!("{name} ({})", unit.symbol));
         panel.label(&mut canvas, &row.planner, &x, if column == 0 { &z } else { "" });
         let at = |place: &[f64]| panel.at(place[0] * unit.per_m, place[1] * unit.per_m);
-        canvas.clipped(area, |canvas| {
+        canvas.clipped(panel.area, |canvas| {
             for (count, touch) in row.touches.iter().enumerate() {
                 let initial = count < run.experiment.initial_touches as usize;
                 let colour = if initial { INITIAL } else { LATER };

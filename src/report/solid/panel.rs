@@ -18,31 +18,15 @@ const PLAIN: f64 = 0.6;
 /// Marks whose colours do not change with the paper's, for the surface's do not.
 pub(super) const ON_SURFACE: &str = r#"class="relief""#;
 
-/// From where objects are seen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// From the side that a finger touches along −y.
-    Front,
-    /// From the other one.
-    Behind,
+/// The viewer in front, on the side that a finger touches along −y, or behind.
+fn camera(is_behind: bool) -> Camera {
+    Camera::toward(AZIMUTH_DEG + if is_behind { 180.0 } else { 0.0 })
 }
 
-impl Side {
-    /// Who looks from there.
-    pub(super) fn camera(self) -> Camera {
-        Camera::toward(match self {
-            Self::Front => AZIMUTH_DEG,
-            Self::Behind => AZIMUTH_DEG + 180.0,
-        })
-    }
-
-    /// How bright a face of this unit normal is under a light that goes with the viewer.
-    fn brightness(self, normal: Vector3<f64>) -> f64 {
-        match self {
-            Self::Front => brightness(normal),
-            Self::Behind => brightness(Vector3::new(-normal.x, -normal.y, normal.z)),
-        }
-    }
+/// Pixels per metre, so that `points` fit into a panel from both sides.
+pub(super) fn scale(points: &[Vector3<f64>], panel: Area) -> f64 {
+    let scales = [false, true].map(|is_behind| camera(is_behind).scale(points, inner(panel)));
+    scales[0].min(scales[1])
 }
 
 /// Where on a panel its surface is drawn.
@@ -58,13 +42,19 @@ pub(super) fn inner(area: Area) -> Area {
 /// A panel and how space lies on it.
 pub(super) struct View {
     pub(super) area: Area,
-    pub(super) side: Side,
+    is_behind: bool,
     pub(super) camera: Camera,
 }
 
 impl View {
+    /// A panel in which `points` are in the middle.
+    pub(super) fn new(area: Area, is_behind: bool, px_per_m: f64, points: &[Vector3<f64>]) -> Self {
+        let camera = camera(is_behind).scaled(px_per_m, points, inner(area));
+        Self { area, is_behind, camera }
+    }
+
     pub(super) fn title(&self, canvas: &mut Canvas, words: &str, score: &str) {
-        let behind = if self.side == Side::Behind { ", from behind" } else { "" };
+        let behind = if self.is_behind { ", from behind" } else { "" };
         let [middle, top] = [self.area.centre()[0], self.area.top];
         canvas.title([middle, top + 14.0], &format!("{words}{behind}"));
         canvas.coloured_text([middle, top + 31.0], score, SMALL_PX, Anchor::Middle, FAINT_INK);
@@ -80,6 +70,11 @@ impl View {
     pub(super) fn relief(&self, mesh: &Triangles, colour: impl Fn(usize, f64) -> String) -> Relief {
         let (vertices, triangles) = mesh;
         let outward = normals(vertices, triangles);
+        // The light goes with the viewer.
+        let lit = |normal: Vector3<f64>| match self.is_behind {
+            true => Vector3::new(-normal.x, -normal.y, normal.z),
+            false => normal,
+        };
         let face = |(triangle, &corners): (usize, &[u32; 3])| {
             let [a, b, c] = corners.map(|vertex| vertices[vertex as usize].coords);
             let normal = (b - a).cross(&(c - a)).try_normalize(0.0)?;
@@ -89,23 +84,23 @@ impl View {
                 nearness: self.camera.nearness(&((a + b + c) / 3.0)),
                 colour: colour(
                     triangle,
-                    self.side.brightness(smooth.try_normalize(0.0).unwrap_or(normal)),
+                    brightness(lit(smooth.try_normalize(0.0).unwrap_or(normal))),
                 ),
             })
         };
         Relief::sorted(triangles.iter().enumerate().filter_map(face).collect())
     }
-}
 
-/// How long a round number of millimetres is.
-pub(super) fn draw_scale(canvas: &mut Canvas, px_per_m: f64, [left, top]: PointPx) {
-    let most_mm = SCALE_PX / px_per_m * MM.per_m;
-    let ticks = Axis::linear(0.0, most_mm, 3.0).ticks();
-    let Some((length_mm, label)) = ticks.into_iter().rev().find(|(mm, _)| *mm > 0.0) else {
-        return;
-    };
-    let right = left + length_mm / MM.per_m * px_per_m;
-    let ends = [[left, top + 2.0], [left, top + 8.0], [right, top + 8.0], [right, top + 2.0]];
-    canvas.line(ends, &style::stroke(INK, 1.2));
-    canvas.text([left, top + 24.0], &format!("{label} mm"), SMALL_PX, Anchor::Start);
+    /// How long a round number of millimetres is.
+    pub(super) fn draw_scale(canvas: &mut Canvas, px_per_m: f64, [left, top]: PointPx) {
+        let most_mm = SCALE_PX / px_per_m * MM.per_m;
+        let ticks = Axis::linear(0.0, most_mm, 3.0).ticks();
+        let Some((length_mm, label)) = ticks.into_iter().rev().find(|(mm, _)| *mm > 0.0) else {
+            return;
+        };
+        let right = left + length_mm / MM.per_m * px_per_m;
+        let ends = [[left, top + 2.0], [left, top + 8.0], [right, top + 8.0], [right, top + 2.0]];
+        canvas.line(ends, &style::stroke(INK, 1.2));
+        canvas.text([left, top + 24.0], &format!("{label} mm"), SMALL_PX, Anchor::Start);
+    }
 }

@@ -1,25 +1,14 @@
 //! What of a whole object can be touched: its surface, and the sides from which the finger comes.
 
-use super::panel::{ON_SURFACE, Side, View, draw_scale, inner};
+use super::panel::{ON_SURFACE, View, scale};
 use super::section::TRUTH_TRIANGLES;
 use crate::geometry::coarse::coarse;
 use crate::geometry::mesh::Mesh;
 use crate::geometry::solids::Triangles;
-use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{Legend, Swatch};
+use crate::report::canvas::Area;
+use crate::report::legend::{Swatch, sheet};
 use crate::report::style;
 use nalgebra::{Point3, Vector3};
-
-/// What is drawn, in `W` and metres.
-#[derive(Clone, Copy, Debug)]
-pub struct Reached<'a> {
-    /// The object.
-    pub mesh: &'a Mesh,
-    /// Points spread over it, and whether the finger can touch each; empty if that is not known.
-    pub spots: &'a [(Point3<f64>, bool)],
-    /// Where the finger sets out on its way to the middle, and whether it can be brought there.
-    pub sides: &'a [(Point3<f64>, bool)],
-}
 
 const PANEL: (f64, f64) = (430.0, 430.0);
 const MARGIN: (f64, f64) = (20.0, 40.0);
@@ -32,38 +21,37 @@ const SURFACE: [[[f64; 3]; 2]; 2] = [[[178.0, 190.0, 205.0]; 2], [[213.0, 94.0, 
 const MARKS: [&str; 2] = ["#0072b2", "#d55e00"];
 const LEGEND: [&str; 2] = ["#b2becd", "#d55e00"];
 
-/// The object from the front and from behind, as SVG.
-pub fn picture(reached: &Reached) -> String {
-    let drawn = coarse(reached.mesh, TRUTH_TRIANGLES);
-    let is_reached = triangles_reached(&drawn, reached.spots);
-    let marks = reached.sides.iter().map(|(p_w, _)| p_w.coords);
+/// An object from the front and from behind, as SVG: `spots` are points spread over it, and whether
+/// the finger can touch each, empty if that is not known; `sides` are where the finger sets out on
+/// its way to the middle, and whether it can be brought there. Everything is in `W` and metres.
+pub fn picture(
+    mesh: &Mesh,
+    spots: &[(Point3<f64>, bool)],
+    sides: &[(Point3<f64>, bool)],
+) -> String {
+    let drawn = coarse(mesh, TRUTH_TRIANGLES);
+    let is_reached = triangles_reached(&drawn, spots);
+    let marks = sides.iter().map(|(p_w, _)| p_w.coords);
     let points: Vec<Vector3<f64>> = drawn.0.iter().map(|p_w| p_w.coords).chain(marks).collect();
     let width = 2.0 * PANEL.0;
-    let legend = Legend::new(width, entries(reached));
-    let top = MARGIN.1 + legend.more_px();
-    let height = top + PANEL.1 + FOOT_PX;
-    let mut canvas = Canvas::new(width + 2.0 * MARGIN.0, height);
-    legend.draw(&mut canvas, [MARGIN.0, 20.0]);
-    let areas = [0.0, 1.0].map(|column| Area {
-        left: MARGIN.0 + column * PANEL.0,
-        top,
+    let size = [width + 2.0 * MARGIN.0, MARGIN.1 + PANEL.1 + FOOT_PX];
+    let (mut canvas, more_px) = sheet(size, [MARGIN.0, 20.0], (width, ""), entries(spots, sides));
+    let area = |column: usize| Area {
+        left: MARGIN.0 + column as f64 * PANEL.0,
+        top: MARGIN.1 + more_px,
         width: PANEL.0,
         height: PANEL.1,
-    });
-    let all = || points.iter().copied();
-    let sides = [Side::Front, Side::Behind];
-    let scales = sides.map(|side| side.camera().scale(all(), inner(areas[0])));
-    let px_per_m = scales[0].min(scales[1]);
-    for (area, side) in areas.into_iter().zip(sides) {
-        let camera = side.camera().scaled(px_per_m, all(), inner(area));
-        let view = View { area, side, camera };
+    };
+    let px_per_m = scale(&points, area(0));
+    for (column, is_behind) in [false, true].into_iter().enumerate() {
+        let view = View::new(area(column), is_behind, px_per_m, &points);
         view.title(&mut canvas, "what can be touched", "");
         let relief = view.relief(&drawn, |triangle, light| {
             style::lit(&SURFACE[usize::from(!is_reached[triangle])], 0.0, light)
         });
         relief.draw(&mut canvas);
         canvas.grouped(ON_SURFACE, |canvas| {
-            for (p_w, is_reached) in reached.sides {
+            for (p_w, is_reached) in sides {
                 let at = view.camera.at(&p_w.coords);
                 let colour = MARKS[usize::from(!is_reached)];
                 match relief.hides(at, view.camera.nearness(&p_w.coords)) {
@@ -74,7 +62,7 @@ pub fn picture(reached: &Reached) -> String {
             }
         });
     }
-    draw_scale(&mut canvas, px_per_m, [MARGIN.0, height - FOOT_PX + 8.0]);
+    View::draw_scale(&mut canvas, px_per_m, [MARGIN.0, size[1] + more_px - FOOT_PX + 8.0]);
     canvas.finish()
 }
 
@@ -93,18 +81,21 @@ fn triangles_reached(
     triangles.iter().map(nearest).collect()
 }
 
-fn entries(reached: &Reached) -> Vec<(Swatch, &'static str)> {
-    let mut entries = Vec::new();
-    if !reached.spots.is_empty() {
-        entries.push((Swatch::Box(LEGEND[0]), "the finger can touch it"));
-        entries.push((Swatch::Box(LEGEND[1]), "no straight way leads there"));
-    }
-    if !reached.sides.is_empty() {
-        let circle = Swatch::Circle(style::visible(MARKS[0]));
-        entries.push((circle, "side it comes from"));
-        entries.push((Swatch::Cross(MARKS[1]), "side it cannot come from"));
-    }
-    entries
+fn entries(
+    spots: &[(Point3<f64>, bool)],
+    sides: &[(Point3<f64>, bool)],
+) -> impl Iterator<Item = (Swatch, &'static str)> {
+    let of_spots = [
+        (Swatch::Box(LEGEND[0]), "the finger can touch it"),
+        (Swatch::Box(LEGEND[1]), "no straight way leads there"),
+    ];
+    let of_sides = [
+        (Swatch::Circle(style::visible(MARKS[0])), "side it comes from"),
+        (Swatch::Cross(MARKS[1]), "side it cannot come from"),
+    ];
+    let (has_spots, has_sides) = (!spots.is_empty(), !sides.is_empty());
+    let of_spots = of_spots.into_iter().filter(move |_| has_spots);
+    of_spots.chain(of_sides.into_iter().filter(move |_| has_sides))
 }
 
 #[cfg(test)]
@@ -129,9 +120,9 @@ mod tests {
         assert_eq!(triangles_reached(&(vertices.clone(), triangles.clone()), &[]), [true; 4]);
         let mesh = Mesh::new(&vertices, &triangles).unwrap().0;
         let sides = [(corner(2.0, 0.0, 0.0), true), (corner(-2.0, 0.0, 0.0), false)];
-        let svg = picture(&Reached { mesh: &mesh, spots: &spots, sides: &sides });
+        let svg = picture(&mesh, &spots, &sides);
         assert!(svg.contains("side it cannot come from") && svg.contains("no straight way"));
-        let svg = picture(&Reached { mesh: &mesh, spots: &[], sides: &[] });
+        let svg = picture(&mesh, &[], &[]);
         assert!(!svg.contains("side it") && !svg.contains("straight way"));
     }
 }

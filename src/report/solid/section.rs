@@ -1,12 +1,21 @@
-//! The section of the page: a believed surface touch by touch, to turn and to colour.
+//! The section of the page: a believed surface touch by touch, to turn and to colour; lengths are
+//! in millimetres, and meshes are coded as text of few bytes.
 
-use super::Sequence;
-use super::codes::BYTES_OF_TRIANGLE;
-use super::data::Data;
+use super::{Frame, Sequence, Touch};
 use crate::geometry::coarse::coarse;
+use crate::geometry::primitives::extent;
 use crate::geometry::mesh::Mesh;
-use crate::report::explorer::PARTS;
-use crate::report::explorer::shell::{self, Shell};
+use crate::geometry::solids::Triangles;
+use crate::report::axes::{self, MM};
+use crate::report::explorer::frames::{encode, short};
+use crate::report::explorer::shell::{self, PARTS, Shell};
+use crate::report::style;
+use anyhow::ensure;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use nalgebra::{Point3, Vector3};
+use serde::Serialize;
+use serde_json::{Value, json};
 
 const SCRIPTS: [&str; 3] = [PARTS, include_str!("surface.js"), include_str!("solid.js")];
 
@@ -33,7 +42,7 @@ pub fn section(sequences: &[Sequence], truth: Option<&Mesh>, trial: u32) -> anyh
         sequences.iter().filter(|sequence| !sequence.frames.is_empty()).collect();
     let Some(first) = shown.first() else { return Ok(String::new()) };
     let truth = truth.map(|mesh| coarse(mesh, TRUTH_TRIANGLES));
-    let Some(data) = Data::new(&shown, truth.as_ref())? else { return Ok(String::new()) };
+    let Some((data, has_errors)) = data(&shown, truth.as_ref())? else { return Ok(String::new()) };
     let initial = first.touches.iter().filter(|touch| touch.is_initial).count();
     let green = match truth {
         Some(_) => " Green: where the true surface stands out of the belief.",
@@ -41,7 +50,7 @@ pub fn section(sequences: &[Sequence], truth: Option<&Mesh>, trial: u32) -> anyh
     };
     let shell = Shell {
         planners: shown.iter().map(|sequence| sequence.planner.as_str()).collect(),
-        colours: if data.has_errors() { &COLOURS } else { &COLOURS[..1] },
+        colours: if has_errors { &COLOURS } else { &COLOURS[..1] },
         truth: truth.as_ref().map(|_| false),
         class: "surface",
         frames: first.frames.len(),
@@ -58,3 +67,183 @@ const HELP: &str = "Hollow touches lie behind the surface, diamonds met nothing.
                     to turn it, the slider to go through the touches; both also follow the arrow \
                     keys. Two fingers, the keys + and −, or the wheel once the surface was clicked \
                     zoom; 0 is as at first.";
+
+/// Deviations smaller than this share of the largest are shown as that; chosen.
+const LEAST_SHARE: f64 = 1e-4;
+/// The least share where all are alike; chosen.
+const ALIKE_SHARE: f64 = 0.1;
+/// Ends of deviations where there are none; chosen.
+const NONE_M: [f64; 2] = [1e-4, 1e-2];
+
+/// The data of beliefs in an object and of its true surface, and whether it has errors; `None` if
+/// there is nothing to be drawn.
+///
+/// # Errors
+/// If a mesh has more vertices than can be drawn.
+fn data(
+    sequences: &[&Sequence],
+    truth: Option<&Triangles>,
+) -> anyhow::Result<Option<(Value, bool)>> {
+    let frames = || sequences.iter().flat_map(|sequence| &sequence.frames);
+    let contacts = || {
+        let touches = sequences.iter().flat_map(|sequence| &sequence.touches);
+        touches.filter_map(|touch| touch.contact_w.as_ref())
+    };
+    let meshes = || frames().map(|frame| &frame.mesh).chain(truth);
+    let points = || meshes().flat_map(|(vertices, _)| vertices).chain(contacts());
+    let Some(cube) = Cube::around(points()) else { return Ok(None) };
+    let middle = cube.middle();
+    let in_mm = |ends: [f64; 2]| ends.map(|end_m| end_m * MM.per_m);
+    let deviations = deviation_range(frames().flat_map(|frame| &frame.sd_m)).unwrap_or(NONE_M);
+    let errors = error_range(frames().flat_map(|frame| &frame.error_m));
+    let planner = |sequence: &&Sequence| -> anyhow::Result<Value> {
+        let frames = sequence.frames.iter().map(|frame| coded(frame, cube, (deviations, errors)));
+        let touches = sequence.touches.iter().map(|touch| marked(touch, cube));
+        Ok(json!({
+            "name": sequence.planner,
+            "touches": touches.collect::<Vec<_>>(),
+            "frames": frames.collect::<anyhow::Result<Vec<_>>>()?,
+        }))
+    };
+    let truth = truth.map(|(vertices, triangles)| Coded::new(cube, vertices, triangles));
+    let data = json!({
+        "unit": MM.symbol,
+        // The ends of the codes of a position, from the middle of everything.
+        "cube": in_mm([-0.5 * cube.side_m, 0.5 * cube.side_m]),
+        // No vertex and no contact is farther from the middle.
+        "reach": MM.per_m * points().map(|p| (p - middle).norm()).fold(0.0, f64::max),
+        "deviation_range": in_mm(deviations),
+        "error_range": errors.map(in_mm),
+        "truth": truth.transpose()?,
+        "colours": style::touch_colours(),
+        "planners": sequences.iter().map(planner).collect::<anyhow::Result<Vec<_>>>()?,
+    });
+    Ok(Some((data, errors.is_some())))
+}
+
+/// Ends of the finite deviations above zero, apart, if there is one.
+pub(super) fn deviation_range<'a>(sds_m: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
+    let (least, most) = axes::range(sds_m.copied().filter(|&sd_m| sd_m > 0.0))?;
+    let least = least.max(LEAST_SHARE * most);
+    Some(if least < most { [least, most] } else { [ALIKE_SHARE * most, most] })
+}
+
+/// Ends around zero of the finite errors, if there is one.
+fn error_range<'a>(errors_m: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> {
+    let (low, high) = axes::range(errors_m.copied())?;
+    let most = high.max(-low).max(f64::MIN_POSITIVE);
+    Some([-most, most])
+}
+
+/// A belief with its numbers coded between the ends of deviations and of errors, in metres.
+fn coded(
+    frame: &Frame,
+    cube: Cube,
+    (deviations, errors): ([f64; 2], Option<[f64; 2]>),
+) -> anyhow::Result<Value> {
+    let (vertices, triangles) = &frame.mesh;
+    let mesh = Coded::new(cube, vertices, triangles)?;
+    let known = |value: f64| if value.is_finite() { value } else { f64::NAN };
+    let of = |values: &[f64], share: &dyn Fn(f64) -> f64| {
+        encode(mesh.order.iter().map(|&vertex| share(known(values[vertex as usize]))))
+    };
+    let [least, most] = deviations;
+    let deviation = of(&frame.sd_m, &|sd_m| (sd_m / least).ln() / (most / least).ln());
+    let error = errors.filter(|_| !frame.error_m.is_empty()).map(|[low, high]| {
+        of(&frame.error_m, &|error_m| 0.5 * (1.0 + error_m / (0.5 * (high - low))))
+    });
+    let mut coded = json!(mesh);
+    coded["touches"] = json!(frame.touches);
+    coded["score"] = json!(frame.score);
+    coded["deviation"] = json!(deviation);
+    coded["error"] = json!(error);
+    Ok(coded)
+}
+
+/// A touch, from the middle of everything.
+fn marked(touch: &Touch, cube: Cube) -> Value {
+    let from_middle = |p_w| <[f64; 3]>::from((p_w - cube.middle()) * MM.per_m).map(short);
+    json!({
+        "aim": from_middle(touch.aim_w),
+        "along": <[f64; 3]>::from(touch.along_w).map(short),
+        "contact": touch.contact_w.map(from_middle),
+        "is_initial": touch.is_initial,
+    })
+}
+
+/// Most vertices of a mesh: indices have sixteen bits where they are drawn.
+const VERTICES_MAX: usize = u16::MAX as usize;
+
+/// The code from which on a number takes two more bytes.
+const LONG: u8 = u8::MAX;
+
+/// Bytes of a triangle in base 64, about: half a vertex of five numbers of two bytes, and three
+/// corners of little more than a byte.
+const BYTES_OF_TRIANGLE: usize = 11;
+
+/// A cube that positions are written in, as sixteen bits each.
+#[derive(Clone, Copy, Debug)]
+struct Cube {
+    /// Its lower corner, in metres.
+    low: Point3<f64>,
+    /// Its side, in metres.
+    side_m: f64,
+}
+
+impl Cube {
+    /// The smallest around all of `points`, with their middle as its own.
+    fn around<'a>(points: impl Iterator<Item = &'a Point3<f64>>) -> Option<Self> {
+        let [low, high] = extent(points)?;
+        let side_m = (high - low).max().max(f64::MIN_POSITIVE);
+        let middle = nalgebra::center(&low, &high);
+        Some(Self { low: middle - Vector3::repeat(0.5 * side_m), side_m })
+    }
+
+    fn middle(&self) -> Point3<f64> {
+        self.low + Vector3::repeat(0.5 * self.side_m)
+    }
+}
+
+/// Triangles whose vertices are numbered as they are first used.
+#[derive(Serialize)]
+struct Coded {
+    /// x, y, z of each vertex: sixteen bits along the cube, the lower eight first.
+    positions: String,
+    /// How far each corner lies behind the next new vertex, 0 being that one; 255 stands before
+    /// two bytes that say it, the lower first. Chun, *WebGL Models: End-to-End*, in *OpenGL
+    /// Insights*, 2012, codes indices so.
+    corners: String,
+    /// Which vertices these are of those given.
+    #[serde(skip)]
+    order: Vec<u32>,
+}
+
+impl Coded {
+    /// Every position is off by half a code at most, `side_m` / 131 068.
+    ///
+    /// # Errors
+    /// If more vertices are used than sixteen bits can count.
+    fn new(cube: Cube, vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> anyhow::Result<Self> {
+        let mut numbers = vec![None; vertices.len()];
+        let (mut order, mut corners) = (Vec::new(), Vec::new());
+        for &vertex in triangles.as_flattened() {
+            let next = order.len();
+            let number = *numbers[vertex as usize].get_or_insert(next);
+            if number == next {
+                order.push(vertex);
+            }
+            match u8::try_from(next - number) {
+                Ok(back) if back < LONG => corners.push(back),
+                _ => {
+                    corners.push(LONG);
+                    corners.extend(((next - number) as u16).to_le_bytes());
+                }
+            }
+        }
+        let count = order.len();
+        ensure!(count <= VERTICES_MAX, "a mesh of {count} vertices; {VERTICES_MAX} can be drawn");
+        let offsets = order.iter().map(|&vertex| vertices[vertex as usize] - cube.low);
+        let shares = offsets.flat_map(|offset| <[f64; 3]>::from(offset / cube.side_m));
+        Ok(Self { positions: encode(shares), corners: STANDARD.encode(corners), order })
+    }
+}

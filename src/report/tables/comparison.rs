@@ -1,50 +1,53 @@
-//! The planners against their baselines in every measure, as tables of the page and as a file.
+//! The planners of a run against its baselines, in every measure and in touches to equal error: as
+//! tables of the page and as files.
 
-use super::{Cell, Table, Verdict, titled, write_csv};
+use super::titled;
 use crate::experiment::measure::{Direction, MEASURES, Measure, in_files};
 use crate::experiment::statistics::comparison::Comparison;
+use crate::experiment::statistics::equal_error::{EqualError, Estimate, errors};
 use crate::experiment::store::Run;
 use crate::report::number::{digits, with_interval};
-use schemars::JsonSchema;
-use serde::Serialize;
-use std::path::Path;
+use crate::report::table::{Cell, Column, Table};
 
-/// A table for each baseline: a line for each measure, a column for each other planner.
-pub fn tables(run: &Run, found: &[Comparison]) -> Vec<Table> {
-    let table = |baseline: &str| {
-        let of_baseline: Vec<&Comparison> =
-            found.iter().filter(|comparison| comparison.baseline == baseline).collect();
-        let others: Vec<&String> = (run.experiment.planners.iter())
-            .filter(|name| of_baseline.iter().any(|comparison| comparison.planner == **name))
-            .collect();
-        let line = |measure: &Measure| -> Option<Vec<Cell>> {
-            let of = |planner: &str| {
-                let is_it = |comparison: &&&Comparison| {
-                    comparison.planner == planner && comparison.measure.id == measure.id
-                };
-                of_baseline.iter().find(is_it)
-            };
-            let cells = others
-                .iter()
-                .map(|planner| of(planner).map_or("-".to_owned().into(), |it| cell(it)));
-            others
-                .iter()
-                .any(|planner| of(planner).is_some())
-                .then(|| std::iter::once(titled(measure).into()).chain(cells).collect())
-        };
-        Table {
-            header: std::iter::once(format!("minus {baseline}"))
-                .chain(others.iter().map(|planner| planner.to_string()))
-                .collect(),
-            lines: MEASURES.iter().filter_map(line).collect(),
-        }
-    };
-    let baselines = run.experiment.baselines().into_iter();
-    baselines.map(table).filter(|table| !table.lines.is_empty()).collect()
+/// The table of `comparison.csv`: a row per planner, baseline and measure after the last touch.
+pub fn comparison_file(found: &[Comparison]) -> Table {
+    let mut table = Table::new([
+        Column::new("planner").note("Which planner."),
+        Column::new("baseline").note("Against which."),
+        Column::new("measure").note("In which measure."),
+        Column::new("trials").note("Trials that both finished."),
+        Column::new("difference")
+            .note("Mean of the planner's value minus the baseline's, in the same trial.")
+            .interval(),
+        Column::new("won")
+            .note("Share of the trials in which the planner is better; a tie is half."),
+    ]);
+    for Comparison { planner, baseline, measure, paired } in found {
+        let difference = Estimate { value: paired.mean, interval: paired.interval };
+        let names = [*planner, *baseline, measure.id].map(Cell::from);
+        let numbers = [paired.trials.into(), difference.into(), paired.won.into()];
+        table.rows.push(names.into_iter().chain(numbers).collect());
+    }
+    table
 }
 
-/// What the columns are.
-pub fn note(run: &Run) -> String {
+/// A table for each baseline: a row for each measure, a column for each other planner.
+pub fn comparisons(run: &Run, found: &[Comparison]) -> Vec<Table> {
+    let table = |baseline: &str| {
+        let rows = MEASURES.iter().map(|measure| (titled(measure), measure));
+        let cell = |measure: &&Measure, planner: &&String| {
+            let is_it = |it: &&Comparison| {
+                (it.baseline, it.planner, it.measure.id) == (baseline, planner, measure.id)
+            };
+            found.iter().find(is_it).map(difference)
+        };
+        Table::cross(format!("minus {baseline}"), rows, planners(run), cell)
+    };
+    tables(run, table)
+}
+
+/// A note on the cells of [`comparisons`].
+pub fn comparisons_note(run: &Run) -> String {
     let more: Vec<&str> = in_files(&run.rows)
         .filter(|measure| measure.direction == Direction::More)
         .map(|measure| measure.title)
@@ -59,59 +62,112 @@ pub fn note(run: &Run) -> String {
     )
 }
 
-/// A record of `comparison.csv`.
-#[derive(Serialize, JsonSchema)]
-pub struct ComparisonRecord<'a> {
-    /// Which planner.
-    pub planner: &'a str,
-    /// Against which.
-    pub baseline: &'a str,
-    /// In which measure.
-    pub measure: &'a str,
-    /// Trials that both finished.
-    pub trials: usize,
-    /// Mean of the planner's value minus the baseline's, in the same trial.
-    pub difference: f64,
-    /// Lower end of its 95 % bootstrap interval.
-    pub difference_low: Option<f64>,
-    /// Upper end.
-    pub difference_high: Option<f64>,
-    /// Share of the trials in which the planner is better; a tie is half.
-    pub won: f64,
-}
-
-/// Writes `comparison.csv`: a line per planner, baseline and measure after the last touch.
-///
-/// # Errors
-/// If it cannot be written.
-pub fn write(found: &[Comparison], folder: &Path) -> anyhow::Result<()> {
-    let records =
-        found.iter().map(|Comparison { planner, baseline, measure, paired }| ComparisonRecord {
-            planner,
-            baseline,
-            measure: measure.id,
-            trials: paired.trials,
-            difference: paired.mean,
-            difference_low: paired.interval.map(|[low, _]| low),
-            difference_high: paired.interval.map(|[_, high]| high),
-            won: paired.won,
-        });
-    write_csv(&folder.join("comparison.csv"), records)
-}
-
-/// Whether the planner is better or worse for certain.
-pub fn verdict(comparison: &Comparison) -> Option<Verdict> {
-    Verdict::of(comparison.paired.interval, 0.0, comparison.measure.direction)
-}
-
-fn cell(comparison: &Comparison) -> Cell {
+fn difference(comparison: &Comparison) -> Cell {
+    let Comparison { measure, paired, .. } = comparison;
     let shown = |value: f64| {
-        let value = comparison.measure.unit.per_si * value;
+        let value = measure.unit.per_si * value;
         let sign = if value < 0.0 { "\u{2212}" } else { "" };
         format!("{sign}{}", digits(value.abs()))
     };
-    let paired = &comparison.paired;
     let mean = with_interval(paired.mean, paired.interval, &shown);
     let words = format!("{mean}, {:.0} %", 100.0 * paired.won);
-    Cell { words, verdict: verdict(comparison) }
+    Cell::from(words).judged(paired.interval, 0.0, measure.direction)
+}
+
+/// The table of `equal_error.csv`: a row per planner, baseline and error; a count or ratio is left
+/// out where the error is not reached.
+pub fn equal_error_file(found: &[EqualError]) -> Table {
+    let mut table = Table::new([
+        Column::new("planner").note("Which planner."),
+        Column::new("baseline").note("Whose error is the goal."),
+        Column::new("measure").note("Which error."),
+        Column::new("trials").note("Trials that both finished."),
+        Column::new("goal").note("The baseline's median error after the goal's touches."),
+        Column::new("baseline_touches")
+            .note("Touches until the baseline itself has met it; empty: never."),
+        Column::new("touches").note("Touches until the planner has.").interval(),
+        Column::new("ratio").note("The planner's touches over the baseline's.").interval(),
+        Column::new("path_ratio")
+            .note("The planner's lateral way after the initial touches over the baseline's.")
+            .interval(),
+    ]);
+    for it in found {
+        let names = [it.planner, it.baseline, it.measure.id].map(Cell::from);
+        let numbers = [it.trials.into(), it.goal.into(), it.baseline_touches.into()];
+        let estimates = [it.touches, it.ratio, it.path_ratio].map(Cell::from);
+        table.rows.push(names.into_iter().chain(numbers).chain(estimates).collect());
+    }
+    table
+}
+
+/// A table for each baseline: a row for each other planner, a column for each error.
+pub fn equal_errors(run: &Run, found: &[EqualError]) -> Vec<Table> {
+    let most = run.experiment.touches;
+    let table = |baseline: &str| {
+        let of = |error: &Measure, planner: Option<&String>| {
+            found.iter().find(|it| {
+                (it.baseline, it.measure.id) == (baseline, error.id)
+                    && planner.is_none_or(|planner| it.planner == planner)
+            })
+        };
+        let head = |error: &'static Measure| {
+            let (unit, equal) = (error.unit, of(error, None)?);
+            let goal = format!("{} {}", digits(unit.per_si * equal.goal), unit.symbol);
+            let own = touches(equal.baseline_touches, most);
+            Some((Column::new(format!("{}: {goal}, {baseline} {own}", error.title)), error))
+        };
+        let rows = run.experiment.planners.iter().map(|planner| (planner.clone(), planner));
+        let cell =
+            |planner: &&String, error: &&Measure| Some(effort(of(error, Some(planner))?, most));
+        let columns = errors().filter_map(head).collect();
+        Table::cross(format!("to the error of {baseline}"), rows, columns, cell)
+    };
+    tables(run, table)
+}
+
+/// A note on the cells of [`equal_errors`].
+pub fn equal_errors_note(run: &Run) -> String {
+    format!(
+        "Touches, initial ones included, after which a planner\u{2019}s median error stays at or \
+         below the one in the column\u{2019}s head, which is the baseline\u{2019}s after {} touches; \
+         behind \u{d7} their ratio to the baseline\u{2019}s own count, and that of the lateral ways \
+         after the initial touches. All with the 95 % interval of a bootstrap over trials. Bold, with \
+         the word beside it: the interval of the touches\u{2019} ratio excludes 1.",
+        run.experiment.goal_touches()
+    )
+}
+
+fn effort(equal: &EqualError, most: u32) -> Cell {
+    // Without a count there is no ratio, and of its interval at most the lower end.
+    if !equal.touches.value.is_finite() {
+        let low = equal.touches.interval.map_or(f64::INFINITY, |[low, _]| low);
+        let some = if low.is_finite() { format!(", {low:.0} at least") } else { String::new() };
+        return format!("{}{some}", touches(f64::INFINITY, most)).into();
+    }
+    let shown = |estimate: &Estimate, shown: &dyn Fn(f64) -> String| {
+        with_interval(estimate.value, estimate.interval, shown)
+    };
+    let ratio = |ratio: f64| if ratio.is_finite() { format!("{ratio:.2}") } else { "–".into() };
+    let words = format!(
+        "{} \u{d7} {}; way \u{d7} {}",
+        shown(&equal.touches, &|count| touches(count, most)),
+        shown(&equal.ratio, &ratio),
+        shown(&equal.path_ratio, &ratio),
+    );
+    Cell::from(words).judged(equal.ratio.interval, 1.0, Direction::Less)
+}
+
+fn touches(count: f64, most: u32) -> String {
+    if count.is_finite() { format!("{count:.0}") } else { format!("over {most}") }
+}
+
+/// The planners of a run as columns.
+fn planners(run: &Run) -> Vec<(Column, &String)> {
+    run.experiment.planners.iter().map(|planner| (Column::new(planner), planner)).collect()
+}
+
+/// The tables of all baselines that have rows.
+fn tables(run: &Run, table: impl Fn(&str) -> Table) -> Vec<Table> {
+    let tables = run.experiment.baselines().into_iter().map(table);
+    tables.filter(|table| !table.rows.is_empty()).collect()
 }

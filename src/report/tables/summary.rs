@@ -1,128 +1,131 @@
-//! The curves as a table of the page and of the terminal, and as a file.
+//! The curves of a run as tables: of the page, of the terminal and as a file; and what a
+//! publication says beside what came out.
 
-use super::{Cell, Table, titled, write_csv_with};
-use crate::experiment::measure::{MEASURES, Measure};
+use super::titled;
+use crate::experiment::measure::{self, MEASURES, Measure};
 use crate::experiment::notice;
 use crate::experiment::statistics::curve_table::{CurveRecord, columns, curve_table};
-use crate::experiment::statistics::summary;
-use crate::experiment::statistics::summary::{CurvePoint, Events};
+use crate::experiment::statistics::summary::{self, CurvePoint, Events, typical};
 use crate::experiment::store::Run;
-use crate::report::number::{shown, with_error};
-use serde_json::{Map, Value, json};
-use std::path::Path;
+use crate::report::number::shown;
+use crate::report::table::{Cell, Column, Table};
+use serde_json::{Value, json};
 
-/// A column: a measure over the trials.
-struct Column {
-    measure: &'static Measure,
-    /// Its median; otherwise its mean.
-    is_median: bool,
-}
-
-impl Column {
-    fn all() -> impl Iterator<Item = Self> {
-        MEASURES.iter().filter(|measure| measure.is_tabled).flat_map(|measure| {
-            let told = [measure.aggregate.has_mean(), measure.aggregate.has_median()];
-            let columns = [false, true].map(|is_median| Self { measure, is_median });
-            columns.into_iter().zip(told).filter(|(_, told)| *told).map(|(column, _)| column)
-        })
-    }
-
-    fn cell(&self, point: &CurvePoint) -> Option<String> {
-        let summary = point.of(self.measure)?;
-        Some(match self.is_median {
-            true => shown(self.measure, summary.median),
-            false => with_error(self.measure, summary.mean, summary.error),
-        })
-    }
-
-    fn named(&self, name: &str) -> String {
-        format!("{} {name}", if self.is_median { "median" } else { "mean" })
-    }
-
-    /// Its head where lines are short: the measure as in files, with the unit it is shown in.
-    fn short(&self) -> String {
-        let name = self.measure.stem().replace('_', " ");
-        self.named(format!("{name} {}", self.measure.unit.symbol).trim_end())
-    }
-}
-
-/// A line per planner and tabled touch count; columns that nothing stands in are left out.
+/// A row for each planner and tabled touch count; columns without a value are left out.
 pub fn table(run: &Run) -> Table {
-    with_heads(run, |column| column.named(&titled(column.measure)))
+    let aggregates: Vec<(&Measure, bool)> = (MEASURES.iter())
+        .filter(|measure| measure.is_tabled)
+        .flat_map(|measure| [(measure, false), (measure, true)])
+        .filter(|(measure, is_median)| match is_median {
+            true => measure.aggregate.has_median(),
+            false => measure.aggregate.has_mean(),
+        })
+        .collect();
+    let column = |(measure, is_median): &(&Measure, bool)| {
+        let kind = if *is_median { "median" } else { "mean" };
+        Column::new(format!("{kind} {}", measure.stem().replace('_', " ")))
+            .title(format!("{kind} {}", measure.title))
+            .unit(measure.unit.symbol, measure.unit.per_si)
+            .decimals(measure.unit.decimals)
+    };
+    let start = ["touches", "planner"].map(Column::new).into_iter();
+    let mut table = Table::new(start.chain(aggregates.iter().map(column)));
+    let curves: Vec<Vec<CurvePoint>> = (run.experiment.planners.iter())
+        .map(|planner| summary::curve(&run.experiment, &run.rows, planner))
+        .collect();
+    for count in run.experiment.tabled_touch_counts() {
+        for point in curves.iter().flatten().filter(|point| point.touches == count) {
+            let start = [Cell::from(count as usize), point.planner.as_str().into()];
+            let value = |(measure, is_median): &(&Measure, bool)| match point.of(measure) {
+                None => Cell::Empty,
+                Some(summary) if *is_median => summary.median.into(),
+                Some(summary) => Cell::Mean(summary.mean, summary.error),
+            };
+            table.rows.push(start.into_iter().chain(aggregates.iter().map(value)).collect());
+        }
+    }
+    table.without_empty()
 }
 
-/// What the cells of [`table`] are.
+/// A note on the cells of [`table`].
 pub fn note(run: &Run) -> String {
     format!("± is one standard error of the mean over {} trials.", run.experiment.trials)
 }
 
-fn with_heads(run: &Run, head: impl Fn(&Column) -> String) -> Table {
-    let curves: Vec<Vec<CurvePoint>> = (run.experiment.planners.iter())
-        .map(|planner| summary::curve(&run.experiment, &run.rows, planner))
-        .collect();
-    let counts = run.experiment.tabled_touch_counts().into_iter();
-    let points: Vec<&CurvePoint> = counts
-        .flat_map(|count| curves.iter().flatten().filter(move |point| point.touches == count))
-        .collect();
-    let columns: Vec<Column> = Column::all()
-        .filter(|column| points.iter().any(|point| column.cell(point).is_some()))
-        .collect();
-    let start = ["touches", "planner"].map(String::from).into_iter();
-    let line = |point: &&CurvePoint| {
-        let start = [point.touches.to_string(), point.planner.clone()].into_iter();
-        let cells = columns.iter().map(|column| column.cell(point).unwrap_or("-".into()));
-        start.chain(cells).map(Cell::from).collect()
-    };
-    Table {
-        header: start.chain(columns.iter().map(head)).collect(),
-        lines: points.iter().map(line).collect(),
-    }
-}
-
 /// The table for the terminal, then what else happened.
 pub fn text(run: &Run) -> String {
-    let Table { header, lines } = with_heads(run, Column::short);
-    let words = |line: Vec<Cell>| line.into_iter().map(|cell| cell.words).collect();
-    let lines: Vec<Vec<String>> = lines.into_iter().map(words).collect();
-    let lines = || std::iter::once(&header).chain(&lines);
-    let widths: Vec<usize> = (0..header.len())
-        .map(|column| lines().map(|line| line[column].chars().count()).max().unwrap_or(0))
-        .collect();
-    let mut text = format!("{}\n", run.experiment.name);
-    for line in lines() {
-        for (cell, width) in line.iter().zip(&widths) {
-            text += &format!("{cell:>width$}  ");
-        }
-        text = text.trim_end().to_owned() + "\n";
-    }
+    let mut text = format!("{}\n{}", run.experiment.name, table(run).text());
     happened(run).iter().for_each(|line| text += &format!("{line}\n"));
     notice::of_run(run).iter().for_each(|notice| text += &format!("note: {notice}\n"));
     text.trim_end().into()
 }
 
-/// The summary for programs: of each planner and tabled touch count the columns of `summary.csv`,
+/// The table of `summary.csv`: a row for each planner and each of its touch counts that
+/// `is_wanted`.
+pub fn file(run: &Run, is_wanted: impl Fn(u32) -> bool) -> Table {
+    let names = ["planner", "touches", "trials"].map(String::from).into_iter();
+    let names = names.chain(columns(&run.experiment, &run.rows));
+    let records = curve_table(&run.experiment, &run.rows, is_wanted);
+    let row = |CurveRecord { point, values }: CurveRecord| -> Vec<Cell> {
+        let start = [point.planner.into(), (point.touches as usize).into(), point.trials.into()];
+        start.into_iter().chain(values.into_iter().map(Cell::from)).collect()
+    };
+    Table {
+        columns: names.map(Column::new).collect(),
+        rows: records.into_iter().map(row).collect(),
+    }
+}
+
+/// The summary for programs: for each planner and tabled touch count the columns of `summary.csv`,
 /// and what a reader should know.
 pub fn json(run: &Run) -> Value {
     let counts = run.experiment.tabled_touch_counts();
-    let columns = columns(&run.experiment, &run.rows);
-    let lines = curve_table(&run.experiment, &run.rows, |count| counts.contains(&count));
-    let lines = lines.into_iter().map(|CurveRecord { point, values }| {
-        let values: Map<String, Value> =
-            columns.iter().cloned().zip(values.into_iter().map(Value::from)).collect();
-        json!({
-            "planner": point.planner, "touches": point.touches, "trials": point.trials,
-            "measures": values,
-        })
-    });
+    let mut rows = file(run, |count| counts.contains(&count)).json();
+    let of_point = |row: &mut serde_json::Map<String, Value>| {
+        let [planner, touches, trials] =
+            ["planner", "touches", "trials"].map(|key| row.remove(key));
+        json!({ "planner": planner, "touches": touches, "trials": trials, "measures": row })
+    };
     let notices = notice::of_run(run);
     json!({
         "name": run.experiment.name,
         "trials": run.rows.len(),
         "failed": run.rows.iter().filter(|row| row.failure.is_some()).count(),
-        "summary": lines.collect::<Vec<_>>(),
+        "summary": rows.iter_mut().map(of_point).collect::<Vec<_>>(),
         "notes": notices.iter().map(ToString::to_string).chain(happened(run)).collect::<Vec<_>>(),
     })
 }
+
+/// What a publication says beside what came out: a row for each measure of each claim.
+pub fn claims(run: &Run) -> Table {
+    let planners = &run.experiment.planners;
+    let heads = ["paper", "it says", "here after", "measure"].map(Column::new).into_iter();
+    let mut table = Table::new(heads.chain(planners.iter().map(Column::new)));
+    let possible = run.experiment.initial_touches..=run.experiment.touches;
+    let claims = run.experiment.report.claims.iter();
+    for claim in claims.filter(|claim| possible.contains(&claim.touches)) {
+        let asked = claim.measures.iter().filter_map(|id| measure::by_id(id));
+        for (i, measure) in asked.enumerate() {
+            let once = |words: &str| Cell::from(if i == 0 { words } else { "" });
+            let kind = if measure.aggregate.has_median() { "median" } else { "mean" };
+            let start = [
+                once(&claim.place),
+                once(&claim.says),
+                format!("{} touches", claim.touches).into(),
+                format!("{kind} {}", titled(measure)).into(),
+            ];
+            let value = |planner: &String| {
+                let value = typical(&run.rows, planner, claim.touches, measure);
+                Cell::from(value.map(|value| shown(measure, value)))
+            };
+            table.rows.push(start.into_iter().chain(planners.iter().map(value)).collect());
+        }
+    }
+    table
+}
+
+/// A note on the cells of [`claims`].
+pub const CLAIMS_NOTE: &str = "What Yi et al. 2016 say, and the same here, over the trials.";
 
 /// What happened to the trials besides their errors, a line each.
 pub fn happened(run: &Run) -> Vec<String> {
@@ -135,20 +138,6 @@ pub fn happened(run: &Run) -> Vec<String> {
         )
     });
     run.experiment.planners.iter().filter_map(of).chain(unlisted).collect()
-}
-
-/// Writes `summary.csv`: a line per planner and touch count.
-///
-/// # Errors
-/// If it cannot be written.
-pub fn write(run: &Run, folder: &Path) -> anyhow::Result<()> {
-    let header = ["planner", "touches", "trials"].map(String::from).into_iter();
-    let header = header.chain(columns(&run.experiment, &run.rows));
-    let curves = curve_table(&run.experiment, &run.rows, |_| true);
-    let records = curves
-        .into_iter()
-        .map(|CurveRecord { point, values }| (point.planner, point.touches, point.trials, values));
-    write_csv_with(&folder.join("summary.csv"), header, records)
 }
 
 /// What happened to a planner's trials, in a line; none if nothing did.
