@@ -1,17 +1,16 @@
 //! `palpate run`.
 
 use super::find::{EXPERIMENTS, find};
-use super::host::Bring;
+use super::host::Host;
 use super::prepare::{bound_threads, ready, simulation};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::terminal::{Ending, Talk, error, print};
 use crate::config::ConfigError;
+use crate::error::Invalid;
 use crate::experiment::experiment::Experiment;
-use crate::experiment::runner::lab_runner::{self, Halt, Outcome};
-use crate::experiment::runner::shard::Shard;
-use crate::experiment::runner::{self, Progress, RunError};
+use crate::experiment::runner::{self, Progress, Shard};
 use crate::experiment::statistics::analysis::Analysis;
-use crate::experiment::store::{Content, JOURNAL, RECORDINGS, Run, RunFolder, Tally};
+use crate::experiment::store::{Journal, RECORDINGS, Run, RunFolder, Tally};
 use crate::experiment::sweep::cells;
 use crate::experiment::trial::row::TrialId;
 use crate::explore::planner;
@@ -80,7 +79,7 @@ pub(super) struct How {
     pub(super) clear_fault: bool,
 }
 
-pub(super) fn run(args: &Args, talk: Talk, bring: &Bring) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Talk, host: &Host) -> anyhow::Result<Ending> {
     let path = find(&args.experiment, EXPERIMENTS)?;
     let cells = cells(&path)?;
     bound_threads(args.how.threads)?;
@@ -88,14 +87,14 @@ pub(super) fn run(args: &Args, talk: Talk, bring: &Bring) -> anyhow::Result<Endi
     if cells.is_empty() {
         let out = args.out.clone();
         let experiment = with_planners(args, |sets| Experiment::load(&path, sets))?;
-        return run_one(args, experiment, out, &mut stop, (talk, bring));
+        return run_one(args, experiment, out, &mut stop, (talk, host));
     }
     // All of them are looked at before the first is run.
     let load = |cell| with_planners(args, |sets| Experiment::load_cell(&path, cell, sets));
     let experiments = cells.iter().map(load).collect::<Result<Vec<_>, _>>()?;
     for experiment in experiments {
         let out = args.out.as_ref().map(|out| out.join(&experiment.name));
-        match run_one(args, experiment, out, &mut stop, (talk, bring))? {
+        match run_one(args, experiment, out, &mut stop, (talk, host))? {
             Ending::Done => (),
             other => return Ok(other),
         }
@@ -127,7 +126,8 @@ pub(super) struct Made {
     tally: Tally,
     /// How many there should be.
     total: u64,
-    halt: Option<Halt>,
+    /// Where and why a real arm stopped, and what is kept.
+    halt: Option<String>,
 }
 
 impl Made {
@@ -162,11 +162,11 @@ pub(super) fn make(
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
-    (talk, bring): (Talk, &Bring),
+    (talk, host): (Talk, &Host),
 ) -> anyhow::Result<Made> {
     let own = experiment.planners.iter().filter(|name| planner::is_own(name));
     let (own, lacking): (Vec<_>, Vec<_>) =
-        own.filter_map(|name| bring(name)).partition(Result::is_ok);
+        own.filter_map(|name| (host.bring)(name)).partition(Result::is_ok);
     let simulation = simulation(experiment, talk)?;
     let mut simulation = simulation.with_planners(own.into_iter().flatten().collect());
     let experiment = simulation.experiment();
@@ -184,13 +184,11 @@ pub(super) fn make(
         let part = how.shard.map(|it| format!("-{}-of-{}", it.index, it.count));
         PathBuf::from("runs").join(format!("{}{}", experiment.name, part.unwrap_or_default()))
     });
-    let content = Content::of(&simulation)?;
-    let (mut folder, done) =
-        RunFolder::open(&path, experiment, simulation.truth(), &content, how.fresh)?;
+    let (mut folder, done) = RunFolder::open(&path, &simulation, host.commit, how.fresh)?;
     // Before an arm is looked for: another program may hold the folder, or a fault may want an
     // operator.
     if simulation.is_real() {
-        if let Some(reason) = folder.journal()?.halted().filter(|_| !how.clear_fault) {
+        if let Some(reason) = Journal::open(&path)?.halted().filter(|_| !how.clear_fault) {
             bail!(
                 "{}: the run was halted by a fault: {reason}\nlook at the arm, then go on with \
                  --clear-fault, or use --fresh to start again",
@@ -214,7 +212,7 @@ pub(super) fn make(
     };
 
     // One that cannot be brought is no harm where all its trials are there.
-    let why = |error: RunError| lacking.into_iter().find_map(Result::err).unwrap_or(error.into());
+    let why = |error: Invalid| lacking.into_iter().find_map(Result::err).unwrap_or(error.into());
     let mut jobs = runner::jobs(&simulation, &done).map_err(why)?;
     if let Some(shard) = how.shard {
         shard.keep(&mut jobs);
@@ -224,25 +222,23 @@ pub(super) fn make(
     let begun = Instant::now();
     let threads = how.threads.into();
     let tick = |progress: Progress| touch_step(talk, &bar, experiment, progress);
-    let outcome = match simulation.is_real() {
+    let (count, halt) = match simulation.is_real() {
         true => {
             let rows = (&mut folder, done.as_slice());
-            lab_runner::run(&simulation, rows, stop, recorded, &tick)?
+            runner::run_real(&simulation, rows, stop, recorded, &tick)?
         }
         false => {
             let rows = (&mut folder, jobs);
-            let finished = runner::run(&simulation, rows, threads, stop, recorded, &tick)?;
-            Outcome { finished, halt: None }
+            (runner::run(&simulation, rows, threads, stop, recorded, &tick)?, None)
         }
     };
-    let count = outcome.finished;
     bar.finish_and_clear();
     let tally = folder.sort(experiment)?;
     let mut words = format!("{count} trials in {:.1} s", begun.elapsed().as_secs_f64());
     if !done.is_empty() {
         words += &format!(", {} were there already", done.len());
     }
-    Ok(Made { path, words, tally, total, halt: outcome.halt })
+    Ok(Made { path, words, tally, total, halt })
 }
 
 fn run_one(
@@ -250,9 +246,9 @@ fn run_one(
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
-    (talk, bring): (Talk, &Bring),
+    (talk, host): (Talk, &Host),
 ) -> anyhow::Result<Ending> {
-    let made = make(&args.how, experiment, out, stop, (talk, bring))?;
+    let made = make(&args.how, experiment, out, stop, (talk, host))?;
     let Made { path, words, total, halt, .. } = &made;
     // A part of a run is not looked at: its rows need not fit into memory.
     if args.how.shard.is_some() {
@@ -280,11 +276,10 @@ fn run_one(
         true => print(&format!("{:#}", report::tables::summary::json(&run)))?,
         false => print(&text)?,
     }
-    if let Some(Halt { planner, trial, touches, reason }) = halt {
+    if let Some(halt) = halt {
         let kept = format!(
-            "{planner}, trial {trial}: {reason}\n{touches} touches of it are kept in {}; mend what is \
-             wrong, and the same command goes on (--clear-fault clears what the arm's side has latched)",
-            path.join(JOURNAL).display()
+            "{halt}; mend what is wrong, and the same command goes on (--clear-fault clears what the \
+             arm's side has latched)"
         );
         let is_asked = stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
         if !is_asked {

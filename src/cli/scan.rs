@@ -5,9 +5,9 @@ use super::output::{Force, make_folder};
 use super::prepare::{environment, needs_zone, simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
+use crate::backend::Fault;
 use crate::experiment::store::write_whole;
 use crate::experiment::truth::scan;
-use crate::experiment::truth::scan::ScanTouch;
 use crate::explore::probe::Touch;
 use crate::report::points::Points;
 use crate::report::{files, scan as drawing};
@@ -73,7 +73,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     bar.finish_and_clear();
     let Some(touches) = touches else { return Ok(Ending::Interrupted) };
 
-    let points = touches.iter().filter_map(|one| match &one.touch {
+    let points = touches.iter().filter_map(|(_, touch)| match touch {
         Ok(Touch::Contact(contact)) => Some((contact.p_wc, contact.normal_w)),
         _ => None,
     });
@@ -96,7 +96,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     if let Some(svg) = drawing::picture((zone, mesh, &height_m), &cloud.points) {
         files::write(&folder.join("scan.svg"), &svg)?;
     }
-    let faults = touches.iter().filter(|one| one.touch.is_err()).count();
+    let faults = touches.iter().filter(|(_, touch)| touch.is_err()).count();
     print(&format!(
         "{name}: {} points of contact, {} misses, {faults} faults\nfolder: {}",
         cloud.points.len(),
@@ -107,10 +107,10 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
 }
 
 /// A line per target: where it was, how the touch ended, and the contact with its normal.
-fn csv(touches: &[ScanTouch]) -> String {
+fn csv(touches: &[(Vec<f64>, Result<Touch, Fault>)]) -> String {
     let mut text =
         String::from("target_x_m,target_z_m,outcome,x_m,y_m,z_m,normal_x,normal_y,normal_z\n");
-    for ScanTouch { target, touch } in touches {
+    for (target, touch) in touches {
         let place = target.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         let ending = match touch {
             Ok(Touch::Contact(contact)) => {

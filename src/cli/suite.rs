@@ -2,7 +2,7 @@
 
 use super::columns::aligned_rows;
 use super::find::{EXPERIMENTS, find};
-use super::host::Bring;
+use super::host::Host;
 use super::prepare::bound_threads;
 use super::run;
 use super::run::How;
@@ -49,7 +49,7 @@ pub(super) struct Args {
     fresh: bool,
 }
 
-pub(super) fn run(args: &Args, talk: Talk, bring: &Bring) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Talk, host: &Host) -> anyhow::Result<Ending> {
     let path = find(&args.experiment, EXPERIMENTS)?;
     let cells = cells(&path)?;
     if cells.is_empty() {
@@ -79,7 +79,7 @@ pub(super) fn run(args: &Args, talk: Talk, bring: &Bring) -> anyhow::Result<Endi
     let mut stop = None;
     for experiment in experiments {
         let out = folder.join(&experiment.name);
-        let made = run::make(&how, experiment, Some(out), &mut stop, (talk, bring))?;
+        let made = run::make(&how, experiment, Some(out), &mut stop, (talk, host))?;
         match made.ending(talk) {
             Ending::Done => (),
             other => return Ok(other),

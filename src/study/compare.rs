@@ -5,7 +5,6 @@
 //! exp(mean log RMSE), in units of what a reference planner has in the same trial, so that objects
 //! of different sizes count alike. Less is better, and the reference has 1.
 
-use super::check::baseline::span;
 use super::check::judged::JUDGED;
 use crate::experiment::measure::outline::TENTHS;
 use crate::experiment::statistics::{mean, percentiles_95, resampled_within};
@@ -156,10 +155,9 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Compar
 
 /// Mean log RMSE of a planner's whole trials.
 fn logs(run: &Run, planner: &str) -> HashMap<u32, f64> {
-    let span = span(&run.experiment);
     let of = JUDGED[0].of;
     let whole = of_planner(&run.rows, planner).filter(|row| row.failure.is_none());
-    whole.filter_map(|row| Some((row.trial, of(row, span)?))).collect()
+    whole.filter_map(|row| Some((row.trial, of(row, &run.experiment)?))).collect()
 }
 
 /// What a planner's whole trials took; none of none.

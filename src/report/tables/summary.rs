@@ -3,7 +3,7 @@
 use super::{Cell, Table, titled, write_csv_with};
 use crate::experiment::measure::{MEASURES, Measure};
 use crate::experiment::notice;
-use crate::experiment::statistics::curve_table::{CurveRecord, columns, curve_table};
+use crate::experiment::statistics::curve_table::{columns, curve_table};
 use crate::experiment::statistics::summary;
 use crate::experiment::statistics::summary::{CurvePoint, Events};
 use crate::experiment::store::Run;
@@ -106,7 +106,7 @@ pub fn json(run: &Run) -> Value {
     let counts = run.experiment.tabled_touch_counts();
     let columns = columns(&run.experiment, &run.rows);
     let lines = curve_table(&run.experiment, &run.rows, |count| counts.contains(&count));
-    let lines = lines.into_iter().map(|CurveRecord { point, values }| {
+    let lines = lines.into_iter().map(|(point, values)| {
         let values: Map<String, Value> =
             columns.iter().cloned().zip(values.into_iter().map(Value::from)).collect();
         json!({
@@ -147,7 +147,7 @@ pub fn write(run: &Run, folder: &Path) -> anyhow::Result<()> {
     let curves = curve_table(&run.experiment, &run.rows, |_| true);
     let records = curves
         .into_iter()
-        .map(|CurveRecord { point, values }| (point.planner, point.touches, point.trials, values));
+        .map(|(point, values)| (point.planner, point.touches, point.trials, values));
     write_csv_with(&folder.join("summary.csv"), header, records)
 }
 

@@ -13,6 +13,6 @@ pub mod judged;
 pub mod sequence;
 pub mod verdict;
 
-pub use baseline::{Baseline, BaselineError};
+pub use baseline::Baseline;
 pub use held::{Held, Planner, differs, hold};
 pub use verdict::{Judgement, Rules, Verdict};
