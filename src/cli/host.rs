@@ -2,11 +2,14 @@
 
 use crate::explore::planner::PlannerFactory;
 
+/// Makes the planner of an [own](crate::explore::planner::is_own) name, or says why it cannot;
+/// returns `None` if the program has no such planners.
+pub type Bring<'a> = dyn Fn(&str) -> Option<anyhow::Result<Box<dyn PlannerFactory>>> + 'a;
+
 /// The program that runs the command line.
 pub struct Host<'a> {
     /// Commit that it was built from; "unknown" without a repository.
     pub commit: &'a str,
-    /// Makes the planner of an [own](crate::explore::planner::is_own) name, or says why it cannot;
-    /// returns `None` if the program has no such planners.
-    pub bring: &'a dyn Fn(&str) -> Option<anyhow::Result<Box<dyn PlannerFactory>>>,
+    /// Its own planners.
+    pub bring: &'a Bring<'a>,
 }

@@ -89,7 +89,7 @@ fn interval(
         .into_iter()
         .filter_map(|row| (measure.of)(row, point.touches))
         .collect();
-    match all.len() == samples.count() {
+    match all.len() == samples.count {
         true => samples.median_interval(&all),
         false => Samples::new(all.len(), experiment.seed).median_interval(&all),
     }

@@ -79,15 +79,19 @@ pub fn equal_error<'a>(
     let mut counts = Vec::new();
     let everyone: Vec<usize> = (0..pairs.len()).collect();
     let goal = medians[1].errors.get(goal_index)?.median(&everyone, &mut counts)?;
-    let found = meet(&medians, &everyone, goal_index, &mut counts);
-    let samples = Samples::new(pairs.len(), experiment.seed)
-        .each(|sample| meet(&medians, sample, goal_index, &mut counts));
     // Of a goal that is not met there is no comparison.
     let touches =
         |after: f64| compared.get(after as usize).map_or(f64::INFINITY, |n| f64::from(*n));
-    let estimate = |of: &dyn Fn(&[(f64, f64); 2]) -> f64| Estimate {
-        value: of(&found),
-        interval: (!samples.is_empty()).then(|| percentiles_95(samples.iter().map(of).collect())),
+    let mut met = |sample: &[usize]| {
+        let met = meet(&medians, sample, goal_index, &mut counts);
+        met.map(|(after, path_m)| [touches(after), path_m])
+    };
+    let found = met(&everyone);
+    let samples = Samples::new(pairs.len(), experiment.seed).each(met);
+    let estimate = |of: fn([[f64; 2]; 2]) -> f64| {
+        let values = samples.iter().map(|met| of(*met)).collect();
+        let interval = (!samples.is_empty()).then(|| percentiles_95(values));
+        Estimate { value: of(found), interval }
     };
     Some(EqualError {
         planner,
@@ -95,10 +99,10 @@ pub fn equal_error<'a>(
         measure,
         trials: pairs.len(),
         goal,
-        touches: estimate(&|[(after, _), _]| touches(*after)),
-        baseline_touches: touches(found[1].0),
-        ratio: estimate(&|[(ours, _), (theirs, _)]| touches(*ours) / touches(*theirs)),
-        path_ratio: estimate(&|[(_, ours_m), (_, theirs_m)]| ours_m / theirs_m),
+        touches: estimate(|[ours, _]| ours[0]),
+        baseline_touches: found[1][0],
+        ratio: estimate(|[ours, theirs]| ours[0] / theirs[0]),
+        path_ratio: estimate(|[ours, theirs]| ours[1] / theirs[1]),
     })
 }
 

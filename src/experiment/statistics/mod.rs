@@ -97,7 +97,8 @@ pub fn median_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
 /// The bootstrap samples of as many values: for each sample as many indices, drawn with
 /// replacement; none of a single value.
 pub(super) struct Samples {
-    count: usize,
+    /// The number of values.
+    pub(super) count: usize,
     indices: Vec<usize>,
 }
 
@@ -108,11 +109,6 @@ impl Samples {
         let samples = if count > 1 { RESAMPLES } else { 0 };
         let indices = (0..samples * count).map(|_| rng.random_range(0..count)).collect();
         Self { count, indices }
-    }
-
-    /// Of how many values.
-    pub(super) fn count(&self) -> usize {
-        self.count
     }
 
     /// A statistic of every sample.

@@ -6,12 +6,12 @@ use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::statistics::mean;
 use crate::experiment::truth::Truth;
 use crate::explore::around::ImplicitSurface;
-use crate::explore::around::Surface;
 use crate::explore::around::surface::steepness;
 use crate::explore::belief::Belief;
 use crate::explore::planner::sample::any_side;
 use crate::explore::planner::search::{Candidates, Search, decided, free_aim};
 use crate::explore::planner::{Plan, PlanError, Planner, PlanningSettings};
+use crate::geometry::spread::Spot;
 use crate::sim::Environment;
 use crate::sim::probe::exact;
 use crate::task::{Aim, Target};
@@ -50,22 +50,16 @@ impl GroundTruth {
         match belief {
             Belief::HeightField(field) => self.truth.rmse_m(field.surface()?),
             Belief::ImplicitSurface(surface) => {
-                Some(off_m(self.shape.as_ref()?, surface.surface()?))
+                let mut field = surface.surface()?.field();
+                let spots = self.shape.as_ref()?.samples().iter().step_by(LOOKED_AT);
+                let offset_m = |spot: &Spot| {
+                    let field = field.at(&spot.point);
+                    field.value.abs() / steepness(&field.gradient)
+                };
+                Some(mean(&spots.map(offset_m).collect::<Vec<f64>>()))
             }
         }
     }
-}
-
-fn off_m(shape: &TrueShape, surface: &Surface) -> f64 {
-    let mut field = surface.field();
-    let spots = shape.samples().iter().step_by(LOOKED_AT);
-    let offsets_m: Vec<f64> = spots
-        .map(|spot| {
-            let field = field.at(&spot.point);
-            field.value.abs() / steepness(&field.gradient)
-        })
-        .collect();
-    mean(&offsets_m)
 }
 
 /// Tries touches on the ground truth and asks for the one after which the belief is nearest to it.

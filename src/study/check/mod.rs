@@ -11,8 +11,6 @@ pub mod cost_table;
 pub mod held;
 pub mod judged;
 pub mod sequence;
-pub mod verdict;
 
 pub use baseline::Baseline;
-pub use held::{Held, Planner, differs, hold};
-pub use verdict::{Judgement, Rules, Verdict};
+pub use held::{Held, Judgement, Planner, Rules, Verdict, differs, hold};
