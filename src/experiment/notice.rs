@@ -5,7 +5,6 @@ use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::measure::{CENTRED_R, Measure, R};
 use crate::experiment::statistics::summary;
-use crate::experiment::store::Run;
 use crate::experiment::trial::row::{TrialRow, of_planner};
 use crate::experiment::truth::Truth;
 use crate::task::Zone;
@@ -79,9 +78,8 @@ pub fn of_shape(shape: &TrueShape) -> Option<String> {
     ))
 }
 
-/// The notices about the truth and the rows of a run.
-pub fn of_run(run: &Run) -> Vec<String> {
-    let Run { experiment, truth, rows, .. } = run;
+/// The notices about the truth and the rows of an experiment that was run.
+pub(super) fn of_run(experiment: &Experiment, truth: &Truth, rows: &[TrialRow]) -> Vec<String> {
     let mut notices = of_truth(experiment.scene.zone.as_ref(), truth);
     notices.extend(experiment.planners.iter().filter_map(|planner| few_contacts(rows, planner)));
     notices.extend(blind_r(experiment, rows));

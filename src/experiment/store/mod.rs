@@ -30,6 +30,7 @@ use self::files::{io_error, remove};
 use self::provenance::{CONTENT, Content};
 use self::surface::{MESH, SURFACE};
 use crate::experiment::experiment::Experiment;
+use crate::experiment::notice;
 use crate::experiment::simulation::Simulation;
 use crate::experiment::trial::row::{TrialId, TrialRow};
 use crate::experiment::truth::Truth;
@@ -220,6 +221,11 @@ impl Run {
         rows.sort_by(|(a, _), (b, _)| rows::order(a, b, &experiment));
         let rows = rows.into_iter().map(|(_, row)| row).collect();
         Ok(Self { experiment, truth, rows, unlisted })
+    }
+
+    /// What makes its numbers mean less than they seem to, a sentence each.
+    pub fn notices(&self) -> Vec<String> {
+        notice::of_run(&self.experiment, &self.truth, &self.rows)
     }
 }
 

@@ -1,4 +1,4 @@
-//! One trial, Algorithm 1 of Yi et al. 2016: touch, fit, plan, again; and the row that is left of it.
+//! One trial, Algorithm 1 of Yi et al. 2016: touch, fit, plan, again; and the row that is left.
 
 mod belief_shape;
 pub mod entrant;

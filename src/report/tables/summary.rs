@@ -2,7 +2,6 @@
 
 use super::{Cell, Table, titled, write_csv_with};
 use crate::experiment::measure::{MEASURES, Measure};
-use crate::experiment::notice;
 use crate::experiment::statistics::curve_table::{columns, curve_table};
 use crate::experiment::statistics::summary;
 use crate::experiment::statistics::summary::{CurvePoint, Events};
@@ -96,7 +95,7 @@ pub fn text(run: &Run) -> String {
         text = text.trim_end().to_owned() + "\n";
     }
     happened(run).iter().for_each(|line| text += &format!("{line}\n"));
-    notice::of_run(run).iter().for_each(|notice| text += &format!("note: {notice}\n"));
+    run.notices().iter().for_each(|notice| text += &format!("note: {notice}\n"));
     text.trim_end().into()
 }
 
@@ -114,13 +113,13 @@ pub fn json(run: &Run) -> Value {
             "measures": values,
         })
     });
-    let notices = notice::of_run(run);
+    let notices = run.notices();
     json!({
         "name": run.experiment.name,
         "trials": run.rows.len(),
         "failed": run.rows.iter().filter(|row| row.failure.is_some()).count(),
         "summary": lines.collect::<Vec<_>>(),
-        "notes": notices.iter().map(ToString::to_string).chain(happened(run)).collect::<Vec<_>>(),
+        "notes": notices.into_iter().chain(happened(run)).collect::<Vec<_>>(),
     })
 }
 
