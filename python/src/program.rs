@@ -24,8 +24,10 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> 
         });
         Some(start.map(|made| -> Box<dyn PlannerFactory> { Box::new(made) }))
     };
-    let host = Host { commit: COMMIT, bring: &brought };
-    py.detach(|| palpate::cli::main_with(arguments.into_iter().map(Into::into), &host))
+    py.detach(|| {
+        let host = Host { commit: COMMIT, bring: &brought };
+        palpate::cli::main_with(arguments.into_iter().map(Into::into), &host)
+    })
 }
 
 /// The names of the built-in planners.

@@ -1,7 +1,7 @@
 //! What a trial costs in instructions: counted and not timed, so that a busy machine counts the
 //! same.
 
-use super::held::Verdict;
+use super::judged::Verdict;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

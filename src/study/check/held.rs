@@ -1,12 +1,11 @@
 //! Trials run again until each planner is told from what it was, or is not.
 
 use super::baseline::{Baseline, Line, settings};
-use super::judged::{JUDGED, Judged};
+use super::judged::{JUDGED, Judged, Verdict};
 use super::sequence::Sequence;
 use crate::error::Invalid;
 use crate::experiment::Simulation;
 use crate::experiment::runner::{self, Progress};
-use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What came of it.
@@ -135,24 +134,6 @@ fn planner_of(baseline: &Baseline, rules: &Rules, rows: &[Line], name: &str) -> 
         (false, None) => of_planner(&judgements),
     };
     Planner { name: name.into(), verdict, trials, failed, judgements }
-}
-
-/// What is said of one measure of one planner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Verdict {
-    /// No difference in any trial.
-    Identical,
-    /// Less of what should be little.
-    Better,
-    /// Not more than is tolerated.
-    Ok,
-    /// These trials cannot tell.
-    Undecided,
-    /// More of it.
-    Worse,
-    /// No trial has it, of which the baseline has some.
-    Missing,
 }
 
 /// One measure of one planner, new against old in the same trials.

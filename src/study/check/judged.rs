@@ -3,6 +3,7 @@
 use crate::experiment::Experiment;
 use crate::experiment::measure::{CENTRED_R, CHAMFER, RMSE};
 use crate::experiment::trial::row::{TouchRow, TrialRow};
+use serde::Serialize;
 
 /// A number of a trial, less of which is better.
 #[derive(Debug)]
@@ -89,4 +90,22 @@ impl Judged {
     pub fn percent(&self, difference: f64) -> f64 {
         100.0 * if self.is_log { difference.exp_m1() } else { difference }
     }
+}
+
+/// What is said of one measure of one planner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// No difference in any trial.
+    Identical,
+    /// Less of what should be little.
+    Better,
+    /// Not more than is tolerated.
+    Ok,
+    /// These trials cannot tell.
+    Undecided,
+    /// More of it.
+    Worse,
+    /// No trial has it, of which the baseline has some.
+    Missing,
 }

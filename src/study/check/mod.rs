@@ -13,4 +13,5 @@ pub mod judged;
 pub mod sequence;
 
 pub use baseline::Baseline;
-pub use held::{Held, Judgement, Planner, Rules, Verdict, differs, hold};
+pub use held::{Held, Judgement, Planner, Rules, differs, hold};
+pub use judged::Verdict;
