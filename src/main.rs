@@ -5,5 +5,5 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     #[cfg(feature = "ros1")]
     palpate::backend::ros::spare_certificates();
-    palpate::cli::main()
+    palpate::cli::main(env!("PALPATE_COMMIT"))
 }

@@ -87,11 +87,11 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
 pub(crate) fn summary<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
     let told = PyDict::new(py);
     let records = py.detach(|| curve_table(&run.experiment, &run.rows, |_| true));
-    words(&told, "planner", records.iter().map(|record| Some(record.point.planner.as_str())))?;
-    counts(&told, "touches", records.iter().map(|record| record.point.touches as usize))?;
-    counts(&told, "trials", records.iter().map(|record| record.point.trials))?;
+    words(&told, "planner", records.iter().map(|(point, _)| Some(point.planner.as_str())))?;
+    counts(&told, "touches", records.iter().map(|(point, _)| point.touches as usize))?;
+    counts(&told, "trials", records.iter().map(|(point, _)| point.trials))?;
     for (i, column) in columns(&run.experiment, &run.rows).iter().enumerate() {
-        numbers(&told, column, records.iter().map(|record| record.values[i]))?;
+        numbers(&told, column, records.iter().map(|(_, values)| values[i]))?;
     }
     Ok(told)
 }

@@ -1,9 +1,7 @@
 //! Palpate's errors as exceptions of `palpate.errors`, with what they carry as attributes.
 
 use palpate::config::{ConfigError, Origin};
-use palpate::experiment::runner::RunError;
-use palpate::experiment::simulation::SimulationError;
-use palpate::experiment::store::StoreError;
+use palpate::experiment::store::RunError;
 use pyo3::exceptions::{PyAttributeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -42,40 +40,19 @@ pub(crate) fn config(error: ConfigError) -> PyErr {
 }
 
 /// Of a scene that cannot be built or simulated.
-pub(crate) fn simulation(error: impl Into<SimulationError>) -> PyErr {
-    scene(error.into())
-}
-
-/// The same in words only.
 pub(crate) fn scene(error: impl std::fmt::Display) -> PyErr {
     exception("SimulationError", &error.to_string(), &[])
 }
 
-/// Of a run's folder.
-pub(crate) fn store(error: StoreError) -> PyErr {
-    let message = error.to_string();
-    let path = match &error {
-        StoreError::Io { path, .. }
-        | StoreError::Differs { path, .. }
-        | StoreError::Changed { path, .. }
-        | StoreError::Busy { path }
-        | StoreError::NotARun { path, .. }
-        | StoreError::Foreign { path }
-        | StoreError::BadRow { path, .. } => shown(path),
-        StoreError::DecidesRows { .. } => None,
-        StoreError::Config(_) => None,
-    };
-    match error {
-        StoreError::Config(error) => config(error),
-        _ => exception("RunFolderError", &message, &[("path", path)]),
-    }
-}
-
-/// Of a run.
+/// Of a run: of its settings, of its folder, or of anything else.
 pub(crate) fn run(error: RunError) -> PyErr {
+    let message = error.to_string();
     match error {
-        RunError::Store(error) => store(error),
-        error => exception("PalpateError", &error.to_string(), &[]),
+        RunError::Config(error) => config(error),
+        RunError::Folder { path, .. } => {
+            exception("RunFolderError", &message, &[("path", shown(&path))])
+        }
+        RunError::Invalid(error) => other(error),
     }
 }
 

@@ -2,10 +2,11 @@
 
 use crate::errors;
 use crate::planner::PythonFactory;
+use crate::program::COMMIT;
 use crate::run::Run;
 use crate::zone::Zone;
 use palpate::experiment::runner::{self, Progress};
-use palpate::experiment::store::{self, Content, RunFolder, resolved};
+use palpate::experiment::store::{self, RunFolder, resolved};
 use palpate::experiment::{self, Simulation};
 use palpate::explore::planner::PlannerFactory;
 use pyo3::prelude::*;
@@ -92,7 +93,7 @@ impl Experiment {
             })
             .collect::<PyResult<_>>()?;
         let experiment = self.0.clone();
-        let simulation = py.detach(|| Simulation::new(experiment)).map_err(errors::simulation)?;
+        let simulation = py.detach(|| Simulation::new(experiment)).map_err(errors::scene)?;
         simulation.simulator().check_reach().map_err(errors::scene)?;
         if simulation.is_real() {
             return Err(errors::scene(
@@ -130,11 +131,9 @@ impl Told {
         threads: usize,
     ) -> PyResult<Run> {
         let experiment = simulation.experiment();
-        let content = Content::of(simulation).map_err(errors::store)?;
         let (mut folder, done) =
-            RunFolder::open(path, experiment, simulation.truth(), &content, fresh)
-                .map_err(errors::store)?;
-        let jobs = runner::jobs(simulation, &done).map_err(errors::run)?;
+            RunFolder::open(path, simulation, COMMIT, fresh).map_err(errors::run)?;
+        let jobs = runner::jobs(simulation, &done).map_err(errors::other)?;
         self.done.store(done.len(), Ordering::Relaxed);
         let total = done.len() + jobs.len();
         let outcome = self.watched(py, total, || {
@@ -144,13 +143,13 @@ impl Told {
             };
             runner::run(simulation, (&mut folder, jobs), threads, &self.is_stopped, None, &tick)
         });
-        folder.sort(experiment).map_err(errors::store)?;
+        folder.sort(experiment).map_err(errors::run)?;
         outcome?.map_err(errors::run)?;
-        store::Run::read(path).map(Run).map_err(errors::store)
+        store::Run::read(path).map(Run).map_err(errors::run)
     }
 
     fn in_memory(&self, py: Python<'_>, simulation: &Simulation, threads: usize) -> PyResult<Run> {
-        let jobs = runner::jobs(simulation, &[]).map_err(errors::run)?;
+        let jobs = runner::jobs(simulation, &[]).map_err(errors::other)?;
         let rows = self.watched(py, jobs.len(), || {
             let tick = |progress: Progress| {
                 let trials = usize::from(matches!(progress, Progress::Trial(_)));
@@ -161,7 +160,7 @@ impl Told {
         Ok(Run(store::Run {
             experiment: simulation.experiment().clone(),
             truth: simulation.truth().clone(),
-            rows: rows.map_err(errors::run)?,
+            rows: rows.map_err(errors::other)?,
             unlisted: 0,
         }))
     }

@@ -1,9 +1,16 @@
 //! The command `palpate`: the same program, with planners of Python.
 
 use crate::planner::PythonFactory;
+use palpate::cli::Host;
 use palpate::experiment::trial::entrant;
 use palpate::explore::planner::PlannerFactory;
 use pyo3::prelude::*;
+
+/// Commit that the package was built from.
+pub(crate) const COMMIT: &str = match option_env!("PALPATE_COMMIT") {
+    Some(commit) => commit,
+    None => "unknown",
+};
 
 /// Runs the program on arguments, of which the first is its name; returns its exit code. `bring`
 /// gives what starts the planner of a name `MODULE:CLASS`.
@@ -17,7 +24,10 @@ pub(crate) fn main(py: Python<'_>, arguments: Vec<String>, bring: Py<PyAny>) -> 
         });
         Some(start.map(|made| -> Box<dyn PlannerFactory> { Box::new(made) }))
     };
-    py.detach(|| palpate::cli::main_with(arguments.into_iter().map(Into::into), &brought))
+    py.detach(|| {
+        let host = Host { commit: COMMIT, bring: &brought };
+        palpate::cli::main_with(arguments.into_iter().map(Into::into), &host)
+    })
 }
 
 /// The names of the built-in planners.

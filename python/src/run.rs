@@ -40,7 +40,7 @@ impl Run {
 impl Run {
     #[staticmethod]
     fn open(py: Python<'_>, folder: PathBuf) -> PyResult<Self> {
-        py.detach(|| store::Run::read(&folder)).map(Self).map_err(errors::store)
+        py.detach(|| store::Run::read(&folder)).map(Self).map_err(errors::run)
     }
 
     #[getter]

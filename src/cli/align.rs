@@ -6,7 +6,7 @@ use super::patience::with_patience;
 use super::terminal::Talk;
 use super::terminal::{Ending, print};
 use crate::experiment::store::write_whole;
-use crate::experiment::truth::cloud;
+use crate::experiment::truth::scan_truth::read_cloud;
 use crate::explore::registration::icp::align;
 use crate::geometry::bvh::MeshBvh;
 use crate::geometry::import::import;
@@ -47,7 +47,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     args.force.claim(&args.out)?;
-    let points = cloud::read(&args.cloud)?;
+    let points = read_cloud(&args.cloud)?;
     let mesh = with_patience(talk, |tell| {
         tell(&format!("reading {}", args.mesh.display()));
         import(&args.mesh, args.unit.metres() * args.scale)

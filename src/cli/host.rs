@@ -1,7 +1,15 @@
-//! What a program that runs this one inside itself adds to it.
+//! The program around the command line: the binary, or one that runs it inside itself.
 
 use crate::explore::planner::PlannerFactory;
 
-/// Brings the planner of an [own](crate::explore::planner::is_own) name, or says why it cannot;
-/// none if the program has no such planners.
+/// Makes the planner of an [own](crate::explore::planner::is_own) name, or says why it cannot;
+/// returns `None` if the program has no such planners.
 pub type Bring<'a> = dyn Fn(&str) -> Option<anyhow::Result<Box<dyn PlannerFactory>>> + 'a;
+
+/// The program that runs the command line.
+pub struct Host<'a> {
+    /// Commit that it was built from; "unknown" without a repository.
+    pub commit: &'a str,
+    /// Its own planners.
+    pub bring: &'a Bring<'a>,
+}

@@ -1,8 +1,8 @@
 //! `palpate merge`.
 
+use super::host::Host;
 use super::terminal::{Ending, print};
-use crate::experiment::store::Shards;
-use anyhow::Context;
+use crate::experiment::store::merge;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -21,9 +21,8 @@ pub(super) struct Args {
     shards: Vec<PathBuf>,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
-    let shards = Shards::open(&args.shards)?.context("no shards")?;
-    let count = shards.merge(&args.out)?;
+pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Ending> {
+    let count = merge(&args.out, &args.shards, host.commit)?;
     print(&format!("{count} trials in {}", args.out.display()))?;
     Ok(Ending::Done)
 }

@@ -30,7 +30,7 @@ mod terminal;
 mod twin;
 mod watch;
 
-pub use host::Bring;
+pub use host::Host;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;
@@ -109,14 +109,14 @@ enum Command {
     Calibrate(calibrate::Args),
 }
 
-/// Runs the program on the process's arguments.
-pub fn main() -> ExitCode {
-    ExitCode::from(main_with(std::env::args_os(), &|_| None))
+/// Runs the program, which was built from `commit`, on the process's arguments.
+pub fn main(commit: &str) -> ExitCode {
+    ExitCode::from(main_with(std::env::args_os(), &Host { commit, bring: &|_| None }))
 }
 
-/// Runs the program on `arguments`, of which the first is its name, with planners of a host's;
-/// returns its exit code.
-pub fn main_with(arguments: impl IntoIterator<Item = OsString>, bring: &Bring) -> u8 {
+/// Runs the program on `arguments`, of which the first is its name, for a host; returns its exit
+/// code.
+pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> u8 {
     let command = Cli::command().mut_subcommand("run", |run| {
         let planners = list::indented(&list::planners());
         run.after_help(format!("{}\n\nPlanners:\n{}", run::EXAMPLES, planners.trim_end()))
@@ -125,10 +125,10 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, bring: &Bring) -
         .unwrap_or_else(|error| error.exit());
     let outcome = match cli.command {
         Command::New(args) => new::run(&args),
-        Command::Run(args) => run::run(&args, cli.talk, bring),
+        Command::Run(args) => run::run(&args, cli.talk, host),
         Command::Replay(args) => replay::run(&args, cli.talk),
         Command::Plan(args) => plan::run(&args, cli.talk),
-        Command::Merge(args) => merge::run(&args),
+        Command::Merge(args) => merge::run(&args, host),
         Command::Compare(args) => compare::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Show(args) => show::run(&args, cli.talk),

@@ -60,7 +60,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let (scene, settings) = match is_experiment(&path) {
         true => {
             let experiment = Experiment::load(&path, &args.set)?;
-            real_robot::check_cell(&experiment)?;
+            real_robot::check(&experiment, true)?;
             (experiment.scene, experiment.backend)
         }
         false => (Scene::load(&path, &args.set)?, BackendSettings::default()),

@@ -2,17 +2,16 @@
 
 use super::compare;
 use super::find::{EXPERIMENTS, find};
-use super::host::Bring;
+use super::host::Host;
 use super::prepare::{bound_threads, ready, simulation};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::terminal::{Ending, Talk, error, print};
 use crate::config::ConfigError;
+use crate::error::Invalid;
 use crate::experiment::experiment::Experiment;
-use crate::experiment::runner::lab_runner::{self, Halt, Outcome};
-use crate::experiment::runner::shard::Shard;
-use crate::experiment::runner::{self, Progress, RunError};
+use crate::experiment::runner::{self, Progress, Shard};
 use crate::experiment::statistics::analysis::Analysis;
-use crate::experiment::store::{Content, JOURNAL, RECORDINGS, Run, RunFolder, Tally};
+use crate::experiment::store::{Journal, RECORDINGS, Run, RunFolder, Tally};
 use crate::experiment::sweep::cells;
 use crate::experiment::trial::row::TrialId;
 use crate::explore::planner;
@@ -87,7 +86,7 @@ impl Args {
     }
 }
 
-pub(super) fn run(args: &Args, talk: Talk, bring: &Bring) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, talk: Talk, host: &Host) -> anyhow::Result<Ending> {
     let path = find(&args.experiment, EXPERIMENTS)?;
     let cells = cells(&path)?;
     bound_threads(args.threads)?;
@@ -95,7 +94,7 @@ pub(super) fn run(args: &Args, talk: Talk, bring: &Bring) -> anyhow::Result<Endi
     if cells.is_empty() {
         let out = args.out.clone();
         let experiment = with_planners(args, |sets| Experiment::load(&path, sets))?;
-        return run_one(args, experiment, out, &mut stop, (talk, bring));
+        return run_one(args, experiment, out, &mut stop, (talk, host));
     }
     // All of them are looked at before the first is run.
     let load = |cell| with_planners(args, |sets| Experiment::load_cell(&path, cell, sets));
@@ -107,7 +106,7 @@ pub(super) fn run(args: &Args, talk: Talk, bring: &Bring) -> anyhow::Result<Endi
     for experiment in experiments {
         let part = if args.out.is_none() { args.suffix() } else { String::new() };
         paths.push(folder.join(format!("{}{part}", experiment.name)));
-        match run_one(args, experiment, paths.last().cloned(), &mut stop, (talk, bring))? {
+        match run_one(args, experiment, paths.last().cloned(), &mut stop, (talk, host))? {
             Ending::Done => (),
             other => return Ok(other),
         }
@@ -173,7 +172,8 @@ struct Made {
     tally: Tally,
     /// How many there should be.
     total: u64,
-    halt: Option<Halt>,
+    /// Where and why a real arm stopped, and what is kept.
+    halt: Option<String>,
 }
 
 impl Made {
@@ -208,11 +208,11 @@ fn make(
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
-    (talk, bring): (Talk, &Bring),
+    (talk, host): (Talk, &Host),
 ) -> anyhow::Result<Made> {
     let own = experiment.planners.iter().filter(|name| planner::is_own(name));
     let (own, lacking): (Vec<_>, Vec<_>) =
-        own.filter_map(|name| bring(name)).partition(Result::is_ok);
+        own.filter_map(|name| (host.bring)(name)).partition(Result::is_ok);
     let simulation = simulation(experiment, talk)?;
     let mut simulation = simulation.with_planners(own.into_iter().flatten().collect());
     let experiment = simulation.experiment();
@@ -229,13 +229,11 @@ fn make(
     let path = out.unwrap_or_else(|| {
         PathBuf::from("runs").join(format!("{}{}", experiment.name, args.suffix()))
     });
-    let content = Content::of(&simulation)?;
-    let (mut folder, done) =
-        RunFolder::open(&path, experiment, simulation.truth(), &content, args.fresh)?;
+    let (mut folder, done) = RunFolder::open(&path, &simulation, host.commit, args.fresh)?;
     // Before an arm is looked for: another program may hold the folder, or a fault may want an
     // operator.
     if simulation.is_real() {
-        if let Some(reason) = folder.journal()?.halted().filter(|_| !args.clear_fault) {
+        if let Some(reason) = Journal::open(&path)?.halted().filter(|_| !args.clear_fault) {
             bail!(
                 "{}: the run was halted by a fault: {reason}\nlook at the arm, then go on with \
                  --clear-fault, or use --fresh to start again",
@@ -259,7 +257,7 @@ fn make(
     };
 
     // One that cannot be brought is no harm where all its trials are there.
-    let why = |error: RunError| lacking.into_iter().find_map(Result::err).unwrap_or(error.into());
+    let why = |error: Invalid| lacking.into_iter().find_map(Result::err).unwrap_or(error.into());
     let mut jobs = runner::jobs(&simulation, &done).map_err(why)?;
     if let Some(shard) = args.shard {
         shard.keep(&mut jobs);
@@ -269,25 +267,23 @@ fn make(
     let begun = Instant::now();
     let threads = args.threads.into();
     let tick = |progress: Progress| touch_step(talk, &bar, experiment, progress);
-    let outcome = match simulation.is_real() {
+    let (count, halt) = match simulation.is_real() {
         true => {
             let rows = (&mut folder, done.as_slice());
-            lab_runner::run(&simulation, rows, stop, recorded, &tick)?
+            runner::run_real(&simulation, rows, stop, recorded, &tick)?
         }
         false => {
             let rows = (&mut folder, jobs);
-            let finished = runner::run(&simulation, rows, threads, stop, recorded, &tick)?;
-            Outcome { finished, halt: None }
+            (runner::run(&simulation, rows, threads, stop, recorded, &tick)?, None)
         }
     };
-    let count = outcome.finished;
     bar.finish_and_clear();
     let tally = folder.sort(experiment)?;
     let mut words = format!("{count} trials in {:.1} s", begun.elapsed().as_secs_f64());
     if !done.is_empty() {
         words += &format!(", {} were there already", done.len());
     }
-    Ok(Made { path, words, tally, total, halt: outcome.halt })
+    Ok(Made { path, words, tally, total, halt })
 }
 
 fn run_one(
@@ -295,9 +291,9 @@ fn run_one(
     experiment: Experiment,
     out: Option<PathBuf>,
     stop: &mut Option<Arc<AtomicBool>>,
-    (talk, bring): (Talk, &Bring),
+    (talk, host): (Talk, &Host),
 ) -> anyhow::Result<Ending> {
-    let made = make(args, experiment, out, stop, (talk, bring))?;
+    let made = make(args, experiment, out, stop, (talk, host))?;
     let Made { path, words, total, halt, .. } = &made;
     // A part of a run is not looked at: its rows need not fit into memory.
     if args.shard.is_some() {
@@ -325,11 +321,10 @@ fn run_one(
         true => print(&format!("{:#}", report::tables::summary::json(&run)))?,
         false => print(&text)?,
     }
-    if let Some(Halt { planner, trial, touches, reason }) = halt {
+    if let Some(halt) = halt {
         let kept = format!(
-            "{planner}, trial {trial}: {reason}\n{touches} touches of it are kept in {}; mend what is \
-             wrong, and the same command goes on (--clear-fault clears what the arm's side has latched)",
-            path.join(JOURNAL).display()
+            "{halt}; mend what is wrong, and the same command goes on (--clear-fault clears what the \
+             arm's side has latched)"
         );
         let is_asked = stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed));
         if !is_asked {

@@ -5,9 +5,9 @@ use super::output::{Force, make_folder};
 use super::prepare::{environment, needs_zone, simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
+use crate::backend::Fault;
 use crate::experiment::store::write_whole;
 use crate::experiment::truth::scan;
-use crate::experiment::truth::scan::ScanTouch;
 use crate::explore::probe::Touch;
 use crate::report::points::Points;
 use crate::report::{files, scan as drawing};
@@ -69,11 +69,13 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let stop = stop_on_interrupt("rows")?;
     let bar = progress_bar(talk, &name, "rows", grid[1] as u64, 0);
     let simulator = simulator(&environment, talk)?;
-    let touches = scan::scan(&simulator, grid, args.threads.into(), &stop, &|| step(talk, &bar))?;
+    let targets = scan::targets(zone, grid);
+    let (rows, threads) = ((targets.as_slice(), grid[0]), args.threads.into());
+    let touches = scan::scan(&simulator, rows, threads, &stop, &|| step(talk, &bar))?;
     bar.finish_and_clear();
     let Some(touches) = touches else { return Ok(Ending::Interrupted) };
 
-    let points = touches.iter().filter_map(|one| match &one.touch {
+    let points = touches.iter().filter_map(|touch| match touch {
         Ok(Touch::Contact(contact)) => Some((contact.p_wc, contact.normal_w)),
         _ => None,
     });
@@ -91,12 +93,12 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     };
     make_folder(&folder)?;
     write_whole(&folder.join("cloud.ply"), cloud.ply())?;
-    write_whole(&folder.join("cloud.csv"), csv(&touches))?;
+    write_whole(&folder.join("cloud.csv"), csv(&targets, &touches))?;
     let height_m = |place: &[f64]| environment.true_height_m(place);
     if let Some(svg) = drawing::picture((zone, mesh, &height_m), &cloud.points) {
         files::write(&folder.join("scan.svg"), &svg)?;
     }
-    let faults = touches.iter().filter(|one| one.touch.is_err()).count();
+    let faults = touches.iter().filter(|touch| touch.is_err()).count();
     print(&format!(
         "{name}: {} points of contact, {} misses, {faults} faults\nfolder: {}",
         cloud.points.len(),
@@ -107,10 +109,10 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
 }
 
 /// A line per target: where it was, how the touch ended, and the contact with its normal.
-fn csv(touches: &[ScanTouch]) -> String {
+fn csv(targets: &[Vec<f64>], touches: &[Result<Touch, Fault>]) -> String {
     let mut text =
         String::from("target_x_m,target_z_m,outcome,x_m,y_m,z_m,normal_x,normal_y,normal_z\n");
-    for ScanTouch { target, touch } in touches {
+    for (target, touch) in targets.iter().zip(touches) {
         let place = target.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         let ending = match touch {
             Ok(Touch::Contact(contact)) => {

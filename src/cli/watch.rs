@@ -75,7 +75,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let number = args.trial;
     // The window has to be drawn by the main thread.
     let worker = std::thread::spawn(move || {
-        let row = simulation.trial_with(&mut probe, planner, number);
+        let row = simulation.trial_with(&mut probe, planner, number, &mut |_| Ok(()));
         let _ = print(&ending(&row));
     });
     let drawn = show(window, &sight);

@@ -207,25 +207,23 @@ impl Experiment {
 
     /// Planners whose beliefs are drawn.
     pub fn drawn_planners(&self) -> Vec<&str> {
-        let chosen = self.listed(self.report.planners.iter().map(String::as_str));
-        match chosen.is_empty() {
-            true => self.planners.iter().map(String::as_str).collect(),
-            false => chosen,
-        }
+        self.first_listed([&self.report.planners, &self.planners])
     }
 
     /// Planners that the others are held against.
     pub fn baselines(&self) -> Vec<&str> {
-        let chosen = self.listed(self.report.baselines.iter().map(String::as_str));
-        let usual = || self.listed(BASELINES);
-        let all = || self.planners.iter().map(String::as_str).collect();
-        [chosen, usual()].into_iter().find(|found| !found.is_empty()).unwrap_or_else(all)
+        let usual = BASELINES.map(String::from);
+        self.first_listed([&self.report.baselines, &usual, &self.planners])
     }
 
-    /// Those of `names` that are among the planners compared.
-    fn listed<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
-        let is_listed = |name: &&str| self.planners.iter().any(|planner| planner == name);
-        names.into_iter().filter(is_listed).collect()
+    /// The planners compared that are in the first of `lists` that has one of them.
+    fn first_listed<const N: usize>(&self, lists: [&[String]; N]) -> Vec<&str> {
+        let listed = |name: &String| {
+            let planner = self.planners.iter().find(|planner| *planner == name);
+            planner.map(String::as_str)
+        };
+        let listed = |names: &[String]| names.iter().filter_map(listed).collect::<Vec<&str>>();
+        lists.into_iter().map(listed).find(|names| !names.is_empty()).unwrap_or_default()
     }
 
     /// The error that planners are judged by.
@@ -260,20 +258,17 @@ impl Experiment {
 
     /// Touch counts after which beliefs are drawn.
     pub fn drawn_touch_counts(&self) -> Vec<u32> {
-        let possible = self.initial_touches..=self.touches;
-        let mut chosen: Vec<u32> = (self.report.touch_counts.iter().copied())
-            .filter(|count| possible.contains(count))
-            .collect();
-        chosen.sort_unstable();
-        chosen.dedup();
-        if !chosen.is_empty() {
-            return chosen;
+        let mut counts = self.report.touch_counts.clone();
+        counts.retain(|count| (self.initial_touches..=self.touches).contains(count));
+        counts.sort_unstable();
+        if counts.is_empty() {
+            let planned = self.touches - self.initial_touches;
+            let compared = |third: u32| {
+                let count = self.initial_touches + planned * third / 3;
+                (count..self.touches).find(|&count| self.is_compared(count))
+            };
+            counts = (1..=3).map(|third| compared(third).unwrap_or(self.touches)).collect();
         }
-        let planned = self.touches - self.initial_touches;
-        let third = |third: u32| self.initial_touches + planned * third / 3;
-        let compared = |count: u32| (count..self.touches).find(|&count| self.is_compared(count));
-        let mut counts: Vec<u32> =
-            (1..=3).map(|i| compared(third(i)).unwrap_or(self.touches)).collect();
         counts.dedup();
         counts
     }

@@ -8,16 +8,11 @@ use crate::error::Invalid;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::notice;
-use crate::experiment::notice::Notice;
-use crate::experiment::real_robot::{self, MissingForRobot};
-use crate::experiment::trial::GroundTruth;
+use crate::experiment::real_robot;
 use crate::experiment::trial::entrant::{Entrant, ORACLE};
 use crate::experiment::trial::row::TrialRow;
-use crate::experiment::trial::trial;
-use crate::experiment::trial::witness::Witness;
+use crate::experiment::trial::{self, GroundTruth, TrialObserver};
 use crate::experiment::truth::Truth;
-use crate::experiment::truth::cloud::CloudError;
-use crate::experiment::truth::scan_truth::LeftOut;
 use crate::explore::planner::{self, PlannerFactory};
 use crate::explore::probe::Probe;
 use crate::explore::probe::servo::Servo;
@@ -27,39 +22,19 @@ use crate::sim::simulator::Simulator;
 use crate::task::Task;
 use rand::RngExt;
 use std::sync::Arc;
-use thiserror::Error;
 
 /// An experiment with everything that its trials share: the scene built, its models compiled, the
 /// truth sampled. It never changes, and threads share it.
 pub struct Simulation {
     experiment: Experiment,
     simulator: Simulator,
-    truth: Truth,
-    /// The true surface of a whole object, where that is explored.
-    shape: Option<TrueShape>,
+    truth: GroundTruth,
     /// The arm that touches in place of the simulated body, once it is connected.
     lab: Option<Arc<Lab>>,
-    /// How far the truth may itself be off, if it was scanned.
-    left_out: Option<LeftOut>,
+    /// The notice about a truth that was scanned.
+    scanned: Option<String>,
     /// Planners that are not built in.
     own_planners: Vec<Box<dyn PlannerFactory>>,
-}
-
-/// An experiment that cannot be simulated.
-#[derive(Debug, Error)]
-pub enum SimulationError {
-    /// It moves a real robot and lacks settings that protect it.
-    #[error(transparent)]
-    MissingForRobot(#[from] MissingForRobot),
-    /// Its scene cannot be built, or its body cannot be made.
-    #[error(transparent)]
-    Invalid(#[from] Invalid),
-    /// The scan that is its truth cannot be read.
-    #[error(transparent)]
-    Cloud(#[from] CloudError),
-    /// No surface at any test place.
-    #[error("no place of the zone has a surface along the approach: nothing to explore")]
-    NoSurface,
 }
 
 impl Simulation {
@@ -67,7 +42,7 @@ impl Simulation {
     ///
     /// # Errors
     /// If the scene cannot be built or simulated, or the zone has no surface.
-    pub fn new(experiment: Experiment) -> Result<Self, SimulationError> {
+    pub fn new(experiment: Experiment) -> Result<Self, Invalid> {
         Self::new_telling(experiment, &|_| ())
     }
 
@@ -76,23 +51,17 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn new_telling(
-        mut experiment: Experiment,
-        tell: &dyn Fn(&str),
-    ) -> Result<Self, SimulationError> {
-        real_robot::check(&experiment)?;
+    pub fn new_telling(mut experiment: Experiment, tell: &dyn Fn(&str)) -> Result<Self, Invalid> {
+        real_robot::check(&experiment, false)?;
         if experiment.backend.kind != BackendKind::Simulated {
             // Otherwise taken from the mesh.
             if let Some(zone) = &mut experiment.scene.zone {
                 zone.datum_y_m.get_or_insert(0.0);
             }
         }
-        let environment = Environment::build_telling(experiment.scene.clone(), tell)?;
-        let (truth, left_out) = sampled(&experiment, &environment, tell)?;
-        let shape = TrueShape::of(&environment);
-        tell("compiling the model");
-        let simulation = Self::against(experiment, Arc::new(environment), truth)?;
-        Ok(Self { left_out, shape, ..simulation })
+        let environment = Environment::build_telling(experiment.scene.clone(), tell);
+        let environment = environment.map_err(|error| Invalid::new(error.to_string()))?;
+        Self::sampled(experiment, Arc::new(environment), tell)
     }
 
     /// As [`new`](Self::new), in an environment that is there already; its scene takes the place of
@@ -100,13 +69,34 @@ impl Simulation {
     ///
     /// # Errors
     /// If it cannot be simulated, or the zone has no surface.
-    pub fn within(
+    pub fn within(experiment: Experiment, environment: Arc<Environment>) -> Result<Self, Invalid> {
+        Self::sampled(experiment, environment, &|_| ())
+    }
+
+    /// In an environment whose truth is sampled as the experiment asks.
+    fn sampled(
         experiment: Experiment,
         environment: Arc<Environment>,
-    ) -> Result<Self, SimulationError> {
-        let (truth, left_out) = sampled(&experiment, &environment, &|_| ())?;
+        tell: &dyn Fn(&str),
+    ) -> Result<Self, Invalid> {
+        let per_side = experiment.grid as usize;
+        let (truth, scanned) = match (environment.task().zone(), &experiment.truth) {
+            (Some(zone), Some(scan)) => {
+                let (truth, contacts, rmse_m) = scan.sample(zone, per_side)?;
+                (truth, Some(notice::of_scan(contacts, rmse_m)))
+            }
+            _ => (Truth::sample_telling(&environment, per_side, tell), None),
+        };
+        if environment.task().zone().is_some() && !truth.is_known() {
+            return Err(Invalid::new(
+                "no place of the zone has a surface along the approach: nothing to explore",
+            ));
+        }
         let shape = TrueShape::of(&environment);
-        Ok(Self { left_out, shape, ..Self::against(experiment, environment, truth)? })
+        tell("compiling the model");
+        let mut simulation = Self::against(experiment, environment, truth)?;
+        simulation.truth.shape = shape;
+        Ok(Self { scanned, ..simulation })
     }
 
     /// As [`within`](Self::within), held against a `truth` that was sampled before; an unknown one
@@ -118,15 +108,15 @@ impl Simulation {
         mut experiment: Experiment,
         environment: Arc<Environment>,
         truth: Truth,
-    ) -> Result<Self, SimulationError> {
+    ) -> Result<Self, Invalid> {
         experiment.scene = environment.scene().clone();
+        let simulator = Simulator::new(Arc::clone(&environment));
         Ok(Self {
             experiment,
-            simulator: Simulator::new(environment)?,
-            truth,
-            shape: None,
+            simulator: simulator.map_err(|error| Invalid::new(error.to_string()))?,
+            truth: GroundTruth { environment, truth, shape: None },
             lab: None,
-            left_out: None,
+            scanned: None,
             own_planners: Vec::new(),
         })
     }
@@ -166,22 +156,21 @@ impl Simulation {
 
     /// What of the experiment may not be meant.
     pub fn notices(&self) -> Vec<String> {
-        let scene = self.simulator.notices().into_iter();
-        let truth = notice::of_truth(self.task().zone(), &self.truth).into_iter();
-        let left_out = self.left_out.map(Notice::FromScan).into_iter();
-        let shape = self.shape.as_ref().and_then(notice::of_shape);
-        let told = truth.chain(left_out).chain(shape).map(|notice| notice.to_string());
-        scene.chain(told).collect()
+        let mut notices: Vec<String> = self.simulator.notices();
+        notices.extend(notice::of_truth(self.task().zone(), self.truth()));
+        notices.extend(self.scanned.clone());
+        notices.extend(self.shape().and_then(notice::of_shape));
+        notices
     }
 
     /// The truth on the test grid.
     pub fn truth(&self) -> &Truth {
-        &self.truth
+        &self.truth.truth
     }
 
     /// The true surface of a whole object; none where one side is explored.
     pub fn shape(&self) -> Option<&TrueShape> {
-        self.shape.as_ref()
+        self.truth.shape.as_ref()
     }
 
     /// What the robot is told.
@@ -247,69 +236,22 @@ impl Simulation {
 
     /// Runs one trial of `planner` from start to end; what goes wrong stands in its row.
     pub fn trial<'a>(&self, planner: impl Into<Entrant<'a>>, trial: u32) -> TrialRow {
-        self.trial_seen(planner, trial, &mut ())
-    }
-
-    /// Runs a trial like [`trial`](Self::trial); `witness` sees every touch.
-    pub fn trial_seen<'a>(
-        &self,
-        planner: impl Into<Entrant<'a>>,
-        trial: u32,
-        witness: &mut dyn Witness,
-    ) -> TrialRow {
         let planner = planner.into();
         match self.probe(trial) {
-            Ok(mut probe) => self.trial_before(&mut *probe, planner, trial, witness),
+            Ok(mut probe) => self.trial_with(&mut *probe, planner, trial, &mut |_| Ok(())),
             Err(fault) => TrialRow::unstarted(trial, planner.name(), &fault),
         }
     }
 
-    /// As [`trial`](Self::trial), with the touches of any `probe`.
+    /// Runs a trial like [`trial`](Self::trial) with the touches of any `probe`, and calls
+    /// `observer` after each.
     pub fn trial_with<'a>(
         &self,
         probe: &mut dyn Probe,
         planner: impl Into<Entrant<'a>>,
         trial: u32,
+        observer: &mut TrialObserver,
     ) -> TrialRow {
-        self.trial_before(probe, planner, trial, &mut ())
-    }
-
-    /// As [`trial_with`](Self::trial_with), with `witness` told of every touch.
-    pub fn trial_before<'a>(
-        &self,
-        probe: &mut dyn Probe,
-        planner: impl Into<Entrant<'a>>,
-        trial: u32,
-        witness: &mut dyn Witness,
-    ) -> TrialRow {
-        let truth = GroundTruth {
-            environment: self.environment(),
-            truth: &self.truth,
-            shape: self.shape.as_ref(),
-        };
-        trial::run(&self.experiment, &truth, probe, planner.into(), trial, witness)
-    }
-}
-
-/// The truth that an experiment asks for, and how far it may be off, if it was scanned.
-fn sampled(
-    experiment: &Experiment,
-    environment: &Environment,
-    tell: &dyn Fn(&str),
-) -> Result<(Truth, Option<LeftOut>), SimulationError> {
-    let per_side = experiment.grid as usize;
-    let Some(zone) = environment.task().zone() else {
-        return Ok((Truth::around(environment.mesh()), None));
-    };
-    let (truth, left_out) = match &experiment.truth {
-        Some(scan) => {
-            let (truth, left_out) = scan.sample(zone, per_side)?;
-            (truth, Some(left_out))
-        }
-        None => (Truth::sample_telling(environment, per_side, tell), None),
-    };
-    match truth.is_known() {
-        true => Ok((truth, left_out)),
-        false => Err(SimulationError::NoSurface),
+        trial::run(&self.experiment, &self.truth, probe, (planner.into(), trial), observer)
     }
 }

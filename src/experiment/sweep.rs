@@ -1,7 +1,7 @@
 //! Several experiments in one file: every combination of the values in its table `[sweep]`.
 
 use crate::config::{ConfigError, Loader};
-use crate::experiment::experiment::{Experiment, SWEEP};
+use crate::experiment::experiment::{Experiment, SWEEP, is_plain};
 use std::path::Path;
 use toml::Value;
 
@@ -90,7 +90,6 @@ fn label(key: &str, value: &Value, place: usize) -> String {
         Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => value.to_string(),
         _ => String::new(),
     };
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     match !text.is_empty() && text.chars().all(is_plain) {
         true => format!("{key}-{text}"),
         false => format!("{key}-{}", place + 1),

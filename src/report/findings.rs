@@ -9,7 +9,6 @@ use crate::experiment::measure::{
     CENTRED_R, CHAMFER, COVERAGE, EDGE_RMSE, Measure, R, REPEATABILITY, RMSE,
     VERIFICATION_COVERAGE, VERIFICATION_RMSE,
 };
-use crate::experiment::notice;
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::statistics::summary;
 use crate::experiment::statistics::summary::CurvePoint;
@@ -23,8 +22,7 @@ pub fn notices(run: &Run) -> Vec<String> {
     let total = run.experiment.trials as usize * run.experiment.planners.len();
     let is_partial = run.rows.len() < total;
     let partial = format!("Only {} of {total} trials are finished.", run.rows.len());
-    let told = notice::of_run(run).into_iter().map(|notice| notice.to_string());
-    is_partial.then_some(partial).into_iter().chain(told).collect()
+    is_partial.then_some(partial).into_iter().chain(run.notices()).collect()
 }
 
 /// Sentences, the most important first.

@@ -5,7 +5,6 @@
 //! exp(mean log RMSE), in units of the reference planner's in the same trial, so that objects of
 //! different sizes count alike. Less is better, and the reference has 1.
 
-use super::check::baseline::span;
 use super::check::judged::JUDGED;
 use crate::error::Invalid;
 use crate::experiment::measure::outline::TENTHS;
@@ -125,10 +124,9 @@ pub fn compare(runs: &[(String, Run)], against: &str) -> Result<Compared, Invali
 
 /// Mean log RMSE of a planner's finished trials.
 fn logs(run: &Run, planner: &str) -> HashMap<u32, f64> {
-    let span = span(&run.experiment);
     let of = JUDGED[0].of;
     let finished = of_planner(&run.rows, planner).filter(|row| row.failure.is_none());
-    finished.filter_map(|row| Some((row.trial, of(row, span)?))).collect()
+    finished.filter_map(|row| Some((row.trial, of(row, &run.experiment)?))).collect()
 }
 
 /// The results of a planner in units of `unit`, the mean log RMSE of the reference's trials.

@@ -6,9 +6,9 @@ use palpate::explore::belief::Belief;
 use palpate::explore::planner::{self, Entry, Plan, PlanError, Planner};
 use palpate::math::seed;
 use palpate::study::check::baseline::Line;
-use palpate::study::check::judged::{JUDGED, Span};
+use palpate::study::check::held::of_planner;
+use palpate::study::check::judged::JUDGED;
 use palpate::study::check::sequence::Sequence;
-use palpate::study::check::verdict::of_planner;
 use palpate::study::check::{Baseline, Rules, Verdict, hold};
 use rand::RngExt;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
@@ -224,12 +224,12 @@ fn one_check(name: &str, seed: u64, old: &Entry, new: &Entry) -> (Verdict, usize
     let path = format!("experiments/{name}.toml");
     let mut experiment = Experiment::load(Path::new(&path), &[]).unwrap();
     experiment.seed = seed;
-    let span = Span { initial: experiment.initial_touches, touches: experiment.touches };
     let simulation = Simulation::new(experiment).unwrap();
     let rules = Rules::default();
     let mut differences: Vec<_> = JUDGED.iter().map(|judged| (judged, Vec::new())).collect();
     for trial in 0..50 {
-        let [was, is] = [old, new].map(|entry| Line::of(&simulation.trial(entry, trial), span));
+        let [was, is] = [old, new]
+            .map(|entry| Line::of(&simulation.trial(entry, trial), simulation.experiment()));
         for (judged, values) in &mut differences {
             values.push(is.values[judged.id] - was.values[judged.id]);
         }

@@ -328,5 +328,5 @@ fn imports_are_read_whole() {
     let path = |text: &str| -> Module { text.split('/').map(str::to_owned).collect() };
     // Through a name that a front page passes on, and through one in the midst of an expression.
     assert!(edges[&path("explore/belief/height_field")].contains(&path("task/zone")));
-    assert!(edges[&path("experiment/trial/exploration")].contains(&path("explore/belief")));
+    assert!(edges[&path("experiment/trial")].contains(&path("explore/belief")));
 }

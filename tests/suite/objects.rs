@@ -3,7 +3,6 @@
 use crate::common::program::palpate;
 use palpate::experiment::sweep::cells;
 use palpate::experiment::{Experiment, Simulation};
-use palpate::study::check::baseline::span;
 use palpate::study::check::judged::JUDGED;
 use palpate::study::compare::{Compared, Contender, ObjectResult, gap_closed, geometric};
 use proptest::prelude::*;
@@ -59,7 +58,6 @@ fn every_object_counts_once() {
 
 /// Mean log RMSE over the touches of a planner's first trials.
 fn logs(experiment: Experiment, names: &[&str], trials: u32) -> Vec<f64> {
-    let span = span(&experiment);
     let simulation = Simulation::new(experiment).unwrap();
     let of = |name: &&str| {
         let planner = simulation.planner(name).unwrap();
@@ -67,7 +65,7 @@ fn logs(experiment: Experiment, names: &[&str], trials: u32) -> Vec<f64> {
         let logs = rows.map(|row| {
             let is_whole = row.failure.is_none();
             assert!(is_whole && row.touches.iter().all(|it| it.stall.is_none()), "{name}");
-            (JUDGED[0].of)(&row, span).unwrap()
+            (JUDGED[0].of)(&row, simulation.experiment()).unwrap()
         });
         logs.sum::<f64>() / f64::from(trials)
     };

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use palpate::experiment::sweep::cells;
-use palpate::experiment::trial::resumed::Resumed;
+use palpate::experiment::trial::recorded_trial::Resumed;
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::belief::HeightField;
 use palpate::explore::gp_settings::GpSettings;
@@ -143,10 +143,9 @@ fn a_trial_goes_on_where_it_was_broken_off() {
     let made = whole.touches[..15].to_vec();
     assert!(made.iter().any(|touch| touch.contact.is_none()));
     assert!(whole.touches.iter().all(|touch| touch.tip.is_some() == touch.contact.is_none()));
-    let finger = simulation.environment().scene().finger.clone();
     let mut probe = simulation.probe(0).unwrap();
-    let mut resumed = Resumed::new(made, finger, &mut *probe);
-    assert_eq!(simulation.trial_with(&mut resumed, planner, 0), whole);
+    let mut resumed = Resumed::new(made, &simulation, &mut *probe);
+    assert_eq!(simulation.trial_with(&mut resumed, planner, 0, &mut |_| Ok(())), whole);
 }
 
 /// Defaults and constants are chosen with one half of the suite and held against the other.

@@ -14,10 +14,10 @@ use palpate::backend::ros::message::{BioTacHand, JointState, JointTrajectory, Wr
 use palpate::backend::{
     Backend, Capabilities, Command, Fault, IdealContact, Reading, Sample, Wrench,
 };
+use palpate::experiment::trial::Touched;
 use palpate::experiment::trial::recorded_trial::{self, next_part, parts, recording_path};
 use palpate::experiment::trial::replay::{self, Difference, ReplayError};
 use palpate::experiment::trial::row::TouchRow;
-use palpate::experiment::trial::witness::{Touched, Witness};
 use palpate::experiment::{Entrant, Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::robot::finger::Frame;
@@ -505,7 +505,7 @@ fn record(folder: &Path, sets: &[&str]) -> (Simulation, PathBuf) {
     let active = Entrant::from(planner::by_name("active").unwrap());
     let path = recording_path(folder, active, 0);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    let row = recorded_trial::run(&simulation, active, 0, &path);
+    let row = recorded_trial::run(&simulation, (active, 0), Some(&path), &[], &mut |_| Ok(()));
     let bare = simulation.trial(active, 0);
     assert_eq!(row.failure, None);
     assert_eq!(serde_json::to_string(&row).unwrap(), serde_json::to_string(&bare).unwrap());
@@ -615,24 +615,6 @@ fn the_program_records_and_replays() {
     assert_eq!(fs::read_dir(path.join("run/recordings")).unwrap().count(), 0);
 }
 
-/// Keeps the touches of a trial and interrupts it after some of them.
-struct Interrupts {
-    made: Vec<TouchRow>,
-    after: u32,
-}
-
-impl Witness for Interrupts {
-    fn touched(&mut self, touched: &Touched) -> Result<(), Fault> {
-        if touched.count as usize > self.made.len() {
-            self.made.push(touched.row.clone());
-        }
-        match touched.count == self.after {
-            true => Err(Fault::Stopped { time_s: touched.row.time_s.unwrap() }),
-            false => Ok(()),
-        }
-    }
-}
-
 /// Each part replays by itself, and the program replays them as one.
 #[test]
 fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
@@ -641,13 +623,22 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     let active = Entrant::from(planner::by_name("active").unwrap());
     let path = recording_path(folder.path(), active, 0);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    let mut interrupts = Interrupts { made: Vec::new(), after: 0 };
+    let mut kept: Vec<TouchRow> = Vec::new();
     let touched = [2, 4, 5];
     for after in touched {
-        interrupts.after = after;
-        let (part, made) = (next_part(&path), interrupts.made.clone());
-        let row = recorded_trial::go_on(&simulation, active, 0, &part, &made, &mut interrupts);
-        assert_eq!(row.touches, interrupts.made);
+        let (part, made) = (next_part(&path), kept.clone());
+        let mut interrupt = |touched: &Touched| {
+            if touched.count as usize > kept.len() {
+                kept.push(touched.row.clone());
+            }
+            match touched.count == after {
+                true => Err(Fault::Stopped { time_s: touched.row.time_s.unwrap() }),
+                false => Ok(()),
+            }
+        };
+        let job = (active, 0);
+        let row = recorded_trial::run(&simulation, job, Some(&part), &made, &mut interrupt);
+        assert_eq!(row.touches, kept);
         assert_eq!(row.touches.len(), after as usize);
     }
     let parts = parts(&path);

@@ -35,108 +35,72 @@ pub struct Metrics {
     pub nlpd: Option<f64>,
 }
 
-/// Running sum of squared errors.
-#[derive(Clone, Copy, Default)]
-pub(in crate::experiment) struct Errors {
-    count: f64,
-    squares: f64,
-}
-
-impl Errors {
-    pub(in crate::experiment) fn add(&mut self, error: f64) {
-        self.count += 1.0;
-        self.squares += error * error;
+/// Root mean square of some errors; `None` without one.
+pub(in crate::experiment) fn rmse(errors: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let (mut count, mut squares) = (0.0, 0.0);
+    for error in errors {
+        count += 1.0;
+        squares += error * error;
     }
-
-    pub(in crate::experiment) fn rmse(&self) -> Option<f64> {
-        (self.count > 0.0).then(|| (self.squares / self.count).sqrt())
-    }
+    (count > 0.0).then(|| f64::sqrt(squares / count))
 }
 
-/// Running sums of how errors compare with their believed variance.
-#[derive(Default)]
-pub(in crate::experiment) struct Calibration {
-    count: f64,
-    inside: f64,
-    nlpd: f64,
-}
-
-impl Calibration {
-    pub(in crate::experiment) fn add(&mut self, error: f64, variance: f64) {
+/// [Coverage](Metrics::coverage) and [NLPD](Metrics::nlpd) of some errors, each with its believed
+/// variance; `None` without one.
+pub(in crate::experiment) fn calibration(
+    errors: impl IntoIterator<Item = (f64, f64)>,
+) -> (Option<f64>, Option<f64>) {
+    let (mut count, mut inside, mut nlpd) = (0.0, 0.0, 0.0);
+    for (error, variance) in errors {
         // A belief without any noise may be sure to the last bit.
-        let variance = variance.max(f64::MIN_POSITIVE);
-        self.count += 1.0;
-        self.inside += f64::from(u8::from(error.abs() <= BAND_95 * variance.sqrt()));
-        self.nlpd += 0.5 * (std::f64::consts::TAU * variance).ln() + 0.5 * error * error / variance;
+        let variance = f64::max(variance, f64::MIN_POSITIVE);
+        count += 1.0;
+        inside += f64::from(u8::from(f64::abs(error) <= BAND_95 * variance.sqrt()));
+        nlpd += 0.5 * (std::f64::consts::TAU * variance).ln() + 0.5 * error * error / variance;
     }
-
-    /// Share inside the 95 % band, and mean negative log density.
-    pub(in crate::experiment) fn told(&self) -> (Option<f64>, Option<f64>) {
-        (self.mean(self.inside), self.mean(self.nlpd))
-    }
-
-    /// To four decimals: the rows keep one after every touch.
-    fn mean(&self, sum: f64) -> Option<f64> {
-        let mean = (1e4 * sum / self.count).round() / 1e4;
-        mean.is_finite().then_some(mean)
-    }
+    // To four decimals: the rows keep one after every touch.
+    let mean = |sum: f64| Some((1e4 * sum / count).round() / 1e4).filter(|mean| mean.is_finite());
+    (mean(inside), mean(nlpd))
 }
 
-/// Running sums of true heights f and believed heights g. The centred ones are updated by
-/// Welford's rule: a large common offset must not cancel what little the heights vary.
-#[derive(Default)]
-pub(in crate::experiment) struct Sums {
-    count: f64,
-    ff: f64,
-    gg: f64,
-    fg: f64,
-    mean_f: f64,
-    mean_g: f64,
-    spread_f: f64,
-    spread_g: f64,
-    covariance: f64,
-    errors: Errors,
-    max_error: f64,
-}
-
-impl Sums {
-    pub(in crate::experiment) fn add(&mut self, f: f64, g: f64) {
-        self.count += 1.0;
-        self.ff += f * f;
-        self.gg += g * g;
-        self.fg += f * g;
-        let (from_f, from_g) = (f - self.mean_f, g - self.mean_g);
-        self.mean_f += from_f / self.count;
-        self.mean_g += from_g / self.count;
-        self.spread_f += from_f * (f - self.mean_f);
-        self.spread_g += from_g * (g - self.mean_g);
-        self.covariance += from_f * (g - self.mean_g);
-        self.errors.add(f - g);
-        self.max_error = self.max_error.max((f - g).abs());
-    }
-
-    /// Everything, given the errors at the edge and where the finger reaches and does not.
-    pub(in crate::experiment) fn metrics(
-        &self,
-        [edge, reachable, unreachable]: [Errors; 3],
-        calibration: Calibration,
-    ) -> Metrics {
+impl Metrics {
+    /// Compares true heights f with believed heights g, without what is of a part of the zone and
+    /// without calibration. The centred sums are updated by Welford's rule: a large common offset
+    /// must not cancel what little the heights vary.
+    pub(in crate::experiment) fn of(heights: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let (mut count, mut squares, mut max_error_m) = (0.0, 0.0, 0.0_f64);
+        let [mut ff, mut gg, mut fg] = [0.0; 3];
+        let [mut mean_f, mut mean_g] = [0.0; 2];
+        let [mut spread_f, mut spread_g, mut covariance] = [0.0; 3];
+        for (f, g) in heights {
+            count += 1.0;
+            ff += f * f;
+            gg += g * g;
+            fg += f * g;
+            let (from_f, from_g) = (f - mean_f, g - mean_g);
+            mean_f += from_f / count;
+            mean_g += from_g / count;
+            spread_f += from_f * (f - mean_f);
+            spread_g += from_g * (g - mean_g);
+            covariance += from_f * (g - mean_g);
+            squares += (f - g) * (f - g);
+            max_error_m = max_error_m.max((f - g).abs());
+        }
         // A spread of rounding errors is none.
         let spread = |spread: f64, square: f64| {
             if spread > 1e3 * f64::EPSILON * f64::EPSILON * square { spread } else { 0.0 }
         };
-        let spreads = spread(self.spread_f, self.ff) * spread(self.spread_g, self.gg);
-        let (coverage, nlpd) = calibration.told();
-        Metrics {
-            r: ratio(self.fg, (self.ff * self.gg).sqrt()),
-            centred_r: ratio(self.covariance, spreads.sqrt()),
-            rmse_m: self.errors.rmse().unwrap_or(f64::NAN),
-            max_error_m: self.max_error,
-            edge_rmse_m: edge.rmse(),
-            reachable_rmse_m: reachable.rmse(),
-            unreachable_rmse_m: unreachable.rmse(),
-            coverage,
-            nlpd,
+        let spreads = spread(spread_f, ff) * spread(spread_g, gg);
+        Self {
+            r: ratio(fg, f64::sqrt(ff * gg)),
+            centred_r: ratio(covariance, spreads.sqrt()),
+            rmse_m: f64::sqrt(squares / count),
+            max_error_m,
+            edge_rmse_m: None,
+            reachable_rmse_m: None,
+            unreachable_rmse_m: None,
+            coverage: None,
+            nlpd: None,
         }
     }
 }
@@ -163,9 +127,7 @@ mod tests {
     use super::*;
 
     fn compare(pairs: &[(f64, f64)]) -> Metrics {
-        let mut sums = Sums::default();
-        pairs.iter().for_each(|&(truth, mean)| sums.add(truth, mean));
-        sums.metrics([Errors::default(); 3], Calibration::default())
+        Metrics::of(pairs.iter().copied())
     }
 
     /// Half of the toy is 1 and the other half has mean 1 and mean square 1.5, so a constant
@@ -218,9 +180,8 @@ mod tests {
     #[test]
     fn honest_errors_are_covered_and_score_the_entropy() {
         let sd: f64 = 1e-3;
-        let mut calibration = Calibration::default();
         let count = 20_000;
-        for i in 0..count {
+        let errors = (0..count).map(|i| {
             // Quantiles of the normal distribution, by bisection.
             let share = (f64::from(i) + 0.5) / f64::from(count);
             let (mut low, mut high) = (-9.0, 9.0);
@@ -229,11 +190,12 @@ mod tests {
                 let is_below = crate::math::normal::cumulative(middle) < share;
                 if is_below { low = middle } else { high = middle }
             }
-            calibration.add(sd * low, sd * sd);
-        }
-        let coverage = calibration.mean(calibration.inside).unwrap();
+            (sd * low, sd * sd)
+        });
+        let (coverage, nlpd) = calibration(errors);
+        let coverage = coverage.unwrap();
         assert!((coverage - 0.95).abs() < 1e-9, "{coverage}");
         let entropy = 0.5 * (std::f64::consts::TAU * std::f64::consts::E * sd * sd).ln();
-        assert!((calibration.mean(calibration.nlpd).unwrap() - entropy).abs() < 1e-3);
+        assert!((nlpd.unwrap() - entropy).abs() < 1e-3);
     }
 }

@@ -1,63 +1,238 @@
 //! The table of measures: the numbers by which trials are compared, and how each is reported.
 //!
-//! A measure is a line of [`MEASURES`]. The columns of `summary.csv` with their intervals, the
+//! A measure is an entry of [`MEASURES`]. The columns of `summary.csv` with their intervals, the
 //! lines of `comparison.csv`, the panels of the convergence figure, the tables of the page and the
-//! names that a claim may use all follow from that line.
+//! names that a claim may use all follow from that entry.
 
-mod closed_surface;
-mod effort;
-mod heights;
-#[allow(clippy::module_inception)]
-mod measure;
 pub mod metrics;
 pub mod outline;
 pub mod shape;
-mod silhouette;
-mod verification;
-mod verified;
 
-pub use closed_surface::CHAMFER;
-pub use heights::{CENTRED_R, COVERAGE, EDGE_RMSE, R, RMSE};
-pub use measure::{Aggregate, Direction, METRES, Measure, Scale, Unit};
-pub use verification::{REPEATABILITY, VERIFICATION_COVERAGE, VERIFICATION_RMSE};
+use self::Direction::{Less, More, Neither};
+use self::metrics::{Metrics, calibration, rmse};
+use self::outline::Outline;
+use self::shape::ShapeMetrics;
+use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
+use std::fmt;
 
-use crate::experiment::trial::row::TrialRow;
-
-/// Every measure, in the order of columns and panels; to add one, write it beside those of its kind
-/// and give it a line here.
+/// Every measure, in the order of columns and panels; to add one, give it an entry here.
 pub static MEASURES: &[Measure] = &[
-    heights::R,
-    heights::CENTRED_R,
-    heights::RMSE,
-    heights::EDGE_RMSE,
-    heights::REACHABLE_RMSE,
-    heights::UNREACHABLE_RMSE,
-    heights::MAX_ERROR,
-    heights::COVERAGE,
-    heights::COVERAGE_OFF,
-    heights::NLPD,
-    silhouette::PRESENCE_BRIER,
-    silhouette::SILHOUETTE_IOU,
-    silhouette::SILHOUETTE_WRONG,
-    closed_surface::CHAMFER,
-    closed_surface::CHAMFER_SHARE,
-    closed_surface::REACHABLE_CHAMFER,
-    closed_surface::F_1,
-    closed_surface::F_3,
-    closed_surface::VOLUME_ERROR,
-    closed_surface::AREA_ERROR,
-    closed_surface::IOU,
-    closed_surface::SHAPE_COVERAGE,
-    effort::PATH,
-    effort::TIME,
-    verification::VERIFICATION_RMSE,
-    verification::VERIFICATION_NLPD,
-    verification::VERIFICATION_COVERAGE,
-    verification::VERIFICATION_MISSED,
-    verification::REPEATABILITY,
-    effort::LENGTH_SCALE_X,
-    effort::LENGTH_SCALE_Z,
+    R,
+    CENTRED_R,
+    RMSE,
+    EDGE_RMSE,
+    measure(Less, "reachable_rmse_m", "RMSE where the finger reaches", MM, |row, n| {
+        metrics(row, n)?.reachable_rmse_m
+    })
+    .aggregated(Aggregate::Median)
+    .drawn(Scale::LogBeside(&UNREACHABLE_RMSE))
+    .untabled()
+    .error(),
+    UNREACHABLE_RMSE,
+    measure(Less, "max_error_m", "largest error", MM, |row, n| Some(metrics(row, n)?.max_error_m))
+        .aggregated(Aggregate::Median),
+    COVERAGE,
+    measure(Less, "coverage_off", "share in the 95 % band, away from 0.95", PLAIN, |row, n| {
+        Some((metrics(row, n)?.coverage? - HONEST).abs())
+    })
+    .untabled(),
+    measure(Less, "nlpd", "NLPD", PLAIN, |row, n| metrics(row, n)?.nlpd),
+    measure(Less, "presence_brier", "Brier score of where there is a surface", PLAIN, |row, n| {
+        Some(outline(row, n)?.brier)
+    }),
+    measure(More, "silhouette_iou", "silhouette, intersection over union", PLAIN, |row, n| {
+        Some(outline(row, n)?.iou)
+    })
+    .drawn(Scale::UpToOne),
+    measure(
+        Less,
+        "silhouette_wrong",
+        "share of the zone on the wrong side of the silhouette",
+        PLAIN,
+        |row, n| Some(outline(row, n)?.wrong_share),
+    )
+    .untabled(),
+    CHAMFER,
+    measure(Less, "chamfer_share", "Chamfer distance, of the diagonal", PERCENT, |row, n| {
+        shape(row, n)?.chamfer_share
+    })
+    .of_shapes(),
+    measure(Less, "reachable_chamfer_m", "distance of what the finger reaches", MM, |row, n| {
+        shape(row, n)?.reachable_chamfer_m
+    })
+    .aggregated(Aggregate::Median)
+    .untabled()
+    .of_shapes(),
+    measure(More, "f_1", "F-score at 1 % of the diagonal", PLAIN, |row, n| {
+        Some(shape(row, n)?.f_1)
+    })
+    .drawn(Scale::UpToOne)
+    .of_shapes(),
+    measure(More, "f_3", "F-score at 3 % of the diagonal", PLAIN, |row, n| {
+        Some(shape(row, n)?.f_3)
+    })
+    .of_shapes(),
+    measure(Neither, "volume_error", "believed volume, too much", PERCENT, |row, n| {
+        shape(row, n)?.volume_error
+    })
+    .of_shapes(),
+    measure(Neither, "area_error", "believed area, too much", PERCENT, |row, n| {
+        Some(shape(row, n)?.area_error)
+    })
+    .of_shapes(),
+    measure(More, "iou", "insides, intersection over union", PLAIN, |row, n| shape(row, n)?.iou)
+        .drawn(Scale::UpToOne)
+        .of_shapes(),
+    measure(
+        Neither,
+        "shape_coverage",
+        "share of the surface within two standard deviations",
+        PLAIN,
+        |row, n| shape(row, n)?.coverage,
+    )
+    .drawn(Scale::UpToOne)
+    .of_shapes(),
+    measure(Less, "path_m", "lateral travel", METRES, TrialRow::path_m).drawn(Scale::Linear),
+    measure(Less, "time_s", "time of the body", SECONDS, |row, n| touch(row, n)?.time_s),
+    VERIFICATION_RMSE,
+    measure(Less, "verification_nlpd", "NLPD at verification touches", PLAIN, |row, n| {
+        predicted(row, n)?.1
+    }),
+    VERIFICATION_COVERAGE,
+    measure(Less, "verification_missed", "verification touches without contact", PLAIN, missed),
+    REPEATABILITY,
+    measure(Neither, "length_scale_x_m", "length scale along x", MM, |row, n| {
+        length_scale(row, n, 0)
+    })
+    .aggregated(Aggregate::Median)
+    .untabled(),
+    measure(Neither, "length_scale_z_m", "length scale along z", MM, |row, n| {
+        length_scale(row, n, 1)
+    })
+    .aggregated(Aggregate::Median)
+    .untabled(),
 ];
+
+/// The share of the truth that an honest 95 % band holds.
+const HONEST: f64 = 0.95;
+
+/// Eq. 5 of Yi et al. 2016.
+pub const R: Measure =
+    measure(More, "r", "R (Eq. 5)", CORRELATION, |row, n| Some(metrics(row, n)?.r))
+        .drawn(Scale::UpToOne);
+
+/// The same after subtracting each one's mean.
+pub const CENTRED_R: Measure =
+    measure(More, "centred_r", "centred R", CORRELATION, |row, n| Some(metrics(row, n)?.centred_r))
+        .drawn(Scale::UpToOne);
+
+/// Root mean square error.
+pub const RMSE: Measure =
+    measure(Less, "rmse_m", "RMSE", MM, |row, n| Some(metrics(row, n)?.rmse_m))
+        .aggregated(Aggregate::Both)
+        .drawn(Scale::Log)
+        .error();
+
+/// Root mean square error in the outer tenth of the zone.
+pub const EDGE_RMSE: Measure =
+    measure(Less, "edge_rmse_m", "RMSE in the outer tenth", MM, |row, n| {
+        metrics(row, n)?.edge_rmse_m
+    })
+    .aggregated(Aggregate::Median)
+    .drawn(Scale::Log)
+    .error();
+
+const UNREACHABLE_RMSE: Measure =
+    measure(Less, "unreachable_rmse_m", "RMSE where it does not reach", MM, |row, n| {
+        metrics(row, n)?.unreachable_rmse_m
+    })
+    .aggregated(Aggregate::Median)
+    .untabled();
+
+/// Share of the truth inside the 95 % band.
+pub const COVERAGE: Measure =
+    measure(Neither, "coverage", "share in the 95 % band", PLAIN, |row, n| {
+        metrics(row, n)?.coverage
+    })
+    .drawn(Scale::UpToOne);
+
+/// Chamfer distance between the believed and the true surface of a whole object.
+pub const CHAMFER: Measure =
+    measure(Less, "chamfer_m", "Chamfer distance", MM, |row, n| shape(row, n)?.chamfer_m)
+        .aggregated(Aggregate::Both)
+        .drawn(Scale::Log)
+        .error()
+        .of_shapes();
+
+/// Root mean square error at touches that the last belief predicted and did not learn from.
+pub const VERIFICATION_RMSE: Measure =
+    measure(Less, "verification_rmse_m", "RMSE at verification touches", MM, |row, n| {
+        rmse(verified(row, n)?.filter_map(|touch| touch.error_m))
+    })
+    .aggregated(Aggregate::Both);
+
+/// Share of verification touches inside the 95 % band.
+pub const VERIFICATION_COVERAGE: Measure = measure(
+    Neither,
+    "verification_coverage",
+    "verification touches in the 95 % band",
+    PLAIN,
+    |row, n| predicted(row, n)?.0,
+);
+
+/// Root mean square difference of a touch from the one it repeats.
+pub const REPEATABILITY: Measure =
+    measure(Less, "repeatability_m", "difference of repeated touches", MM, |row, n| {
+        rmse(verification(row, n)?.iter().filter_map(|touch| touch.difference_m))
+    })
+    .aggregated(Aggregate::Both);
+
+fn touch(row: &TrialRow, count: u32) -> Option<&TouchRow> {
+    row.touches.get((count as usize).checked_sub(1)?)
+}
+
+fn metrics(row: &TrialRow, count: u32) -> Option<&Metrics> {
+    touch(row, count)?.metrics.as_ref()
+}
+
+fn outline(row: &TrialRow, count: u32) -> Option<&Outline> {
+    touch(row, count)?.outline.as_ref()
+}
+
+fn shape(row: &TrialRow, count: u32) -> Option<&ShapeMetrics> {
+    touch(row, count)?.shape.as_ref()
+}
+
+fn length_scale(row: &TrialRow, count: u32, axis: usize) -> Option<f64> {
+    let fit = touch(row, count)?.fit.as_ref()?;
+    fit.hyperparameters.length_scales.get(axis).copied()
+}
+
+/// The touches after the last of a trial; `None` unless that is number `touches`.
+fn verification(row: &TrialRow, touches: u32) -> Option<&[VerificationRow]> {
+    (row.touches.len() == touches as usize).then_some(&row.verification)
+}
+
+/// Those at new places.
+fn verified(row: &TrialRow, touches: u32) -> Option<impl Iterator<Item = &VerificationRow>> {
+    Some(verification(row, touches)?.iter().filter(|touch| touch.again.is_none()))
+}
+
+/// Coverage and NLPD of the errors at verification touches.
+fn predicted(row: &TrialRow, touches: u32) -> Option<(Option<f64>, Option<f64>)> {
+    let errors = verified(row, touches)?.filter_map(|touch| touch.error_m.zip(touch.sd_m));
+    Some(calibration(errors.map(|(error, sd)| (error, sd * sd))))
+}
+
+/// The share of verification touches that met nothing or were broken off.
+fn missed(row: &TrialRow, touches: u32) -> Option<f64> {
+    let (mut count, mut missed) = (0.0, 0.0);
+    for touch in verified(row, touches)? {
+        count += 1.0;
+        missed += f64::from(u8::from(touch.contact.is_none()));
+    }
+    (count > 0.0).then(|| missed / count)
+}
 
 /// The measures that have columns in files about `rows`.
 pub fn in_files(rows: &[TrialRow]) -> impl Iterator<Item = &'static Measure> {
@@ -68,6 +243,180 @@ pub fn in_files(rows: &[TrialRow]) -> impl Iterator<Item = &'static Measure> {
 /// The measure of a name in files.
 pub fn by_id(id: &str) -> Option<&'static Measure> {
     MEASURES.iter().find(|measure| measure.id == id)
+}
+
+/// A number of a trial after some touches, in SI units.
+#[derive(Clone, Copy)]
+pub struct Measure {
+    /// Its name in files, unit last.
+    pub id: &'static str,
+    /// Its name in words.
+    pub title: &'static str,
+    /// Its unit, in files and for readers.
+    pub unit: Unit,
+    /// Whether less or more of it is better.
+    pub direction: Direction,
+    /// The statistics reported of it over many trials.
+    pub aggregate: Aggregate,
+    /// How it is drawn over touches.
+    pub scale: Scale,
+    /// Whether it stands in the summary on the terminal and on the page.
+    pub is_tabled: bool,
+    /// Whether it is an error, so that planners are compared in it after every touch, and in the
+    /// touches that they need to bring it down.
+    pub is_error: bool,
+    /// Whether it is of whole objects: it has no columns in files of runs that explore a zone.
+    pub is_of_shapes: bool,
+    /// Its value after some touches; none where the trial has none.
+    pub of: fn(&TrialRow, u32) -> Option<f64>,
+}
+
+/// A unit in files and for readers.
+#[derive(Clone, Copy, Debug)]
+pub struct Unit {
+    /// How names in files end that are in it.
+    pub suffix: &'static str,
+    /// The symbol of the unit that readers are shown.
+    pub symbol: &'static str,
+    /// How many of that make one of the SI unit.
+    pub per_si: f64,
+    /// Decimals shown.
+    pub decimals: usize,
+}
+
+/// Whether less or more of a measure is better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// Less of it.
+    Less,
+    /// More of it.
+    More,
+    /// Neither: a fact, in which planners are not compared.
+    Neither,
+}
+
+/// The statistics reported of many trials.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aggregate {
+    /// The mean with its standard error.
+    Mean,
+    /// The median with its bootstrap interval.
+    Median,
+    /// Both; where there is room for one, the median.
+    Both,
+}
+
+impl Aggregate {
+    /// Whether the mean is reported.
+    pub fn has_mean(self) -> bool {
+        self != Self::Median
+    }
+
+    /// Whether the median is reported.
+    pub fn has_median(self) -> bool {
+        self != Self::Mean
+    }
+}
+
+/// How a measure is drawn over touches, in a panel of its own.
+#[derive(Clone, Copy, Debug)]
+pub enum Scale {
+    /// Not at all.
+    Undrawn,
+    /// On a linear axis.
+    Linear,
+    /// On a linear axis that shows 1, the best there is.
+    UpToOne,
+    /// On a logarithmic axis.
+    Log,
+    /// The same with another measure dotted beside it; not at all where that has no value.
+    LogBeside(&'static Measure),
+}
+
+const CORRELATION: Unit = Unit { suffix: "", symbol: "", per_si: 1.0, decimals: 4 };
+const PLAIN: Unit = Unit { decimals: 3, ..CORRELATION };
+const PERCENT: Unit = Unit { symbol: "%", per_si: 100.0, ..PLAIN };
+const MM: Unit = Unit { suffix: "_m", symbol: "mm", per_si: 1e3, decimals: 3 };
+/// Metres.
+pub const METRES: Unit = Unit { suffix: "_m", symbol: "m", per_si: 1.0, decimals: 3 };
+const SECONDS: Unit = Unit { suffix: "_s", symbol: "s", per_si: 1.0, decimals: 1 };
+
+impl Measure {
+    /// The columns of its statistics over many trials: its mean with the standard error, its
+    /// median with the ends of its interval.
+    pub fn columns(&self) -> Vec<String> {
+        let mut statistics = Vec::new();
+        if self.aggregate.has_mean() {
+            statistics.extend(["mean", "se"]);
+        }
+        if self.aggregate.has_median() {
+            statistics.extend(["median", "median_low", "median_high"]);
+        }
+        statistics.into_iter().map(|statistic| self.column(statistic)).collect()
+    }
+
+    /// A column of a file that holds `statistic` of it: the statistic stands before the unit.
+    pub fn column(&self, statistic: &str) -> String {
+        format!("{}_{statistic}{}", self.stem(), self.unit.suffix)
+    }
+
+    /// Its name in files without the unit.
+    pub fn stem(&self) -> &'static str {
+        self.id.strip_suffix(self.unit.suffix).unwrap_or(self.id)
+    }
+
+    /// With these statistics over many trials.
+    const fn aggregated(self, aggregate: Aggregate) -> Self {
+        Self { aggregate, ..self }
+    }
+
+    /// Drawn like this.
+    const fn drawn(self, scale: Scale) -> Self {
+        Self { scale, ..self }
+    }
+
+    /// In files only.
+    const fn untabled(self) -> Self {
+        Self { is_tabled: false, ..self }
+    }
+
+    /// Marks a measure of whole objects.
+    const fn of_shapes(self) -> Self {
+        Self { is_of_shapes: true, ..self }
+    }
+
+    /// Marks an error, in which planners are compared after every touch.
+    const fn error(self) -> Self {
+        Self { is_error: true, ..self }
+    }
+}
+
+impl fmt::Debug for Measure {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.id)
+    }
+}
+
+/// A measure whose mean is reported and tabled, and which is not drawn.
+const fn measure(
+    direction: Direction,
+    id: &'static str,
+    title: &'static str,
+    unit: Unit,
+    of: fn(&TrialRow, u32) -> Option<f64>,
+) -> Measure {
+    Measure {
+        id,
+        title,
+        unit,
+        direction,
+        aggregate: Aggregate::Mean,
+        scale: Scale::Undrawn,
+        is_tabled: true,
+        is_error: false,
+        is_of_shapes: false,
+        of,
+    }
 }
 
 #[cfg(test)]

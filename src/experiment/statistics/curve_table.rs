@@ -9,15 +9,6 @@ use crate::experiment::statistics::summary::CurvePoint;
 use crate::experiment::trial::row::TrialRow;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
-/// One planner after one number of touches.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CurveRecord {
-    /// Which planner, after how many touches, over how many trials.
-    pub point: CurvePoint,
-    /// Its values in the [`columns`] of the run.
-    pub values: Vec<Option<f64>>,
-}
-
 /// The columns of a run's records: of each measure its mean with the standard error, or its median
 /// with the 95 % bootstrap interval; of an error also how it differs from each baseline's in the
 /// same trial (mean, 95 % bootstrap interval, share of trials in which it is less).
@@ -34,56 +25,57 @@ pub fn columns(experiment: &Experiment, rows: &[TrialRow]) -> Vec<String> {
     in_files(rows).flat_map(of_measure).collect()
 }
 
-/// A record for each planner and each of its touch counts that `is_wanted`.
+/// A point for each planner and each of its touch counts that `is_wanted`, with its values in the
+/// [`columns`] of the run.
 pub fn curve_table(
     experiment: &Experiment,
     rows: &[TrialRow],
     is_wanted: impl Fn(u32) -> bool,
-) -> Vec<CurveRecord> {
+) -> Vec<(CurvePoint, Vec<Option<f64>>)> {
     let points: Vec<CurvePoint> = (experiment.planners.iter())
         .flat_map(|planner| summary::curve(experiment, rows, planner))
         .filter(|point| is_wanted(point.touches))
         .collect();
     let measures: Vec<&Measure> = in_files(rows).collect();
-    points.par_iter().map(|point| record((experiment, &measures), rows, point)).collect()
+    let values = |point: &CurvePoint| record((experiment, &measures), rows, point);
+    let values: Vec<_> = points.par_iter().map(values).collect();
+    points.into_iter().zip(values).collect()
 }
 
 fn record(
     (experiment, measures): (&Experiment, &[&Measure]),
     rows: &[TrialRow],
     point: &CurvePoint,
-) -> CurveRecord {
+) -> Vec<Option<f64>> {
     let mut values = Vec::new();
     // Of all trials; measures that fewer of them have draw their own.
     let samples = Samples::new(point.trials, experiment.seed);
     for &measure in measures {
-        values.extend(aggregates((experiment, &samples), rows, point, measure));
+        let summary = point.of(measure);
+        if measure.aggregate.has_mean() {
+            values.push(summary.map(|summary| summary.mean));
+            values.push(summary.and_then(|summary| summary.error));
+        }
+        if measure.aggregate.has_median() {
+            let interval = interval((experiment, &samples), rows, point, measure);
+            values.push(summary.map(|summary| summary.median));
+            values.extend(ends(interval));
+        }
         for baseline in experiment.baselines().into_iter().filter(|_| measure.is_error) {
-            values.extend(differences(experiment, rows, (point, baseline), measure));
+            let planners = [point.planner.as_str(), baseline];
+            let paired = (point.planner != baseline)
+                .then(|| paired(experiment, rows, planners, point.touches, measure))
+                .flatten();
+            values.push(paired.map(|paired| paired.mean));
+            values.extend(ends(paired.and_then(|paired| paired.interval)));
+            values.push(paired.map(|paired| paired.won));
         }
     }
-    CurveRecord { point: point.clone(), values }
+    values
 }
 
-fn aggregates(
-    (experiment, samples): (&Experiment, &Samples),
-    rows: &[TrialRow],
-    point: &CurvePoint,
-    measure: &Measure,
-) -> Vec<Option<f64>> {
-    let summary = point.of(measure);
-    let mut values = Vec::new();
-    if measure.aggregate.has_mean() {
-        values.push(summary.map(|summary| summary.mean));
-        values.push(summary.and_then(|summary| summary.error));
-    }
-    if measure.aggregate.has_median() {
-        let interval = interval((experiment, samples), rows, point, measure);
-        values.push(summary.map(|summary| summary.median));
-        values.push(interval.map(|[low, _]| low));
-        values.push(interval.map(|[_, high]| high));
-    }
-    values
+fn ends(interval: Option<[f64; 2]>) -> [Option<f64>; 2] {
+    interval.map_or([None; 2], |ends| ends.map(Some))
 }
 
 /// The 95 % bootstrap interval of the median; none of a single trial.
@@ -97,7 +89,7 @@ fn interval(
         .into_iter()
         .filter_map(|row| (measure.of)(row, point.touches))
         .collect();
-    match all.len() == samples.count() {
+    match all.len() == samples.count {
         true => samples.median_interval(&all),
         false => Samples::new(all.len(), experiment.seed).median_interval(&all),
     }
@@ -117,18 +109,4 @@ pub fn band(
     }
     let summary = point.of(measure)?;
     summary.error.map(|error| [summary.mean - error, summary.mean + error])
-}
-
-fn differences(
-    experiment: &Experiment,
-    rows: &[TrialRow],
-    (point, baseline): (&CurvePoint, &str),
-    measure: &Measure,
-) -> [Option<f64>; 4] {
-    let planners = [point.planner.as_str(), baseline];
-    let paired = (point.planner != baseline)
-        .then(|| paired(experiment, rows, planners, point.touches, measure))
-        .flatten();
-    let end = |end: usize| Some(paired?.interval?[end]);
-    [paired.map(|paired| paired.mean), end(0), end(1), paired.map(|paired| paired.won)]
 }

@@ -70,24 +70,28 @@ pub fn equal_error<'a>(
     measure: &'static Measure,
 ) -> Option<EqualError<'a>> {
     let [ours, theirs] = [planner, baseline].map(|name| curves(experiment, rows, name, measure));
-    let pairs: Vec<[&Curve; 2]> =
+    let pairs: Vec<[&Curve<f64>; 2]> =
         ours.iter().filter_map(|(trial, curve)| Some([curve, theirs.get(trial)?])).collect();
     let compared = compared(experiment);
     let goal_touches = experiment.goal_touches();
     let goal_index = compared.partition_point(|&count| count <= goal_touches).checked_sub(1)?;
-    let medians = [0, 1].map(|which| Medians::new(pairs.iter().map(|pair| pair[which])));
+    let medians = [0, 1].map(|which| Curve::new(pairs.iter().map(|pair| pair[which])));
     let mut counts = Vec::new();
     let everyone: Vec<usize> = (0..pairs.len()).collect();
     let goal = medians[1].errors.get(goal_index)?.median(&everyone, &mut counts)?;
-    let found = meet(&medians, &everyone, goal_index, &mut counts);
-    let samples = Samples::new(pairs.len(), experiment.seed)
-        .each(|sample| meet(&medians, sample, goal_index, &mut counts));
     // Of a goal that is not met there is no comparison.
     let touches =
-        |met: &Met| compared.get(met.after as usize).map_or(f64::INFINITY, |n| f64::from(*n));
-    let estimate = |of: &dyn Fn(&[Met; 2]) -> f64| Estimate {
-        value: of(&found),
-        interval: (!samples.is_empty()).then(|| percentiles_95(samples.iter().map(of).collect())),
+        |after: f64| compared.get(after as usize).map_or(f64::INFINITY, |n| f64::from(*n));
+    let mut met = |sample: &[usize]| {
+        let met = meet(&medians, sample, goal_index, &mut counts);
+        met.map(|(after, path_m)| [touches(after), path_m])
+    };
+    let found = met(&everyone);
+    let samples = Samples::new(pairs.len(), experiment.seed).each(met);
+    let estimate = |of: fn([[f64; 2]; 2]) -> f64| {
+        let values = samples.iter().map(|met| of(*met)).collect();
+        let interval = (!samples.is_empty()).then(|| percentiles_95(values));
+        Estimate { value: of(found), interval }
     };
     Some(EqualError {
         planner,
@@ -95,10 +99,10 @@ pub fn equal_error<'a>(
         measure,
         trials: pairs.len(),
         goal,
-        touches: estimate(&|[ours, _]| touches(ours)),
-        baseline_touches: touches(&found[1]),
-        ratio: estimate(&|[ours, theirs]| touches(ours) / touches(theirs)),
-        path_ratio: estimate(&|[ours, theirs]| ours.path_m / theirs.path_m),
+        touches: estimate(|[ours, _]| ours[0]),
+        baseline_touches: found[1][0],
+        ratio: estimate(|[ours, theirs]| ours[0] / theirs[0]),
+        path_ratio: estimate(|[ours, theirs]| ours[1] / theirs[1]),
     })
 }
 
@@ -108,23 +112,18 @@ fn compared(experiment: &Experiment) -> Vec<u32> {
     counts.filter(|&count| experiment.is_compared(count)).collect()
 }
 
-/// One trial after every count of touches after which its belief is compared.
-struct Curve {
-    errors: Vec<f64>,
+/// After every count of touches after which beliefs are compared: the numbers of one trial, or
+/// those of many in ranks, of which medians over samples are asked.
+struct Curve<T> {
+    errors: Vec<T>,
     /// Lateral way since the last initial touch.
-    paths_m: Vec<f64>,
+    paths_m: Vec<T>,
 }
 
-/// What medians over samples of the trials are asked of, after every count.
-struct Medians {
-    errors: Vec<Ranked>,
-    paths_m: Vec<Ranked>,
-}
-
-impl Medians {
-    fn new<'a>(curves: impl Iterator<Item = &'a Curve> + Clone) -> Self {
+impl Curve<Ranked> {
+    fn new<'a>(curves: impl Iterator<Item = &'a Curve<f64>> + Clone) -> Self {
         let length = curves.clone().next().map_or(0, |curve| curve.errors.len());
-        let ranked = |of: &dyn Fn(&Curve, usize) -> f64| {
+        let ranked = |of: &dyn Fn(&Curve<f64>, usize) -> f64| {
             let at = |index| curves.clone().map(|curve| of(curve, index)).collect::<Vec<f64>>();
             (0..length).map(|index| Ranked::new(&at(index))).collect()
         };
@@ -135,24 +134,15 @@ impl Medians {
     }
 }
 
-/// When the goal was met.
-#[derive(Clone, Copy)]
-struct Met {
-    /// Comparisons after the first one: over a zone touches after the initial ones.
-    after: f64,
-    /// Median way over them.
-    path_m: f64,
-}
-
 /// The trials that have the error after every count that is compared.
 fn curves(
     experiment: &Experiment,
     rows: &[TrialRow],
     planner: &str,
     measure: &Measure,
-) -> BTreeMap<u32, Curve> {
+) -> BTreeMap<u32, Curve<f64>> {
     let counts = compared(experiment);
-    let curve = |row: &TrialRow| -> Option<Curve> {
+    let curve = |row: &TrialRow| -> Option<Curve<f64>> {
         let errors: Option<Vec<f64>> =
             counts.iter().map(|&count| (measure.of)(row, count)).collect();
         let start_m = row.path_m(experiment.initial_touches)?;
@@ -164,16 +154,17 @@ fn curves(
 }
 
 /// When the two of each pair meet the second's median error at `goal_index` in a sample of the
-/// pairs.
+/// pairs: comparisons after the first one, which over a zone are touches after the initial ones,
+/// and the median way over them, m.
 fn meet(
-    medians: &[Medians; 2],
+    medians: &[Curve<Ranked>; 2],
     sample: &[usize],
     goal_index: usize,
     counts: &mut Vec<u32>,
-) -> [Met; 2] {
+) -> [(f64, f64); 2] {
     let goal = medians[1].errors.get(goal_index).and_then(|error| error.median(sample, counts));
     let goal = goal.unwrap_or(f64::NAN);
-    medians.each_ref().map(|Medians { errors, paths_m }| {
+    medians.each_ref().map(|Curve { errors, paths_m }| {
         let mut is_met =
             |index: usize| errors[index].median(sample, counts).is_some_and(|error| error <= goal);
         let met = match is_met(goal_index) {
@@ -181,10 +172,7 @@ fn meet(
             false => (goal_index + 1..errors.len()).find(|&index| is_met(index)),
         };
         let path = met.and_then(|index| paths_m[index].median(sample, counts));
-        Met {
-            after: met.map_or(f64::INFINITY, |index| index as f64),
-            path_m: path.unwrap_or(f64::INFINITY),
-        }
+        (met.map_or(f64::INFINITY, |index| index as f64), path.unwrap_or(f64::INFINITY))
     })
 }
 
@@ -193,7 +181,7 @@ mod tests {
     use super::*;
 
     /// Trials whose errors and ways are the same functions of the count, but for a factor.
-    fn trials(error: impl Fn(f64) -> f64, step_m: f64) -> Vec<Curve> {
+    fn trials(error: impl Fn(f64) -> f64, step_m: f64) -> Vec<Curve<f64>> {
         (0..20)
             .map(|trial| Curve {
                 errors: (0..41)
@@ -204,9 +192,9 @@ mod tests {
             .collect()
     }
 
-    fn met(ours: &[Curve], theirs: &[Curve], goal_index: usize) -> [Met; 2] {
+    fn met(ours: &[Curve<f64>], theirs: &[Curve<f64>], goal_index: usize) -> [(f64, f64); 2] {
         let sample: Vec<usize> = (0..ours.len()).map(|i| i / 2).collect();
-        let medians = [ours, theirs].map(|curves| Medians::new(curves.iter()));
+        let medians = [ours, theirs].map(|curves| Curve::new(curves.iter()));
         meet(&medians, &sample, goal_index, &mut Vec::new())
     }
 
@@ -215,18 +203,17 @@ mod tests {
     fn twice_as_fast_needs_half_the_touches() {
         let (fast, slow) = (trials(|n| (-0.2 * n).exp(), 3.0), trials(|n| (-0.1 * n).exp(), 1.0));
         let [ours, theirs] = met(&fast, &slow, 40);
-        assert_eq!((ours.after, theirs.after), (20.0, 40.0));
-        assert_eq!((ours.path_m, theirs.path_m), (60.0, 40.0));
+        assert_eq!((ours, theirs), ((20.0, 60.0), (40.0, 40.0)));
         let [slower, itself] = met(&slow, &fast, 10);
-        assert_eq!((slower.after, itself.after), (20.0, 10.0));
+        assert_eq!((slower.0, itself.0), (20.0, 10.0));
     }
 
     #[test]
     fn a_goal_is_met_where_the_error_stays_below_it() {
         let steady = trials(|_| 2.0, 1.0);
         let rising = trials(|n| if n < 30.0 { 1.0 } else { 1.0 + n }, 1.0);
-        assert_eq!(met(&rising, &steady, 40)[0].after, f64::INFINITY);
+        assert_eq!(met(&rising, &steady, 40)[0].0, f64::INFINITY);
         let wavy = trials(|n| if n == 7.0 { 5.0 } else { 1.0 }, 1.0);
-        assert_eq!(met(&wavy, &steady, 40)[0].after, 8.0);
+        assert_eq!(met(&wavy, &steady, 40)[0].0, 8.0);
     }
 }

@@ -25,17 +25,11 @@ pub fn mean(values: &[f64]) -> f64 {
 
 /// The middle value, or the mean of the two middle ones; none of nothing.
 pub fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    middle(&mut sorted)
-}
-
-/// As [`median`], and reorders the values.
-fn middle(values: &mut [f64]) -> Option<f64> {
-    let half = values.len() / 2;
     if values.is_empty() {
         return None;
     }
-    let is_even = values.len().is_multiple_of(2);
+    let mut values = values.to_vec();
+    let (half, is_even) = (values.len() / 2, values.len().is_multiple_of(2));
     let (below, &mut upper, _) = values.select_nth_unstable_by(half, f64::total_cmp);
     let lower = below.iter().copied().max_by(f64::total_cmp).filter(|_| is_even);
     Some(0.5 * (lower.unwrap_or(upper) + upper))
@@ -103,7 +97,8 @@ pub fn median_interval(values: &[f64], seed: u64) -> Option<[f64; 2]> {
 /// The bootstrap samples of as many values: for each sample as many indices, drawn with
 /// replacement; none of a single value.
 pub(super) struct Samples {
-    count: usize,
+    /// The number of values.
+    pub(super) count: usize,
     indices: Vec<usize>,
 }
 
@@ -114,11 +109,6 @@ impl Samples {
         let samples = if count > 1 { RESAMPLES } else { 0 };
         let indices = (0..samples * count).map(|_| rng.random_range(0..count)).collect();
         Self { count, indices }
-    }
-
-    /// Of how many values.
-    pub(super) fn count(&self) -> usize {
-        self.count
     }
 
     /// A statistic of every sample.
@@ -177,14 +167,12 @@ impl Paired {
     /// From pairs (error, the other's error); none of no pairs.
     pub fn new(pairs: &[(f64, f64)], seed: u64) -> Option<Self> {
         let differences: Vec<f64> = pairs.iter().map(|(error, other)| error - other).collect();
-        let wins: f64 = differences
-            .iter()
-            .map(|difference| match difference.total_cmp(&0.0) {
-                _ if *difference == 0.0 => 0.5,
-                std::cmp::Ordering::Less => 1.0,
-                _ => 0.0,
-            })
-            .sum();
+        let win = |difference: &f64| match *difference {
+            0.0 => 0.5,
+            difference if difference < 0.0 => 1.0,
+            _ => 0.0,
+        };
+        let wins: f64 = differences.iter().map(win).sum();
         let trials = differences.len();
         (trials > 0).then(|| Self {
             trials,

@@ -1,12 +1,12 @@
 //! `touches.jsonl`: what a real arm has done, touch by touch, so that none is lost with the trial
 //! that it belongs to.
 
-use super::error::{StoreError, io_error};
+use super::files::{RunError, io_error};
 use crate::experiment::trial::row::TouchRow;
 use crate::files;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// File of a run's finished touches and faults.
@@ -43,19 +43,15 @@ impl Journal {
     ///
     /// # Errors
     /// If it cannot be read or written, or a line is damaged.
-    pub fn open(folder: &Path) -> Result<Self, StoreError> {
+    pub fn open(folder: &Path) -> Result<Self, RunError> {
         let path = folder.join(JOURNAL);
         let file = files::append(&path).map_err(io_error(&path))?;
         let bytes = files::bytes(&path, u64::MAX).map_err(io_error(&path))?;
         let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |last| last + 1);
         let mut entries = Vec::new();
         for (i, line) in bytes[..whole].split_inclusive(|&byte| byte == b'\n').enumerate() {
-            let entry = serde_json::from_slice(line).map_err(|error| StoreError::BadRow {
-                path: path.clone(),
-                line: i + 1,
-                message: error.to_string(),
-            })?;
-            entries.push(entry);
+            let entry = serde_json::from_slice(line);
+            entries.push(entry.map_err(|error| RunError::bad_row(&path, i + 1, error))?);
         }
         if whole < bytes.len() {
             file.set_len(whole as u64).map_err(io_error(&path))?;
@@ -78,12 +74,11 @@ impl Journal {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn add(&mut self, entry: Entry) -> Result<(), StoreError> {
-        let mut line =
-            serde_json::to_vec(&entry).map_err(io::Error::from).map_err(io_error(&self.path))?;
+    pub fn add(&mut self, entry: Entry) -> Result<(), RunError> {
+        let mut line = serde_json::to_vec(&entry).map_err(io_error(&self.path))?;
         line.push(b'\n');
-        self.file.write_all(&line).map_err(io_error(&self.path))?;
-        self.file.sync_data().map_err(io_error(&self.path))?;
+        let written = self.file.write_all(&line).and_then(|()| self.file.sync_data());
+        written.map_err(io_error(&self.path))?;
         self.entries.push(entry);
         Ok(())
     }

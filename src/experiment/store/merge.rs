@@ -1,145 +1,81 @@
 //! Shards of a run, put together: the bytes of one that ran in a single process.
 
-use super::content::Content;
-use super::error::io_error;
-use super::rows::{self, Place};
+use super::files::{RunError, io_error};
+use super::provenance::Content;
+use super::rows;
 use super::surface::{self, SURFACE};
-use super::{RunFolder, StoreError, TRIALS, resolved};
-use crate::experiment::experiment::Experiment;
-use crate::experiment::trial::row::TrialId;
-use crate::experiment::truth::Truth;
+use super::{RunFolder, TRIALS, resolved};
+use crate::error::Invalid;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
-/// Why folders are no whole run.
-#[derive(Debug, Error)]
-pub enum MergeError {
-    /// One of them cannot be read, or the run not be written.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// One is of another experiment.
-    #[error(
-        "{}: another experiment than {}: settings, planners, trials or the object differ", path.display(), first.display()
-    )]
-    Foreign {
-        /// It.
-        path: PathBuf,
-        /// The first shard.
-        first: PathBuf,
-    },
-    /// Two have the same trial.
-    #[error("trial {trial} of {planner} stands in {} and in {}", a.display(), b.display())]
-    Twice {
-        /// Which.
-        trial: u32,
-        /// Of which planner.
-        planner: String,
-        /// In one.
-        a: PathBuf,
-        /// In the other.
-        b: PathBuf,
-    },
-    /// Some trials stand in none.
-    #[error(
-        "{missing} of {wanted} trials are missing, the first is trial {trial} of {planner}: run its shard \
-         again, the same command continues"
-    )]
-    Missing {
-        /// How many.
-        missing: usize,
-        /// How many there should be.
-        wanted: usize,
-        /// The first.
-        trial: u32,
-        /// Its planner.
-        planner: String,
-    },
-    /// Where the run shall be there are rows.
-    #[error("{}: has rows already; name a new folder", path.display())]
-    Taken {
-        /// The folder.
-        path: PathBuf,
-    },
-}
-
-/// Folders that hold each trial of an experiment once, all of them together.
-pub struct Shards {
-    experiment: Experiment,
-    truth: Truth,
-    content: Content,
-    paths: Vec<PathBuf>,
-    /// Which of `paths` has a row, and where, in the rows' order.
-    places: Vec<(usize, Place)>,
-}
-
-impl Shards {
-    /// Looks at the folders, row by row.
-    ///
-    /// # Errors
-    /// If they are not each trial of one experiment once.
-    pub fn open(paths: &[PathBuf]) -> Result<Option<Self>, MergeError> {
-        let Some(first) = paths.first() else { return Ok(None) };
-        super::require_run(first)?;
-        let experiment = resolved::read(first, &[])?;
-        let truth = surface::read(&first.join(SURFACE), &experiment)?;
-        let mut content = Content::default();
-        let mut places: Vec<(usize, Place)> = Vec::new();
-        for (i, path) in paths.iter().enumerate() {
-            super::require_run(path)?;
-            let is_same = resolved::read(path, &[])? == experiment
-                && surface::read(&path.join(SURFACE), &experiment)? == truth;
-            if !is_same {
-                return Err(MergeError::Foreign { path: path.clone(), first: first.clone() });
+/// Puts the rows of the run folders `shards`, which hold each trial of one experiment once, into a
+/// new run in `out`, by a program built from `commit`; returns how many trials there are. Rows are
+/// copied one at a time.
+///
+/// # Errors
+/// If they are not each trial of one experiment once, there are rows in `out` already, or a file
+/// cannot be read or written.
+pub fn merge(out: &Path, shards: &[PathBuf], commit: &str) -> Result<usize, RunError> {
+    let first = shards.first().ok_or_else(|| Invalid::new("no shards"))?;
+    super::require_run(first)?;
+    let experiment = resolved::read(first, &[])?;
+    let truth = surface::read(&first.join(SURFACE), &experiment)?;
+    let mut content = Content::default();
+    // Rows in their order, each with the shard and the bytes where it stands.
+    let mut places = Vec::new();
+    for path in shards {
+        super::require_run(path)?;
+        let is_same = resolved::read(path, &[])? == experiment
+            && surface::read(&path.join(SURFACE), &experiment)? == truth;
+        if !is_same {
+            let problem = format!(
+                "another experiment than {}: settings, planners, trials or the object differ",
+                first.display()
+            );
+            return Err(RunError::at(path, problem));
+        }
+        let own = Content::read(path)?;
+        own.require_same(&content, path, |_| true)?;
+        content.extend(own);
+        rows::scan(&path.join(TRIALS), &experiment, |row, bytes| {
+            let id = row.id();
+            if experiment.lists(&id) {
+                places.push(((id, bytes), path.as_path()));
             }
-            let own = Content::read(path)?;
-            own.require_same(&content, path, |_| true)?;
-            content.extend(own);
-            let mut own = rows::places(&path.join(TRIALS), &experiment)?;
-            own.retain(|place| experiment.lists(&place.id));
-            places.extend(own.into_iter().map(|place| (i, place)));
-        }
-        places.sort_by(|(_, a), (_, b)| rows::order(&a.id, &b.id, &experiment));
-        let mut pairs = places.array_windows();
-        if let Some([(a, place), (b, _)]) = pairs.find(|[(_, a), (_, b)]| a.id == b.id) {
-            let TrialId { trial, planner } = place.id.clone();
-            let (a, b) = (paths[*a].clone(), paths[*b].clone());
-            return Err(MergeError::Twice { trial, planner, a, b });
-        }
-        let missing = experiment.lacks(places.iter().map(|(_, place)| &place.id));
-        if let Some(&(trial, planner)) = missing.first() {
-            let (missing, planner) = (missing.len(), planner.to_owned());
-            let wanted = missing + places.len();
-            return Err(MergeError::Missing { missing, wanted, trial, planner });
-        }
-        Ok(Some(Self { experiment, truth, content, paths: paths.into(), places }))
+        })?;
     }
-
-    /// What was run.
-    pub fn experiment(&self) -> &Experiment {
-        &self.experiment
+    places.sort_by(|((a, _), _), ((b, _), _)| rows::order(a, b, &experiment));
+    let mut pairs = places.array_windows();
+    if let Some([((id, _), a), (_, b)]) = pairs.find(|[((a, _), _), ((b, _), _)]| a == b) {
+        let (a, b) = (a.display(), b.display());
+        let problem = format!("trial {} of {} stands in {a} and in {b}", id.trial, id.planner);
+        return Err(Invalid::new(problem).into());
     }
-
-    /// Puts their rows into a new run in `out`; how many.
-    ///
-    /// # Errors
-    /// If there are rows already, or it cannot be written.
-    pub fn merge(&self, out: &Path) -> Result<usize, MergeError> {
-        let (mut folder, there) =
-            RunFolder::open(out, &self.experiment, &self.truth, &self.content, false)?;
-        if !there.is_empty() {
-            return Err(MergeError::Taken { path: out.into() });
-        }
-        let mut line = Vec::new();
-        for (i, place) in &self.places {
-            line.clear();
-            let path = self.paths[*i].join(TRIALS);
-            // One at a time: there may be more shards than files that a process may have open.
-            File::open(&path)
-                .and_then(|mut file| rows::copy(&mut file, &place.bytes, &mut line))
-                .map_err(io_error(&path))?;
-            folder.append_line(&line)?;
-        }
-        Ok(self.places.len())
+    let missing = experiment.lacks(places.iter().map(|((id, _), _)| id));
+    if let Some((trial, planner)) = missing.first() {
+        let problem = format!(
+            "{} of {} trials are missing, the first is trial {trial} of {planner}: run its shard \
+             again, the same command continues",
+            missing.len(),
+            missing.len() + places.len()
+        );
+        return Err(Invalid::new(problem).into());
     }
+    let (mut folder, there) =
+        RunFolder::open_as(out, (&experiment, &truth, content), commit, false)?;
+    if !there.is_empty() {
+        return Err(RunError::at(out, "has rows already; name a new folder"));
+    }
+    let mut line = Vec::new();
+    for ((_, bytes), shard) in &places {
+        line.clear();
+        let path = shard.join(TRIALS);
+        // One at a time: there may be more shards than files that a process may have open.
+        File::open(&path)
+            .and_then(|mut file| rows::copy(&mut file, bytes, &mut line))
+            .map_err(io_error(&path))?;
+        folder.append_line(&line)?;
+    }
+    Ok(places.len())
 }

@@ -12,34 +12,30 @@
 //! `resolved.toml` is the mark of a run's folder: it is written first and never removed. A folder
 //! that has it and no row yet, or at most the pieces of it that a crash leaves, is begun anew.
 
-mod content;
-mod error;
-mod file;
+mod files;
 mod journal;
-mod manifest;
 mod merge;
+mod provenance;
 mod resolved;
 mod rows;
 mod surface;
 
-pub use content::{CONTENT, Content};
-pub use error::StoreError;
-pub use file::write_whole;
+pub use files::{RunError, write_whole};
 pub use journal::{Entry, JOURNAL, Journal};
-pub use manifest::{MANIFEST, Manifest};
-pub use merge::{MergeError, Shards};
+pub use merge::merge;
+pub use provenance::MANIFEST;
 pub use resolved::{RESOLVED, resolved, resolved_beside};
 
-use self::error::io_error;
-use self::file::remove;
-use self::rows::Place;
+use self::files::{io_error, remove};
+use self::provenance::{CONTENT, Content};
 use self::surface::{MESH, SURFACE};
 use crate::experiment::experiment::Experiment;
+use crate::experiment::notice;
+use crate::experiment::simulation::Simulation;
 use crate::experiment::trial::row::{TrialId, TrialRow};
 use crate::experiment::truth::Truth;
-use crate::files;
 use std::fs::{self, File, TryLockError};
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 const TRIALS: &str = "trials.jsonl";
@@ -52,8 +48,8 @@ pub const FIGURES: &str = "figures";
 pub struct RunFolder {
     path: PathBuf,
     trials: File,
-    /// What is about to add its first row.
-    unsigned: Option<Manifest>,
+    /// The program that is about to add its first row.
+    unsigned: Option<serde_json::Value>,
 }
 
 /// A run folder read back.
@@ -70,26 +66,37 @@ pub struct Run {
 }
 
 impl RunFolder {
-    /// Opens `path` for `experiment`: makes it, or continues what was begun there, or, if
-    /// `fresh` or if that has no row yet, throws it away.
+    /// Opens `path` for the rows of `simulation`, which a program built from `commit` runs: makes
+    /// it, or continues what was begun there, or, if `fresh` or if that has no row yet, throws it
+    /// away.
     ///
     /// Returns the trials that are already there of those that the experiment lists. A last line
     /// cut short by a crash is dropped.
     ///
     /// # Errors
-    /// If the folder holds something else or trials made of other `content`, is being written, or
-    /// cannot be.
+    /// If the folder holds something else or trials made of other files or planners, is being
+    /// written, or cannot be.
     pub fn open(
         path: &Path,
-        experiment: &Experiment,
-        truth: &Truth,
-        content: &Content,
+        simulation: &Simulation,
+        commit: &str,
         fresh: bool,
-    ) -> Result<(Self, Vec<TrialId>), StoreError> {
+    ) -> Result<(Self, Vec<TrialId>), RunError> {
+        let content = Content::of(simulation)?;
+        let parts = (simulation.experiment(), simulation.truth(), content);
+        Self::open_as(path, parts, commit, fresh)
+    }
+
+    fn open_as(
+        path: &Path,
+        (experiment, truth, mut content): (&Experiment, &Truth, Content),
+        commit: &str,
+        fresh: bool,
+    ) -> Result<(Self, Vec<TrialId>), RunError> {
         fs::create_dir_all(path).map_err(io_error(path))?;
         let file = path.join(TRIALS);
         refuse_foreign(path)?;
-        let trials = files::append(&file).map_err(io_error(&file))?;
+        let trials = crate::files::append(&file).map_err(io_error(&file))?;
         lock(&trials, path)?;
         let has_touches = fs::metadata(path.join(JOURNAL)).is_ok_and(|journal| journal.len() > 0);
         if fresh || !(has_touches || rows::has_some(&trials).map_err(io_error(&file))?) {
@@ -104,16 +111,15 @@ impl RunFolder {
         if trials.metadata().map_err(io_error(&file))?.len() > good_bytes {
             trials.set_len(good_bytes).map_err(io_error(&file))?;
         }
-        let mut now = content.clone();
         let before = Content::read(path)?;
         let has_row = |planner: &str| done.iter().any(|id| id.planner == planner);
-        now.require_same(&before, path, |planner| has_touches || has_row(planner))?;
-        now.extend(before);
+        content.require_same(&before, path, |planner| has_touches || has_row(planner))?;
+        content.extend(before);
         surface::write_or_compare(path, experiment, truth)?;
-        now.write(path)?;
+        content.write(path)?;
         resolved::write(path, experiment)?;
         done.retain(|id| experiment.lists(id));
-        let unsigned = Some(Manifest::of(experiment));
+        let unsigned = Some(provenance::manifest(commit, experiment.seed));
         Ok((Self { path: path.into(), trials, unsigned }, done))
     }
 
@@ -121,30 +127,26 @@ impl RunFolder {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn append(&mut self, row: &TrialRow) -> Result<(), StoreError> {
+    pub fn append(&mut self, row: &TrialRow) -> Result<(), RunError> {
         let file = self.path.join(TRIALS);
-        let mut line = serde_json::to_vec(row).map_err(io::Error::from).map_err(io_error(&file))?;
+        let mut line = serde_json::to_vec(row).map_err(io_error(&file))?;
         // A number that is not finite has no JSON: such a row could not be read back.
-        if let Err(error) = serde_json::from_slice::<TrialRow>(&line) {
-            return Err(StoreError::BadRow { path: file, line: 0, message: error.to_string() });
-        }
+        serde_json::from_slice::<TrialRow>(&line)
+            .map_err(|error| RunError::bad_row(&file, 0, error))?;
         line.push(b'\n');
         self.append_line(&line)
     }
 
-    fn append_line(&mut self, line: &[u8]) -> Result<(), StoreError> {
+    fn append_line(&mut self, line: &[u8]) -> Result<(), RunError> {
         if let Some(manifest) = self.unsigned.take() {
-            manifest::sign(&self.path.join(MANIFEST), &manifest)?;
+            provenance::sign(&self.path, manifest)?;
         }
         self.trials.write_all(line).map_err(io_error(&self.path.join(TRIALS)))
     }
 
-    /// The touches and faults of a real arm.
-    ///
-    /// # Errors
-    /// If they cannot be read or written.
-    pub fn journal(&self) -> Result<Journal, StoreError> {
-        Journal::open(&self.path)
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Puts the rows in order of trial and planner: the same bytes whoever finished first, and
@@ -152,7 +154,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// If the file cannot be read back or replaced.
-    pub fn sort(self, experiment: &Experiment) -> Result<Tally, StoreError> {
+    pub fn sort(self, experiment: &Experiment) -> Result<Tally, RunError> {
         let file = self.path.join(TRIALS);
         let (mut places, mut tally) = (Vec::new(), Tally::default());
         rows::scan(&file, experiment, |row, bytes| {
@@ -160,13 +162,13 @@ impl RunFolder {
             if experiment.lists(&id) {
                 tally.add(row, experiment);
             }
-            places.push(Place { id, bytes });
+            places.push((id, bytes));
         })?;
         if !rows::is_sorted(&places, experiment) {
-            places.sort_by(|a, b| rows::order(&a.id, &b.id, experiment));
+            places.sort_by(|(a, _), (b, _)| rows::order(a, b, experiment));
             let mut from = File::open(&file).map_err(io_error(&file))?;
-            files::replace_by(&file, |to| {
-                places.iter().try_for_each(|place| rows::copy(&mut from, &place.bytes, to))
+            crate::files::replace_by(&file, |to| {
+                places.iter().try_for_each(|(_, bytes)| rows::copy(&mut from, bytes, to))
             })
             .map_err(io_error(&file))?;
         }
@@ -204,7 +206,7 @@ impl Run {
     ///
     /// # Errors
     /// If it is not one, or a file in it is damaged.
-    pub fn read(path: &Path) -> Result<Self, StoreError> {
+    pub fn read(path: &Path) -> Result<Self, RunError> {
         require_run(path)?;
         let experiment = resolved::read(path, &[])?;
         let truth = surface::read(&path.join(SURFACE), &experiment)?;
@@ -220,6 +222,11 @@ impl Run {
         let rows = rows.into_iter().map(|(_, row)| row).collect();
         Ok(Self { experiment, truth, rows, unlisted })
     }
+
+    /// What makes its numbers mean less than they seem to, a sentence each.
+    pub fn notices(&self) -> Vec<String> {
+        notice::of_run(&self.experiment, &self.truth, &self.rows)
+    }
 }
 
 /// Changes what the report of the run in `path` shows by `--set` assignments to `report.…` and
@@ -228,7 +235,7 @@ impl Run {
 /// # Errors
 /// If an assignment is to something else or wrong, or the folder holds no run, is being written,
 /// or cannot be.
-pub fn set_report(path: &Path, sets: &[String]) -> Result<(), StoreError> {
+pub fn set_report(path: &Path, sets: &[String]) -> Result<(), RunError> {
     require_run(path)?;
     sets.iter().try_for_each(|set| resolved::only_shown(set))?;
     let experiment = resolved::read(path, sets)?;
@@ -239,18 +246,20 @@ pub fn set_report(path: &Path, sets: &[String]) -> Result<(), StoreError> {
 }
 
 /// Keeps every other process from writing the folder while `trials` is open.
-fn lock(trials: &File, path: &Path) -> Result<(), StoreError> {
+fn lock(trials: &File, path: &Path) -> Result<(), RunError> {
     match trials.try_lock() {
-        Err(TryLockError::WouldBlock) => Err(StoreError::Busy { path: path.into() }),
-        Err(TryLockError::Error(cause)) => Err(StoreError::Io { path: path.join(TRIALS), cause }),
+        Err(TryLockError::WouldBlock) => {
+            Err(RunError::at(path, "another run is writing this folder"))
+        }
+        Err(TryLockError::Error(cause)) => Err(io_error(&path.join(TRIALS))(cause)),
         Ok(()) => Ok(()),
     }
 }
 
-fn require_run(path: &Path) -> Result<(), StoreError> {
+fn require_run(path: &Path) -> Result<(), RunError> {
     for missing in [RESOLVED, SURFACE, TRIALS] {
         if !path.join(missing).is_file() {
-            return Err(StoreError::NotARun { path: path.into(), missing });
+            return Err(RunError::at(path, format!("not a run's folder: it has no {missing}")));
         }
     }
     Ok(())
@@ -258,7 +267,7 @@ fn require_run(path: &Path) -> Result<(), StoreError> {
 
 /// Removes what an earlier run wrote but its mark. Figures are drawn again; others' files beside
 /// them are not ours to remove.
-fn clear(path: &Path) -> Result<(), StoreError> {
+fn clear(path: &Path) -> Result<(), RunError> {
     for recording in fs::read_dir(path.join(RECORDINGS)).into_iter().flatten().flatten() {
         let recording = recording.path();
         if recording.extension().is_some_and(|extension| extension == "mcap") {
@@ -272,12 +281,13 @@ fn clear(path: &Path) -> Result<(), StoreError> {
 
 /// A folder that is not empty must hold a run, or at most what a crash leaves of a beginning: no
 /// rows, and of `resolved.toml` nothing or a part.
-fn refuse_foreign(path: &Path) -> Result<(), StoreError> {
+fn refuse_foreign(path: &Path) -> Result<(), RunError> {
     let length = |name: &str| {
         let found = fs::metadata(path.join(name)).ok();
         found.filter(fs::Metadata::is_file).map(|found| found.len())
     };
-    let foreign = || StoreError::Foreign { path: path.into() };
+    let foreign =
+        || RunError::at(path, "this folder holds something else; choose another with --out");
     if path.join(TRIALS).exists() && length(TRIALS).is_none() {
         return Err(foreign());
     }
@@ -285,7 +295,7 @@ fn refuse_foreign(path: &Path) -> Result<(), StoreError> {
     if resolved::is_ours(path) || has_rows && length(RESOLVED).is_some() {
         return Ok(());
     }
-    let part = files::partial(Path::new(RESOLVED));
+    let part = crate::files::partial(Path::new(RESOLVED));
     for entry in fs::read_dir(path).map_err(io_error(path))? {
         let name = entry.map_err(io_error(path))?.file_name();
         let is_empty = name.to_str().and_then(length) == Some(0);

@@ -1,7 +1,7 @@
 //! `resolved.toml`: the experiment of a run with every default written out.
 
-use super::error::StoreError;
-use super::file::{same, write_changed};
+use super::files::{RunError, same, write_changed};
+use crate::error::Invalid;
 use crate::experiment::experiment::Experiment;
 use crate::files;
 use std::path::{Component, Path, PathBuf};
@@ -38,28 +38,32 @@ pub(super) fn is_ours(folder: &Path) -> bool {
 }
 
 /// Reads the experiment of a run's folder, after `--set` assignments.
-pub(super) fn read(folder: &Path, sets: &[String]) -> Result<Experiment, StoreError> {
+pub(super) fn read(folder: &Path, sets: &[String]) -> Result<Experiment, RunError> {
     Ok(Experiment::load(&folder.join(RESOLVED), sets)?)
 }
 
 /// Writes the experiment into a run's folder, unless it stands there already.
-pub(super) fn write(folder: &Path, experiment: &Experiment) -> Result<(), StoreError> {
+pub(super) fn write(folder: &Path, experiment: &Experiment) -> Result<(), RunError> {
     write_changed(&folder.join(RESOLVED), &saved(experiment, folder))
 }
 
 /// Insists that the run in `folder` is one whose rows are `experiment`'s too.
-pub(super) fn same_run(folder: &Path, experiment: &Experiment) -> Result<(), StoreError> {
+pub(super) fn same_run(folder: &Path, experiment: &Experiment) -> Result<(), RunError> {
     let found = read(folder, &[])?;
     let identity = |experiment: &Experiment| saved(&experiment.identity(), folder);
     same(folder, RESOLVED, [&identity(&found), &identity(experiment)])
 }
 
 /// Insists that a `--set` assignment changes only what is shown.
-pub(super) fn only_shown(set: &str) -> Result<(), StoreError> {
+pub(super) fn only_shown(set: &str) -> Result<(), RunError> {
     let key = set.split_once('=').map(|(key, _)| key.trim());
     match key.is_none_or(|key| key == "question" || key.starts_with("report.")) {
         true => Ok(()),
-        false => Err(StoreError::DecidesRows { text: set.into() }),
+        false => Err(Invalid::new(format!(
+            "--set {set}: a run that is there can be shown another way by `report.…` and `question` \
+             only; what else it is must be run (palpate run)"
+        ))
+        .into()),
     }
 }
 
@@ -72,19 +76,19 @@ pub fn resolved_beside(experiment: &Experiment, path: &Path) -> String {
 /// move.
 fn saved(experiment: &Experiment, folder: &Path) -> String {
     let mut experiment = experiment.clone();
-    if let (Some(object), Ok(folder)) = (&mut experiment.scene.object, folder.canonicalize()) {
-        let mesh = object.mesh.canonicalize().unwrap_or_else(|_| object.mesh.clone());
-        object.mesh = relative(&mesh, &folder);
-    }
-    if let (Some(arm), Ok(folder)) = (&mut experiment.scene.arm, folder.canonicalize())
-        && arm.is_file()
-    {
-        let model = Path::new(&arm.model).canonicalize().unwrap_or_else(|_| (&arm.model).into());
-        arm.model = relative(&model, &folder).to_string_lossy().into_owned();
-    }
-    if let (Some(truth), Ok(folder)) = (&mut experiment.truth, folder.canonicalize()) {
-        let scan = truth.scan.canonicalize().unwrap_or_else(|_| truth.scan.clone());
-        truth.scan = relative(&scan, &folder);
+    if let Ok(folder) = folder.canonicalize() {
+        let moved = |path: &Path| {
+            relative(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), &folder)
+        };
+        if let Some(object) = &mut experiment.scene.object {
+            object.mesh = moved(&object.mesh);
+        }
+        if let Some(arm) = experiment.scene.arm.as_mut().filter(|arm| arm.is_file()) {
+            arm.model = moved(arm.model.as_ref()).to_string_lossy().into_owned();
+        }
+        if let Some(truth) = &mut experiment.truth {
+            truth.scan = moved(&truth.scan);
+        }
     }
     resolved(&experiment)
 }

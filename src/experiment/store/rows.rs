@@ -1,6 +1,6 @@
 //! The lines of `trials.jsonl`.
 
-use super::error::{StoreError, io_error};
+use super::files::{RunError, io_error};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::trial::row::{TouchRow, TrialId, TrialRow};
 use crate::{files, words};
@@ -18,12 +18,6 @@ pub(super) fn has_some(trials: &File) -> io::Result<bool> {
     Ok(line.ends_with(b"\n"))
 }
 
-/// Where a trial's row stands in its file.
-pub(super) struct Place {
-    pub id: TrialId,
-    pub bytes: Range<u64>,
-}
-
 /// Reads a results file row by row, none of which stays in memory, and hands each with the bytes
 /// that it fills to `each`; how many bytes all of them fill. A last line without its end was cut
 /// short and is left out.
@@ -34,7 +28,7 @@ pub(super) fn scan(
     path: &Path,
     experiment: &Experiment,
     mut each: impl FnMut(TrialRow, Range<u64>),
-) -> Result<u64, StoreError> {
+) -> Result<u64, RunError> {
     let mut file = BufReader::new(files::open(path).map_err(io_error(path))?);
     let (mut seen, mut line) = (HashSet::new(), Vec::new());
     let (mut number, mut good) = (0, 0);
@@ -45,7 +39,7 @@ pub(super) fn scan(
             return Ok(good);
         }
         number += 1;
-        let bad = |message| StoreError::BadRow { path: path.into(), line: number, message };
+        let bad = |message: String| RunError::bad_row(path, number, message);
         let row: TrialRow =
             serde_json::from_slice(&line).map_err(|error| bad(in_its_line(&error)))?;
         belongs(&row, experiment).map_err(bad)?;
@@ -55,16 +49,6 @@ pub(super) fn scan(
         each(row, good..good + length);
         good += length;
     }
-}
-
-/// Where the rows of a results file stand.
-///
-/// # Errors
-/// As [`scan`].
-pub(super) fn places(path: &Path, experiment: &Experiment) -> Result<Vec<Place>, StoreError> {
-    let mut places = Vec::new();
-    scan(path, experiment, |row, bytes| places.push(Place { id: row.id(), bytes }))?;
-    Ok(places)
 }
 
 /// Copies the row at `bytes` of `from`.
@@ -186,7 +170,7 @@ pub(super) fn order(a: &TrialId, b: &TrialId, experiment: &Experiment) -> Orderi
 }
 
 /// Whether the rows that the experiment lists stand in order; the others may stand anywhere.
-pub(super) fn is_sorted(places: &[Place], experiment: &Experiment) -> bool {
-    let listed = places.iter().map(|place| &place.id).filter(|id| experiment.lists(id));
+pub(super) fn is_sorted(places: &[(TrialId, Range<u64>)], experiment: &Experiment) -> bool {
+    let listed = places.iter().map(|(id, _)| id).filter(|id| experiment.lists(id));
     listed.is_sorted_by(|a, b| order(a, b, experiment).is_le())
 }

@@ -1,7 +1,6 @@
 //! `surface.csv`: the truth of a run on its test grid. `surface.obj`: that of a whole object.
 
-use super::error::{StoreError, io_error};
-use super::file::{same, write_whole};
+use super::files::{RunError, io_error, same, write_whole};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::truth::Truth;
 use crate::files;
@@ -21,14 +20,14 @@ pub(super) fn write_or_compare(
     folder: &Path,
     experiment: &Experiment,
     truth: &Truth,
-) -> Result<(), StoreError> {
+) -> Result<(), RunError> {
     let mesh = truth.mesh.as_deref().map(|mesh| (MESH, obj(mesh)));
     for (name, wanted) in [(SURFACE, text(experiment, truth))].into_iter().chain(mesh) {
         let path = folder.join(name);
         match files::text(&path, u64::MAX) {
             Ok(found) => same(folder, name, [&found, &wanted])?,
             Err(cause) if cause.kind() == io::ErrorKind::NotFound => write_whole(&path, &wanted)?,
-            Err(cause) => return Err(StoreError::Io { path, cause }),
+            Err(cause) => return Err(io_error(&path)(cause)),
         }
     }
     Ok(())
@@ -63,9 +62,8 @@ fn text(experiment: &Experiment, truth: &Truth) -> String {
 }
 
 /// Reads back what [`write_or_compare`] wrote for `experiment`.
-pub(super) fn read(path: &Path, experiment: &Experiment) -> Result<Truth, StoreError> {
-    let bad =
-        |line: usize, message: String| StoreError::BadRow { path: path.into(), line, message };
+pub(super) fn read(path: &Path, experiment: &Experiment) -> Result<Truth, RunError> {
+    let bad = |line: usize, message: String| RunError::bad_row(path, line, message);
     let Some(zone) = &experiment.scene.zone else {
         let mesh = path.with_file_name(MESH);
         if !mesh.exists() {

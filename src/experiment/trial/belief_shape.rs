@@ -66,8 +66,17 @@ pub(super) fn shapes(belief: &Belief) -> [Marker; 2] {
 fn colours(sds: &[f64]) -> Vec<ColorRgba> {
     let ends = (f64::INFINITY, f64::MIN_POSITIVE);
     let (least, most) = sds.iter().fold(ends, |(low, high), &sd| (low.min(sd), high.max(sd)));
-    let share = |sd: f64| ((sd - least) / (most - least).max(f64::MIN_POSITIVE)) as f32;
-    sds.iter().map(|&sd| between(share(sd))).collect()
+    let colour = |sd: &f64| {
+        let share = ((sd - least) / (most - least).max(f64::MIN_POSITIVE)) as f32;
+        let mix = |from: f32, to: f32| from + (to - from) * share;
+        ColorRgba {
+            r: mix(SURE.r, UNSURE.r),
+            g: mix(SURE.g, UNSURE.g),
+            b: mix(SURE.b, UNSURE.b),
+            a: mix(SURE.a, UNSURE.a),
+        }
+    };
+    sds.iter().map(colour).collect()
 }
 
 fn draw(zone: &Zone, belief: &HeightField, posterior: &Posterior, surface: &mut Marker) {
@@ -89,14 +98,4 @@ fn draw(zone: &Zone, belief: &HeightField, posterior: &Posterior, surface: &mut 
     };
     surface.points = order.iter().map(|&i| points[i]).collect();
     surface.colors = order.iter().map(|&i| colors[i]).collect();
-}
-
-fn between(share: f32) -> ColorRgba {
-    let mix = |from: f32, to: f32| from + (to - from) * share;
-    ColorRgba {
-        r: mix(SURE.r, UNSURE.r),
-        g: mix(SURE.g, UNSURE.g),
-        b: mix(SURE.b, UNSURE.b),
-        a: mix(SURE.a, UNSURE.a),
-    }
 }

@@ -1,10 +1,7 @@
 //! Entrants of an experiment: planners, and the oracle beside them.
 
 use crate::experiment::trial::oracle::{GroundTruth, Oracle};
-use crate::explore::belief::Belief;
-use crate::explore::planner::{
-    Entry, PLANNERS, Plan, PlanError, Planner, PlannerFactory, PlanningSettings, is_own,
-};
+use crate::explore::planner::{Entry, PLANNERS, Planner, PlannerFactory, PlanningSettings, is_own};
 use rand_chacha::ChaCha8Rng;
 
 /// Name of the oracle in an experiment's list of planners.
@@ -48,11 +45,16 @@ impl<'a> Entrant<'a> {
         }
     }
 
-    /// Makes the chooser of one trial.
-    pub(super) fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Chooser {
+    /// Makes the planner of one trial; only the oracle is given the truth.
+    pub(super) fn make<'t>(
+        &self,
+        settings: &PlanningSettings,
+        random: ChaCha8Rng,
+        truth: &'t GroundTruth,
+    ) -> Box<dyn Planner + 't> {
         match self {
-            Self::Planner(factory) => Chooser::Planner(factory.make(settings, random)),
-            Self::Oracle => Chooser::Oracle(Box::new(Oracle::new(settings, random))),
+            Self::Planner(factory) => factory.make(settings, random),
+            Self::Oracle => Box::new(Oracle::new(settings, random, truth)),
         }
     }
 }
@@ -66,24 +68,5 @@ impl<'a> From<&'a Entry> for Entrant<'a> {
 impl<'a> From<&'a dyn PlannerFactory> for Entrant<'a> {
     fn from(factory: &'a dyn PlannerFactory) -> Self {
         Self::Planner(factory)
-    }
-}
-
-/// Chooses the touches of one trial.
-pub(super) enum Chooser {
-    Planner(Box<dyn Planner>),
-    Oracle(Box<Oracle>),
-}
-
-impl Chooser {
-    /// The next target.
-    ///
-    /// # Errors
-    /// If the planner names none.
-    pub(super) fn plan(&mut self, belief: &Belief, truth: &GroundTruth) -> Result<Plan, PlanError> {
-        match self {
-            Self::Planner(planner) => planner.plan(belief),
-            Self::Oracle(oracle) => Ok(oracle.plan(belief, truth)),
-        }
     }
 }

@@ -1,17 +1,169 @@
-//! One trial: what competes, the touches in turn, and the row that is left of them.
+//! One trial, Algorithm 1 of Yi et al. 2016: touch, fit, plan, again; and the row that is left.
 
 mod belief_shape;
 pub mod entrant;
-mod exploration;
 mod oracle;
 pub mod recorded_trial;
 pub mod replay;
-pub mod resumed;
 pub mod row;
-#[allow(clippy::module_inception)]
-pub(super) mod trial;
 mod verification;
-pub mod verification_row;
-pub mod witness;
 
 pub(super) use oracle::GroundTruth;
+
+use self::entrant::Entrant;
+use self::row::{TouchRow, TrialRow};
+use self::verification::verify;
+use crate::backend::Fault;
+use crate::experiment::experiment::Experiment;
+use crate::experiment::measure::outline::Outline;
+use crate::explore::belief::Belief;
+use crate::explore::planner::{self, PlannerFactory};
+use crate::explore::probe::{Probe, Touch};
+use crate::gp::covariance::CovarianceError;
+use crate::math::seed;
+
+/// A touch that is done.
+pub struct Touched<'a> {
+    /// Which, counted from 1.
+    pub count: u32,
+    /// Its outcome.
+    pub touch: &'a Touch,
+    /// Its part of the trial's row.
+    pub row: &'a TouchRow,
+    /// The belief that has taken it in.
+    pub belief: &'a Belief,
+}
+
+/// Is called after every touch of a trial, before the next is planned. It changes no row, but a
+/// fault that it returns ends the trial.
+pub type TrialObserver<'a> = dyn FnMut(&Touched) -> Result<(), Fault> + 'a;
+
+/// Runs one trial of an entrant from start to end with the touches of `probe`; calls `observer`
+/// after each.
+///
+/// Its row depends on the experiment, the trial's number, the entrant and the probe only.
+pub(in crate::experiment) fn run(
+    experiment: &Experiment,
+    truth: &GroundTruth,
+    probe: &mut dyn Probe,
+    (entrant, trial): (Entrant, u32),
+    observer: &mut TrialObserver,
+) -> TrialRow {
+    let mut row = TrialRow::ended(trial, entrant.name(), None);
+    row.failure = explore(experiment, truth, probe, (entrant, &mut row), observer).err();
+    row
+}
+
+/// Makes the touches of a trial and writes them into its row.
+///
+/// # Errors
+/// The reason why it ended before the last touch, in words.
+fn explore(
+    experiment: &Experiment,
+    truth: &GroundTruth,
+    probe: &mut dyn Probe,
+    (entrant, row): (Entrant, &mut TrialRow),
+    observer: &mut TrialObserver,
+) -> Result<(), String> {
+    let (scene, task) = (truth.environment.scene(), truth.environment.task());
+    let finger = (&scene.finger, scene.effects.skin.is_some());
+    let mut belief = Belief::new(task, finger, &experiment.gp, &experiment.space);
+    let (is_around, name) = (belief.implicit_surface().is_some(), entrant.name());
+    if let Some(why) = entrant.zone_only().filter(|_| is_around) {
+        return Err(format!("planner `{name}` does not go around an object: {why}"));
+    }
+    // The initial touches: random places of a zone, evenly spread directions at an object.
+    let start = planner::by_name(if is_around { "sobol" } else { "random" });
+    let start = start.ok_or("no planner for the initial touches")?;
+    let stream = |purpose| seed::stream(experiment.seed, row.trial.into(), purpose);
+    let mut start = start.make(&experiment.planning, stream("initial touches"));
+    let mut planner = entrant.make(&experiment.planning, stream(name), truth);
+    // Contact normals and tips stand in the rows where the belief observes them.
+    let writes_normals = experiment.gp.normals || is_around;
+    let writes_tips = experiment.gp.free_space || is_around;
+    for count in 1..=experiment.touches {
+        let is_start = count <= experiment.initial_touches;
+        let plan = if is_start { start.plan(&belief) } else { planner.plan(&belief) };
+        let plan = plan.map_err(|error| format!("touch {count}: {error}"))?;
+        let is_inside = task.region().contains(&plan.target);
+        let Some(approach) = task.approach(&plan.target).filter(|_| is_inside) else {
+            let target = plan.target.numbers();
+            let beyond = match task.ball() {
+                None => "not in the zone",
+                Some(_) => "not in the ball, or out of the finger's reach",
+            };
+            return Err(format!("touch {count}: planned at {target:?}, {beyond}"));
+        };
+        let touch = probe.touch(&approach).map_err(|fault| format!("touch {count}: {fault}"))?;
+        let swept = probe.swept();
+        belief.observe(&plan.target, &approach, (&touch, swept.as_ref()));
+        let swept = swept.filter(|_| writes_tips || touch == Touch::Miss);
+        let contact = match &touch {
+            Touch::Contact(contact) => Some(contact),
+            Touch::Miss | Touch::Overload => None,
+        };
+        let mut touch_row = TouchRow {
+            target: plan.target,
+            contact: contact.map(|contact| contact.p_wc.coords.into()),
+            overload: touch == Touch::Overload,
+            normal: contact.filter(|_| writes_normals).map(|contact| contact.normal_w.into()),
+            tip: swept.map(|swept| swept.p_wt.coords.into()),
+            time_s: probe.time_s(),
+            planned_sd_m: plan.sd_m,
+            stall: plan.stall,
+            fit: None,
+            jitter: 0.0,
+            metrics: None,
+            outline: None,
+            shape: None,
+        };
+        let fitted = match count >= experiment.initial_touches {
+            true => conclude(experiment, truth, &mut belief, (count, &mut touch_row)),
+            false => Ok(()),
+        };
+        let touched = Touched { count, touch: &touch, row: &touch_row, belief: &belief };
+        let observed = observer(&touched);
+        row.touches.push(touch_row);
+        fitted.map_err(|error| format!("fit after touch {count}: {error}"))?;
+        observed.map_err(|fault| format!("touch {count}: {fault}"))?;
+    }
+    verify(experiment, task, &belief, probe, row)
+}
+
+/// Fits the belief after `count` touches, and writes it into the last one's row with how it
+/// compares with the truth.
+///
+/// # Errors
+/// If there is no fit.
+fn conclude(
+    experiment: &Experiment,
+    truth: &GroundTruth,
+    belief: &mut Belief,
+    (count, row): (u32, &mut TouchRow),
+) -> Result<(), CovarianceError> {
+    let fitted = belief.refit().cloned();
+    match belief {
+        Belief::HeightField(field) => {
+            if fitted.is_ok() {
+                row.metrics = field.surface().and_then(|it| truth.truth.compare(it));
+            }
+            // Its reliability stands in the last row only.
+            row.outline = Outline::of(field.presence(), &truth.truth);
+            if let Some(outline) = row.outline.as_mut().filter(|_| count < experiment.touches) {
+                outline.reliability = None;
+            }
+        }
+        Belief::ImplicitSurface(surface) => {
+            let is_compared = fitted.is_ok() && experiment.is_compared(count);
+            if let Some(surface) = surface.surface().filter(|_| is_compared) {
+                let cells = experiment.space.cells;
+                row.shape = truth.shape.as_ref().map(|shape| shape.judge(surface, cells));
+            }
+        }
+    }
+    if fitted.is_ok() {
+        row.jitter = belief.jitter();
+    }
+    row.fit = Some(fitted?);
+    Ok(())
+}

@@ -6,13 +6,13 @@ use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::statistics::mean;
 use crate::experiment::truth::Truth;
 use crate::explore::around::ImplicitSurface;
-use crate::explore::around::Surface;
 use crate::explore::around::surface::steepness;
 use crate::explore::belief::Belief;
 use crate::explore::planner::candidates::{Candidates, free_aim};
 use crate::explore::planner::sample::any_side;
 use crate::explore::planner::search::Search;
-use crate::explore::planner::{Plan, PlanningSettings};
+use crate::explore::planner::{Plan, PlanError, Planner, PlanningSettings};
+use crate::geometry::spread::Spot;
 use crate::sim::Environment;
 use crate::sim::probe::exact;
 use crate::task::{Aim, Target};
@@ -21,23 +21,23 @@ use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
 /// The ground truth that the beliefs of a trial are compared with.
-pub(in crate::experiment) struct GroundTruth<'a> {
+pub(in crate::experiment) struct GroundTruth {
     /// The scene, with the object's mesh.
-    pub(in crate::experiment) environment: &'a Arc<Environment>,
+    pub(in crate::experiment) environment: Arc<Environment>,
     /// True heights over a zone.
-    pub(in crate::experiment) truth: &'a Truth,
+    pub(in crate::experiment) truth: Truth,
     /// The true surface of a whole object; none in a zone.
-    pub(in crate::experiment) shape: Option<&'a TrueShape>,
+    pub(in crate::experiment) shape: Option<TrueShape>,
 }
 
 /// Points of the true surface at which the oracle compares.
 // heuristic: its choice is the same with all of them, and takes eight times as long.
 const LOOKED_AT: usize = 8;
 
-impl GroundTruth<'_> {
+impl GroundTruth {
     /// The belief with a touch of a rigid finger at `target`, not fitted again.
     fn touched(&self, belief: &Belief, target: &Target) -> Option<Belief> {
-        let mut probe = exact(Arc::clone(self.environment));
+        let mut probe = exact(Arc::clone(&self.environment));
         let approach = self.environment.task().approach(target)?;
         let touch = probe.touch(&approach).ok()?;
         let mut after = belief.clone();
@@ -50,65 +50,68 @@ impl GroundTruth<'_> {
     fn error_m(&self, belief: &Belief) -> Option<f64> {
         match belief {
             Belief::HeightField(field) => self.truth.rmse_m(field.surface()?),
-            Belief::ImplicitSurface(surface) => Some(off_m(self.shape?, surface.surface()?)),
+            Belief::ImplicitSurface(surface) => {
+                let mut field = surface.surface()?.field();
+                let spots = self.shape.as_ref()?.samples().iter().step_by(LOOKED_AT);
+                let offset_m = |spot: &Spot| {
+                    let field = field.at(&spot.point);
+                    field.value.abs() / steepness(&field.gradient)
+                };
+                Some(mean(&spots.map(offset_m).collect::<Vec<f64>>()))
+            }
         }
     }
 }
 
-fn off_m(shape: &TrueShape, surface: &Surface) -> f64 {
-    let mut field = surface.field();
-    let spots = shape.samples().iter().step_by(LOOKED_AT);
-    let offsets_m: Vec<f64> = spots
-        .map(|spot| {
-            let field = field.at(&spot.point);
-            field.value.abs() / steepness(&field.gradient)
-        })
-        .collect();
-    mean(&offsets_m)
-}
-
 /// Tries touches on the ground truth and asks for the one after which the belief is nearest to it.
-pub(in crate::experiment) struct Oracle {
+pub(super) struct Oracle<'a> {
     search: Search,
+    truth: &'a GroundTruth,
 }
 
-impl Oracle {
-    /// Makes the oracle of one trial; `rng` is its only randomness.
-    pub(in crate::experiment) fn new(settings: &PlanningSettings, rng: ChaCha8Rng) -> Self {
-        Self { search: Search::new(settings, rng) }
-    }
-
-    /// The touch after which `belief` is nearest to `truth`.
-    pub(in crate::experiment) fn plan(&mut self, belief: &Belief, truth: &GroundTruth) -> Plan {
-        match belief {
+impl Planner for Oracle<'_> {
+    fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+        Ok(match belief {
             Belief::HeightField(field) => {
                 let count = self.search.settings.oracle.candidates;
                 let places = self.search.scattered(field.zone(), count);
                 let targets = places.into_iter().map(Target::from).collect();
-                match self.best(belief, truth, targets) {
+                match self.best(belief, targets) {
                     Some(Target::Place(place)) => self.search.conclude(field, place),
                     _ => self.search.anywhere(field.zone()),
                 }
             }
             Belief::ImplicitSurface(surface) => {
                 let targets = self.aims(surface).into_iter().map(Target::from).collect();
-                match self.best(belief, truth, targets) {
+                match self.best(belief, targets) {
                     Some(target) => Plan::at(target),
                     None => Plan::at(any_side(surface.scope(), &mut self.search.rng)),
                 }
             }
-        }
+        })
+    }
+}
+
+impl<'a> Oracle<'a> {
+    /// Makes the oracle of one trial; `rng` is its only randomness.
+    pub(super) fn new(
+        settings: &PlanningSettings,
+        rng: ChaCha8Rng,
+        truth: &'a GroundTruth,
+    ) -> Self {
+        Self { search: Search::new(settings, rng), truth }
     }
 
-    fn best(&self, belief: &Belief, truth: &GroundTruth, targets: Vec<Target>) -> Option<Target> {
+    /// The target after which `belief` is nearest to the truth.
+    fn best(&self, belief: &Belief, targets: Vec<Target>) -> Option<Target> {
         let is_refitted = self.search.settings.oracle.refit && belief.height_field().is_some();
         let errors = targets.into_iter().filter_map(|target| {
-            let mut after = truth.touched(belief, &target)?;
+            let mut after = self.truth.touched(belief, &target)?;
             match is_refitted {
                 true => after.refit().map(|_| ()).ok()?,
                 false => after.fit().is_some().then(|| after.condition())?.ok()?,
             }
-            Some((truth.error_m(&after)?, target))
+            Some((self.truth.error_m(&after)?, target))
         });
         errors.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, target)| target)
     }

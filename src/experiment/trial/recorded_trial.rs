@@ -1,4 +1,4 @@
-//! A trial that is recorded while it runs.
+//! A trial that is recorded while it runs, or goes on where it was broken off.
 
 use crate::backend::Fault;
 use crate::backend::recording::{self, About, Ending, Recorder, Recording};
@@ -6,10 +6,12 @@ use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{RECORDINGS, resolved_beside};
 use crate::experiment::trial::belief_shape::shapes;
 use crate::experiment::trial::entrant::Entrant;
-use crate::experiment::trial::resumed::Resumed;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
-use crate::experiment::trial::witness::{Touched, Witness};
-use crate::explore::probe::{Probe, Touch};
+use crate::experiment::trial::{Touched, TrialObserver};
+use crate::explore::probe::{Contact, Probe, Swept, Touch};
+use crate::robot::Finger;
+use crate::task::Approach;
+use nalgebra::{Point3, Vector3};
 use std::iter;
 use std::path::{Path, PathBuf};
 
@@ -38,35 +40,36 @@ fn part(path: &Path, number: usize) -> PathBuf {
     path.with_file_name(format!("{stem}-part-{number}.mcap"))
 }
 
-/// As [`Simulation::trial`], recorded in the file `path`, which is replaced if it is there. What
-/// cannot be recorded fails the trial.
-pub fn run(simulation: &Simulation, planner: Entrant, trial: u32, path: &Path) -> TrialRow {
-    go_on(simulation, planner, trial, path, &[], &mut ())
-}
-
-/// Continues a trial after the touches `made`: the recording begins with them, so that it can
-/// be replayed by itself. `witness` sees every touch.
-pub fn go_on(
+/// Runs a trial that goes on after the touches `made`, and calls `observer` after every touch.
+/// With a `path` it is recorded in that file, which is replaced if it is there; the recording
+/// begins with `made`, so that it can be replayed by itself. A touch that cannot be recorded fails
+/// the trial.
+pub fn run(
     simulation: &Simulation,
-    planner: Entrant,
-    trial: u32,
-    path: &Path,
+    (planner, trial): (Entrant, u32),
+    path: Option<&Path>,
     made: &[TouchRow],
-    witness: &mut dyn Witness,
+    observer: &mut TrialObserver,
 ) -> TrialRow {
-    run_faulty(simulation, planner, trial, path, made, witness)
-        .unwrap_or_else(|fault| TrialRow::unstarted(trial, planner.name(), &fault))
+    let job = (planner, trial);
+    let row = match path {
+        Some(path) => record(simulation, job, path, made, observer),
+        None => simulation.probe(trial).map(|mut probe| {
+            let mut probe = Resumed::new(made.to_vec(), simulation, &mut *probe);
+            simulation.trial_with(&mut probe, planner, trial, observer)
+        }),
+    };
+    row.unwrap_or_else(|fault| TrialRow::unstarted(trial, planner.name(), &fault))
 }
 
 /// # Errors
 /// A fault before the first touch.
-fn run_faulty(
+fn record(
     simulation: &Simulation,
-    planner: Entrant,
-    trial: u32,
+    (planner, trial): (Entrant, u32),
     path: &Path,
     made: &[TouchRow],
-    witness: &mut dyn Witness,
+    observer: &mut TrialObserver,
 ) -> Result<TrialRow, Fault> {
     let body = simulation.body()?.ok_or(Fault::Lacks { part: "a body that moves" })?;
     let seed = simulation.body_seed(trial);
@@ -84,47 +87,28 @@ fn run_faulty(
     }
     let recorder = Recorder::new(body, recording.clone());
     let mut servo = simulation.servo(Box::new(recorder), seed)?;
-    let mut scribe = Scribe {
-        recording: recording.clone(),
-        made: made.len() as u32,
-        witness,
-        is_interrupted: false,
-    };
-    let finger = simulation.environment().scene().finger.clone();
-    let mut probe = Resumed::new(made.to_vec(), finger, &mut servo);
-    let mut row = simulation.trial_before(&mut probe, planner, trial, &mut scribe);
-    let ending = Ending { failure: row.failure.clone(), is_interrupted: scribe.is_interrupted };
-    if let Err(fault) = recording.end(servo.time_s().unwrap_or_default(), &ending) {
-        row.failure.get_or_insert_with(|| format!("after the last touch: {fault}"));
-    }
-    Ok(row)
-}
-
-/// Adds every touch to a recording.
-struct Scribe<'a> {
-    recording: Recording,
-    /// Touches that were made before.
-    made: u32,
-    witness: &'a mut dyn Witness,
-    /// Whether `witness` has ended the trial.
-    is_interrupted: bool,
-}
-
-impl Witness for Scribe<'_> {
-    fn touched(&mut self, touched: &Touched) -> Result<(), Fault> {
+    let mut is_interrupted = false;
+    let mut record = |touched: &Touched| {
         // A touch that the trial ends after is recorded all the same.
-        let seen = self.witness.touched(touched);
-        self.is_interrupted |= seen.is_err();
-        if touched.count <= self.made {
-            return seen;
+        let observed = observer(touched);
+        is_interrupted |= observed.is_err();
+        if touched.count as usize <= made.len() {
+            return observed;
         }
         let mut touch = recorded(touched.row, touched.count)?;
         if let Touch::Contact(contact) = touched.touch {
             touch.normal = contact.normal_w.as_slice().into();
         }
-        self.recording.touched(&touch, shapes(touched.belief))?;
-        seen
+        recording.touched(&touch, shapes(touched.belief))?;
+        observed
+    };
+    let mut probe = Resumed::new(made.to_vec(), simulation, &mut servo);
+    let mut row = simulation.trial_with(&mut probe, planner, trial, &mut record);
+    let ending = Ending { failure: row.failure.clone(), is_interrupted };
+    if let Err(fault) = recording.end(servo.time_s().unwrap_or_default(), &ending) {
+        row.failure.get_or_insert_with(|| format!("after the last touch: {fault}"));
     }
+    Ok(row)
 }
 
 /// The message that a touch is recorded as.
@@ -149,4 +133,73 @@ fn recorded(row: &TouchRow, touch: u32) -> Result<recording::Touch<'_>, Fault> {
         normal: row.normal.as_ref().map_or(&[][..], |normal| normal).into(),
         row: json.into(),
     })
+}
+
+/// A trial's probe that goes on where it was broken off: it first gives back the touches that were
+/// made before, then touches.
+pub struct Resumed<'a> {
+    made: std::vec::IntoIter<TouchRow>,
+    finger: Finger,
+    probe: &'a mut dyn Probe,
+    /// The last touch of before, if it was the last, and where the finger would have turned back.
+    last: Option<(TouchRow, Point3<f64>)>,
+    /// Time of the body when it was broken off.
+    begun_s: f64,
+    /// The fault that ended the last touch.
+    pub fault: Option<Fault>,
+}
+
+impl<'a> Resumed<'a> {
+    /// After the touches `made` of a trial of `simulation`, goes on with `probe`.
+    pub fn new(made: Vec<TouchRow>, simulation: &Simulation, probe: &'a mut dyn Probe) -> Self {
+        let begun_s = made.last().and_then(|touch| touch.time_s).unwrap_or(0.0);
+        let finger = simulation.environment().scene().finger.clone();
+        Self { made: made.into_iter(), finger, probe, last: None, begun_s, fault: None }
+    }
+}
+
+/// The outcome of a touch, from its row.
+fn touch(row: &TouchRow, approach: &Approach) -> Touch {
+    match (row.contact, row.overload) {
+        (Some(contact), _) => {
+            // A normal that no belief takes in is not written.
+            let against = -approach.direction_w().into_inner();
+            let normal_w = row.normal.map_or(against, Vector3::from);
+            Touch::Contact(Contact { p_wc: Point3::from(contact), normal_w })
+        }
+        (None, true) => Touch::Overload,
+        (None, false) => Touch::Miss,
+    }
+}
+
+impl Probe for Resumed<'_> {
+    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+        self.last = self.made.next().map(|row| (row, approach.p_far_w));
+        match &self.last {
+            Some((row, _)) => Ok(touch(row, approach)),
+            None => {
+                let touch = self.probe.touch(approach);
+                self.fault = touch.as_ref().err().cloned();
+                touch
+            }
+        }
+    }
+
+    fn swept(&self) -> Option<Swept> {
+        match &self.last {
+            // Where a tip is not written, no more counts than that a finger passed.
+            Some((row, p_far_w)) => {
+                let p_wt = row.tip.map_or(*p_far_w, Point3::from);
+                Some(Swept { finger: self.finger.clone(), p_wt })
+            }
+            None => self.probe.swept(),
+        }
+    }
+
+    fn time_s(&self) -> Option<f64> {
+        match &self.last {
+            Some((row, _)) => row.time_s,
+            None => self.probe.time_s().map(|time_s| self.begun_s + time_s),
+        }
+    }
 }

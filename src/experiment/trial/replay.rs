@@ -3,14 +3,12 @@
 use crate::backend::Fault;
 use crate::backend::recording::{self, Player, Recorded};
 use crate::config::ConfigError;
+use crate::error::Invalid;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::simulation::Simulation;
-use crate::experiment::trial::resumed::Resumed;
+use crate::experiment::trial::Touched;
+use crate::experiment::trial::recorded_trial::Resumed;
 use crate::experiment::trial::row::TouchRow;
-use crate::experiment::trial::witness::{Touched, Witness};
-use crate::explore::probe::servo::Servo;
-use crate::explore::probe::{Probe, Swept, Touch};
-use crate::task::Approach;
 use serde::Serialize;
 use std::path::Path;
 use thiserror::Error;
@@ -70,22 +68,9 @@ pub enum Difference {
 /// Why a recording cannot be replayed.
 #[derive(Debug, Error)]
 pub enum ReplayError {
-    /// Its planner is unknown.
-    #[error("it is of the planner \"{name}\", which this version does not have")]
-    Planner {
-        /// The planner.
-        name: String,
-    },
-    /// A touch that was made before the recording began cannot be read.
-    #[error(
-        "touch {touch} was made before the recording began, and its row cannot be read: {message}"
-    )]
-    Made {
-        /// Which, counted from 1.
-        touch: u32,
-        /// What the parser says.
-        message: String,
-    },
+    /// Its planner is unknown, or a touch in it cannot be read.
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
     /// The robot cannot be brought to the recording's start.
     #[error(transparent)]
     Start(#[from] Fault),
@@ -110,20 +95,32 @@ pub fn experiment(
 /// If it cannot be begun.
 pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, ReplayError> {
     let about = &recorded.about;
-    let unknown = || ReplayError::Planner { name: about.planner.clone() };
-    let planner = simulation.planner(&about.planner).ok_or_else(unknown)?;
+    let planner = simulation.planner(&about.planner).ok_or_else(|| {
+        let name = &about.planner;
+        Invalid::new(format!("it is of the planner \"{name}\", which this version does not have"))
+    })?;
     let player = Box::new(Player::new(recorded.clone()));
-    let servo = simulation.servo(player, simulation.body_seed(about.trial))?;
-    let mut probe = Kept { servo, fault: None };
-    let mut reader = Reader { recorded, same: 0, difference: None };
-    let made = made(recorded)?;
-    let finger = simulation.environment().scene().finger.clone();
-    let mut resumed = Resumed::new(made, finger, &mut probe);
-    let row = simulation.trial_before(&mut resumed, planner, about.trial, &mut reader);
-    let (touches, now) = (reader.same, row.failure);
+    let mut servo = simulation.servo(player, simulation.body_seed(about.trial))?;
+    let mut probe = Resumed::new(made(recorded)?, simulation, &mut servo);
+    let (mut touches, mut differs) = (0, None);
+    let mut compare = |touched: &Touched| {
+        let Some(then) = recorded.touches.get(touches as usize) else {
+            // It was cut between a touch's last tick and what was made of it, or it ended there.
+            return Ok(());
+        };
+        let now = serde_json::to_string(touched.row).unwrap_or_default();
+        if now == then.row || rewritten(&then.row).is_some_and(|then| now == then) {
+            touches += 1;
+            return Ok(());
+        }
+        let (touch, recorded) = (touched.count, then.row.clone().into_owned());
+        differs = Some(Difference::Row { touch, recorded, now });
+        Err(Fault::Stopped { time_s: touched.row.time_s.unwrap_or_default() })
+    };
+    let now = simulation.trial_with(&mut probe, planner, about.trial, &mut compare).failure;
     let is_cut = recorded.ending.is_none();
     let is_interrupted = recorded.ending.as_ref().is_some_and(|ending| ending.is_interrupted);
-    let difference = match (reader.difference, probe.fault) {
+    let difference = match (differs, probe.fault) {
         (Some(difference), _) => Some(difference),
         (_, Some(Fault::Differs { tick, time_s, joint, recorded: then, now })) => {
             let number = |value: f64| Some(value).filter(|value| value.is_finite());
@@ -151,62 +148,16 @@ pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, Re
 }
 
 /// The rows of the touches that were made before the recording began.
-fn made(recorded: &Recorded) -> Result<Vec<TouchRow>, ReplayError> {
-    let made = recorded.touches.iter().take(recorded.made);
+fn made(recorded: &Recorded) -> Result<Vec<TouchRow>, Invalid> {
     let read = |touch: &recording::Touch| {
-        serde_json::from_str(&touch.row)
-            .map_err(|error| ReplayError::Made { touch: touch.touch, message: error.to_string() })
+        serde_json::from_str(&touch.row).map_err(|error| {
+            Invalid::new(format!(
+                "touch {} was made before the recording began, and its row cannot be read: {error}",
+                touch.touch
+            ))
+        })
     };
-    made.map(read).collect()
-}
-
-/// A servo whose fault is kept as it is.
-struct Kept {
-    servo: Servo,
-    fault: Option<Fault>,
-}
-
-impl Probe for Kept {
-    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
-        let touch = self.servo.touch(approach);
-        self.fault = touch.as_ref().err().cloned();
-        touch
-    }
-
-    fn swept(&self) -> Option<Swept> {
-        self.servo.swept()
-    }
-
-    fn time_s(&self) -> Option<f64> {
-        self.servo.time_s()
-    }
-}
-
-/// Compares every touch with the recorded one.
-struct Reader<'a> {
-    recorded: &'a Recorded,
-    same: u32,
-    difference: Option<Difference>,
-}
-
-impl Witness for Reader<'_> {
-    fn touched(&mut self, touched: &Touched) -> Result<(), Fault> {
-        let Some(then) = self.recorded.touches.get(self.same as usize) else {
-            // It was cut between a touch's last tick and what was made of it, or it ended there.
-            return Ok(());
-        };
-        let now = serde_json::to_string(touched.row).unwrap_or_default();
-        if now == then.row || rewritten(&then.row).is_some_and(|then| now == then) {
-            self.same += 1;
-            return Ok(());
-        }
-        self.difference = Some(Difference::Row {
-            touch: touched.count,
-            recorded: then.row.clone().into_owned(),
-            now,
-        });
-        Err(Fault::Stopped { time_s: touched.row.time_s.unwrap_or_default() })
-    }
+    recorded.touches.iter().take(recorded.made).map(read).collect()
 }
 
 /// A recorded row as this version writes it: version 0.1 wrote targets without a name. Returns

@@ -4,7 +4,6 @@ use crate::backend::Fault;
 use crate::experiment::measure::metrics::Metrics;
 use crate::experiment::measure::outline::Outline;
 use crate::experiment::measure::shape::ShapeMetrics;
-use crate::experiment::trial::verification_row::VerificationRow;
 use crate::explore::planner::Stall;
 use crate::gp::fit::Fit;
 use crate::task::Target;
@@ -82,21 +81,53 @@ pub struct TouchRow {
     pub shape: Option<ShapeMetrics>,
 }
 
+/// A touch after a trial's last one, of which the belief learns nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct VerificationRow {
+    /// Where the finger was sent, as in the trial's touches.
+    pub target: Target,
+    /// Which of the trial's touches it repeats, counted from 1; none of a touch at a new place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub again: Option<u32>,
+    /// Height that the belief expected at the target, before the touch was made. Around an object
+    /// the distance from the point aimed at back to where the way was expected to meet the surface;
+    /// 0 where nothing was expected on it.
+    pub predicted_m: f64,
+    /// Standard deviation of that, of a touch: σ² + noise².
+    pub predicted_sd_m: f64,
+    /// The point of contact (x, y, z) in `W`; none for a miss or a touch broken off.
+    pub contact: Option<[f64; 3]>,
+    /// Whether the touch was broken off.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub overload: bool,
+    /// The contact's height above what the same belief expected at the contact's own place, which
+    /// differs from the target; around an object its distance outside of the believed surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error_m: Option<f64>,
+    /// Standard deviation of that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sd_m: Option<f64>,
+    /// The contact's height above that of the touch it repeats, less what the belief says that the
+    /// surface rises from one place of contact to the other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub difference_m: Option<f64>,
+}
+
 impl TrialRow {
     /// Which trial it is.
     pub fn id(&self) -> TrialId {
         TrialId { trial: self.trial, planner: self.planner.clone() }
     }
 
-    /// Of a trial that had to be given up before its first touch.
-    pub fn unstarted(trial: u32, planner: &str, fault: &Fault) -> Self {
-        Self {
-            trial,
-            planner: planner.into(),
-            failure: Some(format!("before the first touch: {fault}")),
-            touches: Vec::new(),
-            verification: Vec::new(),
-        }
+    /// A trial without a touch, which `failure` ended if it is given.
+    pub(in crate::experiment) fn ended(trial: u32, planner: &str, failure: Option<String>) -> Self {
+        let (touches, verification) = (Vec::new(), Vec::new());
+        Self { trial, planner: planner.into(), failure, touches, verification }
+    }
+
+    /// A trial that a fault ended before its first touch.
+    pub(in crate::experiment) fn unstarted(trial: u32, planner: &str, fault: &Fault) -> Self {
+        Self::ended(trial, planner, Some(format!("before the first touch: {fault}")))
     }
 
     /// Travel of the finger over its first `touches` touches, in straight lines: from place to
@@ -123,9 +154,6 @@ impl TouchRow {
         }
     }
 }
-
-/// What was made of verification touches, and why there are no more, if a fault ended them.
-pub type VerificationRows = (Vec<VerificationRow>, Option<String>);
 
 /// The rows of one planner.
 pub fn of_planner<'a>(

@@ -2,8 +2,7 @@
 //! held against what the finger then meets.
 
 use crate::experiment::experiment::Experiment;
-use crate::experiment::trial::row::{TouchRow, VerificationRows};
-use crate::experiment::trial::verification_row::VerificationRow;
+use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
 use crate::explore::around::surface::steepness;
 use crate::explore::belief::{Belief, HeightField};
 use crate::explore::planner::sample::sampled;
@@ -15,19 +14,22 @@ use nalgebra::Point3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Makes the verification touches of `trial`, then those that repeat an earlier one; what was made
-/// of them, and why there are no more, if a fault ended them.
+/// Makes the verification touches of a trial, then those that repeat an earlier one, and writes
+/// them into its row.
 ///
 /// Their targets depend on the experiment's seed and the trial, not on the planner.
+///
+/// # Errors
+/// The fault that ended them, in words.
 pub(super) fn verify(
     experiment: &Experiment,
     task: &Task,
     belief: &Belief,
     probe: &mut dyn Probe,
-    (touches, trial): (&[TouchRow], u32),
-) -> VerificationRows {
-    let mut rows = Vec::new();
-    let mut stream = seed::stream(experiment.seed, trial.into(), "verification");
+    row: &mut TrialRow,
+) -> Result<(), String> {
+    let TrialRow { trial, touches, verification: rows, .. } = row;
+    let mut stream = seed::stream(experiment.seed, (*trial).into(), "verification");
     let targets = new_targets(belief, experiment.verification_touches, &mut stream);
     let targets = targets.into_iter().map(|target| (target, None));
     let again = repeated(touches, experiment.repeat_touches);
@@ -38,31 +40,29 @@ pub(super) fn verify(
         else {
             break;
         };
-        let touch = match probe.touch(&approach) {
-            Ok(touch) => touch,
-            Err(fault) => {
-                let failure = format!("verification touch {}: {fault}", rows.len() + 1);
-                return (rows, Some(failure));
-            }
+        let touch = probe.touch(&approach);
+        let touch =
+            touch.map_err(|fault| format!("verification touch {}: {fault}", rows.len() + 1))?;
+        let p_wc = match &touch {
+            Touch::Contact(contact) => Some(contact.p_wc),
+            Touch::Miss | Touch::Overload => None,
         };
-        let mut row = VerificationRow {
+        let error = p_wc.and_then(|p_wc| outside(belief, &p_wc));
+        let first = again.and_then(|at| touches[at].contact).map(Point3::from);
+        let before = error.zip(first.and_then(|first| outside(belief, &first)));
+        rows.push(VerificationRow {
             target,
             again: again.map(|at| at as u32 + 1),
             predicted_m,
             predicted_sd_m,
-            contact: None,
+            contact: p_wc.map(|p_wc| p_wc.coords.into()),
             overload: touch == Touch::Overload,
-            error_m: None,
-            sd_m: None,
-            difference_m: None,
-        };
-        if let Touch::Contact(contact) = &touch {
-            let first = again.and_then(|at| touches[at].contact).map(Point3::from);
-            meet(&mut row, belief, (&contact.p_wc, first.as_ref()));
-        }
-        rows.push(row);
+            error_m: error.map(|(error_m, _)| error_m),
+            sd_m: error.map(|(_, sd_m)| sd_m),
+            difference_m: before.map(|((now_m, _), (before_m, _))| now_m - before_m),
+        });
     }
-    (rows, None)
+    Ok(())
 }
 
 /// Expected height at a place of a zone, with the deviation of a touch; none before the
@@ -129,20 +129,6 @@ fn first_zero([from, to]: [f64; 2], mut value: impl FnMut(f64) -> f64) -> Option
         *(if value(middle) < 0.0 { &mut high } else { &mut low }) = middle;
     }
     Some(high)
-}
-
-/// Writes what was met into `row`; `first` is the contact that it repeats.
-fn meet(
-    row: &mut VerificationRow,
-    belief: &Belief,
-    (p_wc, first): (&Point3<f64>, Option<&Point3<f64>>),
-) {
-    row.contact = Some(p_wc.coords.into());
-    let error = outside(belief, p_wc);
-    row.error_m = error.map(|(error_m, _)| error_m);
-    row.sd_m = error.map(|(_, sd_m)| sd_m);
-    let before = first.and_then(|first| outside(belief, first));
-    row.difference_m = error.zip(before).map(|((now_m, _), (before_m, _))| now_m - before_m);
 }
 
 /// `count` targets of a Halton sequence over the unit square, shifted by `random` (Cranley and

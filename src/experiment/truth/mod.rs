@@ -1,10 +1,9 @@
 //! The true surface on the test grid of an experiment.
 
-pub mod cloud;
 pub mod scan;
 pub mod scan_truth;
 
-use crate::experiment::measure::metrics::{Calibration, Errors, Metrics, Sums};
+use crate::experiment::measure::metrics::{Metrics, calibration, rmse};
 use crate::geometry::coarse::coarse;
 use crate::geometry::mesh::Mesh;
 use crate::gp::Posterior;
@@ -48,22 +47,15 @@ impl Truth {
     /// Samples like [`sample`](Self::sample); `tell` is called with the name of each step, as it
     /// begins.
     pub fn sample_telling(environment: &Environment, per_side: usize, tell: &dyn Fn(&str)) -> Self {
-        tell("looking where the surface is");
         let Some(zone) = environment.task().zone() else {
             return Self::around(environment.mesh());
         };
+        tell("looking where the surface is");
         let places = zone.grid(per_side);
         let heights_m: Vec<_> =
             places.iter().map(|place| environment.true_height_m(place)).collect();
         let is_reachable = reach::is_reachable(environment, &places, &heights_m, tell);
         Self { is_whole: true, ..Self::new(zone, places, heights_m, is_reachable) }
-    }
-
-    /// Of an object that nobody has measured: no height at any place.
-    pub fn unknown(zone: &Zone, per_side: usize) -> Self {
-        let places = zone.grid(per_side);
-        let count = places.len();
-        Self::new(zone, places, vec![None; count], vec![false; count])
     }
 
     /// The truth of a whole object with the surface `mesh`, made coarser if it is large; without a
@@ -113,14 +105,14 @@ impl Truth {
 
     /// Root mean square error of a belief wherever there is a surface; none if nobody knows of any.
     pub fn rmse_m(&self, belief: &Posterior) -> Option<f64> {
-        let mut errors = Errors::default();
         let means = belief.means(self.places.iter().map(Vec::as_slice));
-        for (mean, truth) in means.iter().zip(&self.heights_m) {
-            if let Some(truth) = truth {
-                errors.add(truth - mean);
-            }
-        }
-        errors.rmse()
+        rmse(self.errors(&means).map(|(_, error)| error))
+    }
+
+    /// Each place with a surface and the error of a belief with these `means`.
+    fn errors(&self, means: &[f64]) -> impl Iterator<Item = (usize, f64)> {
+        let heights_m = self.heights_m.iter().zip(means).enumerate();
+        heights_m.filter_map(|(i, (height_m, mean))| Some((i, (*height_m)? - mean)))
     }
 
     /// Compares a belief with the truth wherever there is a surface; none if nobody knows of any.
@@ -128,25 +120,27 @@ impl Truth {
         if self.count() == 0 {
             return None;
         }
-        let mut sums = Sums::default();
-        let [mut edge, mut reachable, mut unreachable] = [Errors::default(); 3];
-        let mut calibration = Calibration::default();
         let means = belief.means(self.places.iter().map(Vec::as_slice));
         let calibrated: Vec<Vec<f64>> = self.places.iter().step_by(CALIBRATED).cloned().collect();
         let variances = belief.variances(&calibrated, &mut []);
         let noise2 = belief.hyperparameters().noise_sd.powi(2);
-        for (i, mean) in means.into_iter().enumerate() {
-            let Some(truth) = self.heights_m[i] else { continue };
-            sums.add(truth, mean);
-            if self.is_edge[i] {
-                edge.add(truth - mean);
-            }
-            let reached = if self.is_reachable[i] { &mut reachable } else { &mut unreachable };
-            reached.add(truth - mean);
-            if i % CALIBRATED == 0 {
-                calibration.add(truth - mean, variances[i / CALIBRATED] + noise2);
-            }
-        }
-        Some(sums.metrics([edge, reachable, unreachable], calibration))
+        let (coverage, nlpd) = calibration(
+            self.errors(&means)
+                .filter(|(i, _)| i % CALIBRATED == 0)
+                .map(|(i, error)| (error, variances[i / CALIBRATED] + noise2)),
+        );
+        let rmse_where = |holds: &dyn Fn(usize) -> bool| {
+            rmse(self.errors(&means).filter(|(i, _)| holds(*i)).map(|(_, error)| error))
+        };
+        let heights_m = self.heights_m.iter().zip(&means);
+        let heights_m = heights_m.filter_map(|(height_m, mean)| Some(((*height_m)?, *mean)));
+        Some(Metrics {
+            edge_rmse_m: rmse_where(&|i| self.is_edge[i]),
+            reachable_rmse_m: rmse_where(&|i| self.is_reachable[i]),
+            unreachable_rmse_m: rmse_where(&|i| !self.is_reachable[i]),
+            coverage,
+            nlpd,
+            ..Metrics::of(heights_m)
+        })
     }
 }

@@ -1,20 +1,13 @@
 //! Touches on a grid of targets: the object's surface as the finger feels it, without a belief.
 
 use crate::backend::Fault;
-use crate::experiment::runner::{RunError, pool};
+use crate::error::Invalid;
+use crate::experiment::runner::pool;
 use crate::explore::probe::Touch;
 use crate::sim::simulator::Simulator;
 use crate::task::Zone;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// One touch of a scan.
-pub struct ScanTouch {
-    /// Where the finger was sent.
-    pub target: Vec<f64>,
-    /// What it ended with.
-    pub touch: Result<Touch, Fault>,
-}
 
 /// Steps along the longer side of a zone that a scan makes if none are asked for; chosen as twice
 /// the density of a drawing.
@@ -28,8 +21,14 @@ pub fn default_grid(zone: &Zone) -> [usize; 2] {
     [along(0), along(1)]
 }
 
-/// Touches every target of a grid over the zone, x varying fastest; none if `stop` became true
-/// before the end.
+/// The places of a grid over the zone, x varying fastest.
+pub fn targets(zone: &Zone, [columns, rows]: [usize; 2]) -> Vec<Vec<f64>> {
+    let share = |i: usize, count: usize| i as f64 / (count.max(2) - 1) as f64;
+    let target = |i: usize, j: usize| zone.at(&[share(i, columns), share(j, rows)]);
+    (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).map(|(i, j)| target(i, j)).collect()
+}
+
+/// Touches `targets`, of which `columns` are a row; none if `stop` became true before the end.
 ///
 /// Every row has a probe of its own, so the result does not depend on `threads`, 0 for all cores.
 /// `progress` is called after each row, from any thread.
@@ -38,33 +37,30 @@ pub fn default_grid(zone: &Zone) -> [usize; 2] {
 /// If threads cannot be started.
 pub fn scan(
     simulator: &Simulator,
-    [columns, rows]: [usize; 2],
+    (targets, columns): (&[Vec<f64>], usize),
     threads: usize,
     stop: &AtomicBool,
     progress: &(dyn Fn() + Sync),
-) -> Result<Option<Vec<ScanTouch>>, RunError> {
+) -> Result<Option<Vec<Result<Touch, Fault>>>, Invalid> {
     let task = simulator.environment().task();
-    let Some(zone) = task.zone() else { return Ok(None) };
-    let share = |i: usize, count: usize| i as f64 / (count.max(2) - 1) as f64;
-    let row = |j: usize| {
+    let row = |(j, targets): (usize, &[Vec<f64>])| {
         if stop.load(Ordering::Relaxed) {
             return None;
         }
         let mut probe = simulator.probe(j as u64);
-        let touches = (0..columns).map(|i| {
-            let target = zone.at(&[share(i, columns), share(j, rows)]);
+        let touches = targets.iter().map(|target| {
             let approach = task.approach(&target.clone().into())?;
-            let touch = match &mut probe {
+            Some(match &mut probe {
                 Ok(probe) => probe.touch(&approach),
                 Err(fault) => Err(fault.clone()),
-            };
-            Some(ScanTouch { touch, target })
+            })
         });
-        let touches: Option<Vec<ScanTouch>> = touches.collect();
+        let touches: Option<Vec<_>> = touches.collect();
         progress();
         touches
     };
-    let touches: Option<Vec<Vec<ScanTouch>>> =
-        pool(threads)?.install(|| (0..rows).into_par_iter().map(row).collect());
+    let rows: Vec<_> = targets.chunks(columns).enumerate().collect();
+    let touches: Option<Vec<Vec<_>>> =
+        pool(threads)?.install(|| rows.into_par_iter().map(row).collect());
     Ok(touches.map(|rows| rows.into_iter().flatten().collect()))
 }

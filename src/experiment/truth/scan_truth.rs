@@ -1,13 +1,16 @@
 //! The truth of an object that nobody has a mesh of: heights taken from a scan of it.
 
 use crate::config::{Checked, Rules};
+use crate::error::Invalid;
+use crate::experiment::measure::metrics::rmse;
 use crate::experiment::truth::Truth;
-use crate::experiment::truth::cloud::{self, CloudError};
+use crate::files;
+use crate::geometry::import::ply::points;
 use crate::task::Zone;
 use nalgebra::{Matrix3, Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Table `[truth]`: what beliefs are held against, instead of the object's own surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -44,103 +47,87 @@ impl Checked for ScanTruth {
     }
 }
 
-/// How far a scan's heights may themselves be off.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LeftOut {
-    /// Contacts of the scan in the zone's reach.
-    pub contacts: usize,
-    /// Root mean square difference between a contact's height and that which the others give at its
-    /// place; none if no contact has neighbours enough.
-    pub rmse_m: Option<f64>,
-}
-
 impl ScanTruth {
     /// Heights at the test places of a grid of `per_side` along each side of `zone`: of the plane
     /// through the contacts near each, near ones weighing more. Where there are too few, or all lie
     /// to one side, there is none.
     ///
+    /// Returns also the number of contacts, and the root mean square difference between a contact's
+    /// height and that which the others give at its place; `None` if no contact has neighbours
+    /// enough.
+    ///
     /// # Errors
     /// If the file is no cloud.
-    pub fn sample(&self, zone: &Zone, per_side: usize) -> Result<(Truth, LeftOut), CloudError> {
-        let contacts = Contacts::new(zone, &cloud::read(&self.scan)?);
-        let within_m = self.within_m.unwrap_or_else(|| SPACINGS * contacts.spacing_m());
+    pub fn sample(
+        &self,
+        zone: &Zone,
+        per_side: usize,
+    ) -> Result<(Truth, usize, Option<f64>), Invalid> {
+        let contact = |p_w: &Point3<f64>| (flat(&zone.place(p_w)), zone.height_m(p_w));
+        let contacts: Vec<([f64; 2], f64)> = read_cloud(&self.scan)?.iter().map(contact).collect();
+        let within_m = self.within_m.unwrap_or_else(|| SPACINGS * spacing_m(&contacts));
         let places = zone.grid(per_side);
-        let height = |place: &Vec<f64>| contacts.height_m(place, within_m, self.neighbours, None);
-        let heights_m: Vec<Option<f64>> = places.iter().map(height).collect();
+        let height = |place: [f64; 2], without| {
+            height_m(&contacts, place, (within_m, self.neighbours), without)
+        };
+        let heights_m: Vec<Option<f64>> =
+            places.iter().map(|place| height(flat(place), None)).collect();
         let reached = heights_m.iter().map(Option::is_some).collect();
-        let left_out = contacts.left_out(within_m, self.neighbours);
-        Ok((Truth::new(zone, places, heights_m, reached), left_out))
+        let errors = contacts
+            .iter()
+            .enumerate()
+            .filter_map(|(i, (place, height_m))| Some(height(*place, Some(i))? - height_m));
+        let rmse_m = rmse(errors);
+        Ok((Truth::new(zone, places, heights_m, reached), contacts.len(), rmse_m))
     }
 }
 
-/// Places of contacts in the zone's plane, with their heights above the datum.
-struct Contacts(Vec<([f64; 2], f64)>);
+/// Median distance from a contact to its nearest neighbour.
+fn spacing_m(contacts: &[([f64; 2], f64)]) -> f64 {
+    let nearest = contacts.iter().enumerate().filter_map(|(i, (place, _))| {
+        let others = contacts.iter().enumerate().filter(|(j, _)| *j != i);
+        others.map(|(_, (other, _))| distance_m(place, other)).reduce(f64::min)
+    });
+    let mut nearest: Vec<f64> = nearest.collect();
+    nearest.sort_unstable_by(f64::total_cmp);
+    nearest.get(nearest.len() / 2).copied().unwrap_or(0.0)
+}
 
-impl Contacts {
-    fn new(zone: &Zone, points_w: &[Point3<f64>]) -> Self {
-        let contact = |p_w: &Point3<f64>| (flat(&zone.place(p_w)), zone.height_m(p_w));
-        Self(points_w.iter().map(contact).collect())
-    }
-
-    /// Median distance from a contact to its nearest neighbour.
-    fn spacing_m(&self) -> f64 {
-        let nearest = self.0.iter().enumerate().filter_map(|(i, (place, _))| {
-            let others = self.0.iter().enumerate().filter(|(j, _)| *j != i);
-            others.map(|(_, (other, _))| distance_m(place, other)).reduce(f64::min)
-        });
-        let mut nearest: Vec<f64> = nearest.collect();
-        nearest.sort_unstable_by(f64::total_cmp);
-        nearest.get(nearest.len() / 2).copied().unwrap_or(0.0)
-    }
-
-    /// The height at `place` of the plane through the contacts near it, without contact `without`.
-    fn height_m(
-        &self,
-        place: &[f64],
-        within_m: f64,
-        least: usize,
-        without: Option<usize>,
-    ) -> Option<f64> {
-        let place = flat(place);
-        let (mut normal, mut right, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0);
-        let mut around = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-        for (i, (at, height_m)) in self.0.iter().enumerate() {
-            let far_m = distance_m(&place, at);
-            if far_m > within_m || Some(i) == without {
-                continue;
-            }
-            let away = [0, 1].map(|axis| (at[axis] - place[axis]) / within_m);
-            around[0] = [0, 1].map(|axis| around[0][axis].min(away[axis]));
-            around[1] = [0, 1].map(|axis| around[1][axis].max(away[axis]));
-            let row = Vector3::new(1.0, away[0], away[1]);
-            // Tricube (Cleveland 1979).
-            let weight = (1.0 - (far_m / within_m).powi(3)).powi(3);
-            normal += row * row.transpose() * weight;
-            right += row * *height_m * weight;
-            count += 1;
+/// The height at `place` of the plane through the contacts within `within_m` of it, of which
+/// `least` are needed, without contact `without`. A contact is its place in the zone's plane and
+/// its height above the datum.
+fn height_m(
+    contacts: &[([f64; 2], f64)],
+    place: [f64; 2],
+    (within_m, least): (f64, usize),
+    without: Option<usize>,
+) -> Option<f64> {
+    let (mut normal, mut right, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0);
+    let mut around = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+    for (i, (at, height_m)) in contacts.iter().enumerate() {
+        let far_m = distance_m(&place, at);
+        if far_m > within_m || Some(i) == without {
+            continue;
         }
-        // No plane is drawn out beyond its contacts.
-        let is_inside =
-            [0, 1].iter().all(|&axis| around[0][axis] <= BESIDE && around[1][axis] >= -BESIDE);
-        if count < least || !is_inside {
-            return None;
-        }
-        // Contacts on a line, as of a zone that is one, say nothing of the slope across it.
-        let plane = normal.svd(true, true).solve(&right, FLAT * normal.norm()).ok()?;
-        plane.x.is_finite().then_some(plane.x)
+        let away = [0, 1].map(|axis| (at[axis] - place[axis]) / within_m);
+        around[0] = [0, 1].map(|axis| around[0][axis].min(away[axis]));
+        around[1] = [0, 1].map(|axis| around[1][axis].max(away[axis]));
+        let row = Vector3::new(1.0, away[0], away[1]);
+        // Tricube (Cleveland 1979).
+        let weight = (1.0 - (far_m / within_m).powi(3)).powi(3);
+        normal += row * row.transpose() * weight;
+        right += row * *height_m * weight;
+        count += 1;
     }
-
-    fn left_out(&self, within_m: f64, least: usize) -> LeftOut {
-        let (mut squares, mut count) = (0.0, 0.0);
-        for (i, (place, height_m)) in self.0.iter().enumerate() {
-            if let Some(told_m) = self.height_m(place, within_m, least, Some(i)) {
-                squares += (told_m - height_m).powi(2);
-                count += 1.0;
-            }
-        }
-        let rmse_m = (count > 0.0).then(|| f64::sqrt(squares / count));
-        LeftOut { contacts: self.0.len(), rmse_m }
+    // No plane is drawn out beyond its contacts.
+    let is_inside =
+        [0, 1].iter().all(|&axis| around[0][axis] <= BESIDE && around[1][axis] >= -BESIDE);
+    if count < least || !is_inside {
+        return None;
     }
+    // Contacts on a line, as of a zone that is one, say nothing of the slope across it.
+    let plane = normal.svd(true, true).solve(&right, FLAT * normal.norm()).ok()?;
+    plane.x.is_finite().then_some(plane.x)
 }
 
 /// How far beside all of its contacts a place may lie, as a part of how far they may be; chosen.
@@ -155,4 +142,60 @@ fn flat(place: &[f64]) -> [f64; 2] {
 
 fn distance_m(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// The points of contact in `cloud.csv` or `cloud.ply`, which a scan writes, in `W`; targets
+/// without contact are passed over.
+///
+/// # Errors
+/// If it cannot be read, or is none.
+pub fn read_cloud(path: &Path) -> Result<Vec<Point3<f64>>, Invalid> {
+    let unreadable = |cause| Invalid::new(format!("cannot be read: {cause}")).at(path.display());
+    let text = files::text(path, u64::MAX).map_err(unreadable)?;
+    let cloud = match text.starts_with("ply") {
+        true => points(text.as_bytes()).map_err(|error| error.at(path.display()))?,
+        false => of_csv(path, &text)?,
+    };
+    match cloud.is_empty() {
+        true => Err(Invalid::new("no contact in it").at(path.display())),
+        false => Ok(cloud),
+    }
+}
+
+/// A file without this column.
+fn no_column(path: &Path, column: &str) -> Invalid {
+    let allowed = "allowed are cloud.csv and cloud.ply of palpate scan";
+    Invalid::new(format!("no column {column}")).at(path.display()).mend(allowed)
+}
+
+/// A line, counted from 1, that is not one of numbers.
+fn no_point(path: &Path, line: usize, found: &str) -> Invalid {
+    Invalid::new(format!("{found:?} where x, y and z in metres are wanted"))
+        .at(format!("{}:{line}", path.display()))
+}
+
+fn of_csv(path: &Path, text: &str) -> Result<Vec<Point3<f64>>, Invalid> {
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let no_record = |line: usize, error: csv::Error| no_point(path, line, &error.to_string());
+    let header = reader.headers().map_err(|error| no_record(1, error))?.clone();
+    let column = |column: &'static str| {
+        let at = header.iter().position(|name| name == column);
+        at.ok_or_else(|| no_column(path, column))
+    };
+    let columns = [column("x_m")?, column("y_m")?, column("z_m")?];
+    let mut points = Vec::new();
+    for (i, record) in reader.records().enumerate() {
+        let record = record.map_err(|error| no_record(i + 2, error))?;
+        let fields = columns.map(|column| record.get(column).unwrap_or_default());
+        if fields.iter().any(|field| !field.is_empty()) {
+            let point = numbers(fields);
+            points.push(point.ok_or_else(|| no_point(path, i + 2, &fields.join(",")))?);
+        }
+    }
+    Ok(points)
+}
+
+fn numbers(fields: [&str; 3]) -> Option<Point3<f64>> {
+    let [x, y, z] = fields.map(|field| field.parse::<f64>().ok().filter(|x| x.is_finite()));
+    Some(Point3::new(x?, y?, z?))
 }

@@ -3,8 +3,8 @@
 
 use super::{Frame, Sequence, Touch};
 use crate::geometry::coarse::coarse;
-use crate::geometry::primitives::extent;
 use crate::geometry::mesh::Mesh;
+use crate::geometry::primitives::extent;
 use crate::geometry::solids::Triangles;
 use crate::report::axes::{self, MM};
 use crate::report::explorer::frames::{encode, short};

@@ -3,8 +3,7 @@
 
 use super::titled;
 use crate::experiment::measure::{self, MEASURES, Measure};
-use crate::experiment::notice;
-use crate::experiment::statistics::curve_table::{CurveRecord, columns, curve_table};
+use crate::experiment::statistics::curve_table::{columns, curve_table};
 use crate::experiment::statistics::summary::{self, CurvePoint, Events, typical};
 use crate::experiment::store::Run;
 use crate::report::number::shown;
@@ -56,7 +55,7 @@ pub fn note(run: &Run) -> String {
 pub fn text(run: &Run) -> String {
     let mut text = format!("{}\n{}", run.experiment.name, table(run).text());
     happened(run).iter().for_each(|line| text += &format!("{line}\n"));
-    notice::of_run(run).iter().for_each(|notice| text += &format!("note: {notice}\n"));
+    run.notices().iter().for_each(|notice| text += &format!("note: {notice}\n"));
     text.trim_end().into()
 }
 
@@ -66,7 +65,7 @@ pub fn file(run: &Run, is_wanted: impl Fn(u32) -> bool) -> Table {
     let names = ["planner", "touches", "trials"].map(String::from).into_iter();
     let names = names.chain(columns(&run.experiment, &run.rows));
     let records = curve_table(&run.experiment, &run.rows, is_wanted);
-    let row = |CurveRecord { point, values }: CurveRecord| -> Vec<Cell> {
+    let row = |(point, values): (CurvePoint, Vec<Option<f64>>)| -> Vec<Cell> {
         let start = [point.planner.into(), (point.touches as usize).into(), point.trials.into()];
         start.into_iter().chain(values.into_iter().map(Cell::from)).collect()
     };
@@ -86,13 +85,13 @@ pub fn json(run: &Run) -> Value {
             ["planner", "touches", "trials"].map(|key| row.remove(key));
         json!({ "planner": planner, "touches": touches, "trials": trials, "measures": row })
     };
-    let notices = notice::of_run(run);
+    let notices = run.notices();
     json!({
         "name": run.experiment.name,
         "trials": run.rows.len(),
         "failed": run.rows.iter().filter(|row| row.failure.is_some()).count(),
         "summary": rows.iter_mut().map(of_point).collect::<Vec<_>>(),
-        "notes": notices.iter().map(ToString::to_string).chain(happened(run)).collect::<Vec<_>>(),
+        "notes": notices.into_iter().chain(happened(run)).collect::<Vec<_>>(),
     })
 }
 

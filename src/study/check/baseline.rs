@@ -1,6 +1,7 @@
 //! What planners were: a file of JSON lines, a header and then a line for each trial.
 
-use super::judged::{JUDGED, Span};
+use super::judged::JUDGED;
+use crate::error::Invalid;
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
 use crate::words::hex;
@@ -9,7 +10,6 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// The first line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -69,50 +69,12 @@ pub struct Baseline {
     pub lines: Vec<Line>,
 }
 
-/// Why a baseline is of no use.
-#[derive(Debug, Error)]
-pub enum BaselineError {
-    /// It cannot be read.
-    #[error("{}: {message}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        message: String,
-    },
-    /// A line is damaged.
-    #[error("{}:{line}: {message}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// Which line, from 1.
-        line: usize,
-        /// What is wrong with it.
-        message: String,
-    },
-    /// Its trials are not those of the experiment.
-    #[error(
-        "{}: `{field}` is {found} there and {wanted} in the experiment: their trials do not pair; \
-         make a new baseline with --bless WHY", path.display()
-    )]
-    Other {
-        /// The file.
-        path: PathBuf,
-        /// The setting.
-        field: &'static str,
-        /// Its value in the file.
-        found: String,
-        /// Its value in the experiment.
-        wanted: String,
-    },
-}
-
 impl Line {
-    /// Of a finished trial.
-    pub fn of(row: &TrialRow, span: Span) -> Self {
+    /// The line of a finished trial of `experiment`.
+    pub fn of(row: &TrialRow, experiment: &Experiment) -> Self {
         let values = JUDGED
             .iter()
-            .filter_map(|judged| Some((judged.id.to_owned(), (judged.of)(row, span)?)))
+            .filter_map(|judged| Some((judged.id.to_owned(), (judged.of)(row, experiment)?)))
             .collect();
         Self {
             trial: row.trial,
@@ -146,11 +108,6 @@ pub fn settings(experiment: &Experiment) -> String {
     hex(Sha256::new().chain_update(text).chain_update(object).finalize())
 }
 
-/// Which touches of an experiment's trials count.
-pub fn span(experiment: &Experiment) -> Span {
-    Span { initial: experiment.initial_touches, touches: experiment.touches }
-}
-
 impl Baseline {
     /// Of all trials of an experiment, made for this reason.
     pub fn new(simulation: &Simulation, rows: &[TrialRow], why: &str) -> Self {
@@ -169,7 +126,7 @@ impl Baseline {
             planners: experiment.planners.clone(),
             cost: IgnoredAny,
         };
-        let lines = rows.iter().map(|row| Line::of(row, span(experiment))).collect();
+        let lines = rows.iter().map(|row| Line::of(row, experiment)).collect();
         Self { header, lines }
     }
 
@@ -177,18 +134,15 @@ impl Baseline {
     ///
     /// # Errors
     /// If it cannot be read, or a line is not what it should be.
-    pub fn read(path: &Path) -> Result<Self, BaselineError> {
-        let unreadable = |message: String| BaselineError::Unreadable { path: path.into(), message };
-        let text = std::fs::read_to_string(path).map_err(|error| unreadable(error.to_string()))?;
+    pub fn read(path: &Path) -> Result<Self, Invalid> {
+        let text = std::fs::read_to_string(path).map_err(|error| Invalid::io(path, error))?;
         let bad = |i: usize| {
-            move |error: serde_json::Error| BaselineError::Line {
-                path: path.into(),
-                line: i + 1,
-                message: error.to_string(),
-            }
+            let place = format!("{}:{}", path.display(), i + 1);
+            move |error: serde_json::Error| Invalid::new(error.to_string()).at(place)
         };
         let mut lines = text.lines().enumerate();
-        let (_, first) = lines.next().ok_or_else(|| unreadable("it is empty".into()))?;
+        let empty = || Invalid::new("it is empty").at(path.display());
+        let (_, first) = lines.next().ok_or_else(empty)?;
         let header = serde_json::from_str(first).map_err(bad(0))?;
         let lines = lines.map(|(i, line)| serde_json::from_str(line).map_err(bad(i)));
         Ok(Self { header, lines: lines.collect::<Result<_, _>>()? })
@@ -211,7 +165,7 @@ impl Baseline {
     ///
     /// # Errors
     /// The first setting that they do not share.
-    pub fn check_pairs(&self, path: &Path, experiment: &Experiment) -> Result<(), BaselineError> {
+    pub fn check_pairs(&self, path: &Path, experiment: &Experiment) -> Result<(), Invalid> {
         let header = &self.header;
         for (field, found, wanted) in [
             ("seed", header.seed, experiment.seed),
@@ -220,8 +174,11 @@ impl Baseline {
             ("grid", header.grid.into(), experiment.grid.into()),
         ] {
             if found != wanted {
-                let (found, wanted) = (found.to_string(), wanted.to_string());
-                return Err(BaselineError::Other { path: path.into(), field, found, wanted });
+                let problem = format!(
+                    "`{field}` is {found} there and {wanted} in the experiment: their trials do not pair"
+                );
+                let mend = "make a new baseline with --bless WHY";
+                return Err(Invalid::new(problem).at(path.display()).mend(mend));
             }
         }
         Ok(())

@@ -1,10 +1,11 @@
 //! Trials run again until each planner is told from what it was, or is not.
 
-use super::baseline::{Baseline, Line, settings, span};
-use super::judged::{JUDGED, Judged};
-use super::verdict::{Judgement, Rules, Verdict, of_planner};
+use super::baseline::{Baseline, Line, settings};
+use super::judged::{JUDGED, Judged, Verdict};
+use super::sequence::Sequence;
+use crate::error::Invalid;
 use crate::experiment::Simulation;
-use crate::experiment::runner::{self, Job, OnProgress, RunError};
+use crate::experiment::runner::{self, Progress};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What came of it.
@@ -53,10 +54,10 @@ pub fn hold(
     rules: &Rules,
     threads: usize,
     stop: &AtomicBool,
-    progress: OnProgress,
-) -> Result<Held, RunError> {
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Held, Invalid> {
     let experiment = simulation.experiment();
-    let (names, span) = (&experiment.planners, span(experiment));
+    let names = &experiment.planners;
     let mut open: Vec<&str> = names.iter().map(String::as_str).collect();
     open.retain(|name| baseline.header.planners.iter().any(|known| known == name));
     let mut rows: Vec<Line> = Vec::new();
@@ -66,11 +67,11 @@ pub fn hold(
         let (some, batch) = (rules.first as u32, rules.batch as u32);
         let until = last.min(if first < some { some } else { (first / batch + 1) * batch });
         let planners: Vec<_> = open.iter().filter_map(|name| simulation.planner(name)).collect();
-        let jobs: Vec<Job> = (first..until)
+        let jobs: Vec<_> = (first..until)
             .flat_map(|trial| planners.iter().map(move |&planner| (trial, planner)))
             .collect();
         let made = runner::rows(simulation, jobs, threads, stop, progress)?;
-        rows.extend(made.iter().map(|row| Line::of(row, span)));
+        rows.extend(made.iter().map(|row| Line::of(row, experiment)));
         // The first rows only tell whether anything is other: intervals are looked at by batches.
         let is_open = |verdict| match until < batch {
             true => verdict != Verdict::Identical,
@@ -115,34 +116,111 @@ fn planner_of(baseline: &Baseline, rules: &Rules, rows: &[Line], name: &str) -> 
         .collect();
     let failed = failures.first().map(|first| (failures.len(), (*first).clone()));
     let trials = pairs.len();
-    let mut planner = Planner {
-        name: name.into(),
-        verdict: Verdict::Missing,
-        trials,
-        failed,
-        judgements: Vec::new(),
-    };
-    if trials > 0 && pairs.iter().all(|(new, old)| new.row == old.row) {
-        planner.verdict = Verdict::Identical;
-    } else if trials > 0 {
-        // What neither has is not judged.
-        let is_known = |judged: &&Judged| {
-            let has = |line: &Line| line.values.contains_key(judged.id);
-            pairs.iter().any(|(new, old)| has(new) || has(old))
-        };
-        let differences: Vec<(&Judged, Vec<f64>)> = JUDGED
-            .iter()
-            .filter(is_known)
-            .map(|judged| {
-                let difference = |(new, old): &(&Line, &Line)| {
-                    Some(new.values.get(judged.id)? - old.values.get(judged.id)?)
-                };
-                (judged, pairs.iter().filter_map(difference).collect())
-            })
-            .collect();
-        planner.judgements = rules.judge(&differences);
-        let said = of_planner(&planner.judgements);
-        planner.verdict = if planner.failed.is_some() { Verdict::Missing } else { said };
+    let is_identical = trials > 0 && pairs.iter().all(|(new, old)| new.row == old.row);
+    let mut judgements = Vec::new();
+    if trials > 0 && !is_identical {
+        let differences = JUDGED.iter().filter_map(|judged| {
+            let value = |line: &Line| line.values.get(judged.id).copied();
+            // What neither has is not judged.
+            let is_known = pairs.iter().any(|(new, old)| value(new).or(value(old)).is_some());
+            let difference = |(new, old): &(&Line, &Line)| Some(value(new)? - value(old)?);
+            is_known.then(|| (judged, pairs.iter().filter_map(difference).collect()))
+        });
+        judgements = rules.judge(&differences.collect::<Vec<_>>());
     }
-    planner
+    let verdict = match (is_identical, &failed) {
+        (true, _) => Verdict::Identical,
+        (false, Some(_)) => Verdict::Missing,
+        (false, None) => of_planner(&judgements),
+    };
+    Planner { name: name.into(), verdict, trials, failed, judgements }
+}
+
+/// One measure of one planner, new against old in the same trials.
+#[derive(Clone, Debug)]
+pub struct Judgement {
+    /// The measure.
+    pub judged: &'static Judged,
+    /// What its differences, new − old, tell.
+    pub sequence: Sequence,
+    /// What is said of it.
+    pub verdict: Verdict,
+    /// How many trials would tell a difference of the tolerance, by their spread so far.
+    pub wanted: Option<usize>,
+}
+
+/// How sure to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rules {
+    /// Share of an error that may be lost.
+    pub tolerance: f64,
+    /// Probability of one false word about a planner's first measure, at any time; the other
+    /// measures share as much, divided after Holm (1979).
+    pub alpha: f64,
+    /// Trials whose rows are looked at first, whether they are the same.
+    pub first: usize,
+    /// Trials between two looks at an interval.
+    pub batch: usize,
+}
+
+impl Default for Rules {
+    fn default() -> Self {
+        Self { tolerance: 0.05, alpha: 0.05, first: 4, batch: 10 }
+    }
+}
+
+impl Rules {
+    fn verdict(&self, judged: &Judged, sequence: &Sequence, is_sure: bool) -> Verdict {
+        let [low, high] = sequence.interval;
+        match () {
+            () if sequence.count == 0 => Verdict::Missing,
+            () if sequence.is_zero => Verdict::Identical,
+            () if high < 0.0 && is_sure => Verdict::Better,
+            () if high < judged.allowed(self.tolerance) => Verdict::Ok,
+            () if low > 0.0 && is_sure => Verdict::Worse,
+            () => Verdict::Undecided,
+        }
+    }
+
+    /// One planner's measures from the differences of its trials; the first decides.
+    pub fn judge(&self, differences: &[(&'static Judged, Vec<f64>)]) -> Vec<Judgement> {
+        let sequences: Vec<Sequence> = differences
+            .iter()
+            .map(|(_, values)| Sequence::new(values, self.batch, self.alpha))
+            .collect();
+        let sure = self.sure(&sequences);
+        let all = differences.iter().zip(&sequences).zip(&sure);
+        all.map(|(((judged, _), sequence), &is_sure)| Judgement {
+            judged,
+            verdict: self.verdict(judged, sequence, is_sure),
+            wanted: sequence.wanted(judged.allowed(self.tolerance), self.alpha),
+            sequence: *sequence,
+        })
+        .collect()
+    }
+
+    /// Of which measures a difference is sure: of the first by itself, of the others after Holm.
+    fn sure(&self, sequences: &[Sequence]) -> Vec<bool> {
+        let mut order: Vec<usize> = (1..sequences.len()).collect();
+        order.sort_by(|&a, &b| sequences[a].p.total_cmp(&sequences[b].p));
+        let mut sure = vec![false; sequences.len()];
+        if let (Some(sure), Some(first)) = (sure.first_mut(), sequences.first()) {
+            *sure = first.p <= self.alpha;
+        }
+        let count = order.len();
+        for (rank, i) in order.into_iter().enumerate() {
+            if sequences[i].p > self.alpha / (count - rank) as f64 {
+                break;
+            }
+            sure[i] = true;
+        }
+        sure
+    }
+}
+
+/// What is said of a planner: its first measure decides, and any that is worse or missing.
+pub fn of_planner(judgements: &[Judgement]) -> Verdict {
+    let first = judgements.first().map_or(Verdict::Missing, |first| first.verdict);
+    let is_bad = |judgement: &&Judgement| judgement.verdict >= Verdict::Worse;
+    judgements.iter().find(is_bad).map_or(first, |bad| bad.verdict.max(first))
 }

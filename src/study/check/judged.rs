@@ -1,7 +1,9 @@
 //! What a planner is judged by when it is held against what it was: one line to add one.
 
+use crate::experiment::Experiment;
 use crate::experiment::measure::{CENTRED_R, CHAMFER, RMSE};
 use crate::experiment::trial::row::{TouchRow, TrialRow};
+use serde::Serialize;
 
 /// A number of a trial, less of which is better.
 #[derive(Debug)]
@@ -10,28 +12,12 @@ pub struct Judged {
     pub id: &'static str,
     /// Its name in words.
     pub title: &'static str,
-    /// In what it is taken.
-    pub scale: Scale,
-    /// Its value; none where the trial has none.
-    pub of: fn(&TrialRow, Span) -> Option<f64>,
-}
-
-/// In what differences are taken and tolerated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
-    /// Logarithms: a difference of 0.05 is five percent.
-    Log,
-    /// Shares of a trial's touches: a difference of 0.05 is five in a hundred.
-    Share,
-}
-
-/// Which touches of a trial count: after the initial ones, to the last.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Span {
-    /// Initial touches, the same for all planners.
-    pub initial: u32,
-    /// Touches in all.
-    pub touches: u32,
+    /// Whether it is a logarithm, in which a difference of 0.05 is five percent; otherwise it is a
+    /// share of a trial's touches, in which that is five in a hundred.
+    pub is_log: bool,
+    /// Its value over the touches after the initial ones, to the last; none where the trial has
+    /// none.
+    pub of: fn(&TrialRow, &Experiment) -> Option<f64>,
 }
 
 /// Errors and ways are not taken to be less; of zero there is no logarithm.
@@ -47,8 +33,8 @@ fn error_m(row: &TrialRow, touches: u32) -> Option<f64> {
     (RMSE.of)(row, touches).or_else(|| (CHAMFER.of)(row, touches))
 }
 
-fn share(row: &TrialRow, span: Span, is_it: fn(&TouchRow) -> bool) -> Option<f64> {
-    let planned = row.touches.get(span.initial as usize..span.touches as usize)?;
+fn share(row: &TrialRow, of: &Experiment, is_it: fn(&TouchRow) -> bool) -> Option<f64> {
+    let planned = row.touches.get(of.initial_touches as usize..of.touches as usize)?;
     let count = planned.iter().filter(|touch| is_it(touch)).count();
     (!planned.is_empty()).then(|| count as f64 / planned.len() as f64)
 }
@@ -56,64 +42,70 @@ fn share(row: &TrialRow, span: Span, is_it: fn(&TouchRow) -> bool) -> Option<f64
 /// The mean over the touches sees a loss that the last touch hides, and of all measures needs the
 /// fewest trials; so it is the first, which decides.
 pub static JUDGED: &[Judged] = &[
-    Judged {
-        id: "mean_log_rmse",
-        title: "mean log error over the touches",
-        scale: Scale::Log,
-        of: |row, span| {
-            let after = span.initial.max(1)..=span.touches;
-            let whole = row.touches.len() >= span.touches as usize;
-            let logs = after.filter_map(|n| error_m(row, n).map(log));
-            let (count, sum) = logs.fold((0.0, 0.0), |(count, sum), log| (count + 1.0, sum + log));
-            (whole && count > 0.0).then(|| sum / count)
-        },
-    },
-    Judged {
-        id: "log_rmse",
-        title: "error after the last touch",
-        scale: Scale::Log,
-        of: |row, span| error_m(row, span.touches).map(log),
-    },
-    Judged {
-        id: "log_1_minus_centred_r",
-        title: "1 − centred R after the last touch",
-        scale: Scale::Log,
-        of: |row, span| (CENTRED_R.of)(row, span.touches).map(|r| log(1.0 - r)),
-    },
-    Judged {
-        id: "log_path",
-        title: "lateral travel",
-        scale: Scale::Log,
-        of: |row, span| row.path_m(span.touches).map(log),
-    },
-    Judged {
-        id: "missed",
-        title: "share of touches that met nothing",
-        scale: Scale::Share,
-        of: |row, span| share(row, span, |touch| touch.contact.is_none()),
-    },
-    Judged {
-        id: "stalled",
-        title: "share of plans that fell back",
-        scale: Scale::Share,
-        of: |row, span| share(row, span, |touch| touch.stall.is_some()),
-    },
+    Judged::log("mean_log_rmse", "mean log error over the touches", |row, of| {
+        let after = of.initial_touches.max(1)..=of.touches;
+        let whole = row.touches.len() >= of.touches as usize;
+        let logs = after.filter_map(|n| error_m(row, n).map(log));
+        let (count, sum) = logs.fold((0.0, 0.0), |(count, sum), log| (count + 1.0, sum + log));
+        (whole && count > 0.0).then(|| sum / count)
+    }),
+    Judged::log("log_rmse", "error after the last touch", |row, of| {
+        error_m(row, of.touches).map(log)
+    }),
+    Judged::log("log_1_minus_centred_r", "1 − centred R after the last touch", |row, of| {
+        (CENTRED_R.of)(row, of.touches).map(|r| log(1.0 - r))
+    }),
+    Judged::log("log_path", "lateral travel", |row, of| row.path_m(of.touches).map(log)),
+    Judged::share("missed", "share of touches that met nothing", |row, of| {
+        share(row, of, |touch| touch.contact.is_none())
+    }),
+    Judged::share("stalled", "share of plans that fell back", |row, of| {
+        share(row, of, |touch| touch.stall.is_some())
+    }),
 ];
 
 impl Judged {
+    const fn log(
+        id: &'static str,
+        title: &'static str,
+        of: fn(&TrialRow, &Experiment) -> Option<f64>,
+    ) -> Self {
+        Self { id, title, is_log: true, of }
+    }
+
+    const fn share(
+        id: &'static str,
+        title: &'static str,
+        of: fn(&TrialRow, &Experiment) -> Option<f64>,
+    ) -> Self {
+        Self { is_log: false, ..Self::log(id, title, of) }
+    }
+
     /// The difference that `tolerance`, a share of the error, allows.
     pub fn allowed(&self, tolerance: f64) -> f64 {
-        match self.scale {
-            Scale::Log => tolerance.ln_1p(),
-            Scale::Share => tolerance,
-        }
+        if self.is_log { tolerance.ln_1p() } else { tolerance }
     }
 
     /// A difference in percent: of the value, or of the touches.
     pub fn percent(&self, difference: f64) -> f64 {
-        match self.scale {
-            Scale::Log => 100.0 * difference.exp_m1(),
-            Scale::Share => 100.0 * difference,
-        }
+        100.0 * if self.is_log { difference.exp_m1() } else { difference }
     }
+}
+
+/// What is said of one measure of one planner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// No difference in any trial.
+    Identical,
+    /// Less of what should be little.
+    Better,
+    /// Not more than is tolerated.
+    Ok,
+    /// These trials cannot tell.
+    Undecided,
+    /// More of it.
+    Worse,
+    /// No trial has it, of which the baseline has some.
+    Missing,
 }

@@ -8,8 +8,7 @@ pub mod baseline;
 pub mod held;
 pub mod judged;
 pub mod sequence;
-pub mod verdict;
 
-pub use baseline::{Baseline, BaselineError};
-pub use held::{Held, Planner, differs, hold};
-pub use verdict::{Judgement, Rules, Verdict};
+pub use baseline::Baseline;
+pub use held::{Held, Judgement, Planner, Rules, differs, hold};
+pub use judged::Verdict;

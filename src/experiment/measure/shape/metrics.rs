@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// Distances are from a point of one surface to the nearest point of the other, over points spread
 /// evenly by area; shares of a length are of the diagonal of the true surface's bounding box.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ShapeMetrics {
     /// Chamfer distance, in metres: ½·(mean distance from the true surface to the believed one) +
     /// ½·(mean distance from the believed surface to the true one). None where no surface is

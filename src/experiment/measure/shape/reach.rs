@@ -40,35 +40,28 @@ impl Reach<'_> {
         let spread: Vec<UnitVector3<f64>> = directions(DIRECTIONS).collect();
         let (low, high) = mesh.mesh().bounds();
         let tolerance_m = TOLERANCE * (high - low).norm();
-        let touches = |spot: &Spot| self.touches_one((mesh, tolerance_m), spot, &spread);
+        let touches = |spot: &Spot| {
+            let corners = mesh.mesh().corners(spot.triangle as usize);
+            let outward = UnitVector3::new_unchecked(normal(&corners));
+            let tip_w = spot.point + outward.scale(self.radius_m);
+            // A tip no farther than this from there is within the tolerance of the spot, along the
+            // tangent; so this much of it is free wherever it may rest, and the way beyond too.
+            let aside_m = (tolerance_m * (2.0 * self.radius_m + tolerance_m)).sqrt();
+            if mesh.touches(&tip_w, self.radius_m - aside_m) {
+                return false;
+            }
+            let mut ways: Vec<(f64, UnitVector3<f64>)> = (spread.iter())
+                .map(|back| (outward.dot(back), *back))
+                .filter(|(cosine, _)| *cosine > 0.0)
+                .collect();
+            ways.push((1.0, outward));
+            ways.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+            ways.iter().any(|(_, back)| {
+                mesh.ray(&(tip_w + back.scale(aside_m)), back, f64::MAX).is_none()
+                    && self.rests_at((mesh, tolerance_m), spot, &tip_w.coords, back)
+            })
+        };
         spots.par_iter().map(touches).collect()
-    }
-
-    fn touches_one(
-        &self,
-        (mesh, tolerance_m): (&MeshBvh, f64),
-        spot: &Spot,
-        spread: &[UnitVector3<f64>],
-    ) -> bool {
-        let corners = mesh.mesh().corners(spot.triangle as usize);
-        let outward = UnitVector3::new_unchecked(normal(&corners));
-        let tip_w = spot.point + outward.scale(self.radius_m);
-        // A tip no farther than this from there is within the tolerance of the spot, along the
-        // tangent; so this much of it is free wherever it may rest, and the way beyond too.
-        let aside_m = (tolerance_m * (2.0 * self.radius_m + tolerance_m)).sqrt();
-        if mesh.touches(&tip_w, self.radius_m - aside_m) {
-            return false;
-        }
-        let mut ways: Vec<(f64, UnitVector3<f64>)> = (spread.iter())
-            .map(|back| (outward.dot(back), *back))
-            .filter(|(cosine, _)| *cosine > 0.0)
-            .collect();
-        ways.push((1.0, outward));
-        ways.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-        ways.iter().any(|(_, back)| {
-            mesh.ray(&(tip_w + back.scale(aside_m)), back, f64::MAX).is_none()
-                && self.rests_at((mesh, tolerance_m), spot, &tip_w.coords, back)
-        })
     }
 
     /// Whether it comes to rest at `spot` if its tip goes to `tip_w` from `back` there.

@@ -1,19 +1,23 @@
 //! `content.json`: hashes of what decides the rows of a run and is not in its `resolved.toml`.
+//! `manifest.json`: the programs that wrote it.
 
-use super::error::{StoreError, io_error};
-use super::file::write_changed;
+use super::files::{RunError, io_error, write_changed, write_whole};
 use crate::experiment::simulation::Simulation;
 use crate::experiment::trial::entrant::Entrant;
 use crate::files;
 use crate::sim::environment::Shape;
 use crate::words::hex;
+use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
 /// File with the hashes of a run's files and of planners written outside of Palpate.
-pub const CONTENT: &str = "content.json";
+pub(super) const CONTENT: &str = "content.json";
+
+/// File that lists the programs that wrote a run.
+pub const MANIFEST: &str = "manifest.json";
 
 /// Largest scan that is hashed.
 const SCAN_MAX: u64 = 1 << 30;
@@ -24,7 +28,7 @@ const PLANNER: &str = "planner ";
 /// SHA-256 of the files that a run reads and of the planners written outside of Palpate, by what
 /// they are: `scene.object.mesh`, `scene.arm.model`, `truth.scan`, `planner MODULE:NAME`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Content {
+pub(super) struct Content {
     hashes: BTreeMap<String, String>,
     /// Files of the keys that have one, as the experiment names them.
     files: BTreeMap<String, String>,
@@ -35,7 +39,7 @@ impl Content {
     ///
     /// # Errors
     /// If a file cannot be read.
-    pub fn of(simulation: &Simulation) -> Result<Self, StoreError> {
+    pub(super) fn of(simulation: &Simulation) -> Result<Self, RunError> {
         let mut content = Self::default();
         let experiment = simulation.experiment();
         if let (Shape::Mesh { report, .. }, Some(object)) =
@@ -54,11 +58,9 @@ impl Content {
             content.add("scene.arm.model", sha256(&bytes), Some(path));
         }
         for name in &experiment.planners {
-            let source = match simulation.planner(name) {
-                Some(Entrant::Planner(factory)) => factory.source(),
-                _ => None,
-            };
-            if let Some(source) = source {
+            if let Some(Entrant::Planner(factory)) = simulation.planner(name)
+                && let Some(source) = factory.source()
+            {
                 content.add(&format!("{PLANNER}{name}"), sha256(source.as_bytes()), None);
             }
         }
@@ -73,25 +75,22 @@ impl Content {
     }
 
     /// Reads that of the run in `folder`; empty if it has none.
-    pub(super) fn read(folder: &Path) -> Result<Self, StoreError> {
+    pub(super) fn read(folder: &Path) -> Result<Self, RunError> {
         let path = folder.join(CONTENT);
         let text = match files::text(&path, files::TEXT_MAX) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
             text => text.map_err(io_error(&path))?,
         };
-        let hashes = serde_json::from_str(&text).map_err(|error| StoreError::BadRow {
-            path,
-            line: error.line(),
-            message: error.to_string(),
-        })?;
+        let hashes = serde_json::from_str(&text)
+            .map_err(|error| RunError::bad_row(&path, error.line(), error))?;
         Ok(Self { hashes, files: BTreeMap::new() })
     }
 
     /// Writes it into the run in `folder`.
-    pub(super) fn write(&self, folder: &Path) -> Result<(), StoreError> {
+    pub(super) fn write(&self, folder: &Path) -> Result<(), RunError> {
         let path = folder.join(CONTENT);
-        let text = serde_json::to_string_pretty(&self.hashes).map_err(io::Error::from);
-        write_changed(&path, &(text.map_err(io_error(&path))? + "\n"))
+        let text = serde_json::to_string_pretty(&self.hashes).map_err(io_error(&path))?;
+        write_changed(&path, &(text + "\n"))
     }
 
     /// Adds what `other` has and this has not.
@@ -107,24 +106,63 @@ impl Content {
         before: &Self,
         folder: &Path,
         has_row: impl Fn(&str) -> bool,
-    ) -> Result<(), StoreError> {
+    ) -> Result<(), RunError> {
         let counts = |key: &str| key.strip_prefix(PLANNER).is_none_or(&has_row);
         let differs = |(key, hash): &(&String, &String)| {
             counts(key) && before.hashes.get(*key).is_some_and(|before| before != *hash)
         };
-        match self.hashes.iter().find(differs) {
-            None => Ok(()),
-            Some((key, _)) => Err(StoreError::Changed {
-                path: folder.into(),
-                what: match self.files.get(key) {
-                    Some(file) => format!("{key} = \"{file}\""),
-                    None => key.clone(),
-                },
-            }),
-        }
+        let Some((key, _)) = self.hashes.iter().find(differs) else { return Ok(()) };
+        let file = self.files.get(key).map_or(String::new(), |file| format!(" = \"{file}\""));
+        let problem = format!(
+            "{key}{file} has changed since the run began, and its trials were made with what it was \
+             before; choose another folder with --out, or start again with --fresh"
+        );
+        Err(RunError::at(folder, problem))
     }
 }
 
 fn sha256(bytes: &[u8]) -> String {
     hex(Sha256::digest(bytes))
+}
+
+/// This program, built from `commit`, on this machine, which runs an experiment with this `seed`:
+/// its versions, its platform, and the processor's vector extensions, on which the last bits of a
+/// factorisation depend.
+pub(super) fn manifest(commit: &str, seed: u64) -> Value {
+    #[cfg(target_arch = "x86_64")]
+    let vectors = [
+        ("avx2", is_x86_feature_detected!("avx2")),
+        ("fma", is_x86_feature_detected!("fma")),
+        ("avx512f", is_x86_feature_detected!("avx512f")),
+    ];
+    #[cfg(not(target_arch = "x86_64"))]
+    let vectors: [(&str, bool); 0] = [];
+    let vectors: Vec<&str> =
+        vectors.iter().filter(|(_, is_there)| *is_there).map(|(name, _)| *name).collect();
+    #[cfg(feature = "mujoco")]
+    let mujoco = Some(crate::sim::mujoco::version());
+    #[cfg(not(feature = "mujoco"))]
+    let mujoco: Option<&str> = None;
+    json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "commit": commit,
+        "mujoco": mujoco,
+        "platform": format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
+        "cpu_features": vectors,
+        "seed": seed,
+    })
+}
+
+/// Adds `manifest` to the list of programs that wrote a run, unless the last one was the same.
+pub(super) fn sign(folder: &Path, manifest: Value) -> Result<(), RunError> {
+    let path = folder.join(MANIFEST);
+    let to_value = |text: String| serde_json::from_str::<Vec<Value>>(&text).ok();
+    let mut signed =
+        files::text(&path, files::TEXT_MAX).ok().and_then(to_value).unwrap_or_default();
+    if signed.last() != Some(&manifest) {
+        signed.push(manifest);
+        let text = serde_json::to_string_pretty(&signed).map_err(io_error(&path))?;
+        write_whole(&path, &text)?;
+    }
+    Ok(())
 }

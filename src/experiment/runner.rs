@@ -1,0 +1,248 @@
+//! Trials × planners: simulated ones on all cores, those of a real arm one after another.
+
+use crate::backend::Fault;
+use crate::backend::ros::clock;
+use crate::error::Invalid;
+use crate::experiment::simulation::Simulation;
+use crate::experiment::store::{Entry, JOURNAL, Journal, RunError, RunFolder};
+use crate::experiment::trial::Touched;
+use crate::experiment::trial::entrant::Entrant;
+use crate::experiment::trial::recorded_trial::{self, next_part, recording_path};
+use crate::experiment::trial::row::{TrialId, TrialRow};
+use rayon::iter::{
+    IndexedParallelIterator, IntoParallelIterator, ParallelBridge, ParallelIterator,
+};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// The progress of a run, which is reported from any thread.
+#[derive(Clone, Copy, Debug)]
+pub enum Progress<'a> {
+    /// A touch of a running trial is done.
+    Touch,
+    /// A trial is done.
+    Trial(&'a TrialRow),
+}
+
+/// Every trial of every planner that `done` lacks, trial by trial.
+///
+/// # Errors
+/// If the experiment lists a planner that is not there.
+pub fn jobs<'a>(
+    simulation: &'a Simulation,
+    done: &[TrialId],
+) -> Result<Vec<(u32, Entrant<'a>)>, Invalid> {
+    let known = |(trial, name): (u32, &str)| {
+        let planner = simulation.planner(name);
+        let problem = format!("planner `{name}` is not built into this program");
+        let mend = "run it with the Python package's palpate, or from Rust by \
+                    Simulation::with_planners";
+        Ok((trial, planner.ok_or_else(|| Invalid::new(problem).mend(mend))?))
+    };
+    simulation.experiment().lacks(done).into_iter().map(known).collect()
+}
+
+/// A part of an experiment's trials, for a machine or task of its own: every `count`-th trial, with
+/// all its planners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// Its number, from 1.
+    pub index: u32,
+    /// The number of shards.
+    pub count: u32,
+}
+
+impl FromStr for Shard {
+    type Err = Invalid;
+
+    fn from_str(text: &str) -> Result<Self, Invalid> {
+        let wrong = || Invalid::new("allowed is I/N with I from 1 to N, as in 3/8");
+        let (index, count) = text.split_once('/').ok_or_else(wrong)?;
+        let number = |text: &str| text.trim().parse::<u32>().map_err(|_| wrong());
+        let (index, count) = (number(index)?, number(count)?);
+        match index > 0 && index <= count {
+            true => Ok(Self { index, count }),
+            false => Err(wrong()),
+        }
+    }
+}
+
+impl Shard {
+    /// Whether it has a trial.
+    pub fn has(self, trial: u32) -> bool {
+        trial % self.count == self.index - 1
+    }
+
+    /// Leaves its own of all jobs.
+    pub fn keep(self, jobs: &mut Vec<(u32, Entrant)>) {
+        jobs.retain(|(trial, _)| self.has(*trial));
+    }
+}
+
+/// Runs `jobs` and adds each row to `folder` as it finishes; returns how many trials it ran.
+///
+/// A trial is recorded if `recorded` names the run's folder. When `stop` becomes true, running
+/// trials are finished and no others begun. `threads` 0 means all cores.
+///
+/// # Errors
+/// If a row cannot be stored, or threads cannot be started.
+pub fn run(
+    simulation: &Simulation,
+    (folder, jobs): (&mut RunFolder, Vec<(u32, Entrant)>),
+    threads: usize,
+    stop: &AtomicBool,
+    recorded: Option<&Path>,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<usize, RunError> {
+    let pool = pool(threads)?;
+    let finished = Mutex::new((folder, 0));
+    // Handed out one by one, so that rows finish about in order and an interrupted run has
+    // whole pairs.
+    pool.install(|| {
+        jobs.into_iter().par_bridge().try_for_each(|(trial, planner)| {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            let row = run_caught(simulation, (planner, trial), recorded, progress);
+            if row.failure.is_some() && stop.load(Ordering::Relaxed) {
+                // What stopped the run may have failed it: it is run again.
+                return Ok(());
+            }
+            let mut finished = finished.lock().unwrap_or_else(PoisonError::into_inner);
+            finished.0.append(&row)?;
+            finished.1 += 1;
+            progress(Progress::Trial(&row));
+            Ok::<(), RunError>(())
+        })
+    })?;
+    let (_, count) = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
+    Ok(count)
+}
+
+/// Runs `jobs` and keeps their rows in memory, in the jobs' order; those begun after `stop` became
+/// true are left out.
+///
+/// # Errors
+/// If threads cannot be started.
+pub fn rows(
+    simulation: &Simulation,
+    jobs: Vec<(u32, Entrant)>,
+    threads: usize,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Vec<TrialRow>, Invalid> {
+    let run = |(trial, planner): (u32, Entrant)| {
+        let row = (!stop.load(Ordering::Relaxed))
+            .then(|| run_caught(simulation, (planner, trial), None, progress))?;
+        progress(Progress::Trial(&row));
+        Some(row)
+    };
+    let found: Vec<Option<TrialRow>> =
+        pool(threads)?.install(|| jobs.into_par_iter().with_max_len(1).map(run).collect());
+    Ok(found.into_iter().flatten().collect())
+}
+
+/// Threads of its own for a piece of work; 0 means all cores.
+///
+/// # Errors
+/// If they cannot be started.
+pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, Invalid> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| Invalid::new(format!("cannot start {threads} threads: {error}")))
+}
+
+/// Runs one trial; a planner's or probe's panic becomes the trial's failure, so that one fault
+/// in somebody's code does not lose the others' work.
+fn run_caught(
+    simulation: &Simulation,
+    (planner, trial): (Entrant, u32),
+    recorded: Option<&Path>,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> TrialRow {
+    let path = recorded.map(|run| recording_path(run, planner, trial));
+    let mut count = |_: &Touched| {
+        progress(Progress::Touch);
+        Ok(())
+    };
+    let run =
+        || recorded_trial::run(simulation, (planner, trial), path.as_deref(), &[], &mut count);
+    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
+        let words = panic.downcast_ref::<String>().map(String::as_str);
+        let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+        TrialRow::ended(trial, planner.name(), Some(format!("panicked: {words}")))
+    })
+}
+
+/// Runs the trials of a real arm that `done` lacks, one after another, until one fails or `stop`
+/// becomes true between two touches. Every touch is kept in the journal of `folder`, from which an
+/// interrupted trial goes on.
+///
+/// Returns how many trials it finished and, if it went no further, where, why, and what is kept.
+///
+/// # Errors
+/// If a row or touch cannot be stored, or a planner is not there.
+pub fn run_real(
+    simulation: &Simulation,
+    (folder, done): (&mut RunFolder, &[TrialId]),
+    stop: &AtomicBool,
+    recorded: Option<&Path>,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<(usize, Option<String>), RunError> {
+    let mut journal = Journal::open(folder.path())?;
+    let mut finished = 0;
+    for (trial, planner) in jobs(simulation, done)? {
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let name = planner.name();
+        let entry = |touch, fault| {
+            let (time_unix_s, planner) = (clock::now_s(), name.to_owned());
+            Entry { time_unix_s, trial, planner, touch, fault }
+        };
+        let made = journal.touches(trial, name);
+        let (mut is_asked, mut unstored) = (false, None);
+        let mut keep = |touched: &Touched| {
+            let time_s = touched.row.time_s.unwrap_or_default();
+            progress(Progress::Touch);
+            if let Some(made) = made.get(touched.count as usize - 1) {
+                let (touch, target) = (touched.count, made.target.numbers());
+                return match made.target == touched.row.target {
+                    true => Ok(()),
+                    false => Err(Fault::PlannedOtherwise { touch, target }),
+                };
+            }
+            if let Err(error) = journal.add(entry(Some(touched.row.clone()), None)) {
+                let message = error.to_string();
+                unstored = Some(error);
+                return Err(Fault::Unrecorded { time_s, message });
+            }
+            is_asked = stop.load(Ordering::Relaxed);
+            if is_asked { Err(Fault::Stopped { time_s }) } else { Ok(()) }
+        };
+        let path = recorded.map(|run| next_part(&recording_path(run, planner, trial)));
+        let job = (planner, trial);
+        let row = recorded_trial::run(simulation, job, path.as_deref(), &made, &mut keep);
+        if let Some(error) = unstored {
+            return Err(error);
+        }
+        let Some(reason) = row.failure else {
+            folder.append(&row)?;
+            finished += 1;
+            progress(Progress::Trial(&row));
+            continue;
+        };
+        if !is_asked {
+            journal.add(entry(None, Some(reason.clone())))?;
+        }
+        let touches = journal.touches(trial, name).len();
+        let kept = folder.path().join(JOURNAL);
+        let kept = format!("{touches} touches of it are kept in {}", kept.display());
+        return Ok((finished, Some(format!("{name}, trial {trial}: {reason}\n{kept}"))));
+    }
+    Ok((finished, None))
+}
