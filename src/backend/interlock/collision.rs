@@ -1,10 +1,8 @@
 //! What of the robot may not come near to what.
 
-use super::ahead::Ahead;
-use super::interlock::{Entry, Interlock, Now};
+use super::interlock::{Ahead, Entry, Interlock, Now, Site};
 use super::settings::InterlockSettings;
-use super::site::Site;
-use super::trip::Trip;
+use crate::backend::Trip;
 use crate::geometry::distance::{HalfSpace, OrientedBox};
 use crate::geometry::sweep::Capsule;
 use crate::robot::arm::Joints;

@@ -1,8 +1,7 @@
 //! Where fingertip and elbow may be.
 
-use super::ahead::Ahead;
-use super::interlock::{Entry, Interlock, Now};
-use super::trip::Trip;
+use super::interlock::{Ahead, Entry, Interlock, Now};
+use crate::backend::Trip;
 use crate::robot::arm::Joints;
 use nalgebra::{Point3, Vector3};
 

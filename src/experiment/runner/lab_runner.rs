@@ -1,7 +1,7 @@
 //! Trials of a real arm: one after another, every touch kept, and none after a fault.
 
-use crate::backend::Fault;
-use crate::backend::ros::clock;
+use crate::backend::{Fault, pace};
+use crate::error::Invalid;
 use crate::experiment::runner::{OnProgress, Progress, RunError, jobs};
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{Entry, Journal, RunFolder, StoreError};
@@ -82,7 +82,7 @@ pub fn run(
         };
         if !is_asked {
             journal.add(Entry {
-                time_unix_s: clock::now_s(),
+                time_unix_s: pace::now_s(),
                 trial,
                 planner: planner.name().into(),
                 touch: None,
@@ -142,13 +142,17 @@ impl Witness for Keeper<'_> {
         (self.progress)(Progress::Touch);
         if let Some(made) = self.made.get(touched.count as usize - 1) {
             let is_same = made.target == touched.row.target;
-            return is_same.then_some(()).ok_or(Fault::PlannedOtherwise {
-                touch: touched.count,
-                target: made.target.numbers(),
-            });
+            let differs = || {
+                let (touch, target) = (touched.count, made.target.numbers());
+                Invalid::new(format!(
+                    "touch {touch} was made at {target:?}, and would be made elsewhere now: the program or the \
+                     experiment is not what it was; --fresh begins anew"
+                ))
+            };
+            return Ok(is_same.then_some(()).ok_or_else(differs)?);
         }
         let entry = Entry {
-            time_unix_s: clock::now_s(),
+            time_unix_s: pace::now_s(),
             trial: self.trial,
             planner: self.planner.name().into(),
             touch: Some(touched.row.clone()),

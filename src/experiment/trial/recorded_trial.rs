@@ -68,7 +68,7 @@ fn run_faulty(
     made: &[TouchRow],
     witness: &mut dyn Witness,
 ) -> Result<TrialRow, Fault> {
-    let body = simulation.body()?.ok_or(Fault::Lacks { part: "a body that moves" })?;
+    let body = simulation.body()?.ok_or_else(|| Fault::lacks("a body that moves"))?;
     let seed = simulation.body_seed(trial);
     let about = About {
         version: env!("CARGO_PKG_VERSION").into(),

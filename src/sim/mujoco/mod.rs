@@ -20,6 +20,7 @@ pub use shell::FlexShell;
 pub use substeps::{StepLimit, Substeps};
 
 use crate::backend::Fault;
+use crate::error::Invalid;
 use mujoco_rs::error::MjModelError;
 use mujoco_rs::wrappers::MjModel;
 use mujoco_rs::wrappers::mj_logging::{log_config, set_log_config};
@@ -67,9 +68,9 @@ impl From<ModelError> for Fault {
     /// What is left to go wrong once a scene was compiled.
     fn from(error: ModelError) -> Self {
         match error {
-            ModelError::Lacks { part } => Self::Lacks { part },
-            ModelError::Memory => Self::NoMemory,
-            _ => Self::Lacks { part: "a model that MuJoCo steps" },
+            ModelError::Lacks { part } => Self::lacks(part),
+            ModelError::Memory => Invalid::new("no memory for the state of the body").into(),
+            _ => Self::lacks("a model that MuJoCo steps"),
         }
     }
 }

@@ -73,7 +73,7 @@ impl Servo {
     ) -> Result<Self, Fault> {
         body.capabilities().fit(&robot.chain)?;
         let control = Controller::new(robot.chain.clone(), body.capabilities().period_s)
-            .map_err(|cause| Fault::NoCommand { time_s: 0.0, cause })?;
+            .map_err(|cause| Fault::no_command(0.0, cause))?;
         let mut state = State::default();
         state.take(body.reset(seed)?)?;
         let reach = ArmReach::new(&robot, &settings);
@@ -110,7 +110,7 @@ impl Servo {
     /// One tick towards `goal`.
     fn tick(&mut self, goal: &Goal) -> Result<(), Fault> {
         let State { time_s, q } = &self.state;
-        let no_command = |cause| Fault::NoCommand { time_s: *time_s, cause };
+        let no_command = |cause| Fault::no_command(*time_s, cause);
         let motion = self.control.step(q, goal).map_err(no_command)?;
         self.carry_out(&motion.qdot)
     }

@@ -63,7 +63,7 @@ impl Servo {
         loop {
             let posture = line.advance(period_s);
             let State { time_s, q } = &self.state;
-            let no_command = |cause| Fault::NoCommand { time_s: *time_s, cause };
+            let no_command = |cause| Fault::no_command(*time_s, cause);
             let qdot = self.control.along(q, &posture).map_err(no_command)?;
             self.carry_out(&qdot)?;
             let State { time_s, q } = &self.state;
