@@ -78,6 +78,7 @@ mod report;
 mod reproducible;
 #[cfg(feature = "mujoco")]
 mod rigid;
+mod ros_messages;
 mod scenes;
 mod seeking;
 mod sensors;

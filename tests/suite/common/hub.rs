@@ -1,28 +1,28 @@
-//! A transport inside this process, for tests and for a twin without a network.
+//! A transport inside this process: any number of ends of either side, without a network.
 
-use super::packet::Packet;
-use super::queue::{Inlet, Outlet, queue};
-use super::service::{Answer, Service};
-use super::topics::{Side, Topic};
-use super::transport::{Delivery, Transport, TransportError, Waker};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use palpate::backend::ros::message::TriggerResponse;
+use palpate::backend::ros::topics::{Service, Side, Topic};
+use palpate::backend::ros::transport::{Delivery, Packet, Transport, Waker};
+use palpate::error::Invalid;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-/// Where any number of ends meet.
+/// Where the ends meet; each is the same hub.
 #[derive(Clone, Default)]
-pub struct Hub(Arc<Shared>);
+pub struct Hub(Arc<Mutex<Ends>>);
 
 #[derive(Default)]
-struct Shared {
-    ends: Mutex<Vec<End>>,
-    count: AtomicU64,
+struct Ends {
+    all: Vec<End>,
+    count: u64,
 }
 
 struct End {
     id: u64,
     side: Side,
-    inlet: Inlet,
+    /// What arrives; `None` only wakes.
+    inlet: Sender<Option<Delivery>>,
 }
 
 /// One end.
@@ -30,33 +30,35 @@ pub struct Memory {
     hub: Hub,
     id: u64,
     side: Side,
-    inlet: Inlet,
-    outlet: Outlet,
+    inlet: Sender<Option<Delivery>>,
+    outlet: Receiver<Option<Delivery>>,
 }
 
 impl Hub {
     /// An end on one side.
     pub fn end(&self, side: Side) -> Memory {
-        let (inlet, outlet) = queue();
-        let id = self.0.count.fetch_add(1, Ordering::Relaxed);
-        self.lock().push(End { id, side, inlet: inlet.clone() });
+        let (inlet, outlet) = channel();
+        let mut ends = self.lock();
+        let id = ends.count;
+        ends.count += 1;
+        ends.all.push(End { id, side, inlet: inlet.clone() });
         Memory { hub: self.clone(), id, side, inlet, outlet }
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<End>> {
-        self.0.ends.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Ends> {
+        self.0.lock().unwrap()
     }
 }
 
 impl Memory {
     fn to(&self, is_to: impl Fn(&End) -> bool, delivery: &Delivery) {
-        for end in self.hub.lock().iter().filter(|end| is_to(end)) {
-            // An end that was dropped hears nothing.
-            end.inlet.put(delivery.clone());
+        for end in self.hub.lock().all.iter().filter(|end| is_to(end)) {
+            // An end that was dropped receives nothing.
+            let _ = end.inlet.send(Some(delivery.clone()));
         }
     }
 
-    fn others(&self) -> impl Fn(&End) -> bool {
+    fn others(&self) -> impl Fn(&End) -> bool + use<> {
         let side = self.side;
         move |end| end.side != side
     }
@@ -64,16 +66,19 @@ impl Memory {
 
 impl Drop for Memory {
     fn drop(&mut self) {
-        self.hub.lock().retain(|end| end.id != self.id);
+        self.hub.lock().all.retain(|end| end.id != self.id);
     }
 }
 
 impl Transport for Memory {
     fn waker(&self) -> Waker {
-        self.inlet.waker()
+        let inlet = self.inlet.clone();
+        Arc::new(move || {
+            let _ = inlet.send(None);
+        })
     }
 
-    fn send(&mut self, packet: &Packet) -> Result<(), TransportError> {
+    fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
         let packet = packet.clone();
         let delivery = Delivery::Packet { packet, sender: self.id, received: Instant::now() };
         self.to(self.others(), &delivery);
@@ -81,19 +86,23 @@ impl Transport for Memory {
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
-        self.outlet.receive(timeout, take);
+        let mut next = self.outlet.recv_timeout(timeout);
+        while let Ok(delivery) = next {
+            delivery.into_iter().for_each(&mut *take);
+            next = self.outlet.try_recv().map_err(|_| RecvTimeoutError::Timeout);
+        }
     }
 
     fn publisher_count(&self, topic: Topic) -> usize {
-        self.hub.lock().iter().filter(|end| end.side == topic.publisher()).count()
+        self.hub.lock().all.iter().filter(|end| end.side == topic.publisher()).count()
     }
 
     fn is_served(&mut self, _: &Service) -> bool {
         let is_other = self.others();
-        self.hub.lock().iter().any(is_other)
+        self.hub.lock().all.iter().any(is_other)
     }
 
-    fn call(&mut self, service: &Service) -> Result<(), TransportError> {
+    fn call(&mut self, service: &Service) -> Result<(), Invalid> {
         let delivery = Delivery::Call { service: service.clone(), call: self.id };
         self.to(self.others(), &delivery);
         Ok(())
@@ -103,9 +112,9 @@ impl Transport for Memory {
         &mut self,
         service: &Service,
         call: u64,
-        answer: &Answer,
-    ) -> Result<(), TransportError> {
-        let delivery = Delivery::Answered { service: service.clone(), answer: answer.clone() };
+        answer: TriggerResponse,
+    ) -> Result<(), Invalid> {
+        let delivery = Delivery::Answered { service: service.clone(), answer };
         self.to(|end| end.id == call, &delivery);
         Ok(())
     }

@@ -3,6 +3,7 @@
 pub mod around;
 pub mod counting;
 pub mod fake;
+pub mod hub;
 #[cfg(feature = "mujoco")]
 pub mod lab;
 #[cfg(feature = "mujoco")]
