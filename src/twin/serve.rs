@@ -4,7 +4,7 @@ use super::arm_pc::ArmPc;
 use super::failure::{Act, FAILURES, Sender, by_name};
 use crate::backend::pace::{self, Pace};
 use crate::backend::ros::joints::JointNames;
-use crate::backend::ros::link::{Link, Sink};
+use crate::backend::ros::link::Link;
 use crate::backend::ros::message::{
     Header, TriggerResponse, Wrench as WrenchMessage, WrenchStamped,
 };
@@ -17,9 +17,8 @@ use crate::backend::{Backend, Command, Fault, Reading, Wrench};
 use crate::robot::arm::Chain;
 use nalgebra::Isometry3;
 use serde::Serialize;
-use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 /// Joints slower than this are at rest, rad/s or m/s; chosen, the sag of the servos is below it.
@@ -68,39 +67,14 @@ pub fn services() -> Vec<Service> {
     Service::COMMON.into_iter().chain(own).collect()
 }
 
-/// Most deliveries that wait; chosen, seconds of commands.
-const WAITING_MAX: usize = 1024;
-
-/// Deliveries, kept until the loop looks, in the order in which they came.
-#[derive(Clone, Default)]
-struct Inbox(Arc<Mutex<VecDeque<Delivery>>>);
-
-impl Inbox {
-    /// The oldest, if there is one.
-    fn next(&self) -> Option<Delivery> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
-    }
-}
-
-impl Sink for Inbox {
-    fn take(&mut self, delivery: Delivery) {
-        let mut waiting = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if waiting.len() == WAITING_MAX {
-            waiting.pop_front();
-        }
-        waiting.push_back(delivery);
-    }
-
-    fn tick(&mut self, _send: &mut dyn FnMut(Packet)) {}
-}
-
 /// A simulated arm behind topics.
 pub struct Twin {
     body: Box<dyn Backend>,
     settings: BackendSettings,
     names: JointNames,
     pc: ArmPc,
-    inbox: Inbox,
+    /// Deliveries, kept until the loop looks.
+    inbox: Receiver<Delivery>,
     link: Link,
     sender: Sender,
     injections: Vec<Injection>,
@@ -131,9 +105,9 @@ impl Twin {
     ) -> Result<Self, Fault> {
         body.reset(seed)?;
         let names = settings.joint_names(chain);
-        let inbox = Inbox::default();
+        let (sink, inbox) = channel();
         // The loop looks at its own pace; the link only has to hand on.
-        let link = Link::open(connect, Duration::from_millis(20), Box::new(inbox.clone()))?;
+        let link = Link::open(connect, Duration::from_millis(20), Box::new(sink))?;
         let limits = chain.joints.iter().map(|joint| joint.qdot_limit).collect();
         let pc = ArmPc::new(names.clone(), limits, settings.topics.command.age_s);
         Ok(Self {
@@ -220,7 +194,7 @@ impl Twin {
     }
 
     fn listen(&mut self, now_s: f64, tell: &mut dyn FnMut(f64, Event)) {
-        while let Some(delivery) = self.inbox.next() {
+        while let Ok(delivery) = self.inbox.try_recv() {
             match delivery {
                 Delivery::Packet { packet, sender, received } => {
                     if packet.topic() == Topic::Command {

@@ -154,8 +154,6 @@ impl Sink for Echo {
             self.0.lock().unwrap().push((message.header.stamp.s(), pace::now_s()));
         }
     }
-
-    fn tick(&mut self, _: &mut dyn FnMut(Packet)) {}
 }
 
 /// Commands at 250 Hz to a peer of another implementation, which answers each.

@@ -7,7 +7,7 @@ use palpate::backend::ros::connect;
 use palpate::backend::ros::joints::JointNames;
 use palpate::backend::ros::link::{Link, Sink};
 use palpate::backend::ros::topics::Side;
-use palpate::backend::ros::transport::{Delivery, Packet};
+use palpate::backend::ros::transport::Delivery;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -196,8 +196,6 @@ struct Mute;
 
 impl Sink for Mute {
     fn take(&mut self, _: Delivery) {}
-
-    fn tick(&mut self, _: &mut dyn FnMut(Packet)) {}
 }
 
 /// Somebody else commands the arm, too.

@@ -5,7 +5,7 @@ use super::message::{
     BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
     TriggerRequest, TriggerResponse, WrenchStamped,
 };
-use super::network::{Interface, Network};
+use super::network::network;
 use super::settings::{BackendSettings, MappingKind};
 use super::topics::{Service, Side, Topic, Topics};
 use super::transport::{Delivery, Packed, Packet, Transport, Waker, cannot_open, cannot_send};
@@ -23,6 +23,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -48,19 +49,13 @@ pub struct Ros2 {
     /// Each publishes a packet if it is of its topic and type.
     writers: Vec<Box<dyn Fn(&Packet) -> Option<Result<(), String>>>>,
     mapping: MappingKind,
-    clients: Vec<ServiceClient>,
+    /// Services with their clients, once servers are found, and when those were made.
+    clients: Vec<(Service, Option<(Client<TriggerRequest, TriggerResponse>, Instant)>)>,
     /// When servers were looked for last.
     looked: Instant,
     servers: Vec<(Service, Server<TriggerRequest, TriggerResponse>)>,
     calls: HashMap<u64, RmwRequestId>,
     call_count: u64,
-}
-
-/// Calls a service, once its server is found.
-struct ServiceClient {
-    service: Service,
-    /// With the time at which it was made.
-    open: Option<(Client<TriggerRequest, TriggerResponse>, Instant)>,
 }
 
 /// How often servers are looked for.
@@ -92,14 +87,11 @@ fn latched() -> QosProfile {
     reliable().durability(Durability::TransientLocal)
 }
 
-/// The network interfaces of this machine.
-fn interfaces() -> Vec<Interface> {
-    let all = netdev::get_interfaces().into_iter();
-    let interface = |one: netdev::Interface| Interface {
-        addresses: one.ipv4.iter().map(|net| net.addr().into()).collect(),
-        name: one.name,
-    };
-    all.map(interface).collect()
+/// The network interfaces of this machine with their IPv4 addresses.
+fn interfaces() -> Vec<(String, Vec<IpAddr>)> {
+    let addresses =
+        |one: &netdev::Interface| one.ipv4.iter().map(|net| net.addr().into()).collect();
+    netdev::get_interfaces().into_iter().map(|one| (one.name.clone(), addresses(&one))).collect()
 }
 
 impl Ros2 {
@@ -112,10 +104,10 @@ impl Ros2 {
         side: Side,
         services: Vec<Service>,
     ) -> Result<Self, Invalid> {
-        let network = Network::of(settings, |name| std::env::var(name).ok(), &interfaces());
-        let network = network.map_err(cannot_open("the network"))?;
-        let mut participant = DomainParticipantBuilder::new(network.domain);
-        if let Some(addresses) = network.addresses {
+        let (domain, addresses) = network(settings, |name| std::env::var(name).ok(), &interfaces())
+            .map_err(cannot_open("the network"))?;
+        let mut participant = DomainParticipantBuilder::new(domain);
+        if let Some(addresses) = addresses {
             participant = participant.with_only_networks(addresses);
         }
         let participant = participant.build().map_err(cannot_open("a DDS participant"))?;
@@ -150,8 +142,7 @@ impl Ros2 {
         end.topics()?;
         match side {
             Side::Explorer => {
-                let client = |service| ServiceClient { service, open: None };
-                end.clients = services.into_iter().map(client).collect();
+                end.clients = services.into_iter().map(|service| (service, None)).collect();
             }
             Side::Arm => services.into_iter().try_for_each(|service| end.serve(service))?,
         }
@@ -253,16 +244,24 @@ impl Ros2 {
         Ok(())
     }
 
+    /// The client of a service whose server was found.
+    fn client(
+        &self,
+        service: &Service,
+    ) -> Option<&(Client<TriggerRequest, TriggerResponse>, Instant)> {
+        self.clients.iter().find(|(other, _)| other == service)?.1.as_ref()
+    }
+
     /// Makes clients for the servers that were found since.
     fn look_for_servers(&mut self) {
-        let is_open = self.clients.iter().all(|client| client.open.is_some());
+        let is_open = self.clients.iter().all(|(_, client)| client.is_some());
         if is_open || self.looked.elapsed() < LOOK {
             return;
         }
         self.looked = Instant::now();
         let readers = self.context.domain_participant().discovered_readers();
         for i in 0..self.clients.len() {
-            let ServiceClient { service, open: None } = &self.clients[i] else { continue };
+            let (service, None) = &self.clients[i] else { continue };
             let name = service.name(self.topics.namespace());
             // As rmw names the topic of a service's requests.
             let requests = format!("rq{name}Request");
@@ -277,7 +276,7 @@ impl Ros2 {
             // One that cannot be made stays unfound, and the caller's timeout says so.
             let Ok(mut client) = made else { continue };
             if self.watch(&mut client, &name).is_ok() {
-                self.clients[i].open = Some((client, Instant::now()));
+                self.clients[i].1 = Some((client, Instant::now()));
             }
         }
     }
@@ -335,7 +334,7 @@ impl Transport for Ros2 {
             }
         }
         self.look_for_servers();
-        for ServiceClient { service, open } in &self.clients {
+        for (service, open) in &self.clients {
             let Some((client, _)) = open else { continue };
             while let Ok(Some((_, answer))) = client.receive_response() {
                 take(Delivery::Answered { service: service.clone(), answer });
@@ -348,16 +347,12 @@ impl Transport for Ros2 {
     }
 
     fn is_served(&mut self, service: &Service) -> bool {
-        let client = self.clients.iter().find(|client| client.service == *service);
-        let open = client.and_then(|client| client.open.as_ref());
-        open.is_some_and(|(_, since)| since.elapsed() > SETTLE)
+        self.client(service).is_some_and(|(_, since)| since.elapsed() > SETTLE)
     }
 
     fn call(&mut self, service: &Service) -> Result<(), Invalid> {
-        let client = self.clients.iter().find(|client| client.service == *service);
-        let open = client.and_then(|client| client.open.as_ref());
         let name = service.name(self.topics.namespace());
-        let (client, _) = open.ok_or_else(|| cannot_send(&name, "not known"))?;
+        let (client, _) = self.client(service).ok_or_else(|| cannot_send(&name, "not known"))?;
         let sent = client.send_request(TriggerRequest::default());
         sent.map(drop).map_err(|error| cannot_send(&name, error))
     }
