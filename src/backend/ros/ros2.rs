@@ -36,6 +36,13 @@ const DEPTH: usize = 64;
 /// Token of the waker; every other one is looked at whatever woke the thread.
 const WAKE: Token = Token(0);
 
+/// Hands over what has arrived on a topic.
+type Reader = Box<dyn Fn(&mut dyn FnMut(Delivery))>;
+/// Publishes a packet if it is of its topic and type.
+type Writer = Box<dyn Fn(&Packet) -> Option<Result<(), String>>>;
+/// A client with the time at which it was made.
+type MadeClient = (Client<TriggerRequest, TriggerResponse>, Instant);
+
 /// One side's end in a ROS 2 network.
 pub struct Ros2 {
     context: Context,
@@ -45,12 +52,11 @@ pub struct Ros2 {
     poll: Poll,
     events: Events,
     waker: Arc<mio1::Waker>,
-    readers: Vec<Box<dyn Fn(&mut dyn FnMut(Delivery))>>,
-    /// Each publishes a packet if it is of its topic and type.
-    writers: Vec<Box<dyn Fn(&Packet) -> Option<Result<(), String>>>>,
+    readers: Vec<Reader>,
+    writers: Vec<Writer>,
     mapping: MappingKind,
     /// Services with their clients, once servers are found, and when those were made.
-    clients: Vec<(Service, Option<(Client<TriggerRequest, TriggerResponse>, Instant)>)>,
+    clients: Vec<(Service, Option<MadeClient>)>,
     /// When servers were looked for last.
     looked: Instant,
     servers: Vec<(Service, Server<TriggerRequest, TriggerResponse>)>,
@@ -245,10 +251,7 @@ impl Ros2 {
     }
 
     /// The client of a service whose server was found.
-    fn client(
-        &self,
-        service: &Service,
-    ) -> Option<&(Client<TriggerRequest, TriggerResponse>, Instant)> {
+    fn client(&self, service: &Service) -> Option<&MadeClient> {
         self.clients.iter().find(|(other, _)| other == service)?.1.as_ref()
     }
 

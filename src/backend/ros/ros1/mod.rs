@@ -29,6 +29,9 @@ const QUEUE: usize = 64;
 /// How long an answer to a call from outside is waited for; chosen.
 const ANSWER: Duration = Duration::from_millis(500);
 
+/// Publishes a packet if it is of its topic and type.
+type Writer = Box<dyn Fn(&Runtime, &Packet) -> Option<Result<(), String>>>;
+
 /// One side's end in a ROS 1 network.
 pub struct Ros1 {
     runtime: Runtime,
@@ -38,8 +41,7 @@ pub struct Ros1 {
     /// What arrives is put in, by any thread; `None` only wakes.
     inlet: Sender<Option<Delivery>>,
     outlet: Receiver<Option<Delivery>>,
-    /// Each publishes a packet if it is of its topic and type.
-    writers: Vec<Box<dyn Fn(&Runtime, &Packet) -> Option<Result<(), String>>>>,
+    writers: Vec<Writer>,
     /// Kept, for a service ends with it.
     _servers: Vec<ServiceServer>,
     /// Calls from outside that wait for their answer.
@@ -233,13 +235,10 @@ impl Transport for Ros1 {
         let name = service.name(self.topics.namespace());
         self.runtime.spawn(async move {
             let answered = match node.service_client::<Trigger>(&name).await {
-                Ok(client) => client.call(&Request {}).await,
-                Err(error) => Err(error),
+                Ok(client) => client.call(&Request {}).await.map_err(|error| error.to_string()),
+                Err(error) => Err(error.to_string()),
             };
-            let failed = |error: roslibrust::Error| TriggerResponse {
-                success: false,
-                message: error.to_string(),
-            };
+            let failed = |message| TriggerResponse { success: false, message };
             let answer = answered.unwrap_or_else(failed);
             let _ = inlet.send(Some(Delivery::Answered { service, answer }));
         });
