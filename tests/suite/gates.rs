@@ -41,7 +41,10 @@ fn what_is_not_in_order_is_said_with_its_numbers() {
     let cases: [Case; 8] = [
         (|_, reading| reading.q[1] = 1.7, "joint S2 stands at 1.7000, outside its limits "),
         (|_, reading| reading.q[3] += 0.1, "joint E1 stands at "),
-        (|tick, reading| reading.q[0] += 1e-5 * tick as f64, "joint S1 moved by 0.005"),
+        (
+            |tick, reading| reading.q[0] += 1e-5 * tick as f64,
+            "joint S1 moved by 0.01000 while told to stand still; allowed are 0.002",
+        ),
         (
             |tick, reading| reading.wrench.as_mut().unwrap().force_n.z = 1e-3 * tick as f64,
             "the force at rest drifts by 0.75",
