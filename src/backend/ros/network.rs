@@ -4,8 +4,8 @@ use super::settings::{BackendSettings, DOMAIN_MAX};
 use std::net::{IpAddr, Ipv4Addr};
 
 /// The domain of DDS and the addresses of the interfaces that are multicast to and announced
-/// (`None` for all), by `settings`, the variables that `variable` returns and the `interfaces` of this
-/// machine, each with its IPv4 addresses. Settings come before variables: `ROS_DOMAIN_ID`,
+/// (`None` for all), by `settings`, the variables that `variable` returns and the `interfaces` of
+/// this machine, each with its IPv4 addresses. Settings come before variables: `ROS_DOMAIN_ID`,
 /// `ROS_LOCALHOST_ONLY` and `ROS_AUTOMATIC_DISCOVERY_RANGE`, as REP 2003 and the documentation of
 /// ROS 2 have them.
 ///

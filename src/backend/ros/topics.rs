@@ -55,7 +55,8 @@ impl Topic {
 }
 
 /// Default name, allowed types (the first is the default), rate in Hz and age in s of each topic,
-/// as drivers send them (`pa10_hardware_interface`, `kth-ros-pkg/biotac_driver`, `netft_rdt_driver`).
+/// as drivers send them (`pa10_hardware_interface`, `kth-ros-pkg/biotac_driver`,
+/// `netft_rdt_driver`).
 // heuristic: the ages; some frames of each topic may be lost.
 const USUAL: [(&str, &[&str], f64, f64); 5] = [
     ("/joint_states", &[JointState::DEFINITION.name], 250.0, 0.05),
