@@ -1,10 +1,11 @@
-//! One control tick of a body: what it is told, what it can do, and the trait.
+//! One control tick of a body: its command, its reading, its capabilities, and the trait.
 
-use super::command::Command;
 use super::fault::Fault;
-use super::reading::Reading;
 use crate::robot::arm::chain::MAX_JOINTS;
 use crate::robot::arm::{Chain, Joints};
+use crate::robot::finger::Frame;
+use crate::robot::sensor::{IdealContact, Sample, Wrench};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// What a body can do, known before it is connected.
@@ -41,10 +42,10 @@ impl Capabilities {
     /// Whether the body moves the joints of `chain`.
     ///
     /// # Errors
-    /// [`Fault::Joints`] if their numbers differ.
+    /// If their numbers differ.
     pub fn fit(&self, chain: &Chain) -> Result<(), Fault> {
         let (expected, found) = (chain.joints.len(), self.joints.len());
-        if expected == found { Ok(()) } else { Err(Fault::Joints { expected, found }) }
+        if expected == found { Ok(()) } else { Err(Fault::joints(expected, found)) }
     }
 
     /// The command as numbers, one for each joint.
@@ -59,6 +60,88 @@ impl Capabilities {
         match fits {
             true => Ok(Joints::from_fn(|i, _| qdot.get(i).copied().unwrap_or(0.0))),
             false => Err(Fault::Refused { values: qdot.clone() }),
+        }
+    }
+}
+
+/// Joint velocities for the next tick.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Command {
+    /// One entry per joint, in the order of [`Capabilities::joints`](super::Capabilities::joints):
+    /// rad/s, or m/s where the joint slides.
+    pub qdot: Vec<f64>,
+}
+
+/// What a body returns after a tick. Time stands in it and is never read from a clock.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Reading {
+    /// Since reset.
+    pub time_s: f64,
+    /// Joint positions, rad, or m where the joint slides.
+    pub q: Vec<f64>,
+    /// Joint velocities, rad/s or m/s.
+    pub qdot: Vec<f64>,
+    /// What the force/torque sensor at the finger's mount says, if there is one.
+    pub wrench: Option<Wrench>,
+    /// Samples of the fingertip's sensor that arrived during the tick, oldest first.
+    pub samples: Vec<Sample>,
+    /// The command as it was really applied after limiting.
+    pub applied: Command,
+}
+
+impl Reading {
+    /// Becomes the same as `other` in the memory that it has.
+    pub fn copy(&mut self, other: &Self) {
+        let Self { time_s, q, qdot, wrench, samples, applied } = self;
+        (*time_s, *wrench) = (other.time_s, other.wrench);
+        q.clone_from(&other.q);
+        qdot.clone_from(&other.qdot);
+        samples.clone_from(&other.samples);
+        applied.qdot.clone_from(&other.applied.qdot);
+    }
+
+    /// Frames of a BioTac that arrived during the tick, oldest first.
+    pub fn frames(&self) -> impl DoubleEndedIterator<Item = &Frame> {
+        self.samples.iter().filter_map(|sample| match sample {
+            Sample::BioTac(frame) => Some(frame),
+            _ => None,
+        })
+    }
+
+    /// The same, to be altered.
+    pub fn frames_mut(&mut self) -> impl Iterator<Item = &mut Frame> {
+        self.samples.iter_mut().filter_map(|sample| match sample {
+            Sample::BioTac(frame) => Some(frame),
+            _ => None,
+        })
+    }
+
+    /// The contact as a simulator knows it, in a scene that leaves out the sensor which would tell.
+    pub fn ideal(&self) -> Option<IdealContact> {
+        self.samples.iter().find_map(|sample| match sample {
+            Sample::Ideal(contact) => Some(*contact),
+            _ => None,
+        })
+    }
+
+    /// Whether the numbers that a controller acts on are numbers. Tactile frames are judged one by
+    /// one, by who reads them.
+    ///
+    /// # Errors
+    /// [`Fault::BadReading`] with the first quantity that is not finite.
+    pub fn check(&self) -> Result<(), Fault> {
+        let force_n = self.wrench.map_or(Vector3::zeros(), |wrench| wrench.force_n);
+        let read = [
+            ("joint positions", self.q.as_slice()),
+            ("joint velocities", self.qdot.as_slice()),
+            ("force at the mount", force_n.as_slice()),
+        ];
+        let is_bad = |(_, values): &&(&str, &[f64])| values.iter().any(|v| !v.is_finite());
+        match read.iter().find(is_bad) {
+            None => Ok(()),
+            Some(&(quantity, values)) => {
+                Err(Fault::BadReading { time_s: self.time_s, quantity, values: values.into() })
+            }
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Why a body or a touch could not go on.
 
-use super::interlock::Trip;
-use super::ros::fault::LinkFault;
+use crate::error::Invalid;
 use crate::robot::arm::ArmError;
+use std::fmt;
 use thiserror::Error;
 
 /// Why a body or a touch could not go on. A fault is data: it reaches the trial's row.
@@ -14,31 +14,15 @@ pub enum Fault {
         /// The command or approach.
         values: Vec<f64>,
     },
-    /// The body has another number of joints than the arm it is said to be.
-    #[error("a body of {found} joints for an arm of {expected}")]
-    Joints {
-        /// Joints of the arm.
-        expected: usize,
-        /// Joints of the body.
-        found: usize,
-    },
     /// What was read is not a number.
     #[error("bad reading at {time_s:.3} s: {quantity} is {values:?}")]
     BadReading {
         /// When.
         time_s: f64,
-        /// What was read.
-        quantity: Quantity,
+        /// What was read, as in `joint positions`.
+        quantity: &'static str,
         /// As it was read.
         values: Vec<f64>,
-    },
-    /// The controller has no command for where the arm stands and shall go.
-    #[error("no command at {time_s:.3} s: {cause}")]
-    NoCommand {
-        /// When.
-        time_s: f64,
-        /// Why.
-        cause: ArmError,
     },
     /// No posture within the joint limits brings the tip to where it was sent.
     #[error(
@@ -130,23 +114,6 @@ pub enum Fault {
         /// The seed.
         seed: u64,
     },
-    /// The fault that was recorded, played again.
-    #[error("{message}")]
-    Recorded {
-        /// What it was.
-        message: String,
-    },
-    /// A trial that goes on would have made another touch than was made.
-    #[error(
-        "touch {touch} was made at {target:?}, and would be made elsewhere now: the program or the experiment \
-         is not what it was; --fresh begins anew"
-    )]
-    PlannedOtherwise {
-        /// Which, counted from 1.
-        touch: u32,
-        /// Where it was made.
-        target: Vec<f64>,
-    },
     /// Whoever watched it had it stopped.
     #[error("stopped at {time_s:.3} s")]
     Stopped {
@@ -160,22 +127,6 @@ pub enum Fault {
         time_s: f64,
         /// By which, and why.
         trip: Trip,
-    },
-    /// The body must not be moved from where it is: outside the workspace, too deep, or too near to
-    /// something.
-    #[error(
-        "the arm is not moved from where it stands, its tip at [{:.3}, {:.3}, {:.3}] m: {trip}; bring \
-         it near its home posture by hand: {}", p_wt[0], p_wt[1], p_wt[2], posture(home)
-    )]
-    Astray {
-        /// When.
-        time_s: f64,
-        /// The violated limit.
-        trip: Box<Trip>,
-        /// The tip in `W`.
-        p_wt: [f64; 3],
-        /// Joints with their positions at home, rad or m.
-        home: Vec<(String, f64)>,
     },
     /// The body stopped answering.
     #[error("no answer since {time_s:.3} s")]
@@ -191,47 +142,58 @@ pub enum Fault {
         /// Why.
         cause: LinkFault,
     },
-    /// There is no memory for the body's state.
-    #[error("no memory for the state of the body")]
-    NoMemory,
-    /// The body cannot be made of the scene: what it needs is missing.
-    #[error("the body needs {part}, which its scene lacks")]
-    Lacks {
-        /// What is missing.
-        part: &'static str,
-    },
-    /// This build lacks what the body needs.
-    #[error("{body} needs a build with the feature `{feature}`")]
-    NotBuilt {
-        /// The body, as a scene names it.
-        body: &'static str,
-        /// The missing feature.
-        feature: &'static str,
-    },
+    /// The body cannot be made of its scene, or cannot go on for a reason of which no caller asks.
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
 }
 
-fn posture(joints: &[(String, f64)]) -> String {
-    let words: Vec<String> = joints.iter().map(|(name, q)| format!("{name} {q:.3}")).collect();
-    words.join(", ")
+impl Fault {
+    /// The fault of a body that cannot be made of a scene without `part`.
+    pub fn lacks(part: &str) -> Self {
+        Invalid::new(format!("the body needs {part}, which its scene lacks")).into()
+    }
+
+    /// The fault of a body of `found` joints for an arm of `expected`.
+    pub fn joints(expected: usize, found: usize) -> Self {
+        Invalid::new(format!("a body of {found} joints for an arm of {expected}")).into()
+    }
+
+    /// The fault of a controller that has no command for where the arm stands and is to go.
+    pub fn no_command(time_s: f64, cause: ArmError) -> Self {
+        Invalid::new(format!("no command at {time_s:.3} s: {cause}")).into()
+    }
 }
 
-/// What is read from a body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Joint positions.
-    Positions,
-    /// Joint velocities.
-    Velocities,
-    /// Force at the finger's mount.
-    Force,
+/// An error of an arm behind topics.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum LinkFault {
+    /// The arm's own computer refuses to move.
+    #[error("the arm does not move: {0}")]
+    Arm(String),
+    /// The transport, a topic or a service does not work.
+    #[error(transparent)]
+    Link(#[from] Invalid),
 }
 
-impl std::fmt::Display for Quantity {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Positions => "joint positions",
-            Self::Velocities => "joint velocities",
-            Self::Force => "force at the mount",
-        })
+/// An interlock's reason to stop the body: what was found where, and what is allowed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trip {
+    /// The interlock.
+    pub interlock: &'static str,
+    /// Of what: a joint, a pair of links, an electrode; empty where there is only one.
+    pub part: String,
+    /// What was measured or foreseen.
+    pub found: f64,
+    /// The limit.
+    pub limit: f64,
+    /// Unit of both.
+    pub unit: &'static str,
+}
+
+impl fmt::Display for Trip {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { interlock, part, found, limit, unit } = self;
+        let of = if part.is_empty() { "" } else { " of " };
+        write!(f, "{interlock}{of}{part} is {found:.4} {unit}, its limit {limit:.4} {unit}")
     }
 }

@@ -5,19 +5,15 @@
 
 #[allow(clippy::module_inception)]
 mod backend;
-mod command;
 pub mod delay;
 mod fault;
 pub mod interlock;
 pub mod pace;
-mod reading;
 pub mod recording;
 pub mod ros;
 pub mod trace;
 pub mod watched;
 
 pub use crate::robot::sensor::{IdealContact, Sample, Wrench};
-pub use backend::{Backend, Capabilities};
-pub use command::Command;
-pub use fault::{Fault, Quantity};
-pub use reading::Reading;
+pub use backend::{Backend, Capabilities, Command, Reading};
+pub use fault::{Fault, LinkFault, Trip};

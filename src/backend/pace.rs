@@ -1,7 +1,12 @@
-//! Keeps a loop in step with the clock.
+//! Keeps a loop in step with the clock; the time of day.
 
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// Seconds since 1970.
+pub fn now_s() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
+}
 
 /// Ticks of a fixed period.
 pub struct Pace {

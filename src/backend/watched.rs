@@ -55,14 +55,17 @@ impl Sight {
 pub struct Watched {
     inner: Box<dyn Backend>,
     sight: Sight,
-    pace: Pace,
+    /// Seconds of the body in one of the clock.
+    speed: f64,
+    /// A moment of the clock and the body's time then.
+    since: Option<(Instant, f64)>,
 }
 
 impl Watched {
     /// `speed` seconds of the body pass in one of the clock.
     pub fn new(inner: Box<dyn Backend>, speed: f64) -> (Self, Sight) {
         let sight = Sight::default();
-        (Self { inner, sight: sight.clone(), pace: Pace { speed, since: None } }, sight)
+        (Self { inner, sight: sight.clone(), speed, since: None }, sight)
     }
 }
 
@@ -74,7 +77,7 @@ impl Backend for Watched {
     fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
         let reading = self.inner.reset(seed)?;
         self.sight.take(reading);
-        self.pace.since = None;
+        self.since = None;
         Ok(reading)
     }
 
@@ -85,7 +88,14 @@ impl Backend for Watched {
         }
         let reading = self.inner.step(command)?;
         self.sight.take(reading);
-        self.pace.wait_for(reading.time_s);
+        let time_s = reading.time_s;
+        let (moment, from_s) = *self.since.get_or_insert_with(|| (Instant::now(), time_s));
+        let ahead_s = (time_s - from_s) / self.speed - moment.elapsed().as_secs_f64();
+        if ahead_s < -LATE_S {
+            self.since = None;
+        } else if ahead_s > GRAIN_S {
+            sleep(Duration::try_from_secs_f64(ahead_s).unwrap_or_default());
+        }
         Ok(reading)
     }
 }
@@ -95,21 +105,3 @@ const GRAIN_S: f64 = 0.004;
 
 /// Who is later than this does not catch up: a plan was made meanwhile (chosen).
 const LATE_S: f64 = 0.1;
-
-struct Pace {
-    speed: f64,
-    /// A moment of the clock and the body's time then.
-    since: Option<(Instant, f64)>,
-}
-
-impl Pace {
-    fn wait_for(&mut self, time_s: f64) {
-        let (moment, from_s) = *self.since.get_or_insert_with(|| (Instant::now(), time_s));
-        let ahead_s = (time_s - from_s) / self.speed - moment.elapsed().as_secs_f64();
-        if ahead_s < -LATE_S {
-            self.since = None;
-        } else if ahead_s > GRAIN_S {
-            sleep(Duration::try_from_secs_f64(ahead_s).unwrap_or_default());
-        }
-    }
-}

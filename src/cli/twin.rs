@@ -6,7 +6,7 @@ use super::prepare::{environment, simulator};
 use super::progress::stop_on_interrupt;
 use super::show::is_experiment;
 use super::terminal::{Ending, Talk, print};
-use crate::backend::ros::connect::connect;
+use crate::backend::ros::connect;
 use crate::backend::ros::settings::BackendKind;
 use crate::backend::ros::topics::Side;
 use crate::experiment::Experiment;

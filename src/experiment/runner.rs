@@ -1,7 +1,7 @@
 //! Trials × planners: simulated ones on all cores, those of a real arm one after another.
 
 use crate::backend::Fault;
-use crate::backend::ros::clock;
+use crate::backend::pace;
 use crate::error::Invalid;
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{Entry, JOURNAL, Journal, RunError, RunFolder};
@@ -201,7 +201,7 @@ pub fn run_real(
         }
         let name = planner.name();
         let entry = |touch, fault| {
-            let (time_unix_s, planner) = (clock::now_s(), name.to_owned());
+            let (time_unix_s, planner) = (pace::now_s(), name.to_owned());
             Entry { time_unix_s, trial, planner, touch, fault }
         };
         let made = journal.touches(trial, name);
@@ -213,7 +213,10 @@ pub fn run_real(
                 let (touch, target) = (touched.count, made.target.numbers());
                 return match made.target == touched.row.target {
                     true => Ok(()),
-                    false => Err(Fault::PlannedOtherwise { touch, target }),
+                    false => Err(Fault::from(Invalid::new(format!(
+                        "touch {touch} was made at {target:?}, and would be made elsewhere now: the program \
+                         or the experiment is not what it was; --fresh begins anew"
+                    )))),
                 };
             }
             if let Err(error) = journal.add(entry(Some(touched.row.clone()), None)) {

@@ -1,9 +1,8 @@
 //! From an experiment to its trials: the one way that everything goes which runs a simulation.
 
 use crate::backend::ros::arm::Lab;
-use crate::backend::ros::fault::LinkFault;
 use crate::backend::ros::settings::BackendKind;
-use crate::backend::{Backend, Fault};
+use crate::backend::{Backend, Fault, LinkFault};
 use crate::error::Invalid;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
@@ -194,7 +193,7 @@ impl Simulation {
     /// If it cannot be reached, or is not in a state to be driven.
     pub fn connect(&mut self) -> Result<Option<Arc<Lab>>, LinkFault> {
         if self.is_real() {
-            let lacks = || LinkFault::Arm { words: "the scene has no object to touch".into() };
+            let lacks = || LinkFault::Arm("the scene has no object to touch".into());
             let chain = self.environment().chain().ok_or_else(lacks)?;
             self.lab = Some(Lab::join(&self.experiment.backend, &chain)?);
         }
@@ -209,7 +208,7 @@ impl Simulation {
     pub fn body(&self) -> Result<Option<Box<dyn Backend>>, Fault> {
         match &self.lab {
             Some(lab) => Ok(Some(Box::new(lab.body()))),
-            None if self.is_real() => Err(Fault::Lacks { part: "a connection to the arm" }),
+            None if self.is_real() => Err(Fault::lacks("a connection to the arm")),
             None => self.simulator.body(),
         }
     }

@@ -21,11 +21,11 @@ impl Kinematic {
     /// At the chain's home.
     ///
     /// # Errors
-    /// [`Fault::Lacks`] in an environment without an object or without a soft finger.
+    /// In an environment without an object or without a soft finger.
     pub fn new(environment: &Arc<Environment>) -> Result<Self, Fault> {
-        let chain = environment.chain().ok_or(Fault::Lacks { part: "an object" })?;
+        let chain = environment.chain().ok_or_else(|| Fault::lacks("an object"))?;
         let finger = SimulatedFinger::new(Arc::clone(environment), 0);
-        let finger = finger.ok_or(Fault::Lacks { part: "a soft finger" })?;
+        let finger = finger.ok_or_else(|| Fault::lacks("a soft finger"))?;
         let capabilities = Capabilities::of(&chain, environment.scene().period_s());
         let q = chain.home;
         let mut body =

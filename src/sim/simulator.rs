@@ -113,7 +113,7 @@ impl Simulator {
         seed: u64,
         limits: &InterlockSettings,
     ) -> Result<Servo, Fault> {
-        let robot = self.environment.robot().ok_or(Fault::Lacks { part: "an object" })?;
+        let robot = self.environment.robot().ok_or_else(|| Fault::lacks("an object"))?;
         let task = self.environment.task();
         let mut limits = limits.clone();
         let mut object = None;
@@ -135,13 +135,15 @@ impl Simulator {
             Body::Kinematic => Box::new(Kinematic::new(&self.environment)?),
             #[cfg(feature = "mujoco")]
             Body::Dynamic => {
-                let lacking = || Fault::Lacks { part: "a compiled model" };
+                let lacking = || Fault::lacks("a compiled model");
                 let models = self.models.as_ref().ok_or_else(lacking)?;
                 Box::new(mujoco::Dynamic::new(&self.environment, models)?)
             }
             #[cfg(not(feature = "mujoco"))]
             Body::Dynamic => {
-                return Err(Fault::NotBuilt { body: Body::Dynamic.name(), feature: "mujoco" });
+                let words =
+                    format!("{} needs a build with the feature `mujoco`", Body::Dynamic.name());
+                return Err(crate::error::Invalid::new(words).into());
             }
         };
         let timing = self.environment.scene().effects.timing.as_ref();

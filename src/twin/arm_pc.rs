@@ -2,8 +2,8 @@
 //! that are fresh and whole, stops the arm when they cease, and brakes.
 
 use crate::backend::ros::joints::JointNames;
-use crate::backend::ros::packet::Packet;
 use crate::backend::ros::status::ArmStatus;
+use crate::backend::ros::transport::Packet;
 
 /// The arm is stopped when the last command has not been valid for so long; chosen: two periods at
 /// 250 Hz.

@@ -1,11 +1,14 @@
-//! What may go wrong on a twin's side, on purpose.
+//! Failures of a twin on purpose, and what is sent with them.
 
-use crate::backend::ros::message::{DiagnosticStatus, Time};
-use crate::backend::ros::packet::Packet;
+use crate::backend::ros::link::Link;
+use crate::backend::ros::message::{DiagnosticStatus, JointState, Time};
 use crate::backend::ros::topics::Topic;
+use crate::backend::ros::transport::Packet;
+use crate::math::seed;
 use crate::sim::finger::noise::normal;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use std::collections::VecDeque;
 
 /// A failure by name.
 pub struct Failure {
@@ -59,100 +62,105 @@ const AHEAD_S: i32 = 1;
 // heuristic: hundreds of messages stay within the age limit of 50 ms.
 const BACKWARD_S: f64 = 1e-4;
 
+/// A failure that changes packets.
+const fn of_packets(
+    name: &'static str,
+    about: &'static str,
+    change: fn(&mut Packet, &mut Memory) -> bool,
+) -> Failure {
+    Failure { name, about, act: Act::Packet(change) }
+}
+
 /// Every failure; one line to add one.
 pub static FAILURES: &[Failure] = &[
-    Failure {
-        name: "loss",
-        about: "one packet in five does not arrive",
-        act: Act::Packet(|_, memory| memory.rng.random::<f64>() > 0.2),
-    },
+    of_packets("loss", "one packet in five does not arrive", |_, memory| {
+        memory.rng.random::<f64>() > 0.2
+    }),
     Failure { name: "latency", about: "packets are sent 20 ms late", act: Act::Delay(0.02) },
-    Failure { name: "noise", about: "0.3 N of noise on the force", act: Act::Packet(noise) },
-    Failure {
-        name: "frozen",
-        about: "the same tactile frame again and again",
-        act: Act::Packet(|packet, memory| frozen(Topic::Tactile, packet, memory)),
-    },
-    Failure {
-        name: "frozen_joints",
-        about: "the same joint positions and velocities again and again, with fresh stamps",
-        act: Act::Packet(|packet, memory| frozen(Topic::Joints, packet, memory)),
-    },
-    Failure {
-        name: "frozen_wrench",
-        about: "the same force and torque again and again, with fresh stamps",
-        act: Act::Packet(|packet, memory| frozen(Topic::Wrench, packet, memory)),
-    },
-    Failure { name: "force_spike", about: "60 N along z", act: Act::Packet(force_spike) },
-    Failure { name: "nan", about: "a joint position that is not a number", act: Act::Packet(nan) },
-    Failure { name: "six_names", about: "joint states of six joints", act: Act::Packet(six_names) },
-    Failure {
-        name: "swapped_names",
-        about: "the first two joints under each other's names",
-        act: Act::Packet(swapped_names),
-    },
-    Failure {
-        name: "other_joints",
-        about: "every other joint state is that of a hand",
-        act: Act::Packet(other_joints),
-    },
-    Failure { name: "future", about: "stamps a second ahead", act: Act::Packet(future) },
-    Failure { name: "unstamped", about: "stamps of zero", act: Act::Packet(unstamped) },
-    Failure {
-        name: "backward",
-        about: "stamps that run backwards by 0.1 ms a message",
-        act: Act::Packet(backward),
-    },
-    Failure {
-        name: "no_joints",
-        about: "joint states cease",
-        act: Act::Packet(|packet, _| !matches!(packet, Packet::Joints(_))),
-    },
-    Failure {
-        name: "no_wrench",
-        about: "forces cease",
-        act: Act::Packet(|packet, _| !matches!(packet, Packet::Wrench(_))),
-    },
-    Failure {
-        name: "no_tactile",
-        about: "tactile frames cease",
-        act: Act::Packet(|packet, _| !matches!(packet, Packet::Hand(_) | Packet::Fingers(_))),
-    },
+    of_packets("noise", "0.3 N of noise on the force", |packet, memory| {
+        if let Packet::Wrench(message) = packet {
+            let force = &mut message.wrench.force;
+            for part in [&mut force.x, &mut force.y, &mut force.z] {
+                *part += NOISE_N * normal(&mut memory.rng);
+            }
+        }
+        true
+    }),
+    of_packets("frozen", "the same tactile frame again and again", |packet, memory| {
+        frozen(Topic::Tactile, packet, memory)
+    }),
+    of_packets(
+        "frozen_joints",
+        "the same joint positions and velocities again and again, with fresh stamps",
+        |packet, memory| frozen(Topic::Joints, packet, memory),
+    ),
+    of_packets(
+        "frozen_wrench",
+        "the same force and torque again and again, with fresh stamps",
+        |packet, memory| frozen(Topic::Wrench, packet, memory),
+    ),
+    of_packets("force_spike", "60 N along z", |packet, _| {
+        if let Packet::Wrench(message) = packet {
+            message.wrench.force.z += SPIKE_N;
+        }
+        true
+    }),
+    of_packets("nan", "a joint position that is not a number", |packet, _| {
+        of_joints(packet, |message| message.position.iter_mut().take(1).for_each(|q| *q = f64::NAN))
+    }),
+    of_packets("six_names", "joint states of six joints", |packet, _| {
+        of_joints(packet, |message| {
+            message.name.truncate(6);
+            message.position.truncate(6);
+            message.velocity.truncate(6);
+        })
+    }),
+    of_packets("swapped_names", "the first two joints under each other's names", |packet, _| {
+        of_joints(packet, |message| message.name.swap(0, 1))
+    }),
+    of_packets("other_joints", "every other joint state is that of a hand", other_joints),
+    of_packets("future", "stamps a second ahead", |packet, _| {
+        stamped(packet, |stamp| stamp.sec += AHEAD_S)
+    }),
+    of_packets("unstamped", "stamps of zero", |packet, _| {
+        stamped(packet, |stamp| *stamp = Time::default())
+    }),
+    of_packets("backward", "stamps that run backwards by 0.1 ms a message", |packet, memory| {
+        let Some(last) = memory.first(packet).stamp_mut() else { return true };
+        *last = Time::from_s(last.s() - BACKWARD_S);
+        let earlier = *last;
+        stamped(packet, |stamp| *stamp = earlier)
+    }),
+    of_packets("no_joints", "joint states cease", |packet, _| packet.topic() != Topic::Joints),
+    of_packets("no_wrench", "forces cease", |packet, _| packet.topic() != Topic::Wrench),
+    of_packets("no_tactile", "tactile frames cease", |packet, _| packet.topic() != Topic::Tactile),
     Failure { name: "estop", about: "the emergency stop is pressed", act: Act::Estop },
     Failure { name: "deadman", about: "the dead-man switch is released", act: Act::Deadman },
-    Failure {
-        name: "hold",
-        about: "the status says hold; the arm obeys commands all the same",
-        act: Act::Packet(|packet, _| each_flag(packet, |key, _| is(key, "hold", "true"))),
-    },
-    Failure {
-        name: "brake",
-        about: "the status says that the brakes are closed; the arm obeys commands all the same",
-        act: Act::Packet(|packet, _| each_flag(packet, |key, _| is(key, "brake", "true"))),
-    },
-    Failure {
-        name: "python_flags",
-        about: "flags of the status as Python writes them: True, False",
-        act: Act::Packet(|packet, _| each_flag(packet, |_, on| spelt(on, ["False", "True"]))),
-    },
-    Failure {
-        name: "number_flags",
-        about: "flags of the status as numbers: 1, 0",
-        act: Act::Packet(|packet, _| each_flag(packet, |_, on| spelt(on, ["0", "1"]))),
-    },
-    Failure {
-        name: "no_flags",
-        about: "a status without values",
-        act: Act::Packet(|packet, _| {
-            statuses(packet).for_each(|status| status.values.clear());
-            true
-        }),
-    },
-    Failure {
-        name: "unknown_flag",
-        about: "an emergency stop of which the status says \"unknown\"",
-        act: Act::Packet(|packet, _| each_flag(packet, |key, _| is(key, "estop", "unknown"))),
-    },
+    of_packets("hold", "the status says hold; the arm obeys commands all the same", |packet, _| {
+        each_flag(packet, |key, _| is(key, "hold", "true"))
+    }),
+    of_packets(
+        "brake",
+        "the status says that the brakes are closed; the arm obeys commands all the same",
+        |packet, _| each_flag(packet, |key, _| is(key, "brake", "true")),
+    ),
+    of_packets(
+        "python_flags",
+        "flags of the status as Python writes them: True, False",
+        |packet, _| each_flag(packet, |_, on| spelt(on, ["False", "True"])),
+    ),
+    of_packets("number_flags", "flags of the status as numbers: 1, 0", |packet, _| {
+        each_flag(packet, |_, on| spelt(on, ["0", "1"]))
+    }),
+    of_packets("no_flags", "a status without values", |packet, _| {
+        statuses(packet).for_each(|status| status.values.clear());
+        true
+    }),
+    of_packets(
+        "unknown_flag",
+        "an emergency stop of which the status says \"unknown\"",
+        |packet, _| each_flag(packet, |key, _| is(key, "estop", "unknown")),
+    ),
 ];
 
 /// The failure of a name.
@@ -160,57 +168,20 @@ pub fn by_name(name: &str) -> Option<usize> {
     FAILURES.iter().position(|failure| failure.name == name)
 }
 
-fn noise(packet: &mut Packet, memory: &mut Memory) -> bool {
-    if let Packet::Wrench(message) = packet {
-        let force = &mut message.wrench.force;
-        for part in [&mut force.x, &mut force.y, &mut force.z] {
-            *part += NOISE_N * normal(&mut memory.rng);
-        }
-    }
-    true
-}
-
 fn frozen(topic: Topic, packet: &mut Packet, memory: &mut Memory) -> bool {
     if packet.topic() == topic {
-        let header = packet.header().cloned();
+        let stamp = packet.stamp_mut().copied();
         packet.clone_from(memory.first(packet));
-        if let (Some(now), Some(header)) = (packet.header_mut(), header) {
-            *now = header;
-        }
+        stamped(packet, |now| *now = stamp.unwrap_or_default());
     }
     true
 }
 
-fn force_spike(packet: &mut Packet, _: &mut Memory) -> bool {
-    if let Packet::Wrench(message) = packet {
-        message.wrench.force.z += SPIKE_N;
-    }
-    true
-}
-
-fn nan(packet: &mut Packet, _: &mut Memory) -> bool {
-    if let Packet::Joints(message) = packet
-        && let Some(first) = message.position.first_mut()
-    {
-        *first = f64::NAN;
-    }
-    true
-}
-
-fn six_names(packet: &mut Packet, _: &mut Memory) -> bool {
-    if let Packet::Joints(message) = packet {
-        message.name.truncate(6);
-        message.position.truncate(6);
-        message.velocity.truncate(6);
-    }
-    true
-}
-
-fn swapped_names(packet: &mut Packet, _: &mut Memory) -> bool {
+fn of_joints(packet: &mut Packet, change: impl FnOnce(&mut JointState)) -> bool {
     if let Packet::Joints(message) = packet
         && message.name.len() > 1
     {
-        message.name.swap(0, 1);
+        change(message);
     }
     true
 }
@@ -231,25 +202,10 @@ fn other_joints(packet: &mut Packet, memory: &mut Memory) -> bool {
 }
 
 fn stamped(packet: &mut Packet, change: impl FnOnce(&mut Time)) -> bool {
-    if let Some(header) = packet.header_mut() {
-        change(&mut header.stamp);
+    if let Some(stamp) = packet.stamp_mut() {
+        change(stamp);
     }
     true
-}
-
-fn future(packet: &mut Packet, _: &mut Memory) -> bool {
-    stamped(packet, |stamp| stamp.sec += AHEAD_S)
-}
-
-fn unstamped(packet: &mut Packet, _: &mut Memory) -> bool {
-    stamped(packet, |stamp| *stamp = Time::default())
-}
-
-fn backward(packet: &mut Packet, memory: &mut Memory) -> bool {
-    let Some(last) = memory.first(packet).header_mut() else { return true };
-    last.stamp = Time::from_s(last.stamp.s() - BACKWARD_S);
-    let earlier = last.stamp;
-    stamped(packet, |stamp| *stamp = earlier)
 }
 
 fn statuses(packet: &mut Packet) -> impl Iterator<Item = &mut DiagnosticStatus> {
@@ -277,4 +233,65 @@ fn is(key: &str, wanted: &str, value: &'static str) -> Option<&'static str> {
 
 fn spelt(on: bool, words: [&'static str; 2]) -> Option<&'static str> {
     Some(words[usize::from(on)])
+}
+
+/// Sends packets through the failures that are on.
+pub struct Sender {
+    is_on: Vec<bool>,
+    memory: Memory,
+    /// What is sent later, and when.
+    delayed: VecDeque<(f64, Packet)>,
+}
+
+impl Sender {
+    /// Without failures.
+    pub fn new(seed: u64) -> Self {
+        Self {
+            is_on: vec![false; FAILURES.len()],
+            memory: Memory { rng: seed::stream(seed, 0, "twin"), kept: Default::default() },
+            delayed: VecDeque::new(),
+        }
+    }
+
+    /// Begins or ends a failure, by its place in the table.
+    pub fn set(&mut self, failure: usize, is_on: bool) {
+        if let Some(slot) = self.is_on.get_mut(failure) {
+            *slot = is_on;
+        }
+        self.memory.kept = Default::default();
+    }
+
+    /// Whether a failure is on.
+    pub fn is_on(&self, failure: usize) -> bool {
+        self.is_on.get(failure).copied().unwrap_or(false)
+    }
+
+    /// Sends a packet at `now_s`, changed, late or not at all if a failure says so.
+    pub fn send(&mut self, link: &Link, mut packet: Packet, now_s: f64) {
+        let mut delay_s = 0.0;
+        for (failure, _) in FAILURES.iter().zip(&self.is_on).filter(|(_, is_on)| **is_on) {
+            match failure.act {
+                Act::Packet(change) => {
+                    if !change(&mut packet, &mut self.memory) {
+                        return;
+                    }
+                }
+                Act::Delay(by_s) => delay_s += by_s,
+                Act::Estop | Act::Deadman => (),
+            }
+        }
+        match delay_s > 0.0 || !self.delayed.is_empty() {
+            true => self.delayed.push_back((now_s + delay_s, packet)),
+            false => link.send(packet),
+        }
+    }
+
+    /// Sends what was held back until `now_s`.
+    pub fn send_due(&mut self, link: &Link, now_s: f64) {
+        while self.delayed.front().is_some_and(|(at_s, _)| *at_s <= now_s) {
+            if let Some((_, packet)) = self.delayed.pop_front() {
+                link.send(packet);
+            }
+        }
+    }
 }

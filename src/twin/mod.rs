@@ -6,6 +6,4 @@
 
 pub mod arm_pc;
 pub mod failure;
-pub mod inbox;
-pub mod sender;
 pub mod serve;

@@ -1,28 +1,25 @@
 //! The loop of a twin: commands in, one tick of the simulated body, readings out, in real time.
 
 use super::arm_pc::ArmPc;
-use super::failure::{Act, FAILURES};
-use super::inbox::Inbox;
-use super::sender::Sender;
-use crate::backend::pace::Pace;
-use crate::backend::ros::clock;
+use super::failure::{Act, FAILURES, Sender, by_name};
+use crate::backend::pace::{self, Pace};
 use crate::backend::ros::joints::JointNames;
 use crate::backend::ros::link::Link;
-use crate::backend::ros::message::{Header, Wrench as WrenchMessage, WrenchStamped};
-use crate::backend::ros::packet::Packet;
-use crate::backend::ros::service::{Answer, Service};
+use crate::backend::ros::message::{
+    Header, TriggerResponse, Wrench as WrenchMessage, WrenchStamped,
+};
 use crate::backend::ros::settings::BackendSettings;
 use crate::backend::ros::status::ArmStatus;
 use crate::backend::ros::tactile;
-use crate::backend::ros::topics::Topic;
-use crate::backend::ros::transport::{Connect, Delivery, TransportError};
+use crate::backend::ros::topics::{Service, Topic};
+use crate::backend::ros::transport::{Connect, Delivery, Packet};
 use crate::backend::{Backend, Command, Fault, Reading, Wrench};
 use crate::robot::arm::Chain;
 use nalgebra::Isometry3;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
-use thiserror::Error;
 
 /// Joints slower than this are at rest, rad/s or m/s; chosen, the sag of the servos is below it.
 const REST: f64 = 2e-3;
@@ -64,17 +61,6 @@ pub struct Injection {
     pub for_s: Option<f64>,
 }
 
-/// Why a twin ended.
-#[derive(Debug, Error)]
-pub enum TwinError {
-    /// The network does not work.
-    #[error(transparent)]
-    Transport(#[from] TransportError),
-    /// The simulated body cannot go on.
-    #[error(transparent)]
-    Fault(#[from] Fault),
-}
-
 /// Services that a twin answers.
 pub fn services() -> Vec<Service> {
     let own = FAILURES.iter().map(|failure| Service::Twin(failure.name));
@@ -87,7 +73,8 @@ pub struct Twin {
     settings: BackendSettings,
     names: JointNames,
     pc: ArmPc,
-    inbox: Inbox,
+    /// Deliveries, kept until the loop looks.
+    inbox: Receiver<Delivery>,
     link: Link,
     sender: Sender,
     injections: Vec<Injection>,
@@ -115,12 +102,12 @@ impl Twin {
         connect: Connect,
         injections: Vec<Injection>,
         seed: u64,
-    ) -> Result<Self, TwinError> {
+    ) -> Result<Self, Fault> {
         body.reset(seed)?;
         let names = settings.joint_names(chain);
-        let inbox = Inbox::default();
+        let (sink, inbox) = channel();
         // The loop looks at its own pace; the link only has to hand on.
-        let link = Link::open(connect, Duration::from_millis(20), Box::new(inbox.clone()))?;
+        let link = Link::open(connect, Duration::from_millis(20), Box::new(sink))?;
         let limits = chain.joints.iter().map(|joint| joint.qdot_limit).collect();
         let pc = ArmPc::new(names.clone(), limits, settings.topics.command.age_s);
         Ok(Self {
@@ -151,12 +138,12 @@ impl Twin {
         &mut self,
         stop: &AtomicBool,
         tell: &mut dyn FnMut(f64, Event),
-    ) -> Result<(), TwinError> {
+    ) -> Result<(), Fault> {
         let period_s = self.body.capabilities().period_s;
         let mut command = Command::default();
         let mut pace = Pace::new(period_s);
         self.since = Instant::now();
-        tell(clock::now_s(), Event::Serving);
+        tell(pace::now_s(), Event::Serving);
         while !stop.load(Ordering::Relaxed) {
             pace.wait(SLACK_TICKS);
             let now_s = self.since.elapsed().as_secs_f64();
@@ -178,7 +165,7 @@ impl Twin {
             );
             if is_moving != self.is_moving {
                 self.is_moving = is_moving;
-                tell(clock::now_s(), if is_moving { Event::Moving } else { Event::AtRest });
+                tell(pace::now_s(), if is_moving { Event::Moving } else { Event::AtRest });
             }
             if is_moving {
                 self.moved_s.get_or_insert(now_s);
@@ -207,12 +194,12 @@ impl Twin {
     }
 
     fn listen(&mut self, now_s: f64, tell: &mut dyn FnMut(f64, Event)) {
-        while let Some(delivery) = self.inbox.next() {
+        while let Ok(delivery) = self.inbox.try_recv() {
             match delivery {
                 Delivery::Packet { packet, sender, received } => {
                     if packet.topic() == Topic::Command {
                         let at_s = received.saturating_duration_since(self.since).as_secs_f64();
-                        self.pc.take(&packet, sender, at_s.min(now_s), clock::now_s());
+                        self.pc.take(&packet, sender, at_s.min(now_s), pace::now_s());
                     }
                 }
                 Delivery::Garbled { words, .. } => {
@@ -220,7 +207,7 @@ impl Twin {
                 }
                 Delivery::Call { service, call } => {
                     let answer = self.serve(&service, now_s, tell);
-                    tell(clock::now_s(), Event::Called(service.clone()));
+                    tell(pace::now_s(), Event::Called(service.clone()));
                     self.link.answer(service, call, answer);
                 }
                 Delivery::Answered { .. } => (),
@@ -228,8 +215,13 @@ impl Twin {
         }
     }
 
-    fn serve(&mut self, service: &Service, now_s: f64, tell: &mut dyn FnMut(f64, Event)) -> Answer {
-        let mut words = "done".to_owned();
+    fn serve(
+        &mut self,
+        service: &Service,
+        now_s: f64,
+        tell: &mut dyn FnMut(f64, Event),
+    ) -> TriggerResponse {
+        let mut message = "done".to_owned();
         match service {
             Service::Hold => self.pc.set_hold(true, now_s),
             Service::Unhold => self.pc.set_hold(false, now_s),
@@ -237,14 +229,14 @@ impl Twin {
             Service::ClearFault => self.pc.clear(),
             Service::Bias => self.wants_bias = true,
             Service::Twin(name) => {
-                if let Some(failure) = super::failure::by_name(name) {
+                if let Some(failure) = by_name(name) {
                     let is_on = !self.sender.is_on(failure);
                     self.set(failure, is_on, tell);
-                    words = format!("{name} {}", if is_on { "begins" } else { "ends" });
+                    message = format!("{name} {}", if is_on { "begins" } else { "ends" });
                 }
             }
         }
-        Answer { is_done: true, words }
+        TriggerResponse { success: true, message }
     }
 
     fn set(&mut self, failure: usize, is_on: bool, tell: &mut dyn FnMut(f64, Event)) {
@@ -255,7 +247,7 @@ impl Twin {
             Act::Deadman => self.pc.set_deadman(!is_on),
             Act::Packet(_) | Act::Delay(_) => (),
         }
-        tell(clock::now_s(), Event::Failure { name: entry.name, is_on });
+        tell(pace::now_s(), Event::Failure { name: entry.name, is_on });
     }
 
     /// Begins and ends the failures whose time has come.
@@ -285,9 +277,9 @@ impl Twin {
         }
         self.told = self.pc.status().clone();
         if is_new {
-            tell(clock::now_s(), Event::Status(self.told.clone()));
+            tell(pace::now_s(), Event::Status(self.told.clone()));
         }
-        let message = self.told.message(clock::now_s(), self.settings.topics.device());
+        let message = self.told.message(pace::now_s(), self.settings.topics.device());
         self.sender.send(&self.link, Packet::Status(message), now_s);
     }
 }
@@ -306,7 +298,7 @@ fn packets(
     (x_mt, bias): (&Isometry3<f64>, &Wrench),
 ) -> (Vec<Packet>, Option<Wrench>) {
     let topics = &settings.topics;
-    let stamp_s = clock::now_s();
+    let stamp_s = pace::now_s();
     let mut packets = Vec::new();
     if is_due(tick, topics.joints.rate_hz, period_s) {
         packets.push(Packet::Joints(names.state(stamp_s, &reading.q, &reading.qdot)));

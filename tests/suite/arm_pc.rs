@@ -2,7 +2,7 @@
 
 use palpate::backend::ros::joints::JointNames;
 use palpate::backend::ros::message::{JointTrajectory, JointTrajectoryPoint};
-use palpate::backend::ros::packet::Packet;
+use palpate::backend::ros::transport::Packet;
 use palpate::twin::arm_pc::ArmPc;
 use proptest::prelude::*;
 

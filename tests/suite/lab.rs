@@ -2,16 +2,14 @@
 //! ignored without one, because DDS sends to whoever is near.
 
 use crate::common::lab::{CELL, EXPERIMENT, Network, TwinProcess, row};
+use palpate::backend::pace;
 use palpate::backend::ros::arm::Lab;
-use palpate::backend::ros::clock;
-use palpate::backend::ros::connect::connect;
+use palpate::backend::ros::connect;
 use palpate::backend::ros::joints::JointNames;
 use palpate::backend::ros::link::{Link, Sink};
-use palpate::backend::ros::packet::Packet;
-use palpate::backend::ros::service::Service;
 use palpate::backend::ros::settings::{BackendKind, BackendSettings, MappingKind};
-use palpate::backend::ros::topics::Side;
-use palpate::backend::ros::transport::Delivery;
+use palpate::backend::ros::topics::{Service, Side};
+use palpate::backend::ros::transport::{Delivery, Packet};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::probe::Touch;
 use palpate::robot::arm::ArmSettings;
@@ -153,11 +151,9 @@ struct Echo(Arc<Mutex<Vec<(f64, f64)>>>);
 impl Sink for Echo {
     fn take(&mut self, delivery: Delivery) {
         if let Delivery::Packet { packet: Packet::Joints(message), .. } = delivery {
-            self.0.lock().unwrap().push((message.header.stamp.s(), clock::now_s()));
+            self.0.lock().unwrap().push((message.header.stamp.s(), pace::now_s()));
         }
     }
-
-    fn tick(&mut self, _: &mut dyn FnMut(Packet)) {}
 }
 
 /// Commands at 250 Hz to a peer of another implementation, which answers each.
@@ -178,7 +174,7 @@ fn the_loop_loses_nothing_at_250_hz() {
     let link = Link::open(open, period, Box::new(Echo(Arc::clone(&answers)))).unwrap();
     let names =
         JointNames::new(["S1", "S2", "S3", "E1", "E2", "W1", "W2"].map(String::from).into());
-    let send = || link.send(names.command(clock::now_s(), 0.02, &[0.0; 7], false));
+    let send = || link.send(names.command(pace::now_s(), 0.02, &[0.0; 7], false));
     // Until the two have found each other.
     while answers.lock().unwrap().is_empty() {
         send();

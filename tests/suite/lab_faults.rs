@@ -2,11 +2,10 @@
 //! arm stands still. Prints the table of `docs/real-arm.md`.
 
 use crate::common::lab::{EXPERIMENT, Network, TwinProcess, journal, signal};
-use palpate::backend::ros::clock;
-use palpate::backend::ros::connect::connect;
+use palpate::backend::pace;
+use palpate::backend::ros::connect;
 use palpate::backend::ros::joints::JointNames;
 use palpate::backend::ros::link::{Link, Sink};
-use palpate::backend::ros::packet::Packet;
 use palpate::backend::ros::topics::Side;
 use palpate::backend::ros::transport::Delivery;
 use serde_json::Value;
@@ -128,7 +127,7 @@ fn the_death_of_either_side_stops_the_other() {
         let mut scene = Scene::new(number, &[], &[]);
         scene.twin.wait_until_it_moves();
         signal(&scene.explorer, name);
-        let at_s = clock::now_s();
+        let at_s = pace::now_s();
         sleep(Duration::from_secs(1));
         let seen_s = scene.twin.alarmed_s(at_s) - at_s;
         told(&format!("SIG{name} of the explorer"), Some(seen_s), Some(scene.rest_s(at_s)), "");
@@ -149,14 +148,14 @@ fn the_death_of_either_side_stops_the_other() {
         let mut scene = Scene::new(number, &[], &[]);
         scene.twin.wait_until_it_moves();
         signal(&scene.twin.child, name);
-        let at_s = clock::now_s();
+        let at_s = pace::now_s();
         let (said, halted_s) = scene.halted();
         told(&format!("SIG{name} of the arm's side"), Some(halted_s - at_s), None, &said);
         assert!(said.contains("nothing new on"), "{said}");
         if name == "STOP" {
             // It wakes with a command that is old by now.
             signal(&scene.twin.child, "CONT");
-            let at_s = clock::now_s();
+            let at_s = pace::now_s();
             sleep(Duration::from_secs(1));
             told("and after SIGCONT", None, Some(scene.rest_s(at_s)), "");
         }
@@ -171,9 +170,9 @@ fn a_network_that_is_gone_and_back_is_a_stop_and_no_more() {
     let has_dummy = Path::new("/sys/class/net/dds0").exists();
     let mut scene = Scene::new(54, &[], &[]);
     scene.twin.wait_until_it_moves();
-    let before_s = clock::now_s();
+    let before_s = pace::now_s();
     assert!(ip("link set lo down") && (!has_dummy || ip("link set dds0 down")));
-    let at_s = clock::now_s();
+    let at_s = pace::now_s();
     sleep(Duration::from_secs(1));
     let seen_s = scene.twin.alarmed_s(before_s) - at_s;
     let rest_s = scene.rest_s(at_s);
@@ -197,8 +196,6 @@ struct Mute;
 
 impl Sink for Mute {
     fn take(&mut self, _: Delivery) {}
-
-    fn tick(&mut self, _: &mut dyn FnMut(Packet)) {}
 }
 
 /// Somebody else commands the arm, too.
@@ -207,13 +204,13 @@ impl Sink for Mute {
 fn a_second_publisher_of_commands_stops_the_arm() {
     let mut scene = Scene::new(55, &[], &[]);
     scene.twin.wait_until_it_moves();
-    let before_s = clock::now_s();
+    let before_s = pace::now_s();
     let open = connect(&scene.network.settings, Side::Explorer, Vec::new()).unwrap();
     let second = Link::open(open, Duration::from_millis(20), Box::new(Mute)).unwrap();
     let joints = ["S1", "S2", "S3", "E1", "E2", "W1", "W2"].map(String::from);
     let names = JointNames::new(joints.into());
     for _ in 0..50 {
-        second.send(names.command(clock::now_s(), 0.02, &[0.0; 7], false));
+        second.send(names.command(pace::now_s(), 0.02, &[0.0; 7], false));
         sleep(Duration::from_millis(20));
     }
     let (said, halted_s) = scene.halted();

@@ -75,6 +75,7 @@ mod report;
 mod reproducible;
 #[cfg(feature = "mujoco")]
 mod rigid;
+mod ros_messages;
 mod scenes;
 mod seeking;
 mod sensor_file;

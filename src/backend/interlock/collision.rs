@@ -1,10 +1,8 @@
 //! What of the robot may not come near to what.
 
-use super::ahead::Ahead;
-use super::interlock::{Entry, Interlock, Now};
+use super::interlock::{Ahead, Entry, Interlock, Now, Site};
 use super::settings::InterlockSettings;
-use super::site::Site;
-use super::trip::Trip;
+use crate::backend::Trip;
 use crate::geometry::distance::{HalfSpace, OrientedBox};
 use crate::geometry::sweep::Capsule;
 use crate::robot::arm::Joints;
@@ -25,7 +23,8 @@ const NAME: &str = "clearance";
 /// Looks at the capsules of the links where the body cannot help going.
 struct Guard {
     links: Vec<LinkCapsule>,
-    pairs: Vec<Pair>,
+    /// Each link with what it must not meet.
+    pairs: Vec<(usize, Other)>,
     clearance_m: f64,
     reaction_s: f64,
     /// The links in `W` at the posture looked at last.
@@ -33,12 +32,6 @@ struct Guard {
     /// A posture, and the clearance there: until some point can have moved by that much, nobody
     /// needs to look again.
     looked: Option<(Joints, f64)>,
-}
-
-/// What must not meet: a link, and what.
-struct Pair {
-    link: usize,
-    other: Other,
 }
 
 enum Other {
@@ -54,14 +47,14 @@ impl Guard {
         for (i, link) in links.iter().enumerate() {
             let beside = links.iter().enumerate().skip(i + 1);
             let met = beside.filter(|(_, other)| link.may_meet(other));
-            pairs.extend(met.map(|(k, _)| Pair { link: i, other: Other::Link(k) }));
+            pairs.extend(met.map(|(k, _)| (i, Other::Link(k))));
             if let Some(z_m) = settings.lowest_m.filter(|_| !link.near_base) {
                 let (p_w, outward_w) = (Point3::new(0.0, 0.0, z_m), Vector3::z_axis());
-                pairs.push(Pair { link: i, other: Other::Table(HalfSpace { p_w, outward_w }) });
+                pairs.push((i, Other::Table(HalfSpace { p_w, outward_w })));
             }
             let is_arm = !link.near_base && !link.is_carried();
             if let Some(object) = site.object.filter(|_| is_arm) {
-                pairs.push(Pair { link: i, other: Other::Object(object) });
+                pairs.push((i, Other::Object(object)));
             }
         }
         Self {
@@ -80,9 +73,9 @@ impl Guard {
         self.placed.clear();
         self.placed.extend(self.links.iter().map(|link| link.at(&frames[link.link])));
         let mut nearest = (f64::INFINITY, 0);
-        for (i, pair) in self.pairs.iter().enumerate() {
-            let link = &self.placed[pair.link];
-            let distance_m = match &pair.other {
+        for (i, (link, other)) in self.pairs.iter().enumerate() {
+            let link = &self.placed[*link];
+            let distance_m = match other {
                 Other::Link(other) => link.to_capsule_m(&self.placed[*other]),
                 Other::Table(space) => link.to_half_space_m(space),
                 Other::Object(object) => link.to_box_m(object),
@@ -95,7 +88,7 @@ impl Guard {
     }
 
     fn name(&self, pair: usize) -> String {
-        let Pair { link, other } = &self.pairs[pair];
+        let (link, other) = &self.pairs[pair];
         let other = match other {
             Other::Link(other) => &*self.links[*other].name,
             Other::Table(_) => "the table",

@@ -1,8 +1,7 @@
 //! How deep the finger may go.
 
-use super::ahead::Ahead;
-use super::interlock::{Entry, Interlock, Now};
-use super::trip::Trip;
+use super::interlock::{Ahead, Entry, Interlock, Now};
+use crate::backend::Trip;
 use crate::geometry::distance::HalfSpace;
 use crate::robot::arm::Joints;
 

@@ -1,8 +1,7 @@
 //! Electrodes that cannot be right.
 
 use super::interlock::{Entry, Interlock, Now};
-use super::trip::Trip;
-use crate::backend::Reading;
+use crate::backend::{Reading, Trip};
 use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 
 /// Stops a real body if an electrode stands at an end of its range or does not change at all: its

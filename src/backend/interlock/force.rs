@@ -1,8 +1,7 @@
 //! How hard the finger may be pressed, told by the force/torque sensor alone.
 
 use super::interlock::{Entry, Interlock, Now};
-use super::trip::Trip;
-use crate::backend::Reading;
+use crate::backend::{Reading, Trip};
 
 /// Stops the body above a force, a torque, or a rise of the force.
 pub const ENTRY: Entry = Entry {

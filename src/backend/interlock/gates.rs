@@ -2,14 +2,13 @@
 
 use crate::backend::{Backend, Command, Fault, Reading, Wrench};
 use crate::config::{Checked, Rules};
+use crate::error::Invalid;
 use crate::robot::arm::Chain;
 use crate::robot::finger::Frame;
 use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
-use thiserror::Error;
 
 /// How a body is looked at before it moves; figures without a source are chosen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -43,80 +42,6 @@ impl Checked for GateSettings {
     }
 }
 
-/// Why a body must not be moved yet.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum GateError {
-    /// It could not be held still at all.
-    #[error(transparent)]
-    Fault(#[from] Fault),
-    /// A joint stands outside its limits.
-    #[error("joint {joint} stands at {q:.4}, outside its limits {low:.4} to {high:.4}")]
-    Outside {
-        /// The joint.
-        joint: Arc<str>,
-        /// Where it stands, rad or m.
-        q: f64,
-        /// Its smallest position.
-        low: f64,
-        /// Its largest position.
-        high: f64,
-    },
-    /// A joint does not stand where it is expected.
-    #[error(
-        "joint {joint} stands at {q:.4}, {:.4} from where it is expected; allowed are {allowed}",
-        (q - expected).abs()
-    )]
-    Away {
-        /// The joint.
-        joint: Arc<str>,
-        /// Where it stands, rad or m.
-        q: f64,
-        /// Where it is expected.
-        expected: f64,
-        /// Largest difference.
-        allowed: f64,
-    },
-    /// A joint moves though it is told to stand still.
-    #[error("joint {joint} moved by {moved:.5} while told to stand still; allowed are {allowed}")]
-    Moves {
-        /// The joint.
-        joint: Arc<str>,
-        /// By how much, rad or m.
-        moved: f64,
-        /// Largest allowed.
-        allowed: f64,
-    },
-    /// The force/torque sensor drifts.
-    #[error("the force at rest drifts by {drift_n:.3} N; allowed are {allowed_n} N")]
-    Drifts {
-        /// By how much.
-        drift_n: f64,
-        /// Largest allowed.
-        allowed_n: f64,
-    },
-    /// No tactile frame came, though some are expected.
-    #[error("no tactile frame in {hold_s} s")]
-    NoFrames {
-        /// For how long it was waited.
-        hold_s: f64,
-    },
-    /// An electrode at rest shows what none can.
-    #[error(
-        "electrode E{electrode} at rest is {mean_counts:.1} counts with a standard deviation of \
-         {sd_counts:.2}; allowed is a value inside 0 to 4095 with one above 0 and at most {allowed_counts}"
-    )]
-    Electrode {
-        /// Its number, from 1.
-        electrode: usize,
-        /// Its mean.
-        mean_counts: f64,
-        /// Its standard deviation.
-        sd_counts: f64,
-        /// Largest deviation allowed.
-        allowed_counts: f64,
-    },
-}
-
 /// A body at rest in free air.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Baseline {
@@ -130,26 +55,20 @@ pub struct Baseline {
     pub electrode_counts: Option<[f64; ELECTRODES]>,
 }
 
-/// What is expected of a body at its start.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Expected<'a> {
-    /// Joint positions, if they are known.
-    pub q: Option<&'a [f64]>,
-    /// Whether it has a tactile sensor that sends frames.
-    pub sends_frames: bool,
-}
-
-/// Holds `body`, which moves `chain`, still after its reset, and looks at joints and sensors.
+/// Holds `body`, which moves `chain`, still after its reset, and looks at joints and sensors. Its
+/// joints must stand near `expected_q`, if that is known, and tactile frames must come if it
+/// `sends_frames`.
 ///
 /// # Errors
 /// The first thing that is not as it must be.
 pub fn check_start(
     body: &mut dyn Backend,
     chain: &Chain,
-    expected: Expected,
+    expected_q: Option<&[f64]>,
+    sends_frames: bool,
     settings: &GateSettings,
     seed: u64,
-) -> Result<Baseline, GateError> {
+) -> Result<Baseline, Fault> {
     body.capabilities().fit(chain)?;
     let still = Command { qdot: vec![0.0; chain.joints.len()] };
     let ticks = (settings.hold_s / body.capabilities().period_s).ceil() as usize;
@@ -159,11 +78,11 @@ pub fn check_start(
         readings.push(body.step(&still)?.clone());
     }
     readings.iter().try_for_each(Reading::check)?;
-    check_joints(&readings, chain, expected.q, settings)?;
+    check_joints(&readings, chain, expected_q, settings)?;
     let wrench = check_force(&readings, settings)?;
     let frames: Vec<&Frame> = readings.iter().flat_map(Reading::frames).collect();
-    if frames.is_empty() && expected.sends_frames {
-        return Err(GateError::NoFrames { hold_s: settings.hold_s });
+    if frames.is_empty() && sends_frames {
+        return Err(Invalid::new(format!("no tactile frame in {} s", settings.hold_s)).into());
     }
     let noisy = body.capabilities().real_time;
     let electrode_counts = check_electrodes(&frames, settings, noisy)?;
@@ -176,40 +95,38 @@ fn check_joints(
     chain: &Chain,
     expected: Option<&[f64]>,
     settings: &GateSettings,
-) -> Result<(), GateError> {
+) -> Result<(), Invalid> {
     for (i, joint) in chain.joints.iter().enumerate() {
         let places = || readings.iter().filter_map(|reading| reading.q.get(i).copied());
-        let [low, high] = joint.q_limits;
+        let (name, [low, high]) = (&joint.name, joint.q_limits);
         let (least, most) =
             places().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| (a.min(q), b.max(q)));
         let Some(q) = places().next_back() else { continue };
         if let Some(q) = [least, most].into_iter().find(|q| !(low..=high).contains(q)) {
-            return Err(GateError::Outside { joint: joint.name.clone(), q, low, high });
+            return Err(Invalid::new(format!(
+                "joint {name} stands at {q:.4}, outside its limits {low:.4} to {high:.4}"
+            )));
         }
         if let Some(&expected) = expected.and_then(|expected| expected.get(i))
             && (q - expected).abs() > settings.near
         {
-            return Err(GateError::Away {
-                joint: joint.name.clone(),
-                q,
-                expected,
-                allowed: settings.near,
-            });
+            let (away, allowed) = ((q - expected).abs(), settings.near);
+            return Err(Invalid::new(format!(
+                "joint {name} stands at {q:.4}, {away:.4} from where it is expected; allowed are {allowed}"
+            )));
         }
-        let moved = most - least;
-        if moved > settings.still {
-            return Err(GateError::Moves {
-                joint: joint.name.clone(),
-                moved,
-                allowed: settings.still,
-            });
+        let (moved, allowed) = (most - least, settings.still);
+        if moved > allowed {
+            return Err(Invalid::new(format!(
+                "joint {name} moved by {moved:.5} while told to stand still; allowed are {allowed}"
+            )));
         }
     }
     Ok(())
 }
 
 /// The mean wrench; none without a sensor.
-fn check_force(readings: &[Reading], settings: &GateSettings) -> Result<Option<Wrench>, GateError> {
+fn check_force(readings: &[Reading], settings: &GateSettings) -> Result<Option<Wrench>, Invalid> {
     let wrenches: Vec<Wrench> = readings.iter().filter_map(|reading| reading.wrench).collect();
     let quarter = wrenches.len() / 4;
     if quarter == 0 {
@@ -221,8 +138,11 @@ fn check_force(readings: &[Reading], settings: &GateSettings) -> Result<Option<W
     let force = |part: &[Wrench]| mean(part, |wrench| wrench.force_n);
     let drift_n =
         (force(&wrenches[wrenches.len() - quarter..]) - force(&wrenches[..quarter])).norm();
-    if drift_n > settings.drift_n {
-        return Err(GateError::Drifts { drift_n, allowed_n: settings.drift_n });
+    let allowed_n = settings.drift_n;
+    if drift_n > allowed_n {
+        return Err(Invalid::new(format!(
+            "the force at rest drifts by {drift_n:.3} N; allowed are {allowed_n} N"
+        )));
     }
     let torque_nm = mean(&wrenches, |wrench| wrench.torque_nm);
     Ok(Some(Wrench { force_n: force(&wrenches), torque_nm }))
@@ -233,7 +153,7 @@ fn check_electrodes(
     frames: &[&Frame],
     settings: &GateSettings,
     noisy: bool,
-) -> Result<Option<[f64; ELECTRODES]>, GateError> {
+) -> Result<Option<[f64; ELECTRODES]>, Invalid> {
     let all: Vec<[f64; ELECTRODES]> =
         frames.iter().filter_map(|frame| frame.electrode_counts).collect();
     if all.len() < 2 {
@@ -248,9 +168,11 @@ fn check_electrodes(
         let is_inside = *mean > 0.0 && *mean < FULL_SCALE_COUNTS;
         let is_alive = sd_counts > 0.0 || !noisy;
         if !(is_inside && is_alive && sd_counts <= settings.noise_counts) {
-            let (electrode, mean_counts) = (i + 1, *mean);
-            let allowed_counts = settings.noise_counts;
-            return Err(GateError::Electrode { electrode, mean_counts, sd_counts, allowed_counts });
+            let (electrode, allowed_counts) = (i + 1, settings.noise_counts);
+            return Err(Invalid::new(format!(
+                "electrode E{electrode} at rest is {mean:.1} counts with a standard deviation of \
+                 {sd_counts:.2}; allowed is a value inside 0 to 4095 with one above 0 and at most {allowed_counts}"
+            )));
         }
     }
     Ok(Some(means))

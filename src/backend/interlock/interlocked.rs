@@ -1,17 +1,14 @@
 //! The last line before a body moves.
 
-use super::ahead::stopping_s;
-use super::force;
-use super::interlock::{Interlock, Now};
+use super::interlock::{Interlock, Now, Site, stopping_s};
 use super::joints::limited;
 use super::settings::InterlockSettings;
-use super::site::Site;
-use super::table::INTERLOCKS;
-use super::trip::Trip;
-use super::way_back::WayBack;
-use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
+use super::{INTERLOCKS, force};
+use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Trip, Wrench};
+use crate::error::Invalid;
 use crate::robot::arm::{Jacobian, Joints};
 use nalgebra::Isometry3;
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -50,7 +47,7 @@ impl Interlocked {
     /// Around `inner`, which moves the joints of the site's robot.
     ///
     /// # Errors
-    /// [`Fault::Joints`] if their numbers of joints differ.
+    /// If their numbers of joints differ.
     pub fn new(
         inner: Box<dyn Backend>,
         site: &Site,
@@ -117,7 +114,7 @@ impl Interlocked {
         reading.check()?;
         let joints = |values: &[f64]| {
             let (expected, found) = (now.chain.joints.len(), values.len());
-            now.chain.joints_from(values).ok_or(Fault::Joints { expected, found })
+            now.chain.joints_from(values).ok_or_else(|| Fault::joints(expected, found))
         };
         let (before, passed_s) = (now.q, reading.time_s - now.time_s);
         (now.q, now.qdot) = (joints(&reading.q)?, joints(&reading.qdot)?);
@@ -147,14 +144,16 @@ impl Interlocked {
     }
 
     /// The fault of a body that must be brought elsewhere by hand.
-    fn astray(&self, trip: Trip) -> Fault {
+    fn astray(&self, trip: &Trip) -> Fault {
         let joints = self.now.chain.joints.iter().zip(self.now.chain.home.iter());
-        Fault::Astray {
-            time_s: self.now.time_s,
-            trip: Box::new(trip),
-            p_wt: self.now.x_wt.translation.vector.into(),
-            home: joints.map(|(joint, &q)| (joint.name.to_string(), q)).collect(),
-        }
+        let home: Vec<_> = joints.map(|(joint, q)| format!("{} {q:.3}", joint.name)).collect();
+        let p_wt = self.now.x_wt.translation.vector;
+        Invalid::new(format!(
+            "the arm is not moved from where it stands, its tip at [{:.3}, {:.3}, {:.3}] m: {trip}; bring \
+             it near its home posture by hand: {}",
+            p_wt.x, p_wt.y, p_wt.z, home.join(", ")
+        ))
+        .into()
     }
 
     /// What is wrong with the last reading: the first thing, but too much force only where nothing
@@ -276,7 +275,7 @@ impl Backend for Interlocked {
         };
         if let Err(trip) = self.shorten(&mut qdot) {
             return Err(match self.stands_badly() {
-                Some(trip) => self.latch(self.astray(trip)),
+                Some(trip) => self.latch(self.astray(&trip)),
                 None => self.trip(trip),
             });
         }
@@ -298,5 +297,52 @@ impl Backend for Interlocked {
                 Err(self.trip(trip))
             }
         }
+    }
+}
+
+/// How much of the way is kept; chosen: 10 mm at 5 mm/s, the slowest contact.
+const KEPT_S: f64 = 2.0;
+
+/// Most postures kept.
+const MOST: usize = 4096;
+
+/// Postures of the last ticks, oldest first; holds no more than what it was made for.
+struct WayBack {
+    postures: VecDeque<Joints>,
+    most: usize,
+}
+
+impl WayBack {
+    /// Of a body with ticks of `period_s`.
+    fn new(period_s: f64) -> Self {
+        let most = ((KEPT_S / period_s) as usize).clamp(1, MOST);
+        Self { postures: VecDeque::with_capacity(most), most }
+    }
+
+    /// Nothing is behind.
+    fn forget(&mut self) {
+        self.postures.clear();
+    }
+
+    /// Adds where the body stands.
+    fn push(&mut self, q: &Joints) {
+        if self.postures.len() >= self.most {
+            self.postures.pop_front();
+        }
+        self.postures.push_back(*q);
+    }
+
+    /// Joint velocities that lead back with the tip at `speed_m_s`, dropping the postures passed;
+    /// none where the way ends.
+    fn velocity(&mut self, now: &Now, speed_m_s: f64) -> Option<Joints> {
+        while let Some(q) = self.postures.back() {
+            let by = q - now.q;
+            let travel_s = now.tip_speed_m_s(&by) / speed_m_s;
+            if travel_s >= now.period_s {
+                return Some(by / travel_s);
+            }
+            self.postures.pop_back();
+        }
+        None
     }
 }

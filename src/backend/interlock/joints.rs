@@ -1,8 +1,7 @@
 //! Limits of every joint by itself: position, speed, acceleration.
 
 use super::interlock::{Entry, Interlock, Now};
-use super::trip::Trip;
-use crate::backend::Reading;
+use crate::backend::{Reading, Trip};
 use crate::robot::arm::Joints;
 
 /// Keeps commands within the limits, and stops a joint that is read to be far beyond one.

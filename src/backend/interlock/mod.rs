@@ -4,7 +4,6 @@
 //! another that asks each of them in every tick. Before a body is moved, [`check_start`] asks it
 //! to stand still and looks at its sensors.
 
-mod ahead;
 mod collision;
 mod depth;
 mod electrodes;
@@ -16,20 +15,29 @@ mod interlocked;
 mod joints;
 mod settings;
 mod silence;
-mod site;
 mod standstill;
-mod table;
 mod tip_speed;
 mod tracking;
-mod trip;
 mod velocity;
-mod way_back;
 mod workspace;
 
-pub use gates::{Baseline, Expected, GateError, GateSettings, check_start};
-pub use interlock::{Entry, Interlock, Now};
+pub use gates::{Baseline, GateSettings, check_start};
+pub use interlock::{Entry, Interlock, Now, Site};
 pub use interlocked::{Interlocked, Operator};
 pub use settings::{InterlockSettings, defaults};
-pub use site::Site;
-pub use table::INTERLOCKS;
-pub use trip::Trip;
+
+/// In the order in which they act: those that shorten a command come before those that judge what
+/// is left of it. A new one is a file and a line.
+pub const INTERLOCKS: &[Entry] = &[
+    tip_speed::ENTRY,
+    joints::ENTRY,
+    workspace::ENTRY,
+    depth::ENTRY,
+    collision::ENTRY,
+    force::ENTRY,
+    silence::ENTRY,
+    electrodes::ENTRY,
+    standstill::ENTRY,
+    velocity::ENTRY,
+    tracking::ENTRY,
+];

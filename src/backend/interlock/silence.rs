@@ -1,8 +1,7 @@
 //! Sensors that no longer say anything new.
 
 use super::interlock::{Entry, Interlock, Now};
-use super::trip::Trip;
-use crate::backend::Reading;
+use crate::backend::{Reading, Trip};
 use nalgebra::Vector3;
 
 /// Stops a body whose joints, force/torque sensor or tactile sensor fall silent.

@@ -1,8 +1,7 @@
 //! Joints that are commanded to move and keep reading the same position.
 
 use super::interlock::{Entry, Interlock, Now};
-use super::trip::Trip;
-use crate::backend::Reading;
+use crate::backend::{Reading, Trip};
 use crate::robot::arm::chain::MAX_JOINTS;
 
 /// Stops a real body when a joint reads one and the same position while it is commanded to move:

@@ -1,8 +1,7 @@
 //! How fast the fingertip may be.
 
 use super::interlock::{Entry, Interlock, Now};
-use super::trip::Trip;
-use crate::backend::Reading;
+use crate::backend::{Reading, Trip};
 use crate::robot::arm::Joints;
 
 /// Shortens commands to the limit, and stops a tip that is read to be faster all the same.

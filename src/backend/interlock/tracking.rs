@@ -1,8 +1,7 @@
 //! Joints that do not follow their commands: how far they have moved, at any speed.
 
 use super::interlock::{Entry, Interlock, Now};
-use super::trip::Trip;
-use crate::backend::Reading;
+use crate::backend::{Reading, Trip};
 use crate::robot::arm::Joints;
 use std::collections::VecDeque;
 

@@ -1,8 +1,7 @@
 //! Joints whose velocity is not the commanded one.
 
 use super::interlock::{Entry, Interlock, Now};
-use super::trip::Trip;
-use crate::backend::Reading;
+use crate::backend::{Reading, Trip};
 use crate::robot::arm::chain::MAX_JOINTS;
 
 /// Stops a body one of whose joints moves at another velocity than was applied for some time.

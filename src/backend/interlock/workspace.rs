@@ -1,8 +1,7 @@
 //! Where fingertip and elbow may be.
 
-use super::ahead::Ahead;
-use super::interlock::{Entry, Interlock, Now};
-use super::trip::Trip;
+use super::interlock::{Ahead, Entry, Interlock, Now};
+use crate::backend::Trip;
 use crate::robot::arm::Joints;
 use nalgebra::{Point3, Vector3};
 
@@ -11,19 +10,16 @@ use nalgebra::{Point3, Vector3};
 pub const ENTRY: Entry = Entry {
     name: NAME,
     make: |site, settings, _| {
-        let business = site.tip_w.map(|[low, high]| {
+        let mut rooms = Vec::new();
+        if let Some([low, high]) = site.tip_w {
             let margin = Vector3::repeat(settings.tip_margin_m);
-            Room { of: Part::Tip, low: low - margin, high: high + margin }
-        });
-        let workspace = settings
-            .workspace_m
-            .map(|[x, y, z]| [0, 1].map(|end| Point3::new(x[end], y[end], z[end])));
-        let elbow = site.robot.chain.elbow;
-        let whole = [Some(Part::Tip), elbow.map(|link| Part::Elbow { link })];
-        let whole = whole.into_iter().flatten();
-        let mut rooms: Vec<Room> = business.into_iter().collect();
-        if let Some([low, high]) = workspace {
-            rooms.extend(whole.map(|of| Room { of, low, high }));
+            rooms.push(Room { elbow: None, low: low - margin, high: high + margin });
+        }
+        if let Some([x, y, z]) = settings.workspace_m {
+            let [low, high] = [0, 1].map(|end| Point3::new(x[end], y[end], z[end]));
+            rooms.push(Room { elbow: None, low, high });
+            let elbow = site.robot.chain.elbow;
+            rooms.extend(elbow.map(|link| Room { elbow: Some(link), low, high }));
         }
         let reaction_s = settings.reaction_s;
         (!rooms.is_empty()).then(|| Box::new(Workspace { rooms, reaction_s }) as _)
@@ -39,15 +35,10 @@ struct Workspace {
 
 /// A box that a point must stay in.
 struct Room {
-    of: Part,
+    /// The link whose origin is the elbow; `None` for the tip.
+    elbow: Option<usize>,
     low: Point3<f64>,
     high: Point3<f64>,
-}
-
-#[derive(Clone, Copy)]
-enum Part {
-    Tip,
-    Elbow { link: usize },
 }
 
 impl Room {
@@ -55,21 +46,13 @@ impl Room {
     fn clearance_m(&self, p_w: &Point3<f64>) -> f64 {
         (p_w - self.low).inf(&(self.high - p_w)).min()
     }
-}
 
-impl Part {
-    fn at(self, now: &Now, q: &Joints) -> Point3<f64> {
-        match self {
-            Self::Tip => now.chain.forward(q).translation.vector.into(),
-            Self::Elbow { link } => now.chain.frames(q)[link].translation.vector.into(),
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Tip => "the tip",
-            Self::Elbow { .. } => "the elbow",
-        }
+    /// The same of the point where it is at `q`.
+    fn clearance_at_m(&self, now: &Now, q: &Joints) -> f64 {
+        self.clearance_m(&match self.elbow {
+            None => now.chain.forward(q).translation.vector.into(),
+            Some(link) => now.chain.frames(q)[link].translation.vector.into(),
+        })
     }
 }
 
@@ -78,16 +61,15 @@ impl Interlock for Workspace {
         let ahead = Ahead::of(now, qdot, self.reaction_s);
         let farthest_m = ahead.farthest_m(&now.q);
         for room in &self.rooms {
-            let here_m = match room.of {
-                Part::Tip => room.clearance_m(&now.x_wt.translation.vector.into()),
-                elbow => room.clearance_m(&elbow.at(now, &now.q)),
+            let here_m = match room.elbow {
+                None => room.clearance_m(&now.x_wt.translation.vector.into()),
+                Some(_) => room.clearance_at_m(now, &now.q),
             };
             if here_m > farthest_m {
                 continue;
             }
-            let below = ahead.below(0.0, |q| room.clearance_m(&room.of.at(now, q)));
-            if let Some(found) = below {
-                let part = room.of.name().into();
+            if let Some(found) = ahead.below(0.0, |q| room.clearance_at_m(now, q)) {
+                let part = if room.elbow.is_some() { "the elbow" } else { "the tip" }.into();
                 return Err(Trip { interlock: NAME, part, found, limit: 0.0, unit: "m inside" });
             }
         }

@@ -9,28 +9,11 @@
 //! The messages of the lab's kind hold what they can; `palpate_msgs/msg/Tick` holds every number of
 //! a tick to the bit, and is all that a player needs.
 
-mod about;
-mod cdr;
-mod entries;
-mod error;
-mod marker;
-mod player;
-mod recorded;
-mod recorder;
-#[allow(clippy::module_inception)]
-mod recording;
-mod tick;
-mod topic;
-mod touch;
+mod format;
+mod reader;
+mod writer;
 
-pub use about::{About, Ending};
-pub use cdr::decoded;
-pub use error::RecordingError;
-pub use marker::{ColorRgba, Marker, Point, Shape};
-pub use player::Player;
-pub use recorded::{Recorded, Ticks};
-pub use recorder::Recorder;
-pub use recording::{Clock, Recording, wall_clock};
-pub use tick::Tick;
-pub use topic::TOPICS;
-pub use touch::Touch;
+pub use super::ros::message::{ColorRGBA, Marker, Point, Shape};
+pub use format::{About, Ending, TOPICS, Tick, Touch, decoded};
+pub use reader::{Player, Recorded};
+pub use writer::{Clock, Recorder, Recording, wall_clock};

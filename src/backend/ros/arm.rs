@@ -1,21 +1,18 @@
 //! An arm behind topics, as a [`Backend`]: commands out at a fixed rate, the newest of what is
 //! heard in.
 
-use super::clock;
-use super::connect::connect;
-use super::fault::LinkFault;
 use super::joints::JointNames;
 use super::link::Link;
-use super::mailbox::{Heard, Mailboxes, Postman};
+use super::mailbox::{Heard, Mailboxes, Postman, TopicState, refused};
 use super::net_ft::{NetFt, NetFtSettings, Record};
-use super::service::Service;
 use super::settings::BackendSettings;
 use super::status::ArmStatus;
-use super::topics::{Side, Topic};
-use super::transport::{Connect, TransportError};
-use crate::backend::interlock::gates::{Expected, GateError, check_start};
-use crate::backend::pace::Pace;
-use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Sample};
+use super::topics::{Service, Side, Topic};
+use super::transport::{Connect, cannot_open};
+use crate::backend::interlock::gates::check_start;
+use crate::backend::pace::{self, Pace};
+use crate::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading, Sample};
+use crate::error::Invalid;
 use crate::robot::arm::Chain;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
@@ -50,7 +47,7 @@ impl Lab {
     /// # Errors
     /// As [`connect`](Self::connect), and if this build lacks the transport.
     pub fn join(settings: &BackendSettings, chain: &Chain) -> Result<Arc<Self>, LinkFault> {
-        let open = connect(settings, Side::Explorer, Service::COMMON.into())?;
+        let open = super::connect(settings, Side::Explorer, Service::COMMON.into())?;
         Self::connect(settings, chain, open)
     }
 
@@ -107,10 +104,8 @@ impl Lab {
     ///
     /// # Errors
     /// The first thing that is not.
-    pub fn check_start(self: &Arc<Self>) -> Result<(), GateError> {
-        let expected = Expected { q: None, sends_frames: true };
-        let gates = &self.settings.gates;
-        check_start(&mut self.body(), &self.chain, expected, gates, 0).map(|_| ())
+    pub fn check_start(self: &Arc<Self>) -> Result<(), Fault> {
+        check_start(&mut self.body(), &self.chain, None, true, &self.settings.gates, 0).map(drop)
     }
 
     /// Calls a service as soon as its server is found, and waits for the answer for at most the
@@ -131,9 +126,9 @@ impl Lab {
             let mut heard = self.boxes.heard();
             let found = heard.answers.iter().position(|(other, _)| other == service);
             if let Some((_, answer)) = found.map(|i| heard.answers.swap_remove(i)) {
-                match answer.is_done {
+                match answer.success {
                     true => return Ok(()),
-                    false => break answer.words,
+                    false => break answer.message,
                 }
             }
             drop(heard);
@@ -153,7 +148,8 @@ impl Lab {
             }
             sleep(LOOK);
         };
-        Err(LinkFault::Service { name: service.name(self.settings.topics.namespace()), words })
+        let name = service.name(self.settings.topics.namespace());
+        Err(Invalid::new(format!("service {name}: {words}")).into())
     }
 
     /// Forgets faults, here and on the arm's side: the operator's to ask for.
@@ -191,30 +187,45 @@ impl Lab {
             }
             let patience_s = self.settings.patience_s;
             if begun.elapsed().as_secs_f64() > patience_s {
-                let words = |topic| {
-                    let line = self.settings.topics.line(topic);
-                    format!("{} ({})", line.name, line.type_name)
-                };
-                let heard = self.boxes.heard();
-                let skipped = |topic: &Topic| heard.topics[*topic as usize].skipped.clone();
-                let skipped = missing.iter().filter_map(skipped).collect();
-                let missing = missing.into_iter().map(words).collect();
-                return Err(LinkFault::NotThere { missing, patience_s, skipped });
+                return Err(self.nothing_heard(&missing).into());
             }
             sleep(LOOK);
         }
     }
 
+    /// The error of topics on which nothing was heard since the link was opened.
+    fn nothing_heard(&self, missing: &[Topic]) -> Invalid {
+        let name = |topic: &Topic| {
+            let line = self.settings.topics.line(*topic);
+            format!("{} ({})", line.name, line.type_name)
+        };
+        let names: Vec<String> = missing.iter().map(name).collect();
+        let heard = self.boxes.heard();
+        let skipped =
+            missing.iter().filter_map(|topic| heard.topics[*topic as usize].skipped.as_ref());
+        let skipped: String = skipped.map(|why| format!(" Skipped a message: {why}.")).collect();
+        Invalid::new(format!(
+            "nothing heard for {} s on {}; is the arm's side running, with the same domain, and are \
+             names and types those of [backend.topics]?{skipped}",
+            self.settings.patience_s,
+            names.join(", ")
+        ))
+    }
+
     fn check_publishers(&self) -> Result<(), LinkFault> {
         let count = self.link.publisher_count(Topic::Command);
-        let topic = self.settings.topics.line(Topic::Command).name.into_owned();
-        if count > 1 { Err(LinkFault::Publishers { topic, count }) } else { Ok(()) }
+        if count <= 1 {
+            return Ok(());
+        }
+        let topic = self.settings.topics.line(Topic::Command).name;
+        let words = format!("{count} publishers on {topic}, allowed is one: this program");
+        Err(Invalid::new(words).into())
     }
 
     /// Sends velocities.
     fn command(&self, qdot: &[f64]) {
         let command = &self.settings.topics.command;
-        let packet = self.names.command(clock::now_s(), command.age_s, qdot, command.is_bare());
+        let packet = self.names.command(pace::now_s(), command.age_s, qdot, command.is_bare());
         self.boxes.heard().commanded = Some(Instant::now());
         self.link.send(packet);
     }
@@ -225,22 +236,21 @@ impl Lab {
             return Err(refused.clone());
         }
         if let Some(words) = heard.status.as_ref().and_then(|status| status.refusal()) {
-            return Err(LinkFault::Arm { words });
+            return Err(LinkFault::Arm(words));
         }
         for topic in HEARD {
             let line = self.settings.topics.line(topic);
             let state = &heard.topics[topic as usize];
             if self.settings.is_on_change(topic) {
                 if self.link.publisher_count(topic) == 0 {
-                    return Err(LinkFault::Gone { topic: line.name.clone().into_owned() });
+                    let words = format!("no publisher on {} any more", line.name);
+                    return Err(Invalid::new(words).into());
                 }
                 continue;
             }
             let age_s = state.at.map_or(f64::MAX, |at| at.elapsed().as_secs_f64());
             if age_s > line.age_s {
-                let (topic, late_s, backward) =
-                    (line.name.clone().into_owned(), state.late_s, state.backward);
-                return Err(LinkFault::Silent { topic, age_s, late_s, backward });
+                return Err(silent(&line.name, age_s, state).into());
             }
         }
         match self.link.broken() {
@@ -258,15 +268,27 @@ fn listen(settings: &NetFtSettings, boxes: &Mailboxes) -> Result<NetFt, LinkFaul
         heard.topics[Topic::Wrench as usize].at = Some(Instant::now());
         heard.wrench = Some(record.wrench);
         if record.status != 0 {
-            let words = format!("status {:#010x}", record.status);
-            let fault = LinkFault::Message { topic: address.clone(), words };
+            let fault = refused(&address, format_args!("status {:#010x}", record.status));
             heard.refused.get_or_insert(fault);
         }
     };
-    NetFt::open(settings, take).map_err(|error| {
-        let (what, words) = (settings.address.clone(), error.to_string());
-        LinkFault::Transport(TransportError::Open { what, words })
-    })
+    Ok(NetFt::open(settings, take).map_err(cannot_open(&settings.address))?)
+}
+
+/// The error of a topic on which nothing new has come for `age_s`.
+fn silent(topic: &str, age_s: f64, state: &TopicState) -> Invalid {
+    let mut words = format!("nothing new on {topic} for {:.0} ms", 1e3 * age_s);
+    if let Some(late_s) = state.late_s {
+        words += &format!(
+            "; messages come, but their stamps are {:.0} ms old: are the clocks synchronised?",
+            1e3 * late_s
+        );
+    }
+    if state.backward > 0 {
+        let count = state.backward;
+        words += &format!("; {count} messages were dropped because their stamps ran backwards");
+    }
+    Invalid::new(words)
 }
 
 impl Drop for Lab {
@@ -304,7 +326,7 @@ impl LabArm {
         self.lab.command(&self.still.qdot);
         // No command goes to an arm that was stopped by hand: one to stand still could open its
         // brakes again.
-        if matches!(cause, LinkFault::Arm { .. }) {
+        if matches!(cause, LinkFault::Arm(_)) {
             let mut heard = self.lab.boxes.heard();
             (heard.is_engaged, heard.is_ready) = (false, false);
         }
@@ -331,8 +353,11 @@ impl LabArm {
             let joints = self.lab.chain.joints.iter().zip(self.reading.q.iter().zip(&heard.q));
             for (joint, (&from, &to)) in joints {
                 if (to - from).abs() > JUMP_RAD + joint.qdot_limit * dt_s {
-                    let joint = joint.name.to_owned();
-                    return Err(LinkFault::Jump { joint: joint.to_string(), from, to, dt_s });
+                    let (joint, dt_ms) = (&joint.name, 1e3 * dt_s);
+                    let words = format!(
+                        "joint \"{joint}\" went from {from:.4} to {to:.4} in {dt_ms:.0} ms, farther than it can"
+                    );
+                    return Err(Invalid::new(words).into());
                 }
             }
         }
@@ -407,6 +432,7 @@ impl Backend for LabArm {
             Err(cause) => Err(self.fault(cause)),
         }
     }
+
     /// Calls the stop of the arm's side, without waiting for its answer.
     fn brake(&mut self) {
         self.lab.link.call(Service::Stop);

@@ -2,61 +2,8 @@
 
 use super::message::JointTrajectoryPoint;
 use super::message::{Duration, Float64MultiArray, Header, JointState, JointTrajectory};
-use super::packet::Packet;
-use thiserror::Error;
-
-/// A message about joints that cannot be used.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum JointsError {
-    /// A joint is not named.
-    #[error("no joint \"{name}\" among {found:?}")]
-    Missing {
-        /// Which.
-        name: String,
-        /// Those that are named.
-        found: Vec<String>,
-    },
-    /// A joint is named twice.
-    #[error("joint \"{name}\" is named twice")]
-    Twice {
-        /// Which.
-        name: String,
-    },
-    /// A name that is no joint's, in a command.
-    #[error("\"{name}\" is no joint of this arm, which has {known:?}")]
-    Unknown {
-        /// Which.
-        name: String,
-        /// The arm's.
-        known: Vec<String>,
-    },
-    /// As many numbers as names are wanted.
-    #[error("{found} {what} for {expected} joints")]
-    Length {
-        /// Of what.
-        what: &'static str,
-        /// Numbers there are.
-        found: usize,
-        /// Names there are.
-        expected: usize,
-    },
-    /// A number that is none.
-    #[error("{what} of \"{name}\" is {value}")]
-    NotFinite {
-        /// What it should be.
-        what: &'static str,
-        /// Whose.
-        name: String,
-        /// What it is.
-        value: f64,
-    },
-    /// A velocity command has one point.
-    #[error("{found} points in a velocity command, allowed is one")]
-    Points {
-        /// How many it has.
-        found: usize,
-    },
-}
+use super::transport::Packet;
+use crate::error::Invalid;
 
 /// The names of an arm's joints, in the order in which the arm counts them.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,20 +35,21 @@ impl JointNames {
         names: &[String],
         values: &[f64],
         into: &mut Vec<f64>,
-    ) -> Result<(), JointsError> {
+    ) -> Result<(), Invalid> {
         if values.len() != names.len() {
-            return Err(JointsError::Length { what, found: values.len(), expected: names.len() });
+            let (found, expected) = (values.len(), names.len());
+            return Err(Invalid::new(format!("{found} {what} for {expected} joints")));
         }
         into.clear();
         for name in &self.0 {
             let mut found = names.iter().zip(values).filter(|(other, _)| *other == name);
-            let missing = || JointsError::Missing { name: name.clone(), found: names.to_vec() };
+            let missing = || Invalid::new(format!("no joint \"{name}\" among {names:?}"));
             let (_, &value) = found.next().ok_or_else(missing)?;
             if found.next().is_some() {
-                return Err(JointsError::Twice { name: name.clone() });
+                return Err(Invalid::new(format!("joint \"{name}\" is named twice")));
             }
             if !value.is_finite() {
-                return Err(JointsError::NotFinite { what, name: name.clone(), value });
+                return Err(Invalid::new(format!("{what} of \"{name}\" is {value}")));
             }
             into.push(value);
         }
@@ -117,7 +65,7 @@ impl JointNames {
         message: &JointState,
         q: &mut Vec<f64>,
         qdot: &mut Vec<f64>,
-    ) -> Result<(), JointsError> {
+    ) -> Result<(), Invalid> {
         self.pick("positions", &message.name, &message.position, q)?;
         self.pick("velocities", &message.name, &message.velocity, qdot)
     }
@@ -162,15 +110,20 @@ impl JointNames {
         &self,
         packet: &Packet,
         qdot: &mut Vec<f64>,
-    ) -> Result<Option<[f64; 2]>, JointsError> {
+    ) -> Result<Option<[f64; 2]>, Invalid> {
+        let points = |found: usize| {
+            Err(Invalid::new(format!("{found} points in a velocity command, allowed is one")))
+        };
         match packet {
             Packet::Command(message) => {
                 let [point] = message.points.as_slice() else {
-                    return Err(JointsError::Points { found: message.points.len() });
+                    return points(message.points.len());
                 };
                 let names = &message.joint_names;
                 if let Some(name) = names.iter().find(|name| !self.0.contains(name)) {
-                    return Err(JointsError::Unknown { name: name.clone(), known: self.0.clone() });
+                    let known = &self.0;
+                    let words = format!("\"{name}\" is no joint of this arm, which has {known:?}");
+                    return Err(Invalid::new(words));
                 }
                 self.pick("velocities", names, &point.velocities, qdot)?;
                 Ok(Some([message.header.stamp.s(), point.time_from_start.s()]))
@@ -179,7 +132,7 @@ impl JointNames {
                 self.pick("velocities", &self.0, &message.data, qdot)?;
                 Ok(None)
             }
-            _ => Err(JointsError::Points { found: 0 }),
+            _ => points(0),
         }
     }
 }

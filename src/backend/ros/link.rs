@@ -1,13 +1,13 @@
 //! A thread of its own for one side's topics: what arrives is handed on at once, what is to be sent
 //! never makes a control loop wait.
 
-use super::packet::Packet;
-use super::service::{Answer, Service};
-use super::topics::Topic;
-use super::transport::{Connect, Delivery, TransportError, Waker};
+use super::message::TriggerResponse;
+use super::topics::{Service, Topic};
+use super::transport::{Connect, Delivery, Packet, Transport, Waker};
+use crate::error::Invalid;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -18,7 +18,7 @@ const COUNTED_S: f64 = 0.1;
 /// What is to be done by the thread.
 enum Errand {
     Send(Packet),
-    Answer(Service, u64, Answer),
+    Answer(Service, u64, TriggerResponse),
 }
 
 /// Most errands that wait; older ones are of no use.
@@ -30,7 +30,7 @@ struct Shared {
     is_closed: AtomicBool,
     /// Known publishers by topic.
     publishers: [AtomicUsize; Topic::ALL.len()],
-    broken: Mutex<Option<TransportError>>,
+    broken: Mutex<Option<Invalid>>,
     /// Calls whose server has not been found yet.
     waiting: Mutex<Vec<Service>>,
 }
@@ -41,7 +41,16 @@ pub trait Sink: Send {
     fn take(&mut self, delivery: Delivery);
 
     /// Called about every `period`: what is to be sent then.
-    fn tick(&mut self, send: &mut dyn FnMut(Packet));
+    fn tick(&mut self, send: &mut dyn FnMut(Packet)) {
+        let _ = send;
+    }
+}
+
+/// A channel keeps what arrives until its receiver looks.
+impl Sink for Sender<Delivery> {
+    fn take(&mut self, delivery: Delivery) {
+        let _ = self.send(delivery);
+    }
 }
 
 /// One side's end with its thread.
@@ -56,11 +65,7 @@ impl Link {
     ///
     /// # Errors
     /// If it cannot be opened.
-    pub fn open(
-        connect: Connect,
-        period: Duration,
-        sink: Box<dyn Sink>,
-    ) -> Result<Self, TransportError> {
+    pub fn open(connect: Connect, period: Duration, sink: Box<dyn Sink>) -> Result<Self, Invalid> {
         let shared = Arc::new(Shared::default());
         let (opened, is_open) = channel();
         let inside = Arc::clone(&shared);
@@ -73,9 +78,8 @@ impl Link {
                 let _ = opened.send(Err(error));
             }
         });
-        let gone =
-            || TransportError::Open { what: "the transport".into(), words: "it ended".into() };
-        let waker = is_open.recv().map_err(|_| gone())??;
+        let gone = |_| Invalid::new("cannot open the transport: it ended");
+        let waker = is_open.recv().map_err(gone)??;
         Ok(Self { shared, waker, thread: Some(thread) })
     }
 
@@ -101,7 +105,7 @@ impl Link {
     }
 
     /// Answers a call.
-    pub fn answer(&self, service: Service, call: u64, answer: Answer) {
+    pub fn answer(&self, service: Service, call: u64, answer: TriggerResponse) {
         self.errand(Errand::Answer(service, call, answer));
     }
 
@@ -111,7 +115,7 @@ impl Link {
     }
 
     /// Why nothing is sent any more, if that is so.
-    pub fn broken(&self) -> Option<TransportError> {
+    pub fn broken(&self) -> Option<Invalid> {
         lock(&self.shared.broken).clone()
     }
 
@@ -142,7 +146,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// The thread.
 fn serve(
-    mut transport: Box<dyn super::transport::Transport>,
+    mut transport: Box<dyn Transport>,
     shared: &Shared,
     period: Duration,
     mut sink: Box<dyn Sink>,
@@ -157,7 +161,7 @@ fn serve(
             let Some(errand) = lock(&shared.errands).pop_front() else { break };
             result = result.and(match errand {
                 Errand::Send(packet) => transport.send(&packet),
-                Errand::Answer(service, call, answer) => transport.answer(&service, call, &answer),
+                Errand::Answer(service, call, answer) => transport.answer(&service, call, answer),
             });
         }
         lock(&shared.waiting).retain(|service| {

@@ -1,19 +1,16 @@
 //! The newest message of each topic, stamped on receipt by the monotonic clock; and the commands
 //! that hold the arm still while the explorer computes.
 
-use super::clock;
-use super::fault::LinkFault;
 use super::joints::JointNames;
 use super::link::Sink;
-use super::message::Header;
-use super::packet::Packet;
-use super::service::{Answer, Service};
+use super::message::{Time, TriggerResponse};
 use super::settings::BackendSettings;
-use super::status::{ArmStatus, StatusError};
+use super::status::ArmStatus;
 use super::tactile;
-use super::topics::Topic;
-use super::transport::Delivery;
-use crate::backend::Wrench;
+use super::topics::{Service, Topic};
+use super::transport::{Delivery, Packet};
+use crate::backend::{LinkFault, Wrench, pace};
+use crate::error::Invalid;
 use crate::robot::finger::Frame;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -44,7 +41,7 @@ pub struct Heard {
     /// The first message that ends the run.
     pub refused: Option<LinkFault>,
     /// Answers of services.
-    pub answers: Vec<(Service, Answer)>,
+    pub answers: Vec<(Service, TriggerResponse)>,
     /// When a command was last given, if any was.
     pub commanded: Option<Instant>,
     /// Whether the arm is commanded to stand still while no other command is given.
@@ -82,6 +79,11 @@ impl Mailboxes {
     }
 }
 
+/// The fault of a message on `topic` that cannot be used.
+pub(super) fn refused(topic: &str, words: impl std::fmt::Display) -> LinkFault {
+    Invalid::new(format!("message on {topic} refused: {words}")).into()
+}
+
 /// Fills the mailboxes.
 pub struct Postman {
     boxes: Mailboxes,
@@ -103,23 +105,27 @@ impl Postman {
         &self,
         state: &mut TopicState,
         topic: Topic,
-        header: &Header,
+        stamp: Time,
     ) -> Result<bool, LinkFault> {
         let line = self.settings.topics.line(topic);
-        let stamp_s = header.stamp.s();
+        let stamp_s = stamp.s();
         if stamp_s == 0.0 {
-            let topic = line.name.clone().into_owned();
             return match self.settings.accept_unstamped {
                 true => Ok(true),
-                false => Err(LinkFault::Unstamped { topic }),
+                false => Err(refused(
+                    &line.name,
+                    "its stamp is zero, so its age is unknown; stamp it, or set \
+                     backend.accept_unstamped = true to count its age from receipt",
+                )),
             };
         }
-        let age_s = clock::now_s() - stamp_s;
+        let age_s = pace::now_s() - stamp_s;
         if age_s < -self.settings.clock_ahead_s {
-            return Err(LinkFault::Future {
-                topic: line.name.clone().into_owned(),
-                ahead_s: -age_s,
-            });
+            let ahead_ms = -1e3 * age_s;
+            let words = format!(
+                "its stamp is {ahead_ms:.0} ms in the future; are the clocks synchronised?"
+            );
+            return Err(refused(&line.name, words));
         }
         if stamp_s < state.stamp_s {
             state.backward += 1;
@@ -133,15 +139,16 @@ impl Postman {
         Ok(age_s <= line.age_s)
     }
 
-    fn take_packet(&mut self, packet: &Packet, received: Instant) {
+    fn take_packet(&mut self, mut packet: Packet, received: Instant) {
         let topic = packet.topic();
         if topic == Topic::Wrench && self.settings.net_ft.is_some() {
             return;
         }
         let boxes = self.boxes.clone();
         let heard = &mut *boxes.heard();
-        if let Err(fault) = self.read(heard, topic, packet, received) {
-            if matches!(fault, LinkFault::Arm { .. }) {
+        let stamp = packet.stamp_mut().copied().unwrap_or_default();
+        if let Err(fault) = self.read(heard, &packet, stamp, received) {
+            if matches!(fault, LinkFault::Arm(_)) {
                 (heard.is_engaged, heard.is_ready) = (false, false);
             }
             heard.refused.get_or_insert(fault);
@@ -152,12 +159,12 @@ impl Postman {
     fn read(
         &self,
         heard: &mut Heard,
-        topic: Topic,
         packet: &Packet,
+        stamp: Time,
         received: Instant,
     ) -> Result<(), LinkFault> {
-        let name = || self.settings.topics.line(topic).name.into_owned();
-        let refuse = |words| Err(LinkFault::Message { topic: name(), words });
+        let topic = packet.topic();
+        let refuse = |words| refused(&self.settings.topics.line(topic).name, words);
         let state = &mut heard.topics[topic as usize];
         match packet {
             Packet::Joints(message) => {
@@ -171,15 +178,14 @@ impl Postman {
                     state.skipped = Some(words);
                     return Ok(());
                 }
-                if !self.is_timely(state, topic, &message.header)? {
+                if !self.is_timely(state, topic, stamp)? {
                     return Ok(());
                 }
-                self.names
-                    .read(message, &mut heard.q, &mut heard.qdot)
-                    .map_err(|cause| LinkFault::Joints { topic: name(), cause })?;
+                let read = self.names.read(message, &mut heard.q, &mut heard.qdot);
+                read.map_err(|cause| refuse(cause.to_string()))?;
             }
             Packet::Wrench(message) => {
-                if !self.is_timely(state, topic, &message.header)? {
+                if !self.is_timely(state, topic, stamp)? {
                     return Ok(());
                 }
                 let wrench = message.wrench;
@@ -187,24 +193,24 @@ impl Postman {
                 let wrench = Wrench { force_n, torque_nm };
                 let (force, torque) = (wrench.force_n.as_slice(), wrench.torque_nm.as_slice());
                 if !force.iter().chain(torque).all(|part| part.is_finite()) {
-                    return refuse(format!("{force:?} and {torque:?}"));
+                    return Err(refuse(format!("{force:?} and {torque:?}")));
                 }
                 heard.wrench = Some(wrench);
             }
             Packet::Status(message) => {
-                let status = match ArmStatus::read(message, self.settings.topics.device()) {
-                    Ok(status) => status,
-                    Err(error @ StatusError::OtherDevice { .. }) => {
-                        state.skipped = Some(error.to_string());
-                        return Ok(());
-                    }
-                    Err(error) => return refuse(error.to_string()),
+                let device = self.settings.topics.device();
+                let read = ArmStatus::read(message, device);
+                let Some(status) = read.map_err(|cause| refuse(cause.to_string()))? else {
+                    let found: Vec<_> = message.status.iter().map(|status| &status.name).collect();
+                    let words = format!("no status named \"{device}\" among {found:?}");
+                    state.skipped = Some(words);
+                    return Ok(());
                 };
                 // What only an operator can clear counts whatever its stamp says.
-                let is_timely = self.is_timely(state, topic, &message.header);
+                let is_timely = self.is_timely(state, topic, stamp);
                 let is_read = status.needs_operator() || is_timely.clone()?;
                 if let Some(words) = status.refusal().filter(|_| heard.is_ready && is_read) {
-                    return Err(LinkFault::Arm { words });
+                    return Err(LinkFault::Arm(words));
                 }
                 if !is_timely? {
                     return Ok(());
@@ -212,15 +218,14 @@ impl Postman {
                 heard.status = Some(status);
             }
             Packet::Hand(_) | Packet::Fingers(_) => {
-                let Some(header) = packet.header() else { return Ok(()) };
-                if !self.is_timely(state, topic, header)? {
+                if !self.is_timely(state, topic, stamp)? {
                     return Ok(());
                 }
                 let since_s = |since| received.saturating_duration_since(since).as_secs_f64();
                 let time_s = heard.since.map_or(0.0, since_s);
                 let finger = self.settings.finger;
                 let Some(frame) = tactile::frame(packet, finger.into(), time_s) else {
-                    return refuse(format!("it has no finger {finger} with 19 electrodes"));
+                    return Err(refuse(format!("it has no finger {finger} with 19 electrodes")));
                 };
                 if heard.frames.len() == FRAMES_MAX {
                     heard.frames.pop_front();
@@ -237,10 +242,9 @@ impl Postman {
 impl Sink for Postman {
     fn take(&mut self, delivery: Delivery) {
         match delivery {
-            Delivery::Packet { packet, received, .. } => self.take_packet(&packet, received),
+            Delivery::Packet { packet, received, .. } => self.take_packet(packet, received),
             Delivery::Garbled { topic, words } => {
-                let topic = self.settings.topics.line(topic).name.into_owned();
-                let fault = LinkFault::Message { topic, words };
+                let fault = refused(&self.settings.topics.line(topic).name, words);
                 self.boxes.heard().refused.get_or_insert(fault);
             }
             Delivery::Answered { service, answer } => {
@@ -257,7 +261,7 @@ impl Sink for Postman {
         if heard.is_engaged && is_silent {
             let command = &self.settings.topics.command;
             let still = vec![0.0; self.names.names().len()];
-            let (now_s, valid_s) = (clock::now_s(), command.age_s);
+            let (now_s, valid_s) = (pace::now_s(), command.age_s);
             send(self.names.command(now_s, valid_s, &still, command.is_bare()));
         }
     }

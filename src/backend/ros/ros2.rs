@@ -1,12 +1,15 @@
 //! ROS 2, by RustDDS: no installation of ROS, no master.
 
-use super::message::{Described, TriggerRequest, TriggerResponse};
-use super::network::{Interface, Network};
-use super::packet::Packet;
-use super::service::{Answer, Service};
+use super::definition::Described;
+use super::message::{
+    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
+    TriggerRequest, TriggerResponse, WrenchStamped,
+};
+use super::network::network;
 use super::settings::{BackendSettings, MappingKind};
-use super::topics::{Side, Topic, Topics};
-use super::transport::{Delivery, Transport, TransportError, Waker};
+use super::topics::{Service, Side, Topic, Topics};
+use super::transport::{Delivery, Packed, Packet, Transport, Waker, cannot_open, cannot_send};
+use crate::error::Invalid;
 use ros2_client::qos::{Durability, History, WhenFull};
 use ros2_client::request_id::RmwRequestId;
 use ros2_client::{
@@ -20,6 +23,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -32,9 +36,12 @@ const DEPTH: usize = 64;
 /// Token of the waker; every other one is looked at whatever woke the thread.
 const WAKE: Token = Token(0);
 
+/// Hands over what has arrived on a topic.
 type Reader = Box<dyn Fn(&mut dyn FnMut(Delivery))>;
 /// Publishes a packet if it is of its topic and type.
 type Writer = Box<dyn Fn(&Packet) -> Option<Result<(), String>>>;
+/// A client with the time at which it was made.
+type MadeClient = (Client<TriggerRequest, TriggerResponse>, Instant);
 
 /// One side's end in a ROS 2 network.
 pub struct Ros2 {
@@ -48,24 +55,13 @@ pub struct Ros2 {
     readers: Vec<Reader>,
     writers: Vec<Writer>,
     mapping: MappingKind,
-    clients: Vec<ServiceClient>,
+    /// Services with their clients, once servers are found, and when those were made.
+    clients: Vec<(Service, Option<MadeClient>)>,
     /// When servers were looked for last.
     looked: Instant,
     servers: Vec<(Service, Server<TriggerRequest, TriggerResponse>)>,
     calls: HashMap<u64, RmwRequestId>,
     call_count: u64,
-}
-
-fn open<E: std::fmt::Display>(what: &str) -> impl Fn(E) -> TransportError {
-    let what = what.to_owned();
-    move |error| TransportError::Open { what: what.clone(), words: error.to_string() }
-}
-
-/// Calls a service, once its server is found.
-struct ServiceClient {
-    service: Service,
-    /// With the time at which it was made.
-    open: Option<(Client<TriggerRequest, TriggerResponse>, Instant)>,
 }
 
 /// How often servers are looked for.
@@ -97,14 +93,11 @@ fn latched() -> QosProfile {
     reliable().durability(Durability::TransientLocal)
 }
 
-/// The network interfaces of this machine.
-fn interfaces() -> Vec<Interface> {
-    let all = netdev::get_interfaces().into_iter();
-    let interface = |one: netdev::Interface| Interface {
-        addresses: one.ipv4.iter().map(|net| net.addr().into()).collect(),
-        name: one.name,
-    };
-    all.map(interface).collect()
+/// The network interfaces of this machine with their IPv4 addresses.
+fn interfaces() -> Vec<(String, Vec<IpAddr>)> {
+    let addresses =
+        |one: &netdev::Interface| one.ipv4.iter().map(|net| net.addr().into()).collect();
+    netdev::get_interfaces().into_iter().map(|one| (one.name.clone(), addresses(&one))).collect()
 }
 
 impl Ros2 {
@@ -116,25 +109,25 @@ impl Ros2 {
         settings: &BackendSettings,
         side: Side,
         services: Vec<Service>,
-    ) -> Result<Self, TransportError> {
-        let network = Network::of(settings, |name| std::env::var(name).ok(), &interfaces());
-        let network = network.map_err(open("the network"))?;
-        let mut participant = DomainParticipantBuilder::new(network.domain);
-        if let Some(addresses) = network.addresses {
+    ) -> Result<Self, Invalid> {
+        let (domain, addresses) = network(settings, |name| std::env::var(name).ok(), &interfaces())
+            .map_err(cannot_open("the network"))?;
+        let mut participant = DomainParticipantBuilder::new(domain);
+        if let Some(addresses) = addresses {
             participant = participant.with_only_networks(addresses);
         }
-        let participant = participant.build().map_err(open("a DDS participant"))?;
-        let context =
-            Context::from_domain_participant(participant).map_err(open("a DDS participant"))?;
+        let participant = participant.build().map_err(cannot_open("a DDS participant"))?;
+        let context = Context::from_domain_participant(participant)
+            .map_err(cannot_open("a DDS participant"))?;
         let name = match side {
             Side::Explorer => "explorer",
             Side::Arm => "arm",
         };
-        let name = NodeName::new("/palpate", name).map_err(open("a node"))?;
+        let name = NodeName::new("/palpate", name).map_err(cannot_open("a node"))?;
         let options = NodeOptions::new().start_parameter_services(false);
-        let node = context.new_node(name, options).map_err(open("a node"))?;
-        let poll = Poll::new().map_err(open("a poll"))?;
-        let waker = mio1::Waker::new(poll.registry(), WAKE).map_err(open("a waker"))?;
+        let node = context.new_node(name, options).map_err(cannot_open("a node"))?;
+        let poll = Poll::new().map_err(cannot_open("a poll"))?;
+        let waker = mio1::Waker::new(poll.registry(), WAKE).map_err(cannot_open("a waker"))?;
         let mut end = Self {
             context,
             node,
@@ -155,80 +148,45 @@ impl Ros2 {
         end.topics()?;
         match side {
             Side::Explorer => {
-                let client = |service| ServiceClient { service, open: None };
-                end.clients = services.into_iter().map(client).collect();
+                end.clients = services.into_iter().map(|service| (service, None)).collect();
             }
             Side::Arm => services.into_iter().try_for_each(|service| end.serve(service))?,
         }
         Ok(end)
     }
 
-    fn topics(&mut self) -> Result<(), TransportError> {
-        self.topic(Topic::Joints, Packet::Joints, |packet| match packet {
-            Packet::Joints(message) => Some(message),
-            _ => None,
-        })?;
-        self.topic(Topic::Wrench, Packet::Wrench, |packet| match packet {
-            Packet::Wrench(message) => Some(message),
-            _ => None,
-        })?;
-        self.topic(Topic::Status, Packet::Status, |packet| match packet {
-            Packet::Status(message) => Some(message),
-            _ => None,
-        })?;
+    fn topics(&mut self) -> Result<(), Invalid> {
+        self.topic::<JointState>(Topic::Joints)?;
+        self.topic::<WrenchStamped>(Topic::Wrench)?;
+        self.topic::<DiagnosticArray>(Topic::Status)?;
         if self.side == Side::Explorer {
             // One that is published on change was so before this side came.
-            self.subscribe(Topic::Status, Packet::Status, latched())?;
+            self.subscribe::<DiagnosticArray>(Topic::Status, latched())?;
         }
         match self.topics.tactile.is_shadow() {
-            true => self.topic(
-                Topic::Tactile,
-                |m| Packet::Fingers(Box::new(m)),
-                |packet| match packet {
-                    Packet::Fingers(message) => Some(message.as_ref()),
-                    _ => None,
-                },
-            )?,
-            false => self.topic(
-                Topic::Tactile,
-                |m| Packet::Hand(Box::new(m)),
-                |packet| match packet {
-                    Packet::Hand(message) => Some(message.as_ref()),
-                    _ => None,
-                },
-            )?,
+            true => self.topic::<BiotacAll>(Topic::Tactile)?,
+            false => self.topic::<BioTacHand>(Topic::Tactile)?,
         }
         match self.topics.command.is_bare() {
-            true => self.topic(Topic::Command, Packet::Velocities, |packet| match packet {
-                Packet::Velocities(message) => Some(message),
-                _ => None,
-            }),
-            false => self.topic(Topic::Command, Packet::Command, |packet| match packet {
-                Packet::Command(message) => Some(message),
-                _ => None,
-            }),
+            true => self.topic::<Float64MultiArray>(Topic::Command),
+            false => self.topic::<JointTrajectory>(Topic::Command),
         }
     }
 
     /// A topic with messages of type `M`: a writer on the side that publishes it, a reader on the
     /// other.
-    fn topic<M>(
-        &mut self,
-        topic: Topic,
-        wrap: fn(M) -> Packet,
-        pick: fn(&Packet) -> Option<&M>,
-    ) -> Result<(), TransportError>
+    fn topic<M>(&mut self, topic: Topic) -> Result<(), Invalid>
     where
-        M: Described + Serialize + DeserializeOwned + Clone + 'static,
+        M: Packed + Described + Serialize + DeserializeOwned + Clone + 'static,
     {
         if topic.publisher() != self.side {
-            return self.subscribe(topic, wrap, best_effort());
+            return self.subscribe::<M>(topic, best_effort());
         }
         let (name, dds) = self.dds_topic::<M>(topic, &reliable())?;
         let publisher =
-            self.node.create_publisher::<M>(&dds, Some(reliable())).map_err(open(&name))?;
+            self.node.create_publisher::<M>(&dds, Some(reliable())).map_err(cannot_open(&name))?;
         self.writers.push(Box::new(move |packet| {
-            let message = pick(packet)?;
+            let message = M::in_packet(packet)?;
             Some(match publisher.publish(message.clone()) {
                 Ok(()) | Err(ros2_client::error::WriteError::WouldBlock { .. }) => Ok(()),
                 Err(error) => Err(error.to_string()),
@@ -242,33 +200,28 @@ impl Ros2 {
         &mut self,
         topic: Topic,
         qos: &QosProfile,
-    ) -> Result<(String, rustdds::Topic), TransportError> {
+    ) -> Result<(String, rustdds::Topic), Invalid> {
         let name = self.topics.line(topic).name.into_owned();
         let type_name = MessageTypeName::new(M::DEFINITION.package(), M::DEFINITION.short_name());
-        let path = Name::parse(&name).map_err(open(&name))?;
-        let dds = self.node.create_topic(&path, type_name, qos).map_err(open(&name))?;
+        let path = Name::parse(&name).map_err(cannot_open(&name))?;
+        let dds = self.node.create_topic(&path, type_name, qos).map_err(cannot_open(&name))?;
         Ok((name, dds))
     }
 
     /// A reader of messages of type `M`.
-    fn subscribe<M>(
-        &mut self,
-        topic: Topic,
-        wrap: fn(M) -> Packet,
-        qos: QosProfile,
-    ) -> Result<(), TransportError>
+    fn subscribe<M>(&mut self, topic: Topic, qos: QosProfile) -> Result<(), Invalid>
     where
-        M: Described + DeserializeOwned + 'static,
+        M: Packed + Described + DeserializeOwned + 'static,
     {
         let (name, dds) = self.dds_topic::<M>(topic, &qos)?;
         let mut subscription =
-            self.node.create_subscription::<M>(&dds, Some(qos)).map_err(open(&name))?;
+            self.node.create_subscription::<M>(&dds, Some(qos)).map_err(cannot_open(&name))?;
         self.watch(&mut subscription, &name)?;
         self.readers.push(Box::new(move |take| {
             loop {
                 match subscription.take() {
                     Ok(Some((message, info))) => {
-                        let (packet, received) = (wrap(message), Instant::now());
+                        let (packet, received) = (message.into(), Instant::now());
                         let sender = hash(&info.publisher_gid());
                         take(Delivery::Packet { packet, sender, received });
                     }
@@ -283,30 +236,35 @@ impl Ros2 {
         Ok(())
     }
 
-    fn serve(&mut self, service: Service) -> Result<(), TransportError> {
+    fn serve(&mut self, service: Service) -> Result<(), Invalid> {
         let name = service.name(self.topics.namespace());
-        let path = Name::parse(&name).map_err(open(&name))?;
+        let path = Name::parse(&name).map_err(cannot_open(&name))?;
         // Who calls cannot be known before: the usual one, unless it is said.
         let mapping = mapping(self.mapping, [0, 0]);
         let mut server = self
             .node
             .create_server(mapping, &path, &trigger(), reliable(), reliable())
-            .map_err(open(&name))?;
+            .map_err(cannot_open(&name))?;
         self.watch(&mut server, &name)?;
         self.servers.push((service, server));
         Ok(())
     }
 
+    /// The client of a service whose server was found.
+    fn client(&self, service: &Service) -> Option<&MadeClient> {
+        self.clients.iter().find(|(other, _)| other == service)?.1.as_ref()
+    }
+
     /// Makes clients for the servers that were found since.
     fn look_for_servers(&mut self) {
-        let is_open = self.clients.iter().all(|client| client.open.is_some());
+        let is_open = self.clients.iter().all(|(_, client)| client.is_some());
         if is_open || self.looked.elapsed() < LOOK {
             return;
         }
         self.looked = Instant::now();
         let readers = self.context.domain_participant().discovered_readers();
         for i in 0..self.clients.len() {
-            let ServiceClient { service, open: None } = &self.clients[i] else { continue };
+            let (service, None) = &self.clients[i] else { continue };
             let name = service.name(self.topics.namespace());
             // As rmw names the topic of a service's requests.
             let requests = format!("rq{name}Request");
@@ -321,19 +279,15 @@ impl Ros2 {
             // One that cannot be made stays unfound, and the caller's timeout says so.
             let Ok(mut client) = made else { continue };
             if self.watch(&mut client, &name).is_ok() {
-                self.clients[i].open = Some((client, Instant::now()));
+                self.clients[i].1 = Some((client, Instant::now()));
             }
         }
     }
 
     /// Has the poll woken by what arrives at `source`.
-    fn watch(
-        &self,
-        source: &mut impl mio1::event::Source,
-        name: &str,
-    ) -> Result<(), TransportError> {
+    fn watch(&self, source: &mut impl mio1::event::Source, name: &str) -> Result<(), Invalid> {
         let token = Token(WAKE.0 + 1);
-        self.poll.registry().register(source, token, Interest::READABLE).map_err(open(name))
+        self.poll.registry().register(source, token, Interest::READABLE).map_err(cannot_open(name))
     }
 }
 
@@ -365,9 +319,10 @@ impl Transport for Ros2 {
         })
     }
 
-    fn send(&mut self, packet: &Packet) -> Result<(), TransportError> {
+    fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
         let sent = self.writers.iter().find_map(|writer| writer(packet));
-        TransportError::of_sending(&self.topics.line(packet.topic()).name, sent)
+        let sent = sent.unwrap_or(Err("not this side's".into()));
+        sent.map_err(|words| cannot_send(&self.topics.line(packet.topic()).name, words))
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
@@ -382,11 +337,9 @@ impl Transport for Ros2 {
             }
         }
         self.look_for_servers();
-        for ServiceClient { service, open } in &self.clients {
+        for (service, open) in &self.clients {
             let Some((client, _)) = open else { continue };
-            while let Ok(Some((_, response))) = client.receive_response() {
-                let TriggerResponse { success, message } = response;
-                let answer = Answer { is_done: success, words: message };
+            while let Ok(Some((_, answer))) = client.receive_response() {
                 take(Delivery::Answered { service: service.clone(), answer });
             }
         }
@@ -397,45 +350,27 @@ impl Transport for Ros2 {
     }
 
     fn is_served(&mut self, service: &Service) -> bool {
-        let client = self.clients.iter().find(|client| client.service == *service);
-        let open = client.and_then(|client| client.open.as_ref());
-        open.is_some_and(|(_, since)| since.elapsed() > SETTLE)
+        self.client(service).is_some_and(|(_, since)| since.elapsed() > SETTLE)
     }
 
-    fn call(&mut self, service: &Service) -> Result<(), TransportError> {
-        let client = self.clients.iter().find(|client| client.service == *service);
-        let open = client.and_then(|client| client.open.as_ref());
-        let sent = open.map(|(client, _)| client.send_request(TriggerRequest::default()));
-        match sent {
-            Some(Ok(_)) => Ok(()),
-            Some(Err(error)) => Err(TransportError::Send {
-                what: service.name(self.topics.namespace()),
-                words: error.to_string(),
-            }),
-            None => Err(TransportError::Send {
-                what: service.name(self.topics.namespace()),
-                words: "not known".into(),
-            }),
-        }
+    fn call(&mut self, service: &Service) -> Result<(), Invalid> {
+        let name = service.name(self.topics.namespace());
+        let (client, _) = self.client(service).ok_or_else(|| cannot_send(&name, "not known"))?;
+        let sent = client.send_request(TriggerRequest::default());
+        sent.map(drop).map_err(|error| cannot_send(&name, error))
     }
 
     fn answer(
         &mut self,
         service: &Service,
         call: u64,
-        answer: &Answer,
-    ) -> Result<(), TransportError> {
+        answer: TriggerResponse,
+    ) -> Result<(), Invalid> {
+        let name = service.name(self.topics.namespace());
         let server = self.servers.iter().find(|(other, _)| other == service);
         let (Some((_, server)), Some(id)) = (server, self.calls.remove(&call)) else {
-            return Err(TransportError::Send {
-                what: service.name(self.topics.namespace()),
-                words: "no call".into(),
-            });
+            return Err(cannot_send(&name, "no call"));
         };
-        let response = TriggerResponse { success: answer.is_done, message: answer.words.clone() };
-        server.send_response(id, response).map_err(|error| TransportError::Send {
-            what: service.name(self.topics.namespace()),
-            words: error.to_string(),
-        })
+        server.send_response(id, answer).map_err(|error| cannot_send(&name, error))
     }
 }

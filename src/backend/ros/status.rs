@@ -1,8 +1,8 @@
 //! The state of an arm, as its own computer reports it.
 
-use super::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, Level};
+use super::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue};
+use crate::error::Invalid;
 use serde::Serialize;
-use thiserror::Error;
 
 /// The arm's state.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -23,26 +23,9 @@ pub struct ArmStatus {
     pub overruns: u64,
 }
 
-/// A status from which it cannot be known that the arm may move.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum StatusError {
-    /// No entry is the arm's; such a message may come from another device.
-    #[error("no status named \"{device}\" among {found:?}")]
-    OtherDevice {
-        /// The name that is looked for.
-        device: String,
-        /// Names of the entries.
-        found: Vec<String>,
-    },
-    /// A flag is missing, given twice, or not a boolean.
-    #[error("{key} is {found}; allowed are {}", WORDS.map(|[no, yes]| format!("{yes}/{no}")).join(", "))]
-    Flag {
-        /// Key of the flag.
-        key: &'static str,
-        /// The value found.
-        found: String,
-    },
-}
+/// Level of a status without a fault, and that of an error (`diagnostic_msgs/DiagnosticStatus`).
+const OK: u8 = 0;
+const ERROR: u8 = 2;
 
 /// Keys of the flags, in the order of the fields.
 const FLAGS: [&str; 5] = ["servo_on", "brake", "estop", "deadman", "hold"];
@@ -81,9 +64,9 @@ impl ArmStatus {
         let flags = FLAGS.into_iter().zip(flags.map(|is| is.to_string()));
         let rest = [("alarm", self.alarm.clone()), ("overruns", self.overruns.to_string())];
         let entry = |(key, value): (&str, String)| KeyValue { key: key.into(), value };
-        let level = if self.refusal().is_some() { Level::Error } else { Level::Ok };
+        let level = if self.refusal().is_some() { ERROR } else { OK };
         let status = DiagnosticStatus {
-            level: level as u8,
+            level,
             name: device.into(),
             message: self.refusal().unwrap_or_else(|| "ready".into()),
             hardware_id: device.into(),
@@ -92,22 +75,26 @@ impl ArmStatus {
         DiagnosticArray { header: Header::new(stamp_s, ""), status: vec![status] }
     }
 
-    /// Reads the entries of `device` in a message. A level of error or worse counts as an alarm,
-    /// unless flags explain it.
+    /// Reads the entries of `device` in a message; `None` if it has none, as a message of another
+    /// device. A level of error or worse counts as an alarm, unless flags explain it.
     ///
     /// # Errors
-    /// If it has no entry of the arm, or a flag of it is missing or unreadable: neither says that
-    /// the arm may move.
-    pub fn read(message: &DiagnosticArray, device: &str) -> Result<Self, StatusError> {
+    /// If a flag is missing or unreadable, which does not say that the arm may move.
+    pub fn read(message: &DiagnosticArray, device: &str) -> Result<Option<Self>, Invalid> {
         let of_arm = |status: &&DiagnosticStatus| status.name == device;
         let entries: Vec<_> = message.status.iter().filter(of_arm).collect();
-        let Some(worst) = entries.iter().max_by_key(|status| status.level) else {
-            let found = message.status.iter().map(|status| status.name.clone()).collect();
-            return Err(StatusError::OtherDevice { device: device.into(), found });
+        let worst = entries.iter().max_by_key(|status| status.level);
+        let Some(worst) = worst else { return Ok(None) };
+        let flag = |key| {
+            let words = WORDS.map(|[no, yes]| format!("{yes}/{no}")).join(", ");
+            let unreadable = |found| Invalid::new(format!("{key} is {found}; allowed are {words}"));
+            flag(&entries, key).map_err(unreadable)
         };
-        let flag = |key| flag(&entries, key).map_err(|found| StatusError::Flag { key, found });
         let [servo_on, brake, estop, deadman, hold] = FLAGS.map(flag);
-        let text = |key| entries.iter().find_map(|status| status.value(key)).unwrap_or_default();
+        let text = |key| {
+            let mut values = entries.iter().flat_map(|status| &status.values);
+            values.find(|entry| entry.key == key).map_or("", |entry| &entry.value)
+        };
         let alarm = text("alarm").to_owned();
         let overruns = text("overruns").parse().unwrap_or(0);
         let mut read = Self {
@@ -119,13 +106,13 @@ impl ArmStatus {
             alarm,
             overruns,
         };
-        if worst.level >= Level::Error as u8 && read.refusal().is_none() {
+        if worst.level >= ERROR && read.refusal().is_none() {
             read.alarm = match worst.message.as_str() {
                 "" => format!("level {}", worst.level),
                 words => words.to_owned(),
             };
         }
-        Ok(read)
+        Ok(Some(read))
     }
 }
 

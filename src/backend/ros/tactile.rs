@@ -1,7 +1,7 @@
 //! A tactile frame as the two drivers send it.
 
 use super::message::{BioTacData, BioTacHand, BioTacTime, Biotac, BiotacAll, Header, Time};
-use super::packet::Packet;
+use super::transport::Packet;
 use crate::robot::finger::Frame;
 use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS, VIBRATIONS};
 

@@ -1,9 +1,10 @@
-//! The table of topics: what each is called, what is sent over it, how often, and how old it may
-//! be.
+//! The table of topics, what each is called, what is sent over it, how often, and how old it may
+//! be; and the services of an arm.
 
+use super::definition::Described;
 use super::message::{
-    BioTacHand, BiotacAll, Described, DiagnosticArray, Float64MultiArray, Header, JointState,
-    JointTrajectory, WrenchStamped,
+    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
+    WrenchStamped,
 };
 use crate::config::{Checked, Rules};
 use schemars::JsonSchema;
@@ -34,14 +35,6 @@ pub enum Side {
     Arm,
 }
 
-/// A line of the table, if nobody says otherwise; the first type is taken.
-struct Usual {
-    name: &'static str,
-    types: &'static [&'static str],
-    rate_hz: f64,
-    age_s: f64,
-}
-
 impl Topic {
     /// All of them, in the order of the table.
     pub const ALL: [Self; 5] =
@@ -61,39 +54,21 @@ impl Topic {
     }
 }
 
-/// Names, types and rates of what drivers of the time send (`pa10_hardware_interface`,
-/// `kth-ros-pkg/biotac_driver`, `netft_rdt_driver`), ages chosen: some frames of each may be lost.
-const USUAL: [Usual; 5] = [
-    Usual {
-        name: "/joint_states",
-        types: &[JointState::<Header>::DEFINITION.name],
-        rate_hz: 250.0,
-        age_s: 0.05,
-    },
-    Usual {
-        name: "/ft_sensor/wrench",
-        types: &[WrenchStamped::<Header>::DEFINITION.name],
-        rate_hz: 500.0,
-        age_s: 0.06,
-    },
-    Usual {
-        name: "/biotac_pub",
-        types: &[BioTacHand::<Header>::DEFINITION.name, BiotacAll::<Header>::DEFINITION.name],
-        rate_hz: 100.0,
-        age_s: 0.08,
-    },
-    Usual {
-        name: "status",
-        types: &[DiagnosticArray::<Header>::DEFINITION.name],
-        rate_hz: 50.0,
-        age_s: 0.2,
-    },
-    Usual {
-        name: "joint_velocity_cmd",
-        types: &[JointTrajectory::<Header>::DEFINITION.name, Float64MultiArray::DEFINITION.name],
-        rate_hz: 250.0,
-        age_s: 0.03,
-    },
+/// Default name, allowed types (the first is the default), rate in Hz and age in s of each topic,
+/// as drivers send them (`pa10_hardware_interface`, `kth-ros-pkg/biotac_driver`,
+/// `netft_rdt_driver`).
+// heuristic: the ages; some frames of each topic may be lost.
+const USUAL: [(&str, &[&str], f64, f64); 5] = [
+    ("/joint_states", &[JointState::DEFINITION.name], 250.0, 0.05),
+    ("/ft_sensor/wrench", &[WrenchStamped::DEFINITION.name], 500.0, 0.06),
+    ("/biotac_pub", &[BioTacHand::DEFINITION.name, BiotacAll::DEFINITION.name], 100.0, 0.08),
+    ("status", &[DiagnosticArray::DEFINITION.name], 50.0, 0.2),
+    (
+        "joint_velocity_cmd",
+        &[JointTrajectory::DEFINITION.name, Float64MultiArray::DEFINITION.name],
+        250.0,
+        0.03,
+    ),
 ];
 
 /// A line of the table as a table of settings of its own, with its own defaults.
@@ -117,9 +92,8 @@ macro_rules! line {
 
         impl Default for $name {
             fn default() -> Self {
-                let Usual { name, types, rate_hz, age_s } = &USUAL[$topic as usize];
-                let type_name = types[0].into();
-                Self { name: (*name).into(), type_name, rate_hz: *rate_hz, age_s: *age_s }
+                let (name, types, rate_hz, age_s) = USUAL[$topic as usize];
+                Self { name: name.into(), type_name: types[0].into(), rate_hz, age_s }
             }
         }
 
@@ -133,7 +107,7 @@ macro_rules! line {
 
         impl Checked for $name {
             fn check(&self, rules: &mut Rules) {
-                self.line("").check(rules, USUAL[$topic as usize].types);
+                self.line("").check(rules, USUAL[$topic as usize].1);
             }
         }
     };
@@ -155,7 +129,7 @@ impl CommandTopic {
 impl TactileTopic {
     /// Whether the fingers are those of a Shadow hand.
     pub fn is_shadow(&self) -> bool {
-        self.type_name == BiotacAll::<Header>::DEFINITION.name
+        self.type_name == BiotacAll::DEFINITION.name
     }
 }
 
@@ -235,6 +209,48 @@ impl Topics {
     /// Name of the entry of the arm in its status: its namespace without slashes.
     pub fn device(&self) -> &str {
         self.namespace().trim_matches('/')
+    }
+}
+
+/// A service of the arm's side, without arguments (`std_srvs/Trigger`).
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Service {
+    /// Stops and stays, whatever is commanded.
+    Hold,
+    /// Listens to commands again.
+    Unhold,
+    /// Stops at once and brakes: as the emergency stop.
+    Stop,
+    /// Forgets faults; the operator's.
+    ClearFault,
+    /// Takes what the force/torque sensor says now as its zero.
+    Bias,
+    /// Of a twin only: begins or ends a failure, by its name.
+    Twin(&'static str),
+}
+
+impl Service {
+    /// Those that every arm has.
+    pub const COMMON: [Self; 5] =
+        [Self::Hold, Self::Unhold, Self::Stop, Self::ClearFault, Self::Bias];
+
+    /// Whether calling it twice does the same as once: not so for a bias, which may be taken
+    /// under load the second time, nor for a twin's failure, which it would end.
+    pub fn is_idempotent(&self) -> bool {
+        matches!(self, Self::Hold | Self::Unhold | Self::Stop | Self::ClearFault)
+    }
+
+    /// Its name at an arm with this namespace.
+    pub fn name(&self, namespace: &str) -> String {
+        match self {
+            Self::Hold => format!("{namespace}/hold"),
+            Self::Unhold => format!("{namespace}/unhold"),
+            Self::Stop => format!("{namespace}/stop"),
+            Self::ClearFault => format!("{namespace}/clear_fault"),
+            Self::Bias => "/ft_sensor/bias".into(),
+            Self::Twin(name) => format!("/twin/{name}"),
+        }
     }
 }
 

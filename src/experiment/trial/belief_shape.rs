@@ -1,6 +1,6 @@
 //! A belief and its contacts as shapes that viewers draw.
 
-use crate::backend::recording::{ColorRgba, Marker, Point, Shape};
+use crate::backend::recording::{ColorRGBA, Marker, Point, Shape};
 use crate::explore::belief::{Belief, HeightField};
 use crate::gp::posterior::Posterior;
 use crate::task::Zone;
@@ -13,13 +13,13 @@ const PER_SIDE: usize = 21;
 const SIZE_M: f64 = 2e-3;
 
 /// Where the belief is sure; chosen.
-const SURE: ColorRgba = ColorRgba { r: 0.13, g: 0.40, b: 0.67, a: 0.8 };
+const SURE: ColorRGBA = ColorRGBA { r: 0.13, g: 0.40, b: 0.67, a: 0.8 };
 
 /// Where it is least sure; chosen.
-const UNSURE: ColorRgba = ColorRgba { r: 0.94, g: 0.54, b: 0.38, a: 0.8 };
+const UNSURE: ColorRGBA = ColorRGBA { r: 0.94, g: 0.54, b: 0.38, a: 0.8 };
 
 /// Of contacts; chosen.
-const CONTACT: ColorRgba = ColorRgba { r: 0.1, g: 0.1, b: 0.1, a: 1.0 };
+const CONTACT: ColorRGBA = ColorRGBA { r: 0.1, g: 0.1, b: 0.1, a: 1.0 };
 
 /// Cells along the longest side of the box in which a closed surface is sought.
 // heuristic: to look at; a tenth of the time of a belief's own.
@@ -63,13 +63,13 @@ pub(super) fn shapes(belief: &Belief) -> [Marker; 2] {
 }
 
 /// The colour of each standard deviation.
-fn colours(sds: &[f64]) -> Vec<ColorRgba> {
+fn colours(sds: &[f64]) -> Vec<ColorRGBA> {
     let ends = (f64::INFINITY, f64::MIN_POSITIVE);
     let (least, most) = sds.iter().fold(ends, |(low, high), &sd| (low.min(sd), high.max(sd)));
     let colour = |sd: &f64| {
         let share = ((sd - least) / (most - least).max(f64::MIN_POSITIVE)) as f32;
         let mix = |from: f32, to: f32| from + (to - from) * share;
-        ColorRgba {
+        ColorRGBA {
             r: mix(SURE.r, UNSURE.r),
             g: mix(SURE.g, UNSURE.g),
             b: mix(SURE.b, UNSURE.b),

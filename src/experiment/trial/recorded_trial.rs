@@ -71,7 +71,7 @@ fn record(
     made: &[TouchRow],
     observer: &mut TrialObserver,
 ) -> Result<TrialRow, Fault> {
-    let body = simulation.body()?.ok_or(Fault::Lacks { part: "a body that moves" })?;
+    let body = simulation.body()?.ok_or_else(|| Fault::lacks("a body that moves"))?;
     let seed = simulation.body_seed(trial);
     let about = About {
         version: env!("CARGO_PKG_VERSION").into(),

@@ -12,7 +12,7 @@ use nalgebra::{Point3, Vector3};
 /// `object` is what the arm's links must keep away from, if that is known.
 ///
 /// # Errors
-/// [`Fault::Joints`] if the body is another arm.
+/// If the body is another arm.
 pub fn interlocked(
     body: Box<dyn Backend>,
     robot: &Robot,

@@ -30,9 +30,9 @@ impl Dynamic {
     /// At the chain's home.
     ///
     /// # Errors
-    /// [`Fault::NoMemory`], or [`Fault::Lacks`] in an environment without an object.
+    /// In an environment without an object.
     pub fn new(environment: &Arc<Environment>, models: &Models) -> Result<Self, Fault> {
-        let chain = environment.chain().ok_or(Fault::Lacks { part: "an object" })?;
+        let chain = environment.chain().ok_or_else(|| Fault::lacks("an object"))?;
         let period_s = environment.scene().period_s();
         let mut body = Self {
             capabilities: Capabilities::of(&chain, period_s),

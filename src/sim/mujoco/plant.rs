@@ -4,6 +4,7 @@ use super::contact;
 use super::joint_servo::JointServo;
 use super::joint_servo::embedded;
 use crate::backend::{Fault, IdealContact, Wrench};
+use crate::error::Invalid;
 use crate::robot::arm::Joints;
 use crate::robot::arm::chain::MAX_JOINTS;
 use mujoco_rs::wrappers::mj_data::MjData;
@@ -39,20 +40,19 @@ impl Plant {
     /// # Errors
     /// If `model` is not one of a robot with a finger, or memory is short.
     pub fn new(model: Arc<MjModel>) -> Result<Self, Fault> {
-        let part = |kind, name: &'static str| {
-            model.name_to_id(kind, name).ok_or(Fault::Lacks { part: name })
-        };
+        let part =
+            |kind, name: &'static str| model.name_to_id(kind, name).ok_or(Fault::lacks(name));
         let tip = part(MjtObjBase::mjOBJ_SITE, "tip")?;
         let mount = part(MjtObjBase::mjOBJ_SITE, "mount")?;
         let finger = part(MjtObjBase::mjOBJ_BODY, "finger")?;
         let joints = model.nv() as usize;
         let driven = model.nq() as usize == joints && model.nu() as usize == joints;
         if !driven || joints > MAX_JOINTS {
-            return Err(Fault::Lacks { part: "one servo for each of at most 7 joints" });
+            return Err(Fault::lacks("one servo for each of at most 7 joints"));
         }
         // Six numbers: the force, then the torque.
         if ![0, 6].contains(&model.nsensordata()) {
-            return Err(Fault::Lacks { part: "a force and a torque sensor, or neither" });
+            return Err(Fault::lacks("a force and a torque sensor, or neither"));
         }
         let mut kv = Joints::zeros();
         let mut limit = Joints::zeros();
@@ -76,7 +76,8 @@ impl Plant {
         };
         let x_tm = local(tip).inv_mul(&local(mount));
         let staged = model.opt().integrator == MjtIntegrator::mjINT_RK4 as i32;
-        let data = MjData::try_new(Arc::clone(&model)).map_err(|_| Fault::NoMemory)?;
+        let data = MjData::try_new(Arc::clone(&model))
+            .map_err(|_| Invalid::new("no memory for the state of the body"))?;
         Ok(Self {
             data,
             servo: JointServo::new(kv, limit),

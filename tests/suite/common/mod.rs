@@ -4,6 +4,7 @@ pub mod around;
 pub mod counting;
 pub mod fake;
 pub mod fault_injector;
+pub mod hub;
 #[cfg(feature = "mujoco")]
 pub mod lab;
 pub mod program;

@@ -1,17 +1,16 @@
 //! An explorer and a twin in one process, in real time: the same code as over a network, but for the
 //! transport.
 
+use crate::common::hub::{Hub, Memory};
 use nalgebra::Point3;
+use palpate::backend::pace;
 use palpate::backend::ros::arm::Lab;
-use palpate::backend::ros::clock;
-use palpate::backend::ros::fault::LinkFault;
-use palpate::backend::ros::memory::{Hub, Memory};
-use palpate::backend::ros::packet::Packet;
-use palpate::backend::ros::service::{Answer, Service};
+use palpate::backend::ros::message::TriggerResponse;
 use palpate::backend::ros::settings::BackendSettings;
-use palpate::backend::ros::topics::{Side, Topic};
-use palpate::backend::ros::transport::{Delivery, Transport, TransportError, Waker};
-use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
+use palpate::backend::ros::topics::{Service, Side, Topic};
+use palpate::backend::ros::transport::{Delivery, Packet, Transport, Waker};
+use palpate::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading};
+use palpate::error::Invalid;
 use palpate::explore::probe::{Probe, Touch};
 use palpate::robot::arm::ArmSettings;
 use palpate::robot::arm::Chain;
@@ -66,7 +65,7 @@ impl Backend for Tracked {
         let reading = self.body.step(command)?;
         let q = self.chain.joints_from(&reading.q).unwrap();
         let tip: Point3<f64> = self.chain.forward(&q).translation.vector.into();
-        self.track.lock().unwrap().push((clock::now_s(), tip));
+        self.track.lock().unwrap().push((pace::now_s(), tip));
         Ok(reading)
     }
 
@@ -93,7 +92,7 @@ impl Transport for Wired {
         self.end.waker()
     }
 
-    fn send(&mut self, packet: &Packet) -> Result<(), TransportError> {
+    fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
         match self.wire.cuts_sent.load(Ordering::Relaxed) {
             true => Ok(()),
             false => self.end.send(packet),
@@ -117,14 +116,14 @@ impl Transport for Wired {
         self.end.is_served(service)
     }
 
-    fn call(&mut self, service: &Service) -> Result<(), TransportError> {
+    fn call(&mut self, service: &Service) -> Result<(), Invalid> {
         match self.wire.cuts_sent.load(Ordering::Relaxed) {
             true => Ok(()),
             false => self.end.call(service),
         }
     }
 
-    fn answer(&mut self, service: &Service, call: u64, it: &Answer) -> Result<(), TransportError> {
+    fn answer(&mut self, service: &Service, call: u64, it: TriggerResponse) -> Result<(), Invalid> {
         self.end.answer(service, call, it)
     }
 }
@@ -229,7 +228,7 @@ impl Rig {
 
     /// Length of the tip's path in the last `span`.
     pub fn path_m(&self, span: Duration) -> f64 {
-        let since_s = clock::now_s() - span.as_secs_f64();
+        let since_s = pace::now_s() - span.as_secs_f64();
         let track = self.track.lock().unwrap();
         let after: Vec<_> = track.iter().filter(|(at_s, _)| *at_s >= since_s).collect();
         after.windows(2).map(|pair| (pair[1].1 - pair[0].1).norm()).sum()
@@ -242,7 +241,7 @@ impl Rig {
             std::thread::sleep(Duration::from_millis(1));
         }
         std::thread::sleep(span);
-        clock::now_s()
+        pace::now_s()
     }
 
     #[cfg(feature = "mujoco")]

@@ -1,26 +1,27 @@
 //! ROS 1, by roslibrust: for labs whose drivers are of that age.
 
-mod definitions;
 mod master;
-#[cfg(unix)]
-mod nodelay;
-mod types;
+mod wire;
 
-use crate::backend::ros::packet::Packet;
-use crate::backend::ros::queue::{Inlet, Outlet, queue};
-use crate::backend::ros::service::{Answer, Service};
+use crate::backend::ros::message::{
+    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
+    TriggerResponse, WrenchStamped,
+};
 use crate::backend::ros::settings::BackendSettings;
-use crate::backend::ros::topics::{Side, Topic, Topics};
-use crate::backend::ros::transport::{Delivery, Transport, TransportError, Waker};
+use crate::backend::ros::topics::{Service, Side, Topic, Topics};
+use crate::backend::ros::transport::{
+    Delivery, Packed, Packet, Transport, Waker, cannot_open, cannot_send,
+};
+use crate::error::Invalid;
 use master::Census;
 use roslibrust::RosMessageType;
 use roslibrust::ros1::{NodeHandle, Publisher, ServiceServer};
 use std::collections::HashMap;
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
-use types::*;
+use wire::{Counted, Request, Trigger};
 
 /// Messages that wait in a reader or writer; chosen, more than come while a thread is held up.
 const QUEUE: usize = 64;
@@ -28,9 +29,8 @@ const QUEUE: usize = 64;
 /// How long an answer to a call from outside is waited for; chosen.
 const ANSWER: Duration = Duration::from_millis(500);
 
+/// Publishes a packet if it is of its topic and type.
 type Writer = Box<dyn Fn(&Runtime, &Packet) -> Option<Result<(), String>>>;
-/// Calls from outside that wait for their answer.
-type Waiting = Arc<Mutex<HashMap<u64, Sender<Answer>>>>;
 
 /// One side's end in a ROS 1 network.
 pub struct Ros1 {
@@ -38,12 +38,14 @@ pub struct Ros1 {
     node: NodeHandle,
     census: Census,
     topics: Topics,
-    inlet: Inlet,
-    outlet: Outlet,
+    /// What arrives is put in, by any thread; `None` only wakes.
+    inlet: Sender<Option<Delivery>>,
+    outlet: Receiver<Option<Delivery>>,
     writers: Vec<Writer>,
     /// Kept, for a service ends with it.
     _servers: Vec<ServiceServer>,
-    waiting: Waiting,
+    /// Calls from outside that wait for their answer.
+    waiting: Arc<Mutex<HashMap<u64, Sender<TriggerResponse>>>>,
 }
 
 /// Spares ROS 1 the loading of certificates, which nobody uses there: each attempt to reach a dead
@@ -57,11 +59,6 @@ pub fn spare_certificates() {
     }
 }
 
-fn open<E: std::fmt::Display>(what: &str) -> impl Fn(E) -> TransportError {
-    let what = what.to_owned();
-    move |error| TransportError::Open { what: what.clone(), words: error.to_string() }
-}
-
 impl Ros1 {
     /// An end on one side of the arm of `settings`; `services` are those that are served.
     ///
@@ -71,8 +68,8 @@ impl Ros1 {
         settings: &BackendSettings,
         side: Side,
         services: Vec<Service>,
-    ) -> Result<Self, TransportError> {
-        let runtime = Runtime::new().map_err(open("threads"))?;
+    ) -> Result<Self, Invalid> {
+        let runtime = Runtime::new().map_err(cannot_open("threads"))?;
         // A second node of the same name would end the first.
         let name = match side {
             Side::Explorer => format!("/palpate_explorer_{}", std::process::id()),
@@ -81,8 +78,8 @@ impl Ros1 {
         let master = settings.master.clone();
         let node = runtime
             .block_on(NodeHandle::new(&master, &name))
-            .map_err(open(&format!("a node at the master {master}")))?;
-        let (inlet, outlet) = queue();
+            .map_err(cannot_open(&format!("a node at the master {master}")))?;
+        let (inlet, outlet) = channel();
         let mut end = Self {
             runtime,
             node,
@@ -92,7 +89,7 @@ impl Ros1 {
             outlet,
             writers: Vec::new(),
             _servers: Vec::new(),
-            waiting: Waiting::default(),
+            waiting: Arc::default(),
         };
         end.topics(side)?;
         if side == Side::Arm {
@@ -101,39 +98,36 @@ impl Ros1 {
         Ok(end)
     }
 
-    fn topics(&mut self, side: Side) -> Result<(), TransportError> {
-        self.topic(side, Topic::Joints, joints_in, |packet| match packet {
-            Packet::Joints(message) => Some(joints_out(message.clone())),
-            _ => None,
-        })?;
-        self.topic(side, Topic::Wrench, wrench_in, |packet| match packet {
-            Packet::Wrench(message) => Some(wrench_out(message.clone())),
-            _ => None,
-        })?;
-        self.topic(side, Topic::Status, status_in, |packet| match packet {
-            Packet::Status(message) => Some(status_out(message.clone())),
-            _ => None,
-        })?;
+    fn topics(&mut self, side: Side) -> Result<(), Invalid> {
+        self.headed::<JointState>(side, Topic::Joints)?;
+        self.headed::<WrenchStamped>(side, Topic::Wrench)?;
+        self.headed::<DiagnosticArray>(side, Topic::Status)?;
         match self.topics.tactile.is_shadow() {
-            true => self.topic(side, Topic::Tactile, fingers_in, |packet| match packet {
-                Packet::Fingers(message) => Some(fingers_out(*message.clone())),
-                _ => None,
-            })?,
-            false => self.topic(side, Topic::Tactile, hand_in, |packet| match packet {
-                Packet::Hand(message) => Some(hand_out(*message.clone())),
-                _ => None,
-            })?,
+            true => self.headed::<BiotacAll>(side, Topic::Tactile)?,
+            false => self.headed::<BioTacHand>(side, Topic::Tactile)?,
         }
         match self.topics.command.is_bare() {
-            true => self.topic(side, Topic::Command, Packet::Velocities, |packet| match packet {
-                Packet::Velocities(message) => Some(message.clone()),
-                _ => None,
+            true => self.topic::<Float64MultiArray>(side, Topic::Command, Into::into, |packet| {
+                Float64MultiArray::in_packet(packet).cloned()
             }),
-            false => self.topic(side, Topic::Command, command_in, |packet| match packet {
-                Packet::Command(message) => Some(command_out(message.clone())),
-                _ => None,
-            }),
+            false => self.headed::<JointTrajectory>(side, Topic::Command),
         }
+    }
+
+    /// A topic with messages of type `M`, which have a header.
+    fn headed<M: Packed + Clone>(&mut self, side: Side, topic: Topic) -> Result<(), Invalid>
+    where
+        Counted<M>: RosMessageType,
+    {
+        self.topic::<Counted<M>>(
+            side,
+            topic,
+            |counted| counted.message.into(),
+            |packet| {
+                let message = M::in_packet(packet)?.clone();
+                Some(Counted { seq: 0, message })
+            },
+        )
     }
 
     /// A topic with messages of type `M`: a writer on the side that publishes it, a reader on the
@@ -144,21 +138,23 @@ impl Ros1 {
         topic: Topic,
         wrap: fn(M) -> Packet,
         pick: fn(&Packet) -> Option<M>,
-    ) -> Result<(), TransportError> {
+    ) -> Result<(), Invalid> {
         let name = self.topics.line(topic).name.into_owned();
         if topic.publisher() == side {
             let publisher: Publisher<M> = self
                 .runtime
                 .block_on(self.node.advertise(&name, QUEUE, false))
-                .map_err(open(&name))?;
+                .map_err(cannot_open(&name))?;
             self.writers.push(Box::new(move |runtime, packet| {
                 let message = pick(packet)?;
                 Some(runtime.block_on(publisher.publish(&message)).map_err(|e| e.to_string()))
             }));
             return Ok(());
         }
-        let mut subscriber =
-            self.runtime.block_on(self.node.subscribe::<M>(&name, QUEUE)).map_err(open(&name))?;
+        let mut subscriber = self
+            .runtime
+            .block_on(self.node.subscribe::<M>(&name, QUEUE))
+            .map_err(cannot_open(&name))?;
         let inlet = self.inlet.clone();
         self.runtime.spawn(async move {
             while let Some(message) = subscriber.next().await {
@@ -170,7 +166,7 @@ impl Ros1 {
                     Err(error) if error.to_string().contains("lag") => continue,
                     Err(error) => Delivery::Garbled { topic, words: error.to_string() },
                 };
-                if !inlet.put(delivery) {
+                if inlet.send(Some(delivery)).is_err() {
                     break;
                 }
             }
@@ -179,23 +175,23 @@ impl Ros1 {
     }
 
     /// A service is answered by the link's loop; the caller's task waits for it.
-    fn serve(&mut self, number: usize, service: Service) -> Result<(), TransportError> {
+    fn serve(&mut self, number: usize, service: Service) -> Result<(), Invalid> {
         let name = service.name(self.topics.namespace());
         let (inlet, waiting) = (self.inlet.clone(), Arc::clone(&self.waiting));
         let number = number as u64;
         let answer = move |_: Request| {
             let (sender, answer) = channel();
             waiting.lock().unwrap_or_else(PoisonError::into_inner).insert(number, sender);
-            inlet.put(Delivery::Call { service: service.clone(), call: number });
-            Ok(match answer.recv_timeout(ANSWER) {
-                Ok(Answer { is_done, words }) => Response { success: is_done, message: words },
-                Err(_) => Response { success: false, message: "not answered in time".into() },
-            })
+            let _ = inlet.send(Some(Delivery::Call { service: service.clone(), call: number }));
+            Ok(answer.recv_timeout(ANSWER).unwrap_or_else(|_| TriggerResponse {
+                success: false,
+                message: "not answered in time".into(),
+            }))
         };
         let server = self
             .runtime
             .block_on(self.node.advertise_service::<Trigger, _>(&name, answer))
-            .map_err(open(&name))?;
+            .map_err(cannot_open(&name))?;
         self._servers.push(server);
         Ok(())
     }
@@ -203,16 +199,26 @@ impl Ros1 {
 
 impl Transport for Ros1 {
     fn waker(&self) -> Waker {
-        self.inlet.waker()
+        let inlet = self.inlet.clone();
+        Arc::new(move || {
+            let _ = inlet.send(None);
+        })
     }
 
-    fn send(&mut self, packet: &Packet) -> Result<(), TransportError> {
+    fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
         let sent = self.writers.iter().find_map(|writer| writer(&self.runtime, packet));
-        TransportError::of_sending(&self.topics.line(packet.topic()).name, sent)
+        let sent = sent.unwrap_or(Err("not this side's".into()));
+        sent.map_err(|words| cannot_send(&self.topics.line(packet.topic()).name, words))
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
-        self.outlet.receive(timeout, take);
+        let mut next = self.outlet.recv_timeout(timeout);
+        while let Ok(delivery) = next {
+            if let Some(delivery) = delivery {
+                take(delivery);
+            }
+            next = self.outlet.try_recv().map_err(|_| RecvTimeoutError::Timeout);
+        }
     }
 
     fn publisher_count(&self, topic: Topic) -> usize {
@@ -224,20 +230,17 @@ impl Transport for Ros1 {
         true
     }
 
-    fn call(&mut self, service: &Service) -> Result<(), TransportError> {
+    fn call(&mut self, service: &Service) -> Result<(), Invalid> {
         let (node, inlet, service) = (self.node.clone(), self.inlet.clone(), service.clone());
         let name = service.name(self.topics.namespace());
         self.runtime.spawn(async move {
-            let answer = match node.service_client::<Trigger>(&name).await {
-                Ok(client) => match client.call(&Request {}).await {
-                    Ok(Response { success, message }) => {
-                        Answer { is_done: success, words: message }
-                    }
-                    Err(error) => Answer { is_done: false, words: error.to_string() },
-                },
-                Err(error) => Answer { is_done: false, words: error.to_string() },
+            let answered = match node.service_client::<Trigger>(&name).await {
+                Ok(client) => client.call(&Request {}).await.map_err(|error| error.to_string()),
+                Err(error) => Err(error.to_string()),
             };
-            inlet.put(Delivery::Answered { service, answer });
+            let failed = |message| TriggerResponse { success: false, message };
+            let answer = answered.unwrap_or_else(failed);
+            let _ = inlet.send(Some(Delivery::Answered { service, answer }));
         });
         Ok(())
     }
@@ -246,16 +249,10 @@ impl Transport for Ros1 {
         &mut self,
         service: &Service,
         call: u64,
-        answer: &Answer,
-    ) -> Result<(), TransportError> {
+        answer: TriggerResponse,
+    ) -> Result<(), Invalid> {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-        let sent = waiting.remove(&call).map(|waiting| waiting.send(answer.clone()));
-        match sent {
-            Some(Ok(())) => Ok(()),
-            _ => Err(TransportError::Send {
-                what: service.name(self.topics.namespace()),
-                words: "no call".into(),
-            }),
-        }
+        let sent = waiting.remove(&call).and_then(|waiting| waiting.send(answer).ok());
+        sent.ok_or_else(|| cannot_send(&service.name(self.topics.namespace()), "no call"))
     }
 }

@@ -65,7 +65,7 @@ impl Servo {
     ) -> Result<Self, Fault> {
         body.capabilities().fit(&robot.chain)?;
         let control = Controller::new(robot.chain.clone(), body.capabilities().period_s)
-            .map_err(|cause| Fault::NoCommand { time_s: 0.0, cause })?;
+            .map_err(|cause| Fault::no_command(0.0, cause))?;
         let reading = body.reset(seed)?;
         reading.check()?;
         let (time_s, q) = (reading.time_s, reading.q.clone());
@@ -104,7 +104,7 @@ impl Servo {
     /// One tick towards `goal`.
     fn tick(&mut self, goal: &Goal) -> Result<(), Fault> {
         let motion = self.control.step(&self.q, goal);
-        let motion = motion.map_err(|cause| Fault::NoCommand { time_s: self.time_s, cause })?;
+        let motion = motion.map_err(|cause| Fault::no_command(self.time_s, cause))?;
         self.carry_out(&motion.qdot)
     }
 
@@ -231,7 +231,7 @@ impl Servo {
         loop {
             let posture = line.advance(period_s);
             let qdot = self.control.along(&self.q, &posture);
-            let qdot = qdot.map_err(|cause| Fault::NoCommand { time_s: self.time_s, cause })?;
+            let qdot = qdot.map_err(|cause| Fault::no_command(self.time_s, cause))?;
             self.carry_out(&qdot)?;
             let (time_s, q) = (self.time_s, &self.q);
             let deadline_s = *deadline_s.get_or_insert(time_s + line.patience_s());

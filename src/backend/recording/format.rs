@@ -1,11 +1,133 @@
-//! One control tick, to the bit.
+//! The contents of a recording: its metadata, its topics and the messages that only it has.
 
-use crate::backend::ros::message::{Definition, Described};
-use crate::backend::{Command, IdealContact, Reading, Sample, Wrench};
+use crate::backend::ros::definition::{Definition, Described};
+use crate::backend::ros::message::{
+    BioTacHand, JointState, JointTrajectory, Marker, WrenchStamped,
+};
+use crate::backend::{Capabilities, Command, IdealContact, Reading, Sample, Wrench};
+use crate::error::Invalid;
 use crate::robot::finger::Frame;
+use crate::words::brief;
+use byteorder::LittleEndian;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+/// What a recording is of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct About {
+    /// Of the program that wrote it.
+    pub version: String,
+    /// The experiment with every default written out, as TOML.
+    pub experiment: String,
+    /// The planner's name.
+    pub planner: String,
+    /// The trial's number.
+    pub trial: u32,
+    /// What the body was reset with.
+    pub seed: u64,
+    /// What the body can do.
+    pub capabilities: Capabilities,
+}
+
+/// How what was recorded ended.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Ending {
+    /// Why it ended before its last touch, if it did.
+    pub failure: Option<String>,
+    /// Whether it was interrupted from outside after a touch, so that it can be continued.
+    pub is_interrupted: bool,
+}
+
+/// Name of the metadata that an [`About`] is written to.
+pub(super) const ABOUT: &str = "palpate";
+
+/// Name of the metadata that an [`Ending`] is written to.
+pub(super) const ENDING: &str = "palpate_ending";
+
+const FAILURE: &str = "failure";
+const INTERRUPTED: &str = "interrupted";
+
+impl About {
+    pub(super) fn texts(&self) -> BTreeMap<String, String> {
+        // Names and numbers always have a JSON.
+        let capabilities = serde_json::to_string(&self.capabilities).unwrap_or_default();
+        let texts = [
+            ("version", self.version.clone()),
+            ("resolved.toml", self.experiment.clone()),
+            ("planner", self.planner.clone()),
+            ("trial", self.trial.to_string()),
+            ("seed", self.seed.to_string()),
+            ("capabilities", capabilities),
+        ];
+        texts.into_iter().map(|(name, text)| (name.to_owned(), text)).collect()
+    }
+
+    pub(super) fn of(texts: &BTreeMap<String, String>) -> Result<Self, Invalid> {
+        Ok(Self {
+            version: text(texts, "version")?.into(),
+            experiment: text(texts, "resolved.toml")?.into(),
+            planner: text(texts, "planner")?.into(),
+            trial: number(texts, "trial")?,
+            seed: number(texts, "seed")?,
+            capabilities: serde_json::from_str(text(texts, "capabilities")?)
+                .map_err(|_| bad(texts, "capabilities"))?,
+        })
+    }
+}
+
+impl Ending {
+    pub(super) fn texts(&self) -> BTreeMap<String, String> {
+        let failure = self.failure.iter().map(|failure| (FAILURE, failure.clone()));
+        let interrupted = self.is_interrupted.then(|| (INTERRUPTED, true.to_string()));
+        failure.chain(interrupted).map(|(name, text)| (name.to_owned(), text)).collect()
+    }
+
+    pub(super) fn of(texts: &BTreeMap<String, String>) -> Self {
+        let is_interrupted = texts.contains_key(INTERRUPTED);
+        Self { failure: texts.get(FAILURE).cloned(), is_interrupted }
+    }
+}
+
+fn text<'a>(texts: &'a BTreeMap<String, String>, name: &str) -> Result<&'a str, Invalid> {
+    texts.get(name).map(String::as_str).ok_or_else(|| bad(texts, name))
+}
+
+fn number<T: FromStr>(texts: &BTreeMap<String, String>, name: &str) -> Result<T, Invalid> {
+    text(texts, name)?.parse().map_err(|_| bad(texts, name))
+}
+
+fn bad(texts: &BTreeMap<String, String>, name: &str) -> Invalid {
+    let found = texts.get(name).map_or("missing".into(), |found| format!("\"{}\"", brief(found)));
+    Invalid::new(format!("in its metadata `{name}` is {found}"))
+}
+
+/// A channel, by its place in [`TOPICS`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Topic {
+    Joints,
+    Applied,
+    Wrench,
+    Tactile,
+    Tick,
+    Touch,
+    Belief,
+    Contacts,
+}
+
+/// Name and message of each channel.
+pub const TOPICS: [(&str, &Definition); 8] = [
+    ("/joint_states", &JointState::DEFINITION),
+    ("/palpate/applied", &JointTrajectory::DEFINITION),
+    ("/wrench", &WrenchStamped::DEFINITION),
+    ("/biotac_pub", &BioTacHand::DEFINITION),
+    ("/palpate/tick", &Tick::DEFINITION),
+    ("/palpate/touch", &Touch::DEFINITION),
+    ("/palpate/belief", &Marker::DEFINITION),
+    ("/palpate/contacts", &Marker::DEFINITION),
+];
 
 /// `palpate_msgs/Tick`: a command and the reading after it, or a reset and the reading after that.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -230,4 +352,55 @@ mod slips {
         let slip = |told: u8| (told < 2).then_some(told == 1);
         Ok(told.into_iter().map(|told| Frame { slip: slip(told), ..Frame::default() }).collect())
     }
+}
+
+/// `palpate_msgs/Touch`: what a touch was asked for and found, written when it is done.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Touch<'a> {
+    /// Counted from 1.
+    pub touch: u32,
+    /// The body's time at its end.
+    pub time_s: f64,
+    /// Where the finger was sent: (x) or (x, z) of the zone.
+    pub target: Cow<'a, [f64]>,
+    /// `contact`, `miss` or `overload`.
+    pub outcome: Cow<'a, str>,
+    /// The point of contact in `W`, m; or empty.
+    pub contact: Cow<'a, [f64]>,
+    /// The contact's unit normal in `W`, towards the finger; or empty.
+    pub normal: Cow<'a, [f64]>,
+    /// The touch with the belief after it, as the trial's row holds it: JSON.
+    pub row: Cow<'a, str>,
+}
+
+impl Described for Touch<'_> {
+    const DEFINITION: Definition = Definition {
+        name: "palpate_msgs/msg/Touch",
+        fields: "# A touch, written when it is done.\n\
+                 # Counted from 1.\nuint32 touch\n\
+                 # The body's time at its end.\nfloat64 time_s\n\
+                 # Where the finger was sent: (x) or (x, z) of the zone, m.\nfloat64[] target\n\
+                 # contact, miss or overload.\nstring outcome\n\
+                 # The point of contact in W, m; or empty.\nfloat64[] contact\n\
+                 # The contact's unit normal in W, towards the finger; or empty.\nfloat64[] normal\n\
+                 # The touch with the belief after it, as in trials.jsonl.\nstring row\n",
+        parts: &[],
+    };
+}
+
+/// Says little-endian CDR (DDSI-RTPS 2.3, 10.2).
+const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
+
+/// Puts `message` into `bytes`, in place of what was there.
+pub(super) fn encode(bytes: &mut Vec<u8>, message: &impl Serialize) -> cdr_encoding::Result<()> {
+    bytes.clear();
+    bytes.extend_from_slice(&LITTLE_ENDIAN);
+    cdr_encoding::to_writer::<_, LittleEndian, _>(bytes, message)
+}
+
+/// The message that `bytes` hold; none if they do not.
+pub fn decoded<'a, M: Deserialize<'a>>(bytes: &'a [u8]) -> Option<M> {
+    let payload = bytes.strip_prefix(&LITTLE_ENDIAN)?;
+    let (message, _) = cdr_encoding::from_bytes::<M, LittleEndian>(payload).ok()?;
+    Some(message)
 }

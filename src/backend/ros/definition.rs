@@ -1,0 +1,209 @@
+//! Definitions of message types: their texts, and the macro that makes a struct and a definition of
+//! one declaration.
+
+/// A message type: its name and the text of its definition.
+pub struct Definition {
+    /// As in `sensor_msgs/msg/JointState`.
+    pub name: &'static str,
+    /// Its fields, one line each, in the language of `.msg` files.
+    pub fields: &'static str,
+    /// The definitions of the types that it names.
+    pub parts: &'static [&'static Definition],
+}
+
+/// A type that is sent over topics.
+pub trait Described {
+    /// Its name and its fields.
+    const DEFINITION: Definition;
+}
+
+/// Replacements that make a definition of ROS 2 of what a macro writes.
+const ROS2: &[(&str, &str)] = &[("r#", "")];
+
+/// Replacements that make a definition of ROS 1 of one of ROS 2: times are primitive there, and a
+/// header counts.
+#[cfg(feature = "ros1")]
+const ROS1: &[(&str, &str)] = &[
+    ("builtin_interfaces/Time stamp", "uint32 seq\ntime stamp"),
+    ("builtin_interfaces/Time", "time"),
+    ("builtin_interfaces/Duration", "duration"),
+];
+
+/// Separates the definitions of parts.
+const RULE: &str =
+    "================================================================================\nMSG: ";
+
+impl Definition {
+    /// The package, as in `sensor_msgs`.
+    pub fn package(&self) -> &'static str {
+        self.name.split('/').next().unwrap_or_default()
+    }
+
+    /// The name in its package, as in `JointState`.
+    pub fn short_name(&self) -> &'static str {
+        self.name.rsplit('/').next().unwrap_or_default()
+    }
+
+    /// The whole definition with those of all parts: a schema of encoding `ros2msg`.
+    pub fn text(&self) -> String {
+        Text::of(self, ROS2).as_str().into()
+    }
+
+    /// The same in ROS 1.
+    #[cfg(feature = "ros1")]
+    pub(super) const fn ros1(&self) -> Text {
+        Text::of(self, ROS1)
+    }
+}
+
+/// A definition that is put together when the program is compiled.
+pub(super) struct Text {
+    bytes: [u8; 4096],
+    length: usize,
+}
+
+impl Text {
+    const fn of(definition: &Definition, replaced: &[(&str, &str)]) -> Self {
+        let mut text = Self { bytes: [0; 4096], length: 0 };
+        text.push(definition.fields, replaced);
+        text.push_parts(definition.parts, replaced);
+        text
+    }
+
+    /// Adds the definitions of `parts` and of what they name, each once.
+    const fn push_parts(&mut self, parts: &[&Definition], replaced: &[(&str, &str)]) {
+        let mut i = 0;
+        while i < parts.len() {
+            let start = self.length;
+            self.push(RULE, &[]);
+            self.push(parts[i].name, &[("/msg/", "/")]);
+            self.push("\n", &[]);
+            let is_primitive =
+                replaced.len() > 1 && begins(parts[i].name.as_bytes(), 0, b"builtin");
+            if is_primitive || self.has_before(start) {
+                self.length = start;
+            } else {
+                self.push(parts[i].fields, replaced);
+                self.push_parts(parts[i].parts, replaced);
+            }
+            i += 1;
+        }
+    }
+
+    /// Whether what stands from `start` on stands before it too.
+    const fn has_before(&self, start: usize) -> bool {
+        let (before, found) = self.bytes.split_at(start);
+        let (found, _) = found.split_at(self.length - start);
+        let mut at = 0;
+        while at < start {
+            if begins(before, at, found) {
+                return true;
+            }
+            at += 1;
+        }
+        false
+    }
+
+    /// Adds `text` with what is `replaced`.
+    const fn push(&mut self, text: &str, replaced: &[(&str, &str)]) {
+        let text = text.as_bytes();
+        let mut at = 0;
+        'text: while at < text.len() {
+            let mut i = 0;
+            while i < replaced.len() {
+                let (from, to) = replaced[i];
+                if begins(text, at, from.as_bytes()) {
+                    self.push(to, &[]);
+                    at += from.len();
+                    continue 'text;
+                }
+                i += 1;
+            }
+            self.bytes[self.length] = text[at];
+            self.length += 1;
+            at += 1;
+        }
+    }
+
+    /// The text.
+    pub(super) const fn as_str(&self) -> &str {
+        match std::str::from_utf8(self.bytes.split_at(self.length).0) {
+            Ok(text) => text,
+            Err(_) => panic!("a definition is no text"),
+        }
+    }
+}
+
+/// Whether `text` has `what` at the byte `at`.
+const fn begins(text: &[u8], at: usize, what: &[u8]) -> bool {
+    let mut i = 0;
+    while i < what.len() {
+        if at + i >= text.len() || text[at + i] != what[i] {
+            return false;
+        }
+        i += 1;
+    }
+    true
+}
+
+/// Makes a struct with its [`Definition`] of each declaration in the language of `.msg` files: a
+/// package with a name and, in braces, constants as a text and fields with their types and
+/// defaults. `serde` writes the fields in this order, so that a CDR serializer writes what every
+/// other implementation reads.
+macro_rules! messages {
+    ($(
+        $(#[$meta:meta])*
+        $package:ident / $name:ident {
+            $($constants:literal)?
+            $(
+                $(#[$field_meta:meta])*
+                $type:ident $(/ $part:ident)? $([$($count:literal)?])? $field:ident $($default:literal)?,
+            )*
+        }
+    )*) => {$(
+        $(#[$meta])*
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        pub struct $name {
+            $(
+                $(#[$field_meta])*
+                pub $field: messages!(@type $type $(/ $part)? $([$($count)?])?),
+            )*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: messages!(@default $($default)?),)* }
+            }
+        }
+
+        impl Described for $name {
+            const DEFINITION: Definition = Definition {
+                name: concat!(stringify!($package), "/msg/", stringify!($name)),
+                fields: concat!($($constants,)? $(
+                    stringify!($type), $("/", stringify!($part),)? $("[", $($count,)? "]",)?
+                    " ", stringify!($field), $(" ", $default,)? "\n",
+                )*),
+                parts: &[$($(&$part::DEFINITION,)?)*],
+            };
+        }
+    )*};
+    (@default) => { Default::default() };
+    (@default $number:literal) => { $number as f64 };
+    (@type bool) => { bool };
+    (@type byte) => { u8 };
+    (@type uint8) => { u8 };
+    (@type int16) => { i16 };
+    (@type uint16) => { u16 };
+    (@type int32) => { i32 };
+    (@type uint32) => { u32 };
+    (@type float32) => { f32 };
+    (@type float64) => { f64 };
+    (@type string) => { String };
+    (@type $package:ident / $name:ident) => { $name };
+    (@type $type:ident $(/ $part:ident)? []) => { Vec<messages!(@type $type $(/ $part)?)> };
+    (@type $type:ident $(/ $part:ident)? [$count:literal]) => {
+        [messages!(@type $type $(/ $part)?); $count]
+    };
+}
+
+pub(super) use messages;

@@ -1,0 +1,121 @@
+//! A transport inside this process: any number of ends of either side, without a network.
+
+use palpate::backend::ros::message::TriggerResponse;
+use palpate::backend::ros::topics::{Service, Side, Topic};
+use palpate::backend::ros::transport::{Delivery, Packet, Transport, Waker};
+use palpate::error::Invalid;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::{Duration, Instant};
+
+/// Where the ends meet; each is the same hub.
+#[derive(Clone, Default)]
+pub struct Hub(Arc<Mutex<Ends>>);
+
+#[derive(Default)]
+struct Ends {
+    all: Vec<End>,
+    count: u64,
+}
+
+struct End {
+    id: u64,
+    side: Side,
+    /// What arrives; `None` only wakes.
+    inlet: Sender<Option<Delivery>>,
+}
+
+/// One end.
+pub struct Memory {
+    hub: Hub,
+    id: u64,
+    side: Side,
+    inlet: Sender<Option<Delivery>>,
+    outlet: Receiver<Option<Delivery>>,
+}
+
+impl Hub {
+    /// An end on one side.
+    pub fn end(&self, side: Side) -> Memory {
+        let (inlet, outlet) = channel();
+        let mut ends = self.lock();
+        let id = ends.count;
+        ends.count += 1;
+        ends.all.push(End { id, side, inlet: inlet.clone() });
+        Memory { hub: self.clone(), id, side, inlet, outlet }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Ends> {
+        self.0.lock().unwrap()
+    }
+}
+
+impl Memory {
+    fn to(&self, is_to: impl Fn(&End) -> bool, delivery: &Delivery) {
+        for end in self.hub.lock().all.iter().filter(|end| is_to(end)) {
+            // An end that was dropped receives nothing.
+            let _ = end.inlet.send(Some(delivery.clone()));
+        }
+    }
+
+    fn others(&self) -> impl Fn(&End) -> bool + use<> {
+        let side = self.side;
+        move |end| end.side != side
+    }
+}
+
+impl Drop for Memory {
+    fn drop(&mut self) {
+        self.hub.lock().all.retain(|end| end.id != self.id);
+    }
+}
+
+impl Transport for Memory {
+    fn waker(&self) -> Waker {
+        let inlet = self.inlet.clone();
+        Arc::new(move || {
+            let _ = inlet.send(None);
+        })
+    }
+
+    fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
+        let packet = packet.clone();
+        let delivery = Delivery::Packet { packet, sender: self.id, received: Instant::now() };
+        self.to(self.others(), &delivery);
+        Ok(())
+    }
+
+    fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
+        let mut next = self.outlet.recv_timeout(timeout);
+        while let Ok(delivery) = next {
+            delivery.into_iter().for_each(&mut *take);
+            next = self.outlet.try_recv().map_err(|_| RecvTimeoutError::Timeout);
+        }
+    }
+
+    fn publisher_count(&self, topic: Topic) -> usize {
+        self.hub.lock().all.iter().filter(|end| end.side == topic.publisher()).count()
+    }
+
+    fn is_served(&mut self, _: &Service) -> bool {
+        let is_other = self.others();
+        self.hub.lock().all.iter().any(is_other)
+    }
+
+    fn call(&mut self, service: &Service) -> Result<(), Invalid> {
+        let delivery = Delivery::Call { service: service.clone(), call: self.id };
+        self.to(self.others(), &delivery);
+        Ok(())
+    }
+
+    fn answer(
+        &mut self,
+        service: &Service,
+        call: u64,
+        answer: TriggerResponse,
+    ) -> Result<(), Invalid> {
+        let delivery = Delivery::Answered { service: service.clone(), answer };
+        self.to(|end| end.id == call, &delivery);
+        Ok(())
+    }
+}
