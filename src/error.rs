@@ -1,4 +1,5 @@
-//! The error of input or state that cannot be used: where, what is wrong, what is allowed, what mends it.
+//! The error of input or state that cannot be used: place, problem, value, what is allowed, what
+//! mends it.
 
 use crate::words::brief;
 use std::fmt;
@@ -6,8 +7,8 @@ use std::path::Path;
 
 /// An error with its place, the value found there, what is allowed instead, and how to mend it.
 ///
-/// It is shown as `place: problem = value: allowed is …; mend`, without the parts that are absent. An enum of its
-/// own is for errors that a caller distinguishes.
+/// It is shown as `place: problem = value: allowed is …; mend`, without the parts that are absent.
+/// An enum of its own is for errors that a caller distinguishes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Invalid(Box<Parts>);
 

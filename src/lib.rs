@@ -16,7 +16,7 @@
 //! | 3 | [`task`], [`backend`] | what the robot is told; what is commanded and read |
 //! | 2 | [`robot`], [`gp`] | arm and finger; Gaussian processes |
 //! | 1 | [`geometry`], [`config`], [`math`] | know nothing of each other |
-//! | 0 | [`error`], [`files`], [`words`] | the error of bad input; reading files; how messages put values |
+//! | 0 | [`error`], [`files`], [`words`] | errors of input; files; values in messages |
 //!
 //! [`experiment::Simulation`] is the front door: from an experiment's file to its trials. What
 //! stands below `sim` is what runs on a real arm: a [`Servo`](explore::probe::servo::Servo) is made

@@ -1,6 +1,5 @@
 //! What only a simulator knows: the object, the physics of the finger, the simulated bodies.
 
-pub mod around;
 pub mod collision;
 pub mod environment;
 pub mod finger;

@@ -391,8 +391,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Makes the paths of a scene under `prefix` absolute, and puts the constants of its sensor into
-    /// its effects; returns the keys of constants that stand in the effects themselves.
+    /// Makes the paths of a scene under `prefix` absolute, and puts the constants of its sensor
+    /// into its effects; returns the keys of constants that stand in the effects themselves.
     ///
     /// # Errors
     /// If the sensor's file cannot be read, or holds what is not allowed.

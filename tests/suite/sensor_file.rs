@@ -1,4 +1,5 @@
-//! The file with the constants of a sensor, and scenes of version 0.1 that had them in their effects.
+//! The file with the constants of a sensor, and scenes of version 0.1 that had them in their
+//! effects.
 
 use palpate::experiment::Experiment;
 use palpate::experiment::store::resolved;

@@ -102,9 +102,9 @@ fn presses_agree_with_another_solver() {
     }
 }
 
-/// A shell of MuJoCo's (`flex`) of the same skin stretches like 0.31 E with ν = 0.633 and bends like half of D: a
-/// dry finger of that material takes 0.26 and 0.66 N on a plane, on 24 × 16 cells. Compliance through
-/// the thickness, which that shell has not, takes a tenth of it.
+/// A shell of MuJoCo's (`flex`) of the same skin stretches like 0.31 E with ν = 0.633 and bends
+/// like half of D: a dry finger of that material takes 0.26 and 0.66 N on a plane, on 24 × 16
+/// cells. Compliance through the thickness, which that shell has not, takes a tenth of it.
 #[test]
 fn a_dry_press_agrees_with_mujocos_material() {
     let poisson = 0.633;

@@ -1,5 +1,5 @@
-//! Why another solver of the skin's shell finds less force on the flat pulp: its own elements on the
-//! same nodes find its figures.
+//! Why another solver of the skin's shell finds less force on the flat pulp: its own elements on
+//! the same nodes find its figures.
 //!
 //! That solver bends about hinges (Bergou et al., A quadratic bending model for inextensible
 //! surfaces, 2006, with a third of its coefficient), in all three directions, and so lets go of the

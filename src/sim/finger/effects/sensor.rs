@@ -8,9 +8,9 @@ use crate::sim::finger::Effects;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Puts the constants of the scene's sensor into those effects that stand under `effects`, where the
-/// scene itself has others; returns the keys of constants that the scene has in its effects, where
-/// version 0.1 had them.
+/// Puts the constants of the scene's sensor into those effects that stand under `effects`, where
+/// the scene itself has others; returns the keys of constants that the scene has in its effects,
+/// where version 0.1 had them.
 ///
 /// # Errors
 /// If the sensor's file cannot be read, or holds what is not a constant or not allowed.

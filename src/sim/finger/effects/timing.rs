@@ -11,9 +11,9 @@ use crate::robot::finger::frame::ELECTRODES;
 const LONG_DELAY_S: f64 = 0.02;
 
 effect! {
-    /// Table `[timing]`: channels are sampled one after the other, frames arrive in batches, commands
-    /// late. Without it a frame is sampled at once, every 10 ms, and arrives then, and a command holds
-    /// from the tick on in which it is given.
+    /// Table `[timing]`: channels are sampled one after the other, frames arrive in batches,
+    /// commands late. Without it a frame is sampled at once, every 10 ms, and arrives then, and a
+    /// command holds from the tick on in which it is given.
     TimingEffect in "timing"
     settings checked by check_delay {
         /// From a command to its effect, rounded to whole control periods.

@@ -14,7 +14,8 @@ const OPEN_COUNTS: f64 = 1.0;
 
 effect! {
     /// Table `[variation]`: another sensor of the kind in each trial. Every number is a standard
-    /// deviation about what the scene says, of a logarithm unless it is of an angle; or a probability.
+    /// deviation about what the scene says, of a logarithm unless it is of an angle; or a
+    /// probability.
     VariationEffect in "variation"
     constants {
         /// Of each electrode's resistance at rest.

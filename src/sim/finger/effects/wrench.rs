@@ -8,8 +8,8 @@ use nalgebra::Vector6;
 use rand_chacha::ChaCha8Rng;
 
 effect! {
-    /// Table `[wrench]`: what a force/torque sensor makes of the load on it, in its own frame: z along
-    /// the finger, distal. Without it a body has no such sensor.
+    /// Table `[wrench]`: what a force/torque sensor makes of the load on it, in its own frame: z
+    /// along the finger, distal. Without it a body has no such sensor.
     WrenchEffect in "wrench"
     constants {
         /// Standard deviation of each reading: forces along x, y, z.
