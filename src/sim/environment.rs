@@ -16,10 +16,9 @@ use crate::robot::arm::stage::{stage, stage_with_wrist};
 use crate::robot::arm::{ArmSettings, Chain, model};
 use crate::robot::finger::shape::BIOTAC_RADIUS_M;
 use crate::sim::finger::Fingertip;
-use crate::task::{Around, Ball, RADIUS_M, Region, Task, Zone};
+use crate::task::{Approach, Around, Ball, RADIUS_M, Region, Task, Zone};
 use nalgebra::{Point3, Vector3};
 use std::borrow::Cow;
-use std::sync::Arc;
 
 /// A scene with its mesh loaded and its search tree built.
 pub struct Environment {
@@ -397,7 +396,7 @@ fn task_around(
         )));
     }
     Ok(match ArmReach::new(&robot, touch) {
-        Some(reach) => task.within(Arc::new(reach)),
+        Some(reach) => task.within(move |approach: &Approach| reach.reaches(approach)),
         None => task,
     })
 }
