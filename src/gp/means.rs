@@ -1,5 +1,5 @@
-//! Means at very many places: the same ones while observations are added, or those that a search for
-//! zeros asks for.
+//! Means at very many places: the same ones while observations are added, or those that a search
+//! for zeros asks for.
 
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::Observations;

@@ -50,12 +50,12 @@
 //! |---|---|
 //! | [`kernel`] | how alike the heights of two places are, and the hyperparameters |
 //! | [`observations`] | places, heights, and slopes if they are observed too |
-//! | [`posterior`], [`batch`], [`means`] | mean, variance and their gradients at a place (Eq. 3 of Yi et al. 2016), at many, at very many |
+//! | [`posterior`], [`batch`], [`means`] | mean, variance, gradients at one, many, most places |
 //! | [`inducing`] | the posterior of very many touches through a few of them |
 //! | [`likelihood`] | how well hyperparameters explain the observations |
 //! | [`fit`], [`search_box`] | the most likely hyperparameters and kernel, and where to seek them |
 //! | [`reduction`] | how much one more observation would tell |
-//! | [`covariance`], [`dense`], [`cholesky`] | the covariance matrix, factored whole or row by row |
+//! | [`covariance`], [`dense`], [`cholesky`] | the covariance, factored whole or row by row |
 
 pub mod batch;
 pub mod cholesky;

@@ -178,9 +178,10 @@ pub fn jacobian<P: Problem>(problem: &P, state: &P::State, count: usize) -> DMat
     jacobian
 }
 
-/// Covariance of the parameters at `state` of a robust fit some of whose residuals err together, A⁻¹ (Σ g gᵀ) A⁻¹ · n/(n − 1) with A = JᵀWJ and the
-/// n clusters' gradients g = Σ Jᵢᵀ wᵢ rᵢ (Liang & Zeger 1986). Residuals without a cluster, those
-/// of what was believed before, count in A only. None if A has no inverse.
+/// Covariance of the parameters at `state` of a robust fit some of whose residuals err together,
+/// A⁻¹ (Σ g gᵀ) A⁻¹ · n/(n − 1) with A = JᵀWJ and the n clusters' gradients g = Σ Jᵢᵀ wᵢ rᵢ (Liang
+/// & Zeger 1986). Residuals without a cluster, those of what was believed before, count in A only.
+/// None if A has no inverse.
 pub fn clustered_covariance<P: Problem>(
     problem: &P,
     state: &P::State,

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-/// Defines a function whose loops are compiled for the widest vectors of this processor, as those of
-/// [`widest`]. All references among its arguments have the one lifetime.
+/// Defines a function whose loops are compiled for the widest vectors of this processor, as those
+/// of [`widest`]. All references among its arguments have the one lifetime.
 macro_rules! widest_fn {
     ($(#[$meta:meta])* $vis:vis fn $name:ident<$life:lifetime> $($rest:tt)*) => {
         $crate::math::simd::widest_fn!(
@@ -44,8 +44,9 @@ pub(crate) use widest_fn;
 /// Runs `work` with its loops compiled once for each vector width and the widest one chosen.
 ///
 /// What it calls must be `#[inline(always)]` to be compiled along, and so must a `work` that is
-/// long or multiplies and adds in one rounding, which `widest_fn!` then writes instead of a closure.
-/// Sums keep the order in which they are written, so that the width changes speed and not results.
+/// long or multiplies and adds in one rounding, which `widest_fn!` then writes instead of a
+/// closure. Sums keep the order in which they are written, so that the width changes speed and not
+/// results.
 #[inline(always)]
 pub fn widest<Work: pulp::NullaryFnOnce>(work: Work) -> Work::Output {
     pulp::Arch::new().dispatch(work)
@@ -68,7 +69,8 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 widest_fn! {
-    /// The same with the widest vectors, where it does not stand in a loop that is compiled for them.
+    /// The same with the widest vectors, where it does not stand in a loop that is compiled for
+    /// them.
     pub fn widest_dot<'a>(a: &'a [f64], b: &'a [f64]) -> f64 {
         dot(a, b)
     }

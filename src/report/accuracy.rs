@@ -34,8 +34,8 @@ const TOP_PX: f64 = 66.0;
 const LINE_PX: f64 = 18.0;
 const NAME_PX: f64 = 140.0;
 
-/// Draws levels and effects, as far as they were compared; `None` without a variant that differs from
-/// its reference.
+/// Draws levels and effects, as far as they were compared; `None` without a variant that differs
+/// from its reference.
 pub fn draw(
     levels: Option<&Comparison>,
     orders: &[Order],
@@ -148,7 +148,8 @@ fn draw_order(canvas: &mut Canvas, order: &Order, area: Area) {
     }
 }
 
-/// Draws each effect as a line: how far contacts move, the time of a touch, and the verdict's change.
+/// Draws each effect as a line: how far contacts move, the time of a touch, and the verdict's
+/// change.
 fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option<()> {
     let time = |variant: &Variant| -> Option<Bar> {
         let ratio = variant.time_ratio?;

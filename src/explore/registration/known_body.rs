@@ -185,8 +185,8 @@ impl Outline {
         (self.profile.skin_t(x_m, turn), outward)
     }
 
-    /// The point in `T` at which it meets `body` when the fingertip stands at `x_wt`, and how far it
-    /// would have to go on until it has given way by `give_m`; negative if it has gone too far.
+    /// The point in `T` at which it meets `body` when the fingertip stands at `x_wt`, and how far
+    /// it would have to go on until it has given way by `give_m`; negative if it has gone too far.
     ///
     /// A soft finger tells contact when a certain volume of liquid is displaced: that which a
     /// sphere of its own radius displaces by going in so far, V = π r give². So a blunt place gives

@@ -71,8 +71,8 @@ pub struct Cheapest {
 }
 
 impl Comparison {
-    /// Measures the reference. The default margin of a verdict is the end of its interval nearest to
-    /// zero: a smaller change cannot reverse it.
+    /// Measures the reference. The default margin of a verdict is the end of its interval nearest
+    /// to zero: a smaller change cannot reverse it.
     ///
     /// # Errors
     /// If the scene cannot be built, or its verdict is the criterion and undecided.
@@ -179,8 +179,8 @@ impl Comparison {
         errors.min_by(f64::total_cmp)
     }
 
-    /// The reference without effects that it does not need: the most expensive is left out first, as
-    /// long as all that are left out are together not needed either; `None` if none can be.
+    /// The reference without effects that it does not need: the most expensive is left out first,
+    /// as long as all that are left out are together not needed either; `None` if none can be.
     ///
     /// # Errors
     /// If a scene cannot be built.
@@ -232,8 +232,8 @@ impl Comparison {
         Ok(Cheapest { scene, selected, held_out, is_confirmed })
     }
 
-    /// The orders in which the errors of the levels of `scene` fall: in the time step, in the points
-    /// of the skin, and in the step of a body with masses.
+    /// The orders in which the errors of the levels of `scene` fall: in the time step, in the
+    /// points of the skin, and in the step of a body with masses.
     ///
     /// # Errors
     /// If a scene cannot be built or simulated.
@@ -245,8 +245,8 @@ impl Comparison {
         Ok(orders.into_iter().flatten().collect())
     }
 
-    /// Whether each of the levels that approach the reference is nearer to it than the one before, in
-    /// the mean force; `None` if one is not measured.
+    /// Whether each of the levels that approach the reference is nearer to it than the one before,
+    /// in the mean force; `None` if one is not measured.
     pub fn is_converging(&self) -> Option<bool> {
         let error_n = |level| {
             let variant = self.variants.iter().find(|variant| variant.level == Some(level))?;

@@ -13,8 +13,8 @@ use crate::sim::{Environment, Scene};
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Ticks per second compared with the last. A stage takes 20 ms to stop from an approach of 20 mm/s,
-/// and longer ticks than a quarter of that do not resolve it.
+/// Ticks per second compared with the last. A stage takes 20 ms to stop from an approach of 20
+/// mm/s, and longer ticks than a quarter of that do not resolve it.
 const TICKS_PER_S: [f64; 5] = [200.0, 500.0, 1000.0, 2000.0, 8000.0];
 
 /// Points of the skins compared with the last.
@@ -83,8 +83,8 @@ impl Order {
     }
 }
 
-/// In the time step: a dry finger stops up to a tick after the force that is detected as contact, so
-/// the error of the force is of first order.
+/// In the time step: a dry finger stops up to a tick after the force that is detected as contact,
+/// so the error of the force is of first order.
 ///
 /// # Errors
 /// If the touches cannot be made.
@@ -98,8 +98,8 @@ pub fn in_time_step(scene: &Scene, trials: &Trials) -> anyhow::Result<Option<Ord
     })
 }
 
-/// In the points of the skin, pressed as in `poses`: a midpoint rule over an area has an error of the
-/// order of a cell's area, one over the number of points.
+/// In the points of the skin, pressed as in `poses`: a midpoint rule over an area has an error of
+/// the order of a cell's area, one over the number of points.
 ///
 /// # Errors
 /// If a scene cannot be built.

@@ -108,9 +108,9 @@ pub struct Share {
 impl Share {
     /// Returns the share of the touches of several trials, or `None` without any.
     ///
-    /// The interval is that of Clopper and Pearson (1934) for the effective number of touches, which
-    /// are alike within a trial: their number over the ratio of the share's variance between trials
-    /// to that of independent touches (Korn and Graubard 1998).
+    /// The interval is that of Clopper and Pearson (1934) for the effective number of touches,
+    /// which are alike within a trial: their number over the ratio of the share's variance between
+    /// trials to that of independent touches (Korn and Graubard 1998).
     pub fn of(trials: &[Vec<bool>]) -> Option<Self> {
         let of = trials.iter().map(Vec::len).sum::<usize>();
         let count_of = |trial: &[bool]| trial.iter().filter(|is_counted| **is_counted).count();

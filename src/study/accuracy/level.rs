@@ -63,9 +63,9 @@ const fn shell(cells: [usize; 2], period_s: f64) -> Level {
     Level { shell: Some(cells), ..kinematic(Senses::Full, 0, period_s) }
 }
 
-/// All levels, one a line. The last six approach the last, the reference, in points and time step at
-/// once: how far each is from it says whether it has converged. They begin with ticks shorter than a
-/// tactile frame: ticks as long as a frame see every frame at the instant it is sampled.
+/// All levels, one a line. The last six approach the last, the reference, in points and time step
+/// at once: how far each is from it says whether it has converged. They begin with ticks shorter
+/// than a tactile frame: ticks as long as a frame see every frame at the instant it is sampled.
 pub const LEVELS: &[Level] = &[
     Level::new(Body::Cast, Senses::Rigid, 0, 0.01),
     rigid(Collision::Hull),

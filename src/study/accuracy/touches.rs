@@ -188,8 +188,8 @@ pub fn reference_load(simulator: &Simulator, ticks: &[Tick]) -> Option<Reference
     })
 }
 
-/// Wall times of touches of each scene, its sensors as noisy as they are: in turn, so that other load
-/// of the machine falls on all alike.
+/// Wall times of touches of each scene, its sensors as noisy as they are: in turn, so that other
+/// load of the machine falls on all alike.
 ///
 /// # Errors
 /// If a scene cannot be built or its body not be brought to its start.
@@ -220,8 +220,8 @@ pub fn wall_times_s<const N: usize>(
     Ok(times_s)
 }
 
-/// Bytes of a finger's skin, electrodes and one trial's memory of them; the mesh and its tree, which
-/// all variants of a scene share, are left out.
+/// Bytes of a finger's skin, electrodes and one trial's memory of them; the mesh and its tree,
+/// which all variants of a scene share, are left out.
 pub fn finger_bytes(environment: &Environment) -> usize {
     let Some(tip) = environment.fingertip() else { return 0 };
     tip.bytes() + FingertipState::new(tip, &seed::stream(0, 0, "finger")).bytes()

@@ -69,8 +69,8 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// The reference, which is the finest level, then `scene` as it is and every other level that this
-    /// build can simulate.
+    /// The reference, which is the finest level, then `scene` as it is and every other level that
+    /// this build can simulate.
     pub fn levels(scene: &Scene) -> Vec<(Self, Scene)> {
         let of_level = |level: &Level| {
             let variant = Self { level: Some(*level), ..Self::named(level.name()) };
@@ -82,8 +82,8 @@ impl Variant {
         variants
     }
 
-    /// The reference, which is `scene` as it is, then the same with each effect switched alone: those
-    /// that it has, and all others that its body can have.
+    /// The reference, which is `scene` as it is, then the same with each effect switched alone:
+    /// those that it has, and all others that its body can have.
     pub fn effects(scene: &Scene) -> Vec<(Self, Scene)> {
         let mut variants = vec![(Self::named(AS_IT_IS.into()), scene.clone())];
         for switch in switches() {

@@ -27,8 +27,8 @@ pub enum Relevance {
 }
 
 impl Relevance {
-    /// Returns the relevance of a change with this 95 % interval: whether it lies within `margin` on
-    /// both sides, or beyond it.
+    /// Returns the relevance of a change with this 95 % interval: whether it lies within `margin`
+    /// on both sides, or beyond it.
     pub fn of_change(interval: Option<[f64; 2]>, margin: Option<f64>) -> Self {
         match interval.zip(margin) {
             Some(([low, high], margin)) if low > -margin && high < margin => Self::NotNeeded,
@@ -47,7 +47,8 @@ impl Relevance {
     }
 }
 
-/// RMSE of `active` minus that of `random`, m, trial by trial; `None` where one of them did not end.
+/// RMSE of `active` minus that of `random`, m, trial by trial; `None` where one of them did not
+/// end.
 ///
 /// # Errors
 /// If the scene cannot be built.
