@@ -5,9 +5,9 @@ use crate::backend::ros::message::{DiagnosticStatus, JointState, Time};
 use crate::backend::ros::topics::Topic;
 use crate::backend::ros::transport::Packet;
 use crate::math::seed;
-use crate::sim::finger::noise::normal;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use std::collections::VecDeque;
 
 /// A failure by name.
@@ -81,7 +81,7 @@ pub static FAILURES: &[Failure] = &[
         if let Packet::Wrench(message) = packet {
             let force = &mut message.wrench.force;
             for part in [&mut force.x, &mut force.y, &mut force.z] {
-                *part += NOISE_N * normal(&mut memory.rng);
+                *part += NOISE_N * Distribution::<f64>::sample(&StandardNormal, &mut memory.rng);
             }
         }
         true
