@@ -29,20 +29,16 @@
 //! +x distal, −z out of the pad. `p_WC` names the point C in frame W, `X_WT` the pose of T in W,
 //! `R_WT` its attitude; in code they are written `p_wc`, `x_wt`, `r_wt`.
 
-pub mod backend;
 pub mod cli;
-pub mod config;
-pub mod error;
 pub mod experiment;
-pub mod explore;
-pub mod files;
-pub mod geometry;
-pub mod gp;
-pub mod math;
 pub mod report;
-pub mod robot;
 pub mod sim;
 pub mod study;
-pub mod task;
-pub mod twin;
-pub mod words;
+
+pub use palpate_explore as explore;
+pub use palpate_explore::{backend, robot, task};
+pub use palpate_geometry as geometry;
+pub use palpate_gp as gp;
+pub use palpate_gp::math;
+pub use palpate_input::{config, error, files, words};
+pub use palpate_ros as ros;

@@ -4,6 +4,6 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     #[cfg(feature = "ros1")]
-    palpate::backend::ros::spare_certificates();
+    palpate_ros::spare_certificates();
     palpate::cli::main(env!("PALPATE_COMMIT"))
 }

@@ -7,11 +7,11 @@ use super::terminal::Talk;
 use super::terminal::{Ending, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::truth::scan_truth::read_cloud;
-use crate::explore::registration::icp::align;
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::import::import;
-use crate::math::pose::pose;
 use crate::sim::scene::Unit;
+use palpate_explore::registration::icp::align;
+use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::import::import;
+use palpate_gp::math::pose::pose;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

@@ -4,13 +4,13 @@ use super::output::Force;
 use super::terminal::{Ending, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
-use crate::gp::posterior::Scratch;
 use crate::report::points::Points;
 use crate::report::replay::{self, Replay};
 use crate::report::{figures, files, style, whole};
-use crate::task::zone::grid_triangles;
 use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
+use palpate_explore::task::zone::grid_triangles;
+use palpate_gp::posterior::Scratch;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

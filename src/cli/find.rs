@@ -1,7 +1,7 @@
 //! Experiments and scenes by name: `bird` for `experiments/bird.toml`.
 
-use crate::words;
 use anyhow::bail;
+use palpate_input::words;
 use std::path::{Path, PathBuf};
 
 /// Folder of the experiments that come with the program.

@@ -1,8 +1,8 @@
 //! The program around the command line: the binary, or one that runs it inside itself.
 
-use crate::explore::planner::PlannerFactory;
+use palpate_explore::planner::PlannerFactory;
 
-/// Makes the planner of an [own](crate::explore::planner::is_own) name, or says why it cannot;
+/// Makes the planner of an [own](palpate_explore::planner::is_own) name, or says why it cannot;
 /// returns `None` if the program has no such planners.
 pub type Bring<'a> = dyn Fn(&str) -> Option<anyhow::Result<Box<dyn PlannerFactory>>> + 'a;
 

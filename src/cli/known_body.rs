@@ -1,8 +1,8 @@
 //! A ball or a plate on the command line.
 
-use crate::explore::registration::KnownBody;
 use anyhow::Context;
 use nalgebra::{UnitVector3, Vector3};
+use palpate_explore::registration::KnownBody;
 
 #[derive(clap::Args)]
 pub(super) struct KnownBodyArgs {

@@ -4,14 +4,14 @@ use super::output::{Force, make_folder};
 use super::terminal::{Ending, print};
 use crate::experiment::experiment::is_plain;
 use crate::experiment::store::write_whole;
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::import::import_with;
-use crate::geometry::mesh::Mesh;
-use crate::math::pose::pose;
 use crate::sim::placement::{self, Facing, Found, Side, Up};
 use crate::sim::scene::Unit;
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
+use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::import::import_with;
+use palpate_geometry::mesh::Mesh;
+use palpate_gp::math::pose::pose;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]

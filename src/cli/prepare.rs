@@ -3,11 +3,11 @@
 
 use super::patience::with_patience;
 use super::terminal::Talk;
-use crate::backend::ros::arm::Lab;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
 use anyhow::{Context, ensure};
+use palpate_ros::arm::Lab;
 use std::path::Path;
 use std::sync::Arc;
 

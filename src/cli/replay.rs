@@ -2,11 +2,11 @@
 
 use super::prepare::simulation;
 use super::terminal::{Ending, Talk, print};
-use crate::backend::recording::Recorded;
 use crate::experiment::trial::recorded_trial::parts;
 use crate::experiment::trial::replay::{self, Difference, Replay};
-use crate::words::brief;
 use anyhow::Context;
+use palpate_input::words::brief;
+use palpate_ros::recording::Recorded;
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -5,14 +5,14 @@ use super::output::{Force, make_folder};
 use super::prepare::{environment, needs_zone, simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
-use crate::backend::Fault;
 use crate::experiment::store::write_whole;
 use crate::experiment::truth::scan;
-use crate::explore::probe::Touch;
 use crate::report::points::Points;
 use crate::report::{files, scan as drawing};
 use crate::sim::Scene;
 use anyhow::Context;
+use palpate_explore::backend::Fault;
+use palpate_explore::probe::Touch;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]

@@ -10,18 +10,18 @@ use crate::experiment::notice;
 use crate::experiment::store;
 use crate::experiment::store::Run;
 use crate::experiment::truth::Truth;
-use crate::files;
-use crate::geometry::import::import_with;
-use crate::geometry::spread::directions;
 use crate::report;
 use crate::report::files::png;
 use crate::report::solid;
 use crate::sim::environment::Shape;
 use crate::sim::scene::Unit;
 use crate::sim::{Environment, Scene, mjcf};
-use crate::task::{Ball, DIRECTIONS};
 use anyhow::{Context, bail, ensure};
 use nalgebra::{Point3, UnitVector3};
+use palpate_explore::task::{Ball, DIRECTIONS};
+use palpate_geometry::import::import_with;
+use palpate_geometry::spread::directions;
+use palpate_input::files;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]

@@ -4,18 +4,18 @@ use super::find::{SCENES, find};
 use super::prepare::simulation;
 use super::show::is_experiment;
 use super::terminal::{Ending, Talk, print};
-use crate::backend::Fault;
-use crate::backend::watched::{Sight, Watched};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};
 use crate::experiment::trial::row::TrialRow;
-use crate::explore::planner;
-use crate::explore::planner::PLANNERS;
-use crate::explore::probe::servo::Servo;
-use crate::explore::probe::{Probe, Swept, Touch};
 use crate::sim::Scene;
-use crate::task::Approach;
 use anyhow::{Context, bail};
+use palpate_explore::backend::Fault;
+use palpate_explore::backend::watched::{Sight, Watched};
+use palpate_explore::planner;
+use palpate_explore::planner::PLANNERS;
+use palpate_explore::probe::servo::Servo;
+use palpate_explore::probe::{Probe, Swept, Touch};
+use palpate_explore::task::Approach;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

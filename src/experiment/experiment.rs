@@ -4,19 +4,19 @@
 //! may change on a finished run. More trials and other planners are run beside the rows that are
 //! there; rows of trials or planners that are no longer listed are kept, but not shown.
 
-use crate::backend::ros::settings::{BackendKind, BackendSettings};
-use crate::config::{Checked, ConfigError, Loader, Rules, is_default};
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};
 use crate::experiment::report_settings::{ReportSettings, TOUCHES_MAX};
 use crate::experiment::trial::entrant::{self, ORACLE};
 use crate::experiment::trial::row::TrialId;
 use crate::experiment::truth::scan_truth::ScanTruth;
-use crate::explore::around::SpaceSettings;
-use crate::explore::gp_settings::GpSettings;
-use crate::explore::planner;
-use crate::explore::planner::PlanningSettings;
-use crate::robot::arm::ArmSettings;
 use crate::sim::Scene;
+use palpate_explore::around::SpaceSettings;
+use palpate_explore::gp_settings::GpSettings;
+use palpate_explore::planner;
+use palpate_explore::planner::PlanningSettings;
+use palpate_explore::robot::arm::ArmSettings;
+use palpate_input::config::{Checked, ConfigError, Loader, Rules, is_default};
+use palpate_ros::settings::{BackendKind, BackendSettings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;

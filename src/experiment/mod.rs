@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use palpate::experiment::{Experiment, Simulation, measure};
-//! use palpate::explore::planner;
+//! use palpate_explore::planner;
 //!
 //! # let folder = env!("CARGO_MANIFEST_DIR");
 //! # std::env::set_current_dir(folder)?;

@@ -7,7 +7,7 @@ use crate::experiment::measure::{CENTRED_R, Measure, R};
 use crate::experiment::statistics::summary;
 use crate::experiment::trial::row::{TrialRow, of_planner};
 use crate::experiment::truth::Truth;
-use crate::task::Zone;
+use palpate_explore::task::Zone;
 
 /// Share of places or touches below which they are few.
 // heuristic: a quarter.

@@ -1,8 +1,8 @@
 //! Settings that a real robot needs and that a simulation takes from its mesh.
 
-use crate::backend::ros::settings::BackendKind;
-use crate::error::Invalid;
 use crate::experiment::experiment::Experiment;
+use palpate_input::error::Invalid;
+use palpate_ros::settings::BackendKind;
 
 /// Whether `experiment` says what a real robot needs; one that is simulated needs nothing. Where
 /// the body that is touched is known, the depths are known from it: `is_known` leaves them out.

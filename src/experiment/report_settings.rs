@@ -1,8 +1,8 @@
 //! What the report of a run shows. It decides no row, so it may change on a finished run.
 
-use crate::config::{Checked, Rules};
 use crate::experiment::measure::MEASURES;
 use crate::experiment::trial::entrant;
+use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,14 +1,14 @@
 //! Trials × planners: simulated ones on all cores, those of a real arm one after another.
 
-use crate::backend::Fault;
-use crate::backend::pace;
-use crate::error::Invalid;
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{Entry, JOURNAL, Journal, RunError, RunFolder};
 use crate::experiment::trial::Touched;
 use crate::experiment::trial::entrant::Entrant;
 use crate::experiment::trial::recorded_trial::{self, next_part, recording_path};
 use crate::experiment::trial::row::{TrialId, TrialRow};
+use palpate_explore::backend::Fault;
+use palpate_explore::backend::pace;
+use palpate_input::error::Invalid;
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, ParallelBridge, ParallelIterator,
 };

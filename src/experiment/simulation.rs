@@ -1,9 +1,5 @@
 //! From an experiment to its trials: the one way that everything goes which runs a simulation.
 
-use crate::backend::ros::arm::Lab;
-use crate::backend::ros::settings::BackendKind;
-use crate::backend::{Backend, Fault, LinkFault};
-use crate::error::Invalid;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::notice;
@@ -12,13 +8,17 @@ use crate::experiment::trial::entrant::{Entrant, ORACLE};
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::trial::{self, GroundTruth, TrialObserver};
 use crate::experiment::truth::Truth;
-use crate::explore::planner::{self, PlannerFactory};
-use crate::explore::probe::Probe;
-use crate::explore::probe::servo::Servo;
-use crate::math::seed;
 use crate::sim::Environment;
 use crate::sim::simulator::Simulator;
-use crate::task::Task;
+use palpate_explore::backend::{Backend, Fault, LinkFault};
+use palpate_explore::planner::{self, PlannerFactory};
+use palpate_explore::probe::Probe;
+use palpate_explore::probe::servo::Servo;
+use palpate_explore::task::Task;
+use palpate_gp::math::seed;
+use palpate_input::error::Invalid;
+use palpate_ros::arm::Lab;
+use palpate_ros::settings::BackendKind;
 use rand::RngExt;
 use std::sync::Arc;
 

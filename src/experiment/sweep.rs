@@ -1,7 +1,7 @@
 //! Several experiments in one file: every combination of the values in its table `[sweep]`.
 
-use crate::config::{ConfigError, Loader};
 use crate::experiment::experiment::{Experiment, SWEEP, is_plain};
+use palpate_input::config::{ConfigError, Loader};
 use std::path::Path;
 use toml::Value;
 

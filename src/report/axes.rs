@@ -3,7 +3,7 @@
 use super::canvas::{Anchor, Area, Canvas, PointPx};
 use super::style;
 use super::style::{FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
-use crate::task::Zone;
+use palpate_explore::task::Zone;
 
 /// A unit of length for labels.
 #[derive(Clone, Copy, Debug)]

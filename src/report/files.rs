@@ -4,8 +4,8 @@
 //! every machine.
 
 use crate::experiment::store::write_whole;
-use crate::files;
 use anyhow::{Context, anyhow};
+use palpate_input::files;
 use png::{ColorType, Encoder};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree, fontdb};

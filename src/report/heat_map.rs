@@ -2,7 +2,7 @@
 
 use super::canvas::{Area, Canvas, number};
 use super::style;
-use crate::task::Zone;
+use palpate_explore::task::Zone;
 
 /// About the size of a cell in pixels.
 const CELL_PX: f64 = 4.0;

@@ -53,7 +53,7 @@ pub fn write_tables(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Re
 /// If the rows do not belong to the experiment, or a file cannot be written.
 pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()> {
     let figures = folder.join(FIGURES_FOLDER);
-    crate::files::make_folder(&figures).with_context(|| figures.display().to_string())?;
+    palpate_input::files::make_folder(&figures).with_context(|| figures.display().to_string())?;
     let mut drawings = Vec::new();
     for figure in FIGURES {
         let path = figures.join(figure.name);
@@ -65,7 +65,8 @@ pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()
         }
         drawings.extend(svg.map(|svg| (figure, svg)));
     }
-    let text = |name| crate::files::text(&folder.join(name), crate::files::TEXT_MAX).ok();
+    let text =
+        |name| palpate_input::files::text(&folder.join(name), palpate_input::files::TEXT_MAX).ok();
     let (settings, manifest) = (text(RESOLVED), text(MANIFEST));
     let explorer = match run.experiment.scene.around {
         None => explorer::section(run)?,

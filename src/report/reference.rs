@@ -1,10 +1,10 @@
 //! The reference of settings and files, drawn from the types that read and write them.
 
-use crate::config::Rules;
 use crate::experiment::Experiment;
 use crate::experiment::measure::{Direction, MEASURES};
 use crate::experiment::trial::row::TrialRow;
 use crate::report::table::{Cell, Column, Table};
+use palpate_input::config::Rules;
 use schemars::{JsonSchema, schema_for};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -239,7 +239,7 @@ pub fn rows() -> String {
     let touch = record::<crate::experiment::trial::row::TouchRow>();
     let metrics = record::<crate::experiment::measure::metrics::Metrics>();
     let shape = record::<crate::experiment::measure::shape::ShapeMetrics>();
-    let fit = record::<crate::gp::fit::Fit>();
+    let fit = record::<palpate_gp::fit::Fit>();
     format!(
         "{}\nEach of `touches`:\n\n{touch}\nIts `metrics`:\n\n{metrics}\nIts `shape`:\n\n{shape}\n\
          Its `fit`:\n\n{fit}",

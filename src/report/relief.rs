@@ -4,8 +4,8 @@ use super::axes::{Axis, Length, rounded};
 use super::camera::{AZIMUTH_DEG, Camera};
 use super::canvas::{Anchor, Area, Canvas, PointPx, pair};
 use super::style::{self, FAINT_INK, SMALL_PX};
-use crate::geometry::mesh::Mesh;
 use nalgebra::Vector3;
+use palpate_geometry::mesh::Mesh;
 
 /// Whence light falls: from the front, so that no relief is dark, and from the viewer's side.
 const LIGHT: Vector3<f64> = Vector3::new(0.45, 0.7, 0.55);

@@ -4,15 +4,15 @@ use crate::experiment::Experiment;
 use crate::experiment::measure::metrics::Metrics;
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
-use crate::explore::belief::HeightField;
-use crate::explore::probe::{Contact, Swept, Touch};
-use crate::gp::Posterior;
 use crate::report::canvas::{Canvas, PointPx};
 use crate::report::number::digits;
 use crate::report::style::{self, INITIAL, LATER};
-use crate::task::Zone;
 use anyhow::{Context, ensure};
 use nalgebra::{Point3, Vector3};
+use palpate_explore::belief::HeightField;
+use palpate_explore::probe::{Contact, Swept, Touch};
+use palpate_explore::task::Zone;
+use palpate_gp::Posterior;
 
 /// One planner's belief after some touches of the trial that the report draws.
 pub struct Replay<'a> {

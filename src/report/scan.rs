@@ -5,9 +5,9 @@ use super::axes::{Axis, Length, height_bar};
 use super::canvas::{Area, Canvas};
 use super::relief::{Relief, ReliefPanel, Space, brightness};
 use super::style::{self, LATER};
-use crate::geometry::mesh::Mesh;
-use crate::task::Zone;
 use nalgebra::{Point3, Vector3};
+use palpate_explore::task::Zone;
+use palpate_geometry::mesh::Mesh;
 
 /// Sizes of a panel of a scene and of a scan.
 const ZONE_PX: (f64, f64) = (560.0, 560.0);

@@ -8,13 +8,13 @@ use crate::experiment::Experiment;
 use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
-use crate::explore::around::{ImplicitSurface, Scope};
-use crate::explore::probe::{Contact, Swept, Touch};
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::coarse::coarse;
-use crate::task::Task;
 use anyhow::{Context, ensure};
 use nalgebra::{Point3, Vector3};
+use palpate_explore::around::{ImplicitSurface, Scope};
+use palpate_explore::probe::{Contact, Swept, Touch};
+use palpate_explore::task::Task;
+use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::coarse::coarse;
 
 /// Triangles of a surface that is drawn; chosen, so that a page stays a few megabytes.
 const TRIANGLES: usize = 3000;

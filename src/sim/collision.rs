@@ -1,6 +1,6 @@
 //! As what the object is met by a finger without skin, which MuJoCo lets collide.
 
-use crate::config::{Checked, Rules};
+use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -3,21 +3,21 @@
 use super::function::Function;
 use super::notice;
 use super::scene::{Body, Object, Scene, Unit};
-use crate::error::Invalid;
-use crate::explore::probe::servo::ArmReach;
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::implicit::Implicit;
-use crate::geometry::import::import_with;
-use crate::geometry::mesh::Mesh;
-use crate::geometry::report::MeshReport;
-use crate::geometry::surfaces;
-use crate::robot::Robot;
-use crate::robot::arm::stage::{stage, stage_with_wrist};
-use crate::robot::arm::{ArmSettings, Chain, model};
-use crate::robot::finger::shape::BIOTAC_RADIUS_M;
 use crate::sim::finger::Fingertip;
-use crate::task::{Approach, Around, Ball, RADIUS_M, Region, Task, Zone};
 use nalgebra::{Point3, Vector3};
+use palpate_explore::probe::servo::ArmReach;
+use palpate_explore::robot::Robot;
+use palpate_explore::robot::arm::stage::{stage, stage_with_wrist};
+use palpate_explore::robot::arm::{ArmSettings, Chain, model};
+use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
+use palpate_explore::task::{Approach, Around, Ball, RADIUS_M, Region, Task, Zone};
+use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::implicit::Implicit;
+use palpate_geometry::import::import_with;
+use palpate_geometry::mesh::Mesh;
+use palpate_geometry::report::MeshReport;
+use palpate_geometry::surfaces;
+use palpate_input::error::Invalid;
 use std::borrow::Cow;
 
 /// A scene with its mesh loaded and its search tree built.

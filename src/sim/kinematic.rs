@@ -1,10 +1,10 @@
 //! An arm or stage that moves exactly as commanded, carrying the soft finger.
 
 use super::simulated_finger::SimulatedFinger;
-use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
-use crate::robot::arm::{Chain, Joints};
-use crate::robot::finger::TipMotion;
 use crate::sim::Environment;
+use palpate_explore::backend::{Backend, Capabilities, Command, Fault, Reading, Wrench};
+use palpate_explore::robot::arm::{Chain, Joints};
+use palpate_explore::robot::finger::TipMotion;
 use std::sync::Arc;
 
 /// No masses, no servo: joint positions are the sum of the velocities commanded.

@@ -2,14 +2,14 @@
 
 use super::environment::{Environment, Shape, missing};
 use super::scene::{Body, Object, Scene, Unit};
-use crate::error::Invalid;
-use crate::explore::registration::{KnownBody, design};
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::mesh::Mesh;
-use crate::geometry::solids::{Triangles, ball, block};
-use crate::math::pose::parts;
-use crate::task::Zone;
 use nalgebra::Point3;
+use palpate_explore::registration::{KnownBody, design};
+use palpate_explore::task::Zone;
+use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::mesh::Mesh;
+use palpate_geometry::solids::{Triangles, ball, block};
+use palpate_gp::math::pose::parts;
+use palpate_input::error::Invalid;
 
 /// Rings of a ball; chosen: its facets lie within 2 µm of a ball of 20 mm.
 const RINGS: u32 = 180;

@@ -2,11 +2,11 @@
 //! notice says so and how to change it.
 
 use super::scene::Unit;
-use crate::geometry::spread::directions;
-use crate::robot::finger::shape::BIOTAC_RADIUS_M;
-use crate::task::{DIRECTIONS, Task, Zone};
 use clap::ValueEnum;
 use nalgebra::{Point3, UnitVector3, Vector2};
+use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
+use palpate_explore::task::{DIRECTIONS, Task, Zone};
+use palpate_geometry::spread::directions;
 
 /// A soft finger without tables has those of a BioTac.
 pub(super) const DEFAULT_FINGER: &str = "the scene names no effects: its finger has the default \

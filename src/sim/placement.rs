@@ -1,11 +1,11 @@
 //! Where a mesh that nobody has prepared could stand, and which zone of it could be explored.
 
 use super::scene::Unit;
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::mesh::Mesh;
-use crate::task::Zone;
 use clap::ValueEnum;
 use nalgebra::{Matrix3, Rotation3, Vector3};
+use palpate_explore::task::Zone;
+use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::mesh::Mesh;
 
 /// A side of an object, as somebody names it who sees its front upright.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]

@@ -1,14 +1,14 @@
 //! Probes whose scenes ask for no dynamics.
 
-use crate::backend::Fault;
-use crate::explore::probe::{Contact, Probe, Swept, Touch, refuse_unless_finite};
-use crate::geometry::bvh::SweepHit;
-use crate::geometry::sweep::Capsule;
 use crate::sim::Environment;
 use crate::sim::environment::{CLEARANCE_M, Shape};
-use crate::task::Approach;
-use crate::task::approach::BEYOND_M;
 use nalgebra::{Isometry3, Point3, Vector3};
+use palpate_explore::backend::Fault;
+use palpate_explore::probe::{Contact, Probe, Swept, Touch, refuse_unless_finite};
+use palpate_explore::task::Approach;
+use palpate_explore::task::approach::BEYOND_M;
+use palpate_geometry::bvh::SweepHit;
+use palpate_geometry::sweep::Capsule;
 use std::sync::Arc;
 
 /// Touches whatever stands in `environment`, exactly and at once.

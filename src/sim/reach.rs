@@ -6,10 +6,10 @@
 
 use super::environment::{CLEARANCE_M, Shape};
 use super::probe::rest;
-use crate::robot::finger::shape::Front;
 use crate::sim::Environment;
 use crate::sim::scene::Body;
-use crate::task::Zone;
+use palpate_explore::robot::finger::shape::Front;
+use palpate_explore::task::Zone;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 

@@ -2,18 +2,18 @@
 
 use super::function::Function;
 use super::solver::SolverSettings;
-use crate::config::{Checked, ConfigError, Loader, Rules, is_default};
-use crate::geometry::surfaces;
-use crate::math::pose::pose;
-use crate::robot::arm::ArmSettings;
-use crate::robot::finger::Finger;
-use crate::robot::finger::profile::Profile;
 use crate::sim::finger::Effects;
 use crate::sim::finger::effects::sensor;
-use crate::task::Around;
-use crate::task::touch::TouchSettings;
-use crate::task::zone::Zone;
 use nalgebra::Isometry3;
+use palpate_explore::robot::arm::ArmSettings;
+use palpate_explore::robot::finger::Finger;
+use palpate_explore::robot::finger::profile::Profile;
+use palpate_explore::task::Around;
+use palpate_explore::task::touch::TouchSettings;
+use palpate_explore::task::zone::Zone;
+use palpate_geometry::surfaces;
+use palpate_gp::math::pose::pose;
+use palpate_input::config::{Checked, ConfigError, Loader, Rules, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;

@@ -1,15 +1,15 @@
 //! What the simulated finger feels of the scene's object, for every simulated body.
 
-use crate::backend::{Fault, IdealContact, Reading, Sample, Wrench};
-use crate::math::seed;
-use crate::robot::finger::Frame;
-use crate::robot::finger::TipMotion;
 use crate::sim::Environment;
 use crate::sim::environment::Shape;
 use crate::sim::finger::effects::registration::Registration;
 use crate::sim::finger::effects::wrench::Gauge;
 use crate::sim::finger::{Fingertip, FingertipState, Load};
 use nalgebra::{Isometry3, Vector6};
+use palpate_explore::backend::{Fault, IdealContact, Reading, Sample, Wrench};
+use palpate_explore::robot::finger::Frame;
+use palpate_explore::robot::finger::TipMotion;
+use palpate_gp::math::seed;
 use std::sync::Arc;
 
 /// Forces below this have no place; far below any that is detected (chosen).

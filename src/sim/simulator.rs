@@ -6,16 +6,16 @@ use super::kinematic::Kinematic;
 use super::mujoco;
 use super::notice;
 use super::probe::exact;
-use crate::backend::delay::Delayed;
-use crate::backend::interlock::InterlockSettings;
-use crate::backend::{Backend, Fault};
-use crate::error::Invalid;
-use crate::explore::probe::Probe;
-use crate::explore::probe::interlocks::interlocked;
-use crate::explore::probe::servo::{Servo, check_reach};
-use crate::geometry::distance::OrientedBox;
 use crate::sim::Environment;
 use crate::sim::scene::Body;
+use palpate_explore::backend::delay::Delayed;
+use palpate_explore::backend::interlock::InterlockSettings;
+use palpate_explore::backend::{Backend, Fault};
+use palpate_explore::probe::Probe;
+use palpate_explore::probe::interlocks::interlocked;
+use palpate_explore::probe::servo::{Servo, check_reach};
+use palpate_geometry::distance::OrientedBox;
+use palpate_input::error::Invalid;
 use std::sync::Arc;
 
 /// An environment with everything ready to put bodies into it.
@@ -143,7 +143,7 @@ impl Simulator {
             Body::Dynamic => {
                 let words =
                     format!("{} needs a build with the feature `mujoco`", Body::Dynamic.name());
-                return Err(crate::error::Invalid::new(words).into());
+                return Err(palpate_input::error::Invalid::new(words).into());
             }
         };
         let timing = self.environment.scene().effects.timing.as_ref();

@@ -1,7 +1,7 @@
 //! How a body with masses is integrated over time.
 
 use super::collision::{Collision, Sdf};
-use crate::config::{Checked, Rules};
+use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

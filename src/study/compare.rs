@@ -6,13 +6,13 @@
 //! different sizes count alike. Less is better, and the reference has 1.
 
 use super::check::judged::JUDGED;
-use crate::error::Invalid;
 use crate::experiment::measure::outline::TENTHS;
 use crate::experiment::statistics::equal_error::Estimate;
 use crate::experiment::statistics::{mean, percentiles_95, resampled_within};
 use crate::experiment::store::Run;
 use crate::experiment::trial::entrant::ORACLE;
 use crate::experiment::trial::row::{TouchRow, TrialRow, of_planner};
+use palpate_input::error::Invalid;
 use std::collections::HashMap;
 
 /// The planner that gains nothing; the [`ORACLE`] gains all that can be.

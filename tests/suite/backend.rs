@@ -3,11 +3,11 @@
 use crate::common::shipped;
 use palpate::backend::delay::Delayed;
 use palpate::backend::interlock::{InterlockSettings, Interlocked, Site};
-use palpate::backend::recording::{About, Recorder, Recording, wall_clock};
 use palpate::backend::watched::Watched;
 use palpate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use palpate::robot::arm::Chain;
 use palpate::robot::{Finger, Robot};
+use palpate::ros::recording::{About, Recorder, Recording, wall_clock};
 use palpate::sim::Environment;
 use palpate::sim::simulator::Simulator;
 use std::sync::Arc;

@@ -1,30 +1,31 @@
-//! The floor plan: a room imports only from rooms below its own, and no files import each other in
-//! a circle.
+//! Layers: inside a package a module imports only from lower layers, and no files import each other in
+//! a circle. Between packages the compiler sees to both.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Rooms of `src`, lowest floor first; the rooms of a floor know nothing of each other.
-const FLOORS: [&[&str]; 11] = [
-    &["files", "words"],
-    &["error"],
-    &["geometry", "config", "math"],
-    &["robot", "gp"],
-    &["task", "backend"],
-    &["explore"],
-    &["sim"],
-    &["experiment", "twin"],
-    &["study"],
-    &["report"],
-    &["cli"],
+/// Layers of a package's modules, lowest first; modules of one layer do not import each other. All modules
+/// that are not named are one layer above those that are.
+const LAYERS: [(&str, &[&[&str]]); 6] = [
+    ("palpate_input", &[&["files", "words"], &["error"]]),
+    ("palpate_gp", &[&["math"]]),
+    ("palpate_geometry", &[]),
+    ("palpate_explore", &[&["robot"], &["task", "backend"]]),
+    ("palpate_ros", &[]),
+    ("palpate", &[&["sim"], &["experiment"], &["study"], &["report"], &["cli"]]),
 ];
 
-/// A module by its path below the crate's root.
+/// A module by its path: its package, then the modules below.
 type Module = Vec<String>;
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+/// The folder with a package's sources.
+fn folder(package: &str) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    match package {
+        "palpate" => root.join("src"),
+        _ => root.join("crates").join(package.replace('_', "-")).join("src"),
+    }
 }
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
@@ -50,21 +51,23 @@ struct Tree {
 
 impl Tree {
     fn read() -> Self {
-        let root = root();
         let mut texts = BTreeMap::new();
-        for path in sources(&root) {
-            let below = path.strip_prefix(&root).unwrap().with_extension("");
-            let mut module: Module =
-                below.iter().map(|part| part.to_str().unwrap().to_owned()).collect();
-            match module.last().map(String::as_str) {
-                Some("main") => continue,
-                Some("mod" | "lib") => drop(module.pop()),
-                _ => {}
+        for (package, _) in LAYERS {
+            let root = folder(package);
+            for path in sources(&root) {
+                let below = path.strip_prefix(&root).unwrap().with_extension("");
+                let mut module: Module = vec![package.to_owned()];
+                module.extend(below.iter().map(|part| part.to_str().unwrap().to_owned()));
+                match module.last().map(String::as_str) {
+                    Some("main") => continue,
+                    Some("mod" | "lib") => drop(module.pop()),
+                    _ => {}
+                }
+                let text = fs::read_to_string(&path).unwrap();
+                let text = text.split("#[cfg(test)]\nmod tests").next().unwrap();
+                let code = |line: &str| line.split("//").next().unwrap().to_owned() + "\n";
+                texts.insert(module, text.lines().map(code).collect());
             }
-            let text = fs::read_to_string(&path).unwrap();
-            let text = text.split("#[cfg(test)]\nmod tests").next().unwrap();
-            let code = |line: &str| line.split("//").next().unwrap().to_owned() + "\n";
-            texts.insert(module, text.lines().map(code).collect());
         }
         let mut tree = Self { texts, passed_on: BTreeMap::new() };
         for module in tree.texts.keys().cloned().collect::<Vec<_>>() {
@@ -79,7 +82,7 @@ impl Tree {
         tree
     }
 
-    /// What a module names of this crate, by path from the root, and whether it passes it on.
+    /// The paths of our packages that a module names, and whether it passes each on.
     fn imports(&self, module: &Module) -> Vec<(bool, Module)> {
         let mut found = Vec::new();
         let mut rest = String::new();
@@ -108,7 +111,8 @@ impl Tree {
         let path = path.split(" as ").next().unwrap();
         let parts: Vec<&str> = path.split("::").filter(|part| !part.is_empty()).collect();
         let mut from = match parts.first() {
-            Some(&"crate") => Module::new(),
+            Some(&"crate") => module[..1].to_vec(),
+            Some(package) if LAYERS.iter().any(|(known, _)| known == package) => Module::new(),
             Some(&"super") => module.clone(),
             Some(&"self") => module.clone(),
             Some(first) => {
@@ -187,8 +191,11 @@ fn expanded(tree: &str) -> Vec<String> {
     parts.flat_map(|part| expanded(part)).map(|part| format!("{head}{part}")).collect()
 }
 
-fn floor(room: &str) -> usize {
-    FLOORS.iter().position(|rooms| rooms.contains(&room)).unwrap_or_else(|| panic!("{room}"))
+/// The layer of a module in its package.
+fn layer(module: &Module) -> usize {
+    let (_, layers) = LAYERS.iter().find(|(package, _)| *package == module[0]).unwrap();
+    let holds = |names: &&&[&str]| module.get(1).is_some_and(|name| names.contains(&name.as_str()));
+    layers.iter().position(|names| holds(&names)).unwrap_or(layers.len())
 }
 
 #[test]
@@ -196,10 +203,10 @@ fn imports_point_down() {
     let tree = Tree::read();
     let mut seen = 0;
     for (module, imports) in tree.edges() {
-        let Some(room) = module.first() else { continue };
-        for import in imports {
-            let other = &import[0];
-            let is_allowed = room == other || floor(other) < floor(room);
+        for import in imports.iter().filter(|import| import[0] == module[0] && import.len() > 1) {
+            let is_same = module.get(1) == import.get(1);
+            let are_above = layer(&module) == layer(import) && layer(import) == unnamed(&module[0]);
+            let is_allowed = is_same || are_above || layer(import) < layer(&module);
             assert!(is_allowed, "{} imports {}", module.join("/"), import.join("/"));
             seen += 1;
         }
@@ -207,26 +214,9 @@ fn imports_point_down() {
     assert!(seen > 400, "the test found only {seen} imports");
 }
 
-/// What compiles without `sim` runs on the real arm, and cannot see the truth.
-#[test]
-fn the_explorer_knows_nothing_of_the_simulator() {
-    let edges = Tree::read().edges();
-    let mut reached: BTreeSet<Module> = (edges.keys())
-        .filter(|module| module.first().is_some_and(|room| floor(room) <= floor("explore")))
-        .cloned()
-        .collect();
-    assert!(reached.len() > 60);
-    loop {
-        let more: BTreeSet<Module> = reached.iter().flat_map(|from| edges[from].clone()).collect();
-        let before = reached.len();
-        reached.extend(more);
-        if reached.len() == before {
-            break;
-        }
-    }
-    for module in reached {
-        assert!(floor(&module[0]) <= floor("explore"), "{}", module.join("/"));
-    }
+/// The layer of all modules of a package that [`LAYERS`] does not name.
+fn unnamed(package: &str) -> usize {
+    LAYERS.iter().find(|(known, _)| *known == package).unwrap().1.len()
 }
 
 #[test]
@@ -264,15 +254,16 @@ fn planners_see_the_belief_and_nothing_else() {
     let mut seen = 0;
     for (module, imports) in tree.edges() {
         let module_path = module.join("/");
-        if !module_path.starts_with("explore/planner") {
+        if !module_path.starts_with("palpate_explore/planner") {
             continue;
         }
-        let beliefs = ["explore/planner", "explore/belief", "explore/around", "explore/tour"];
-        let below = ["gp", "math", "config", "task"];
+        let beliefs = ["planner", "belief", "around", "tour", "task"];
+        let beliefs = beliefs.map(|module| format!("palpate_explore/{module}"));
+        let below = ["palpate_gp", "palpate_input"].map(String::from);
         let allowed = beliefs.iter().chain(&below);
         for import in imports {
             let path = import.join("/");
-            let is_allowed = allowed.clone().any(|room| path.starts_with(room));
+            let is_allowed = allowed.clone().any(|room| path.starts_with(room.as_str()));
             assert!(is_allowed, "{module_path} imports {path}");
             seen += 1;
         }
@@ -285,9 +276,11 @@ fn planners_see_the_belief_and_nothing_else() {
 fn reports_know_nothing_of_the_simulator() {
     let mut seen = 0;
     for (module, imports) in Tree::read().edges() {
-        if module.first().is_some_and(|room| room == "report") {
+        if module.join("/").starts_with("palpate/report") {
             for import in imports {
-                assert!(import[0] != "sim" && import[0] != "backend", "{module:?} {import:?}");
+                let path = import.join("/");
+                let is_body = path.starts_with("palpate_explore/backend");
+                assert!(!is_body && !path.starts_with("palpate/sim"), "{module:?} imports {path}");
                 seen += 1;
             }
         }
@@ -297,7 +290,7 @@ fn reports_know_nothing_of_the_simulator() {
 
 #[test]
 fn a_file_is_one_idea() {
-    for path in sources(&root()) {
+    for path in LAYERS.iter().flat_map(|(package, _)| sources(&folder(package))) {
         let text = fs::read_to_string(&path).unwrap();
         let lines = text.lines().count();
         assert!(lines <= 600, "{} has {lines} lines", path.display());
@@ -311,11 +304,23 @@ fn a_file_is_one_idea() {
 }
 
 #[test]
-fn every_folder_of_the_sources_is_a_room() {
-    for entry in fs::read_dir(root()).unwrap() {
+fn every_folder_of_the_program_is_a_layer() {
+    for entry in fs::read_dir(folder("palpate")).unwrap() {
         let path = entry.unwrap().path();
-        if path.is_dir() {
-            floor(path.file_name().unwrap().to_str().unwrap());
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        let module = vec!["palpate".to_owned(), name];
+        assert!(!path.is_dir() || layer(&module) < unnamed("palpate"), "{}", path.display());
+    }
+}
+
+/// The explorer cannot see the truth: no package below the program depends on it.
+#[test]
+fn no_package_below_depends_on_the_program() {
+    for (package, _) in LAYERS.iter().filter(|(package, _)| *package != "palpate") {
+        let manifest = fs::read_to_string(folder(package).join("../Cargo.toml")).unwrap();
+        for line in manifest.lines() {
+            let is_program = line.starts_with("palpate.") || line.starts_with("palpate =");
+            assert!(!is_program && !line.contains("mujoco"), "{package}: {line}");
         }
     }
 }
@@ -327,6 +332,9 @@ fn imports_are_read_whole() {
     let edges = Tree::read().edges();
     let path = |text: &str| -> Module { text.split('/').map(str::to_owned).collect() };
     // Through a name that a front page passes on, and through one in the midst of an expression.
-    assert!(edges[&path("explore/belief/height_field")].contains(&path("task/zone")));
+    assert!(
+        edges[&path("palpate_explore/belief/height_field")]
+            .contains(&path("palpate_explore/task/zone"))
+    );
     assert!(edges[&path("experiment/trial")].contains(&path("explore/belief")));
 }

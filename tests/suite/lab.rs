@@ -3,16 +3,16 @@
 
 use crate::common::lab::{CELL, EXPERIMENT, Network, TwinProcess, row};
 use palpate::backend::pace;
-use palpate::backend::ros::arm::Lab;
-use palpate::backend::ros::connect;
-use palpate::backend::ros::joints::JointNames;
-use palpate::backend::ros::link::{Link, Sink};
-use palpate::backend::ros::settings::{BackendKind, BackendSettings, MappingKind};
-use palpate::backend::ros::topics::{Service, Side};
-use palpate::backend::ros::transport::{Delivery, Packet};
 use palpate::experiment::{Experiment, Simulation};
 use palpate::explore::probe::Touch;
 use palpate::robot::arm::ArmSettings;
+use palpate::ros::arm::Lab;
+use palpate::ros::connect;
+use palpate::ros::joints::JointNames;
+use palpate::ros::link::{Link, Sink};
+use palpate::ros::settings::{BackendKind, BackendSettings, MappingKind};
+use palpate::ros::topics::{Service, Side};
+use palpate::ros::transport::{Delivery, Packet};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

@@ -3,11 +3,11 @@
 
 use crate::common::lab::{EXPERIMENT, Network, TwinProcess, journal, signal};
 use palpate::backend::pace;
-use palpate::backend::ros::connect;
-use palpate::backend::ros::joints::JointNames;
-use palpate::backend::ros::link::{Link, Sink};
-use palpate::backend::ros::topics::Side;
-use palpate::backend::ros::transport::Delivery;
+use palpate::ros::connect;
+use palpate::ros::joints::JointNames;
+use palpate::ros::link::{Link, Sink};
+use palpate::ros::topics::Side;
+use palpate::ros::transport::Delivery;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};

@@ -6,11 +6,6 @@ use crate::common::program::{MESH, command, ended, fails, said, succeeds};
 use crate::common::shipped;
 use mcap::MessageStream;
 use mcap::records::{MessageHeader, Record};
-use palpate::backend::recording::{
-    About, Ending, Marker, Player, Recorded, Recorder, Recording, Shape, TOPICS, Tick, Touch,
-    decoded,
-};
-use palpate::backend::ros::message::{BioTacHand, JointState, JointTrajectory, WrenchStamped};
 use palpate::backend::{
     Backend, Capabilities, Command, Fault, IdealContact, Reading, Sample, Wrench,
 };
@@ -21,6 +16,11 @@ use palpate::experiment::trial::row::TouchRow;
 use palpate::experiment::{Entrant, Experiment, Simulation};
 use palpate::explore::planner;
 use palpate::robot::finger::Frame;
+use palpate::ros::message::{BioTacHand, JointState, JointTrajectory, WrenchStamped};
+use palpate::ros::recording::{
+    About, Ending, Marker, Player, Recorded, Recorder, Recording, Shape, TOPICS, Tick, Touch,
+    decoded,
+};
 use palpate::sim::simulator::Simulator;
 use proptest::prelude::*;
 use std::collections::HashMap;

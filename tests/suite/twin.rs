@@ -4,13 +4,13 @@ use crate::common::hub::Hub;
 #[cfg(feature = "mujoco")]
 use crate::common::rig::ARM;
 use crate::common::rig::{Rig, STAGE, patient};
-use palpate::backend::ros::arm::Lab;
-use palpate::backend::ros::definition::Described;
-use palpate::backend::ros::message::{BiotacAll, Float64MultiArray};
-use palpate::backend::ros::settings::BackendSettings;
-use palpate::backend::ros::topics::{Service, Side};
 use palpate::explore::probe::Touch;
-use palpate::twin::serve::services;
+use palpate::ros::arm::Lab;
+use palpate::ros::definition::Described;
+use palpate::ros::message::{BiotacAll, Float64MultiArray};
+use palpate::ros::settings::BackendSettings;
+use palpate::ros::topics::{Service, Side};
+use palpate::ros::twin::serve::services;
 
 /// The contact by topics and by the body itself, for the same place.
 fn compare(scene: &str, settings: BackendSettings) {

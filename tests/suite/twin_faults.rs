@@ -6,10 +6,10 @@
 #[cfg(feature = "mujoco")]
 use crate::common::rig::{ARM, Rest};
 use crate::common::rig::{Rig, STAGE, patient};
-use palpate::backend::ros::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue};
-use palpate::backend::ros::settings::BackendSettings;
-use palpate::backend::ros::status::ArmStatus;
 use palpate::explore::probe::Touch;
+use palpate::ros::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue};
+use palpate::ros::settings::BackendSettings;
+use palpate::ros::status::ArmStatus;
 #[cfg(feature = "mujoco")]
 use std::sync::atomic::Ordering;
 use std::thread::sleep;

@@ -1,6 +1,6 @@
 //! How near a belief is to the true surface.
 
-use crate::math::normal::BAND_95;
+use palpate_gp::math::normal::BAND_95;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -187,7 +187,7 @@ mod tests {
             let (mut low, mut high) = (-9.0, 9.0);
             for _ in 0..60 {
                 let middle = 0.5 * (low + high);
-                let is_below = crate::math::normal::cumulative(middle) < share;
+                let is_below = palpate_gp::math::normal::cumulative(middle) < share;
                 if is_below { low = middle } else { high = middle }
             }
             (sd * low, sd * sd)

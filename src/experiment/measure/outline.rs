@@ -1,7 +1,7 @@
 //! How near the believed silhouette is to the object's own.
 
 use crate::experiment::truth::Truth;
-use crate::explore::presence::Presence;
+use palpate_explore::presence::Presence;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -6,7 +6,7 @@ pub mod curve_table;
 pub mod equal_error;
 pub mod summary;
 
-use crate::math::seed;
+use palpate_gp::math::seed;
 use rand::RngExt;
 
 /// A mean with its standard error, which a single value does not have.
@@ -186,7 +186,7 @@ impl Paired {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::seed::stream;
+    use palpate_gp::math::seed::stream;
 
     #[test]
     fn mean_error_and_median_are_the_textbooks() {

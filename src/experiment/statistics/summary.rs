@@ -4,9 +4,9 @@ use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{MEASURES, Measure};
 use crate::experiment::statistics::{mean, mean_and_error, median};
 use crate::experiment::trial::row::{TouchRow, TrialRow, of_planner};
-use crate::explore::planner::Stall;
-use crate::task::Zone;
 use nalgebra::Point3;
+use palpate_explore::planner::Stall;
+use palpate_explore::task::Zone;
 use serde::Serialize;
 
 /// One planner after one number of touches, over its trials.

@@ -1,8 +1,8 @@
 //! Files of a run's folder, written whole or not at all, and the error that names them.
 
-use crate::config::ConfigError;
-use crate::error::Invalid;
-use crate::files;
+use palpate_input::config::ConfigError;
+use palpate_input::error::Invalid;
+use palpate_input::files;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::{fs, io};

@@ -3,7 +3,7 @@
 
 use super::files::{RunError, io_error};
 use crate::experiment::trial::row::TouchRow;
-use crate::files;
+use palpate_input::files;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::Write;

@@ -5,7 +5,7 @@ use super::provenance::Content;
 use super::rows;
 use super::surface::{self, SURFACE};
 use super::{RunFolder, TRIALS, resolved};
-use crate::error::Invalid;
+use palpate_input::error::Invalid;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 

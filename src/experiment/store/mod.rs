@@ -96,7 +96,7 @@ impl RunFolder {
         fs::create_dir_all(path).map_err(io_error(path))?;
         let file = path.join(TRIALS);
         refuse_foreign(path)?;
-        let trials = crate::files::append(&file).map_err(io_error(&file))?;
+        let trials = palpate_input::files::append(&file).map_err(io_error(&file))?;
         lock(&trials, path)?;
         let has_touches = fs::metadata(path.join(JOURNAL)).is_ok_and(|journal| journal.len() > 0);
         if fresh || !(has_touches || rows::has_some(&trials).map_err(io_error(&file))?) {
@@ -167,7 +167,7 @@ impl RunFolder {
         if !rows::is_sorted(&places, experiment) {
             places.sort_by(|(a, _), (b, _)| rows::order(a, b, experiment));
             let mut from = File::open(&file).map_err(io_error(&file))?;
-            crate::files::replace_by(&file, |to| {
+            palpate_input::files::replace_by(&file, |to| {
                 places.iter().try_for_each(|(_, bytes)| rows::copy(&mut from, bytes, to))
             })
             .map_err(io_error(&file))?;
@@ -295,7 +295,7 @@ fn refuse_foreign(path: &Path) -> Result<(), RunError> {
     if resolved::is_ours(path) || has_rows && length(RESOLVED).is_some() {
         return Ok(());
     }
-    let part = crate::files::partial(Path::new(RESOLVED));
+    let part = palpate_input::files::partial(Path::new(RESOLVED));
     for entry in fs::read_dir(path).map_err(io_error(path))? {
         let name = entry.map_err(io_error(path))?.file_name();
         let is_empty = name.to_str().and_then(length) == Some(0);

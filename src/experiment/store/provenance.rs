@@ -4,9 +4,9 @@
 use super::files::{RunError, io_error, write_changed, write_whole};
 use crate::experiment::simulation::Simulation;
 use crate::experiment::trial::entrant::Entrant;
-use crate::files;
 use crate::sim::environment::Shape;
-use crate::words::hex;
+use palpate_input::files;
+use palpate_input::words::hex;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;

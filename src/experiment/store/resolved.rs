@@ -1,9 +1,9 @@
 //! `resolved.toml`: the experiment of a run with every default written out.
 
 use super::files::{RunError, same, write_changed};
-use crate::error::Invalid;
 use crate::experiment::experiment::Experiment;
-use crate::files;
+use palpate_input::error::Invalid;
+use palpate_input::files;
 use std::path::{Component, Path, PathBuf};
 use toml_edit::DocumentMut;
 

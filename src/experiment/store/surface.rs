@@ -3,9 +3,9 @@
 use super::files::{RunError, io_error, same, write_whole};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::truth::Truth;
-use crate::files;
-use crate::geometry::import::import;
-use crate::geometry::mesh::Mesh;
+use palpate_geometry::import::import;
+use palpate_geometry::mesh::Mesh;
+use palpate_input::files;
 use std::io;
 use std::path::Path;
 

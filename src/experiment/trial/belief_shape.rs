@@ -1,10 +1,10 @@
 //! A belief and its contacts as shapes that viewers draw.
 
-use crate::backend::recording::{ColorRGBA, Marker, Point, Shape};
-use crate::explore::belief::{Belief, HeightField};
-use crate::gp::posterior::Posterior;
-use crate::task::Zone;
-use crate::task::zone::grid_triangles;
+use palpate_explore::belief::{Belief, HeightField};
+use palpate_explore::task::Zone;
+use palpate_explore::task::zone::grid_triangles;
+use palpate_gp::posterior::Posterior;
+use palpate_ros::recording::{ColorRGBA, Marker, Point, Shape};
 
 /// Places along each side of the zone; chosen: to look at.
 const PER_SIDE: usize = 21;

@@ -1,7 +1,9 @@
 //! Entrants of an experiment: planners, and the oracle beside them.
 
 use crate::experiment::trial::oracle::{GroundTruth, Oracle};
-use crate::explore::planner::{Entry, PLANNERS, Planner, PlannerFactory, PlanningSettings, is_own};
+use palpate_explore::planner::{
+    Entry, PLANNERS, Planner, PlannerFactory, PlanningSettings, is_own,
+};
 use rand_chacha::ChaCha8Rng;
 
 /// Name of the oracle in an experiment's list of planners.

@@ -13,14 +13,14 @@ pub(super) use oracle::GroundTruth;
 use self::entrant::Entrant;
 use self::row::{TouchRow, TrialRow};
 use self::verification::verify;
-use crate::backend::Fault;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::outline::Outline;
-use crate::explore::belief::Belief;
-use crate::explore::planner::{self, PlannerFactory};
-use crate::explore::probe::{Probe, Touch};
-use crate::gp::covariance::CovarianceError;
-use crate::math::seed;
+use palpate_explore::backend::Fault;
+use palpate_explore::belief::Belief;
+use palpate_explore::planner::{self, PlannerFactory};
+use palpate_explore::probe::{Probe, Touch};
+use palpate_gp::covariance::CovarianceError;
+use palpate_gp::math::seed;
 
 /// A touch that is done.
 pub struct Touched<'a> {

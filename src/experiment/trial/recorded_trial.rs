@@ -1,17 +1,17 @@
 //! A trial that is recorded while it runs, or goes on where it was broken off.
 
-use crate::backend::Fault;
-use crate::backend::recording::{self, About, Ending, Recorder, Recording};
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{RECORDINGS, resolved_beside};
 use crate::experiment::trial::belief_shape::shapes;
 use crate::experiment::trial::entrant::Entrant;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::experiment::trial::{Touched, TrialObserver};
-use crate::explore::probe::{Contact, Probe, Swept, Touch};
-use crate::robot::Finger;
-use crate::task::Approach;
 use nalgebra::{Point3, Vector3};
+use palpate_explore::backend::Fault;
+use palpate_explore::probe::{Contact, Probe, Swept, Touch};
+use palpate_explore::robot::Finger;
+use palpate_explore::task::Approach;
+use palpate_ros::recording::{self, About, Ending, Recorder, Recording};
 use std::iter;
 use std::path::{Path, PathBuf};
 

@@ -1,14 +1,14 @@
 //! A recorded trial run again by today's code, on what was read then.
 
-use crate::backend::Fault;
-use crate::backend::recording::{self, Player, Recorded};
-use crate::config::ConfigError;
-use crate::error::Invalid;
 use crate::experiment::experiment::Experiment;
 use crate::experiment::simulation::Simulation;
 use crate::experiment::trial::Touched;
 use crate::experiment::trial::recorded_trial::Resumed;
 use crate::experiment::trial::row::TouchRow;
+use palpate_explore::backend::Fault;
+use palpate_input::config::ConfigError;
+use palpate_input::error::Invalid;
+use palpate_ros::recording::{self, Player, Recorded};
 use serde::Serialize;
 use std::path::Path;
 use thiserror::Error;

@@ -1,12 +1,12 @@
 //! One line of `trials.jsonl`: everything a trial did.
 
-use crate::backend::Fault;
 use crate::experiment::measure::metrics::Metrics;
 use crate::experiment::measure::outline::Outline;
 use crate::experiment::measure::shape::ShapeMetrics;
-use crate::explore::planner::Stall;
-use crate::gp::fit::Fit;
-use crate::task::Target;
+use palpate_explore::backend::Fault;
+use palpate_explore::planner::Stall;
+use palpate_explore::task::Target;
+use palpate_gp::fit::Fit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -3,14 +3,14 @@
 
 use crate::experiment::experiment::Experiment;
 use crate::experiment::trial::row::{TouchRow, TrialRow, VerificationRow};
-use crate::explore::around::surface::steepness;
-use crate::explore::belief::{Belief, HeightField};
-use crate::explore::planner::sample::sampled;
-use crate::explore::probe::{Probe, Touch};
-use crate::gp::posterior::Scratch;
-use crate::math::seed;
-use crate::task::{Target, Task};
 use nalgebra::Point3;
+use palpate_explore::around::surface::steepness;
+use palpate_explore::belief::{Belief, HeightField};
+use palpate_explore::planner::sample::sampled;
+use palpate_explore::probe::{Probe, Touch};
+use palpate_explore::task::{Target, Task};
+use palpate_gp::math::seed;
+use palpate_gp::posterior::Scratch;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 

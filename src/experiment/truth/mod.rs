@@ -4,12 +4,12 @@ pub mod scan;
 pub mod scan_truth;
 
 use crate::experiment::measure::metrics::{Metrics, calibration, rmse};
-use crate::geometry::coarse::coarse;
-use crate::geometry::mesh::Mesh;
-use crate::gp::Posterior;
 use crate::sim::Environment;
 use crate::sim::reach;
-use crate::task::Zone;
+use palpate_explore::task::Zone;
+use palpate_geometry::coarse::coarse;
+use palpate_geometry::mesh::Mesh;
+use palpate_gp::Posterior;
 use std::sync::Arc;
 
 /// True heights on the test grid of an experiment.

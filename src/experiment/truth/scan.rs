@@ -1,11 +1,11 @@
 //! Touches on a grid of targets: the object's surface as the finger feels it, without a belief.
 
-use crate::backend::Fault;
-use crate::error::Invalid;
 use crate::experiment::runner::pool;
-use crate::explore::probe::Touch;
 use crate::sim::simulator::Simulator;
-use crate::task::Zone;
+use palpate_explore::backend::Fault;
+use palpate_explore::probe::Touch;
+use palpate_explore::task::Zone;
+use palpate_input::error::Invalid;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -1,13 +1,13 @@
 //! The truth of an object that nobody has a mesh of: heights taken from a scan of it.
 
-use crate::config::{Checked, Rules};
-use crate::error::Invalid;
 use crate::experiment::measure::metrics::rmse;
 use crate::experiment::truth::Truth;
-use crate::files;
-use crate::geometry::import::ply::points;
-use crate::task::Zone;
 use nalgebra::{Matrix3, Point3, Vector3};
+use palpate_explore::task::Zone;
+use palpate_geometry::import::ply::points;
+use palpate_input::config::{Checked, Rules};
+use palpate_input::error::Invalid;
+use palpate_input::files;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

@@ -3,15 +3,15 @@
 use super::shell::counts;
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::TouchRow;
-use crate::gp::batch::Prediction;
 use crate::report::axes;
 use crate::report::axes::{Axis, Length};
 use crate::report::relief::Space;
 use crate::report::replay::{self, Grid, Replay};
 use crate::report::style;
-use crate::task::Zone;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use palpate_explore::task::Zone;
+use palpate_gp::batch::Prediction;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 use serde_json::{Value, json};
 

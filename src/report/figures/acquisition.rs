@@ -3,8 +3,6 @@
 use super::curves;
 use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
-use crate::explore::belief::HeightField;
-use crate::gp::posterior::Scratch;
 use crate::report::axes::{Axis, Length, Panel, colour_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::heat_map::HeatMap;
@@ -12,7 +10,9 @@ use crate::report::legend::{Swatch, sheet};
 use crate::report::replay::{Replay, drawn_words};
 use crate::report::style;
 use crate::report::style::{INITIAL, LATER};
-use crate::task::Zone;
+use palpate_explore::belief::HeightField;
+use palpate_explore::task::Zone;
+use palpate_gp::posterior::Scratch;
 
 pub(super) const FIGURE: Figure = Figure { name: "acquisition", caption, draw };
 

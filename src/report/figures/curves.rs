@@ -2,14 +2,14 @@
 
 use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
-use crate::gp::posterior::Scratch;
 use crate::report::axes::{Axis, Length, MM, Panel};
 use crate::report::canvas::{Anchor, Area, Canvas};
 use crate::report::legend::{Swatch, sheet};
 use crate::report::replay::{self, Replay, drawn_words};
 use crate::report::style;
 use crate::report::style::{FAINT_INK, INITIAL, INK, LATER, SMALL_PX, TRUTH};
-use crate::task::Zone;
+use palpate_explore::task::Zone;
+use palpate_gp::posterior::Scratch;
 
 pub(super) const FIGURE: Figure = Figure { name: "curves", caption, draw };
 

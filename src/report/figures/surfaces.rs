@@ -3,7 +3,6 @@
 use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::TouchRow;
-use crate::gp::posterior::Scratch;
 use crate::report::axes::{Axis, Length, height_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{sheet, touch_entries};
@@ -11,7 +10,8 @@ use crate::report::relief::{Relief, ReliefPanel, Space};
 use crate::report::replay::{self, Grid, Replay, drawn_words};
 use crate::report::style;
 use crate::report::style::{INITIAL, LATER};
-use crate::task::Zone;
+use palpate_explore::task::Zone;
+use palpate_gp::posterior::Scratch;
 
 /// Beliefs beside the true surface.
 pub const FIGURE: Figure = Figure { name: "surfaces", caption, draw };

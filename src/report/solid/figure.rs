@@ -3,13 +3,13 @@
 use super::panel::{ON_SURFACE, View, inner, scale};
 use super::section::{TRUTH_TRIANGLES, deviation_range};
 use super::{Frame, Sequence, Touch};
-use crate::geometry::coarse::coarse;
-use crate::geometry::mesh::Mesh;
 use crate::report::axes::{Axis, MM, colour_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{MISS, sheet, touch_entries};
 use crate::report::relief::Relief;
 use crate::report::style::{self, INITIAL, LATER};
+use palpate_geometry::coarse::coarse;
+use palpate_geometry::mesh::Mesh;
 
 const PANEL: (f64, f64) = (236.0, 258.0);
 const MARGIN: (f64, f64) = (20.0, 40.0);

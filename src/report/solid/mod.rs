@@ -12,11 +12,11 @@ pub use figure::figure;
 pub use reach::picture;
 pub use section::{counts, section};
 
-use crate::geometry::solids::{Triangles, normals};
 use crate::report::points::Points;
 use crate::report::style;
 use anyhow::{Context, bail, ensure};
 use nalgebra::{Point3, Vector3};
+use palpate_geometry::solids::{Triangles, normals};
 
 /// What a planner's touches made of an object.
 #[derive(Clone, Debug, Default)]

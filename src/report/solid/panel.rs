@@ -1,12 +1,12 @@
 //! One view of a solid on a sheet: from the front or from behind, lit by the viewer.
 
-use crate::geometry::solids::{Triangles, normals};
 use crate::report::axes::{Axis, MM};
 use crate::report::camera::{AZIMUTH_DEG, Camera};
 use crate::report::canvas::{Anchor, Area, Canvas, PointPx};
 use crate::report::relief::{Face, Relief, brightness};
 use crate::report::style::{self, FAINT_INK, INK, SMALL_PX};
 use nalgebra::Vector3;
+use palpate_geometry::solids::{Triangles, normals};
 
 /// Room for the title above a surface, and on every side of it.
 const TITLE_PX: f64 = 38.0;

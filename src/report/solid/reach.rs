@@ -2,13 +2,13 @@
 
 use super::panel::{ON_SURFACE, View, scale};
 use super::section::TRUTH_TRIANGLES;
-use crate::geometry::coarse::coarse;
-use crate::geometry::mesh::Mesh;
-use crate::geometry::solids::Triangles;
 use crate::report::canvas::Area;
 use crate::report::legend::{Swatch, sheet};
 use crate::report::style;
 use nalgebra::{Point3, Vector3};
+use palpate_geometry::coarse::coarse;
+use palpate_geometry::mesh::Mesh;
+use palpate_geometry::solids::Triangles;
 
 const PANEL: (f64, f64) = (430.0, 430.0);
 const MARGIN: (f64, f64) = (20.0, 40.0);

@@ -2,10 +2,6 @@
 //! in millimetres, and meshes are coded as text of few bytes.
 
 use super::{Frame, Sequence, Touch};
-use crate::geometry::coarse::coarse;
-use crate::geometry::mesh::Mesh;
-use crate::geometry::primitives::extent;
-use crate::geometry::solids::Triangles;
 use crate::report::axes::{self, MM};
 use crate::report::explorer::frames::{encode, short};
 use crate::report::explorer::shell::{self, PARTS, Shell};
@@ -14,6 +10,10 @@ use anyhow::ensure;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::{Point3, Vector3};
+use palpate_geometry::coarse::coarse;
+use palpate_geometry::mesh::Mesh;
+use palpate_geometry::primitives::extent;
+use palpate_geometry::solids::Triangles;
 use serde::Serialize;
 use serde_json::{Value, json};
 

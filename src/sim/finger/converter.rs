@@ -6,7 +6,9 @@ use super::effects::electrodes::{Common, Electrodes};
 use super::effects::fluid::Filter;
 use super::effects::timing::{Channel, channel};
 use super::noise::normal;
-use crate::robot::finger::frame::{ELECTRODES, FRAME_S, Frame, SLOTS, SLOTS_HZ, VIBRATIONS};
+use palpate_explore::robot::finger::frame::{
+    ELECTRODES, FRAME_S, Frame, SLOTS, SLOTS_HZ, VIBRATIONS,
+};
 use rand_chacha::ChaCha8Rng;
 use std::collections::VecDeque;
 

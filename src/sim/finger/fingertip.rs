@@ -10,12 +10,12 @@ use super::effects::variation::Sensor;
 use super::effects::{EffectStates, Effects};
 use super::load::{Load, PressError};
 use super::shear::Shear;
-use crate::backend::Fault;
-use crate::geometry::bvh::MeshBvh;
-use crate::robot::finger::TipMotion;
-use crate::robot::finger::frame::Frame;
-use crate::robot::finger::profile::Profile;
-use crate::robot::finger::shape::Finger;
+use palpate_explore::backend::Fault;
+use palpate_explore::robot::finger::TipMotion;
+use palpate_explore::robot::finger::frame::Frame;
+use palpate_explore::robot::finger::profile::Profile;
+use palpate_explore::robot::finger::shape::Finger;
+use palpate_geometry::bvh::MeshBvh;
 use rand_chacha::ChaCha8Rng;
 
 /// Longest step: beyond it a frame's signals would be mostly interpolated (chosen).

@@ -1,8 +1,8 @@
 //! The skin over the fluid as triangles.
 
 use super::samples::SkinSample;
-use crate::robot::finger::profile::Profile;
 use nalgebra::{Point3, UnitVector3, Vector3};
+use palpate_explore::robot::finger::profile::Profile;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// One node, in the middle of the skin's thickness, in `T`.

@@ -1,12 +1,12 @@
 //! Neighbouring samples of the skin together, so that those far from an object are skipped at once.
 
 use super::samples::SkinSample;
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::bvh::Nearby;
-use crate::geometry::mesh::Mesh;
-use crate::geometry::sweep::Capsule;
-use crate::robot::finger::profile::Profile;
 use nalgebra::{Isometry3, Point3, Vector3};
+use palpate_explore::robot::finger::profile::Profile;
+use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::bvh::Nearby;
+use palpate_geometry::mesh::Mesh;
+use palpate_geometry::sweep::Capsule;
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;

@@ -3,12 +3,12 @@
 use super::effects::electrodes::{Electrodes, ElectrodesEffect};
 use super::effects::skin::{Pressed, Skin, SkinEffect};
 use super::load::{Load, PressError};
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::mesh::Mesh;
-use crate::robot::finger::frame::ELECTRODES;
-use crate::robot::finger::profile::Profile;
-use crate::robot::finger::shape::Finger;
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
+use palpate_explore::robot::finger::frame::ELECTRODES;
+use palpate_explore::robot::finger::profile::Profile;
+use palpate_explore::robot::finger::shape::Finger;
+use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::mesh::Mesh;
 
 /// Half the side of the plate the finger is pressed on.
 const PLATE_M: f64 = 0.1;

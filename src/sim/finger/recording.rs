@@ -1,7 +1,7 @@
 //! Recordings of fingers pressed on a flat plate.
 
-use crate::error::Invalid;
-use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
+use palpate_explore::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
+use palpate_input::error::Invalid;
 use serde::Deserialize;
 
 /// Recordings of one or more sensors.

@@ -1,7 +1,7 @@
 //! Points spread evenly over the fingertip's outer skin.
 
-use crate::robot::finger::profile::{Layers, Profile};
 use nalgebra::{Point3, UnitVector3, Vector3};
+use palpate_explore::robot::finger::profile::{Layers, Profile};
 use std::f64::consts::TAU;
 
 /// Golden section of a turn: successive points never line up.

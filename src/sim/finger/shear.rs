@@ -9,8 +9,8 @@
 
 use super::effects::electrodes::Electrodes;
 use super::samples::SkinSample;
-use crate::robot::finger::frame::ELECTRODES;
 use nalgebra::Vector3;
+use palpate_explore::robot::finger::frame::ELECTRODES;
 
 /// How skin that is carried sideways changes the electrodes' gaps; never changes.
 #[derive(Clone, Debug)]

@@ -2,9 +2,9 @@
 
 use super::text::pose;
 use super::text::surface;
-use crate::robot::finger::Finger;
-use crate::robot::finger::profile::{CORE_M, Profile};
 use nalgebra::Isometry3;
+use palpate_explore::robot::finger::Finger;
+use palpate_explore::robot::finger::profile::{CORE_M, Profile};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Cells along the finger and around each of its halves; chosen: smooth to look at.

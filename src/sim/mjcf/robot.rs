@@ -2,10 +2,10 @@
 
 use super::fingertip;
 use super::text::{CONTACT, LINK, TABLE, pose};
-use crate::robot::arm::Chain;
-use crate::robot::arm::settings::TOOL_KG;
-use crate::robot::finger::Finger;
 use crate::sim::Scene;
+use palpate_explore::robot::arm::Chain;
+use palpate_explore::robot::arm::settings::TOOL_KG;
+use palpate_explore::robot::finger::Finger;
 
 const STAGE: &str = include_str!("../../../models/stage.xml");
 

@@ -1,10 +1,10 @@
 //! What stands around: the object on its board, the floor, the camera, the lights.
 
 use super::text::{list, mesh_asset, pose};
-use crate::geometry::mesh::Mesh;
-use crate::robot::arm::Chain;
-use crate::task::{Task, Zone};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use palpate_explore::robot::arm::Chain;
+use palpate_explore::task::{Task, Zone};
+use palpate_geometry::mesh::Mesh;
 
 /// Thickness of the board that the object is fixed to, and how far it reaches beyond it.
 const BOARD_M: f64 = 0.02;

@@ -1,7 +1,7 @@
 //! Pieces of MJCF that several parts write.
 
-use crate::geometry::mesh::Mesh;
 use nalgebra::{Isometry3, Point3};
+use palpate_geometry::mesh::Mesh;
 use std::fmt::Display;
 
 /// Attributes of the two geoms that collide: without friction, yielding as mount and gears of an

@@ -1,9 +1,9 @@
 //! What MuJoCo's own contacts say, where the finger has no skin.
 
-use crate::backend::IdealContact;
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::MjModel;
 use nalgebra::{Isometry3, Point3, Vector3};
+use palpate_explore::backend::IdealContact;
 use std::sync::Arc;
 
 /// The contacts as one, in `T`: centre weighted by force, sum of the forces and its direction; none

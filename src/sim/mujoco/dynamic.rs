@@ -1,11 +1,11 @@
 //! An arm or stage with masses, servos and friction, carrying the finger.
 
 use super::{Models, Plant};
-use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Sample, Wrench};
-use crate::robot::arm::Chain;
-use crate::robot::finger::TipMotion;
 use crate::sim::Environment;
 use crate::sim::simulated_finger::SimulatedFinger;
+use palpate_explore::backend::{Backend, Capabilities, Command, Fault, Reading, Sample, Wrench};
+use palpate_explore::robot::arm::Chain;
+use palpate_explore::robot::finger::TipMotion;
 use std::sync::Arc;
 
 /// A state counts as diverged this far beyond a joint's limits, rad or m (the stops stand 0.05 rad

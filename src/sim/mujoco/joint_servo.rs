@@ -1,8 +1,8 @@
 //! The velocity servo of a joint: proportional plus integral.
 
-use crate::robot::arm::Joints;
-use crate::robot::arm::chain::MAX_JOINTS;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtIntegrator};
+use palpate_explore::robot::arm::Joints;
+use palpate_explore::robot::arm::chain::MAX_JOINTS;
 
 /// Integral over proportional gain; chosen: with the arm outstretched, where kv over inertia is
 /// smallest, 110 /s at S1, the loop is damped 0.75.

@@ -16,9 +16,9 @@ pub use models::Models;
 pub use plant::Plant;
 pub use substeps::{StepLimit, Substeps};
 
-use crate::error::Invalid;
 use mujoco_rs::wrappers::MjModel;
 use mujoco_rs::wrappers::mj_logging::{log_config, set_log_config};
+use palpate_input::error::Invalid;
 use std::sync::Once;
 
 /// A model that is not one of a robot with a finger.

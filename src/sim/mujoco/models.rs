@@ -1,13 +1,13 @@
 //! What MuJoCo compiles of an environment, once for all trials.
 
 use super::{Substeps, compile, lacking};
-use crate::error::Invalid;
 use crate::sim::Environment;
 use crate::sim::collision::Collision;
 use crate::sim::environment::Shape;
 use crate::sim::mjcf;
 use crate::sim::mjcf::Mode;
 use mujoco_rs::wrappers::MjModel;
+use palpate_input::error::Invalid;
 use std::sync::Arc;
 
 /// Shared by the trials of an experiment.

@@ -1,10 +1,10 @@
 //! A picture of a model, drawn off-screen through EGL: no window and no display is needed.
 
-use crate::error::Invalid;
 use mujoco_rs::renderer::{MjRenderer, RendererError, png::Compression};
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 use mujoco_rs::wrappers::mj_visualization::MjvCamera;
+use palpate_input::error::Invalid;
 use std::path::Path;
 
 /// Draws `model` at its first keyframe, or at q = 0 without one, as `camera` sees it, and writes

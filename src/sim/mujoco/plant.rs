@@ -3,16 +3,16 @@
 use super::contact;
 use super::joint_servo::JointServo;
 use super::joint_servo::embedded;
-use crate::backend::{Fault, IdealContact, Wrench};
-use crate::error::Invalid;
-use crate::robot::arm::Joints;
-use crate::robot::arm::chain::MAX_JOINTS;
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtIntegrator, MjtObjBase};
 use nalgebra::{
     DMatrix, Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion,
     Vector3, Vector6,
 };
+use palpate_explore::backend::{Fault, IdealContact, Wrench};
+use palpate_explore::robot::arm::Joints;
+use palpate_explore::robot::arm::chain::MAX_JOINTS;
+use palpate_input::error::Invalid;
 use std::sync::Arc;
 
 /// A compiled model of [`mjcf::scene`](crate::sim::mjcf::scene), shared, and one state of it.

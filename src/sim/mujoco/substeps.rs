@@ -1,11 +1,11 @@
 //! How finely the scene's time step must be divided for the skin's force.
 
 use super::{Plant, lacking};
-use crate::error::Invalid;
 use crate::sim::Environment;
 use crate::sim::environment::invalid;
 use crate::sim::finger::plate;
 use mujoco_rs::wrappers::MjModel;
+use palpate_input::error::Invalid;
 use std::fmt::{Display, Formatter, Result as Written};
 use std::sync::Arc;
 

@@ -1,14 +1,14 @@
 //! A window that shows a model in the posture that something else gives it: MuJoCo's viewer.
 
 use super::{compile, lacking};
-use crate::backend::watched::Seen;
-use crate::error::Invalid;
 use crate::sim::Environment;
 use crate::sim::mjcf;
 use crate::sim::mjcf::Mode;
 use mujoco_rs::viewer::{MjViewer, MjViewerError};
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtGeom};
+use palpate_explore::backend::watched::Seen;
+use palpate_input::error::Invalid;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, PoisonError};
 

@@ -7,11 +7,11 @@ use super::tolerance::{Criterion, Origin, Tolerance};
 use super::touches::{Touches, Trials, wall_times_s};
 use super::variant::{ALLOWED, Variant};
 use super::verdict::{Relevance, advantages_m, difference};
-use crate::config::Rules;
 use crate::experiment::statistics::{median, median_interval};
-use crate::robot::finger::TipMotion;
 use crate::sim::Scene;
 use anyhow::{Context, bail};
+use palpate_explore::robot::finger::TipMotion;
+use palpate_input::config::Rules;
 use serde::Serialize;
 
 /// Seed of held-out targets and trials: no comparison has as many.

@@ -2,14 +2,14 @@
 
 use super::level::{Level, Senses};
 use super::touches::{Trials, noise_free};
-use crate::backend::Command;
 use crate::experiment::statistics::mean;
-use crate::robot::finger::TipMotion;
 use crate::sim::environment::Shape;
 use crate::sim::probe::rest;
 use crate::sim::scene::Body;
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
+use palpate_explore::backend::Command;
+use palpate_explore::robot::finger::TipMotion;
 use serde::Serialize;
 use std::sync::Arc;
 

@@ -1,10 +1,10 @@
 //! Switches of a scene: every effect of the finger, its arm, and the masses.
 
-use crate::config::Rules;
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
 use crate::sim::finger::effects::switch::Switch;
 use crate::sim::scene::Body;
+use palpate_input::config::Rules;
 
 /// Every switch of a scene, the effects first, in the order of their table.
 pub fn switches() -> Vec<Switch<Scene>> {

@@ -1,21 +1,21 @@
 //! Touches of a scene without sensor noise, so that only the model differs: contacts, loads, times.
 
-use crate::backend::Fault;
-use crate::backend::trace::{Tick, Ticks, Trace};
 use crate::experiment::truth::Truth;
-use crate::explore::belief::HeightField;
-use crate::explore::gp_settings::GpSettings;
-use crate::explore::planner;
-use crate::explore::planner::{PlannerFactory, PlanningSettings};
-use crate::explore::probe::{Contact, Probe, Touch};
-use crate::math::seed;
-use crate::robot::finger::frame::ELECTRODES;
-use crate::robot::finger::{Frame, TipMotion};
 use crate::sim::environment::Shape;
 use crate::sim::finger::FingertipState;
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
-use crate::task::Target;
+use palpate_explore::backend::Fault;
+use palpate_explore::backend::trace::{Tick, Ticks, Trace};
+use palpate_explore::belief::HeightField;
+use palpate_explore::gp_settings::GpSettings;
+use palpate_explore::planner;
+use palpate_explore::planner::{PlannerFactory, PlanningSettings};
+use palpate_explore::probe::{Contact, Probe, Touch};
+use palpate_explore::robot::finger::frame::ELECTRODES;
+use palpate_explore::robot::finger::{Frame, TipMotion};
+use palpate_explore::task::Target;
+use palpate_gp::math::seed;
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::sync::Arc;

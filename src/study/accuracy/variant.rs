@@ -6,11 +6,11 @@ use super::switches::{switched, switches};
 use super::tolerance::{Origin, Tolerance};
 use super::touches::{Touches, Trials, finger_bytes, noise_free, surface_rmse_m};
 use super::verdict::Relevance;
-use crate::config::Rules;
 use crate::experiment::statistics::{Paired, median};
-use crate::explore::probe::Contact;
 use crate::sim::environment::Shape;
 use crate::sim::{Environment, Scene};
+use palpate_explore::probe::Contact;
+use palpate_input::config::Rules;
 use serde::Serialize;
 use std::sync::Arc;
 

@@ -3,8 +3,8 @@
 use crate::experiment::statistics::Paired;
 use crate::experiment::truth::Truth;
 use crate::experiment::{Experiment, Simulation};
-use crate::explore::planner;
 use crate::sim::{Environment, Scene};
+use palpate_explore::planner;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::ops::Range;

@@ -1,10 +1,10 @@
 //! What planners were: a file of JSON lines, a header and then a line for each trial.
 
 use super::judged::JUDGED;
-use crate::error::Invalid;
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
-use crate::words::hex;
+use palpate_input::error::Invalid;
+use palpate_input::words::hex;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

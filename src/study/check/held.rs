@@ -3,9 +3,9 @@
 use super::baseline::{Baseline, Line, settings};
 use super::judged::{JUDGED, Judged, Verdict};
 use super::sequence::Sequence;
-use crate::error::Invalid;
 use crate::experiment::Simulation;
 use crate::experiment::runner::{self, Progress};
+use palpate_input::error::Invalid;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What came of it.

@@ -1,9 +1,9 @@
 //! A transport inside this process: any number of ends of either side, without a network.
 
-use palpate::backend::ros::message::TriggerResponse;
-use palpate::backend::ros::topics::{Service, Side, Topic};
-use palpate::backend::ros::transport::{Delivery, Packet, Transport, Waker};
 use palpate::error::Invalid;
+use palpate::ros::message::TriggerResponse;
+use palpate::ros::topics::{Service, Side, Topic};
+use palpate::ros::transport::{Delivery, Packet, Transport, Waker};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};

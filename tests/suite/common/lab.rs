@@ -1,8 +1,8 @@
 //! An explorer and a twin in processes of their own, over ROS 2 or ROS 1: `PALPATE_ROS` says which.
 
-use palpate::backend::ros::settings::{BackendKind, BackendSettings};
 use palpate::experiment::trial::row::TrialRow;
 use palpate::robot::arm::ArmSettings;
+use palpate::ros::settings::{BackendKind, BackendSettings};
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader};

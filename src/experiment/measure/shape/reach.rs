@@ -1,10 +1,10 @@
 //! Where a finger that goes straight at a whole object, from any side, can touch it.
 
-use crate::geometry::bvh::MeshBvh;
-use crate::geometry::primitives::{nearest_on_segment, normal};
-use crate::geometry::spread::{Spot, directions};
-use crate::geometry::sweep::Capsule;
 use nalgebra::{UnitVector3, Vector3};
+use palpate_geometry::bvh::MeshBvh;
+use palpate_geometry::primitives::{nearest_on_segment, normal};
+use palpate_geometry::spread::{Spot, directions};
+use palpate_geometry::sweep::Capsule;
 use rayon::prelude::*;
 
 /// Distance between surface and resting finger that still counts as touching, as a share of the

@@ -3,9 +3,9 @@
 use super::constants::{Constant, Model};
 use super::problem::Calibration;
 use super::session::Session;
-use crate::math::least_squares::{FitError, Problem, clustered_covariance, robust};
 use crate::sim::finger::recording::Recording;
 use nalgebra::DVector;
+use palpate_gp::math::least_squares::{FitError, Problem, clustered_covariance, robust};
 
 /// Besides from where it starts, a fit is tried from skins this many times softer: a stiff skin
 /// and a soft one are two valleys (chosen).

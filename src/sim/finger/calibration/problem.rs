@@ -3,11 +3,11 @@
 use super::bench::Bench;
 use super::constants::{Constant, Model};
 use super::session::Session;
-use crate::math::least_squares::Problem;
-use crate::robot::finger::frame::ELECTRODES;
 use crate::sim::finger::effects::skin::SkinModel;
 use crate::sim::finger::recording::Recording;
 use nalgebra::DVector;
+use palpate_explore::robot::finger::frame::ELECTRODES;
+use palpate_gp::math::least_squares::Problem;
 use std::cell::RefCell;
 
 /// Expected error of a mean count (chosen: two thirds of what the best fit is off on average).

@@ -5,10 +5,10 @@ use super::bench::Bench;
 use super::constants::Model;
 use super::fit::{Fit, Free, fit};
 use super::session::Session;
-use crate::math::least_squares::FitError;
-use crate::robot::finger::frame::ELECTRODES;
 use crate::sim::finger::effects::electrodes::{counts, impedance_ohm};
 use crate::sim::finger::recording::{Bin, Recording};
+use palpate_explore::robot::finger::frame::ELECTRODES;
+use palpate_gp::math::least_squares::FitError;
 use rayon::prelude::*;
 
 /// A measured change below this is too small to have a sign.

@@ -2,11 +2,11 @@
 
 use super::bench::Bench;
 use super::constants::Model;
-use crate::robot::finger::frame::ELECTRODES;
 use crate::sim::finger::effects::electrodes::{Electrodes, ElectrodesEffect};
 use crate::sim::finger::plate::direction_t;
 use crate::sim::finger::recording::Recording;
 use nalgebra::Vector3;
+use palpate_explore::robot::finger::frame::ELECTRODES;
 
 /// Standard deviation of the roll from press to press of a hand at one load (chosen, as fits that
 /// leave it free find 0.01 to 0.27).

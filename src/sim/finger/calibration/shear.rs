@@ -4,12 +4,12 @@ use super::bench::Bench;
 use super::constants::Model;
 use super::fit::{Free, fit};
 use super::session::Session;
-use crate::error::Invalid;
-use crate::math::least_squares::FitError;
-use crate::robot::finger::frame::ELECTRODES;
 use crate::sim::finger::effects::friction::FrictionEffect;
 use crate::sim::finger::recording::{Recording, filled, force};
 use nalgebra::Vector3;
+use palpate_explore::robot::finger::frame::ELECTRODES;
+use palpate_gp::math::least_squares::FitError;
+use palpate_input::error::Invalid;
 use serde::Deserialize;
 
 /// Tangential force to either side over which the model's slopes are taken; chosen: about what a

@@ -1,7 +1,7 @@
 //! Links, tool, object and table in each other's way.
 
 use super::effect::{Effect, Needs};
-use crate::config::{Checked, Rules};
+use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -2,7 +2,7 @@
 //!
 //! In memory an effect holds its constants beside its settings.
 
-use crate::config::Rules;
+use palpate_input::config::Rules;
 use serde::de::DeserializeOwned;
 use std::ops::{RangeFull, RangeInclusive};
 use std::sync::LazyLock;
@@ -95,8 +95,8 @@ macro_rules! effect {
             }
         }
 
-        impl crate::config::Checked for $Effect {
-            fn check(&self, rules: &mut crate::config::Rules) {
+        impl palpate_input::config::Checked for $Effect {
+            fn check(&self, rules: &mut palpate_input::config::Rules) {
                 use crate::sim::finger::effects::constants::Constant;
                 $($check(self, rules);)?
                 $(Constant::check(&self.$constant, stringify!($constant), $allowed, rules);)*

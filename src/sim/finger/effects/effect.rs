@@ -1,9 +1,9 @@
 //! What an effect is: an optional table of the scene and what follows from its being there.
 
 use super::switch::Switch;
-use crate::config::Checked;
-use crate::robot::finger::TipMotion;
 use crate::sim::finger::load::Load;
+use palpate_explore::robot::finger::TipMotion;
+use palpate_input::config::Checked;
 use std::fmt::Debug;
 
 /// One optional piece of the finger's physics: its settings, all of which have defaults.

@@ -3,10 +3,10 @@
 use super::constants::effect;
 use super::effect::Effect;
 use super::skin::Pressed;
-use crate::robot::finger::electrode_table;
-use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use crate::sim::finger::noise::normal;
 use crate::sim::finger::samples::SkinSample;
+use palpate_explore::robot::finger::electrode_table;
+use palpate_explore::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use rand::Rng;
 
 /// The resistor an electrode divides its voltage with (SynTouch BioTac SP manual, §5.1).

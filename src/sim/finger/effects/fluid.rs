@@ -3,9 +3,9 @@
 use super::constants::effect;
 use super::effect::Effect;
 use super::switch::Switch;
-use crate::config::Rules;
-use crate::robot::finger::frame::FULL_SCALE_COUNTS;
 use crate::sim::finger::noise::normal;
+use palpate_explore::robot::finger::frame::FULL_SCALE_COUNTS;
+use palpate_input::config::Rules;
 use rand::Rng;
 use std::f64::consts::TAU;
 

@@ -23,8 +23,8 @@ pub mod wrench;
 
 use super::counter::count;
 use super::load::Load;
-use crate::config::{Checked, Rules};
 use effect::{Effect, Needs, Step};
+use palpate_input::config::{Checked, Rules};
 use switch::Switch;
 
 // What an effect needs stands above it.

@@ -1,11 +1,11 @@
 //! What is not where it is believed to be: the finger on its mount, the object in the world.
 
 use super::effect::Effect;
-use crate::config::{Checked, Rules};
-use crate::math::pose::pose;
-use crate::robot::finger::TipMotion;
 use crate::sim::finger::noise::normal;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use palpate_explore::robot::finger::TipMotion;
+use palpate_gp::math::pose::pose;
+use palpate_input::config::{Checked, Rules};
 use rand::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -2,9 +2,9 @@
 //! `[effects.sensor]` with them.
 
 use super::constants::{BIOTAC, SENSORS};
-use crate::config::{ConfigError, Loader};
-use crate::files;
 use crate::sim::finger::Effects;
+use palpate_input::config::{ConfigError, Loader};
+use palpate_input::files;
 use std::path::Path;
 use toml::{Table, Value};
 

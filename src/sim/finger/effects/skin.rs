@@ -2,9 +2,6 @@
 
 use super::constants::effect;
 use super::effect::{Effect, Needs};
-use crate::config::Rules;
-use crate::geometry::bvh::MeshBvh;
-use crate::robot::finger::profile::Profile;
 use crate::sim::finger::column::Column;
 use crate::sim::finger::foundation::Foundation;
 use crate::sim::finger::foundation::SkinContact;
@@ -15,6 +12,9 @@ use crate::sim::finger::samples::{SkinSample, spread};
 use crate::sim::finger::shell::sheet::Material;
 use crate::sim::finger::shell::{Shell, ShellState};
 use nalgebra::{Isometry3, Point3, Vector3};
+use palpate_explore::robot::finger::profile::Profile;
+use palpate_geometry::bvh::MeshBvh;
+use palpate_input::config::Rules;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -2,8 +2,8 @@
 
 use super::constants::effect;
 use super::effect::{Effect, OnLoad};
-use crate::robot::finger::frame::FULL_SCALE_COUNTS;
 use crate::sim::finger::noise::normal;
+use palpate_explore::robot::finger::frame::FULL_SCALE_COUNTS;
 use rand::Rng;
 use std::f64::consts::TAU;
 

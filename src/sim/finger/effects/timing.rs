@@ -3,9 +3,9 @@
 use super::constants::effect;
 use super::effect::{Effect, Needs};
 use super::switch::Switch;
-use crate::backend::delay::DELAY_MAX_S;
-use crate::config::Rules;
-use crate::robot::finger::frame::ELECTRODES;
+use palpate_explore::backend::delay::DELAY_MAX_S;
+use palpate_explore::robot::finger::frame::ELECTRODES;
+use palpate_input::config::Rules;
 
 /// A delay of commands that is more than a control tick of any body (chosen).
 const LONG_DELAY_S: f64 = 0.02;

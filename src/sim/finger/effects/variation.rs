@@ -4,9 +4,9 @@ use super::constants::effect;
 use super::effect::Effect;
 use super::electrodes::{ElectrodesEffect, counts, impedance_ohm};
 use super::skin::SkinEffect;
-use crate::robot::finger::frame::ELECTRODES;
 use crate::sim::finger::noise::normal;
 use nalgebra::{UnitQuaternion, Vector3};
+use palpate_explore::robot::finger::frame::ELECTRODES;
 use rand::{Rng, RngExt};
 
 /// What an open electrode reads: as little as a scene may say.

@@ -7,9 +7,9 @@ use super::course::Course;
 use super::sheet::{Material, Sheet, Strained};
 use super::softness::Softness;
 use super::springs::Springs;
-use crate::math::simd::Quad;
 use crate::sim::finger::lattice::{Lattice, Node};
 use nalgebra::Vector3;
+use palpate_gp::math::simd::Quad;
 
 /// An object before a node of the shell: a plane, for all that the node knows.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,8 +11,8 @@
 //! is that shell and object go on as they went; it is taken if the energy is lower there.
 
 use super::membrane::{Link, Membrane, Push, Settled};
-use crate::math::simd::{Quad, dot_quad, dot_single, quad, scaled, sum, widest};
 use nalgebra::Vector3;
+use palpate_gp::math::simd::{Quad, dot_quad, dot_single, quad, scaled, sum, widest};
 
 /// The shell is settled once a correction promises less than this part of the energy: force and
 /// pressure are then within 0.5 % (measured, 1.5 mm deep on a plane at three pitches, ticks of 10

@@ -16,8 +16,8 @@
 //!
 //! What a processor goes through are edges: each knows the edges with which it shares a triangle.
 
-use crate::math::simd::{Quad, cross, dot_quad, quad, scaled, sum, widest};
 use nalgebra::{Matrix3, Vector3};
+use palpate_gp::math::simd::{Quad, cross, dot_quad, quad, scaled, sum, widest};
 use std::collections::HashMap;
 
 /// What a sheet is made of.

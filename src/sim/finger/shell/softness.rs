@@ -5,9 +5,9 @@
 //! half the band, and a solution costs half.
 
 use super::sheet::Sheet;
-use crate::math::banded::{Banded, Factor};
-use crate::math::simd::Quad;
 use nalgebra::Matrix3;
+use palpate_gp::math::banded::{Banded, Factor};
+use palpate_gp::math::simd::Quad;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// The inverse of the sheet's stiffness at rest for the nodes that can move; never changes.

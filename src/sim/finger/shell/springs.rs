@@ -5,7 +5,7 @@
 //! looked for among the loaded springs, which are those of the last guess that push and those
 //! beside them that are shortened; where that goes in a circle, one spring after the other.
 
-use crate::math::simd::{dot, widest};
+use palpate_gp::math::simd::{dot, widest};
 
 /// Guesses of what is loaded (chosen; two or three are usual).
 const GUESSES: usize = 12;

@@ -1,0 +1,192 @@
+//! Observations of the field by touches: where it is zero and which way it grows, and where it is
+//! free. And the prior: a body about what was met.
+
+use super::settings::PriorShape;
+use crate::probe::{Contact, Swept, Touch};
+use crate::task::{Aim, Approach, Ball};
+use nalgebra::{Point3, Vector3};
+use palpate_geometry::implicit::Field;
+use palpate_geometry::primitives::extent;
+use palpate_geometry::primitives::nearest_on_segment;
+use palpate_gp::{Observation, Observations, Slope};
+
+/// All that was met and swept.
+#[derive(Clone, Debug, Default)]
+pub struct Evidence {
+    contacts: Vec<Contact>,
+    ways: Vec<Way>,
+}
+
+/// The way of a fingertip that met nothing before its end.
+#[derive(Clone, Debug)]
+struct Way {
+    /// Its end, and which way it went.
+    end: Aim,
+    length_m: f64,
+    radius_m: f64,
+    /// Balls along it that are observed.
+    places: u32,
+    /// Whether something was met at its end.
+    is_met: bool,
+}
+
+impl Way {
+    /// How far `p_w` is from its hull.
+    fn away_m(&self, p_w: &Point3<f64>) -> f64 {
+        let start_w = self.end.p_w - self.end.ahead_w.scale(self.length_m);
+        (nearest_on_segment(p_w, &start_w, &self.end.p_w) - p_w).norm() - self.radius_m
+    }
+
+    /// Middles of its balls, from its end backwards: where it runs through `ball`, and at least the
+    /// one that something was met with.
+    fn places_w(&self, ball: &Ball) -> impl Iterator<Item = Point3<f64>> {
+        let [near_m, far_m] = ball.chord_m(&self.end);
+        let first_m = if self.is_met { 0.0 } else { (-far_m).max(0.0) };
+        let last_m =
+            (-near_m).min(self.length_m).max(if self.is_met { self.radius_m } else { 0.0 });
+        let is_in = self.is_met || (near_m < far_m && first_m < last_m);
+        let count = if is_in { self.places } else { 0 };
+        (0..count).map(move |i| {
+            let share = f64::from(i) / f64::from(count);
+            let back_m = first_m + share * (last_m - first_m);
+            self.end.p_w - self.end.ahead_w.scale(back_m)
+        })
+    }
+}
+
+/// Least deviation of a free place's field, as a share of its distance from what was met: the field
+/// is near a distance, not one. Chosen.
+const SURE: f64 = 0.1;
+
+impl Evidence {
+    /// Takes in a touch, with what it swept if that is known, as `places` balls along the way.
+    pub fn observe(
+        &mut self,
+        approach: &Approach,
+        touch: &Touch,
+        swept: Option<&Swept>,
+        places: u32,
+    ) {
+        let places = match touch {
+            Touch::Contact(contact) => {
+                self.contacts.push(contact.clone());
+                places
+            }
+            Touch::Miss => 2 * places,
+            // Where a touch broken off met something is not known.
+            Touch::Overload => 0,
+        };
+        let Some(Swept { finger, p_wt }) = swept else { return };
+        let ahead_w = approach.direction_w();
+        self.ways.push(Way {
+            end: Aim { p_w: *p_wt, ahead_w },
+            length_m: (p_wt - approach.p_near_w).dot(&ahead_w),
+            radius_m: finger.radius_m,
+            places,
+            is_met: matches!(touch, Touch::Contact(_)),
+        });
+    }
+
+    /// Points of contact in `W`, in order.
+    pub fn contacts(&self) -> impl ExactSizeIterator<Item = &Point3<f64>> + Clone {
+        self.contacts.iter().map(|contact| &contact.p_wc)
+    }
+
+    /// How far `p_w` is from all contacts and from the hull of the fingertip on all its ways.
+    pub fn hole_m(&self, p_w: &Point3<f64>) -> f64 {
+        let met = self.contacts().map(|contact| (contact - p_w).norm());
+        met.chain(self.ways.iter().map(|way| way.away_m(p_w))).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Middles and radii of the balls that were swept inside `ball`.
+    fn free<'a>(&'a self, ball: &'a Ball) -> impl Iterator<Item = (Point3<f64>, f64)> {
+        self.ways.iter().flat_map(|way| way.places_w(ball).map(|p_w| (p_w, way.radius_m)))
+    }
+
+    /// What the field is above `prior`: 0 at each contact, with the normal as its gradient if
+    /// `normals`; and at the middle of each ball swept inside `ball` the distance to the nearest
+    /// contact. That is the most that a distance can be there as the swept radius is the least: the
+    /// deviation is that of a uniform distribution between them. `noise_m` is the deviation that
+    /// counts as one.
+    pub fn observations(
+        &self,
+        (prior, ball): (&Prior, &Ball),
+        normals: bool,
+        noise_m: f64,
+    ) -> Observations {
+        let mut all = Observations::new(3);
+        for Contact { p_wc: p_w, normal_w } in &self.contacts {
+            let field = prior.field(p_w);
+            let gradient = normal_w - field.gradient;
+            let slope = normals.then_some(Slope { gradient: gradient.as_slice(), noise: 1.0 });
+            let place = p_w.coords.as_slice();
+            all.take_in(&Observation { place, height: -field.value, noise: 1.0, slope });
+        }
+        for (p_w, radius_m) in self.free(ball) {
+            let distances_m = self.contacts().map(|contact| (contact - p_w).norm());
+            let Some(nearest_m) = distances_m.reduce(f64::min) else { continue };
+            let least_m = radius_m.min(nearest_m);
+            let sd_m = ((nearest_m - least_m) / 12f64.sqrt()).max(SURE * nearest_m);
+            all.take_in(&Observation {
+                place: p_w.coords.as_slice(),
+                height: nearest_m - prior.field(&p_w).value,
+                noise: (sd_m / noise_m).max(1.0),
+                slope: None,
+            });
+        }
+        all
+    }
+}
+
+/// The mean of the field over space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prior {
+    /// Centre in `W` and half axes along those of `W`; none for a field of zeros.
+    body: Option<(Point3<f64>, Vector3<f64>)>,
+}
+
+/// Shortest half axis as a share of the ball's radius, so that touches on one plane leave a body;
+/// chosen.
+const THINNEST: f64 = 0.1;
+
+/// Half axis of the sphere before two contacts, as a share of the ball's radius; chosen.
+const UNKNOWN: f64 = 0.5;
+
+impl Prior {
+    /// About `contacts`, in the `ball` about them.
+    pub fn about<'a>(
+        shape: PriorShape,
+        ball: &Ball,
+        contacts: impl Iterator<Item = &'a Point3<f64>>,
+    ) -> Self {
+        let thinnest_m = THINNEST * ball.radius_m;
+        let (centre_w, radii_m) = match extent(contacts) {
+            Some([low, high]) if low != high => {
+                let radii_m = (high - low) / 2.0;
+                (nalgebra::center(&low, &high), radii_m.map(|radius_m| radius_m.max(thinnest_m)))
+            }
+            _ => (ball.centre_w, Vector3::repeat(UNKNOWN * ball.radius_m)),
+        };
+        let body = match shape {
+            PriorShape::Ellipsoid => Some((centre_w, radii_m)),
+            PriorShape::Sphere => Some((centre_w, Vector3::repeat(radii_m.product().cbrt()))),
+            PriorShape::None => None,
+        };
+        Self { body }
+    }
+
+    /// The field at `p_w`, negative inside, with its gradient: s·(|v / r|² − 1) / 2 for the offset
+    /// v from the centre, the half axes r and the least of them s. It is as smooth as any, so that
+    /// what a Gaussian process must add to it is no rougher than the object.
+    pub fn field(&self, p_w: &Point3<f64>) -> Field {
+        let Some((centre_w, radii_m)) = &self.body else {
+            return Field { value: 0.0, gradient: Vector3::zeros() };
+        };
+        let scaled = (p_w - centre_w).component_div(radii_m);
+        let least_m = radii_m.min();
+        Field {
+            value: 0.5 * least_m * (scaled.norm_squared() - 1.0),
+            gradient: scaled.component_div(radii_m) * least_m,
+        }
+    }
+}

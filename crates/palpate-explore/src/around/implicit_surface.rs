@@ -1,0 +1,207 @@
+//! What is known of a whole object after some touches: a Gaussian process over space whose zero set
+//! is the surface, negative inside (Williams & Fitzgibbon 2007).
+
+use super::evidence::{Evidence, Prior};
+use super::scope::Scope;
+use super::settings::SpaceSettings;
+use super::surface::Surface;
+use crate::probe::{Swept, Touch};
+use crate::task::{Aim, Approach};
+use nalgebra::Point3;
+use palpate_gp::covariance::CovarianceError;
+use palpate_gp::fit::Fit;
+use palpate_gp::kernel;
+use palpate_gp::kernel::{Kernel, Matern52};
+use palpate_gp::likelihood::Likelihood;
+use palpate_gp::math::optimize::compass;
+use palpate_gp::{Hyperparameters, Mean, NoiseRatio, Observations, Posterior, Range, Scale};
+
+/// The belief of one trial around an object.
+#[derive(Clone)]
+pub struct ImplicitSurface {
+    scope: Scope,
+    settings: SpaceSettings,
+    kernel: &'static dyn Kernel,
+    evidence: Evidence,
+    asked: Vec<Aim>,
+    fit: Option<Fit>,
+    surface: Option<Surface>,
+}
+
+/// Signal's deviation before the first fit, as a share of the radius of the ball about the
+/// contacts, and the range in which it is sought; chosen, the field is a distance and the object
+/// fills a part of the ball.
+const SIGNAL: f64 = 0.5;
+const SIGNAL_RANGE: [f64; 2] = [1e-2, 1e2];
+
+/// Numbers of the covariance matrices' cubes that a fit may spend, with at least [`TRIED_MIN`]
+/// factorisations; chosen, some ten milliseconds.
+const CUBES: f64 = 2e8;
+const TRIED_MIN: f64 = 3.0;
+const TRIED_MAX: f64 = 60.0;
+
+/// First step of the first fit, first one of those that follow, and last of all, in logarithms;
+/// chosen.
+const STEP_FIRST: f64 = 0.7;
+const STEP_NEXT: f64 = 0.35;
+const STEP_LAST: f64 = 0.1;
+
+impl ImplicitSurface {
+    /// Knows nothing yet.
+    pub fn new(scope: Scope, settings: SpaceSettings) -> Self {
+        let kernel = kernel::by_name(&settings.kernel).unwrap_or(&Matern52);
+        let (evidence, asked) = (Evidence::default(), Vec::new());
+        Self { scope, settings, kernel, evidence, asked, fit: None, surface: None }
+    }
+
+    /// Takes in one touch that went the way of `approach` because of `aim`, and what it swept; the
+    /// belief changes with the next [`refit`](Self::refit).
+    pub fn observe(
+        &mut self,
+        aim: &Aim,
+        approach: &Approach,
+        (touch, swept): (&Touch, Option<&Swept>),
+    ) {
+        self.asked.push(*aim);
+        self.evidence.observe(approach, touch, swept, self.settings.free_places);
+    }
+
+    /// Finds the most likely length and noises and conditions on all touches.
+    ///
+    /// A step along each parameter in turn from where the last fit ended, halved where none is
+    /// uphill: touch by touch the fit follows its hill, and a large covariance is factored three
+    /// times only.
+    ///
+    /// # Errors
+    /// If the covariance of the touches cannot be factored.
+    pub fn refit(&mut self) -> Result<(&Fit, &Surface), CovarianceError> {
+        let start = self.fit.as_ref().map(|fit| &fit.hyperparameters);
+        let (prior, observations) = self.observations(start);
+        let fit = self.search(start, &observations)?;
+        self.conclude(prior, observations, fit)
+    }
+
+    /// Conditions on all touches with what a fit found that began from `last`, as when a recorded
+    /// belief is drawn again.
+    ///
+    /// # Errors
+    /// If the covariance of the touches cannot be factored.
+    pub fn condition(&mut self, last: Option<&Fit>, fit: &Fit) -> Result<(), CovarianceError> {
+        let start = last.map(|last| &last.hyperparameters);
+        let (prior, observations) = self.observations(start);
+        self.conclude(prior, observations, fit.clone()).map(|_| ())
+    }
+
+    fn conclude(
+        &mut self,
+        prior: Prior,
+        observations: Observations,
+        fit: Fit,
+    ) -> Result<(&Fit, &Surface), CovarianceError> {
+        let mut posterior = Posterior::new(self.kernel, fit.hyperparameters.clone(), observations)?;
+        posterior.widen(self.settings.widening);
+        let offset_m = self.settings.offset_m.unwrap_or(self.scope.offset_m);
+        let met = (self.contacts(), offset_m);
+        let surface = Surface::new(&self.scope, prior, posterior, met);
+        Ok((self.fit.insert(fit), self.surface.insert(surface)))
+    }
+
+    /// What the touches say, in units of the noise of `last`.
+    fn observations(&self, last: Option<&Hyperparameters>) -> (Prior, Observations) {
+        let ball = self.scope.met(self.contacts());
+        let prior = Prior::about(self.settings.prior, &ball, self.contacts());
+        let unknown_m = SIGNAL * ball.radius_m * self.settings.noise[0];
+        let noise_m = last.map_or(unknown_m, |last| last.noise_sd);
+        let observations = self.evidence.observations((&prior, &ball), self.normals(), noise_m);
+        (prior, observations)
+    }
+
+    /// Whether normals are observed: a kernel without slopes cannot.
+    fn normals(&self) -> bool {
+        self.settings.normals && self.kernel.has_slopes()
+    }
+
+    fn search(
+        &self,
+        start: Option<&Hyperparameters>,
+        observations: &Observations,
+    ) -> Result<Fit, CovarianceError> {
+        let radius_m = self.scope.met(self.contacts()).radius_m;
+        let SpaceSettings { length_scale, noise, slope_noise, .. } = &self.settings;
+        let lengths_m = length_scale.map(|share| share * radius_m);
+        let mut ranges = vec![lengths_m, *noise];
+        ranges.extend(self.normals().then_some(*slope_noise));
+        let ranges: Vec<[f64; 2]> = ranges.iter().map(|range| range.map(f64::ln)).collect();
+        let middle = |[low, high]: [f64; 2]| 0.5 * (low + high);
+        let mut begin: Vec<f64> = match start {
+            Some(start) => {
+                let (length_m, ratio) = (start.length_scales[0], start.noise_ratio());
+                vec![length_m.ln(), ratio.height.ln(), (ratio.slope * length_m).ln()]
+            }
+            None => ranges.iter().copied().map(middle).collect(),
+        };
+        begin.truncate(ranges.len());
+        // The object may have grown since.
+        begin.iter_mut().zip(&ranges).for_each(|(at, [low, high])| *at = at.clamp(*low, *high));
+        let signal_sd =
+            Scale::Best(Range::from((SIGNAL_RANGE[0] * radius_m, SIGNAL_RANGE[1] * radius_m)));
+        let mut likelihood = Likelihood::new(self.kernel, Mean::Zero, observations);
+        let cube = (observations.order() as f64).powi(3);
+        // Each fit begins with another parameter, so that short ones see to all.
+        let axis = observations.len() % begin.len();
+        let steps = [if start.is_some() { STEP_NEXT } else { STEP_FIRST }, STEP_LAST];
+        let budget = (CUBES / cube).clamp(TRIED_MIN, TRIED_MAX) as u32;
+        let (found, signal_sd) = compass(begin, &ranges, axis, steps, budget, |logs| {
+            let (length_m, ratio) = parameters(logs);
+            let found = likelihood.profile(&[length_m; 3], ratio, &signal_sd, None)?;
+            Ok::<_, CovarianceError>((found.log_likelihood, found.signal_sd))
+        })?;
+        let (length_m, ratio) = parameters(&found.x);
+        Ok(Fit {
+            kernel: None,
+            hyperparameters: Hyperparameters::new(signal_sd, vec![length_m; 3], ratio, 0.0),
+            log_likelihood: found.value,
+            left_sd: None,
+            factorisations: found.evaluations,
+            scanned_at: observations.len(),
+            stop: found.stop,
+        })
+    }
+
+    /// What is explored, and with what.
+    pub fn scope(&self) -> &Scope {
+        &self.scope
+    }
+
+    /// Points of contact in `W`, in order.
+    pub fn contacts(&self) -> impl ExactSizeIterator<Item = &Point3<f64>> + Clone {
+        self.evidence.contacts()
+    }
+
+    /// How far `p_w` is from all that was met and swept.
+    pub fn hole_m(&self, p_w: &Point3<f64>) -> f64 {
+        self.evidence.hole_m(p_w)
+    }
+
+    /// Every aim asked for so far.
+    pub fn asked(&self) -> &[Aim] {
+        &self.asked
+    }
+
+    /// What the last [`refit`](Self::refit) found.
+    pub fn fit(&self) -> Option<&Fit> {
+        self.fit.as_ref()
+    }
+
+    /// The surface that is believed, once fitted.
+    pub fn surface(&self) -> Option<&Surface> {
+        self.surface.as_ref()
+    }
+}
+
+/// Length in metres and noise ratios from their logarithms; the slopes' is that of slopes per
+/// length scale.
+fn parameters(logs: &[f64]) -> (f64, NoiseRatio) {
+    let at = |i: usize| logs.get(i).map_or(0.0, |log| log.exp());
+    (at(0), NoiseRatio { height: at(1), slope: at(2) / at(0) })
+}

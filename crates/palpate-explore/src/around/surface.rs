@@ -1,0 +1,130 @@
+//! The surface that is believed: the zero set of a Gaussian process over space.
+
+use super::evidence::Prior;
+use super::grid::{touched, zero_set};
+use super::scope::Scope;
+use crate::task::Ball;
+use nalgebra::{Point3, Vector3};
+use palpate_geometry::implicit::Field;
+use palpate_geometry::mesh::Mesh;
+use palpate_geometry::primitives::extent;
+use palpate_gp::Posterior;
+use palpate_gp::means::MeanField;
+
+/// A field over space with its uncertainty: negative inside the object, and near its surface about
+/// the distance from it.
+#[derive(Clone)]
+pub struct Surface {
+    prior: Prior,
+    posterior: Posterior,
+    contacts: Vec<Point3<f64>>,
+    /// Standard deviation of what all contacts are off by.
+    offset_m: f64,
+    /// Corners of the box in which the surface is sought.
+    bounds: [Point3<f64>; 2],
+}
+
+/// How far the box of a surface goes beyond its contacts, as a share of the radius of the ball
+/// about them; chosen.
+const BEYOND: f64 = 0.15;
+
+/// A gradient below this is not a distance's; chosen.
+const FLAT: f64 = 0.3;
+
+/// By how much a field of this gradient grows on the way out of its surface; so that a deviation of
+/// the field becomes one of the surface.
+pub fn steepness(gradient: &Vector3<f64>) -> f64 {
+    gradient.norm().max(FLAT)
+}
+
+/// Steps by which a vertex is put onto the surface, none longer than a cell and a half; chosen.
+const STEPS: usize = 2;
+
+impl Surface {
+    pub(super) fn new<'a>(
+        scope: &Scope,
+        prior: Prior,
+        posterior: Posterior,
+        (contacts, offset_m): (impl Iterator<Item = &'a Point3<f64>>, f64),
+    ) -> Self {
+        let contacts: Vec<Point3<f64>> = contacts.copied().collect();
+        let Ball { centre_w, radius_m, .. } = &scope.ball;
+        let [ball_low, ball_high] = [-radius_m, *radius_m].map(|r| centre_w.map(|x| x + r));
+        let bounds = match extent(&contacts) {
+            None => [ball_low, ball_high],
+            Some([low, high]) => {
+                let beyond_m = BEYOND * scope.met(contacts.iter()).radius_m;
+                [
+                    low.map(|x| x - beyond_m).sup(&ball_low),
+                    high.map(|x| x + beyond_m).inf(&ball_high),
+                ]
+            }
+        };
+        Self { prior, posterior, contacts, offset_m, bounds }
+    }
+
+    /// To ask for its mean at many points.
+    pub fn field(&self) -> SurfaceField<'_> {
+        SurfaceField { prior: &self.prior, mean: MeanField::from(&self.posterior) }
+    }
+
+    /// Standard deviation of the field at each of `points_w`, metres.
+    pub fn sds_m(&self, points_w: &[Point3<f64>]) -> Vec<f64> {
+        let places: Vec<Vec<f64>> =
+            points_w.iter().map(|p_w| p_w.coords.as_slice().into()).collect();
+        let variances = self.posterior.variances(&places, &mut []);
+        let offset2 = self.offset_m * self.offset_m;
+        variances.into_iter().map(|variance| (variance.max(0.0) + offset2).sqrt()).collect()
+    }
+
+    /// How far the surface may lie from where it is believed at each of `points_w` of it: σ / |∇f|.
+    pub fn offsets_m(&self, points_w: &[Point3<f64>]) -> Vec<f64> {
+        let mut field = self.field();
+        let sds_m = self.sds_m(points_w).into_iter().zip(points_w);
+        sds_m.map(|(sd_m, p_w)| sd_m / steepness(&field.at(p_w).gradient)).collect()
+    }
+
+    /// What it was conditioned on.
+    pub fn posterior(&self) -> &Posterior {
+        &self.posterior
+    }
+
+    /// The surface as closed triangles, from a grid of `cells` along the longest side of the box
+    /// about the contacts: the pieces that were touched. None if the field has no zeros there.
+    pub fn mesh(&self, cells: u32) -> Option<Mesh> {
+        let [low, high] = &self.bounds;
+        let cell_m = (high - low).max() / f64::from(cells.max(1));
+        let mut field = self.field();
+        let (mut vertices, triangles) = zero_set([*low, *high], cell_m, |p_w| field.value(p_w));
+        let triangles = touched(&vertices, triangles, &self.contacts);
+        for p_w in &mut vertices {
+            for _ in 0..STEPS {
+                let Field { value, gradient } = field.at(p_w);
+                let step = gradient * (value / gradient.norm_squared().max(FLAT * FLAT));
+                *p_w -= step.cap_magnitude(1.5 * cell_m);
+            }
+        }
+        Mesh::new(&vertices, &triangles).ok().map(|(mesh, _)| mesh)
+    }
+}
+
+/// A surface's field at many points, with buffers of its own.
+pub struct SurfaceField<'a> {
+    prior: &'a Prior,
+    mean: MeanField,
+}
+
+impl SurfaceField<'_> {
+    /// The mean at `p_w`, metres: negative inside.
+    pub fn value(&mut self, p_w: &Point3<f64>) -> f64 {
+        self.prior.field(p_w).value + self.mean.value(p_w.coords.as_slice())
+    }
+
+    /// The same with its gradient.
+    pub fn at(&mut self, p_w: &Point3<f64>) -> Field {
+        let mut gradient = [0.0; 3];
+        let prior = self.prior.field(p_w);
+        let mean = self.mean.gradient(p_w.coords.as_slice(), &mut gradient);
+        Field { value: prior.value + mean, gradient: prior.gradient + Vector3::from(gradient) }
+    }
+}

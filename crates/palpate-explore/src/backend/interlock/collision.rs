@@ -1,0 +1,127 @@
+//! What of the robot may not come near to what.
+
+use super::interlock::{Ahead, Entry, Interlock, Now, Site};
+use super::settings::InterlockSettings;
+use crate::backend::Trip;
+use crate::robot::arm::Joints;
+use crate::robot::arm::LinkCapsule;
+use nalgebra::{Point3, Vector3};
+use palpate_geometry::distance::{HalfSpace, OrientedBox};
+use palpate_geometry::sweep::Capsule;
+
+/// Stops the body before links come near to each other, to the table or to the object.
+pub const ENTRY: Entry = Entry {
+    name: NAME,
+    make: |site, settings, _| {
+        let guard = Guard::new(site, settings);
+        (!guard.pairs.is_empty()).then(|| Box::new(guard) as _)
+    },
+};
+
+const NAME: &str = "clearance";
+
+/// Looks at the capsules of the links where the body cannot help going.
+struct Guard {
+    links: Vec<LinkCapsule>,
+    /// Each link with what it must not meet.
+    pairs: Vec<(usize, Other)>,
+    clearance_m: f64,
+    reaction_s: f64,
+    /// The links in `W` at the posture looked at last.
+    placed: Vec<Capsule>,
+    /// A posture, and the clearance there: until some point can have moved by that much, nobody
+    /// needs to look again.
+    looked: Option<(Joints, f64)>,
+}
+
+enum Other {
+    Link(usize),
+    Table(HalfSpace),
+    Object(OrientedBox),
+}
+
+impl Guard {
+    fn new(site: &Site, settings: &InterlockSettings) -> Self {
+        let links = site.robot.capsules();
+        let mut pairs = Vec::new();
+        for (i, link) in links.iter().enumerate() {
+            let beside = links.iter().enumerate().skip(i + 1);
+            let met = beside.filter(|(_, other)| link.may_meet(other));
+            pairs.extend(met.map(|(k, _)| (i, Other::Link(k))));
+            if let Some(z_m) = settings.lowest_m.filter(|_| !link.near_base) {
+                let (p_w, outward_w) = (Point3::new(0.0, 0.0, z_m), Vector3::z_axis());
+                pairs.push((i, Other::Table(HalfSpace { p_w, outward_w })));
+            }
+            let is_arm = !link.near_base && !link.is_carried();
+            if let Some(object) = site.object.filter(|_| is_arm) {
+                pairs.push((i, Other::Object(object)));
+            }
+        }
+        Self {
+            placed: Vec::with_capacity(links.len()),
+            links,
+            pairs,
+            clearance_m: settings.clearance_m,
+            reaction_s: settings.reaction_s,
+            looked: None,
+        }
+    }
+
+    /// The smallest distance at `q`, and the pair that has it.
+    fn nearest(&mut self, now: &Now, q: &Joints) -> (f64, usize) {
+        let frames = now.chain.frames(q);
+        self.placed.clear();
+        self.placed.extend(self.links.iter().map(|link| link.at(&frames[link.link])));
+        let mut nearest = (f64::INFINITY, 0);
+        for (i, (link, other)) in self.pairs.iter().enumerate() {
+            let link = &self.placed[*link];
+            let distance_m = match other {
+                Other::Link(other) => link.to_capsule_m(&self.placed[*other]),
+                Other::Table(space) => link.to_half_space_m(space),
+                Other::Object(object) => link.to_box_m(object),
+            };
+            if distance_m < nearest.0 || distance_m.is_nan() {
+                nearest = (distance_m, i);
+            }
+        }
+        nearest
+    }
+
+    fn name(&self, pair: usize) -> String {
+        let (link, other) = &self.pairs[pair];
+        let other = match other {
+            Other::Link(other) => &*self.links[*other].name,
+            Other::Table(_) => "the table",
+            Other::Object(_) => "the object",
+        };
+        format!("{} and {other}", self.links[*link].name)
+    }
+}
+
+impl Interlock for Guard {
+    fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
+        let ahead = Ahead::of(now, qdot, self.reaction_s);
+        let limit = self.clearance_m;
+        if let Some((q, distance_m)) = &self.looked
+            && distance_m - ahead.farthest_m(q) > limit
+        {
+            return Ok(());
+        }
+        self.looked = None;
+        let mut pair = 0;
+        let below = ahead.below(limit, |q| {
+            let (distance_m, of) = self.nearest(now, q);
+            self.looked.get_or_insert((*q, distance_m));
+            pair = of;
+            distance_m
+        });
+        below.map_or(Ok(()), |found| {
+            let part = self.name(pair);
+            Err(Trip { interlock: NAME, part, found, limit, unit: "m" })
+        })
+    }
+
+    fn reset(&mut self) {
+        self.looked = None;
+    }
+}

@@ -1,0 +1,348 @@
+//! The last line before a body moves.
+
+use super::interlock::{Interlock, Now, Site, stopping_s};
+use super::joints::limited;
+use super::settings::InterlockSettings;
+use super::{INTERLOCKS, force};
+use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Trip, Wrench};
+use crate::robot::arm::{Jacobian, Joints};
+use nalgebra::Isometry3;
+use palpate_input::error::Invalid;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A body that is stopped when something is wrong, whatever it is told.
+///
+/// The controller keeps limits along the tip's direction; this body keeps them joint by joint, and
+/// passes a command within all of them unchanged. What cannot be kept by shortening a command trips
+/// an interlock: the body is braked within its joints' accelerations and does not move again. A
+/// reset clears that of a simulated body, of a real one only an [`Operator`] does.
+pub struct Interlocked {
+    inner: Box<dyn Backend>,
+    interlocks: Vec<Box<dyn Interlock>>,
+    settings: InterlockSettings,
+    now: Now,
+    way_back: WayBack,
+    /// What the wrench was at the reset.
+    rest: Option<Wrench>,
+    reading: Reading,
+    command: Command,
+    fault: Option<Fault>,
+    operator: Operator,
+}
+
+/// Who may clear a fault of a real body, from wherever.
+#[derive(Clone, Debug, Default)]
+pub struct Operator(Arc<AtomicBool>);
+
+impl Operator {
+    /// Whoever looked at the body and found it fit lets the next reset clear its fault.
+    pub fn clear(&self) {
+        self.0.store(true, Ordering::Release);
+    }
+}
+
+impl Interlocked {
+    /// Around `inner`, which moves the joints of the site's robot.
+    ///
+    /// # Errors
+    /// If their numbers of joints differ.
+    pub fn new(
+        inner: Box<dyn Backend>,
+        site: &Site,
+        settings: &InterlockSettings,
+    ) -> Result<Self, Fault> {
+        let (chain, capabilities) = (site.robot.chain.clone(), inner.capabilities());
+        capabilities.fit(&chain)?;
+        let made = INTERLOCKS.iter().filter_map(|entry| (entry.make)(site, settings, capabilities));
+        let (q, x_wt) = (chain.home, Isometry3::identity());
+        Ok(Self {
+            interlocks: made.collect(),
+            settings: settings.clone(),
+            way_back: WayBack::new(capabilities.period_s),
+            command: Command { qdot: vec![0.0; chain.joints.len()] },
+            now: Now {
+                reaches_m: chain.reaches_m(site.robot.finger.radius_m),
+                period_s: capabilities.period_s,
+                chain,
+                tick: 0,
+                time_s: 0.0,
+                q,
+                qdot: Joints::zeros(),
+                sent: Joints::zeros(),
+                unseen: Joints::zeros(),
+                x_wt,
+                jacobian: Jacobian::zeros(),
+                load: None,
+            },
+            rest: None,
+            reading: Reading::default(),
+            fault: None,
+            operator: Operator::default(),
+            inner,
+        })
+    }
+
+    /// Who may clear its faults.
+    pub fn operator(&self) -> Operator {
+        self.operator.clone()
+    }
+
+    /// Has the inner body do `qdot` for a tick, and takes in what it says.
+    fn advance(&mut self, qdot: &Joints) -> Result<(), Fault> {
+        self.command.qdot.iter_mut().zip(qdot.iter()).for_each(|(to, from)| *to = *from);
+        self.now.sent = *qdot;
+        self.now.tick += 1;
+        match self.inner.step(&self.command) {
+            Ok(reading) => self.reading.copy(reading),
+            Err(fault) => {
+                // It said itself that it stops; what was commanded must not hold on.
+                if self.inner.capabilities().real_time {
+                    self.command.qdot.fill(0.0);
+                    let _ = self.inner.step(&self.command);
+                }
+                return Err(fault);
+            }
+        }
+        self.take()
+    }
+
+    /// Where the body stands by the last reading.
+    fn take(&mut self) -> Result<(), Fault> {
+        let Self { now, reading, .. } = self;
+        reading.check()?;
+        let joints = |values: &[f64]| {
+            let (expected, found) = (now.chain.joints.len(), values.len());
+            now.chain.joints_from(values).ok_or_else(|| Fault::joints(expected, found))
+        };
+        let (before, passed_s) = (now.q, reading.time_s - now.time_s);
+        (now.q, now.qdot) = (joints(&reading.q)?, joints(&reading.qdot)?);
+        now.time_s = reading.time_s;
+        // A pause between two ticks is spent at rest.
+        let moved_s = passed_s.clamp(0.0, HELD_TICKS * now.period_s);
+        let unseen = (now.unseen + now.sent * moved_s)
+            .zip_map(&(now.q - before), |unseen, by| if by == 0.0 { unseen } else { 0.0 });
+        now.unseen = unseen;
+        (now.x_wt, now.jacobian) = now.chain.jacobian(&now.q);
+        now.load = reading.wrench.map(|Wrench { force_n, torque_nm }| {
+            let rest = *self.rest.get_or_insert(Wrench { force_n, torque_nm });
+            [(force_n - rest.force_n).norm(), (torque_nm - rest.torque_nm).norm()]
+        });
+        Ok(())
+    }
+
+    /// Shortens `qdot`, or says why it must not be.
+    fn shorten(&mut self, qdot: &mut Joints) -> Result<(), Trip> {
+        self.interlocks.iter_mut().try_for_each(|one| one.command(&self.now, qdot))
+    }
+
+    /// Why a body at rest must not even stand where it does.
+    fn stands_badly(&mut self) -> Option<Trip> {
+        let is_at_rest = self.now.sent == Joints::zeros();
+        is_at_rest.then(|| self.shorten(&mut Joints::zeros()).err()).flatten()
+    }
+
+    /// The fault of a body that must be brought elsewhere by hand.
+    fn astray(&self, trip: &Trip) -> Fault {
+        let joints = self.now.chain.joints.iter().zip(self.now.chain.home.iter());
+        let home: Vec<_> = joints.map(|(joint, q)| format!("{} {q:.3}", joint.name)).collect();
+        let p_wt = self.now.x_wt.translation.vector;
+        Invalid::new(format!(
+            "the arm is not moved from where it stands, its tip at [{:.3}, {:.3}, {:.3}] m: {trip}; bring \
+             it near its home posture by hand: {}",
+            p_wt.x, p_wt.y, p_wt.z, home.join(", ")
+        ))
+        .into()
+    }
+
+    /// What is wrong with the last reading: the first thing, but too much force only where nothing
+    /// else is.
+    fn judge(&mut self) -> Result<(), Trip> {
+        let Self { interlocks, now, reading, .. } = self;
+        let mut trips = interlocks.iter_mut().filter_map(|one| one.reading(now, reading).err());
+        let Some(first) = trips.next() else { return Ok(()) };
+        let other = trips.find(|_| first.interlock == force::NAME);
+        Err(other.unwrap_or(first))
+    }
+
+    /// Braked, and from now on refused.
+    fn latch(&mut self, fault: Fault) -> Fault {
+        self.fault = Some(fault.clone());
+        fault
+    }
+
+    fn trip(&mut self, trip: Trip) -> Fault {
+        let is_force = trip.interlock == force::NAME;
+        let fault = Fault::Interlock { time_s: self.now.time_s, trip };
+        let is_sound = self.brake();
+        if is_force && is_sound {
+            self.go_back();
+        }
+        self.latch(fault)
+    }
+
+    /// Brings the joints to rest together, in a straight line. Whether nothing but too much force
+    /// was found wrong meanwhile.
+    fn brake(&mut self) -> bool {
+        let mut is_sound = true;
+        let ticks = (stopping_s(&self.now, &self.now.sent) / self.now.period_s).ceil() as usize + 1;
+        for _ in 0..ticks {
+            let sent = self.now.sent;
+            let left_s = stopping_s(&self.now, &sent);
+            if left_s <= 0.0 {
+                break;
+            }
+            let slower = sent * (1.0 - self.now.period_s / left_s).max(0.0);
+            let slower = limited(&self.now, &slower);
+            if self.advance(&slower).is_err() {
+                return false;
+            }
+            is_sound &= self.judge().map_or_else(|trip| trip.interlock == force::NAME, |()| true);
+        }
+        is_sound
+    }
+
+    /// Takes the finger off what it was pressed on.
+    fn go_back(&mut self) {
+        let InterlockSettings { retract_m, retract_m_s, retract_rise_n, .. } = self.settings;
+        let from = self.now.x_wt.translation.vector;
+        let Some([begun_n, _]) = self.now.load else { return };
+        let ticks = (2.0 * retract_m / (retract_m_s * self.now.period_s)) as usize + PATIENCE_TICKS;
+        for _ in 0..ticks {
+            if (self.now.x_wt.translation.vector - from).norm() >= retract_m {
+                break;
+            }
+            let Some(back) = self.way_back.velocity(&self.now, retract_m_s) else { break };
+            let mut qdot = back;
+            if self.shorten(&mut qdot).is_err() || self.advance(&qdot).is_err() {
+                break;
+            }
+            let is_worse = match self.now.load {
+                Some([force_n, _]) => force_n > begun_n + retract_rise_n,
+                None => true,
+            };
+            let is_other = self.judge().is_err_and(|trip| trip.interlock != force::NAME);
+            if is_worse || is_other {
+                break;
+            }
+        }
+        self.brake();
+    }
+}
+
+/// Ticks for which a command moves the body at most if no other follows: the arm's side takes a
+/// stale one for a stop.
+// heuristic: 30 ms at 250 Hz.
+const HELD_TICKS: f64 = 8.0;
+
+/// Ticks beyond twice those of a way back at full speed: to start and to stop.
+const PATIENCE_TICKS: usize = 100;
+
+impl Backend for Interlocked {
+    fn capabilities(&self) -> &Capabilities {
+        self.inner.capabilities()
+    }
+
+    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
+        let is_cleared = self.operator.0.swap(false, Ordering::AcqRel);
+        if let Some(fault) = &self.fault
+            && self.inner.capabilities().real_time
+            && !is_cleared
+        {
+            return Err(fault.clone());
+        }
+        self.reading.copy(self.inner.reset(seed)?);
+        self.interlocks.iter_mut().for_each(|one| one.reset());
+        self.way_back.forget();
+        (self.fault, self.rest) = (None, None);
+        (self.now.tick, self.now.sent) = (0, Joints::zeros());
+        (self.now.unseen, self.now.time_s) = (Joints::zeros(), self.reading.time_s);
+        self.take().map_err(|fault| self.latch(fault))?;
+        Ok(&self.reading)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        if let Some(fault) = &self.fault {
+            return Err(fault.clone());
+        }
+        let mut qdot = match self.inner.capabilities().accept(command) {
+            Ok(qdot) => qdot,
+            Err(refused) => {
+                self.brake();
+                return Err(refused);
+            }
+        };
+        if let Err(trip) = self.shorten(&mut qdot) {
+            return Err(match self.stands_badly() {
+                Some(trip) => self.latch(self.astray(&trip)),
+                None => self.trip(trip),
+            });
+        }
+        self.way_back.push(&self.now.q);
+        if let Err(fault) = self.advance(&qdot) {
+            // Readings that make no sense say nothing of where it brakes; it brakes all the same.
+            if matches!(fault, Fault::BadReading { .. }) {
+                self.brake();
+            }
+            return Err(self.latch(fault));
+        }
+        match self.judge() {
+            Ok(()) => Ok(&self.reading),
+            Err(trip) => {
+                // Where readings cannot be trusted, nothing watches how the servos brake.
+                if trip.interlock != force::NAME && self.inner.capabilities().real_time {
+                    self.inner.brake();
+                }
+                Err(self.trip(trip))
+            }
+        }
+    }
+}
+
+/// How much of the way is kept; chosen: 10 mm at 5 mm/s, the slowest contact.
+const KEPT_S: f64 = 2.0;
+
+/// Most postures kept.
+const MOST: usize = 4096;
+
+/// Postures of the last ticks, oldest first; holds no more than what it was made for.
+struct WayBack {
+    postures: VecDeque<Joints>,
+    most: usize,
+}
+
+impl WayBack {
+    /// Of a body with ticks of `period_s`.
+    fn new(period_s: f64) -> Self {
+        let most = ((KEPT_S / period_s) as usize).clamp(1, MOST);
+        Self { postures: VecDeque::with_capacity(most), most }
+    }
+
+    /// Nothing is behind.
+    fn forget(&mut self) {
+        self.postures.clear();
+    }
+
+    /// Adds where the body stands.
+    fn push(&mut self, q: &Joints) {
+        if self.postures.len() >= self.most {
+            self.postures.pop_front();
+        }
+        self.postures.push_back(*q);
+    }
+
+    /// Joint velocities that lead back with the tip at `speed_m_s`, dropping the postures passed;
+    /// none where the way ends.
+    fn velocity(&mut self, now: &Now, speed_m_s: f64) -> Option<Joints> {
+        while let Some(q) = self.postures.back() {
+            let by = q - now.q;
+            let travel_s = now.tip_speed_m_s(&by) / speed_m_s;
+            if travel_s >= now.period_s {
+                return Some(by / travel_s);
+            }
+            self.postures.pop_back();
+        }
+        None
+    }
+}

@@ -1,0 +1,17 @@
+//! Bodies that are commanded and read: simulated, recorded or real.
+//!
+//! [`Backend`] is the trait of a body, one control tick at a time. `delay`, `interlock`, `trace`,
+//! `watched` and the recorder of `recording` are bodies around other bodies.
+
+#[allow(clippy::module_inception)]
+mod backend;
+pub mod delay;
+mod fault;
+pub mod interlock;
+pub mod pace;
+pub mod trace;
+pub mod watched;
+
+pub use crate::robot::sensor::{IdealContact, Sample, Wrench};
+pub use backend::{Backend, Capabilities, Command, Reading};
+pub use fault::{Fault, LinkFault, Trip};

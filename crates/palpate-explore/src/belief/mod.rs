@@ -1,0 +1,148 @@
+//! The belief after some touches: a Gaussian process, over a zone or in space.
+
+mod height_field;
+
+pub use height_field::HeightField;
+
+use super::around::{ImplicitSurface, Scope, SpaceSettings};
+use super::gp_settings::GpSettings;
+use super::probe::{Swept, Touch};
+use crate::robot::Finger;
+use crate::task::{Approach, Region, Target, Task};
+use palpate_gp::Posterior;
+use palpate_gp::covariance::CovarianceError;
+use palpate_gp::fit::Fit;
+
+/// The belief of one trial. Either kind is large, and few are held at once.
+#[derive(Clone)]
+#[allow(clippy::large_enum_variant)]
+pub enum Belief {
+    /// Heights over a zone.
+    HeightField(HeightField),
+    /// A closed surface in a ball.
+    ImplicitSurface(ImplicitSurface),
+}
+
+impl Belief {
+    /// Knows nothing yet of what `task` explores with `finger`, which may be soft.
+    pub fn new(
+        task: &Task,
+        (finger, is_soft): (&Finger, bool),
+        gp: &GpSettings,
+        space: &SpaceSettings,
+    ) -> Self {
+        match task.region() {
+            Region::Zone(zone) => HeightField::new(zone.clone(), gp.clone()).into(),
+            Region::Ball(ball) => {
+                let scope = Scope::new(*ball, task, (finger, is_soft));
+                ImplicitSurface::new(scope, space.clone()).into()
+            }
+        }
+    }
+
+    /// Adds a touch that went the way of `approach` because of `target`, and what it swept; the
+    /// belief changes with the next [`refit`](Self::refit).
+    pub fn observe(
+        &mut self,
+        target: &Target,
+        approach: &Approach,
+        (touch, swept): (&Touch, Option<&Swept>),
+    ) {
+        match (self, target) {
+            (Self::HeightField(field), Target::Place(place)) => {
+                field.observe(place, touch);
+                swept.into_iter().for_each(|swept| field.observe_swept(swept));
+            }
+            (Self::ImplicitSurface(surface), Target::Aim(aim)) => {
+                surface.observe(aim, approach, (touch, swept));
+            }
+            _ => {}
+        }
+    }
+
+    /// Finds the most likely hyperparameters and conditions on all touches.
+    ///
+    /// # Errors
+    /// If the covariance of the touches cannot be factored.
+    pub fn refit(&mut self) -> Result<&Fit, CovarianceError> {
+        match self {
+            Self::HeightField(field) => field.refit().map(|(fit, _)| fit),
+            Self::ImplicitSurface(surface) => surface.refit().map(|(fit, _)| fit),
+        }
+    }
+
+    /// Conditions on all touches with the hyperparameters of the last fit.
+    ///
+    /// # Errors
+    /// If the covariance of the touches cannot be factored.
+    pub fn condition(&mut self) -> Result<(), CovarianceError> {
+        let Some(fit) = self.fit().cloned() else { return Ok(()) };
+        match self {
+            Self::HeightField(field) => field.condition(&fit),
+            Self::ImplicitSurface(surface) => surface.condition(Some(&fit), &fit),
+        }
+    }
+
+    /// What the last [`refit`](Self::refit) found.
+    pub fn fit(&self) -> Option<&Fit> {
+        match self {
+            Self::HeightField(field) => field.fit(),
+            Self::ImplicitSurface(surface) => surface.fit(),
+        }
+    }
+
+    /// The Gaussian process, once fitted: of heights over places of a zone, or of a field over
+    /// points of `W` whose zero set is the surface.
+    pub fn posterior(&self) -> Option<&Posterior> {
+        match self {
+            Self::HeightField(field) => field.surface(),
+            Self::ImplicitSurface(surface) => Some(surface.surface()?.posterior()),
+        }
+    }
+
+    /// Largest jitter that a covariance of this belief needed, relative to its diagonal.
+    pub fn jitter(&self) -> f64 {
+        match self {
+            Self::HeightField(field) => field.jitter(),
+            Self::ImplicitSurface(_) => self.posterior().map_or(0.0, Posterior::jitter),
+        }
+    }
+
+    /// Every target asked for so far.
+    pub fn targets(&self) -> Vec<Target> {
+        match self {
+            Self::HeightField(field) => field.targets().iter().cloned().map(Target::from).collect(),
+            Self::ImplicitSurface(surface) => {
+                surface.asked().iter().copied().map(Target::from).collect()
+            }
+        }
+    }
+
+    /// The belief over a zone, if it is one.
+    pub fn height_field(&self) -> Option<&HeightField> {
+        match self {
+            Self::HeightField(field) => Some(field),
+            Self::ImplicitSurface(_) => None,
+        }
+    }
+
+    /// The belief in space, if it is one.
+    pub fn implicit_surface(&self) -> Option<&ImplicitSurface> {
+        match self {
+            Self::HeightField(_) => None,
+            Self::ImplicitSurface(surface) => Some(surface),
+        }
+    }
+}
+
+impl From<HeightField> for Belief {
+    fn from(field: HeightField) -> Self {
+        Self::HeightField(field)
+    }
+}
+
+impl From<ImplicitSurface> for Belief {
+    fn from(surface: ImplicitSurface) -> Self {
+        Self::ImplicitSurface(surface)
+    }
+}

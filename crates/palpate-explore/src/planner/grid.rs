@@ -1,0 +1,60 @@
+//! A lattice from coarse to fine: the corners, then the middles between them, and so on.
+//!
+//! Level k is the lattice of 2ᵏ + 1 places along each side, borders included, without those of
+//! the levels before; within a level, places come in bit-reversed (van der Corput) order, so that
+//! a trial may end at any touch. Each axis sees few distinct coordinates: a surface whose period
+//! the lattice shares is not seen until a finer level. Around an object it is a lattice of equal
+//! areas on the sphere of directions.
+
+use super::plan::{Entry, Plan};
+use super::sample::sampled;
+use crate::belief::Belief;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "grid",
+    about: "a lattice from coarse to fine, no model",
+    zone_only: None,
+    make: |_, _| {
+        let mut next_level = 0;
+        // Remaining nodes of this level, the next one last: fractions 0..1.
+        let mut rest: Vec<Vec<f64>> = Vec::new();
+        Box::new(move |belief: &Belief| {
+            let target = sampled(belief, |dimension| {
+                loop {
+                    match rest.pop() {
+                        Some(node) => break node,
+                        None => {
+                            rest = lattice(dimension, next_level);
+                            next_level = (next_level + 1) % (FINEST + 1);
+                        }
+                    }
+                }
+            });
+            Ok(Plan::at(target))
+        })
+    },
+};
+
+/// Finest level: beyond the most touches that a trial may have, in one dimension as in two.
+const FINEST: u32 = 11;
+
+/// The nodes that `level` adds, last to first.
+fn lattice(dimension: usize, level: u32) -> Vec<Vec<f64>> {
+    let last = 1u32 << level;
+    let is_new = |node: &[u32]| level == 0 || node.iter().any(|index| index % 2 == 1);
+    let mut nodes: Vec<Vec<u32>> = match dimension {
+        1 => (0..=last).map(|x| vec![x]).collect(),
+        _ => (0..=last).flat_map(|z| (0..=last).map(move |x| vec![x, z])).collect(),
+    };
+    nodes.retain(|node| is_new(node));
+    nodes.sort_by_key(|node| std::cmp::Reverse(order(node)));
+    let fraction = |index: &u32| f64::from(*index) / f64::from(last);
+    nodes.iter().map(|node| node.iter().map(fraction).collect()).collect()
+}
+
+/// The bits of a node's indices, those of all axes in turn, the smallest first.
+fn order(node: &[u32]) -> u64 {
+    (0..=FINEST).fold(0, |order, bit| {
+        node.iter().fold(order, |order, index| order << 1 | u64::from(index >> bit & 1))
+    })
+}

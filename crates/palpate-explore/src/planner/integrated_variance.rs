@@ -1,0 +1,53 @@
+//! Touch where the variance of the whole surface falls most: the active learning of Cohn (1996),
+//! also called integrated variance reduction.
+
+use super::candidates::Candidates;
+use super::plan::{Entry, Plan};
+use super::search::Search;
+use super::sobol;
+use crate::around::ImplicitSurface;
+use crate::belief::{Belief, HeightField};
+use palpate_gp::posterior::Scratch;
+use palpate_gp::reduction::Reduction;
+use rand::RngExt;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "integrated_variance",
+    about: "largest fall of the variance over the whole surface (Cohn's active learning)",
+    zone_only: None,
+    make: |settings, rng| {
+        let mut search = Search::new(settings, rng);
+        // Of the places of a zone at which the variance is computed; drawn with the first plan.
+        let mut seed = None;
+        Box::new(move |belief: &Belief| {
+            Ok(match belief {
+                Belief::HeightField(field) => {
+                    let seed = *seed.get_or_insert_with(|| search.rng.random());
+                    in_zone(&mut search, seed, field)
+                }
+                Belief::ImplicitSurface(surface) => around(&mut search, surface),
+            })
+        })
+    },
+};
+
+fn in_zone(search: &mut Search, seed: u32, field: &HeightField) -> Plan {
+    let Some(posterior) = field.explorable() else { return search.anywhere(field.zone()) };
+    let places = sobol::places(field.zone(), search.settings.integrated_variance.places, seed);
+    let reduction = Reduction::new(posterior, places.iter().map(Vec::as_slice));
+    let mut scratch = Scratch::default();
+    let score = search.differentiated(field.zone(), |places| {
+        places.iter().map(|place| reduction.at(place, &mut scratch)).collect()
+    });
+    search.plan(field, score)
+}
+
+fn around(search: &mut Search, surface: &ImplicitSurface) -> Plan {
+    Candidates::choose(surface, &mut search.rng, |candidates| {
+        let all = &candidates.all;
+        let places = || all.iter().map(|candidate| candidate.p_w.coords.as_slice());
+        let reduction = Reduction::new(candidates.surface().posterior(), places());
+        let mut scratch = Scratch::default();
+        places().map(|place| reduction.at(place, &mut scratch)).collect()
+    })
+}

@@ -1,0 +1,231 @@
+//! Where an acquisition function is largest over a zone: DIRECT finds its hills, climbs go up side
+//! by side.
+//!
+//! The function is asked for whole lists of places: values of many cost less than many values.
+
+use super::plan::{Plan, Stall};
+use super::sample::uniform;
+use super::settings::PlanningSettings;
+use super::sobol;
+use crate::belief::HeightField;
+use crate::task::Zone;
+use palpate_gp::math::climb::{Climb, Manner};
+use palpate_gp::math::direct::direct;
+use palpate_gp::math::optimize::Bounds;
+use palpate_gp::posterior::Scratch;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+/// Two targets nearer than this, in units of the zone's sides, are the same touch; chosen.
+const SAME_TARGET: f64 = 1e-6;
+
+/// Below this fraction of the signal's standard deviation, the posterior's is the rounding error
+/// of a covariance with the least noise allowed; chosen.
+const LOST_IN_ROUNDING: f64 = 1e-5;
+
+/// Hills that are climbed, see [`MARGIN`].
+const HILLS: usize = 8;
+
+/// DIRECT searches the zone with this fraction of its sides added all around, and what it asks
+/// outside is answered from the nearest place inside: it divides from the middles of rectangles
+/// and would reach the zone's border, where the variance often peaks, only in the limit. On 78
+/// beliefs of the bird, 200 evaluations and one climb came within 2 % of the maximum on a dense
+/// grid 23 times; with the margin and eight climbs 73 times, and 500 evaluations 76 times.
+const MARGIN: f64 = 0.1;
+
+/// A climb is given up that would stay below the highest if it won so many times what its parabola
+/// says; chosen.
+const HOPE: f64 = 4.0;
+
+/// First step of a climb in units of the zone's sides, half the distance of two hills; and the
+/// share of the value that is not worth another step, far below what changes a plan. Chosen.
+const FIRST_STEP: f64 = 0.02;
+const RELATIVE_GAIN: f64 = 1e-6;
+
+/// Places nearer than this, in units of the zone's sides, are taken for the same hill; chosen.
+const SAME_HILL: f64 = 0.04;
+
+/// Step of a central difference in units of the zone's sides, near the cube root of the rounding
+/// error, where its own and the rounding error balance.
+const STEP: f64 = 1e-5;
+
+/// Finds where an acquisition function is largest over a zone.
+pub struct Search {
+    /// Settings of all planners.
+    pub settings: PlanningSettings,
+    /// All of the randomness.
+    pub rng: ChaCha8Rng,
+}
+
+impl Search {
+    /// Whose only randomness is `rng`.
+    pub fn new(settings: &PlanningSettings, rng: ChaCha8Rng) -> Self {
+        Self { settings: settings.clone(), rng }
+    }
+
+    /// A random place, of a belief that knows nothing.
+    pub fn anywhere(&mut self, zone: &Zone) -> Plan {
+        Plan::at(uniform(zone, &mut self.rng))
+    }
+
+    /// The place where `score` is largest; `score` returns the values of places and writes their
+    /// gradients into its second argument unless that is empty.
+    pub fn plan(
+        &mut self,
+        belief: &HeightField,
+        score: impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64>,
+    ) -> Plan {
+        let (_, place) = self.maximum(belief.zone(), score);
+        self.conclude(belief, place)
+    }
+
+    /// Plans to touch `place`, or a random one if a touch there would tell nothing.
+    pub fn conclude(&mut self, belief: &HeightField, place: Vec<f64>) -> Plan {
+        let stall = stalled(belief, &place);
+        let target = if stall.is_none() { place } else { uniform(belief.zone(), &mut self.rng) };
+        let sd_m = Some(variance(belief, &target).sqrt());
+        Plan { target: target.into(), sd_m, stall }
+    }
+
+    /// The largest value of `score` that was found, and its place.
+    pub fn maximum(
+        &self,
+        zone: &Zone,
+        mut score: impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64>,
+    ) -> (f64, Vec<f64>) {
+        let mut seen: Vec<(f64, Vec<f64>)> = Vec::new();
+        let (lower, upper) = corners(zone, MARGIN);
+        let bounds = Bounds { lower: &lower, upper: &upper };
+        direct(bounds, self.settings.direct_evaluations, |places| {
+            let places: Vec<_> = places.iter().map(|place| clamped(zone, place)).collect();
+            let values = score(&places, &mut []);
+            seen.extend(values.iter().copied().zip(places));
+            values
+        });
+        let (lower, upper) = corners(zone, 0.0);
+        let bounds = Bounds { lower: &lower, upper: &upper };
+        let manner = Manner {
+            first_step: FIRST_STEP,
+            gain: 0.0,
+            relative_gain: RELATIVE_GAIN,
+            budget: self.settings.lbfgs_evaluations,
+        };
+        let start = |start: Vec<f64>| Climb::new(bounds, &start, None, manner);
+        let mut climbs: Vec<Climb> = hills(zone, seen).into_iter().map(start).collect();
+        loop {
+            let asked: Vec<Vec<f64>> =
+                climbs.iter().filter_map(|climb| climb.asked().map(<[f64]>::to_vec)).collect();
+            if asked.is_empty() {
+                break;
+            }
+            let mut gradients = vec![vec![0.0; zone.dimension()]; asked.len()];
+            let values = score(&asked, &mut gradients);
+            let going = climbs.iter_mut().filter(|climb| climb.asked().is_some());
+            for ((climb, value), gradient) in going.zip(values).zip(&gradients) {
+                climb.tell(value, gradient);
+            }
+            let tops = climbs.iter().map(|climb| climb.top().value);
+            let highest = tops.fold(f64::NEG_INFINITY, f64::max);
+            climbs.retain(|climb| {
+                climb.asked().is_none() || !climb.is_measured() || climb.hope(HOPE) >= highest
+            });
+        }
+        let mut best = (f64::MIN, zone.at(&vec![0.5; zone.dimension()]));
+        for climb in &climbs {
+            let top = climb.top();
+            if top.value > best.0 {
+                best = (top.value, top.x.clone());
+            }
+        }
+        best
+    }
+
+    /// Evenly spread places, others each time: none was asked for before.
+    pub fn scattered(&mut self, zone: &Zone, count: u32) -> Vec<Vec<f64>> {
+        sobol::places(zone, count, self.rng.random())
+    }
+
+    /// `values` with their gradients by central differences, one-sided at the zone's border.
+    pub fn differentiated<V: FnMut(&[Vec<f64>]) -> Vec<f64>>(
+        &self,
+        zone: &Zone,
+        mut values: V,
+    ) -> impl FnMut(&[Vec<f64>], &mut [Vec<f64>]) -> Vec<f64> + use<V> {
+        let sides: Vec<[f64; 2]> = zone.sides().collect();
+        move |places, gradients| {
+            if gradients.is_empty() {
+                return values(places);
+            }
+            // Each place, then the one before and after it along each axis.
+            let mut all: Vec<Vec<f64>> = Vec::new();
+            for place in places {
+                all.push(place.clone());
+                for (axis, [low, high]) in sides.iter().enumerate() {
+                    let step = STEP * (high - low);
+                    for at in [(place[axis] - step).max(*low), (place[axis] + step).min(*high)] {
+                        let mut beside = place.clone();
+                        beside[axis] = at;
+                        all.push(beside);
+                    }
+                }
+            }
+            let told = values(&all);
+            let each = 1 + 2 * sides.len();
+            let around = all.chunks_exact(each).zip(told.chunks_exact(each));
+            for ((places, values), gradient) in around.zip(gradients) {
+                for (axis, slope) in gradient.iter_mut().enumerate() {
+                    let [before, after] = [1, 2].map(|side| 2 * axis + side);
+                    *slope = (values[after] - values[before])
+                        / (places[after][axis] - places[before][axis]);
+                }
+            }
+            told.into_iter().step_by(each).collect()
+        }
+    }
+}
+
+/// Lowest and highest corner of the zone, moved out by `margin` of its sides.
+fn corners(zone: &Zone, margin: f64) -> (Vec<f64>, Vec<f64>) {
+    let moved = |[low, high]: [f64; 2]| {
+        let step = margin * (high - low);
+        (low - step, high + step)
+    };
+    zone.sides().map(moved).unzip()
+}
+
+fn clamped(zone: &Zone, place: &[f64]) -> Vec<f64> {
+    place.iter().zip(zone.sides()).map(|(at, [low, high])| at.clamp(low, high)).collect()
+}
+
+/// The best places seen that are not next to a better one.
+fn hills(zone: &Zone, mut seen: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
+    seen.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut hills: Vec<Vec<f64>> = Vec::new();
+    for (_, place) in seen {
+        let is_apart = |hill: &Vec<f64>| zone.distance(hill, &place) > SAME_HILL;
+        if hills.iter().all(is_apart) {
+            hills.push(place);
+        }
+        if hills.len() == HILLS {
+            break;
+        }
+    }
+    hills
+}
+
+/// Why a touch at `place` would tell nothing, if so.
+fn stalled(belief: &HeightField, place: &[f64]) -> Option<Stall> {
+    let lost_sd = LOST_IN_ROUNDING * belief.surface()?.hyperparameters().signal_sd;
+    let same = |target: &Vec<f64>| belief.zone().distance(target, place) < SAME_TARGET;
+    if variance(belief, place) <= lost_sd * lost_sd {
+        Some(Stall::Collapsed)
+    } else if belief.targets().iter().any(same) {
+        Some(Stall::Repeated)
+    } else {
+        None
+    }
+}
+
+fn variance(belief: &HeightField, place: &[f64]) -> f64 {
+    belief.explorable_variance(place, &mut [], &mut Scratch::default())
+}

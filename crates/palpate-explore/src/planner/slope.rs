@@ -1,0 +1,49 @@
+//! Touch where the belief is unsure and steep: a smooth belief is most wrong at edges.
+//!
+//! α(x) = σ(x)·(1 + w·|∇μ(x)| / mean|∇μ|), the mean taken over the zone.
+
+use super::plan::{Entry, Plan, over_zone};
+use super::search::Search;
+use super::sobol;
+use crate::belief::HeightField;
+use palpate_gp::Posterior;
+use palpate_gp::posterior::Scratch;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "slope",
+    about: "standard deviation weighted by the slope of the posterior mean",
+    zone_only: Some("it follows the slope of a surface over a plane"),
+    make: |settings, rng| {
+        let mut search = Search::new(settings, rng);
+        over_zone(move |belief| plan(&mut search, belief))
+    },
+};
+
+/// Places over which the slope is averaged; chosen.
+const MEAN_PLACES: u32 = 256;
+
+fn plan(search: &mut Search, belief: &HeightField) -> Plan {
+    let Some(surface) = belief.surface() else { return search.anywhere(belief.zone()) };
+    let mut scratch = Scratch::default();
+    let places = sobol::places(belief.zone(), MEAN_PLACES, 0);
+    let slopes = places.iter().map(|place| slope(surface, place, &mut scratch));
+    let mean = slopes.sum::<f64>() / places.len() as f64;
+    let weight = search.settings.slope.weight;
+    // A flat belief is steep nowhere.
+    let per_slope = if mean > 0.0 { weight / mean } else { 0.0 };
+    let score = search.differentiated(belief.zone(), |places| {
+        let variances = belief.explorable_variances(places, &mut []);
+        let steep = places.iter().map(|place| slope(surface, place, &mut scratch));
+        let each = variances.iter().zip(steep);
+        each.map(|(variance, slope)| variance.sqrt() * (1.0 + per_slope * slope)).collect()
+    });
+    search.plan(belief, score)
+}
+
+/// |∇μ| at `place`.
+fn slope(surface: &Posterior, place: &[f64], scratch: &mut Scratch) -> f64 {
+    // A zone has at most two coordinates.
+    let mut gradient = [0.0; 2];
+    surface.mean_gradient(place, &mut gradient, scratch);
+    gradient[0].hypot(gradient[1])
+}

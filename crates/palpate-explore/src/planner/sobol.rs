@@ -1,0 +1,35 @@
+//! A scrambled Sobol sequence: evenly spread targets without any model.
+
+use super::plan::{Entry, Plan};
+use super::sample::sampled;
+use crate::belief::Belief;
+use crate::task::Zone;
+use rand::RngExt;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "sobol",
+    about: "a scrambled Sobol sequence: evenly spread, no model (the fairer baseline)",
+    zone_only: None,
+    make: |_, mut rng| {
+        let (seed, mut index) = (rng.random(), 0);
+        Box::new(move |belief: &Belief| {
+            let target = sampled(belief, |count| {
+                let at = fractions(count, index, seed);
+                index += 1;
+                at
+            });
+            Ok(Plan::at(target))
+        })
+    },
+};
+
+/// The first `count` places of the sequence that `seed` scrambles: evenly spread, with no period in
+/// common with a surface's.
+pub(super) fn places(zone: &Zone, count: u32, seed: u32) -> Vec<Vec<f64>> {
+    (0..count).map(|index| zone.at(&fractions(zone.dimension(), index, seed))).collect()
+}
+
+/// Entry `index` of the sequence in `dimension` dimensions that `seed` scrambles.
+fn fractions(dimension: usize, index: u32, seed: u32) -> Vec<f64> {
+    (0..dimension).map(|axis| f64::from(sobol_burley::sample(index, axis as u32, seed))).collect()
+}

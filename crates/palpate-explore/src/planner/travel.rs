@@ -1,0 +1,229 @@
+//! Short ways: several touches are planned together and made on a short tour.
+//!
+//! The variance does not depend on the heights, so that what `active` would ask for next is known
+//! ahead as long as the fit stays: the place where σ is largest, then the one where it is largest
+//! given a touch there too, and so on. These places are touched in the order of a short way through
+//! them; then the next tour is planned with what was learnt. Every tour has the place where σ is
+//! largest, so that none is put off for ever.
+
+use super::candidates::{Candidates, unseen};
+use super::plan::{Entry, Plan};
+use super::sample::any_side;
+use super::search::Search;
+use crate::around::ImplicitSurface;
+use crate::belief::{Belief, HeightField};
+use crate::task::{Aim, Region, Target};
+use palpate_gp::posterior::Scratch;
+
+pub(super) const ENTRY: Entry = Entry {
+    name: "travel",
+    about: "the largest standard deviations of the next touches, in the order of a short tour",
+    zone_only: None,
+    make: |settings, rng| {
+        let mut travel = Travel { tour: Vec::new(), search: Search::new(settings, rng) };
+        Box::new(move |belief: &Belief| {
+            Ok(match belief {
+                Belief::HeightField(field) => travel.in_zone(field),
+                Belief::ImplicitSurface(surface) => travel.around(surface),
+            })
+        })
+    },
+};
+
+struct Travel {
+    /// What is left of this tour, the next touch last.
+    tour: Vec<Plan>,
+    search: Search,
+}
+
+impl Travel {
+    fn in_zone(&mut self, field: &HeightField) -> Plan {
+        if field.surface().is_none() {
+            return self.search.anywhere(field.zone());
+        }
+        let plan = match self.tour.pop() {
+            Some(plan) => plan,
+            None => {
+                let places = self.largest(field);
+                let tour = places.into_iter().map(|place| self.search.conclude(field, place));
+                self.tour = tour.collect();
+                if let Some(last) = field.targets().last().cloned() {
+                    let zone = Region::from(field.zone().clone());
+                    shorten(&mut self.tour, &last.into(), &|a, b| zone.travel_m(a, b));
+                }
+                self.tour.reverse();
+                self.tour.pop().unwrap_or_else(|| self.search.anywhere(field.zone()))
+            }
+        };
+        match &plan {
+            // Touches of this tour may have told what this one was to tell.
+            Plan { stall: None, target: Target::Place(place), .. } => {
+                self.search.conclude(field, place.clone())
+            }
+            _ => plan,
+        }
+    }
+
+    /// The places of a tour, at least one: each where σ is largest given touches at those before.
+    fn largest(&self, field: &HeightField) -> Vec<Vec<f64>> {
+        let (_, first) = self.search.maximum(field.zone(), |places, gradients| {
+            field.explorable_variances(places, gradients)
+        });
+        let mut places = vec![first];
+        let mut known = field.explorable().cloned();
+        for _ in 1..self.search.settings.travel.tour {
+            let last = places.last().map(Vec::as_slice);
+            known = known.and_then(|known| known.fantasize(last.into_iter()).ok());
+            let Some(posterior) = &known else { break };
+            let (_, place) = self
+                .search
+                .maximum(field.zone(), |places, gradients| posterior.variances(places, gradients));
+            places.push(place);
+        }
+        places
+    }
+
+    fn around(&mut self, surface: &ImplicitSurface) -> Plan {
+        if let Some(aim) = unseen(surface, &mut self.search.rng) {
+            return Plan::at(aim);
+        }
+        if let Some(plan) = self.tour.pop() {
+            return plan;
+        }
+        let aside = any_side(surface.scope(), &mut self.search.rng);
+        if let Some(candidates) = Candidates::of(surface, &mut self.search.rng) {
+            self.tour = self.farthest(surface, &candidates, &aside);
+            self.tour.reverse();
+        }
+        self.tour.pop().unwrap_or_else(|| Plan::at(aside))
+    }
+
+    /// The aims of a tour: each where the surface may lie farthest off, given touches at those
+    /// before.
+    fn farthest(
+        &self,
+        surface: &ImplicitSurface,
+        candidates: &Candidates,
+        aside: &Aim,
+    ) -> Vec<Plan> {
+        let mut plans: Vec<Plan> = Vec::new();
+        let mut known = candidates.surface().posterior().clone();
+        for _ in 0..self.search.settings.travel.tour {
+            let mut scratch = Scratch::default();
+            let variances = (candidates.all.iter())
+                .map(|candidate| known.variance(candidate.p_w.coords.as_slice(), &mut scratch));
+            let plan = candidates.best(variances, aside);
+            let aimed_at = plan.target.aim().filter(|_| plan.stall.is_none());
+            let Some(place) = aimed_at.map(|aim| aim.p_w.coords) else { break };
+            plans.push(plan);
+            match known.fantasize([place.as_slice()].into_iter()) {
+                Ok(after) => known = after,
+                Err(_) => break,
+            }
+        }
+        if plans.is_empty() {
+            plans.push(Plan::at(*aside));
+        }
+        if let Some(last) = surface.asked().last() {
+            let ball = Region::from(surface.scope().ball);
+            shorten(&mut plans, &Target::from(*last), &|a, b| ball.travel_m(a, b));
+        }
+        plans
+    }
+}
+
+/// Puts a tour in the order of a short way from `start`: always the nearest first, then parts of it
+/// turned round as long as that shortens it (2-opt, Croes 1958).
+fn shorten(tour: &mut [Plan], start: &Target, travel_m: &dyn Fn(&Target, &Target) -> f64) {
+    for i in 0..tour.len() {
+        let here = before(tour, start, i);
+        let away = |index: &usize| travel_m(here, &tour[*index].target);
+        let nearest = (i..tour.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
+        tour.swap(i, nearest.unwrap_or(i));
+    }
+    while let Some((i, j)) = turn(tour, start, travel_m) {
+        tour[i..=j].reverse();
+    }
+}
+
+/// A part of the way that shortens it when turned round, if there is one.
+fn turn(
+    tour: &[Plan],
+    start: &Target,
+    travel_m: &dyn Fn(&Target, &Target) -> f64,
+) -> Option<(usize, usize)> {
+    let parts = (0..tour.len()).flat_map(|i| (i + 1..tour.len()).map(move |j| (i, j)));
+    parts.into_iter().find(|&(i, j)| {
+        let joined = |first: &Plan, last: &Plan| {
+            let onward = |next: &Plan| travel_m(&last.target, &next.target);
+            travel_m(before(tour, start, i), &first.target) + tour.get(j + 1).map_or(0.0, onward)
+        };
+        joined(&tour[j], &tour[i]) < joined(&tour[i], &tour[j]) - SHORTER_M
+    })
+}
+
+/// Where the finger comes from to the `index`-th place.
+fn before<'a>(tour: &'a [Plan], start: &'a Target, index: usize) -> &'a Target {
+    index.checked_sub(1).map_or(start, |last| &tour[last].target)
+}
+
+/// A way must shorten by more than rounding, or it could be turned for ever.
+const SHORTER_M: f64 = 1e-9;
+
+#[cfg(test)]
+mod tests {
+    use super::{Plan, Target, before, shorten, turn};
+    use crate::task::{Region, Zone};
+    use palpate_gp::math::seed::stream;
+    use rand::RngExt;
+
+    fn travel_m(from: &Target, to: &Target) -> f64 {
+        Region::from(Zone::new([0.0, 1.0], None)).travel_m(from, to)
+    }
+
+    fn length_m(tour: &[Plan], start: &Target) -> f64 {
+        (0..tour.len()).map(|i| travel_m(before(tour, start, i), &tour[i].target)).sum()
+    }
+
+    /// The slow twin tries every order. 2-opt is known to end within some 5 % of the shortest way
+    /// on average (Johnson & McGeoch 1997).
+    #[test]
+    fn tours_are_nearly_the_shortest() {
+        fn best_m(tour: &mut [Plan], from: usize, start: &Target) -> f64 {
+            if from == tour.len() {
+                return length_m(tour, start);
+            }
+            let mut best = f64::INFINITY;
+            for i in from..tour.len() {
+                tour.swap(from, i);
+                best = best.min(best_m(tour, from + 1, start));
+                tour.swap(from, i);
+            }
+            best
+        }
+        let mut rng = stream(1, 0, "places");
+        let mut ratios = Vec::new();
+        for _ in 0..50 {
+            let mut place = || vec![rng.random::<f64>(), rng.random::<f64>()];
+            let start = place().into();
+            let mut tour: Vec<Plan> = (0..7).map(|_| Plan::at(place())).collect();
+            let shortest_m = best_m(&mut tour, 0, &start);
+            shorten(&mut tour, &start, &travel_m);
+            ratios.push(length_m(&tour, &start) / shortest_m);
+            assert!(turn(&tour, &start, &travel_m).is_none());
+        }
+        assert!(ratios.iter().all(|&ratio| ratio >= 1.0 - 1e-12));
+        let mean = ratios.iter().sum::<f64>() / 50.0;
+        assert!(mean < 1.05, "{mean}");
+    }
+
+    /// Places on a line are passed one after the other; the same place twice ends too.
+    #[test]
+    fn a_line_is_swept() {
+        let on_line = [0.4, 0.1, 0.9, 0.1, 0.6];
+        let mut tour: Vec<Plan> = on_line.map(|x| Plan::at(vec![x])).into();
+        shorten(&mut tour, &vec![0.0].into(), &travel_m);
+        let order: Vec<f64> = tour.iter().map(|plan| plan.target.place().unwrap()[0]).collect();
+        assert_eq!(order, [0.1, 0.1, 0.4, 0.6, 0.9]);
+    }
+}

@@ -1,0 +1,381 @@
+//! One touch by a body that moves and feels: travel, tare, approach, settle, read, retract.
+
+mod contact_monitor;
+mod reach;
+mod trajectory;
+
+use super::{Contact, Probe, Swept, Touch, refuse_unless_finite};
+use crate::backend::{Backend, Command, Fault};
+use crate::control::{Controller, Goal, posture};
+use crate::robot::Robot;
+use crate::robot::arm::{ArmError, Joints};
+use crate::robot::finger::frame::FRAME_S;
+use crate::robot::sensor::{SensedContact, Sensor};
+use crate::task::touch::TouchSettings;
+use crate::task::{Approach, Ball};
+use contact_monitor::{ApproachEnd, ContactMonitor};
+use nalgebra::{Isometry3, UnitVector3, Vector3};
+use reach::Leg;
+use trajectory::{Path, rounds};
+
+pub use crate::task::approach::BEYOND_M;
+pub use reach::{ArmReach, check_reach};
+pub(super) use reach::{standoff, turning_point};
+
+/// A movement has arrived when the tip is this near to its end; chosen: below what a touch
+/// resolves.
+const ARRIVED_M: f64 = 5e-5;
+
+/// A finger that is no farther beyond the stand-off goes there at once; chosen: less than any
+/// object is high.
+const DEEPER_M: f64 = 5e-3;
+
+/// Joints are home when each is this near; chosen, as for a finger that is turned.
+const HOME_RAD: f64 = 2e-3;
+
+/// Drives any [`Backend`] through touches. The same code drives simulators, recordings and the
+/// real arm: it knows the robot, how to touch, and what it is told of each touch.
+pub struct Servo {
+    robot: Robot,
+    body: Box<dyn Backend>,
+    control: Controller,
+    settings: TouchSettings,
+    monitor: ContactMonitor,
+    command: Command,
+    /// Of the last reading.
+    time_s: f64,
+    q: Vec<f64>,
+    swept: Option<Swept>,
+    /// Where the last contact was read.
+    tip: Option<Isometry3<f64>>,
+    /// Of an arm, which tries a way around an object out before it goes.
+    reach: Option<ArmReach>,
+}
+
+impl Servo {
+    /// Brings `body`, which moves the robot's chain, to its start.
+    ///
+    /// # Errors
+    /// If the body cannot be brought there, or is another arm.
+    pub fn new(
+        robot: Robot,
+        settings: TouchSettings,
+        mut body: Box<dyn Backend>,
+        seed: u64,
+    ) -> Result<Self, Fault> {
+        body.capabilities().fit(&robot.chain)?;
+        let control = Controller::new(robot.chain.clone(), body.capabilities().period_s)
+            .map_err(|cause| Fault::no_command(0.0, cause))?;
+        let reading = body.reset(seed)?;
+        reading.check()?;
+        let (time_s, q) = (reading.time_s, reading.q.clone());
+        let reach = ArmReach::new(&robot, &settings);
+        Ok(Self {
+            monitor: ContactMonitor::new(&settings, &robot.finger),
+            command: Command { qdot: vec![0.0; robot.chain.joints.len()] },
+            robot,
+            body,
+            control,
+            settings,
+            time_s,
+            q,
+            swept: None,
+            tip: None,
+            reach,
+        })
+    }
+
+    /// Asks `sensor` before those that Palpate knows.
+    pub fn with_sensor(mut self, sensor: Box<dyn Sensor>) -> Self {
+        self.monitor.add(sensor);
+        self
+    }
+
+    /// Pose of the fingertip by forward kinematics.
+    fn x_wt(&mut self) -> Isometry3<f64> {
+        let x_wt = self.control.x_wt(&self.q);
+        x_wt.unwrap_or(self.control.chain().base)
+    }
+
+    fn period_s(&self) -> f64 {
+        self.body.capabilities().period_s
+    }
+
+    /// One tick towards `goal`.
+    fn tick(&mut self, goal: &Goal) -> Result<(), Fault> {
+        let motion = self.control.step(&self.q, goal);
+        let motion = motion.map_err(|cause| Fault::no_command(self.time_s, cause))?;
+        self.carry_out(&motion.qdot)
+    }
+
+    /// One tick in which the joints move at `qdot`.
+    fn carry_out(&mut self, qdot: &Joints) -> Result<(), Fault> {
+        self.command.qdot.iter_mut().zip(qdot.iter()).for_each(|(to, from)| *to = *from);
+        let reading = self.body.step(&self.command)?;
+        reading.check()?;
+        self.time_s = reading.time_s;
+        self.q.clone_from(&reading.q);
+        self.monitor.take(reading);
+        match self.monitor.last_sample_s() {
+            Some(heard_s) if self.time_s - heard_s > SILENCE_S => {
+                Err(Fault::Lost { time_s: heard_s })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Moves straight to `to`, until there or, if `alert`, until something is felt.
+    fn go(
+        &mut self,
+        phase: &'static str,
+        to: Isometry3<f64>,
+        speed_m_s: f64,
+        alert: bool,
+    ) -> Result<Option<ApproachEnd>, Fault> {
+        let from = self.x_wt().translation.vector;
+        self.follow(phase, Path::straight(from, to, speed_m_s), alert)
+    }
+
+    /// Moves along `path`, until at its end or, if `alert`, until something is felt.
+    fn follow(
+        &mut self,
+        phase: &'static str,
+        mut path: Path,
+        alert: bool,
+    ) -> Result<Option<ApproachEnd>, Fault> {
+        let to = path.to();
+        // From the first reading on: the clock of a real arm goes on while the next touch is
+        // thought about.
+        let mut deadline_s = None;
+        let period_s = self.period_s();
+        loop {
+            let goal = path.advance(period_s);
+            self.tick(&goal)?;
+            let time_s = self.time_s;
+            let deadline_s = *deadline_s.get_or_insert(time_s + path.patience_s());
+            if let Some(end) = self.monitor.approach_end().filter(|_| alert) {
+                return Ok(Some(end));
+            }
+            let here = self.x_wt();
+            let away = here.translation.vector - to.translation.vector;
+            if path.is_done() && away.norm() < ARRIVED_M && path.has_turned(&here) {
+                return Ok(None);
+            }
+            if time_s > deadline_s {
+                return Err(self.overdue(phase, &to));
+            }
+        }
+    }
+
+    /// Goes straight back to the level of the stand-off `above` where the finger is beyond it:
+    /// after a touch that was broken off there may be something beside it.
+    fn withdraw(&mut self, approach: &Approach, above: &Isometry3<f64>) -> Result<(), Fault> {
+        let here = self.x_wt();
+        let from_w = here.translation.vector;
+        let back_w = approach.level_with(&from_w, &above.translation.vector);
+        if (back_w - from_w).dot(&approach.direction_w()) > -DEEPER_M {
+            return Ok(());
+        }
+        let back = Isometry3::from_parts(back_w.into(), here.rotation);
+        self.go("the way back", back, self.settings.approach_m_s, false).map(|_| ())
+    }
+
+    /// Goes around what lies between two approaches to the stand-off `above`, an arm on a way that
+    /// it has tried out.
+    fn travel_around(
+        &mut self,
+        around: &Ball,
+        approach: &Approach,
+        above: Isometry3<f64>,
+    ) -> Result<(), Fault> {
+        let ahead_t = approach.r_at.inverse() * -Vector3::y_axis();
+        self.leave(around, &ahead_t)?;
+        let legs = match &self.reach {
+            None => vec![Leg::Around(above)],
+            Some(reach) => {
+                let q = self.robot.chain.joints_from(&self.q);
+                q.and_then(|q| reach.plan(&q, approach)).ok_or_else(|| self.no_way())?
+            }
+        };
+        for leg in legs {
+            match leg {
+                Leg::Around(to) => self.go_around(around, approach, to)?,
+                Leg::Home => self.go_home(around)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn go_around(
+        &mut self,
+        around: &Ball,
+        approach: &Approach,
+        to: Isometry3<f64>,
+    ) -> Result<(), Fault> {
+        let here = self.x_wt();
+        for round in rounds(around, here, to, &self.robot.finger, &approach.r_at) {
+            let path = Path::round(round, self.settings.travel_m_s);
+            self.follow("the stand-off", path, false)?;
+        }
+        Ok(())
+    }
+
+    /// Brings all joints home together, from where an arm comes to all that it reaches; on a line
+    /// that is tried out from where they really are.
+    fn go_home(&mut self, around: &Ball) -> Result<(), Fault> {
+        let q = self.robot.chain.joints_from(&self.q);
+        let line = self.reach.as_ref().zip(q).and_then(|(reach, q)| reach.line_home(&q, around));
+        let mut line = line.ok_or_else(|| self.no_way())?;
+        let period_s = self.period_s();
+        let mut deadline_s = None;
+        loop {
+            let posture = line.advance(period_s);
+            let qdot = self.control.along(&self.q, &posture);
+            let qdot = qdot.map_err(|cause| Fault::no_command(self.time_s, cause))?;
+            self.carry_out(&qdot)?;
+            let (time_s, q) = (self.time_s, &self.q);
+            let deadline_s = *deadline_s.get_or_insert(time_s + line.patience_s());
+            let home = self.robot.chain.start();
+            let is_home = q.iter().zip(home).all(|(q, home)| (q - home).abs() < HOME_RAD);
+            if line.is_done() && is_home {
+                return Ok(());
+            }
+            if time_s > deadline_s {
+                return Err(Fault::Late { phase: "home", time_s, q: q.clone() });
+            }
+        }
+    }
+
+    /// Goes straight back out of the sphere the way the finger points, where the tip is in it:
+    /// after a touch that was broken off there may be something beside it.
+    fn leave(&mut self, around: &Ball, ahead_t: &UnitVector3<f64>) -> Result<(), Fault> {
+        let here = self.x_wt();
+        let p_wt = here.translation.vector.into();
+        if around.depth_m(&p_wt) < DEEPER_M {
+            return Ok(());
+        }
+        let out_w = around.entrance_w(&p_wt, &(here.rotation * ahead_t));
+        let out = Isometry3::from_parts(out_w.coords.into(), here.rotation);
+        let speed_m_s = self.settings.approach_m_s;
+        if let Some(reach) = &self.reach {
+            let path = Path::straight(here.translation.vector, out, speed_m_s);
+            let q = self.robot.chain.joints_from(&self.q);
+            if !q.is_some_and(|q| reach.leaves(&q, path, around)) {
+                return Err(self.no_way());
+            }
+        }
+        self.go("the way back", out, speed_m_s, false).map(|_| ())
+    }
+
+    fn no_way(&self) -> Fault {
+        Fault::NoWay { time_s: self.time_s, q: self.q.clone() }
+    }
+
+    /// Why a movement to `to` has not ended in its time.
+    fn overdue(&self, phase: &'static str, to: &Isometry3<f64>) -> Fault {
+        let time_s = self.time_s;
+        match posture(&self.robot.chain, to) {
+            Err(ArmError::OutOfReach { distance_m, angle_rad }) => {
+                Fault::OutOfReach { phase, time_s, distance_m, angle_rad }
+            }
+            _ => Fault::Late { phase, time_s, q: self.q.clone() },
+        }
+    }
+
+    /// Stands still at `x_wt` until `count` more frames have arrived, or their time has passed in a
+    /// body without sensor.
+    fn rest(&mut self, x_wt: Isometry3<f64>, count: usize) -> Result<Option<ApproachEnd>, Fault> {
+        self.monitor.forget();
+        let here = Goal::still(x_wt);
+        let until_s = self.time_s + count as f64 * FRAME_S;
+        while self.monitor.collected() < count {
+            if self.monitor.last_sample_s().is_none() && self.time_s >= until_s {
+                break;
+            }
+            self.tick(&here)?;
+            if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
+                return Ok(Some(ApproachEnd::Overload));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Stops, settles where contact was told, and reads it: what the finger overran while its
+    /// servos stopped it is taken back, so that the depth does not depend on them.
+    fn read(&mut self, approach: &Approach) -> Result<Option<Contact>, Fault> {
+        let until_s = self.time_s + self.settings.settle_s;
+        let mut held = self.x_wt();
+        let press_m = if self.robot.is_soft { self.settings.press_m } else { 0.0 };
+        held.translation.vector += approach.direction_w().scale(press_m);
+        while self.time_s < until_s {
+            self.tick(&Goal::still(held))?;
+            if self.monitor.approach_end() == Some(ApproachEnd::Overload) {
+                return Ok(None);
+            }
+        }
+        if self.rest(held, self.settings.frames)?.is_some() {
+            return Ok(None);
+        }
+        let x_wt = self.x_wt();
+        self.tip = Some(x_wt);
+        Ok(self.monitor.contact(&self.robot.finger).map(|SensedContact { p_tc, normal_t }| {
+            Contact { p_wc: x_wt * p_tc, normal_w: x_wt.rotation * normal_t }
+        }))
+    }
+}
+
+/// Depth to which the object may be in the skin before the finger stops; chosen: the fluid's gap.
+const GIVES_WAY_M: f64 = 1.5e-3;
+
+/// Silence of a sensor after which it counts as lost; chosen: three batches of five frames, in
+/// which an approach goes 3 mm.
+const SILENCE_S: f64 = 0.15;
+
+impl Probe for Servo {
+    /// The centre of the fingertip's hemisphere travels to the stand-off and goes the approach's
+    /// way.
+    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
+        refuse_unless_finite(approach)?;
+        let TouchSettings { travel_m_s, approach_m_s, .. } = self.settings;
+        let above = standoff(&self.robot, self.settings.standoff_m, approach);
+        match &approach.around {
+            Some(around) => self.travel_around(around, approach, above)?,
+            None => {
+                self.withdraw(approach, &above)?;
+                self.go("the stand-off", above, travel_m_s, false)?;
+            }
+        }
+        self.rest(above, self.monitor.samples_of_tare())?;
+        self.monitor.tare();
+        let below = turning_point(&self.robot, approach);
+        let end = self.go("the object", below, approach_m_s, true)?;
+        let ahead_w = approach.direction_w();
+        let reached_w = self.x_wt().translation.vector - ahead_w.scale(GIVES_WAY_M);
+        let finger = self.robot.finger.clone();
+        self.swept = Some(Swept { finger, p_wt: reached_w.into() });
+        let touch = match end {
+            None => Touch::Miss,
+            Some(ApproachEnd::Overload) => Touch::Overload,
+            Some(ApproachEnd::Contact) => {
+                self.read(approach)?.map_or(Touch::Overload, Touch::Contact)
+            }
+        };
+        let here_w = self.x_wt().translation.vector;
+        let back_w = approach.level_with(&here_w, &above.translation.vector);
+        let back = Isometry3::from_parts(back_w.into(), above.rotation);
+        self.go("the way back", back, travel_m_s, false)?;
+        Ok(touch)
+    }
+
+    fn swept(&self) -> Option<Swept> {
+        self.swept.clone()
+    }
+
+    fn tip(&self) -> Option<Isometry3<f64>> {
+        self.tip
+    }
+
+    fn time_s(&self) -> Option<f64> {
+        Some(self.time_s)
+    }
+}

@@ -1,0 +1,484 @@
+//! Which touches a robot can make: the poses between which each goes, and movements of an arm that
+//! are tried out on its kinematics before they are made. Around an object an arm comes from home,
+//! goes all of the way, and is home again, within the joints' limits, clear of itself and of the
+//! object.
+
+use super::trajectory::{Line, Path, Round, rounds};
+use crate::backend::interlock::defaults;
+use crate::control::{Controller, posture};
+use crate::robot::Robot;
+use crate::robot::arm::chain::MAX_JOINTS;
+use crate::robot::arm::{ArmError, Joints, Kind, LinkCapsule, Part};
+use crate::task::approach::BEYOND_M;
+use crate::task::touch::TouchSettings;
+use crate::task::{Approach, Ball, DIRECTIONS, Task};
+use nalgebra::{Isometry3, Point3, Vector3};
+use palpate_geometry::sweep::Capsule;
+use palpate_input::error::Invalid;
+
+/// The tip in front of all that may be touched.
+pub(in crate::probe) fn standoff(
+    robot: &Robot,
+    standoff_m: f64,
+    approach: &Approach,
+) -> Isometry3<f64> {
+    if let Some(around) = &approach.around {
+        let p_wt = around.entrance_w(&approach.p_near_w, &approach.direction_w());
+        return Isometry3::from_parts(p_wt.coords.into(), approach.r_wt());
+    }
+    let back_w = -approach.direction_w().into_inner();
+    let bulge_w = back_w * robot.finger.bulge_m();
+    let p_wt = approach.p_near_w + bulge_w + back_w * standoff_m;
+    Isometry3::from_parts(p_wt.into(), approach.r_wt())
+}
+
+/// The tip behind all that may be touched.
+pub(in crate::probe) fn turning_point(robot: &Robot, approach: &Approach) -> Isometry3<f64> {
+    let ahead_w = approach.direction_w().into_inner();
+    let hull_w = ahead_w * robot.finger.radius_m;
+    let p_wt = approach.p_far_w + hull_w + ahead_w * BEYOND_M;
+    Isometry3::from_parts(p_wt.into(), approach.r_wt())
+}
+
+/// Places along each side of the zone that are tried; chosen.
+const TRIED_PER_SIDE: usize = 5;
+
+/// Whether `robot` has postures to touch over all of the task's zone: in front of each place of a
+/// grid and where it turns back behind the farthest depth. Around a whole object: whether it comes
+/// to its middle from some side.
+///
+/// # Errors
+/// If it has not, with the place that is missed by most.
+pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), Invalid> {
+    let Some(zone) = task.zone() else {
+        let of = DIRECTIONS;
+        let is_any = task.unreached(of).len() < of;
+        return match is_any {
+            true => Ok(()),
+            false => Err(Invalid::new(format!(
+                "the finger cannot be brought to the object from any of {of} directions"
+            ))
+            .mend(
+                "bring it nearer (object.position_m), move arm.base_position_m, or make \
+                 around.radius_m or around.lowest_m smaller",
+            )),
+        };
+    };
+    let places = zone.grid(TRIED_PER_SIDE);
+    let of = places.len();
+    let mut missed = Vec::new();
+    for place in places {
+        let Some(approach) = task.approach(&place.clone().into()) else { continue };
+        let poses = [
+            ("the stand-off", standoff(robot, task.touch().standoff_m, &approach)),
+            ("the farthest depth", turning_point(robot, &approach)),
+        ];
+        missed.extend(poses.into_iter().find_map(|(phase, x_wt)| {
+            match posture(&robot.chain, &x_wt) {
+                Err(ArmError::OutOfReach { distance_m, angle_rad }) => {
+                    Some((place.clone(), phase, distance_m, angle_rad))
+                }
+                _ => None,
+            }
+        }));
+    }
+    let count = missed.len();
+    let by = |(_, _, distance_m, angle_rad): &(_, _, f64, f64)| distance_m + angle_rad;
+    match missed.into_iter().max_by(|a, b| by(a).total_cmp(&by(b))) {
+        Some((place, phase, distance_m, angle_rad)) => {
+            let away = format!("{:.0} mm and {:.0} deg", 1e3 * distance_m, angle_rad.to_degrees());
+            Err(Invalid::new(format!(
+                "the arm does not reach {count} of {of} places of the zone: over {place:?} the tip \
+                 stays {away} away from {phase}"
+            ))
+            .mend(
+                "bring the object and the zone nearer (object.position_m, zone), move \
+                 arm.base_position_m, or make the zone smaller",
+            ))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Shares of an approach after which it is tried to turn back, of which a contact may be any: how
+/// long the finger has gone decides on which side the elbow is then. Chosen.
+const TURNS: [f64; 2] = [0.0, 1.0];
+
+/// What an arm reaches.
+pub struct ArmReach {
+    robot: Robot,
+    standoff_m: f64,
+    travel_m_s: f64,
+    approach_m_s: f64,
+    /// Where the tip is at home.
+    home: Isometry3<f64>,
+    links: Vec<LinkCapsule>,
+    /// Links that must not meet.
+    pairs: Vec<[usize; 2]>,
+}
+
+/// A part of an arm's way to an approach.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Leg {
+    /// Around the ball, until the tip is there.
+    Around(Isometry3<f64>),
+    /// Straight in the space of the joints, until they are home.
+    Home,
+}
+
+impl ArmReach {
+    /// Of `robot`, touching as `touch` says. Returns `None` for a robot whose joints slide or turn
+    /// without end, which reaches everything.
+    pub fn new(robot: &Robot, touch: &TouchSettings) -> Option<Self> {
+        let is_arm = robot.chain.joints.iter().any(|joint| {
+            let [low, high] = joint.q_limits;
+            joint.kind == Kind::Revolute && high - low <= 4.0 * std::f64::consts::TAU
+        });
+        if !is_arm {
+            return None;
+        }
+        let home = robot.chain.forward(&robot.chain.home);
+        let links = robot.capsules();
+        let pairs = (0..links.len()).flat_map(|i| (0..i).map(move |k| [k, i]));
+        let pairs = pairs.filter(|&[k, i]| links[k].may_meet(&links[i])).collect();
+        let &TouchSettings { standoff_m, travel_m_s, approach_m_s, .. } = touch;
+        let robot = robot.clone();
+        Some(Self { robot, standoff_m, travel_m_s, approach_m_s, home, links, pairs })
+    }
+
+    /// Where it must keep clear, with this share of the slack.
+    fn clear(&self, around: &Ball, slack: f64) -> Clear {
+        Clear::of(around, &self.robot, self.standoff_m, slack)
+    }
+
+    /// Where the joints are after going around from `q` to `to`, and where the tip stops on the
+    /// way: nowhere, or over the top of what it goes around.
+    fn around(
+        &self,
+        q: &Joints,
+        approach: &Approach,
+        to: Isometry3<f64>,
+        slack: f64,
+    ) -> Option<(Joints, Option<Isometry3<f64>>)> {
+        let around = approach.around.as_ref()?;
+        let clear = self.clear(around, slack);
+        let from = self.robot.chain.forward(q);
+        let ahead_t = approach.r_at.inverse() * -Vector3::y_axis();
+        let top = Round::new(&around.centre_w, from, to, &ahead_t).over_the_top(&ahead_t);
+        [None, Some(top)].into_iter().find_map(|stop| {
+            let mut here = from;
+            let paths = stop.into_iter().chain([to]).flat_map(|to| {
+                let rounds = rounds(around, here, to, &self.robot.finger, &approach.r_at);
+                here = to;
+                rounds.into_iter().map(|round| Path::round(round, self.travel_m_s))
+            });
+            Some((self.follow(*q, paths, &clear)?, stop))
+        })
+    }
+
+    /// The line of the joints from `q` home, with this share of the slack; none if it is not clear.
+    fn line(&self, q: &Joints, around: &Ball, slack: f64) -> Option<Line> {
+        let chain = &self.robot.chain;
+        let line = Line::new(chain, q, &chain.home, self.travel_m_s);
+        self.allows(&line, &self.clear(around, slack)).then_some(line)
+    }
+
+    /// The way home from `q`: first with the tip, then with the joints, which by then may be wound
+    /// up or have the elbow on the other side; or with the joints alone. None if none is known.
+    fn homeward(&self, q: &Joints, approach: &Approach, slack: f64) -> Option<Vec<Leg>> {
+        let around = approach.around.as_ref()?;
+        let by_tip = || {
+            let (there, stop) = self.around(q, approach, self.home, slack)?;
+            self.line(&there, around, slack)?;
+            let tip = stop.into_iter().chain([self.home]).map(Leg::Around);
+            Some(tip.chain([Leg::Home]).collect())
+        };
+        by_tip().or_else(|| self.line(q, around, slack).map(|_| vec![Leg::Home]))
+    }
+
+    /// The way from `q` to the stand-off of `approach`; none if the arm does not come there, along
+    /// the approach and home again, wherever on the approach it turns back.
+    fn way(&self, q: &Joints, approach: &Approach) -> Option<Vec<Leg>> {
+        let clear = self.clear(approach.around.as_ref()?, LATER);
+        let above = standoff(&self.robot, self.standoff_m, approach);
+        let below = turning_point(&self.robot, approach);
+        let (there, stop) = self.around(q, approach, above, LATER)?;
+        for share in TURNS {
+            let mut turn = above;
+            turn.translation.vector =
+                above.translation.vector.lerp(&below.translation.vector, share);
+            let touch = [(above, turn, self.approach_m_s), (turn, above, self.travel_m_s)];
+            let touch = touch.map(|(from, to, speed_m_s)| {
+                Path::straight(from.translation.vector, to, speed_m_s)
+            });
+            let back = self.follow(there, touch, &clear)?;
+            self.homeward(&back, approach, LATER)?;
+        }
+        Some(stop.into_iter().chain([above]).map(Leg::Around).collect())
+    }
+
+    /// Whether it can come from home to where `approach` sets out, go it to its end, and be home
+    /// again.
+    pub fn reaches(&self, approach: &Approach) -> bool {
+        self.way(&self.robot.chain.home, approach).is_some()
+    }
+
+    /// The way from `q` to the stand-off of `approach`, directly or by way of home; none if the arm
+    /// comes there on neither.
+    pub(super) fn plan(&self, q: &Joints, approach: &Approach) -> Option<Vec<Leg>> {
+        let by_home = || {
+            let mut legs = self.homeward(q, approach, NOW)?;
+            legs.extend(self.way(&self.robot.chain.home, approach)?);
+            Some(legs)
+        };
+        self.way(q, approach).or_else(by_home)
+    }
+
+    /// The line of the joints home from `q`, where the arm stands; none if it is not clear.
+    pub(super) fn line_home(&self, q: &Joints, around: &Ball) -> Option<Line> {
+        self.line(q, around, NOW)
+    }
+
+    /// Whether the tip can go straight back out of the ball from `q`.
+    pub(super) fn leaves(&self, q: &Joints, path: Path, around: &Ball) -> bool {
+        self.follow(*q, [path], &self.clear(around, NOW)).is_some()
+    }
+}
+
+/// Its tick; chosen: coarse, for the controller's gain of 5 per second.
+const PERIOD_S: f64 = 0.05;
+
+/// How far tip and attitude may lag behind their path before the arm counts as stuck; chosen: near
+/// a singularity it slows down and catches up.
+const LAG_M: f64 = 0.1;
+const LAG_RAD: f64 = 1.0;
+
+/// How near they must come to its end, and the ticks they are given for that; chosen.
+const NEAR_M: f64 = 1e-3;
+const NEAR_RAD: f64 = 0.01;
+const TICKS_TO_END: usize = 40;
+
+/// How far joints keep from their limits, and links from each other beyond that distance, because
+/// nothing moves exactly as it is tried out; chosen.
+const SLACK_RAD: f64 = 0.1;
+const SLACK_M: f64 = 5e-3;
+
+/// How far the tip may be from the box around home and ball, as a share of what interlocks allow.
+// heuristic: a quarter is left for what the rehearsal does not know.
+const TIP_MARGIN: f64 = 0.75;
+
+/// How far anything moves from one posture that is looked at to the next, straight in the space of
+/// the joints; chosen: no more than is asked beyond the interlocks' clearance.
+const GRAIN_M: f64 = 2e-3;
+
+/// From a command until the joints begin to brake, as a multiple of what interlocks take.
+// heuristic: a tick more.
+const REACTION: f64 = 2.0;
+
+/// Where an arm must keep clear while it tries.
+#[derive(Clone, Copy)]
+struct Clear {
+    /// The ball that links, and what the hand carries while it travels, stay out of.
+    ball: (Point3<f64>, f64),
+    /// Lowest z of what carries the finger; the finger's own ways keep above it.
+    lowest_m: Option<f64>,
+    /// Box that the tip stays in.
+    tip_w: [Point3<f64>; 2],
+    /// Share of the slack that is asked.
+    slack: f64,
+}
+
+/// Of a way home from where the arm stands; chosen: it was promised from a little beside, and must
+/// be found again.
+const NOW: f64 = 0.4;
+
+/// Of everything else.
+const LATER: f64 = 1.0;
+
+impl Clear {
+    /// Of the ball that a finger of `robot` goes `around`, at `standoff_m` from it, with
+    /// this share of the slack.
+    fn of(around: &Ball, robot: &Robot, standoff_m: f64, slack: f64) -> Self {
+        let radius_m = around.radius_m - standoff_m - robot.finger.bulge_m();
+        let home_w = Point3::from(robot.chain.forward(&robot.chain.home).translation.vector);
+        let [beyond, margin] =
+            [around.radius_m, TIP_MARGIN * defaults::TIP_MARGIN_M].map(Vector3::repeat);
+        let low = home_w.inf(&(around.centre_w - beyond)) - margin;
+        let high = home_w.sup(&(around.centre_w + beyond)) + margin;
+        let ball = (around.centre_w, radius_m);
+        Self { ball, lowest_m: around.lowest_m, tip_w: [low, high], slack }
+    }
+}
+
+impl ArmReach {
+    /// Where the joints are after `paths` from `q`; none if it does not come along one of them.
+    fn follow(
+        &self,
+        mut q: Joints,
+        paths: impl IntoIterator<Item = Path>,
+        clear: &Clear,
+    ) -> Option<Joints> {
+        for path in paths {
+            q = self.follow_one(q, path, clear)?;
+        }
+        Some(q)
+    }
+
+    fn follow_one(&self, mut q: Joints, mut path: Path, clear: &Clear) -> Option<Joints> {
+        let mut control = Controller::new(self.robot.chain.clone(), PERIOD_S).ok()?;
+        let count = self.robot.chain.joints.len();
+        let is_approach = path.is_straight();
+        let mut waited = 0;
+        loop {
+            let goal = path.advance(PERIOD_S);
+            let motion = control.step(&q.as_slice()[..count], &goal).ok()?;
+            q = self.robot.chain.clamp(&(q + motion.qdot * PERIOD_S));
+            let x_wt = control.x_wt(&q.as_slice()[..count]).ok()?;
+            let (away_m, away_rad) = apart(&x_wt, &goal.x_wt);
+            let is_stuck = away_m > LAG_M || away_rad > LAG_RAD;
+            let stops = self.stops(&q, &motion.qdot);
+            if is_stuck || !self.is_clear(&q, clear, is_approach) || !self.is_apart(&stops, clear) {
+                return None;
+            }
+            if path.is_done() {
+                if away_m < NEAR_M && away_rad < NEAR_RAD {
+                    return Some(q);
+                }
+                waited += 1;
+                if waited > TICKS_TO_END {
+                    return None;
+                }
+            }
+        }
+    }
+
+    /// Whether all of `line` is clear; joints that brake on it stay on it.
+    fn allows(&self, line: &Line, clear: &Clear) -> bool {
+        line.postures(GRAIN_M).all(|q| {
+            self.is_clear(&q, clear, false)
+                && self.is_apart(&q, clear)
+                && self.is_above(&self.robot.chain.frames(&q), clear, LinkCapsule::is_carried)
+        })
+    }
+
+    /// Where joints stop that brake together from `qdot`.
+    fn stops(&self, q: &Joints, qdot: &Joints) -> Joints {
+        let joints = self.robot.chain.joints.iter().zip(qdot.iter());
+        let braking_s = joints.map(|(joint, qdot)| qdot.abs() / joint.qddot_limit);
+        let time_s = REACTION * defaults::REACTION_S + braking_s.fold(0.0, f64::max) / 2.0;
+        self.robot.chain.clamp(&(q + qdot * time_s))
+    }
+
+    /// Whether links keep from each other.
+    fn is_apart(&self, q: &Joints, clear: &Clear) -> bool {
+        let frames = self.robot.chain.frames(q);
+        let least_m = defaults::CLEARANCE_M + clear.slack * SLACK_M;
+        let placed = |i: usize| self.links[i].at(&frames[self.links[i].link]);
+        self.pairs.iter().all(|&[k, i]| placed(k).to_capsule_m(&placed(i)) > least_m)
+    }
+
+    /// Whether joints keep from their limits, the tip in its box, links from the ball, and what
+    /// carries the finger above the lowest z; on an approach hand and finger go into the ball.
+    fn is_clear(&self, q: &Joints, clear: &Clear, is_approach: bool) -> bool {
+        let slack_rad = clear.slack * SLACK_RAD;
+        let within = self.robot.chain.joints.iter().zip(q.iter()).all(|(joint, q)| {
+            let [low, high] = joint.q_limits;
+            (low + slack_rad..=high - slack_rad).contains(q)
+        });
+        if !within {
+            return false;
+        }
+        let frames = self.robot.chain.frames(q);
+        let x_wt = frames[MAX_JOINTS] * self.robot.chain.flange * self.robot.chain.tool;
+        let (p_wt, [low, high]) = (Point3::from(x_wt.translation.vector), clear.tip_w);
+        let (centre_w, radius_m) = clear.ball;
+        let ball = Capsule { p0_w: centre_w, p1_w: centre_w, radius_m };
+        let mut far = self.links.iter().filter(|link| !link.near_base);
+        (p_wt - low).inf(&(high - p_wt)).min() >= 0.0
+            && self.is_above(&frames, clear, |link| link.part == Part::Tool)
+            && (is_approach
+                || far.all(|link| link.at(&frames[link.link]).to_capsule_m(&ball) > 0.0))
+    }
+
+    /// Whether the links of which `holds` is true are above the lowest z.
+    fn is_above(
+        &self,
+        frames: &[Isometry3<f64>],
+        clear: &Clear,
+        holds: impl Fn(&LinkCapsule) -> bool,
+    ) -> bool {
+        let Some(lowest_m) = clear.lowest_m else { return true };
+        let mut links = self.links.iter().filter(|link| holds(link));
+        links.all(|link| {
+            let Capsule { p0_w, p1_w, radius_m } = link.at(&frames[link.link]);
+            p0_w.z.min(p1_w.z) - radius_m >= lowest_m
+        })
+    }
+}
+
+/// Distance and angle between two poses.
+fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
+    let away_m = (a.translation.vector - b.translation.vector).norm();
+    (away_m, a.rotation.angle_to(&b.rotation))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::Finger;
+    use crate::robot::arm::ArmSettings;
+    use crate::task::Aim;
+
+    /// A PA-10 as it stands before the container.
+    fn reach() -> (ArmReach, Approach) {
+        let arm = ArmSettings {
+            base_rotation_deg: [0.0, 0.0, -90.0],
+            home_deg: Some(vec![0.0, -19.0, 0.0, 102.0, 0.0, 22.0, 0.0]),
+            ..ArmSettings::default()
+        };
+        let robot = Robot { chain: arm.chain().unwrap(), finger: Finger::default(), is_soft: true };
+        let touch = TouchSettings::default();
+        let ball =
+            Ball { centre_w: Point3::new(0.0, -0.6, 0.6), radius_m: 0.11, lowest_m: Some(0.5) };
+        let aim = Aim::against(ball.centre_w, &Vector3::y());
+        let approach = ball.approach(&aim, &robot.finger, touch.standoff_m, 0.0);
+        (ArmReach::new(&robot, &touch).unwrap(), approach)
+    }
+
+    /// Behind the object, where a touch of a PA-10 ended: the hand would be drawn through it.
+    #[test]
+    fn a_line_of_the_joints_through_the_object_is_refused_and_the_tip_goes_around() {
+        let (reach, approach) = reach();
+        let around = approach.around.unwrap();
+        let q = Joints::from([-0.819, 0.695, 0.609, 1.266, 1.593, 1.768, -0.887]);
+        let (from, ball) = (reach.robot.chain.forward(&q), around.centre_w);
+        assert!((from.translation.vector - ball.coords).norm() > around.radius_m - 1e-3);
+        assert!(reach.line_home(&q, &around).is_none());
+        let legs = reach.homeward(&q, &approach, NOW).unwrap();
+        assert!(matches!(legs[..], [Leg::Around(_), .., Leg::Home]), "{legs:?}");
+    }
+
+    /// The elbow on the other side, from where no standing with the tip at home brings it back.
+    #[test]
+    fn joints_are_home_in_the_end_on_whichever_side_the_elbow_was() {
+        let (reach, approach) = reach();
+        let q = [1.322, -0.724, -1.416, 1.894, -1.630, -0.712, 1.747];
+        let legs = reach.homeward(&Joints::from(q), &approach, NOW).unwrap();
+        assert!(matches!(legs[..], [Leg::Around(_), .., Leg::Home]), "{legs:?}");
+        let mut wound = reach.robot.chain.home;
+        wound[6] += 4.3;
+        assert!(reach.line_home(&wound, &approach.around.unwrap()).is_some());
+        wound[6] += 0.14;
+        assert!(reach.line_home(&wound, &approach.around.unwrap()).is_none());
+    }
+
+    /// What is promised for later is asked more, or it would not be found again.
+    #[test]
+    fn a_way_home_is_found_from_where_none_is_promised() {
+        let (reach, approach) = reach();
+        let mut q = reach.robot.chain.home;
+        q[6] += 4.38;
+        assert!(reach.homeward(&q, &approach, LATER).is_none());
+        assert!(reach.homeward(&q, &approach, NOW).is_some());
+    }
+}

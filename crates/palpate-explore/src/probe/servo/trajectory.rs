@@ -1,0 +1,453 @@
+//! Movements, point by point: straight, around a sphere, or straight in the space of the joints.
+
+use crate::control::Goal;
+use crate::robot::Finger;
+use crate::robot::arm::{Chain, Joints};
+use crate::task::Ball;
+use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3, Vector6};
+
+/// From the wrist's centre to the fingertip: turning, the wrist goes no faster than the tip may,
+/// and no joint turns faster than that. Chosen, as in the controller.
+const LEVER_M: f64 = 0.2;
+
+/// A movement has turned the finger when it is this near to its last attitude; chosen: it moves the
+/// finger's heel by less than a touch resolves.
+const TURNED_RAD: f64 = 2e-3;
+
+/// A movement of the fingertip with an end, straight or around a sphere.
+pub(super) struct Path {
+    from: Vector3<f64>,
+    to: Isometry3<f64>,
+    /// `None` of a straight movement.
+    round: Option<Round>,
+    pace: Pace,
+}
+
+impl Path {
+    /// Straight from `from` to `to` at `speed_m_s` at most; the attitude is that of `to` all along.
+    pub(super) fn straight(from: Vector3<f64>, to: Isometry3<f64>, speed_m_s: f64) -> Self {
+        let length_m = (to.translation.vector - from).norm();
+        Self { from, to, round: None, pace: Pace::new(length_m, speed_m_s) }
+    }
+
+    /// Along `round` at `speed_m_s` at most.
+    pub(super) fn round(round: Round, speed_m_s: f64) -> Self {
+        let (from, to) = (round.from.translation.vector, round.to);
+        let pace = Pace::new(round.length_m(), speed_m_s);
+        Self { from, to, round: Some(round), pace }
+    }
+
+    /// Where it ends.
+    pub(super) fn to(&self) -> Isometry3<f64> {
+        self.to
+    }
+
+    /// Longest time it may take before something is wrong.
+    pub(super) fn patience_s(&self) -> f64 {
+        self.pace.patience_s()
+    }
+
+    /// Whether the point has arrived.
+    pub(super) fn is_done(&self) -> bool {
+        self.pace.is_done()
+    }
+
+    /// Whether it is straight.
+    pub(super) fn is_straight(&self) -> bool {
+        self.round.is_none()
+    }
+
+    /// Whether the attitude `here` is that of its end; a straight movement has it all along.
+    pub(super) fn has_turned(&self, here: &Isometry3<f64>) -> bool {
+        self.is_straight() || here.rotation.angle_to(&self.to.rotation) < TURNED_RAD
+    }
+
+    /// Moves the point on by `dt_s`.
+    pub(super) fn advance(&mut self, dt_s: f64) -> Goal {
+        let Some([travelled_m, now_m_s]) = self.pace.advance(dt_s) else {
+            return Goal::still(self.to);
+        };
+        if let Some(round) = &self.round {
+            let length_m = self.pace.length_m;
+            let (x_wt, change) = round.at(travelled_m / length_m);
+            return Goal { x_wt, twist: change * (now_m_s / length_m) };
+        }
+        let mut direction = self.to.translation.vector - self.from;
+        let _ = direction.try_normalize_mut(0.0);
+        let mut x_wt = self.to;
+        x_wt.translation.vector = self.from + direction * travelled_m;
+        let velocity = direction * now_m_s;
+        Goal { x_wt, twist: Vector6::new(velocity.x, velocity.y, velocity.z, 0.0, 0.0, 0.0) }
+    }
+}
+
+/// Acceleration of the point that the fingertip follows; chosen, half of what the stage and the
+/// slowest joints of the arm can do.
+const ACCELERATION_M_S2: f64 = 0.5;
+
+/// How far a point has run that speeds up and slows down evenly.
+struct Pace {
+    length_m: f64,
+    speed_m_s: f64,
+    travelled_m: f64,
+    now_m_s: f64,
+}
+
+impl Pace {
+    /// Over `length_m` at `speed_m_s` at most.
+    fn new(length_m: f64, speed_m_s: f64) -> Self {
+        Self { length_m, speed_m_s, travelled_m: 0.0, now_m_s: 0.0 }
+    }
+
+    /// Whether it has arrived.
+    fn is_done(&self) -> bool {
+        self.travelled_m >= self.length_m
+    }
+
+    /// Goes on for `dt_s`: the way travelled and the speed, none once it has arrived.
+    fn advance(&mut self, dt_s: f64) -> Option<[f64; 2]> {
+        let left_m = self.length_m - self.travelled_m;
+        let stops = (2.0 * ACCELERATION_M_S2 * left_m.max(0.0)).sqrt();
+        let faster = self.now_m_s + ACCELERATION_M_S2 * dt_s;
+        // Without the floor the last step would take for ever.
+        let crawl = ACCELERATION_M_S2 * dt_s;
+        self.now_m_s = faster.min(self.speed_m_s).min(stops.max(crawl));
+        let step_m = (self.now_m_s * dt_s).min(left_m);
+        self.travelled_m += step_m;
+        if left_m - step_m <= 0.0 {
+            self.travelled_m = self.length_m;
+            return None;
+        }
+        Some([self.travelled_m, self.now_m_s])
+    }
+
+    /// Longest time it may take before something is wrong; chosen: four times what it should.
+    fn patience_s(&self) -> f64 {
+        let least_s = self.length_m / self.speed_m_s + self.speed_m_s / ACCELERATION_M_S2;
+        4.0 * least_s + 2.0
+    }
+}
+
+/// Poses looked at along one way to see what it comes near to; chosen.
+const LOOKS: usize = 48;
+
+/// A pose that runs around a centre: while the tip goes along a great circle and its distance from
+/// the centre changes evenly, the finger is carried along the circle, its own direction is turned
+/// from the first to the last one the shortest way, and it is rolled about that direction.
+///
+/// At the share t of the way, with rotation vectors a, b, c of those three turns in `W`:
+/// `R(t) = exp(t a) exp(t b) exp(t c) R(0)` and `p(t) = centre + ρ(t) exp(t a) u`.
+#[derive(Clone)]
+pub(super) struct Round {
+    centre_w: Vector3<f64>,
+    from: Isometry3<f64>,
+    to: Isometry3<f64>,
+    /// Distances from the centre at start and end.
+    distance_m: [f64; 2],
+    /// From the centre to the start.
+    outward_w: Vector3<f64>,
+    carried: Vector3<f64>,
+    tilted: Vector3<f64>,
+    rolled: Vector3<f64>,
+}
+
+impl Round {
+    /// From `from` to `to` about `centre_w`, for a finger that goes along `ahead_t` in `T`.
+    pub(super) fn new(
+        centre_w: &Point3<f64>,
+        from: Isometry3<f64>,
+        to: Isometry3<f64>,
+        ahead_t: &UnitVector3<f64>,
+    ) -> Self {
+        let away = |x_wt: &Isometry3<f64>| x_wt.translation.vector - centre_w.coords;
+        let outward = |x_wt| UnitVector3::try_new(away(x_wt), 1e-9).unwrap_or(Vector3::z_axis());
+        let [first_w, last_w] = [&from, &to].map(outward);
+        // Half around, over the top.
+        let carry = turn(&first_w, &last_w, &Vector3::z());
+        let ahead_w = from.rotation * ahead_t;
+        let brought = carry.inverse() * to.rotation;
+        let tilt = turn(&ahead_w, &(brought * ahead_t), &first_w);
+        let roll = tilt.inverse() * brought * from.rotation.inverse();
+        Self {
+            centre_w: centre_w.coords,
+            from,
+            to,
+            distance_m: [&from, &to].map(|x_wt| away(x_wt).norm()),
+            outward_w: first_w.into_inner(),
+            carried: carry.scaled_axis(),
+            tilted: tilt.scaled_axis(),
+            rolled: roll.scaled_axis(),
+        }
+    }
+
+    /// The pose over the top of the centre, as far from it as the farther end, to which the finger
+    /// comes without rolling, pointing down.
+    pub(super) fn over_the_top(&self, ahead_t: &UnitVector3<f64>) -> Isometry3<f64> {
+        let up = Vector3::z_axis();
+        let carry = turn(&UnitVector3::new_unchecked(self.outward_w), &up, &Vector3::y());
+        let carried = carry * self.from.rotation;
+        let tilt = turn(&(carried * ahead_t), &-up, &Vector3::y());
+        let far_m = self.distance_m[0].max(self.distance_m[1]);
+        let p_wt = self.centre_w + up.scale(far_m);
+        Isometry3::from_parts(p_wt.into(), tilt * carried)
+    }
+
+    /// Where it is at the share `t` of its way, and the change of tip and attitude with t.
+    fn at(&self, t: f64) -> (Isometry3<f64>, Vector6<f64>) {
+        let [carry, tilt, roll] = [self.carried, self.tilted, self.rolled]
+            .map(|turn| UnitQuaternion::from_scaled_axis(turn * t));
+        let [near_m, far_m] = self.distance_m;
+        let outward_w = carry * self.outward_w;
+        let out_m = near_m + (far_m - near_m) * t;
+        let p_wt = self.centre_w + outward_w * out_m;
+        let linear = outward_w * (far_m - near_m) + self.carried.cross(&outward_w) * out_m;
+        let angular = self.carried + carry * (self.tilted + tilt * self.rolled);
+        let r_wt = carry * tilt * roll * self.from.rotation;
+        let change = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
+        (Isometry3::from_parts(p_wt.into(), r_wt), change)
+    }
+
+    /// Poses along the way, the last one its end.
+    fn poses(&self) -> impl Iterator<Item = Isometry3<f64>> {
+        let poses = (1..LOOKS).map(|i| self.at(i as f64 / LOOKS as f64).0);
+        poses.chain(std::iter::once(self.to))
+    }
+
+    /// Whether the hull of `finger`, of attitude `r_at` in its approach's frame, stays above
+    /// `lowest_m` on all of the way.
+    fn is_above(&self, lowest_m: f64, finger: &Finger, r_at: &UnitQuaternion<f64>) -> bool {
+        self.poses().all(|x_wt| {
+            let r_wa = x_wt.rotation * r_at.inverse();
+            x_wt.translation.z - finger.drop_m(&r_wa) >= lowest_m - ROUNDING_M
+        })
+    }
+
+    /// What the point runs along: the way of the tip, or that of the wrist, whichever is longer.
+    fn length_m(&self) -> f64 {
+        let [near_m, far_m] = self.distance_m;
+        let around_m = near_m.max(far_m) * self.carried.norm();
+        let turned = self.carried.norm() + self.tilted.norm() + self.rolled.norm();
+        around_m.hypot(far_m - near_m).max(LEVER_M * turned)
+    }
+}
+
+/// The ways from one pose outside the sphere to another: around it, or over its top where that way
+/// would come too low.
+pub(super) fn rounds(
+    around: &Ball,
+    from: Isometry3<f64>,
+    to: Isometry3<f64>,
+    finger: &Finger,
+    r_at: &UnitQuaternion<f64>,
+) -> Vec<Round> {
+    let ahead_t = r_at.inverse() * -Vector3::y_axis();
+    let part = |from, to| Round::new(&around.centre_w, from, to, &ahead_t);
+    let whole = part(from, to);
+    match around.lowest_m {
+        Some(lowest_m) if !whole.is_above(lowest_m, finger, r_at) => {
+            let top = whole.over_the_top(&ahead_t);
+            vec![part(from, top), part(top, to)]
+        }
+        _ => vec![whole],
+    }
+}
+
+/// More than rounding changes a height by.
+const ROUNDING_M: f64 = 1e-9;
+
+/// The shortest turn from one direction to another; from one to its opposite through `over`.
+fn turn(
+    from: &UnitVector3<f64>,
+    to: &UnitVector3<f64>,
+    over: &Vector3<f64>,
+) -> UnitQuaternion<f64> {
+    if from.dot(to) > NEARLY_OPPOSITE {
+        let shortest = UnitQuaternion::rotation_between_axis(from, to);
+        return shortest.unwrap_or_else(UnitQuaternion::identity);
+    }
+    let sides = [*over, Vector3::x(), Vector3::y()];
+    let sides = sides.iter().map(|side| from.cross(side));
+    let middle = sides.map(|axis| UnitVector3::try_new(axis.cross(from), 1e-3));
+    let Some(middle) = middle.flatten().next() else { return UnitQuaternion::identity() };
+    let halves = [(from, &middle), (&middle, to)];
+    let [first, second] = halves.map(|(from, to)| {
+        UnitQuaternion::rotation_between_axis(from, to).unwrap_or_else(UnitQuaternion::identity)
+    });
+    second * first
+}
+
+/// Cosine from which the shortest turn is left to chance.
+const NEARLY_OPPOSITE: f64 = -1.0 + 1e-6;
+
+/// Steps in which the length of a line is measured; chosen.
+const STEPS: usize = 64;
+
+/// A movement straight in the space of the joints.
+///
+/// All joints set out and arrive together, so that only where they are on one line decides what
+/// they come near to.
+pub(super) struct Line {
+    from: Joints,
+    by: Joints,
+    pace: Pace,
+}
+
+impl Line {
+    /// Of `chain` from one posture to another, on which nothing goes faster than `speed_m_s`.
+    pub(super) fn new(chain: &Chain, from: &Joints, to: &Joints, speed_m_s: f64) -> Self {
+        let by = to - from;
+        let at = |i: usize| chain.frames(&(from + by * (i as f64 / STEPS as f64)));
+        let tip = chain.flange * chain.tool;
+        let steps = (0..STEPS).map(|i| farthest_m(&at(i), &at(i + 1), &tip));
+        // As though it went everywhere as fast as where it is fastest.
+        let longest_m = steps.fold(LEVER_M * by.amax() / STEPS as f64, f64::max);
+        Self { from: *from, by, pace: Pace::new(longest_m * STEPS as f64, speed_m_s) }
+    }
+
+    /// Postures along it, its ends too, between which nothing moves by more than `step_m`.
+    pub(super) fn postures(&self, step_m: f64) -> impl Iterator<Item = Joints> {
+        let count = (self.pace.length_m / step_m).ceil().max(1.0) as usize;
+        (0..=count).map(move |i| self.from + self.by * (i as f64 / count as f64))
+    }
+
+    /// Moves the joints on by `dt_s`: where they should be and how they should move.
+    pub(super) fn advance(&mut self, dt_s: f64) -> [Joints; 2] {
+        let Some([travelled_m, now_m_s]) = self.pace.advance(dt_s) else {
+            return [self.from + self.by, Joints::zeros()];
+        };
+        let length_m = self.pace.length_m;
+        [self.from + self.by * (travelled_m / length_m), self.by * (now_m_s / length_m)]
+    }
+
+    /// Whether it has been run to its end.
+    pub(super) fn is_done(&self) -> bool {
+        self.pace.is_done()
+    }
+
+    /// Longest time it may take before something is wrong.
+    pub(super) fn patience_s(&self) -> f64 {
+        self.pace.patience_s()
+    }
+}
+
+/// The farthest that a joint or the tip moves between two postures.
+fn farthest_m(from: &[Isometry3<f64>], to: &[Isometry3<f64>], tip: &Isometry3<f64>) -> f64 {
+    let moved_m = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
+        let away_m = (b.translation.vector - a.translation.vector).norm();
+        away_m.max(LEVER_M * a.rotation.angle_to(&b.rotation))
+    };
+    let tips = from.last().zip(to.last()).map(|(a, b)| moved_m(&(a * tip), &(b * tip)));
+    from.iter().zip(to).map(|(a, b)| moved_m(a, b)).fold(tips.unwrap_or(0.0), f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::reach::standoff;
+    use super::*;
+    use crate::robot::Robot;
+    use crate::robot::arm::ArmSettings;
+    use crate::robot::arm::stage::stage;
+    use crate::task::touch::TouchSettings;
+    use crate::task::{Aim, Task};
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(100))]
+
+        /// Neither tip nor any joint's frame goes faster than asked, none by more than a step from
+        /// one posture to the next, and all joints arrive.
+        #[test]
+        fn nothing_on_a_line_is_faster_than_asked(
+            from in prop::array::uniform7(-1.5..1.5f64),
+            to in prop::array::uniform7(-1.5..1.5f64),
+        ) {
+            let chain = ArmSettings::default().chain().unwrap();
+            let (from, to) = (Joints::from(from), Joints::from(to));
+            let mut line = Line::new(&chain, &from, &to, 0.1);
+            let tip = chain.flange * chain.tool;
+            let moved_m = |a: &Joints, b: &Joints| {
+                farthest_m(&chain.frames(a), &chain.frames(b), &tip)
+            };
+            let postures: Vec<Joints> = line.postures(0.01).collect();
+            prop_assert!((postures[0] - from).amax() < 1e-12);
+            prop_assert!((postures[postures.len() - 1] - to).amax() < 1e-12);
+            // Of steps whose length is measured along their chords.
+            prop_assert!(postures.windows(2).all(|two| moved_m(&two[0], &two[1]) < 0.01 * 1.02));
+            let (mut q, dt_s) = (from, 0.01);
+            while !line.is_done() {
+                let [next, qdot] = line.advance(dt_s);
+                prop_assert!(moved_m(&q, &next) < 0.1 * dt_s * 1.02);
+                prop_assert!(line.is_done() || (qdot * dt_s - (next - q)).amax() < 1e-9);
+                q = next;
+            }
+            prop_assert!((q - to).amax() < 1e-12);
+        }
+    }
+
+    fn robot() -> Robot {
+        let finger = Finger::default();
+        Robot { chain: stage(Point3::origin(), finger.r_at()), finger, is_soft: true }
+    }
+
+    /// An aim from a direction and a point of the unit ball.
+    fn aim(ball: &Ball, [x, y, z, u, v, w]: [f64; 6]) -> Option<Aim> {
+        let (inside, outward_w) = (Vector3::new(x, y, z), Vector3::new(u, v, w));
+        let is_usable = inside.norm() < 1.0 && outward_w.norm() > 0.01;
+        is_usable.then(|| Aim::against(ball.centre_w + inside * ball.radius_m, &outward_w))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+
+        /// Between two stand-offs the tip is never nearer to the centre than they are, the hull
+        /// never in the ball and never too low; the pose changes as the motion says.
+        #[test]
+        fn ways_lead_around(
+            numbers in prop::array::uniform12(-1.0f64..1.0),
+            stands in any::<bool>(),
+        ) {
+            let lowest_m = stands.then_some(0.4);
+            let ball = Ball { centre_w: Point3::new(0.0, -0.6, 0.5), radius_m: 0.14, lowest_m };
+            let (first, second) = numbers.split_at(6);
+            let aims = [first, second].map(|part| aim(&ball, part.try_into().unwrap()));
+            let [Some(from), Some(to)] = aims else { return Ok(()) };
+            let (robot, touch) = (robot(), TouchSettings::default());
+            let task = Task::new(ball, touch.clone(), &robot.finger).unwrap();
+            prop_assume!(task.reaches(&from) && task.reaches(&to));
+            let approaches = [from, to].map(|aim| task.approach(&aim.into()).unwrap());
+            let [from, to] = approaches.map(|approach| standoff(&robot, touch.standoff_m, &approach));
+            let (around, r_at) = (approaches[0].around.unwrap(), approaches[0].r_at);
+            let heel_t = Vector3::x() * -robot.finger.length_m;
+            let mut last = from;
+            for round in rounds(&around, from, to, &robot.finger, &r_at) {
+                prop_assert!((round.at(0.0).0.translation.vector - last.translation.vector).norm() < 1e-9);
+                prop_assert!(round.at(0.0).0.rotation.angle_to(&last.rotation) < 1e-6);
+                for i in 0..=200 {
+                    let t = f64::from(i) / 200.0;
+                    let (x_wt, change) = round.at(t);
+                    let tip_w = Point3::from(x_wt.translation.vector);
+                    prop_assert!(around.depth_m(&tip_w) < 1e-9);
+                    for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
+                        let p_w = tip_w + x_wt.rotation * heel_t * share;
+                        let hull_m = (p_w - ball.centre_w).norm() - robot.finger.radius_m;
+                        prop_assert!(hull_m > ball.radius_m, "{hull_m}");
+                    }
+                    if let Some(lowest_m) = lowest_m {
+                        let drop_m = robot.finger.drop_m(&(x_wt.rotation * r_at.inverse()));
+                        prop_assert!(tip_w.z - drop_m > lowest_m - 1e-4);
+                    }
+                    let step = 1e-6;
+                    let (next, _) = round.at(t + step);
+                    let moved = (next.translation.vector - x_wt.translation.vector) / step;
+                    let turned = (next.rotation * x_wt.rotation.inverse()).scaled_axis() / step;
+                    prop_assert!((moved - change.fixed_rows::<3>(0)).norm() < 1e-4);
+                    prop_assert!((turned - change.fixed_rows::<3>(3)).norm() < 1e-4);
+                }
+                last = round.to;
+                prop_assert!((round.at(1.0).0.translation.vector - last.translation.vector).norm() < 1e-9);
+                prop_assert!(round.at(1.0).0.rotation.angle_to(&last.rotation) < 1e-6);
+            }
+            prop_assert_eq!(last, to);
+        }
+    }
+}

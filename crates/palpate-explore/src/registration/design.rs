@@ -1,0 +1,423 @@
+//! Which touches of a known body tell the most of where the finger and the body stand.
+
+use super::hand_eye::{FELT, HandEyeFit, PARAMETERS, RegistrationTouch, parameters, undetermined};
+use super::known_body::{KnownBody, Outline};
+use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
+use crate::control::posture;
+use crate::probe::Probe;
+use crate::probe::servo::{BEYOND_M, Servo};
+use crate::robot::Robot;
+use crate::robot::arm::{Chain, Joints, Kind};
+use crate::robot::finger::Finger;
+use crate::robot::finger::frame::FRAME_S;
+use crate::task::Approach;
+use crate::task::touch::TouchSettings;
+use nalgebra::{
+    DMatrix, Isometry3, Point3, Rotation3, SMatrix, Translation3, UnitQuaternion, UnitVector3,
+    Vector3,
+};
+use palpate_gp::math::least_squares::{Problem, foresee, jacobian};
+use palpate_input::error::Invalid;
+use rand::Rng;
+use rand::seq::SliceRandom;
+
+/// Touches to make, in order, and what they would tell.
+#[derive(Clone, Debug)]
+pub struct Design {
+    /// How each is made.
+    pub approaches: Vec<Approach>,
+    /// Foreseen standard deviation of each parameter, in its own unit, from the expected scatter.
+    pub sds: [f64; PARAMETERS],
+    /// Parameters that these touches would not determine.
+    pub undetermined: Vec<&'static str>,
+    /// Condition number of the rest.
+    pub condition: f64,
+}
+
+/// Greatest condition number of a design; chosen: a residual's error reaches no parameter more than
+/// so many times as much as another, all in units of what is plausible.
+const CONDITION_MAX: f64 = 1000.0;
+
+/// How far before and behind the place where the body is expected the finger looks for it; chosen:
+/// what finger and body may be off.
+const MARGIN_M: f64 = 0.012;
+
+/// Clear way in front of that, so that the finger passes from one side of the body to another;
+/// chosen.
+const STANDOFF_M: f64 = 0.05;
+
+/// Fastest approach: in the 10 ms between two frames the finger goes 50 µm. Chosen.
+const APPROACH_M_S: f64 = 0.005;
+
+/// Frames averaged; chosen: a fifth of a single frame's noise.
+const FRAMES: usize = 25;
+
+/// Where on the finger it is touched: part of its radius before the origin of `T`, or part of its
+/// length behind it; and degrees around it from the pad. Chosen: pad and tip, as far to the sides
+/// as liquid is under the skin.
+const SITES: [f64; 6] = [0.8, 0.55, 0.2, -0.25, -0.6, -0.88];
+const TURNS_DEG: [f64; 5] = [-65.0, -25.0, 0.0, 25.0, 65.0];
+
+/// From where the body is touched: angles from its free side, and how many on that circle; chosen.
+const SIDES: [(f64, usize); 3] = [(0.0, 1), (25.0, 6), (50.0, 8)];
+
+/// Turns of the finger about the normal of the contact; chosen.
+const SPINS: usize = 12;
+
+/// Touches among which the best are looked for; chosen.
+const CANDIDATES: usize = 600;
+
+/// One touch more for each so many, of which the arm turns out not to be able to make some; chosen.
+const SPARE: usize = 2;
+
+/// How far a candidate may reach into the body elsewhere than where it is meant to touch.
+const INTO_M: f64 = 2e-4;
+
+/// How far a finger goes on, on average, after its pressure has passed the threshold until it is
+/// held and read: as many frames as must agree, half a frame for the first, and the firmer press.
+pub fn pressed_m(robot: &Robot, touch: &TouchSettings) -> f64 {
+    if !robot.is_soft {
+        return 0.0;
+    }
+    let frames = f64::from(touch.detection.frames) - 0.5;
+    touch.press_m + touch.approach_m_s * frames * FRAME_S
+}
+
+/// How registration touches: slowly and from afar, all else as the task says.
+pub fn touch_settings(touch: &TouchSettings) -> TouchSettings {
+    TouchSettings {
+        approach_m_s: touch.approach_m_s.min(APPROACH_M_S),
+        standoff_m: touch.standoff_m.max(STANDOFF_M),
+        frames: touch.frames.max(FRAMES),
+        ..touch.clone()
+    }
+}
+
+/// A touch that could be made.
+struct Candidate {
+    touch: RegistrationTouch,
+    approach: Approach,
+    rows: DMatrix<f64>,
+}
+
+impl Candidate {
+    /// The way that it takes if the body is where it is believed to be: it ends there.
+    fn expected(&self) -> Approach {
+        let beyond_m = MARGIN_M + BEYOND_M;
+        let back_w = self.approach.direction_w().scale(beyond_m);
+        Approach { p_far_w: self.approach.p_far_w - back_w, ..self.approach }
+    }
+}
+
+impl Design {
+    /// The `count` touches of `body` that tell the most: each is the one that shrinks the
+    /// parameters' ellipsoid most, given those before it, among those that `robot` reaches. Then
+    /// they are rehearsed in the order in which they will be made, and those left out that do not
+    /// follow on from the one before.
+    ///
+    /// # Errors
+    /// If it reaches too few, or they would determine too little.
+    pub fn new(
+        robot: &Robot,
+        touch: &TouchSettings,
+        body: &KnownBody,
+        count: usize,
+        rng: &mut impl Rng,
+    ) -> Result<Self, Invalid> {
+        if !robot.chain.turns() {
+            return Err(unreachable(0, 0, count));
+        }
+        let outline = Outline::of(robot);
+        let free_w = free_side(robot, body);
+        let mut all = candidates(&outline, robot, body, &free_w, rng);
+        let tried = all.len();
+        // What was plausible before; it keeps the first picks finite.
+        let mut information = SMatrix::<f64, PARAMETERS, PARAMETERS>::identity();
+        let mut chosen: Vec<Candidate> = Vec::new();
+        while chosen.len() < count + count / SPARE && !all.is_empty() {
+            let Some(covariance) = information.try_inverse() else { break };
+            let told = |candidate: &Candidate| {
+                let rows = &candidate.rows;
+                let inner = DMatrix::identity(rows.nrows(), rows.nrows())
+                    + rows * covariance * rows.transpose();
+                inner.determinant()
+            };
+            let values: Vec<f64> = all.iter().map(told).collect();
+            let best = (0..all.len()).max_by(|&a, &b| values[a].total_cmp(&values[b]));
+            let candidate = all.swap_remove(best.unwrap_or_default());
+            if is_reached(robot, &candidate.approach) {
+                information += candidate.rows.transpose() * &candidate.rows;
+                chosen.push(candidate);
+            }
+        }
+        let chosen = in_order(robot, chosen);
+        let ways: Vec<Approach> = chosen.iter().map(Candidate::expected).collect();
+        let mut made = rehearsed(robot, &touch_settings(touch), &ways)
+            .map_err(|fault| Invalid::new(fault.to_string()))?;
+        if made.len() < count {
+            return Err(unreachable(made.len(), tried, count));
+        }
+        made.truncate(count);
+        let chosen: Vec<Candidate> = (chosen.into_iter().enumerate())
+            .filter_map(|(i, candidate)| made.contains(&i).then_some(candidate))
+            .collect();
+        let touches: Vec<_> = chosen.iter().map(|candidate| candidate.touch).collect();
+        let fit = HandEyeFit::new(&outline, &touches);
+        let foreseen = foresee(&fit, &HandEyeFit::start(*body))
+            .map_err(|error| Invalid::new(error.to_string()))?;
+        let named = parameters(body);
+        let sds = std::array::from_fn(|i| foreseen.covariance[(i, i)].sqrt() * named[i].1);
+        let lost = undetermined(&foreseen, body);
+        Ok(Self {
+            approaches: chosen.into_iter().map(|candidate| candidate.approach).collect(),
+            sds,
+            undetermined: lost,
+            condition: foreseen.condition,
+        })
+    }
+
+    /// Whether these touches are worth making.
+    ///
+    /// # Errors
+    /// If they leave something undetermined, or determine it badly.
+    pub fn check(&self) -> Result<(), Invalid> {
+        // What the finger feels may stay unknown; where it stands may not.
+        let sought = self.undetermined.iter().filter(|name| !FELT.contains(name));
+        let lost: Vec<&'static str> = sought.copied().collect();
+        if !lost.is_empty() {
+            let (touches, lost) = (self.approaches.len(), lost.join(", "));
+            return Err(Invalid::new(format!(
+                "these {touches} touches would not determine {lost}"
+            ))
+            .mend("make more (--touches)"));
+        }
+        match self.condition <= CONDITION_MAX {
+            true => Ok(()),
+            false => Err(Invalid::new(format!(
+                "the condition number of these touches is {:.0}, and {CONDITION_MAX} is allowed",
+                self.condition
+            ))),
+        }
+    }
+}
+
+fn unreachable(reached: usize, tried: usize, wanted: usize) -> Invalid {
+    Invalid::new(format!(
+        "the robot reaches {reached} of {tried} touches of the body, and {wanted} are wanted"
+    ))
+    .mend(
+        "a finger must be turned to find where it stands, which a stage cannot do; bring the body \
+         nearer (--at)",
+    )
+}
+
+/// The side from which the robot comes: from the body's centre to the fingertip at home; a plate's
+/// normal.
+fn free_side(robot: &Robot, body: &KnownBody) -> UnitVector3<f64> {
+    match body {
+        KnownBody::Plate { normal_w, .. } => *normal_w,
+        KnownBody::Ball { centre_w, .. } => {
+            let home_w = robot.chain.forward(&robot.chain.home).translation.vector;
+            UnitVector3::try_new(home_w - centre_w.coords, 0.0).unwrap_or(Vector3::y_axis())
+        }
+    }
+}
+
+/// Touches at every site of the finger, from every side of the body, at every spin; some of them,
+/// where they are many.
+fn candidates(
+    outline: &Outline,
+    robot: &Robot,
+    body: &KnownBody,
+    free_w: &UnitVector3<f64>,
+    rng: &mut impl Rng,
+) -> Vec<Candidate> {
+    let sites: Vec<(f64, f64)> = (SITES.iter())
+        .flat_map(|&site| TURNS_DEG.iter().map(move |turn_deg| (site, turn_deg.to_radians())))
+        .collect();
+    let mut all: Vec<(UnitVector3<f64>, (f64, f64), f64)> = Vec::new();
+    for side_w in sides(body, free_w) {
+        for &site in &sites {
+            let spins = (0..SPINS).map(|i| std::f64::consts::TAU * i as f64 / SPINS as f64);
+            all.extend(spins.map(|spin| (side_w, site, spin)));
+        }
+    }
+    all.shuffle(rng);
+    let made = all.into_iter().filter_map(|(side_w, (site, turn), spin)| {
+        let length_m = if site > 0.0 { outline.radius_m() } else { outline.length_m() };
+        let (p_t, outward_t) = outline.at(site * length_m, turn);
+        let x_wt = pose(body, &side_w, (&p_t, &outward_t), spin)?;
+        let touch = RegistrationTouch { x_wt, pressed_m: 0.0, felt_t: Some(p_t) };
+        let is_meant = outline.nearest(body, &x_wt).1 > -INTO_M;
+        is_meant.then(|| {
+            let only = [touch];
+            let fit = HandEyeFit::new(outline, &only);
+            let state = HandEyeFit::start(*body);
+            let count = fit.residuals(&state).len();
+            // The last is of no touch.
+            let rows = jacobian(&fit, &state, count).remove_row(count - 1);
+            Candidate { touch, approach: approach(&x_wt, &side_w, &robot.finger), rows }
+        })
+    });
+    made.take(CANDIDATES).collect()
+}
+
+/// Directions from the body towards the finger: around the free side of a ball; a plate has one.
+fn sides(body: &KnownBody, free_w: &UnitVector3<f64>) -> Vec<UnitVector3<f64>> {
+    if let KnownBody::Plate { normal_w, .. } = body {
+        return vec![*normal_w];
+    }
+    let [across, along] = KnownBody::axes(free_w);
+    let circle = |(angle_deg, count): (f64, usize)| {
+        (0..count).map(move |i| {
+            let (sin, cos) = angle_deg.to_radians().sin_cos();
+            let (up, aside) = (std::f64::consts::TAU * i as f64 / count as f64).sin_cos();
+            let side = free_w.into_inner() * cos + (across * aside + along * up) * sin;
+            UnitVector3::new_normalize(side)
+        })
+    };
+    SIDES.iter().copied().flat_map(circle).collect()
+}
+
+/// Pose of `T` at which the finger's place with this outward normal lies on the body on `side_w`,
+/// turned by `spin` about that normal; none if no turn brings it there.
+fn pose(
+    body: &KnownBody,
+    side_w: &UnitVector3<f64>,
+    (p_t, outward_t): (&Point3<f64>, &UnitVector3<f64>),
+    spin: f64,
+) -> Option<Isometry3<f64>> {
+    let p_w = match body {
+        KnownBody::Ball { centre_w, radius_m } => centre_w + side_w.scale(*radius_m),
+        KnownBody::Plate { point_w, .. } => *point_w,
+    };
+    let inward_w = -side_w.into_inner();
+    let turn = Rotation3::rotation_between(outward_t, &inward_w)
+        .or_else(|| Rotation3::rotation_between(&-outward_t.into_inner(), side_w))?;
+    let spun = Rotation3::from_axis_angle(side_w, spin) * turn;
+    let r_wt = UnitQuaternion::from_rotation_matrix(&spun);
+    let p_wt = p_w - r_wt * p_t.coords;
+    Some(Isometry3::from_parts(Translation3::from(p_wt.coords), r_wt))
+}
+
+/// The way to that pose against `side_w`.
+fn approach(x_wt: &Isometry3<f64>, side_w: &UnitVector3<f64>, finger: &Finger) -> Approach {
+    let p_wt = Point3::from(x_wt.translation.vector);
+    let [across, _] = KnownBody::axes(side_w);
+    let axes = [across, side_w.into_inner(), across.cross(side_w)];
+    let r_wa = Rotation3::from_basis_unchecked(&axes);
+    let r_wa = UnitQuaternion::from_rotation_matrix(&r_wa);
+    // The servo keeps the hull's bulge and radius off what an approach names.
+    let ahead_m = [finger.bulge_m() - MARGIN_M, MARGIN_M - finger.radius_m];
+    let [p_near_w, p_far_w] = ahead_m.map(|ahead_m| p_wt - side_w.scale(ahead_m));
+    Approach { p_near_w, p_far_w, r_wa, r_at: r_wa.inverse() * x_wt.rotation, around: None }
+}
+
+/// Whether `robot` has a posture at the ends of the way.
+fn is_reached(robot: &Robot, approach: &Approach) -> bool {
+    let ahead_w = approach.direction_w();
+    let bulge_m = robot.finger.bulge_m();
+    let ends = [
+        approach.p_near_w - ahead_w.scale(bulge_m + STANDOFF_M),
+        approach.p_far_w + ahead_w.scale(robot.finger.radius_m),
+    ];
+    ends.into_iter().all(|p_wt| {
+        let x_wt = Isometry3::from_parts(p_wt.coords.into(), approach.r_wt());
+        posture(&robot.chain, &x_wt).is_ok()
+    })
+}
+
+/// In an order in which the finger turns little from one to the next, beginning at home.
+fn in_order(robot: &Robot, mut left: Vec<Candidate>) -> Vec<Candidate> {
+    let mut ordered: Vec<Candidate> = Vec::new();
+    let mut at = robot.chain.forward(&robot.chain.home).rotation;
+    while !left.is_empty() {
+        let turn = |candidate: &Candidate| at.angle_to(&candidate.touch.x_wt.rotation);
+        let next = (0..left.len()).min_by(|&a, &b| turn(&left[a]).total_cmp(&turn(&left[b])));
+        let candidate = left.swap_remove(next.unwrap_or_default());
+        at = candidate.touch.x_wt.rotation;
+        ordered.push(candidate);
+    }
+    ordered
+}
+
+/// An arm in empty space: no mass, no object, no sensor.
+struct Rehearsal {
+    chain: Chain,
+    capabilities: Capabilities,
+    q: Joints,
+    reading: Reading,
+}
+
+/// Its tick; chosen: what a resolved-rate controller needs, not what a servo does.
+const PERIOD_S: f64 = 0.01;
+
+impl Rehearsal {
+    fn new(chain: &Chain) -> Self {
+        let capabilities = Capabilities::of(chain, PERIOD_S);
+        let (chain, q, reading) = (chain.clone(), chain.home, Reading::default());
+        Self { chain, capabilities, q, reading }
+    }
+
+    fn report(&mut self, qdot: &Joints) {
+        let joints = self.chain.joints.len();
+        let told = [(&mut self.reading.q, &self.q), (&mut self.reading.qdot, qdot)];
+        for (to, from) in told {
+            to.clear();
+            to.extend(from.iter().take(joints));
+        }
+    }
+}
+
+impl Backend for Rehearsal {
+    fn capabilities(&self) -> &Capabilities {
+        &self.capabilities
+    }
+
+    fn reset(&mut self, _seed: u64) -> Result<&Reading, Fault> {
+        self.q = self.chain.home;
+        self.reading.time_s = 0.0;
+        self.report(&Joints::zeros());
+        Ok(&self.reading)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        let qdot = self.capabilities.accept(command)?;
+        self.q = self.chain.clamp(&(self.q + qdot * PERIOD_S));
+        self.reading.time_s += PERIOD_S;
+        self.report(&qdot);
+        Ok(&self.reading)
+    }
+}
+
+/// How far the rehearsed joints keep from their limits, because touches do not end exactly where
+/// they are rehearsed; chosen.
+const SLACK_RAD: f64 = 0.25;
+
+/// Those of `approaches` that `robot` can go one after the other from home, by number.
+///
+/// # Errors
+/// If the robot cannot be driven at all.
+fn rehearsed(
+    robot: &Robot,
+    touch: &TouchSettings,
+    approaches: &[Approach],
+) -> Result<Vec<usize>, Fault> {
+    let mut robot = robot.clone();
+    for joint in robot.chain.joints.iter_mut().filter(|joint| joint.kind == Kind::Revolute) {
+        joint.q_limits = [joint.q_limits[0] + SLACK_RAD, joint.q_limits[1] - SLACK_RAD];
+    }
+    // By the servo that will make them, on the arm's kinematics alone.
+    let mut left: Vec<usize> = (0..approaches.len()).collect();
+    'again: loop {
+        let body = Box::new(Rehearsal::new(&robot.chain));
+        let mut servo = Servo::new(robot.clone(), touch.clone(), body, 0)?;
+        for at in 0..left.len() {
+            if servo.touch(&approaches[left[at]]).is_err() {
+                left.remove(at);
+                continue 'again;
+            }
+        }
+        return Ok(left);
+    }
+}

@@ -1,0 +1,173 @@
+//! Lays a cloud of contacts onto a mesh (point-to-plane, Chen and Medioni 1992).
+
+use super::register::pose_table;
+use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use palpate_geometry::bvh::MeshBvh;
+use palpate_gp::math::least_squares::{FitError, Problem, Solution, fit};
+use palpate_input::error::Invalid;
+use toml_edit::{Array, DocumentMut, Table, value};
+
+/// Where the mesh stands.
+#[derive(Clone, Debug)]
+pub struct Aligned {
+    /// Pose of the mesh's frame in that of the cloud.
+    pub x_wo: Isometry3<f64>,
+    /// Standard deviation of its place along each axis, m, then of its turn about each axis through
+    /// the mesh's middle, rad.
+    pub sds: [f64; 6],
+    /// Unit vectors of what the cloud does not determine: place in units of 2 cm, then turn in
+    /// units of 0.2 rad. The mesh stays there as it was.
+    pub undetermined: Vec<DVector<f64>>,
+    /// Root mean square distance of the points used from the mesh.
+    pub rms_m: f64,
+    /// Points used.
+    pub used: usize,
+    /// Points left out: they did not fit the others.
+    pub outliers: usize,
+    /// Rounds of matching.
+    pub rounds: usize,
+}
+
+impl Aligned {
+    /// The keys of a scene's `[object]`, and how sure they are, as TOML.
+    pub fn tables(&self) -> String {
+        let [a, b, c, d, e, f] = self.sds;
+        let undetermined = self.undetermined.iter().map(|v| Array::from_iter(v.iter().copied()));
+        let mut sure = Table::new();
+        sure["position_sd_m"] = value(Array::from_iter([a, b, c]));
+        sure["turn_sd_deg"] = value(Array::from_iter([d, e, f].map(f64::to_degrees)));
+        sure["undetermined"] = value(Array::from_iter(undetermined));
+        sure["residual_rms_m"] = value(self.rms_m);
+        sure["points"] = value(self.used as i64);
+        sure["outliers"] = value(self.outliers as i64);
+        let mut tables = DocumentMut::new();
+        tables["object"] = pose_table("", &self.x_wo);
+        tables["alignment"] = sure.into();
+        tables.to_string()
+    }
+}
+
+/// Numbers of a pose; and a point more than those for a residual.
+const PARAMETERS: usize = 6;
+const LEAST: usize = PARAMETERS + 1;
+
+/// Rounds of matching at most, and the movement, as a part of the mesh's size, below which they
+/// end; chosen.
+const ROUNDS: usize = 200;
+const SETTLED: f64 = 1e-9;
+
+/// How far the start could plausibly be off, in place and turn; chosen.
+const PLACE_M: f64 = 0.02;
+const TURN_RAD: f64 = 0.2;
+
+/// A direction that moves the points off the mesh by less than this part of what another does is
+/// not determined: so much does a mesh's facets alone let a round body seem not to turn freely.
+/// Chosen.
+const RESOLUTION: f64 = 0.03;
+
+/// Expected scatter of contacts; chosen: that of the electrodes' contacts on smooth objects.
+const SCATTER_M: f64 = 3e-4;
+
+/// One round's matches: each point held against the plane through the mesh's point nearest to it.
+struct Planes<'a> {
+    points_w: &'a [Point3<f64>],
+    /// In the mesh's frame.
+    planes_o: Vec<(Point3<f64>, Vector3<f64>)>,
+    middle_o: Point3<f64>,
+}
+
+impl Problem for Planes<'_> {
+    type State = Isometry3<f64>;
+
+    fn parameters(&self) -> usize {
+        PARAMETERS
+    }
+
+    fn resolution(&self) -> f64 {
+        RESOLUTION
+    }
+
+    /// A step is of place and turn about the mesh's middle.
+    fn moved(&self, x_wo: &Isometry3<f64>, step: &DVector<f64>) -> Isometry3<f64> {
+        let [place, turn] = [0, 3].map(|i| Vector3::new(step[i], step[i + 1], step[i + 2]));
+        let rotation = UnitQuaternion::from_scaled_axis(turn * TURN_RAD) * x_wo.rotation;
+        let origin_w = x_wo * self.middle_o + place * PLACE_M - rotation * self.middle_o.coords;
+        Isometry3::from_parts(Translation3::from(origin_w.coords), rotation)
+    }
+
+    fn residuals(&self, x_wo: &Isometry3<f64>) -> DVector<f64> {
+        let distances = self.points_w.iter().zip(&self.planes_o).map(|(p_w, (at_o, normal_o))| {
+            normal_o.dot(&(x_wo.inverse_transform_point(p_w) - at_o)) / SCATTER_M
+        });
+        DVector::from_iterator(self.points_w.len(), distances)
+    }
+}
+
+/// Moves `mesh` from `start` until the points of the cloud lie on it.
+///
+/// Each round matches every point with the mesh's nearest and fits the pose to these planes; it
+/// finds the nearest valley, so `start` must be near.
+///
+/// # Errors
+/// If there are too few points, or they cannot be fitted.
+pub fn align(
+    mesh: &MeshBvh,
+    points_w: &[Point3<f64>],
+    start: &Isometry3<f64>,
+) -> Result<Aligned, Invalid> {
+    if points_w.len() < LEAST {
+        let count = points_w.len();
+        return Err(Invalid::new(format!("{count} points, and at least {LEAST} are needed")));
+    }
+    let (low, high) = mesh.mesh().bounds();
+    let (middle_o, size_m) = (nalgebra::center(&low, &high), (high - low).norm());
+    let mut x_wo = *start;
+    for round in 1..=ROUNDS {
+        let planes_o = points_w.iter().map(|p_w| plane(mesh, &x_wo.inverse_transform_point(p_w)));
+        let problem = Planes { points_w, planes_o: planes_o.collect(), middle_o };
+        let fitted = fit(&problem, &x_wo).map_err(|error| Invalid::new(error.to_string()))?;
+        let step = x_wo.inverse() * fitted.state;
+        let moved = (step * middle_o - middle_o).norm() / size_m + step.rotation.angle();
+        x_wo = fitted.state;
+        if moved < SETTLED || round == ROUNDS {
+            return Ok(told(&problem, &fitted, mesh, round));
+        }
+    }
+    Err(Invalid::new(FitError::Unsettled.to_string()))
+}
+
+/// The plane through the mesh's point nearest to `p_o`: square to the way there, or the triangle's
+/// where the point lies on it.
+fn plane(mesh: &MeshBvh, p_o: &Point3<f64>) -> (Point3<f64>, Vector3<f64>) {
+    let nearest = mesh.closest_point(p_o);
+    let [a, b, c] = mesh.mesh().corners(nearest.triangle as usize);
+    let face = (b - a).cross(&(c - a)).normalize();
+    (nearest.point, face)
+}
+
+fn told(
+    problem: &Planes<'_>,
+    fitted: &Solution<Isometry3<f64>>,
+    mesh: &MeshBvh,
+    rounds: usize,
+) -> Aligned {
+    let x_wo = fitted.state;
+    let distances = problem
+        .points_w
+        .iter()
+        .zip(&fitted.used)
+        .filter(|(_, used)| **used)
+        .map(|(p_w, _)| mesh.closest_point(&x_wo.inverse_transform_point(p_w)).distance_m);
+    let distances: Vec<f64> = distances.collect();
+    let squares: f64 = distances.iter().map(|m| m * m).sum();
+    let unit = |i: usize| if i < 3 { PLACE_M } else { TURN_RAD };
+    Aligned {
+        x_wo,
+        sds: std::array::from_fn(|i| fitted.covariance[(i, i)].sqrt() * unit(i)),
+        undetermined: fitted.undetermined.clone(),
+        rms_m: (squares / distances.len().max(1) as f64).sqrt(),
+        used: distances.len(),
+        outliers: problem.points_w.len() - distances.len(),
+        rounds,
+    }
+}

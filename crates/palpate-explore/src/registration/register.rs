@@ -1,0 +1,169 @@
+//! Makes the touches of a design and fits what they tell.
+
+use super::design::{Design, pressed_m};
+use super::hand_eye::{
+    HandEye, HandEyeFit, PARAMETERS, RegistrationTouch, depths_m, parameters, undetermined,
+};
+use super::known_body::{KnownBody, Outline};
+use crate::backend::Fault;
+use crate::probe::{Probe, Touch};
+use crate::robot::Robot;
+use crate::task::touch::TouchSettings;
+use nalgebra::Isometry3;
+use palpate_gp::math::least_squares::fit;
+use palpate_gp::math::pose::parts;
+use palpate_input::error::Invalid;
+use toml_edit::{Array, DocumentMut, Item, Table, value};
+
+/// What touches of a known body told.
+#[derive(Clone, Debug)]
+pub struct Registered {
+    /// The finger on its mount, the body and the skin's give.
+    pub found: HandEye,
+    /// Standard deviation of each of [`parameters`], in its own unit.
+    pub sds: [f64; PARAMETERS],
+    /// What the touches did not determine; it stands where it was believed to be.
+    pub undetermined: Vec<&'static str>,
+    /// Condition number of the rest.
+    pub condition: f64,
+    /// Root mean square of the depths' residuals, of the touches used.
+    pub rms_m: f64,
+    /// Touches that met the body.
+    pub contacts: usize,
+    /// Touches of these that were left out: they did not fit the others.
+    pub outliers: usize,
+    /// Touches that met nothing or were broken off.
+    pub lost: usize,
+    /// Why not all touches of the design were made; what they told until then counts.
+    pub ended: Option<Fault>,
+}
+
+impl Registered {
+    /// Pose of `T` at the end of the mount, for `arm.tool_position_m` and `arm.tool_rotation_deg`;
+    /// `before` is what they said when it was touched.
+    pub fn tool(&self, before: Option<Isometry3<f64>>) -> Isometry3<f64> {
+        before.map_or(self.found.correction, |before| before * self.found.correction)
+    }
+
+    /// The keys of a scene's `[arm]` and `[object]` that were found (of the body a ball's centre,
+    /// or a plate's point with +y along its normal), and how sure they are, as TOML; `before` as in
+    /// [`tool`](Self::tool).
+    pub fn tables(&self, before: Option<Isometry3<f64>>) -> String {
+        let [a, b, c, d, e, f, g, h, i, ..] = self.sds;
+        let mut sure = Table::new();
+        sure["tool_position_sd_m"] = value(Array::from_iter([a, b, c]));
+        // Of small turns about the axes of the mount.
+        sure["tool_turn_sd_deg"] = value(Array::from_iter([d, e, f].map(f64::to_degrees)));
+        // Of a ball along x, y and z; of a plate along its normal, then of its tilts in rad.
+        sure["body_sd"] = value(Array::from_iter([g, h, i]));
+        sure["undetermined"] = value(Array::from_iter(self.undetermined.iter().copied()));
+        sure["residual_rms_m"] = value(self.rms_m);
+        sure["give_m"] = value(self.found.give_m);
+        sure["gain"] = value(self.found.gain);
+        sure["condition"] = value(self.condition);
+        for (key, count) in
+            [("contacts", self.contacts), ("outliers", self.outliers), ("lost", self.lost)]
+        {
+            sure[key] = value(count as i64);
+        }
+        if let Some(fault) = &self.ended {
+            sure["ended"] = value(fault.to_string());
+        }
+        let mut tables = DocumentMut::new();
+        tables["arm"] = pose_table("tool_", &self.tool(before));
+        tables["object"] = pose_table("", &self.found.body.x_wo());
+        tables["registration"] = sure.into();
+        tables.to_string()
+    }
+}
+
+/// The place and the turn of a pose as a scene's keys, which begin with `prefix`.
+pub(super) fn pose_table(prefix: &str, pose: &Isometry3<f64>) -> Item {
+    let (position_m, rotation_deg) = parts(pose);
+    let mut table = Table::new();
+    table[&format!("{prefix}position_m")] = value(Array::from_iter(position_m));
+    table[&format!("{prefix}rotation_deg")] = value(Array::from_iter(rotation_deg));
+    table.into()
+}
+
+/// Touches the body as `design` says, with the finger of `robot`, by a probe that touches as
+/// `touch` says; `made` is called after each touch.
+///
+/// # Errors
+/// If too few touches can be made or meet the body, or they cannot be fitted.
+pub fn register(
+    probe: &mut dyn Probe,
+    robot: &Robot,
+    touch: &TouchSettings,
+    (body, design): (&KnownBody, &Design),
+    made: &mut dyn FnMut(&Touch),
+) -> Result<Registered, Invalid> {
+    let of = design.approaches.len();
+    let pressed_m = pressed_m(robot, touch);
+    let mut touches = Vec::with_capacity(of);
+    let (mut made_count, mut ended) = (0, None);
+    for (i, approach) in design.approaches.iter().enumerate() {
+        let ending = match probe.touch(approach) {
+            Ok(ending) => ending,
+            Err(fault) => {
+                ended = Some((i + 1, fault));
+                break;
+            }
+        };
+        made(&ending);
+        made_count += 1;
+        if let Touch::Contact(contact) = &ending {
+            let x_wt = probe.tip().ok_or_else(|| {
+                Invalid::new("this body does not say where its finger was when it touched")
+            })?;
+            let felt_t = Some(x_wt.inverse_transform_point(&contact.p_wc));
+            touches.push(RegistrationTouch { x_wt, pressed_m, felt_t });
+        }
+    }
+    let least = PARAMETERS;
+    if touches.len() < least {
+        return Err(match ended {
+            Some((touch, fault)) => {
+                Invalid::new(fault.to_string()).at(format!("touch {touch} of {of}"))
+            }
+            None => Invalid::new(format!(
+                "{} of {of} touches met the body, and {least} are needed; is it where --at says?",
+                touches.len()
+            )),
+        });
+    }
+    let told = conclude(&touches, robot, body, made_count)?;
+    Ok(Registered { ended: ended.map(|(_, fault)| fault), ..told })
+}
+
+/// What `touches` tell, of `of` that were made.
+///
+/// # Errors
+/// If they cannot be fitted.
+pub fn conclude(
+    touches: &[RegistrationTouch],
+    robot: &Robot,
+    body: &KnownBody,
+    of: usize,
+) -> Result<Registered, Invalid> {
+    let outline = Outline::of(robot);
+    let problem = HandEyeFit::new(&outline, touches);
+    let fitted = fit(&problem, &HandEyeFit::start(*body))
+        .map_err(|error| Invalid::new(error.to_string()))?;
+    let named = parameters(body);
+    let depths_m = depths_m(&fitted, touches.len());
+    let used: Vec<f64> =
+        depths_m.iter().zip(&fitted.used).filter(|(_, used)| **used).map(|(m, _)| *m).collect();
+    let squares: f64 = used.iter().map(|m| m * m).sum();
+    Ok(Registered {
+        found: fitted.state,
+        sds: std::array::from_fn(|i| fitted.covariance[(i, i)].sqrt() * named[i].1),
+        undetermined: undetermined(&fitted, body),
+        condition: fitted.condition,
+        rms_m: (squares / used.len().max(1) as f64).sqrt(),
+        contacts: touches.len(),
+        outliers: touches.len() - used.len(),
+        lost: of - touches.len(),
+        ended: None,
+    })
+}

@@ -1,0 +1,249 @@
+//! A serial chain: where its tip is and how it moves, and the capsules that move with its links.
+
+use nalgebra::{Isometry3, Point3, SMatrix, SVector, UnitQuaternion, UnitVector3, Vector3};
+use palpate_geometry::sweep::Capsule;
+use palpate_input::error::Invalid;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Most joints of a chain.
+pub const MAX_JOINTS: usize = 7;
+
+/// One number per joint, rad or m and their rates; entries beyond the chain's joints are zero.
+pub type Joints = SVector<f64, MAX_JOINTS>;
+
+/// Geometric Jacobian in `W` at the origin of `T`: rows 0 to 2 linear, rows 3 to 5 angular
+/// velocity per joint velocity. Columns beyond the chain's joints are zero.
+pub type Jacobian = SMatrix<f64, 6, MAX_JOINTS>;
+
+/// How a joint moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Turns about its axis, rad.
+    Revolute,
+    /// Slides along its axis, m.
+    Prismatic,
+}
+
+/// A joint. Positions are rad where it turns and m where it slides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// The manufacturer's name; joints are matched by name, never by number.
+    pub name: Arc<str>,
+    /// How it moves.
+    pub kind: Kind,
+    /// Its origin in the frame of the joint before it; all frames are parallel at q = 0.
+    pub origin_m: Vector3<f64>,
+    /// Its axis in the same frame.
+    pub axis: UnitVector3<f64>,
+    /// Smallest and largest position.
+    pub q_limits: [f64; 2],
+    /// Largest speed, rad/s or m/s.
+    pub qdot_limit: f64,
+    /// Largest acceleration, rad/s² or m/s².
+    pub qddot_limit: f64,
+}
+
+impl Joint {
+    /// Largest speed in the direction of `qdot` from which the joint still stops before its limit,
+    /// commanded once in a period: `v² / 2a + v · period = distance`.
+    pub fn fastest(&self, q: f64, qdot: f64, period_s: f64) -> f64 {
+        let [low, high] = self.q_limits;
+        let distance = if qdot > 0.0 { high - q } else { q - low };
+        let a = self.qddot_limit;
+        let stops = a * ((period_s * period_s + 2.0 * distance.max(0.0) / a).sqrt() - period_s);
+        stops.min(self.qdot_limit)
+    }
+
+    /// Pose of the joint's moved frame, if that of the frame before it is `x`.
+    #[inline]
+    fn moved(&self, x: &Isometry3<f64>, q: f64) -> Isometry3<f64> {
+        let (origin_m, rotation) = match self.kind {
+            Kind::Revolute => {
+                (self.origin_m, x.rotation * UnitQuaternion::from_axis_angle(&self.axis, q))
+            }
+            Kind::Prismatic => (self.origin_m + self.axis.scale(q), x.rotation),
+        };
+        Isometry3::from_parts((x * Point3::from(origin_m)).into(), rotation)
+    }
+}
+
+/// A part of a robot that a capsule covers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// A link of the arm.
+    Link,
+    /// The adapter between flange and finger.
+    Tool,
+    /// The finger.
+    Finger,
+}
+
+/// A capsule that moves with a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinkCapsule {
+    /// Name in messages: of its link, `tool` or `finger`.
+    pub name: Arc<str>,
+    /// The part of the robot that it covers.
+    pub part: Part,
+    /// Number of joints that move it: the place of its frame in
+    /// [`Chain::frames`].
+    pub link: usize,
+    /// Ends of its axis in that frame.
+    pub ends: [Point3<f64>; 2],
+    /// Radius.
+    pub radius_m: f64,
+    /// Whether its link is too near to the foot to come to the object or the table.
+    pub near_base: bool,
+    /// Whether what the hand carries can fold back onto it.
+    pub folds: bool,
+}
+
+impl LinkCapsule {
+    /// Where it is when its link's frame stands at `x_wl`.
+    pub fn at(&self, x_wl: &Isometry3<f64>) -> Capsule {
+        let [p0_w, p1_w] = self.ends.map(|p| x_wl * p);
+        Capsule { p0_w, p1_w, radius_m: self.radius_m }
+    }
+
+    /// Whether it can meet `other` in the joints' limits and must not: they are three joints apart.
+    /// Nearer neighbours touch where they are joined; of those one that [`folds`](Self::folds) is
+    /// met by what the hand carries.
+    pub fn may_meet(&self, other: &Self) -> bool {
+        let (near, far) = if self.link < other.link { (self, other) } else { (other, self) };
+        far.link >= near.link + 3 || (near.folds && far.is_carried())
+    }
+
+    /// Whether it is beyond the flange: the tool or the finger.
+    pub fn is_carried(&self) -> bool {
+        self.part != Part::Link
+    }
+}
+
+/// Joints from the base to the fingertip `T`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain {
+    /// Pose of the base in `W`.
+    pub base: Isometry3<f64>,
+    /// At most [`MAX_JOINTS`], from the base on; more are ignored.
+    pub joints: Vec<Joint>,
+    /// Pose of the flange in the last joint's frame.
+    pub flange: Isometry3<f64>,
+    /// Pose of `T` in the flange's frame.
+    pub tool: Isometry3<f64>,
+    /// The posture to start from and to prefer.
+    pub home: Joints,
+    /// Collision capsules of its links.
+    pub capsules: Vec<LinkCapsule>,
+    /// Number of joints that move the elbow's link, if it has an elbow.
+    pub elbow: Option<usize>,
+}
+
+impl Chain {
+    /// Joint positions from a slice of the chain's length, or none if its length differs.
+    pub fn joints_from(&self, q: &[f64]) -> Option<Joints> {
+        let fits = q.len() == self.joints.len() && q.len() <= MAX_JOINTS;
+        fits.then(|| Joints::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0)))
+    }
+
+    /// The home posture, one number per joint.
+    pub fn start(&self) -> &[f64] {
+        self.home.as_slice().get(..self.joints.len()).unwrap_or_default()
+    }
+
+    /// `q` with every joint moved into its limits.
+    pub fn clamp(&self, q: &Joints) -> Joints {
+        let mut clamped = *q;
+        for (joint, q) in self.joints.iter().zip(clamped.iter_mut()) {
+            *q = q.max(joint.q_limits[0]).min(joint.q_limits[1]);
+        }
+        clamped
+    }
+
+    /// Whether any joint turns; a chain of slides alone cannot change its attitude.
+    pub fn turns(&self) -> bool {
+        self.joints.iter().any(|joint| joint.kind == Kind::Revolute)
+    }
+
+    /// Forward kinematics, the pose of `T` in `W`:
+    /// `X_WT = X_WB · Π X_i(q_i) · X_flange · X_tool`.
+    pub fn forward(&self, q: &Joints) -> Isometry3<f64> {
+        let moved = self.joints.iter().zip(q.iter());
+        moved.fold(self.base, |x, (joint, &q)| joint.moved(&x, q)) * self.flange * self.tool
+    }
+
+    /// Poses in `W` of the base and then of each joint's moved frame; beyond the chain's joints
+    /// that of the last.
+    pub fn frames(&self, q: &Joints) -> [Isometry3<f64>; MAX_JOINTS + 1] {
+        let mut frames = [self.base; MAX_JOINTS + 1];
+        let mut x = self.base;
+        for (k, frame) in frames.iter_mut().enumerate().skip(1) {
+            if let (Some(joint), Some(&q)) = (self.joints.get(k - 1), q.get(k - 1)) {
+                x = joint.moved(&x, q);
+            }
+            *frame = x;
+        }
+        frames
+    }
+
+    /// For each joint, the farthest that any point moved by it within `beyond_m` of `T` can lie
+    /// from its axis, in m: what such a point moves by per rad, at most. 1 where the joint slides.
+    pub fn reaches_m(&self, beyond_m: f64) -> Joints {
+        let end_m = self.flange.translation.vector.norm() + self.tool.translation.vector.norm();
+        let mut reaches = Joints::zeros();
+        let mut rest_m = end_m + beyond_m;
+        let joints = self.joints.iter().enumerate().take(MAX_JOINTS).rev();
+        for (i, joint) in joints {
+            let [low, high] = joint.q_limits;
+            (reaches[i], rest_m) = match joint.kind {
+                Kind::Revolute => (rest_m, rest_m + joint.origin_m.norm()),
+                Kind::Prismatic => {
+                    (1.0, rest_m + joint.origin_m.norm() + low.abs().max(high.abs()))
+                }
+            };
+        }
+        reaches
+    }
+
+    /// [`forward`](Self::forward) with the geometric Jacobian: column i is
+    /// `[a × (p_T − p_i); a]` where joint i turns and `[a; 0]` where it slides, with its axis a
+    /// and origin p_i in `W` (Siciliano et al. 2009, Robotics, Eq. 3.30).
+    pub fn jacobian(&self, q: &Joints) -> (Isometry3<f64>, Jacobian) {
+        let mut x = self.base;
+        let mut axes = [(Vector3::zeros(), Vector3::zeros()); MAX_JOINTS];
+        for ((joint, &q), (axis, origin)) in self.joints.iter().zip(q.iter()).zip(&mut axes) {
+            *axis = x.rotation * joint.axis.into_inner();
+            x = joint.moved(&x, q);
+            *origin = x.translation.vector;
+        }
+        let x_wt = x * self.flange * self.tool;
+        let mut jacobian = Jacobian::zeros();
+        for ((joint, (axis, origin)), mut column) in
+            self.joints.iter().zip(axes).zip(jacobian.column_iter_mut())
+        {
+            let (linear, angular) = match joint.kind {
+                Kind::Revolute => (axis.cross(&(x_wt.translation.vector - origin)), axis),
+                Kind::Prismatic => (axis, Vector3::zeros()),
+            };
+            column.fixed_rows_mut::<3>(0).copy_from(&linear);
+            column.fixed_rows_mut::<3>(3).copy_from(&angular);
+        }
+        (x_wt, jacobian)
+    }
+}
+
+/// The error of a command or posture that cannot be computed.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ArmError {
+    /// The wrong number of joints, or a position, goal or period that is not a usable number.
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
+    /// No posture within the joint limits brings the tip there.
+    #[error("out of reach: the tip stays {distance_m} m and {angle_rad} rad away")]
+    OutOfReach {
+        /// Smallest distance found.
+        distance_m: f64,
+        /// Angle at that distance.
+        angle_rad: f64,
+    },
+}

@@ -1,0 +1,324 @@
+//! An arm's model: a file with its joints, home posture, collision capsules and topics.
+
+use super::chain::{Joint, Joints, Kind, LinkCapsule, MAX_JOINTS, Part};
+use nalgebra::{Isometry3, UnitVector3, Vector3};
+use palpate_gp::math::pose::pose;
+use palpate_input::config::{Checked, ConfigError, Loader, Rules};
+use palpate_input::files;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// The arms that come with Palpate, by name: model and MJCF.
+pub const MODELS: [(&str, [&str; 2]); 2] = [
+    (
+        "pa10",
+        [
+            include_str!("../../../../../models/pa10/c.toml"),
+            include_str!("../../../../../models/pa10/c.xml"),
+        ],
+    ),
+    (
+        "pa10_a",
+        [
+            include_str!("../../../../../models/pa10/a.toml"),
+            include_str!("../../../../../models/pa10/a.xml"),
+        ],
+    ),
+];
+
+/// An arm as its file describes it. Frames of all links are parallel at q = 0.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ArmModel {
+    /// The manufacturer's name of the arm.
+    pub name: String,
+    /// Namespace of the topics and services of its driver.
+    pub namespace: String,
+    /// MJCF file beside this one, for a dynamic simulation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mjcf: Option<PathBuf>,
+    /// Name of the joint that the workspace interlock watches beside the tip.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub elbow: Option<String>,
+    /// Origin of the flange in the last joint's frame, m. The tool points along the flange's +z.
+    pub flange_m: [f64; 3],
+    /// Turns of the flange about the fixed axes x, then y, then z of that frame.
+    #[serde(default)]
+    pub flange_rotation_deg: [f64; 3],
+    /// Joints, from the base on.
+    pub joint: Vec<JointModel>,
+    /// Collision capsules of its links.
+    #[serde(default)]
+    pub capsule: Vec<CapsuleModel>,
+}
+
+/// A joint as a file describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum JointModel {
+    /// Turns about its axis.
+    Revolute {
+        /// The manufacturer's name.
+        name: String,
+        /// Its origin in the frame of the joint before it, m.
+        origin_m: [f64; 3],
+        /// Its axis in the same frame.
+        axis: [f64; 3],
+        /// Smallest and largest position.
+        limits_deg: [f64; 2],
+        /// Largest speed.
+        speed_rad_s: f64,
+        /// Largest acceleration.
+        acceleration_deg_s2: f64,
+        /// Position at home.
+        home_deg: f64,
+    },
+    /// Slides along its axis.
+    Prismatic {
+        /// The manufacturer's name.
+        name: String,
+        /// Its origin in the frame of the joint before it, m.
+        origin_m: [f64; 3],
+        /// Its axis in the same frame.
+        axis: [f64; 3],
+        /// Smallest and largest position.
+        limits_m: [f64; 2],
+        /// Largest speed.
+        speed_m_s: f64,
+        /// Largest acceleration.
+        acceleration_m_s2: f64,
+        /// Position at home.
+        home_m: f64,
+    },
+}
+
+/// A collision capsule as a file describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CapsuleModel {
+    /// Joint that moves its link, or `base`.
+    pub link: String,
+    /// Name in messages; that of the link if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// One end of its axis in the link's frame, m.
+    pub from_m: [f64; 3],
+    /// The other end.
+    pub to_m: [f64; 3],
+    /// Its radius.
+    pub radius_m: f64,
+    /// Whether its link is too near to the foot to come to the object or the table.
+    #[serde(default)]
+    pub near_base: bool,
+    /// Whether the tool can fold back onto it, although it is fewer than three joints away.
+    #[serde(default)]
+    pub folds: bool,
+}
+
+/// Name of the link that no joint moves.
+const BASE: &str = "base";
+
+impl ArmModel {
+    /// The model of this name, or that in the file `model`.
+    ///
+    /// # Errors
+    /// If the file cannot be read or does not describe an arm.
+    pub fn load(model: &str) -> Result<Self, ConfigError> {
+        match MODELS.iter().find(|(name, _)| *name == model) {
+            Some((name, [text, _])) => Loader::of(Path::new(name), (*text).into())?.finish(),
+            None => Loader::read(Path::new(model))?.finish(),
+        }
+    }
+
+    /// The joints of the chain.
+    pub fn joints(&self) -> Vec<Joint> {
+        self.joint.iter().map(JointModel::joint).collect()
+    }
+
+    /// Pose of the flange in the last joint's frame.
+    pub fn flange(&self) -> Isometry3<f64> {
+        pose(self.flange_m, self.flange_rotation_deg)
+    }
+
+    /// The home posture, deg, or m where a joint slides.
+    pub fn home(&self) -> Vec<f64> {
+        let home = |joint: &JointModel| match joint {
+            JointModel::Revolute { home_deg, .. } => *home_deg,
+            JointModel::Prismatic { home_m, .. } => *home_m,
+        };
+        self.joint.iter().map(home).collect()
+    }
+
+    /// A posture in the file's units as positions of the chain.
+    pub fn positions(&self, posture: &[f64]) -> Joints {
+        let position = |i: usize| match (self.joint.get(i), posture.get(i)) {
+            (Some(JointModel::Revolute { .. }), Some(q_deg)) => q_deg.to_radians(),
+            (Some(JointModel::Prismatic { .. }), Some(q_m)) => *q_m,
+            _ => 0.0,
+        };
+        Joints::from_fn(|i, _| position(i))
+    }
+
+    /// Capsules that move with its links.
+    pub fn capsules(&self) -> Vec<LinkCapsule> {
+        let on_link = |capsule: &CapsuleModel| Some(capsule.on(self.link(&capsule.link)?));
+        self.capsule.iter().filter_map(on_link).collect()
+    }
+
+    /// Number of joints that move the link of this name.
+    fn link(&self, name: &str) -> Option<usize> {
+        match name == BASE {
+            true => Some(0),
+            false => Some(self.joint.iter().position(|joint| joint.name() == name)? + 1),
+        }
+    }
+
+    /// Number of joints that move the elbow's link.
+    pub fn elbow(&self) -> Option<usize> {
+        self.link(self.elbow.as_deref()?)
+    }
+}
+
+/// MJCF of the arm `model`, if it has one.
+///
+/// # Errors
+/// If its file cannot be read.
+pub fn mjcf(model: &str) -> Result<Option<String>, ConfigError> {
+    if let Some((_, [_, mjcf])) = MODELS.iter().find(|(name, _)| *name == model) {
+        return Ok(Some((*mjcf).into()));
+    }
+    let Some(file) = ArmModel::load(model)?.mjcf else { return Ok(None) };
+    let path = Path::new(model).with_file_name(file);
+    let text = files::text(&path, files::TEXT_MAX);
+    text.map(Some).map_err(|cause| ConfigError::unreadable(&path, &cause))
+}
+
+impl JointModel {
+    /// The manufacturer's name.
+    pub fn name(&self) -> &str {
+        let (Self::Revolute { name, .. } | Self::Prismatic { name, .. }) = self;
+        name
+    }
+
+    /// Origin and axis in the frame of the joint before it.
+    fn placement(&self) -> (&[f64; 3], &[f64; 3]) {
+        let (Self::Revolute { origin_m, axis, .. } | Self::Prismatic { origin_m, axis, .. }) = self;
+        (origin_m, axis)
+    }
+
+    fn joint(&self) -> Joint {
+        let (origin_m, axis) = self.placement();
+        let (kind, q_limits, qdot_limit, qddot_limit) = match self {
+            Self::Revolute { limits_deg, speed_rad_s, acceleration_deg_s2, .. } => {
+                let limits = limits_deg.map(f64::to_radians);
+                (Kind::Revolute, limits, *speed_rad_s, acceleration_deg_s2.to_radians())
+            }
+            Self::Prismatic { limits_m, speed_m_s, acceleration_m_s2, .. } => {
+                (Kind::Prismatic, *limits_m, *speed_m_s, *acceleration_m_s2)
+            }
+        };
+        Joint {
+            name: self.name().into(),
+            kind,
+            origin_m: Vector3::from(*origin_m),
+            axis: UnitVector3::new_normalize(Vector3::from(*axis)),
+            q_limits,
+            qdot_limit,
+            qddot_limit,
+        }
+    }
+}
+
+impl CapsuleModel {
+    /// On the link that `link` joints move.
+    fn on(&self, link: usize) -> LinkCapsule {
+        LinkCapsule {
+            name: self.name.as_deref().unwrap_or(&self.link).into(),
+            part: Part::Link,
+            link,
+            ends: [self.from_m.into(), self.to_m.into()],
+            radius_m: self.radius_m,
+            near_base: self.near_base,
+            folds: self.folds,
+        }
+    }
+}
+
+/// Farthest that one link lies from the next.
+// heuristic: ten times the reach of an arm on a table.
+const FAR_M: f64 = 10.0;
+
+impl Checked for ArmModel {
+    fn check(&self, rules: &mut Rules) {
+        let (count, most) = (self.joint.len(), MAX_JOINTS);
+        rules.require("joint", count, (1..=most).contains(&count), || {
+            format!("1 to {most} tables [[joint]]")
+        });
+        rules.require("namespace", &self.namespace, self.namespace.starts_with('/'), || {
+            "a slash and a name".into()
+        });
+        rules.numbers("flange_m", &self.flange_m, -FAR_M..=FAR_M);
+        rules.numbers("flange_rotation_deg", &self.flange_rotation_deg, -360.0..=360.0);
+        let names: Vec<&str> = self.joint.iter().map(JointModel::name).collect();
+        for (i, joint) in self.joint.iter().enumerate() {
+            let key = format!("joint[{i}]");
+            rules.require(
+                &format!("{key}.name"),
+                names[i],
+                !names[..i].contains(&names[i]),
+                || "a name of its own".into(),
+            );
+            match joint {
+                JointModel::Revolute {
+                    limits_deg,
+                    home_deg,
+                    speed_rad_s,
+                    acceleration_deg_s2,
+                    ..
+                } => {
+                    rules.interval(&format!("{key}.limits_deg"), *limits_deg, -1e4..=1e4);
+                    let [low, high] = *limits_deg;
+                    if low < high {
+                        rules.number(&format!("{key}.home_deg"), *home_deg, low..=high);
+                    }
+                    rules.number(&format!("{key}.speed_rad_s"), *speed_rad_s, 1e-3..=100.0);
+                    let key = format!("{key}.acceleration_deg_s2");
+                    rules.number(&key, *acceleration_deg_s2, 0.1..=1e5);
+                }
+                JointModel::Prismatic {
+                    limits_m, home_m, speed_m_s, acceleration_m_s2, ..
+                } => {
+                    rules.interval(&format!("{key}.limits_m"), *limits_m, -FAR_M..=FAR_M);
+                    let [low, high] = *limits_m;
+                    if low < high {
+                        rules.number(&format!("{key}.home_m"), *home_m, low..=high);
+                    }
+                    rules.number(&format!("{key}.speed_m_s"), *speed_m_s, 1e-4..=10.0);
+                    rules.number(
+                        &format!("{key}.acceleration_m_s2"),
+                        *acceleration_m_s2,
+                        1e-3..=1e3,
+                    );
+                }
+            }
+            let (origin_m, axis) = joint.placement();
+            rules.numbers(&format!("{key}.origin_m"), origin_m, -FAR_M..=FAR_M);
+            let length = Vector3::from(*axis).norm();
+            rules.require(&format!("{key}.axis"), format!("{axis:?}"), length > 1e-6, || {
+                "three numbers that are not all zero".into()
+            });
+        }
+        let links: Vec<&str> = names.iter().copied().chain([BASE]).collect();
+        for (i, capsule) in self.capsule.iter().enumerate() {
+            let key = format!("capsule[{i}]");
+            rules.one_of(&format!("{key}.link"), &capsule.link, &links);
+            rules.numbers(&format!("{key}.from_m"), &capsule.from_m, -FAR_M..=FAR_M);
+            rules.numbers(&format!("{key}.to_m"), &capsule.to_m, -FAR_M..=FAR_M);
+            rules.number(&format!("{key}.radius_m"), capsule.radius_m, 1e-4..=FAR_M);
+        }
+        if let Some(elbow) = &self.elbow {
+            rules.one_of("elbow", elbow, &names);
+        }
+    }
+}

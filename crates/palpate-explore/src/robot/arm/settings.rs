@@ -1,0 +1,171 @@
+//! The arm in a scene: which, where, and how it stands.
+
+use super::chain::{Chain, Kind};
+use super::model::{ArmModel, MODELS};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use palpate_gp::math::pose::pose;
+use palpate_input::config::{Checked, ConfigError, Origin, Rules};
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer, Serialize};
+use std::f64::consts::FRAC_PI_2;
+use std::path::Path;
+
+/// An arm with the finger along its flange's axis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ArmSettings {
+    /// The arm: `"pa10"` (PA-10-7C), `"pa10_a"` (the older PA-10), or a file like
+    /// `models/pa10/c.toml`.
+    #[serde(alias = "links", deserialize_with = "model")]
+    pub model: String,
+    /// Where the base stands in `W`.
+    pub base_position_m: [f64; 3],
+    /// Turns of the base about the fixed axes x, then y, then z of `W`.
+    pub base_rotation_deg: [f64; 3],
+    /// The posture to start from and to prefer, a number for each joint: deg, or m where it slides.
+    /// Left out, that of the model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub home_deg: Option<Vec<f64>>,
+    /// From the flange along its axis to the origin of `T`.
+    pub mount_m: f64,
+    /// Where the origin of `T` really is, in the frame that `T` has at the end of the mount, as
+    /// `palpate register` finds it.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub tool_position_m: [f64; 3],
+    /// Turns of `T` about the fixed axes x, then y, then z of that frame.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub tool_rotation_deg: [f64; 3],
+    /// Mass of adapter and finger, which a `dynamic` body moves.
+    pub tool_kg: f64,
+}
+
+/// Mass of adapter and finger beyond the force/torque sensor; chosen.
+pub const TOOL_KG: f64 = 0.15;
+
+impl Default for ArmSettings {
+    /// A PA-10 with its base at `W`: at home the elbow is up and the finger points along -y, 45
+    /// degrees up, 0.56 m in front of the base's axis and 0.48 m above its foot. The mount
+    /// leaves room for a force/torque sensor and an adapter.
+    fn default() -> Self {
+        Self {
+            model: MODELS[0].0.into(),
+            base_position_m: [0.0; 3],
+            base_rotation_deg: [0.0; 3],
+            home_deg: None,
+            mount_m: 0.12,
+            tool_position_m: [0.0; 3],
+            tool_rotation_deg: [0.0; 3],
+            tool_kg: TOOL_KG,
+        }
+    }
+}
+
+impl ArmSettings {
+    /// Pose of `T` in the frame that it has at the end of the mount; none if it is that frame.
+    pub fn correction(&self) -> Option<Isometry3<f64>> {
+        let is_there = is_zero(&self.tool_position_m) && is_zero(&self.tool_rotation_deg);
+        (!is_there).then(|| pose(self.tool_position_m, self.tool_rotation_deg))
+    }
+
+    /// Writes out the home posture that is left to the model; a model that cannot be read is an
+    /// error where the arm is built.
+    pub fn complete(&mut self) {
+        if let (None, Ok(model)) = (&self.home_deg, ArmModel::load(&self.model)) {
+            self.home_deg = Some(model.home());
+        }
+    }
+
+    /// Whether its model is a file, and not one of [`MODELS`].
+    pub fn is_file(&self) -> bool {
+        Path::new(&self.model).extension().is_some_and(|extension| extension == "toml")
+    }
+
+    /// The arm as a chain from `W` to `T`.
+    ///
+    /// # Errors
+    /// If its model cannot be read, or `home_deg` is not within the model's limits.
+    pub fn chain(&self) -> Result<Chain, ConfigError> {
+        let model = ArmModel::load(&self.model)?;
+        let home = self.home_deg.clone().unwrap_or_else(|| model.home());
+        self.check_home(&model).map_or(Ok(()), |(key, value, allowed)| {
+            let origin = Origin::File { path: (&self.model).into(), line: None };
+            Err(ConfigError::not_allowed(origin, format!("arm.{key}"), value, allowed))
+        })?;
+        Ok(Chain {
+            base: pose(self.base_position_m, self.base_rotation_deg),
+            joints: model.joints(),
+            flange: model.flange(),
+            tool: match self.correction() {
+                Some(correction) => tool(self.mount_m) * correction,
+                None => tool(self.mount_m),
+            },
+            home: model.positions(&home),
+            capsules: model.capsules(),
+            elbow: model.elbow(),
+        })
+    }
+
+    /// Key, value and allowed values of the first number of `home_deg` that is beyond the limits of
+    /// `model`.
+    fn check_home(&self, model: &ArmModel) -> Option<(String, String, String)> {
+        let home = self.home_deg.as_ref()?;
+        let joints = model.joints();
+        if home.len() != joints.len() {
+            let allowed = format!("{} numbers, one for each joint", joints.len());
+            return Some(("home_deg".into(), format!("{home:?}"), allowed));
+        }
+        home.iter().zip(&joints).enumerate().find_map(|(i, (&home, joint))| {
+            let [low, high] = match joint.kind {
+                Kind::Revolute => joint.q_limits.map(f64::to_degrees).map(f64::round),
+                Kind::Prismatic => joint.q_limits,
+            };
+            let allowed = || format!("{low} to {high}");
+            let is_within = (low..=high).contains(&home);
+            (!is_within).then(|| (format!("home_deg[{i}]"), home.to_string(), allowed()))
+        })
+    }
+}
+
+/// Reads `model`; version 0.1 had `links = "C"` or `"A"` in its place.
+fn model<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let model = String::deserialize(deserializer)?;
+    Ok(match model.as_str() {
+        "C" => MODELS[0].0.into(),
+        "A" => MODELS[1].0.into(),
+        _ => model,
+    })
+}
+
+fn is_zero(numbers: &[f64; 3]) -> bool {
+    *numbers == [0.0; 3]
+}
+
+/// Pose of `T` in the flange's frame: distal along the flange's +z, the pad towards its +x.
+pub(super) fn tool(mount_m: f64) -> Isometry3<f64> {
+    Isometry3::from_parts(
+        Translation3::new(0.0, 0.0, mount_m),
+        UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -FRAC_PI_2),
+    )
+}
+
+impl Checked for ArmSettings {
+    fn check(&self, rules: &mut Rules) {
+        rules.numbers("base_position_m", &self.base_position_m, -1e3..=1e3);
+        rules.numbers("base_rotation_deg", &self.base_rotation_deg, -360.0..=360.0);
+        let is_known = MODELS.iter().any(|(name, _)| *name == self.model);
+        rules.require("model", format!("\"{}\"", self.model), is_known || self.is_file(), || {
+            let names: Vec<String> = MODELS.iter().map(|(name, _)| format!("\"{name}\"")).collect();
+            format!("{}, or a file ending in .toml", names.join(", "))
+        });
+        // A file is read when the arm is built: a run's folder is read without it.
+        if let Some(model) = is_known.then(|| ArmModel::load(&self.model).ok()).flatten()
+            && let Some((key, value, allowed)) = self.check_home(&model)
+        {
+            rules.require(&key, value, false, || allowed);
+        }
+        rules.number("mount_m", self.mount_m, 0.01..=0.5);
+        rules.numbers("tool_position_m", &self.tool_position_m, -0.1..=0.1);
+        rules.numbers("tool_rotation_deg", &self.tool_rotation_deg, -45.0..=45.0);
+        rules.number("tool_kg", self.tool_kg, 1e-6..=100.0);
+    }
+}

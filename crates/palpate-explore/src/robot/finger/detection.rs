@@ -1,0 +1,302 @@
+//! From tactile frames to contact: is there one? By how far a frame is from the sensor at rest, of
+//! which each channel's mean and scatter are remembered.
+
+use super::contact_point::OPEN_COUNTS;
+use super::frame::{ELECTRODES, FULL_SCALE_COUNTS, Frame};
+use palpate_input::config::{Checked, Rules, is_default};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What says contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Alarm {
+    /// A rise of the fluid's pressure (PDC).
+    #[default]
+    Pressure,
+    /// Electrodes that change otherwise than all of them do together.
+    Electrodes,
+    /// Either.
+    Both,
+}
+
+impl Alarm {
+    /// Whether a sensor with these channels can say it.
+    pub fn is_heard(self, pressure: bool, electrodes: bool) -> bool {
+        let [by_pressure, by_electrodes] = self.by();
+        by_pressure && pressure || by_electrodes && electrodes
+    }
+
+    fn by(self) -> [bool; 2] {
+        [self != Self::Electrodes, self != Self::Pressure]
+    }
+}
+
+/// When a frame counts as contact.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Detection {
+    /// What says contact; electrodes do by `threshold_sds` only.
+    #[serde(skip_serializing_if = "is_default")]
+    pub by: Alarm,
+    /// Rise of PDC above its tare; without meaning beside `threshold_sds`.
+    pub threshold_counts: f64,
+    /// Change since the tare, in standard deviations of the sensor's own noise as tares show it.
+    /// Left out, `threshold_counts` decides.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threshold_sds: Option<f64>,
+    /// Frames in a row that must agree.
+    pub frames: u32,
+}
+
+impl Default for Detection {
+    /// Threshold: tams_biotac and balakumar-s/biotac_force_net. Frames: chosen, 30 ms; the latter
+    /// waits for 10.
+    fn default() -> Self {
+        Self { by: Alarm::Pressure, threshold_counts: 10.0, threshold_sds: None, frames: 3 }
+    }
+}
+
+impl Checked for Detection {
+    fn check(&self, rules: &mut Rules) {
+        rules.number("threshold_counts", self.threshold_counts, 0.0..=FULL_SCALE_COUNTS);
+        if let Some(threshold_sds) = self.threshold_sds {
+            rules.number("threshold_sds", threshold_sds, 1.0..=100.0);
+        }
+        let is_told = self.by == Alarm::Pressure || self.threshold_sds.is_some();
+        rules.require("threshold_sds", "(none)", is_told, || {
+            "a number, because only standard deviations say when electrodes tell contact".into()
+        });
+        rules.require("frames", self.frames, (1..=1000).contains(&self.frames), || {
+            "1 to 1000".into()
+        });
+    }
+}
+
+/// Says whether there is contact, and changes its mind only when enough frames agree.
+#[derive(Clone, Debug)]
+pub struct Detector {
+    detection: Detection,
+    tare: Option<Frame>,
+    rest: Rest,
+    touching: bool,
+    against: u32,
+}
+
+impl Detector {
+    /// A detector that knows no sensor yet.
+    pub fn new(detection: Detection) -> Self {
+        Self { detection, tare: None, rest: Rest::default(), touching: false, against: 0 }
+    }
+
+    /// Frames at rest that it wants at the next [`tare`](Self::tare), at least.
+    pub fn wants(&self) -> usize {
+        self.detection.threshold_sds.map_or(0, |_| self.rest.wants())
+    }
+
+    /// What untouched frames read is the rest, and nothing is touched. How much they scatter is
+    /// remembered from one tare to the next.
+    pub fn tare(&mut self, frames: &[Frame]) {
+        self.tare = Some(Frame::mean(frames));
+        if self.detection.threshold_sds.is_some() {
+            self.rest.tare(frames);
+        }
+        (self.touching, self.against) = (false, 0);
+    }
+
+    /// Whether `frame` can say anything about contact.
+    pub fn hears(&self, frame: &Frame) -> bool {
+        let Some(tare) = &self.tare else { return false };
+        let pressure = tare.pdc_counts.is_some() && frame.pdc_counts.is_some();
+        let electrodes = tare.electrode_counts.is_some() && frame.electrode_counts.is_some();
+        self.detection.by.is_heard(pressure, electrodes)
+    }
+
+    /// Whether the skin is touched, after another frame. One that says nothing changes nothing.
+    ///
+    /// Where n frames must agree on a threshold of T standard deviations, noise alarms Q(T)ⁿ times
+    /// a frame by the electrodes. By the pressure it does so ∫ φ(u) Q(T √(1 + v) + u √v)ⁿ du times:
+    /// all frames share the error u of a tare of 1/v frames.
+    pub fn update(&mut self, frame: &Frame) -> bool {
+        let Some(says) = self.says(frame) else { return self.touching };
+        self.against = if says == self.touching { 0 } else { self.against + 1 };
+        if self.against >= self.detection.frames {
+            (self.touching, self.against) = (says, 0);
+        }
+        self.touching
+    }
+
+    /// Whether this frame alone says contact.
+    fn says(&self, frame: &Frame) -> Option<bool> {
+        if !self.hears(frame) {
+            return None;
+        }
+        let Some(threshold_sds) = self.detection.threshold_sds else {
+            let rest = self.tare.as_ref()?.pdc_counts?;
+            return Some(frame.pdc_counts? - rest > self.detection.threshold_counts);
+        };
+        let [pressure, electrodes] = self.rest.evidence(frame);
+        let [by_pressure, by_electrodes] = self.detection.by.by();
+        let exceeds = |evidence: Option<f64>| evidence.is_some_and(|sds| sds > threshold_sds);
+        Some(by_pressure && exceeds(pressure) || by_electrodes && exceeds(electrodes))
+    }
+}
+
+/// Frames at rest over which the scatter of a channel is remembered, from one tare to the next;
+/// chosen: one second, so that a channel that grows noisy is known to within twenty touches.
+const MEMORY: f64 = 100.0;
+
+/// Frames that tell how much a channel scatters; chosen: from here on the rate of false alarms is
+/// that of many (`tests/suite/detection.rs`).
+const LEARNT: usize = 20;
+
+/// Least standard deviation of an electrode: rounding, and no recorded one has less than 1.5
+/// (MiaoLi/syntouchcontact).
+const LEAST_COUNTS: f64 = 1.0;
+
+/// The same of PDC: recorded ones have up to half a count (RuihanGao/BioTacSP_setup).
+const LEAST_PDC_COUNTS: f64 = 0.5;
+
+/// Mean of every channel over the frames of the last tare, and its variance over those of the last
+/// ones.
+///
+/// Electrodes drift together, as the fluid conducts better or worse: dE = E (1 − E/4095) d ln G. So
+/// each is taken in its difference to the median change of ln G over all that are not open. Two
+/// real sensors that nobody touches drift by 24 and 54 counts (standard deviations of means over
+/// 20 s) and by 2 about that law, 3 and 7 about an equal change of counts; they scatter about it as
+/// much over 20 s as over 20 ms (MiaoLi/syntouchcontact). A PDC at rest stays within a count for
+/// 20 s (I-Quotient-Robotics/syntouch_btd_decode). So between two tares nothing else is followed,
+/// and no contact is too slow.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rest {
+    electrodes: Option<[Channel; ELECTRODES]>,
+    pdc: Option<Channel>,
+    /// Frames that the means are of.
+    mean_of: f64,
+    /// Frames less one for each tare that the variances are of.
+    variance_of: f64,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Channel {
+    mean: f64,
+    variance: f64,
+}
+
+impl Rest {
+    /// Frames that the next tare should have so that evidence is what it says.
+    pub fn wants(&self) -> usize {
+        LEARNT.saturating_sub(self.variance_of as usize)
+    }
+
+    /// Takes in untouched frames: the means are theirs, the variances become so by and by.
+    pub fn tare(&mut self, frames: &[Frame]) {
+        self.mean_of = 0.0;
+        frames.iter().for_each(|frame| self.learn(frame));
+    }
+
+    fn learn(&mut self, frame: &Frame) {
+        let has = [frame.electrode_counts.is_some(), frame.pdc_counts.is_some()];
+        // A channel that comes or goes begins anew.
+        if [self.electrodes.is_some(), self.pdc.is_some()] != has {
+            *self = Self::default();
+        }
+        let first = self.mean_of == 0.0;
+        let to_mean = 1.0 / (self.mean_of + 1.0);
+        let to_variance = 1.0 / (self.variance_of + 1.0).min(MEMORY);
+        let alone = self.alone();
+        let learn = |channel: &mut Channel, off: f64, moved: f64| {
+            if !first {
+                channel.variance += to_variance * (off * off / alone - channel.variance);
+            }
+            channel.mean += to_mean * moved;
+        };
+        if let Some(now) = frame.electrode_counts {
+            let channels = self.electrodes.get_or_insert_default();
+            let moved: [f64; ELECTRODES] = std::array::from_fn(|i| now[i] - channels[i].mean);
+            let common = common_change(channels, &moved);
+            for (channel, moved) in channels.iter_mut().zip(moved) {
+                learn(channel, moved - common * channel.sensitivity_counts(), moved);
+            }
+        }
+        if let Some(now) = frame.pdc_counts {
+            let channel = self.pdc.get_or_insert_default();
+            let moved = now - channel.mean;
+            learn(channel, moved, moved);
+        }
+        self.mean_of += 1.0;
+        self.variance_of += f64::from(u8::from(!first));
+    }
+
+    /// The rise of the pressure above rest, and the change of all electrodes together in whichever
+    /// way, in standard deviations of the normal distribution; none for a channel that
+    /// either lacks.
+    ///
+    /// A channel's difference over its standard deviation, t, is Student's with as many degrees of
+    /// freedom as frames tell of the latter, and is taken to the normal z of the same probability
+    /// by z² = ν ln(1 + t²/ν) ((8ν + 1)/(8ν + 3))² (Wallace 1959). The mean of z² over n electrodes
+    /// is χ²/ν' with ν' = n − 1, as the median change is taken out, and goes to a normal number by
+    /// its cube root (Wilson and Hilferty 1931).
+    pub fn evidence(&self, frame: &Frame) -> [Option<f64>; 2] {
+        if self.mean_of == 0.0 || self.variance_of == 0.0 {
+            return [None; 2];
+        }
+        let alone = self.alone();
+        let freedom = self.variance_of.min(2.0 * MEMORY - 1.0);
+        let squared = |channel: &Channel, off: f64, least: f64| {
+            let variance = channel.variance.max(least * least);
+            let squared = freedom * (off * off / (alone * variance * freedom)).ln_1p();
+            squared * ((8.0 * freedom + 1.0) / (8.0 * freedom + 3.0)).powi(2)
+        };
+        let pressure = self.pdc.zip(frame.pdc_counts).map(|(channel, now)| {
+            let rise = now - channel.mean;
+            squared(&channel, rise, LEAST_PDC_COUNTS).sqrt().copysign(rise)
+        });
+        let electrodes = self.electrodes.zip(frame.electrode_counts).and_then(|(channels, now)| {
+            let moved = std::array::from_fn(|i| now[i] - channels[i].mean);
+            let common = common_change(&channels, &moved);
+            let (mut sum, mut count) = (0.0, 0.0);
+            for (channel, moved) in channels.iter().zip(moved).filter(|(one, _)| one.is_sound()) {
+                let own = moved - common * channel.sensitivity_counts();
+                sum += squared(channel, own, LEAST_COUNTS);
+                count += 1.0;
+            }
+            let ninth = 2.0 / (9.0 * (count - 1.0));
+            (count > 1.0).then(|| ((sum / count).cbrt() - (1.0 - ninth)) / ninth.sqrt())
+        });
+        [pressure, electrodes]
+    }
+
+    /// Variance of one more frame about the mean, in that of one frame about the truth.
+    fn alone(&self) -> f64 {
+        1.0 + 1.0 / self.mean_of
+    }
+}
+
+impl Channel {
+    /// Whether it is no electrode that is open or at the end of its range.
+    fn is_sound(&self) -> bool {
+        (OPEN_COUNTS..FULL_SCALE_COUNTS - 1.0).contains(&self.mean)
+    }
+
+    /// Change of an electrode's counts for a change of ln G, of the voltage divider.
+    fn sensitivity_counts(&self) -> f64 {
+        self.mean * (1.0 - self.mean / FULL_SCALE_COUNTS)
+    }
+}
+
+/// By how much ln G changed at the electrodes that are not open, in the middle.
+fn common_change(channels: &[Channel; ELECTRODES], moved: &[f64; ELECTRODES]) -> f64 {
+    let mut sorted = [0.0; ELECTRODES];
+    let mut count = 0;
+    for (channel, moved) in channels.iter().zip(moved).filter(|(one, _)| one.is_sound()) {
+        sorted[count] = moved / channel.sensitivity_counts();
+        count += 1;
+    }
+    let sorted = &mut sorted[..count];
+    sorted.sort_unstable_by(f64::total_cmp);
+    match count {
+        0 => 0.0,
+        _ => 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]),
+    }
+}

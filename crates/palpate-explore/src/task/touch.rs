@@ -1,0 +1,105 @@
+//! How a touch is carried out by a body that moves: travel, approach, contact, settle, read,
+//! retract.
+
+use crate::robot::finger::Detection;
+use crate::robot::finger::contact_point::ContactEstimate;
+use crate::robot::finger::frame::FRAME_S;
+use palpate_input::config::{Checked, Rules};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Table `[touch]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TouchSettings {
+    /// Duration of one control tick; left out, that of the body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period_s: Option<f64>,
+    /// Speed of travel in front of the object, and of the way back.
+    pub travel_m_s: f64,
+    /// Speed of the approach.
+    pub approach_m_s: f64,
+    /// Distance kept between the finger's hull and the object's foremost point while travelling.
+    pub standoff_m: f64,
+    /// When pressure or electrodes say contact.
+    pub detection: Detection,
+    /// Force that says contact where no pressure is sensed, or what else `detection.by` names.
+    pub detection_n: f64,
+    /// How far beyond the place where contact was told a soft finger is held and read; a rigid one
+    /// stays there.
+    pub press_m: f64,
+    /// Time the finger rests on the object before it is read.
+    pub settle_s: f64,
+    /// Tactile frames averaged, at rest before the approach and on the object; before the first
+    /// one at least 20 with `detection.threshold_sds`, which learns from them.
+    pub frames: usize,
+    /// Force at which the finger retreats without reading.
+    pub force_limit_n: f64,
+    /// Rise of the pressure (PDC) at which it does.
+    pub pressure_limit_counts: f64,
+    /// Which point counts as the contact.
+    pub point: ContactEstimate,
+}
+
+impl Default for TouchSettings {
+    /// Chosen, but for the detection: an approach slow enough that
+    /// the skin is pressed by less than a millimetre before the pressure has spoken.
+    fn default() -> Self {
+        Self {
+            period_s: None,
+            travel_m_s: 0.1,
+            approach_m_s: 0.02,
+            standoff_m: 0.01,
+            detection: Detection::default(),
+            detection_n: 0.05,
+            press_m: 0.0,
+            settle_s: 0.05,
+            frames: 5,
+            force_limit_n: 15.0,
+            pressure_limit_counts: 1500.0,
+            point: ContactEstimate::Skin,
+        }
+    }
+}
+
+/// Fastest that a body takes speed away; the stage's largest acceleration.
+const BRAKE_M_S2: f64 = 1.0;
+
+impl TouchSettings {
+    /// Approach at which the finger comes to rest within `depth_m` of the first contact, when
+    /// contact is told by force, or by frames that arrive in batches of `batch`, with control ticks
+    /// of `period_s`.
+    ///
+    /// Contact begins just after a frame; then as many frames as must agree, the rest of their
+    /// batch, and the tick that brings them go by: v t + v² / 2a = depth.
+    pub fn approach_limit_m_s(&self, period_s: f64, batch: Option<usize>, depth_m: f64) -> f64 {
+        let wait_s = match batch {
+            Some(batch) => {
+                let frames = self.detection.frames as usize + batch.max(1) - 1;
+                frames as f64 * FRAME_S.max(period_s) + period_s
+            }
+            None => 2.0 * period_s,
+        };
+        let lost_m_s = BRAKE_M_S2 * wait_s;
+        (lost_m_s * lost_m_s + 2.0 * BRAKE_M_S2 * depth_m).sqrt() - lost_m_s
+    }
+}
+
+impl Checked for TouchSettings {
+    fn check(&self, rules: &mut Rules) {
+        if let Some(period_s) = self.period_s {
+            rules.number("period_s", period_s, 1e-4..=0.1);
+        }
+        rules.number("travel_m_s", self.travel_m_s, 1e-4..=1.0);
+        rules.number("approach_m_s", self.approach_m_s, 1e-4..=1.0);
+        rules.number("standoff_m", self.standoff_m, 1e-4..=1.0);
+        rules.table("detection", &self.detection);
+        rules.number("detection_n", self.detection_n, 1e-3..=100.0);
+        rules.number("press_m", self.press_m, 0.0..=2e-3);
+        rules.number("settle_s", self.settle_s, 0.0..=10.0);
+        rules
+            .require("frames", self.frames, (1..=100).contains(&self.frames), || "1 to 100".into());
+        rules.number("force_limit_n", self.force_limit_n, 0.01..=1e4);
+        rules.number("pressure_limit_counts", self.pressure_limit_counts, 1.0..=4095.0);
+    }
+}

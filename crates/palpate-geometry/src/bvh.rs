@@ -1,0 +1,479 @@
+//! Where a ray, a point or a moving capsule meets a mesh.
+
+use std::cell::Cell;
+use std::sync::Arc;
+use std::time::Duration;
+
+use nalgebra::{Point3, UnitVector3, Vector3};
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::{Bvh2, builder::build_bvh2};
+use obvhs::faststack::FastStack;
+use obvhs::{BvhBuildParams, fast_stack};
+
+use super::bounds::{Box3, SingleBall, SingleSlab, Slab, Tube, Wall};
+use super::mesh::Mesh;
+use super::primitives::{Line, nearest_on_triangle, normal};
+use super::sweep::{Capsule, Sweep};
+
+/// Boxes grow by this part of the mesh's diagonal: more than rounding to f32, and the rounding of
+/// a query kilometres away, can take off them.
+const PADDING: f64 = 1e-6;
+
+/// Below this distance, in metres, the direction between two points says nothing.
+const NO_DIRECTION_M: f64 = 1e-12;
+
+/// A triangle mesh with a bounding volume hierarchy over it.
+///
+/// Boxes are f32, relative to the centre of the mesh and padded, and only decide which triangles
+/// to ask; every triangle is asked in f64. Queries do not allocate.
+#[derive(Clone)]
+pub struct MeshBvh {
+    mesh: Arc<Mesh>,
+    centre: Vector3<f64>,
+    bvh: Bvh2,
+    /// Nodes that wait on the stack at most.
+    stack_size: usize,
+}
+
+/// Where a ray meets the mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// Distance from the origin of the ray, in metres.
+    pub distance_m: f64,
+    /// The triangle.
+    pub triangle: u32,
+    /// The point, in metres.
+    pub point: Point3<f64>,
+    /// Unit normal of the triangle, towards the side its corners run counter-clockwise on.
+    pub normal: Vector3<f64>,
+}
+
+/// The point of the mesh nearest to another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClosestHit {
+    /// Distance to it, in metres.
+    pub distance_m: f64,
+    /// The point, in metres.
+    pub point: Point3<f64>,
+    /// A triangle it lies on.
+    pub triangle: u32,
+}
+
+/// Where a moving capsule first touches the mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SweepHit {
+    /// Travel of the capsule until it touches, in metres; 0 if it overlaps from the start.
+    pub travel_m: f64,
+    /// The point of the mesh that is touched, in metres. Where a line or an area is touched at
+    /// once, one point of it.
+    pub point: Point3<f64>,
+    /// Unit vector from `point` to the axis of the capsule. If the axis itself touches: the
+    /// triangle's normal, on the side the capsule comes from.
+    pub normal: Vector3<f64>,
+    /// A triangle that is touched.
+    pub triangle: u32,
+}
+
+impl MeshBvh {
+    /// Builds the hierarchy.
+    pub fn new(mesh: impl Into<Arc<Mesh>>) -> Self {
+        let mesh = mesh.into();
+        let (low, high) = mesh.bounds();
+        let centre = (low.coords + high.coords) / 2.0;
+        let padding = PADDING * (high - low).norm();
+        let boxes: Vec<Aabb> = mesh
+            .iter_corners()
+            .map(|corners| {
+                let [a, b, c] = corners.map(|corner| corner.coords - centre);
+                let low = a.inf(&b).inf(&c).add_scalar(-padding);
+                let high = a.sup(&b).sup(&c).add_scalar(padding);
+                let f32s = |corner: Vector3<f64>| <[f32; 3]>::from(corner.map(|x| x as f32));
+                Aabb::new(f32s(low).into(), f32s(high).into())
+            })
+            .collect();
+        let params = BvhBuildParams { max_prims_per_leaf: 4, ..BvhBuildParams::medium_build() };
+        let bvh = build_bvh2(&boxes, params, &mut Duration::default());
+        let stack_size = depth(&bvh) + MOST;
+        Self { mesh, centre, bvh, stack_size }
+    }
+
+    /// The mesh asked about.
+    pub fn mesh(&self) -> &Arc<Mesh> {
+        &self.mesh
+    }
+
+    /// First point where the ray o + s d, 0 ≤ s ≤ `max_distance_m`, meets the mesh, from either
+    /// side. A ray through an edge or a vertex does not slip between triangles.
+    pub fn ray(
+        &self,
+        origin: &Point3<f64>,
+        direction: &UnitVector3<f64>,
+        max_distance_m: f64,
+    ) -> Option<RayHit> {
+        self.ray_near(&Nearby::WHOLE, origin, direction, max_distance_m)
+    }
+
+    /// The same of a ray that stays in the ball of `near`.
+    pub fn ray_near(
+        &self,
+        near: &Nearby,
+        origin: &Point3<f64>,
+        direction: &UnitVector3<f64>,
+        max_distance_m: f64,
+    ) -> Option<RayHit> {
+        let slab = SingleSlab::new(&(origin - self.centre), direction);
+        let line = Line::along(direction);
+        let mut hit = None;
+        self.visit(
+            near,
+            max_distance_m.next_up(),
+            |node| slab.enter_m(node),
+            |triangle, limit_m| {
+                let distance_m = line.distance_m(origin, &self.corners(triangle));
+                match distance_m.filter(|distance_m| (0.0..limit_m).contains(distance_m)) {
+                    Some(distance_m) => {
+                        hit = Some((distance_m, triangle));
+                        distance_m
+                    }
+                    None => limit_m,
+                }
+            },
+        );
+        hit.map(|(distance_m, triangle)| RayHit {
+            distance_m,
+            triangle,
+            point: origin + direction.scale(distance_m),
+            normal: normal(&self.corners(triangle)),
+        })
+    }
+
+    /// The point of the mesh nearest to `p`.
+    pub fn closest_point(&self, p: &Point3<f64>) -> ClosestHit {
+        let from = p - self.centre;
+        let reach = |triangle| {
+            let point = nearest_on_triangle(p, &self.corners(triangle));
+            ((point - p).norm_squared(), point)
+        };
+        let mut best = (reach(0), 0);
+        self.visit(
+            &Nearby::WHOLE,
+            best.0.0,
+            |node| Box3::of(node).distance_squared(&from, &from),
+            |triangle, limit| {
+                let here = reach(triangle);
+                if here.0 < limit {
+                    best = (here, triangle);
+                }
+                limit.min(here.0)
+            },
+        );
+        let ((squared, point), triangle) = best;
+        ClosestHit { distance_m: squared.sqrt(), point, triangle }
+    }
+
+    /// Whether the mesh comes within `radius_m` of `centre`.
+    pub fn touches(&self, centre: &Point3<f64>, radius_m: f64) -> bool {
+        self.touches_near(&Nearby::WHOLE, centre, radius_m)
+    }
+
+    /// What of the mesh lies within `radius_m` of `centre`, for queries that stay there.
+    pub fn nearby(&self, centre: &Point3<f64>, radius_m: f64) -> Nearby {
+        Nearby::new(&self.bvh, &(centre - self.centre), radius_m)
+    }
+
+    /// Whether what is `near` comes within `radius_m` of `centre`.
+    pub fn touches_near(&self, near: &Nearby, centre: &Point3<f64>, radius_m: f64) -> bool {
+        let ball = SingleBall::new(&(centre - self.centre));
+        let mut touched = false;
+        let reach = (radius_m * radius_m).next_up();
+        self.visit(
+            near,
+            reach,
+            |node| ball.distance_squared(node),
+            |triangle, limit| {
+                let point = nearest_on_triangle(centre, &self.corners(triangle));
+                touched |= (point - centre).norm_squared() < limit;
+                // One is enough: nothing lies under the new limit.
+                if touched { f64::NEG_INFINITY } else { limit }
+            },
+        );
+        touched
+    }
+
+    /// Whether the mesh reaches into `capsule`.
+    pub fn enters(&self, capsule: &Capsule) -> bool {
+        self.overlap(capsule).is_some()
+    }
+
+    /// Whether `p` sees only back faces along the six axes: it is inside a closed mesh, or deep
+    /// in one with few holes.
+    pub fn surrounds(&self, p: &Point3<f64>) -> bool {
+        let from = p - self.centre;
+        if Box3::of(self.bvh.nodes[0].aabb()).distance_squared(&from, &from) > 0.0 {
+            return false;
+        }
+        [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()]
+            .into_iter()
+            .flat_map(|axis| [axis, -axis])
+            .all(|axis| self.ray(p, &axis, f64::MAX).is_some_and(|hit| hit.normal.dot(&axis) > 0.0))
+    }
+
+    /// First contact of a capsule that travels along `direction` by at most `max_travel_m`: the
+    /// least travel at which the distance from axis to mesh is no more than the radius. If that
+    /// is so from the start, the contact is the point of the mesh nearest to the axis.
+    pub fn sweep(
+        &self,
+        capsule: &Capsule,
+        direction: &UnitVector3<f64>,
+        max_travel_m: f64,
+    ) -> Option<SweepHit> {
+        if let Some(triangle) = self.overlap(capsule) {
+            return Some(self.contact(capsule, direction, 0.0, triangle));
+        }
+        let slab = Slab::new(&(capsule.p0_w - self.centre), direction);
+        let body = Box3::swept(capsule);
+        let sweep = Sweep::new(capsule, *direction);
+        let wall = Cell::new(Wall::default());
+        let tube = Tube::new(capsule, &self.centre, direction);
+        let lower = |node: &Box3| {
+            wall.get().travel_m(node).max(slab.enter_m(&node.grown(&body))).max(tube.enter_m(node))
+        };
+        let mut hit = None;
+        self.visit(
+            &Nearby::WHOLE,
+            max_travel_m.next_up(),
+            |node| lower(&Box3::of(node)),
+            |triangle, limit_m| {
+                let corners = self.corners(triangle);
+                let reach_m = wall.get().travel_to_m(&corners.map(|corner| corner - self.centre));
+                if reach_m >= limit_m || lower(&Box3::around(&corners, &self.centre)) >= limit_m {
+                    return limit_m;
+                }
+                match sweep.travel_m(&corners).filter(|&travel_m| travel_m < limit_m) {
+                    Some(travel_m) => {
+                        let contact = self.contact(capsule, direction, travel_m, triangle);
+                        wall.set(Wall::new(capsule, &self.centre, direction, &contact.normal));
+                        hit = Some(contact);
+                        travel_m
+                    }
+                    None => limit_m,
+                }
+            },
+        );
+        hit
+    }
+
+    /// The triangle nearest to the axis, if it is no farther than the radius.
+    fn overlap(&self, capsule: &Capsule) -> Option<u32> {
+        let ends = (capsule.p0_w - self.centre, capsule.p1_w - self.centre);
+        let (low, high) = (ends.0.coords.inf(&ends.1.coords), ends.0.coords.sup(&ends.1.coords));
+        let lower = |node: &Box3| node.distance_squared(&low.into(), &high.into());
+        let mut nearest = None;
+        let reach = (capsule.radius_m * capsule.radius_m).next_up();
+        self.visit(
+            &Nearby::WHOLE,
+            reach,
+            |node| lower(&Box3::of(node)),
+            |triangle, limit| {
+                let corners = self.corners(triangle);
+                if lower(&Box3::around(&corners, &self.centre)) >= limit {
+                    return limit;
+                }
+                let (on_axis, on_mesh) = capsule.nearest(&corners);
+                let squared = (on_axis - on_mesh).norm_squared();
+                if squared < limit {
+                    nearest = Some(triangle);
+                }
+                limit.min(squared)
+            },
+        );
+        nearest
+    }
+
+    fn contact(
+        &self,
+        capsule: &Capsule,
+        direction: &UnitVector3<f64>,
+        travel_m: f64,
+        triangle: u32,
+    ) -> SweepHit {
+        let corners = self.corners(triangle);
+        let (on_axis, point) = capsule.translated(&direction.scale(travel_m)).nearest(&corners);
+        let normal = UnitVector3::try_new(on_axis - point, NO_DIRECTION_M).map_or_else(
+            || {
+                let normal = normal(&corners);
+                normal * -normal.dot(direction).signum()
+            },
+            UnitVector3::into_inner,
+        );
+        SweepHit { travel_m, point, normal, triangle }
+    }
+
+    /// `p` from the middle of the boxes.
+    pub(super) fn local(&self, p: &Point3<f64>) -> Point3<f64> {
+        p - self.centre
+    }
+
+    #[inline]
+    fn corners(&self, triangle: u32) -> [Point3<f64>; 3] {
+        self.mesh.corners(triangle as usize)
+    }
+
+    /// Shows `ask` the triangles of some parts whose boxes have a lower bound under the limit, in
+    /// each part near ones first. `ask` returns the new limit.
+    #[inline]
+    pub(super) fn visit(
+        &self,
+        parts: &Nearby,
+        mut limit: f64,
+        lower: impl Fn(&Aabb) -> f64,
+        mut ask: impl FnMut(u32, f64) -> f64,
+    ) {
+        let nodes = &self.bvh.nodes;
+        fast_stack!((f64, u32), (32, 128), self.stack_size, stack, {
+            for &part in parts.nodes() {
+                stack.push((lower(nodes[part as usize].aabb()), part));
+            }
+            'waiting: while let Some((bound, index)) = stack.pop() {
+                if bound.is_nan() || bound >= limit {
+                    continue;
+                }
+                let mut node = &nodes[index as usize];
+                while !node.is_leaf() {
+                    let first = node.first_index;
+                    let bound = |index: u32| (lower(nodes[index as usize].aabb()), index);
+                    let (left, right) = (bound(first), bound(first + 1));
+                    let (near, far) = if left.0 <= right.0 { (left, right) } else { (right, left) };
+                    if far.0 < limit {
+                        stack.push(far);
+                    }
+                    if near.0.is_nan() || near.0 >= limit {
+                        continue 'waiting;
+                    }
+                    node = &nodes[near.1 as usize];
+                }
+                let first = node.first_index as usize;
+                for &triangle in &self.bvh.primitive_indices[first..][..node.prim_count as usize] {
+                    limit = ask(triangle, limit);
+                }
+            }
+        });
+    }
+}
+
+/// Levels of the tree below its root.
+fn depth(bvh: &Bvh2) -> usize {
+    let mut deepest = 0;
+    let mut waiting = vec![(0, 0)];
+    while let Some((index, level)) = waiting.pop() {
+        deepest = deepest.max(level);
+        let node = &bvh.nodes[index as usize];
+        if !node.is_leaf() {
+            waiting.extend([(node.first_index, level + 1), (node.first_index + 1, level + 1)]);
+        }
+    }
+    deepest
+}
+
+/// Parts kept at most; chosen: more are asked one by one in vain.
+const MOST: usize = 8;
+
+/// Parts of a mesh that hold every triangle within some ball, and perhaps others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Nearby {
+    nodes: [u32; MOST],
+    count: usize,
+}
+
+impl Nearby {
+    /// The whole mesh.
+    pub(super) const WHOLE: Self = Self { nodes: [0; MOST], count: 1 };
+
+    const NOTHING: Self = Self { nodes: [0; MOST], count: 0 };
+
+    /// Within `radius_m` of `centre`, which is relative to that of the boxes: one level of the
+    /// hierarchy after the other, as deep as there is room for all of a level that the ball meets.
+    fn new(bvh: &Bvh2, centre: &Point3<f64>, radius_m: f64) -> Self {
+        let ball = SingleBall::new(centre);
+        let reach = (radius_m * radius_m).next_up();
+        let is_met =
+            |&index: &u32| ball.distance_squared(bvh.nodes[index as usize].aabb()) <= reach;
+        let mut found = Self::WHOLE;
+        loop {
+            let mut below = Self::NOTHING;
+            for &index in found.nodes() {
+                let node = &bvh.nodes[index as usize];
+                let parts = match node.is_leaf() {
+                    true => index..index + 1,
+                    false => node.first_index..node.first_index + 2,
+                };
+                if !parts.filter(is_met).all(|part| below.has_taken(part)) {
+                    return found;
+                }
+            }
+            if below == found {
+                return found;
+            }
+            found = below;
+        }
+    }
+
+    /// The nodes at the parts' roots.
+    fn nodes(&self) -> &[u32] {
+        &self.nodes[..self.count]
+    }
+
+    /// Whether there was room for one more.
+    fn has_taken(&mut self, node: u32) -> bool {
+        let room = self.nodes.get_mut(self.count);
+        self.count += usize::from(room.is_some());
+        room.map(|room| *room = node).is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Mesh;
+    use proptest::prelude::*;
+
+    /// A wavy sheet, 1 m by 1 m.
+    fn sheet() -> MeshBvh {
+        const SIDE: u32 = 30;
+        let vertex = |i: u32| {
+            let (u, v) = (f64::from(i % SIDE) / 29.0, f64::from(i / SIDE) / 29.0);
+            Point3::new(u, v, 0.1 * (9.0 * u).sin() * (7.0 * v).cos())
+        };
+        let vertices: Vec<Point3<f64>> = (0..SIDE * SIDE).map(vertex).collect();
+        let cells = (0..SIDE - 1).flat_map(|row| (0..SIDE - 1).map(move |i| row * SIDE + i));
+        let halves = cells.flat_map(|i| [[i, i + 1, i + SIDE], [i + 1, i + SIDE + 1, i + SIDE]]);
+        MeshBvh::new(Mesh::new(&vertices, &halves.collect::<Vec<_>>()).unwrap().0)
+    }
+
+    proptest! {
+        /// Queries that begin at the root are the slow twins.
+        #[test]
+        fn in_the_ball_nothing_is_missed(
+            centre in prop::array::uniform3(-0.2..1.2f64),
+            radius_m in 0.0..0.5f64,
+            from in prop::array::uniform3(-0.5..0.5f64),
+            towards in prop::array::uniform3(-1.0..1.0f64),
+            part in 0.0..1.0f64,
+        ) {
+            let bvh = sheet();
+            let centre = Point3::from(centre);
+            let near = bvh.nearby(&centre, radius_m);
+            let start = centre + Vector3::from(from) * radius_m;
+            let Some(direction) = UnitVector3::try_new(Vector3::from(towards), 1e-3) else {
+                return Ok(());
+            };
+            let max_m = (radius_m - (start - centre).norm()).max(0.0);
+            let distance_m = |near: &Nearby| {
+                bvh.ray_near(near, &start, &direction, max_m).map(|hit| hit.distance_m)
+            };
+            prop_assert_eq!(distance_m(&near), distance_m(&Nearby::WHOLE));
+            let touches = |near: &Nearby| bvh.touches_near(near, &start, part * max_m);
+            prop_assert_eq!(touches(&near), touches(&Nearby::WHOLE));
+        }
+    }
+}

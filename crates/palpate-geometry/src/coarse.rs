@@ -1,0 +1,102 @@
+//! A mesh of fewer triangles, to be looked at.
+
+use super::mesh::Mesh;
+use super::solids::{Triangles, normals};
+use nalgebra::{Point3, Vector3};
+use std::collections::HashMap;
+
+/// From one size of cells to the next that is tried; chosen.
+const FINER: f64 = 0.9;
+
+/// The mesh with at most `most` triangles, or as it is if it has no more: the vertices of a cubic
+/// cell become their mean, and triangles without three corners vanish (Rossignac and Borrel,
+/// *Multi-resolution 3D approximations for rendering complex scenes*, 1993). Cells are as small as
+/// that allows; where a surface of area A is folded so that even cells of √(12 A / `most`) have
+/// more triangles, it has more.
+///
+/// No vertex moves by more than a cell's diagonal, 6 √(A / `most`). The two sides of a thin wall
+/// stay apart: a vertex that looks the other way than the first of its cell is of another. What was
+/// closed stays closed; nothing keeps triangles from meeting.
+pub fn coarse(mesh: &Mesh, most: usize) -> Triangles {
+    let (vertices, triangles) = (mesh.vertices(), mesh.triangles());
+    if triangles.len() <= most {
+        return (vertices.to_vec(), triangles.to_vec());
+    }
+    let normals = normals(vertices, triangles);
+    // A surface meets one to two cells for each square of their side that it has, and has two
+    // triangles for each: this begins with too few.
+    let mut cell_m = (12.0 * mesh.area_m2() / most.max(1) as f64).sqrt();
+    let mut found = clustered(mesh, &normals, cell_m);
+    loop {
+        cell_m *= FINER;
+        let finer = clustered(mesh, &normals, cell_m);
+        if finer.1.len() > most {
+            return found;
+        }
+        found = finer;
+    }
+}
+
+fn clustered(mesh: &Mesh, normals: &[Vector3<f64>], cell_m: f64) -> Triangles {
+    let (vertices, triangles) = (mesh.vertices(), mesh.triangles());
+    let (low, _) = mesh.bounds();
+    let mut sides = HashMap::new();
+    let mut numbers = HashMap::new();
+    let mut sums = Vec::new();
+    let clusters: Vec<u32> = (vertices.iter())
+        .zip(normals)
+        .map(|(vertex, normal)| {
+            let cell = (vertex - low).map(|x_m| (x_m / cell_m) as i64);
+            let is_other = sides.entry(cell).or_insert(normal).dot(normal) < 0.0;
+            let number = *numbers.entry((cell, is_other)).or_insert(sums.len());
+            if number == sums.len() {
+                sums.push((vertex.coords * 0.0, 0.0));
+            }
+            sums[number].0 += vertex.coords;
+            sums[number].1 += 1.0;
+            number as u32
+        })
+        .collect();
+    let means = sums.iter().map(|(sum, count)| Point3::from(sum / *count)).collect();
+    let joined = triangles.iter().map(|corners| corners.map(|vertex| clusters[vertex as usize]));
+    (means, joined.filter(|[a, b, c]| a != b && b != c && c != a).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::coarse;
+    use crate::bvh::MeshBvh;
+    use crate::mesh::Mesh;
+    use crate::solids::{ball, block};
+    use nalgebra::Point3;
+
+    /// A wall of 2 mm with cells of 9 mm keeps its two sides.
+    #[test]
+    fn a_coarse_mesh_is_near_the_fine_one_and_as_closed() {
+        let (points, triangles) = ball(Point3::origin(), 0.05, 100);
+        let wall = points.iter().map(|p| Point3::new(p.x, 0.02 * p.y, p.z)).collect();
+        for (points, factor) in [(points, 0.97), (wall, 0.9)] {
+            let (fine, _) = Mesh::new(&points, &triangles).unwrap();
+            let (vertices, triangles) = coarse(&fine, 1000);
+            assert!((700..=1000).contains(&triangles.len()), "{}", triangles.len());
+            let limit_m = 6.0 * (fine.area_m2() / 1000.0).sqrt();
+            let (coarse, report) = Mesh::new(&vertices, &triangles).unwrap();
+            assert!(report.is_closed(), "{report}");
+            let [volumes, areas] =
+                [[&coarse, &fine].map(Mesh::volume_m3), [&coarse, &fine].map(Mesh::area_m2)];
+            assert!(volumes[0] / volumes[1] > factor - 0.05, "{volumes:?}");
+            assert!((factor - 0.05..1.01).contains(&(areas[0] / areas[1])), "{areas:?}");
+            let fine = MeshBvh::new(fine);
+            for vertex in &vertices {
+                assert!((fine.closest_point(vertex).point - vertex).norm() < limit_m);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_coarse_stays_as_it_is() {
+        let (points, triangles) = block([0.0; 3], [0.1; 3]);
+        let (mesh, _) = Mesh::new(&points, &triangles).unwrap();
+        assert_eq!(coarse(&mesh, 12), (mesh.vertices().to_vec(), mesh.triangles().to_vec()));
+    }
+}

@@ -1,0 +1,262 @@
+//! The bytes behind a glTF document: buffers, buffer views, accessors.
+//!
+//! Every offset, stride and count is checked against the bytes that are really there before
+//! anything is read or allocated.
+
+use std::io;
+use std::path::{Path, PathBuf, absolute};
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use gltf::json::accessor::{Accessor, ComponentType, Type};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Root};
+
+use super::source::{BYTES_MAX, Source};
+use palpate_input::error::Invalid;
+use palpate_input::files;
+
+/// A glTF document and the bytes of its buffers.
+pub(super) struct Document {
+    pub root: Root,
+    buffers: Vec<Vec<u8>>,
+}
+
+/// Elements of an accessor as they lie in memory.
+struct Elements<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    size: usize,
+    count: usize,
+}
+
+impl<'a> Elements<'a> {
+    fn iter(&self) -> impl Iterator<Item = &'a [u8]> {
+        let (bytes, stride, size) = (self.bytes, self.stride, self.size);
+        (0..self.count).filter_map(move |element| bytes.get(element * stride..)?.get(..size))
+    }
+}
+
+impl Document {
+    /// Fetches the buffers of `root`: from the binary chunk, from data URIs, or from files.
+    pub fn load(source: &Source, root: Root, mut chunk: Option<Vec<u8>>) -> Result<Self, Invalid> {
+        let mut buffers = Vec::with_capacity(root.buffers.len());
+        let mut left = BYTES_MAX;
+        for (number, buffer) in root.buffers.iter().enumerate() {
+            let bytes = match &buffer.uri {
+                Some(uri) => fetch(source, uri, left),
+                None => chunk.take().ok_or_else(|| Invalid::new("the file has no binary chunk")),
+            };
+            let declared = buffer.byte_length.0;
+            let checked = bytes.and_then(|bytes| match bytes.len() {
+                actual if declared > actual as u64 => {
+                    Err(Invalid::new(format!("{declared} bytes declared, {actual} present")))
+                }
+                _ => Ok(bytes),
+            });
+            let bytes =
+                checked.map_err(|reason| Invalid::new(format!("buffer {number}: {reason}")))?;
+            // Many buffers may name one large file.
+            left = left.saturating_sub(bytes.len() as u64);
+            buffers.push(bytes);
+        }
+        Ok(Self { root, buffers })
+    }
+
+    /// Vertex positions.
+    pub fn positions(&self, index: Index<Accessor>) -> Result<Vec<[f32; 3]>, Invalid> {
+        let is_vec3 = |component, kind| component == ComponentType::F32 && kind == Type::Vec3;
+        let values = self.values(index, "float VEC3", is_vec3)?;
+        let (floats, _) = values.as_chunks::<4>();
+        let floats: Vec<f32> = floats.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
+        Ok(floats.as_chunks().0.to_vec())
+    }
+
+    /// Vertex indices.
+    pub fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, Invalid> {
+        let is_index = |component, kind| unsigned_size(component).is_some() && kind == Type::Scalar;
+        let values = self.values(index, "unsigned SCALAR", is_index)?;
+        let size = self.component(index)?.size();
+        Ok(values.chunks_exact(size).map(unsigned).collect())
+    }
+
+    fn component(&self, index: Index<Accessor>) -> Result<ComponentType, Invalid> {
+        let accessor = find(&self.root.accessors, "accessor", index)?;
+        match accessor.component_type {
+            Checked::Valid(component) => Ok(component.0),
+            Checked::Invalid => Err(wrong_type(index.value(), "a known component type")),
+        }
+    }
+
+    /// All elements of an accessor, tightly packed, with sparse values in place.
+    fn values(
+        &self,
+        index: Index<Accessor>,
+        expected: &str,
+        accepts: impl Fn(ComponentType, Type) -> bool,
+    ) -> Result<Vec<u8>, Invalid> {
+        let number = index.value();
+        let wrong_type = || wrong_type(number, expected);
+        let accessor = find(&self.root.accessors, "accessor", index)?;
+        let component = self.component(index)?;
+        let Checked::Valid(kind) = accessor.type_ else { return Err(wrong_type()) };
+        if !accepts(component, kind) || accessor.normalized {
+            return Err(wrong_type());
+        }
+        let size = component.size() * kind.multiplicity();
+        let count = accessor.count.0;
+        let mut values = match accessor.buffer_view {
+            Some(view) => {
+                let offset = accessor.byte_offset.unwrap_or_default().0;
+                self.elements(number, view, offset, size, count)?
+                    .iter()
+                    .flatten()
+                    .copied()
+                    .collect()
+            }
+            // Zeros, to be replaced by sparse values: no bytes stand behind the count, so it may
+            // not exceed those of the whole file.
+            None if count > self.buffers.iter().map(Vec::len).sum::<usize>() as u64 => {
+                return Err(Invalid::new(format!(
+                    "accessor {number} declares {count} elements and no data"
+                )));
+            }
+            None => vec![0; count as usize * size],
+        };
+        self.replace_sparse(number, accessor, size, &mut values)?;
+        Ok(values)
+    }
+
+    fn replace_sparse(
+        &self,
+        number: usize,
+        accessor: &Accessor,
+        size: usize,
+        values: &mut [u8],
+    ) -> Result<(), Invalid> {
+        let Some(sparse) = &accessor.sparse else { return Ok(()) };
+        let (places, news) = (&sparse.indices, &sparse.values);
+        let component = match places.component_type {
+            Checked::Valid(component) => unsigned_size(component.0),
+            Checked::Invalid => None,
+        };
+        let place_size = component.ok_or_else(|| wrong_type(number, "unsigned sparse indices"))?;
+        let count = sparse.count.0;
+        let places =
+            self.elements(number, places.buffer_view, places.byte_offset.0, place_size, count)?;
+        let news = self.elements(number, news.buffer_view, news.byte_offset.0, size, count)?;
+        let elements = values.len() / size;
+        for (place, new) in places.iter().map(unsigned).zip(news.iter()) {
+            let old = values.chunks_exact_mut(size).nth(place as usize);
+            let out_of_range = || {
+                Invalid::new(format!("accessor {number} replaces element {place} of {elements}"))
+            };
+            old.ok_or_else(out_of_range)?.copy_from_slice(new);
+        }
+        Ok(())
+    }
+
+    /// `count` elements of `size` bytes from `offset` within a buffer view.
+    fn elements(
+        &self,
+        accessor: usize,
+        view: Index<gltf::json::buffer::View>,
+        offset: u64,
+        size: usize,
+        count: u64,
+    ) -> Result<Elements<'_>, Invalid> {
+        let number = view.value();
+        let view = find(&self.root.buffer_views, "buffer view", view)?;
+        let buffer = find(&self.buffers, "buffer", view.buffer)?;
+        let start = view.byte_offset.unwrap_or_default().0;
+        let end = u128::from(start) + u128::from(view.byte_length.0);
+        let bytes = usize::try_from(end)
+            .ok()
+            .and_then(|end| buffer.get(start as usize..end))
+            .ok_or_else(|| {
+                let available = buffer.len();
+                Invalid::new(format!(
+                    "buffer view {number} reaches byte {end} of a buffer of {available}"
+                ))
+            })?;
+        let stride = view.byte_stride.map_or(0, |stride| stride.0).max(size);
+        let needed = match count {
+            0 => 0,
+            _ => u128::from(offset) + u128::from(count - 1) * stride as u128 + size as u128,
+        };
+        if needed > bytes.len() as u128 {
+            let available = bytes.len();
+            return Err(Invalid::new(format!(
+                "accessor {accessor} needs {needed} bytes of buffer view {number}, which has \
+                 {available}"
+            )));
+        }
+        let bytes = bytes.get(offset as usize..).unwrap_or_default();
+        Ok(Elements { bytes, stride, size, count: count as usize })
+    }
+}
+
+/// The object a document's index refers to.
+pub(super) fn find<'a, T, K>(
+    objects: &'a [T],
+    kind: &str,
+    index: Index<K>,
+) -> Result<&'a T, Invalid> {
+    let missing = || Invalid::new(format!("{kind} {} does not exist", index.value()));
+    objects.get(index.value()).ok_or_else(missing)
+}
+
+fn wrong_type(accessor: usize, expected: &str) -> Invalid {
+    Invalid::new(format!("accessor {accessor} must hold {expected}"))
+}
+
+fn unsigned_size(component: ComponentType) -> Option<usize> {
+    match component {
+        ComponentType::U8 | ComponentType::U16 | ComponentType::U32 => Some(component.size()),
+        ComponentType::I8 | ComponentType::I16 | ComponentType::F32 => None,
+    }
+}
+
+/// A little-endian number of one to four bytes.
+fn unsigned(bytes: &[u8]) -> u32 {
+    bytes.iter().rev().fold(0, |number, &byte| (number << 8) | u32::from(byte))
+}
+
+fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, Invalid> {
+    let unknown = || Invalid::new("its URI is neither base64 data nor a path");
+    if let Some(data) = uri.strip_prefix("data:") {
+        let (_, encoded) = data.split_once(";base64,").ok_or_else(unknown)?;
+        let decoded = STANDARD.decode(encoded);
+        return decoded.map_err(|error| Invalid::new(format!("base64: {error}")));
+    }
+    let name = percent_decoded(uri).filter(|name| !name.contains("://")).ok_or_else(unknown)?;
+    let path = source.path.with_file_name("").join(&name);
+    let unreadable = |error| Invalid::new(format!("{} cannot be read: {error}", path.display()));
+    // Where it is in truth: `..` and links may lead anywhere.
+    let real = path.canonicalize().map_err(unreadable)?;
+    let folder = folder(source.path).map_err(unreadable)?;
+    if !source.outside_buffers && !real.starts_with(folder) {
+        return Err(Invalid::new(format!(
+            "{} lies outside the mesh's folder; if that is meant, allow it by \
+             object.outside_buffers = true in a scene, or by --outside-buffers",
+            real.display()
+        )));
+    }
+    files::bytes(&real, most).map_err(unreadable)
+}
+
+/// The folder that a file is named in, without links.
+fn folder(file: &Path) -> io::Result<PathBuf> {
+    absolute(file)?.with_file_name("").canonicalize()
+}
+
+/// `%20` and its like replaced by the bytes they stand for; `None` if that is not UTF-8.
+fn percent_decoded(uri: &str) -> Option<String> {
+    let mut parts = uri.split('%');
+    let mut bytes = parts.next()?.as_bytes().to_vec();
+    for part in parts {
+        bytes.push(u8::from_str_radix(part.get(..2)?, 16).ok()?);
+        bytes.extend_from_slice(part.get(2..)?.as_bytes());
+    }
+    String::from_utf8(bytes).ok()
+}

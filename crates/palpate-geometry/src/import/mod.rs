@@ -1,0 +1,85 @@
+//! Mesh files. To add a format: write its file here and give it a line in `FORMATS`.
+
+use std::io;
+use std::path::Path;
+
+use super::mesh::Mesh;
+use super::raw::RawMesh;
+use super::repair::repair;
+use super::report::MeshReport;
+use palpate_input::error::Invalid;
+use palpate_input::files;
+
+mod accessor;
+mod gltf;
+mod obj;
+pub mod ply;
+mod source;
+mod stl;
+
+use source::{BYTES_MAX, Source};
+
+/// Extensions, in lower case, and their readers.
+const FORMATS: &[(&str, fn(&Source) -> Result<RawMesh, Invalid>)] = &[
+    ("obj", obj::read),
+    ("gltf", gltf::read),
+    ("glb", gltf::read),
+    ("stl", stl::read),
+    ("ply", ply::read),
+];
+
+/// Reads a mesh file, scales it by `metres_per_unit` and repairs it. Buffers that a glTF document
+/// refers to must lie in its folder or below.
+///
+/// The extension decides the format: OBJ, glTF (`.gltf` or `.glb`), STL, PLY. A glTF file is in
+/// metres by its specification; the scale multiplies all the same.
+///
+/// # Errors
+/// If the file cannot be read or repaired; the place is the file.
+pub fn import(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshReport), Invalid> {
+    import_with(path, metres_per_unit, false)
+}
+
+/// As [`import`], with buffers of a glTF document anywhere if `outside_buffers`.
+///
+/// # Errors
+/// As [`import`].
+pub fn import_with(
+    path: &Path,
+    metres_per_unit: f64,
+    outside_buffers: bool,
+) -> Result<(Mesh, MeshReport), Invalid> {
+    read_and_repair(path, metres_per_unit, outside_buffers)
+        .map_err(|fault| fault.at(path.display()))
+}
+
+fn read_and_repair(
+    path: &Path,
+    metres_per_unit: f64,
+    outside_buffers: bool,
+) -> Result<(Mesh, MeshReport), Invalid> {
+    if !(metres_per_unit > 0.0 && metres_per_unit.is_finite()) {
+        return Err(Invalid::new(format!(
+            "the scale is {metres_per_unit} metres per unit; it must be positive and finite"
+        )));
+    }
+    if path.is_dir() {
+        return Err(unreadable(io::ErrorKind::IsADirectory.into()));
+    }
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let Some((_, read)) = FORMATS.iter().find(|(known, _)| *known == extension) else {
+        let supported: Vec<&str> = FORMATS.iter().map(|(known, _)| *known).collect();
+        let supported = supported.join(", ");
+        return Err(Invalid::new(format!("is a \".{extension}\" file; supported: {supported}")));
+    };
+    let bytes = files::bytes(path, BYTES_MAX).map_err(unreadable)?;
+    let mut raw = read(&Source { path, bytes: &bytes, outside_buffers })?;
+    raw.scale(metres_per_unit);
+    let (mesh, report) = repair(raw)?;
+    let sha256 = mesh.sha256();
+    Ok((mesh, MeshReport { sha256, ..report }))
+}
+
+fn unreadable(cause: io::Error) -> Invalid {
+    Invalid::new(format!("cannot be read: {cause}"))
+}

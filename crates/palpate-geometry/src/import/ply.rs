@@ -1,0 +1,174 @@
+//! PLY, as text or binary of either byte order. Polygons become triangle fans, as those of OBJ;
+//! what a file holds beside positions and faces is ignored.
+
+use nalgebra::Point3;
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
+use ply_rs_bw::ply::PropertyAccessResult::{Ignored, Set, UnsupportedType};
+use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
+
+use super::source::{Source, bad_line};
+use crate::raw::RawMesh;
+use palpate_input::error::Invalid;
+use palpate_input::files::unmarked;
+
+/// The properties of a position.
+const AXES: [&str; 3] = ["x", "y", "z"];
+/// What programs call the list of a face's vertices.
+const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// Reads a PLY file.
+pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
+    let (vertices, faces) = elements(source.bytes)?;
+    if faces.is_empty() && !vertices.is_empty() {
+        return Err(Invalid::new(format!(
+            "holds {} points and no faces, as a scan does; to be touched it needs a surface: a mesh",
+            vertices.len()
+        )));
+    }
+    let mut raw = RawMesh::default();
+    raw.skipped_primitives = faces.iter().filter(|face| face.0.len() < 3).count();
+    let fans = faces.iter().filter_map(|Face(corners)| corners.split_first());
+    let triangles =
+        fans.flat_map(|(&hub, rim)| rim.array_windows().map(move |&[b, c]| [hub, b, c]));
+    raw.add_part("PLY", vertices.iter().map(|vertex| Point3::from(vertex.0)), triangles)?;
+    Ok(raw)
+}
+
+/// The vertices of a PLY file, in metres.
+///
+/// # Errors
+/// If it is broken, or a coordinate is not finite.
+pub fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, Invalid> {
+    let (vertices, _) = elements(bytes)?;
+    let is_lost = |vertex: &Vertex| !vertex.0.iter().all(|coordinate| coordinate.is_finite());
+    if let Some(lost) = vertices.iter().position(is_lost) {
+        let at_m = vertices[lost].0;
+        return Err(Invalid::new(format!("PLY: vertex {lost} is not finite: {at_m:?}")));
+    }
+    Ok(vertices.iter().map(|vertex| Point3::from(vertex.0)).collect())
+}
+
+fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), Invalid> {
+    let bytes = unmarked(bytes);
+    let mut reader = Reader::new(bytes);
+    let header = Parser::<Other>::new().read_header(&mut reader);
+    let header = header.map_err(|error| fault(&error, bytes, &Encoding::Ascii))?;
+    let (mut vertices, mut faces) = (Vec::<Vertex>::new(), Vec::<Face>::new());
+    for (name, element) in &header.elements {
+        // Each takes a byte at least, unless it has no properties.
+        if element.count > bytes.len() {
+            let count = element.count;
+            return Err(Invalid::new(format!(
+                "PLY: declares {count} of element \"{name}\", more than the file has bytes"
+            )));
+        }
+        let has = |property: &str| element.properties.contains_key(property);
+        let place = |error: ParseError| fault(&error, bytes, &header.encoding);
+        match name.as_str() {
+            "vertex" => {
+                require(element, AXES.iter().all(|axis| has(axis)), "x, y and z")?;
+                let read = Parser::new().read_payload_for_element(&mut reader, element, &header);
+                vertices = read.map_err(place)?;
+            }
+            "face" => {
+                require(element, CORNERS.iter().any(|list| has(list)), CORNERS[0])?;
+                let read = Parser::new().read_payload_for_element(&mut reader, element, &header);
+                faces = read.map_err(place)?;
+            }
+            _ => {
+                let others = Parser::<Other>::new();
+                others.read_payload_for_element(&mut reader, element, &header).map_err(place)?;
+            }
+        }
+    }
+    let left = reader.into_inner().trim_ascii().len();
+    if left > 0 {
+        return Err(Invalid::new(format!("PLY: holds {left} bytes more than its header declares")));
+    }
+    Ok((vertices, faces))
+}
+
+/// Insists that an element has the properties it needs.
+fn require(element: &ElementDef, has: bool, needed: &str) -> Result<(), Invalid> {
+    match has {
+        true => Ok(()),
+        false => {
+            let name = &element.name;
+            Err(Invalid::new(format!("PLY: element \"{name}\" must have {needed}")))
+        }
+    }
+}
+
+/// The fault with its line, if that lies in text.
+fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> Invalid {
+    match error.line().filter(|_| *encoding == Encoding::Ascii) {
+        Some(line) => {
+            let found = bytes.split(|&byte| byte == b'\n').nth(line.saturating_sub(1));
+            let found = String::from_utf8_lossy(found.unwrap_or_default());
+            bad_line(line, "PLY as its header declares it", &found)
+        }
+        None => {
+            // Behind "Line 7: ": what is no text has no lines.
+            let words = error.to_string();
+            let message = words.split_once(": ").filter(|_| error.line().is_some());
+            let message = message.map_or(words.as_str(), |(_, message)| message);
+            Invalid::new(format!("PLY: {}", message.lines().next().unwrap_or_default()))
+        }
+    }
+}
+
+/// A position.
+struct Vertex([f64; 3]);
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self([f64::NAN; 3])
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let Some(axis) = AXES.iter().position(|axis| *axis == name) else { return Ignored };
+        self.0[axis] = match property {
+            Property::Char(number) => number.into(),
+            Property::UChar(number) => number.into(),
+            Property::Short(number) => number.into(),
+            Property::UShort(number) => number.into(),
+            Property::Int(number) => number.into(),
+            Property::UInt(number) => number.into(),
+            Property::Float(number) => number.into(),
+            Property::Double(number) => number,
+            _ => return UnsupportedType,
+        };
+        Set
+    }
+}
+
+/// The vertices around a polygon.
+struct Face(Vec<u32>);
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self(Vec::new())
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        if !CORNERS.contains(&name) {
+            return Ignored;
+        }
+        let Some(corners) = property.to_u32_list() else { return UnsupportedType };
+        self.0 = corners;
+        Set
+    }
+}
+
+/// What is passed over.
+struct Other;
+
+impl PropertyAccess for Other {
+    fn new() -> Self {
+        Self
+    }
+
+    fn set_property(&mut self, _: &str, _: Property) -> PropertyAccessResult {
+        Ignored
+    }
+}

@@ -1,0 +1,195 @@
+//! From whatever an importer read to a [`Mesh`] that can be trusted.
+
+use foldhash::{HashMap, HashMapExt, HashSet, HashSetExt};
+use nalgebra::Point3;
+
+use super::mesh::Mesh;
+use super::raw::{Element, RawMesh};
+use super::report::{Finding, MeshReport};
+use super::topology::orient;
+use palpate_input::error::Invalid;
+
+/// A coordinate beyond this, in metres, is a file read in the wrong unit.
+pub const MAX_COORDINATE_M: f64 = 1e4;
+
+/// A triangle is degenerate if its height is at most this part of its longest side.
+const MIN_ASPECT: f64 = 1e-12;
+
+/// Makes a sound mesh of `raw` and says what had to be done.
+///
+/// In this order: vertices at equal positions become one (renders split them at seams of normals
+/// and textures; −0 equals 0); degenerate triangles go (a repeated vertex, or a height that is
+/// nothing beside the longest side or the rounding of the coordinates); of triangles with the
+/// same three vertices the first stays; winding is made consistent over each edge-connected
+/// component, outward where it is closed, as most of its triangles were where it is open;
+/// vertices no triangle uses go.
+///
+/// # Errors
+/// If there is no triangle with an area, or a vertex is not finite or too far away.
+pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), Invalid> {
+    if raw.triangles.is_empty() {
+        return Err(Invalid::new(format!(
+            "holds no triangles ({} primitives of points or lines were skipped)",
+            raw.skipped_primitives
+        )));
+    }
+    check_positions(&raw)?;
+    let (vertices, canonical) = weld(&raw.vertices);
+    let mut report = MeshReport {
+        vertices_before: raw.vertices.len(),
+        triangles_before: raw.triangles.len(),
+        skipped_primitives: raw.skipped_primitives,
+        welded: raw.vertices.len() - vertices.len(),
+        ..MeshReport::default()
+    };
+    let (mut triangles, sources) = sift(&raw, &vertices, &canonical, &mut report);
+    if triangles.is_empty() {
+        let count = raw.triangles.len();
+        return Err(Invalid::new(format!("all {count} triangles are degenerate")));
+    }
+    let topology = orient(&triangles, |triangle| {
+        // Measured from a vertex, so that a mesh far from the origin loses no digits.
+        let [a, b, c] = triangles[triangle as usize].map(|v| vertices[v as usize] - vertices[0]);
+        a.dot(&b.cross(&c))
+    });
+    for &triangle in &topology.flip {
+        triangles[triangle as usize].swap(1, 2);
+    }
+    let name = |triangle: &u32| raw.triangle_element(sources[*triangle as usize] as usize);
+    let finding = |list: &[u32]| Finding { count: list.len(), first: list.first().map(name) };
+    report.flipped = finding(&topology.flip);
+    report.border_edges = finding(&topology.border);
+    report.non_manifold_edges = finding(&topology.non_manifold);
+    report.components = topology.components;
+    report.unorientable = topology.unorientable;
+    let mesh = compact(vertices, triangles);
+    report.measure(&mesh, topology.closed);
+    Ok((mesh, report))
+}
+
+impl Mesh {
+    /// Repairs vertices (metres) and triangles (indices into them) into a mesh.
+    ///
+    /// # Errors
+    /// Whatever [`repair`] refuses; elements are named as parts of "the mesh".
+    pub fn new(
+        vertices: &[Point3<f64>],
+        triangles: &[[u32; 3]],
+    ) -> Result<(Self, MeshReport), Invalid> {
+        let mut raw = RawMesh::default();
+        raw.add_part("the mesh", vertices.iter().copied(), triangles.iter().copied())?;
+        repair(raw)
+    }
+}
+
+fn check_positions(raw: &RawMesh) -> Result<(), Invalid> {
+    for (number, vertex) in raw.vertices.iter().enumerate() {
+        let farthest_m = vertex.coords.amax();
+        let element = || raw.vertex_element(number);
+        if !vertex.iter().all(|coordinate| coordinate.is_finite()) {
+            let at_m: [f64; 3] = vertex.coords.into();
+            return Err(Invalid::new(format!("vertex {} is not finite: {at_m:?}", element())));
+        }
+        if farthest_m > MAX_COORDINATE_M {
+            let too_far = Invalid::new(format!(
+                "vertex {} lies {farthest_m:e} m from the origin, more than {MAX_COORDINATE_M} m",
+                element()
+            ));
+            let mut units = [("mm", 1e-3), ("um", 1e-6)].into_iter();
+            return Err(match units.find(|(_, metres)| farthest_m * metres <= MAX_COORDINATE_M) {
+                Some((unit, _)) => {
+                    too_far.mend(format!("for a file in {unit} say unit = \"{unit}\""))
+                }
+                None => too_far,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Distinct positions in order of first appearance, and for each vertex its position's number.
+fn weld(vertices: &[Point3<f64>]) -> (Vec<Point3<f64>>, Vec<u32>) {
+    let mut distinct = Vec::new();
+    let mut numbers: HashMap<[u64; 3], u32> = HashMap::with_capacity(vertices.len());
+    let canonical = vertices
+        .iter()
+        .map(|vertex| {
+            // Adding zero turns −0 into 0 and changes nothing else.
+            let vertex = vertex.map(|coordinate| coordinate + 0.0);
+            let bits = [vertex.x.to_bits(), vertex.y.to_bits(), vertex.z.to_bits()];
+            *numbers.entry(bits).or_insert_with(|| {
+                distinct.push(vertex);
+                distinct.len() as u32 - 1
+            })
+        })
+        .collect();
+    (distinct, canonical)
+}
+
+/// Drops degenerate and duplicate triangles. Returns the rest over welded vertices, and the raw
+/// number of each.
+fn sift(
+    raw: &RawMesh,
+    vertices: &[Point3<f64>],
+    canonical: &[u32],
+    report: &mut MeshReport,
+) -> (Vec<[u32; 3]>, Vec<u32>) {
+    let rounding_m =
+        4.0 * f64::EPSILON * vertices.iter().map(|v| v.coords.amax()).fold(0.0, f64::max);
+    let mut seen = HashSet::with_capacity(raw.triangles.len());
+    let mut kept = Vec::with_capacity(raw.triangles.len());
+    let mut sources = Vec::with_capacity(raw.triangles.len());
+    for (number, triangle) in raw.triangles.iter().enumerate() {
+        let triangle = triangle.map(|vertex| canonical[vertex as usize]);
+        let element = || raw.triangle_element(number);
+        if is_degenerate(triangle, vertices, rounding_m) {
+            report.degenerate_removed.add(element);
+            continue;
+        }
+        let mut key = triangle;
+        key.sort_unstable();
+        if seen.insert(key) {
+            kept.push(triangle);
+            sources.push(number as u32);
+        } else {
+            report.duplicates_removed.add(element);
+        }
+    }
+    (kept, sources)
+}
+
+fn is_degenerate(triangle: [u32; 3], vertices: &[Point3<f64>], rounding_m: f64) -> bool {
+    let [a, b, c] = triangle.map(|vertex| vertices[vertex as usize]);
+    let longest_m = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+    let twice_area_m2 = (b - a).cross(&(c - a)).norm();
+    twice_area_m2 <= longest_m * rounding_m.max(MIN_ASPECT * longest_m)
+}
+
+/// Drops unused vertices, keeping the order of the others.
+fn compact(vertices: Vec<Point3<f64>>, mut triangles: Vec<[u32; 3]>) -> Mesh {
+    let mut used = vec![false; vertices.len()];
+    for &vertex in triangles.iter().flatten() {
+        used[vertex as usize] = true;
+    }
+    let mut next = 0;
+    let renumbered: Vec<u32> = used
+        .iter()
+        .map(|&used| {
+            let number = next;
+            next += u32::from(used);
+            number
+        })
+        .collect();
+    for vertex in triangles.iter_mut().flatten() {
+        *vertex = renumbered[*vertex as usize];
+    }
+    let kept = vertices.into_iter().zip(used).filter_map(|(vertex, used)| used.then_some(vertex));
+    Mesh::from_sound_parts(kept.collect(), triangles)
+}
+
+impl Finding {
+    fn add(&mut self, element: impl FnOnce() -> Element) {
+        self.count += 1;
+        self.first.get_or_insert_with(element);
+    }
+}

@@ -1,0 +1,138 @@
+//! Joints by name: which number of a message is which joint's.
+
+use super::message::JointTrajectoryPoint;
+use super::message::{Duration, Float64MultiArray, Header, JointState, JointTrajectory};
+use super::transport::Packet;
+use palpate_input::error::Invalid;
+
+/// The names of an arm's joints, in the order in which the arm counts them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JointNames(Vec<String>);
+
+impl JointNames {
+    /// In the arm's order.
+    pub fn new(names: Vec<String>) -> Self {
+        Self(names)
+    }
+
+    /// In the arm's order.
+    pub fn names(&self) -> &[String] {
+        &self.0
+    }
+
+    /// Whether any of `names` is one of the arm's joints.
+    pub fn are_among(&self, names: &[String]) -> bool {
+        self.0.iter().any(|name| names.contains(name))
+    }
+
+    /// Puts `values`, one for each of `names`, into `into`, in the arm's order.
+    ///
+    /// # Errors
+    /// If one is missing, twice there or not finite, or their lengths differ.
+    fn pick(
+        &self,
+        what: &'static str,
+        names: &[String],
+        values: &[f64],
+        into: &mut Vec<f64>,
+    ) -> Result<(), Invalid> {
+        if values.len() != names.len() {
+            let (found, expected) = (values.len(), names.len());
+            return Err(Invalid::new(format!("{found} {what} for {expected} joints")));
+        }
+        into.clear();
+        for name in &self.0 {
+            let mut found = names.iter().zip(values).filter(|(other, _)| *other == name);
+            let missing = || Invalid::new(format!("no joint \"{name}\" among {names:?}"));
+            let (_, &value) = found.next().ok_or_else(missing)?;
+            if found.next().is_some() {
+                return Err(Invalid::new(format!("joint \"{name}\" is named twice")));
+            }
+            if !value.is_finite() {
+                return Err(Invalid::new(format!("{what} of \"{name}\" is {value}")));
+            }
+            into.push(value);
+        }
+        Ok(())
+    }
+
+    /// Reads positions and velocities of a message, which may name other joints too.
+    ///
+    /// # Errors
+    /// If it does not say them of every joint of the arm.
+    pub fn read(
+        &self,
+        message: &JointState,
+        q: &mut Vec<f64>,
+        qdot: &mut Vec<f64>,
+    ) -> Result<(), Invalid> {
+        self.pick("positions", &message.name, &message.position, q)?;
+        self.pick("velocities", &message.name, &message.velocity, qdot)
+    }
+
+    /// What an arm says of itself.
+    pub fn state(&self, stamp_s: f64, q: &[f64], qdot: &[f64]) -> JointState {
+        JointState {
+            header: Header::new(stamp_s, ""),
+            name: self.0.clone(),
+            position: q.into(),
+            velocity: qdot.into(),
+            effort: Vec::new(),
+        }
+    }
+
+    /// A velocity command that is valid for `valid_s` from `stamp_s` on; without names and stamp
+    /// where the lab wants it so.
+    pub fn command(&self, stamp_s: f64, valid_s: f64, qdot: &[f64], is_bare: bool) -> Packet {
+        if is_bare {
+            return Packet::Velocities(Float64MultiArray {
+                data: qdot.into(),
+                ..Float64MultiArray::default()
+            });
+        }
+        Packet::Command(JointTrajectory {
+            header: Header::new(stamp_s, ""),
+            joint_names: self.0.clone(),
+            points: vec![JointTrajectoryPoint {
+                velocities: qdot.into(),
+                time_from_start: Duration::from_s(valid_s),
+                ..JointTrajectoryPoint::default()
+            }],
+        })
+    }
+
+    /// Reads a velocity command: its stamp and for how long it is valid, in seconds. A bare one has
+    /// neither.
+    ///
+    /// # Errors
+    /// If it is not of this arm's joints, one finite velocity each.
+    pub fn read_command(
+        &self,
+        packet: &Packet,
+        qdot: &mut Vec<f64>,
+    ) -> Result<Option<[f64; 2]>, Invalid> {
+        let points = |found: usize| {
+            Err(Invalid::new(format!("{found} points in a velocity command, allowed is one")))
+        };
+        match packet {
+            Packet::Command(message) => {
+                let [point] = message.points.as_slice() else {
+                    return points(message.points.len());
+                };
+                let names = &message.joint_names;
+                if let Some(name) = names.iter().find(|name| !self.0.contains(name)) {
+                    let known = &self.0;
+                    let words = format!("\"{name}\" is no joint of this arm, which has {known:?}");
+                    return Err(Invalid::new(words));
+                }
+                self.pick("velocities", names, &point.velocities, qdot)?;
+                Ok(Some([message.header.stamp.s(), point.time_from_start.s()]))
+            }
+            Packet::Velocities(message) => {
+                self.pick("velocities", &self.0, &message.data, qdot)?;
+                Ok(None)
+            }
+            _ => points(0),
+        }
+    }
+}

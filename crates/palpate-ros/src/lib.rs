@@ -1,0 +1,65 @@
+//! A body behind a laboratory's topics, and what the side that serves them needs.
+//!
+//! [`topics`] is the table of what is sent; [`arm`] is the body, a [`Backend`](super::Backend);
+//! [`transport`] is what carries, and [`connect`] makes it of settings.
+
+pub mod arm;
+pub mod definition;
+pub mod joints;
+pub mod link;
+pub mod mailbox;
+pub mod message;
+pub mod net_ft;
+pub mod network;
+pub mod recording;
+#[cfg(feature = "ros1")]
+mod ros1;
+#[cfg(feature = "ros2")]
+mod ros2;
+pub mod settings;
+pub mod status;
+pub mod tactile;
+pub mod topics;
+pub mod transport;
+pub mod twin;
+
+use palpate_input::error::Invalid;
+#[cfg(feature = "ros1")]
+pub use ros1::spare_certificates;
+use settings::{BackendKind, BackendSettings};
+use topics::{Service, Side};
+use transport::Connect;
+
+/// Returns what opens the transport that `settings` name, in the thread that is going to own it.
+///
+/// # Errors
+/// If this build lacks it.
+pub fn connect(
+    settings: &BackendSettings,
+    side: Side,
+    services: Vec<Service>,
+) -> Result<Connect, Invalid> {
+    let owned = settings.clone();
+    match settings.kind {
+        #[cfg(feature = "ros2")]
+        BackendKind::Ros2 => Ok(Box::new(move || {
+            Ok(Box::new(ros2::Ros2::open(&owned, side, services)?) as Box<dyn transport::Transport>)
+        })),
+        #[cfg(feature = "ros1")]
+        BackendKind::Ros1 => Ok(Box::new(move || {
+            Ok(Box::new(ros1::Ros1::open(&owned, side, services)?) as Box<dyn transport::Transport>)
+        })),
+        BackendKind::Simulated => Err(Invalid::new(
+            "kind = \"simulated\" has no arm to connect to; allowed are \"ros2\", \"ros1\"",
+        )),
+        #[cfg(not(all(feature = "ros1", feature = "ros2")))]
+        kind => {
+            drop((owned, side, services));
+            let kind = kind.name();
+            Err(Invalid::new(format!(
+                "kind = \"{kind}\" needs a build with the feature `{kind}`: \
+                 cargo build --release --features {kind}"
+            )))
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! A thread of its own for one side's topics: what arrives is handed on at once, what is to be sent
+//! never makes a control loop wait.
+
+use super::message::TriggerResponse;
+use super::topics::{Service, Topic};
+use super::transport::{Connect, Delivery, Packet, Transport, Waker};
+use palpate_input::error::Invalid;
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// How often publishers are counted; chosen, discovery takes longer.
+const COUNTED_S: f64 = 0.1;
+
+/// What is to be done by the thread.
+enum Errand {
+    Send(Packet),
+    Answer(Service, u64, TriggerResponse),
+}
+
+/// Most errands that wait; older ones are of no use.
+const ERRANDS_MAX: usize = 256;
+
+#[derive(Default)]
+struct Shared {
+    errands: Mutex<VecDeque<Errand>>,
+    is_closed: AtomicBool,
+    /// Known publishers by topic.
+    publishers: [AtomicUsize; Topic::ALL.len()],
+    broken: Mutex<Option<Invalid>>,
+    /// Calls whose server has not been found yet.
+    waiting: Mutex<Vec<Service>>,
+}
+
+/// What a side does with what arrives, in the link's thread.
+pub trait Sink: Send {
+    /// Takes what has arrived.
+    fn take(&mut self, delivery: Delivery);
+
+    /// Called about every `period`: what is to be sent then.
+    fn tick(&mut self, send: &mut dyn FnMut(Packet)) {
+        let _ = send;
+    }
+}
+
+/// A channel keeps what arrives until its receiver looks.
+impl Sink for Sender<Delivery> {
+    fn take(&mut self, delivery: Delivery) {
+        let _ = self.send(delivery);
+    }
+}
+
+/// One side's end with its thread.
+pub struct Link {
+    shared: Arc<Shared>,
+    waker: Waker,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Link {
+    /// Opens a transport in a thread of its own, which ticks every `period`.
+    ///
+    /// # Errors
+    /// If it cannot be opened.
+    pub fn open(connect: Connect, period: Duration, sink: Box<dyn Sink>) -> Result<Self, Invalid> {
+        let shared = Arc::new(Shared::default());
+        let (opened, is_open) = channel();
+        let inside = Arc::clone(&shared);
+        let thread = std::thread::spawn(move || match connect() {
+            Ok(transport) => {
+                let _ = opened.send(Ok(transport.waker()));
+                serve(transport, &inside, period, sink);
+            }
+            Err(error) => {
+                let _ = opened.send(Err(error));
+            }
+        });
+        let gone = |_| Invalid::new("cannot open the transport: it ended");
+        let waker = is_open.recv().map_err(gone)??;
+        Ok(Self { shared, waker, thread: Some(thread) })
+    }
+
+    /// Sends a packet soon.
+    pub fn send(&self, packet: Packet) {
+        self.errand(Errand::Send(packet));
+    }
+
+    /// Calls a service of the other side as soon as its server is found; the answer comes to the
+    /// sink.
+    pub fn call(&self, service: Service) {
+        let mut waiting = lock(&self.shared.waiting);
+        if !waiting.contains(&service) {
+            waiting.push(service);
+        }
+        drop(waiting);
+        (self.waker)();
+    }
+
+    /// Whether a call of `service` still waits for its server.
+    pub fn awaits_server(&self, service: &Service) -> bool {
+        lock(&self.shared.waiting).contains(service)
+    }
+
+    /// Answers a call.
+    pub fn answer(&self, service: Service, call: u64, answer: TriggerResponse) {
+        self.errand(Errand::Answer(service, call, answer));
+    }
+
+    /// How many publishers of a topic are known, this side's own among them.
+    pub fn publisher_count(&self, topic: Topic) -> usize {
+        self.shared.publishers[topic as usize].load(Ordering::Relaxed)
+    }
+
+    /// Why nothing is sent any more, if that is so.
+    pub fn broken(&self) -> Option<Invalid> {
+        lock(&self.shared.broken).clone()
+    }
+
+    fn errand(&self, errand: Errand) {
+        let mut errands = lock(&self.shared.errands);
+        if errands.len() == ERRANDS_MAX {
+            errands.pop_front();
+        }
+        errands.push_back(errand);
+        drop(errands);
+        (self.waker)();
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        self.shared.is_closed.store(true, Ordering::Relaxed);
+        (self.waker)();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The thread.
+fn serve(
+    mut transport: Box<dyn Transport>,
+    shared: &Shared,
+    period: Duration,
+    mut sink: Box<dyn Sink>,
+) {
+    let mut next = Instant::now() + period;
+    let mut counted = Instant::now() - Duration::from_secs(1);
+    while !shared.is_closed.load(Ordering::Relaxed) {
+        let wait = next.saturating_duration_since(Instant::now());
+        transport.receive(wait, &mut |delivery| sink.take(delivery));
+        let mut result = Ok(());
+        loop {
+            let Some(errand) = lock(&shared.errands).pop_front() else { break };
+            result = result.and(match errand {
+                Errand::Send(packet) => transport.send(&packet),
+                Errand::Answer(service, call, answer) => transport.answer(&service, call, answer),
+            });
+        }
+        lock(&shared.waiting).retain(|service| {
+            let is_found = transport.is_served(service);
+            if is_found {
+                result = result.clone().and(transport.call(service));
+            }
+            !is_found
+        });
+        let now = Instant::now();
+        if now >= next {
+            sink.tick(&mut |packet| result = result.clone().and(transport.send(&packet)));
+            // Who was held up does not catch up.
+            next = (next + period).max(now);
+        }
+        if counted.elapsed().as_secs_f64() > COUNTED_S {
+            counted = now;
+            for topic in Topic::ALL {
+                let count = transport.publisher_count(topic);
+                shared.publishers[topic as usize].store(count, Ordering::Relaxed);
+            }
+        }
+        *lock(&shared.broken) = result.err();
+    }
+    // What a side says last is still sent.
+    for errand in lock(&shared.errands).drain(..) {
+        if let Errand::Send(packet) = errand {
+            let _ = transport.send(&packet);
+        }
+    }
+}

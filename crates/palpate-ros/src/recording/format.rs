@@ -1,0 +1,404 @@
+//! The contents of a recording: its metadata, its topics and the messages that only it has.
+
+use crate::definition::{Definition, Described};
+use crate::message::{BioTacHand, JointState, JointTrajectory, Marker, WrenchStamped};
+use byteorder::LittleEndian;
+use nalgebra::{Point3, Vector3};
+use palpate_explore::backend::{Capabilities, Command, IdealContact, Reading, Sample, Wrench};
+use palpate_explore::robot::finger::Frame;
+use palpate_input::error::Invalid;
+use palpate_input::words::brief;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+/// What a recording is of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct About {
+    /// Of the program that wrote it.
+    pub version: String,
+    /// The experiment with every default written out, as TOML.
+    pub experiment: String,
+    /// The planner's name.
+    pub planner: String,
+    /// The trial's number.
+    pub trial: u32,
+    /// What the body was reset with.
+    pub seed: u64,
+    /// What the body can do.
+    pub capabilities: Capabilities,
+}
+
+/// How what was recorded ended.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Ending {
+    /// Why it ended before its last touch, if it did.
+    pub failure: Option<String>,
+    /// Whether it was interrupted from outside after a touch, so that it can be continued.
+    pub is_interrupted: bool,
+}
+
+/// Name of the metadata that an [`About`] is written to.
+pub(super) const ABOUT: &str = "palpate";
+
+/// Name of the metadata that an [`Ending`] is written to.
+pub(super) const ENDING: &str = "palpate_ending";
+
+const FAILURE: &str = "failure";
+const INTERRUPTED: &str = "interrupted";
+
+impl About {
+    pub(super) fn texts(&self) -> BTreeMap<String, String> {
+        // Names and numbers always have a JSON.
+        let capabilities = serde_json::to_string(&self.capabilities).unwrap_or_default();
+        let texts = [
+            ("version", self.version.clone()),
+            ("resolved.toml", self.experiment.clone()),
+            ("planner", self.planner.clone()),
+            ("trial", self.trial.to_string()),
+            ("seed", self.seed.to_string()),
+            ("capabilities", capabilities),
+        ];
+        texts.into_iter().map(|(name, text)| (name.to_owned(), text)).collect()
+    }
+
+    pub(super) fn of(texts: &BTreeMap<String, String>) -> Result<Self, Invalid> {
+        Ok(Self {
+            version: text(texts, "version")?.into(),
+            experiment: text(texts, "resolved.toml")?.into(),
+            planner: text(texts, "planner")?.into(),
+            trial: number(texts, "trial")?,
+            seed: number(texts, "seed")?,
+            capabilities: serde_json::from_str(text(texts, "capabilities")?)
+                .map_err(|_| bad(texts, "capabilities"))?,
+        })
+    }
+}
+
+impl Ending {
+    pub(super) fn texts(&self) -> BTreeMap<String, String> {
+        let failure = self.failure.iter().map(|failure| (FAILURE, failure.clone()));
+        let interrupted = self.is_interrupted.then(|| (INTERRUPTED, true.to_string()));
+        failure.chain(interrupted).map(|(name, text)| (name.to_owned(), text)).collect()
+    }
+
+    pub(super) fn of(texts: &BTreeMap<String, String>) -> Self {
+        let is_interrupted = texts.contains_key(INTERRUPTED);
+        Self { failure: texts.get(FAILURE).cloned(), is_interrupted }
+    }
+}
+
+fn text<'a>(texts: &'a BTreeMap<String, String>, name: &str) -> Result<&'a str, Invalid> {
+    texts.get(name).map(String::as_str).ok_or_else(|| bad(texts, name))
+}
+
+fn number<T: FromStr>(texts: &BTreeMap<String, String>, name: &str) -> Result<T, Invalid> {
+    text(texts, name)?.parse().map_err(|_| bad(texts, name))
+}
+
+fn bad(texts: &BTreeMap<String, String>, name: &str) -> Invalid {
+    let found = texts.get(name).map_or("missing".into(), |found| format!("\"{}\"", brief(found)));
+    Invalid::new(format!("in its metadata `{name}` is {found}"))
+}
+
+/// A channel, by its place in [`TOPICS`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Topic {
+    Joints,
+    Applied,
+    Wrench,
+    Tactile,
+    Tick,
+    Touch,
+    Belief,
+    Contacts,
+}
+
+/// Name and message of each channel.
+pub const TOPICS: [(&str, &Definition); 8] = [
+    ("/joint_states", &JointState::DEFINITION),
+    ("/palpate/applied", &JointTrajectory::DEFINITION),
+    ("/wrench", &WrenchStamped::DEFINITION),
+    ("/biotac_pub", &BioTacHand::DEFINITION),
+    ("/palpate/tick", &Tick::DEFINITION),
+    ("/palpate/touch", &Touch::DEFINITION),
+    ("/palpate/belief", &Marker::DEFINITION),
+    ("/palpate/contacts", &Marker::DEFINITION),
+];
+
+/// `palpate_msgs/Tick`: a command and the reading after it, or a reset and the reading after that.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tick<'a> {
+    /// Ticks since the reset; 0 is the reset.
+    pub tick: u64,
+    /// What a reset was given; 0 in a tick.
+    pub seed: u64,
+    /// What was commanded, rad/s or m/s; empty in a reset.
+    pub command: Cow<'a, [f64]>,
+    /// Why there is no reading; empty if there is one.
+    pub fault: Cow<'a, str>,
+    /// Since reset.
+    pub time_s: f64,
+    /// Joint positions, rad or m.
+    pub q: Cow<'a, [f64]>,
+    /// Joint velocities, rad/s or m/s.
+    pub qdot: Cow<'a, [f64]>,
+    /// The command as it was applied.
+    pub applied: Cow<'a, [f64]>,
+    /// Force, then torque in `T`; or empty.
+    pub wrench: Cow<'a, [f64]>,
+    /// Point and normal in `T`, and force, of an ideal contact; or empty.
+    pub ideal: Cow<'a, [f64]>,
+    /// Frames that arrived.
+    #[serde(with = "frames")]
+    pub frames: Cow<'a, [Frame]>,
+    /// The same frames: of each whether the skin slipped. It stands last, so that recordings
+    /// without it are beginnings of such a message.
+    #[serde(with = "slips")]
+    pub slips: Cow<'a, [Frame]>,
+}
+
+/// Fields of a tick with `more` at their end.
+macro_rules! fields {
+    ($($more:literal),*) => {
+        concat!(
+            "# One control tick of a body, every number as it was.\n\
+             # Ticks since the reset; 0 is the reset itself.\nuint64 tick\n\
+             # What the reset was given; 0 in a tick.\nuint64 seed\n\
+             # Joint velocities as given, rad/s or m/s; empty in a reset.\nfloat64[] command\n\
+             # Why there is no reading; empty if there is one.\nstring fault\n\
+             # The body's time since the reset.\nfloat64 time_s\n\
+             # Joint positions, rad or m.\nfloat64[] q\n\
+             # Joint velocities, rad/s or m/s.\nfloat64[] qdot\n\
+             # The command as applied, after every limit.\nfloat64[] applied\n\
+             # Force (N), then torque (N m), at the fingertip in its frame T; or empty.\nfloat64[] wrench\n\
+             # Point (m), normal and force (N) of an ideal contact in T; or empty.\nfloat64[] ideal\n\
+             palpate_msgs/Frame[] frames\n",
+            $($more),*
+        )
+    };
+}
+
+impl Described for Tick<'_> {
+    const DEFINITION: Definition = Definition {
+        name: "palpate_msgs/msg/Tick",
+        fields: fields!(
+            "# Of each frame whether the skin slipped: 1, 0, or 2 if nobody knows; or empty.\n\
+             uint8[] slips\n"
+        ),
+        parts: &[&Definition {
+            name: "palpate_msgs/msg/Frame",
+            fields: "# A tactile frame in counts; what the sensor does not have is empty.\n\
+                     float64 time_s\nfloat64[] electrodes\nfloat64[] pdc\nfloat64[] pac\n\
+                     float64[] tdc\nfloat64[] tac\n",
+            parts: &[],
+        }],
+    };
+}
+
+impl Tick<'_> {
+    /// A tick of a recording that does not say whether the skin slipped.
+    pub(super) const WITHOUT_SLIPS: Definition =
+        Definition { fields: fields!(), ..Self::DEFINITION };
+}
+
+/// The loads and frames of a reading, where they lie while a tick is written.
+#[derive(Default)]
+pub(super) struct Loads {
+    wrench: Option<[f64; 6]>,
+    ideal: Option<[f64; 7]>,
+    frames: Vec<Frame>,
+}
+
+impl Loads {
+    /// Takes those of `reading`, in the memory that it has.
+    pub(super) fn take(&mut self, reading: &Reading) {
+        self.wrench = reading
+            .wrench
+            .map(|Wrench { force_n: f, torque_nm: t }| [f.x, f.y, f.z, t.x, t.y, t.z]);
+        self.ideal = reading.ideal().map(|IdealContact { p_tc: p, normal_t: n, force_n }| {
+            [p.x, p.y, p.z, n.x, n.y, n.z, force_n]
+        });
+        self.frames.clear();
+        self.frames.extend(reading.frames().cloned());
+    }
+}
+
+impl<'a> Tick<'a> {
+    /// With what `reading` holds; `loads` are its own.
+    pub(super) fn read(self, reading: &'a Reading, loads: &'a Loads) -> Self {
+        Self {
+            time_s: reading.time_s,
+            q: (&reading.q).into(),
+            qdot: (&reading.qdot).into(),
+            applied: (&reading.applied.qdot).into(),
+            wrench: loads.wrench.as_ref().map_or(&[][..], |all| all).into(),
+            ideal: loads.ideal.as_ref().map_or(&[][..], |all| all).into(),
+            frames: Cow::Borrowed(&loads.frames),
+            slips: Cow::Borrowed(&loads.frames),
+            ..self
+        }
+    }
+
+    /// Puts what was read into `reading`.
+    pub(super) fn write_to(self, reading: &mut Reading) {
+        let mut frames = self.frames.into_owned();
+        for (frame, said) in frames.iter_mut().zip(&*self.slips) {
+            frame.slip = said.slip;
+        }
+        let wrench = <[f64; 6]>::try_from(&*self.wrench).ok();
+        let ideal = <[f64; 7]>::try_from(&*self.ideal).ok();
+        let ideal = ideal.map(|[a, b, c, d, e, f, force_n]| {
+            let (p_tc, normal_t) = (Point3::new(a, b, c), Vector3::new(d, e, f));
+            Sample::Ideal(IdealContact { p_tc, normal_t, force_n })
+        });
+        *reading = Reading {
+            time_s: self.time_s,
+            q: self.q.into_owned(),
+            qdot: self.qdot.into_owned(),
+            wrench: wrench.map(|[a, b, c, d, e, f]| Wrench {
+                force_n: Vector3::new(a, b, c),
+                torque_nm: Vector3::new(d, e, f),
+            }),
+            samples: frames.into_iter().map(Sample::BioTac).chain(ideal).collect(),
+            applied: Command { qdot: self.applied.into_owned() },
+        };
+    }
+
+    /// Whether it is a reset.
+    pub fn is_reset(&self) -> bool {
+        self.tick == 0
+    }
+}
+
+/// Frames as lists, of which those that a frame lacks are empty.
+mod frames {
+    use palpate_explore::robot::finger::Frame;
+    use serde::de::{Error, Unexpected};
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use std::borrow::Cow;
+
+    #[derive(Serialize, Deserialize)]
+    struct Lists<'a> {
+        time_s: f64,
+        electrodes: Cow<'a, [f64]>,
+        pdc: Cow<'a, [f64]>,
+        pac: Cow<'a, [f64]>,
+        tdc: Cow<'a, [f64]>,
+        tac: Cow<'a, [f64]>,
+    }
+
+    pub(super) fn serialize<S: Serializer>(frames: &[Frame], to: S) -> Result<S::Ok, S::Error> {
+        to.collect_seq(frames.iter().map(|frame| Lists {
+            time_s: frame.time_s,
+            electrodes: frame.electrode_counts.as_ref().map_or(&[][..], |all| all).into(),
+            pdc: frame.pdc_counts.as_slice().into(),
+            pac: frame.pac_counts.as_ref().map_or(&[][..], |all| all).into(),
+            tdc: frame.tdc_counts.as_slice().into(),
+            tac: frame.tac_counts.as_slice().into(),
+        }))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<Cow<'static, [Frame]>, D::Error> {
+        let lists = Vec::<Lists>::deserialize(from)?;
+        lists.iter().map(frame).collect::<Result<_, _>>().map(Cow::Owned)
+    }
+
+    fn frame<E: Error>(lists: &Lists) -> Result<Frame, E> {
+        let single = |list| array::<1, E>(list).map(|found| found.map(|[one]| one));
+        Ok(Frame {
+            time_s: lists.time_s,
+            electrode_counts: array(&lists.electrodes)?,
+            pdc_counts: single(&lists.pdc)?,
+            pac_counts: array(&lists.pac)?,
+            tdc_counts: single(&lists.tdc)?,
+            tac_counts: single(&lists.tac)?,
+            slip: None,
+        })
+    }
+
+    fn array<const N: usize, E: Error>(list: &[f64]) -> Result<Option<[f64; N]>, E> {
+        match list.len() {
+            0 => Ok(None),
+            _ => list.try_into().map(Some).map_err(|_| {
+                E::invalid_value(Unexpected::Seq, &&*format!("none or {N} of {}", list.len()))
+            }),
+        }
+    }
+}
+
+/// Of each frame whether the skin slipped: 1, 0, or 2 if that is not known; nothing if it is of
+/// none.
+mod slips {
+    use palpate_explore::robot::finger::Frame;
+    use serde::{Deserialize, Deserializer, Serializer};
+    use std::borrow::Cow;
+
+    pub(super) fn serialize<S: Serializer>(frames: &[Frame], to: S) -> Result<S::Ok, S::Error> {
+        let known = frames.iter().any(|frame| frame.slip.is_some());
+        let told = if known { frames } else { &[] };
+        to.collect_seq(told.iter().map(|frame| frame.slip.map_or(2, u8::from)))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<Cow<'static, [Frame]>, D::Error> {
+        let told = Vec::<u8>::deserialize(from)?;
+        let slip = |told: u8| (told < 2).then_some(told == 1);
+        Ok(told.into_iter().map(|told| Frame { slip: slip(told), ..Frame::default() }).collect())
+    }
+}
+
+/// `palpate_msgs/Touch`: what a touch was asked for and found, written when it is done.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Touch<'a> {
+    /// Counted from 1.
+    pub touch: u32,
+    /// The body's time at its end.
+    pub time_s: f64,
+    /// Where the finger was sent: (x) or (x, z) of the zone.
+    pub target: Cow<'a, [f64]>,
+    /// `contact`, `miss` or `overload`.
+    pub outcome: Cow<'a, str>,
+    /// The point of contact in `W`, m; or empty.
+    pub contact: Cow<'a, [f64]>,
+    /// The contact's unit normal in `W`, towards the finger; or empty.
+    pub normal: Cow<'a, [f64]>,
+    /// The touch with the belief after it, as the trial's row holds it: JSON.
+    pub row: Cow<'a, str>,
+}
+
+impl Described for Touch<'_> {
+    const DEFINITION: Definition = Definition {
+        name: "palpate_msgs/msg/Touch",
+        fields: "# A touch, written when it is done.\n\
+                 # Counted from 1.\nuint32 touch\n\
+                 # The body's time at its end.\nfloat64 time_s\n\
+                 # Where the finger was sent: (x) or (x, z) of the zone, m.\nfloat64[] target\n\
+                 # contact, miss or overload.\nstring outcome\n\
+                 # The point of contact in W, m; or empty.\nfloat64[] contact\n\
+                 # The contact's unit normal in W, towards the finger; or empty.\nfloat64[] normal\n\
+                 # The touch with the belief after it, as in trials.jsonl.\nstring row\n",
+        parts: &[],
+    };
+}
+
+/// Says little-endian CDR (DDSI-RTPS 2.3, 10.2).
+const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
+
+/// Puts `message` into `bytes`, in place of what was there.
+pub(super) fn encode(bytes: &mut Vec<u8>, message: &impl Serialize) -> cdr_encoding::Result<()> {
+    bytes.clear();
+    bytes.extend_from_slice(&LITTLE_ENDIAN);
+    cdr_encoding::to_writer::<_, LittleEndian, _>(bytes, message)
+}
+
+/// The message that `bytes` hold; none if they do not.
+pub fn decoded<'a, M: Deserialize<'a>>(bytes: &'a [u8]) -> Option<M> {
+    let payload = bytes.strip_prefix(&LITTLE_ENDIAN)?;
+    let (message, _) = cdr_encoding::from_bytes::<M, LittleEndian>(payload).ok()?;
+    Some(message)
+}

@@ -1,0 +1,306 @@
+//! A recording while it is written, and the body around any body that writes its ticks.
+
+use super::format::{ABOUT, About, ENDING, Ending, Loads, TOPICS, Tick, Topic, Touch, encode};
+use crate::message::{
+    BioTacData, BioTacHand, BioTacTime, Duration, Header, JointState, JointTrajectory,
+    JointTrajectoryPoint, Marker, Time, WrenchStamped,
+};
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{Compression, McapResult, WriteOptions, Writer};
+use palpate_explore::backend::{Backend, Capabilities, Command, Fault, Reading};
+use palpate_explore::robot::finger::Frame;
+use palpate_explore::robot::finger::frame::FRAME_S;
+use palpate_input::files;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
+
+/// Nanoseconds since 1970.
+pub type Clock = fn() -> u64;
+
+/// The time of day.
+pub fn wall_clock() -> u64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
+}
+
+/// Bytes of a chunk at which it is written although its touch goes on; chosen: a minute of the
+/// PA-10. So much address space is set aside at once, so that no tick asks for memory.
+const CHUNK_MAX: u64 = 16 << 20;
+
+/// A recording, shared by the body that is recorded and whoever runs its trial.
+///
+/// A touch is one chunk of the file: it is kept in memory while it lasts, so that no tick waits for
+/// a disk, and is handed to the operating system at its end. A process that is killed loses the
+/// touch in hand.
+///
+/// A message's `log_time` is the wall clock's when it is written, its `publish_time` and the stamp
+/// in its header are the body's own time since reset.
+#[derive(Clone)]
+pub struct Recording(Arc<Mutex<Sheet>>);
+
+/// What a recording is written on.
+struct Sheet {
+    /// None once it is ended.
+    writer: Option<Writer<NoSeek<Box<dyn Write + Send>>>>,
+    channels: [u16; TOPICS.len()],
+    message: Vec<u8>,
+    sequence: u32,
+    clock: Clock,
+}
+
+impl Recording {
+    /// Begins the file `path`, in place of what was there.
+    ///
+    /// # Errors
+    /// [`Fault::Unrecorded`] if it cannot be written.
+    pub fn create(path: &Path, about: &About) -> Result<Self, Fault> {
+        let file = files::create(path)
+            .map_err(|error| unrecorded(0.0, &format!("{}: {error}", path.display())))?;
+        Self::new(Box::new(BufWriter::new(file)), about, wall_clock)
+    }
+
+    /// Begins a recording that is written to `out`, its messages logged by `clock`.
+    ///
+    /// # Errors
+    /// [`Fault::Unrecorded`] if it cannot be written.
+    pub fn new(out: Box<dyn Write + Send>, about: &About, clock: Clock) -> Result<Self, Fault> {
+        let sheet = Sheet::new(out, about, clock).map_err(|error| unrecorded(0.0, &error))?;
+        Ok(Self(Arc::new(Mutex::new(sheet))))
+    }
+
+    /// Adds a touch that is done, with the `shapes` that show what was then known: the belief and
+    /// the contacts. What was recorded so far is handed to the operating system.
+    ///
+    /// # Errors
+    /// [`Fault::Unrecorded`] if it cannot be written.
+    pub fn touched(&self, touch: &Touch, [belief, contacts]: [Marker; 2]) -> Result<(), Fault> {
+        let mut sheet = self.sheet();
+        sheet.put(Topic::Touch, touch.time_s, touch)?;
+        for (topic, mut shape) in [(Topic::Belief, belief), (Topic::Contacts, contacts)] {
+            if !shape.points.is_empty() {
+                shape.header.stamp = Time::from_s(touch.time_s);
+                sheet.put(topic, touch.time_s, &shape)?;
+            }
+        }
+        sheet.write(touch.time_s, |writer| writer.flush())
+    }
+
+    /// Ends the file with why the trial ended before its last touch, if it did.
+    ///
+    /// # Errors
+    /// [`Fault::Unrecorded`] if it cannot be written.
+    pub fn end(&self, time_s: f64, ending: &Ending) -> Result<(), Fault> {
+        let mut sheet = self.sheet();
+        let metadata = metadata(ENDING, ending.texts());
+        sheet.write(time_s, |writer| {
+            writer.write_metadata(&metadata)?;
+            writer.finish().map(drop)
+        })?;
+        let mut out = sheet.writer.take().map(|writer| writer.into_inner().into_inner());
+        out.as_mut().map_or(Ok(()), Write::flush).map_err(|error| unrecorded(time_s, &error))
+    }
+
+    fn sheet(&self) -> MutexGuard<'_, Sheet> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Sheet {
+    fn new(out: Box<dyn Write + Send>, about: &About, clock: Clock) -> McapResult<Self> {
+        let mut writer = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("palpate ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Lz4))
+            .chunk_size(Some(CHUNK_MAX))
+            .disable_seeking(true)
+            .create(NoSeek::new(out))?;
+        writer.write_metadata(&metadata(ABOUT, about.texts()))?;
+        let mut channels = [0; TOPICS.len()];
+        for (channel, (topic, definition)) in channels.iter_mut().zip(TOPICS) {
+            let text = definition.text();
+            let schema = writer.add_schema(definition.name, "ros2msg", text.as_bytes())?;
+            *channel = writer.add_channel(schema, topic, "cdr", &BTreeMap::new())?;
+        }
+        Ok(Self { writer: Some(writer), channels, message: Vec::new(), sequence: 0, clock })
+    }
+
+    /// Adds a message of the body's time `time_s`.
+    fn put(&mut self, topic: Topic, time_s: f64, message: &impl Serialize) -> Result<(), Fault> {
+        let mut bytes = std::mem::take(&mut self.message);
+        encode(&mut bytes, message).map_err(|error| unrecorded(time_s, &error))?;
+        self.sequence = self.sequence.wrapping_add(1);
+        let header = MessageHeader {
+            channel_id: self.channels[topic as usize],
+            sequence: self.sequence,
+            log_time: (self.clock)(),
+            publish_time: (time_s * 1e9).round() as u64,
+        };
+        let written = self.write(time_s, |writer| writer.write_to_known_channel(&header, &bytes));
+        self.message = bytes;
+        written
+    }
+
+    fn write(
+        &mut self,
+        time_s: f64,
+        write: impl FnOnce(&mut Writer<NoSeek<Box<dyn Write + Send>>>) -> McapResult<()>,
+    ) -> Result<(), Fault> {
+        let ended = || unrecorded(time_s, &"it is ended");
+        let writer = self.writer.as_mut().ok_or_else(ended)?;
+        write(writer).map_err(|error| unrecorded(time_s, &error))
+    }
+}
+
+fn metadata(name: &str, metadata: BTreeMap<String, String>) -> Metadata {
+    Metadata { name: name.into(), metadata }
+}
+
+fn unrecorded(time_s: f64, message: &dyn std::fmt::Display) -> Fault {
+    Fault::Unrecorded { time_s, message: message.to_string() }
+}
+
+/// A body whose ticks are recorded. A tick that cannot be kept is a fault, also where the body
+/// made it.
+pub struct Recorder {
+    inner: Box<dyn Backend>,
+    recording: Recording,
+    page: Page,
+}
+
+/// What is kept from tick to tick, so that none asks for memory.
+struct Page {
+    loads: Loads,
+    tick: u64,
+    time_s: f64,
+    joints: JointState,
+    applied: JointTrajectory,
+    wrench: WrenchStamped,
+    tactile: BioTacHand,
+}
+
+impl Recorder {
+    /// Writes to `recording` what `inner` is told and reads.
+    pub fn new(inner: Box<dyn Backend>, recording: Recording) -> Self {
+        let page = Page::new(inner.capabilities());
+        Self { inner, recording, page }
+    }
+}
+
+impl Backend for Recorder {
+    fn capabilities(&self) -> &Capabilities {
+        self.inner.capabilities()
+    }
+
+    fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
+        self.page.tick = 0;
+        let reading = self.inner.reset(seed)?;
+        self.page.write(&mut self.recording.sheet(), reading, Tick { seed, ..Tick::default() })?;
+        Ok(reading)
+    }
+
+    fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
+        self.page.tick += 1;
+        let number = self.page.tick;
+        let result = self.inner.step(command);
+        let mut sheet = self.recording.sheet();
+        match &result {
+            Ok(reading) => {
+                let command = (&command.qdot).into();
+                let tick = Tick { tick: number, command, ..Tick::default() };
+                self.page.write(&mut sheet, reading, tick)?;
+            }
+            Err(fault) => {
+                let (time_s, fault) = (self.page.time_s, fault.to_string().into());
+                let command = (&command.qdot).into();
+                let tick = Tick { tick: number, time_s, command, fault, ..Tick::default() };
+                sheet.put(Topic::Tick, time_s, &tick)?;
+            }
+        }
+        result
+    }
+}
+
+impl Page {
+    fn new(capabilities: &Capabilities) -> Self {
+        let header = Header::new(0.0, "W");
+        let names = &capabilities.joints;
+        let point = JointTrajectoryPoint {
+            time_from_start: Duration::from_s(capabilities.period_s),
+            ..JointTrajectoryPoint::default()
+        };
+        Self {
+            loads: Loads::default(),
+            tick: 0,
+            time_s: 0.0,
+            joints: JointState {
+                header: header.clone(),
+                name: names.clone(),
+                ..JointState::default()
+            },
+            applied: JointTrajectory { header, joint_names: names.clone(), points: vec![point] },
+            wrench: WrenchStamped { header: Header::new(0.0, "T"), ..WrenchStamped::default() },
+            tactile: BioTacHand {
+                header: Header::new(0.0, "T"),
+                bt_data: vec![BioTacData::default()],
+                ..BioTacHand::default()
+            },
+        }
+    }
+
+    /// Writes `tick` with what `reading` holds.
+    fn write(&mut self, sheet: &mut Sheet, reading: &Reading, tick: Tick) -> Result<(), Fault> {
+        let time_s = reading.time_s;
+        self.time_s = time_s;
+        let stamp = Time::from_s(time_s);
+        self.loads.take(reading);
+        let is_reset = tick.is_reset();
+        sheet.put(Topic::Tick, time_s, &tick.read(reading, &self.loads))?;
+        self.joints.header.stamp = stamp;
+        self.joints.position.clone_from(&reading.q);
+        self.joints.velocity.clone_from(&reading.qdot);
+        sheet.put(Topic::Joints, time_s, &self.joints)?;
+        if !is_reset {
+            self.applied.header.stamp = stamp;
+            for point in &mut self.applied.points {
+                point.velocities.clone_from(&reading.applied.qdot);
+            }
+            sheet.put(Topic::Applied, time_s, &self.applied)?;
+        }
+        if let Some(wrench) = reading.wrench {
+            self.wrench.header.stamp = stamp;
+            self.wrench.wrench.force = wrench.force_n.into();
+            self.wrench.wrench.torque = wrench.torque_nm.into();
+            sheet.put(Topic::Wrench, time_s, &self.wrench)?;
+        }
+        for frame in reading.frames() {
+            self.tactile.header.stamp = Time::from_s(frame.time_s);
+            self.tactile.bt_time = BioTacTime {
+                frame_start_time: Time::from_s(frame.time_s - FRAME_S),
+                frame_end_time: Time::from_s(frame.time_s),
+                ..BioTacTime::default()
+            };
+            self.tactile.bt_data.iter_mut().for_each(|data| show(frame, data));
+            sheet.put(Topic::Tactile, time_s, &self.tactile)?;
+        }
+        Ok(())
+    }
+}
+
+/// A frame as the sensor's driver sends it: whole counts, 0 where there are none.
+fn show(frame: &Frame, data: &mut BioTacData) {
+    let whole = |counts: Option<f64>| counts.unwrap_or(0.0).round() as u16;
+    data.pdc_data = whole(frame.pdc_counts);
+    data.tdc_data = whole(frame.tdc_counts);
+    data.tac_data = whole(frame.tac_counts);
+    for (i, to) in data.pac_data.iter_mut().enumerate() {
+        *to = whole(frame.pac_counts.map(|all| all[i]));
+    }
+    for (i, to) in data.electrode_data.iter_mut().enumerate() {
+        *to = whole(frame.electrode_counts.map(|all| all[i]));
+    }
+}

@@ -1,0 +1,256 @@
+//! ROS 1, by roslibrust: for labs whose drivers are of that age.
+
+mod master;
+mod wire;
+
+use crate::message::{
+    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
+    TriggerResponse, WrenchStamped,
+};
+use crate::settings::BackendSettings;
+use crate::topics::{Service, Side, Topic, Topics};
+use crate::transport::{Delivery, Packed, Packet, Transport, Waker, cannot_open, cannot_send};
+use master::Census;
+use palpate_input::error::Invalid;
+use roslibrust::RosMessageType;
+use roslibrust::ros1::{NodeHandle, Publisher, ServiceServer};
+use std::collections::HashMap;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::runtime::Runtime;
+use wire::{Counted, Request, Trigger};
+
+/// Messages that wait in a reader or writer; chosen, more than come while a thread is held up.
+const QUEUE: usize = 64;
+
+/// How long an answer to a call from outside is waited for; chosen.
+const ANSWER: Duration = Duration::from_millis(500);
+
+/// Publishes a packet if it is of its topic and type.
+type Writer = Box<dyn Fn(&Runtime, &Packet) -> Option<Result<(), String>>>;
+
+/// One side's end in a ROS 1 network.
+pub struct Ros1 {
+    runtime: Runtime,
+    node: NodeHandle,
+    census: Census,
+    topics: Topics,
+    /// What arrives is put in, by any thread; `None` only wakes.
+    inlet: Sender<Option<Delivery>>,
+    outlet: Receiver<Option<Delivery>>,
+    writers: Vec<Writer>,
+    /// Kept, for a service ends with it.
+    _servers: Vec<ServiceServer>,
+    /// Calls from outside that wait for their answer.
+    waiting: Arc<Mutex<HashMap<u64, Sender<TriggerResponse>>>>,
+}
+
+/// Spares ROS 1 the loading of certificates, which nobody uses there: each attempt to reach a dead
+/// publisher would load them anew and hold messages up for 200 ms. To be called before any thread
+/// runs, as a program's first act.
+pub fn spare_certificates() {
+    // SAFETY: no other thread reads the environment yet.
+    unsafe {
+        std::env::set_var("SSL_CERT_FILE", "/dev/null");
+        std::env::set_var("SSL_CERT_DIR", "/nonexistent");
+    }
+}
+
+impl Ros1 {
+    /// An end on one side of the arm of `settings`; `services` are those that are served.
+    ///
+    /// # Errors
+    /// If there is no master, or it does not take the node.
+    pub fn open(
+        settings: &BackendSettings,
+        side: Side,
+        services: Vec<Service>,
+    ) -> Result<Self, Invalid> {
+        let runtime = Runtime::new().map_err(cannot_open("threads"))?;
+        // A second node of the same name would end the first.
+        let name = match side {
+            Side::Explorer => format!("/palpate_explorer_{}", std::process::id()),
+            Side::Arm => format!("/palpate_arm_{}", std::process::id()),
+        };
+        let master = settings.master.clone();
+        let node = runtime
+            .block_on(NodeHandle::new(&master, &name))
+            .map_err(cannot_open(&format!("a node at the master {master}")))?;
+        let (inlet, outlet) = channel();
+        let mut end = Self {
+            runtime,
+            node,
+            census: Census::new(&master, &settings.topics),
+            topics: settings.topics.clone(),
+            inlet,
+            outlet,
+            writers: Vec::new(),
+            _servers: Vec::new(),
+            waiting: Arc::default(),
+        };
+        end.topics(side)?;
+        if side == Side::Arm {
+            services.into_iter().enumerate().try_for_each(|(i, service)| end.serve(i, service))?;
+        }
+        Ok(end)
+    }
+
+    fn topics(&mut self, side: Side) -> Result<(), Invalid> {
+        self.headed::<JointState>(side, Topic::Joints)?;
+        self.headed::<WrenchStamped>(side, Topic::Wrench)?;
+        self.headed::<DiagnosticArray>(side, Topic::Status)?;
+        match self.topics.tactile.is_shadow() {
+            true => self.headed::<BiotacAll>(side, Topic::Tactile)?,
+            false => self.headed::<BioTacHand>(side, Topic::Tactile)?,
+        }
+        match self.topics.command.is_bare() {
+            true => self.topic::<Float64MultiArray>(side, Topic::Command, Into::into, |packet| {
+                Float64MultiArray::in_packet(packet).cloned()
+            }),
+            false => self.headed::<JointTrajectory>(side, Topic::Command),
+        }
+    }
+
+    /// A topic with messages of type `M`, which have a header.
+    fn headed<M: Packed + Clone>(&mut self, side: Side, topic: Topic) -> Result<(), Invalid>
+    where
+        Counted<M>: RosMessageType,
+    {
+        self.topic::<Counted<M>>(
+            side,
+            topic,
+            |counted| counted.message.into(),
+            |packet| {
+                let message = M::in_packet(packet)?.clone();
+                Some(Counted { seq: 0, message })
+            },
+        )
+    }
+
+    /// A topic with messages of type `M`: a writer on the side that publishes it, a reader on the
+    /// other.
+    fn topic<M: RosMessageType>(
+        &mut self,
+        side: Side,
+        topic: Topic,
+        wrap: fn(M) -> Packet,
+        pick: fn(&Packet) -> Option<M>,
+    ) -> Result<(), Invalid> {
+        let name = self.topics.line(topic).name.into_owned();
+        if topic.publisher() == side {
+            let publisher: Publisher<M> = self
+                .runtime
+                .block_on(self.node.advertise(&name, QUEUE, false))
+                .map_err(cannot_open(&name))?;
+            self.writers.push(Box::new(move |runtime, packet| {
+                let message = pick(packet)?;
+                Some(runtime.block_on(publisher.publish(&message)).map_err(|e| e.to_string()))
+            }));
+            return Ok(());
+        }
+        let mut subscriber = self
+            .runtime
+            .block_on(self.node.subscribe::<M>(&name, QUEUE))
+            .map_err(cannot_open(&name))?;
+        let inlet = self.inlet.clone();
+        self.runtime.spawn(async move {
+            while let Some(message) = subscriber.next().await {
+                let delivery = match message {
+                    Ok(message) => {
+                        let (packet, received) = (wrap(message), Instant::now());
+                        Delivery::Packet { packet, sender: 0, received }
+                    }
+                    Err(error) if error.to_string().contains("lag") => continue,
+                    Err(error) => Delivery::Garbled { topic, words: error.to_string() },
+                };
+                if inlet.send(Some(delivery)).is_err() {
+                    break;
+                }
+            }
+        });
+        Ok(())
+    }
+
+    /// A service is answered by the link's loop; the caller's task waits for it.
+    fn serve(&mut self, number: usize, service: Service) -> Result<(), Invalid> {
+        let name = service.name(self.topics.namespace());
+        let (inlet, waiting) = (self.inlet.clone(), Arc::clone(&self.waiting));
+        let number = number as u64;
+        let answer = move |_: Request| {
+            let (sender, answer) = channel();
+            waiting.lock().unwrap_or_else(PoisonError::into_inner).insert(number, sender);
+            let _ = inlet.send(Some(Delivery::Call { service: service.clone(), call: number }));
+            Ok(answer.recv_timeout(ANSWER).unwrap_or_else(|_| TriggerResponse {
+                success: false,
+                message: "not answered in time".into(),
+            }))
+        };
+        let server = self
+            .runtime
+            .block_on(self.node.advertise_service::<Trigger, _>(&name, answer))
+            .map_err(cannot_open(&name))?;
+        self._servers.push(server);
+        Ok(())
+    }
+}
+
+impl Transport for Ros1 {
+    fn waker(&self) -> Waker {
+        let inlet = self.inlet.clone();
+        Arc::new(move || {
+            let _ = inlet.send(None);
+        })
+    }
+
+    fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
+        let sent = self.writers.iter().find_map(|writer| writer(&self.runtime, packet));
+        let sent = sent.unwrap_or(Err("not this side's".into()));
+        sent.map_err(|words| cannot_send(&self.topics.line(packet.topic()).name, words))
+    }
+
+    fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
+        let mut next = self.outlet.recv_timeout(timeout);
+        while let Ok(delivery) = next {
+            if let Some(delivery) = delivery {
+                take(delivery);
+            }
+            next = self.outlet.try_recv().map_err(|_| RecvTimeoutError::Timeout);
+        }
+    }
+
+    fn publisher_count(&self, topic: Topic) -> usize {
+        self.census.publishers(topic)
+    }
+
+    /// A call asks the master for the server by itself.
+    fn is_served(&mut self, _: &Service) -> bool {
+        true
+    }
+
+    fn call(&mut self, service: &Service) -> Result<(), Invalid> {
+        let (node, inlet, service) = (self.node.clone(), self.inlet.clone(), service.clone());
+        let name = service.name(self.topics.namespace());
+        self.runtime.spawn(async move {
+            let answered = match node.service_client::<Trigger>(&name).await {
+                Ok(client) => client.call(&Request {}).await.map_err(|error| error.to_string()),
+                Err(error) => Err(error.to_string()),
+            };
+            let failed = |message| TriggerResponse { success: false, message };
+            let answer = answered.unwrap_or_else(failed);
+            let _ = inlet.send(Some(Delivery::Answered { service, answer }));
+        });
+        Ok(())
+    }
+
+    fn answer(
+        &mut self,
+        service: &Service,
+        call: u64,
+        answer: TriggerResponse,
+    ) -> Result<(), Invalid> {
+        let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
+        let sent = waiting.remove(&call).and_then(|waiting| waiting.send(answer).ok());
+        sent.ok_or_else(|| cannot_send(&service.name(self.topics.namespace()), "no call"))
+    }
+}

@@ -1,0 +1,96 @@
+//! The messages as ROS 1 has them: those of ROS 2 but for the header, which counts too.
+
+use crate::definition::{Described, Text};
+use crate::message::{
+    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
+    TriggerResponse, WrenchStamped,
+};
+use roslibrust::{MessageDescriptor, RosMessageType, RosServiceType};
+use serde::{Deserialize, Serialize};
+
+/// A message with a header as ROS 1 sends it: the header's number comes before its other fields,
+/// which are the first of the message.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Counted<M> {
+    /// Consecutive number.
+    pub seq: u32,
+    /// The message.
+    pub message: M,
+}
+
+/// A message type with its name in ROS 1 and the MD5 sum of its definition (genmsg 0.6).
+macro_rules! ros1 {
+    ($type:ty, $message:ident, $name:literal, $md5:literal) => {
+        impl RosMessageType for $type {
+            const DESCRIPTION: MessageDescriptor = {
+                const TEXT: &Text = &$message::DEFINITION.ros1();
+                MessageDescriptor::new::<Self>($name, $md5, TEXT.as_str(), "", &[0; 32])
+            };
+        }
+    };
+}
+
+ros1!(
+    Counted<JointState>,
+    JointState,
+    "sensor_msgs/JointState",
+    "3066dcd76a6cfaef579bd0f34173e9fd"
+);
+ros1!(
+    Counted<WrenchStamped>,
+    WrenchStamped,
+    "geometry_msgs/WrenchStamped",
+    "d78d3cb249ce23087ade7e7d0c40cfa7"
+);
+ros1!(
+    Counted<BioTacHand>,
+    BioTacHand,
+    "biotac_sensors/BioTacHand",
+    "d96f900cbfb096d61de125081e11dcab"
+);
+ros1!(Counted<BiotacAll>, BiotacAll, "sr_robot_msgs/BiotacAll", "0022d8afb0897596a0c41f523836ee37");
+ros1!(
+    Counted<DiagnosticArray>,
+    DiagnosticArray,
+    "diagnostic_msgs/DiagnosticArray",
+    "60810da900de1dd6ddd437c3503511da"
+);
+ros1!(
+    Counted<JointTrajectory>,
+    JointTrajectory,
+    "trajectory_msgs/JointTrajectory",
+    "65b4f94a94d1ed67169da35a02f33d3f"
+);
+ros1!(
+    Float64MultiArray,
+    Float64MultiArray,
+    "std_msgs/Float64MultiArray",
+    "4b7d974086d4060e7db4613a7e6c3ba4"
+);
+
+/// `std_srvs/Trigger`.
+pub struct Trigger;
+
+/// Its request, which is empty.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Request {}
+
+/// MD5 sum of `std_srvs/Trigger` (genmsg).
+const TRIGGER_MD5: &str = "937c9679a518e3a18d831e57125ea522";
+
+impl RosMessageType for Request {
+    const DESCRIPTION: MessageDescriptor =
+        MessageDescriptor::new::<Self>("std_srvs/TriggerRequest", TRIGGER_MD5, "", "", &[0; 32]);
+}
+
+impl RosMessageType for TriggerResponse {
+    const DESCRIPTION: MessageDescriptor =
+        MessageDescriptor::new::<Self>("std_srvs/TriggerResponse", TRIGGER_MD5, "", "", &[0; 32]);
+}
+
+impl RosServiceType for Trigger {
+    const ROS_SERVICE_NAME: &'static str = "std_srvs/Trigger";
+    const MD5SUM: &'static str = TRIGGER_MD5;
+    type Request = Request;
+    type Response = TriggerResponse;
+}

@@ -1,0 +1,376 @@
+//! ROS 2, by RustDDS: no installation of ROS, no master.
+
+use super::definition::Described;
+use super::message::{
+    BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory,
+    TriggerRequest, TriggerResponse, WrenchStamped,
+};
+use super::network::network;
+use super::settings::{BackendSettings, MappingKind};
+use super::topics::{Service, Side, Topic, Topics};
+use super::transport::{Delivery, Packed, Packet, Transport, Waker, cannot_open, cannot_send};
+use palpate_input::error::Invalid;
+use ros2_client::qos::{Durability, History, WhenFull};
+use ros2_client::request_id::RmwRequestId;
+use ros2_client::{
+    Client, Context, MessageTypeName, Name, Node, NodeName, NodeOptions, QosProfile, Server,
+    ServiceMapping, ServiceTypeName,
+};
+use rustdds::DomainParticipantBuilder;
+use rustdds::mio1;
+use rustdds::mio1::{Events, Interest, Poll, Token};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::net::IpAddr;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+impl ros2_client::Message for TriggerRequest {}
+impl ros2_client::Message for TriggerResponse {}
+
+/// Messages that wait in a reader or writer; chosen, more than come while a thread is held up.
+const DEPTH: usize = 64;
+
+/// Token of the waker; every other one is looked at whatever woke the thread.
+const WAKE: Token = Token(0);
+
+/// Hands over what has arrived on a topic.
+type Reader = Box<dyn Fn(&mut dyn FnMut(Delivery))>;
+/// Publishes a packet if it is of its topic and type.
+type Writer = Box<dyn Fn(&Packet) -> Option<Result<(), String>>>;
+/// A client with the time at which it was made.
+type MadeClient = (Client<TriggerRequest, TriggerResponse>, Instant);
+
+/// One side's end in a ROS 2 network.
+pub struct Ros2 {
+    context: Context,
+    node: Node,
+    topics: Topics,
+    side: Side,
+    poll: Poll,
+    events: Events,
+    waker: Arc<mio1::Waker>,
+    readers: Vec<Reader>,
+    writers: Vec<Writer>,
+    mapping: MappingKind,
+    /// Services with their clients, once servers are found, and when those were made.
+    clients: Vec<(Service, Option<MadeClient>)>,
+    /// When servers were looked for last.
+    looked: Instant,
+    servers: Vec<(Service, Server<TriggerRequest, TriggerResponse>)>,
+    calls: HashMap<u64, RmwRequestId>,
+    call_count: u64,
+}
+
+/// How often servers are looked for.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// From when a client is made until its server knows of it, so that a request is not lost.
+// heuristic: several exchanges of endpoint discovery on a local network.
+const SETTLE: Duration = Duration::from_millis(200);
+
+/// Vendor of Eclipse Cyclone DDS in the first two bytes of a GUID (RTPS 2.5, section 9.3.1.3; list
+/// of vendors of the DDS Foundation).
+const CYCLONE: [u8; 2] = [0x01, 0x10];
+
+/// What a writer promises: nobody has to ask for less, and it never waits.
+fn reliable() -> QosProfile {
+    QosProfile::publisher_default()
+        .reliability_reliable(WhenFull::Fail)
+        .durability(Durability::Volatile)
+        .history(History::KeepLast { depth: DEPTH })
+}
+
+/// What a reader asks for: what sensors' drivers promise.
+fn best_effort() -> QosProfile {
+    QosProfile::subscription_default().history(History::KeepLast { depth: DEPTH })
+}
+
+/// QoS of a reader that is also sent the last message published before it came.
+fn latched() -> QosProfile {
+    reliable().durability(Durability::TransientLocal)
+}
+
+/// The network interfaces of this machine with their IPv4 addresses.
+fn interfaces() -> Vec<(String, Vec<IpAddr>)> {
+    let addresses =
+        |one: &netdev::Interface| one.ipv4.iter().map(|net| net.addr().into()).collect();
+    netdev::get_interfaces().into_iter().map(|one| (one.name.clone(), addresses(&one))).collect()
+}
+
+impl Ros2 {
+    /// An end on one side of the arm of `settings`; `services` are those that are called or served.
+    ///
+    /// # Errors
+    /// If the network cannot be joined.
+    pub fn open(
+        settings: &BackendSettings,
+        side: Side,
+        services: Vec<Service>,
+    ) -> Result<Self, Invalid> {
+        let (domain, addresses) = network(settings, |name| std::env::var(name).ok(), &interfaces())
+            .map_err(cannot_open("the network"))?;
+        let mut participant = DomainParticipantBuilder::new(domain);
+        if let Some(addresses) = addresses {
+            participant = participant.with_only_networks(addresses);
+        }
+        let participant = participant.build().map_err(cannot_open("a DDS participant"))?;
+        let context = Context::from_domain_participant(participant)
+            .map_err(cannot_open("a DDS participant"))?;
+        let name = match side {
+            Side::Explorer => "explorer",
+            Side::Arm => "arm",
+        };
+        let name = NodeName::new("/palpate", name).map_err(cannot_open("a node"))?;
+        let options = NodeOptions::new().start_parameter_services(false);
+        let node = context.new_node(name, options).map_err(cannot_open("a node"))?;
+        let poll = Poll::new().map_err(cannot_open("a poll"))?;
+        let waker = mio1::Waker::new(poll.registry(), WAKE).map_err(cannot_open("a waker"))?;
+        let mut end = Self {
+            context,
+            node,
+            topics: settings.topics.clone(),
+            side,
+            poll,
+            events: Events::with_capacity(64),
+            waker: Arc::new(waker),
+            readers: Vec::new(),
+            writers: Vec::new(),
+            mapping: settings.service_mapping,
+            clients: Vec::new(),
+            looked: Instant::now(),
+            servers: Vec::new(),
+            calls: HashMap::new(),
+            call_count: 0,
+        };
+        end.topics()?;
+        match side {
+            Side::Explorer => {
+                end.clients = services.into_iter().map(|service| (service, None)).collect();
+            }
+            Side::Arm => services.into_iter().try_for_each(|service| end.serve(service))?,
+        }
+        Ok(end)
+    }
+
+    fn topics(&mut self) -> Result<(), Invalid> {
+        self.topic::<JointState>(Topic::Joints)?;
+        self.topic::<WrenchStamped>(Topic::Wrench)?;
+        self.topic::<DiagnosticArray>(Topic::Status)?;
+        if self.side == Side::Explorer {
+            // One that is published on change was so before this side came.
+            self.subscribe::<DiagnosticArray>(Topic::Status, latched())?;
+        }
+        match self.topics.tactile.is_shadow() {
+            true => self.topic::<BiotacAll>(Topic::Tactile)?,
+            false => self.topic::<BioTacHand>(Topic::Tactile)?,
+        }
+        match self.topics.command.is_bare() {
+            true => self.topic::<Float64MultiArray>(Topic::Command),
+            false => self.topic::<JointTrajectory>(Topic::Command),
+        }
+    }
+
+    /// A topic with messages of type `M`: a writer on the side that publishes it, a reader on the
+    /// other.
+    fn topic<M>(&mut self, topic: Topic) -> Result<(), Invalid>
+    where
+        M: Packed + Described + Serialize + DeserializeOwned + Clone + 'static,
+    {
+        if topic.publisher() != self.side {
+            return self.subscribe::<M>(topic, best_effort());
+        }
+        let (name, dds) = self.dds_topic::<M>(topic, &reliable())?;
+        let publisher =
+            self.node.create_publisher::<M>(&dds, Some(reliable())).map_err(cannot_open(&name))?;
+        self.writers.push(Box::new(move |packet| {
+            let message = M::in_packet(packet)?;
+            Some(match publisher.publish(message.clone()) {
+                Ok(()) | Err(ros2_client::error::WriteError::WouldBlock { .. }) => Ok(()),
+                Err(error) => Err(error.to_string()),
+            })
+        }));
+        Ok(())
+    }
+
+    /// The name of a topic, and what DDS has for it.
+    fn dds_topic<M: Described>(
+        &mut self,
+        topic: Topic,
+        qos: &QosProfile,
+    ) -> Result<(String, rustdds::Topic), Invalid> {
+        let name = self.topics.line(topic).name.into_owned();
+        let type_name = MessageTypeName::new(M::DEFINITION.package(), M::DEFINITION.short_name());
+        let path = Name::parse(&name).map_err(cannot_open(&name))?;
+        let dds = self.node.create_topic(&path, type_name, qos).map_err(cannot_open(&name))?;
+        Ok((name, dds))
+    }
+
+    /// A reader of messages of type `M`.
+    fn subscribe<M>(&mut self, topic: Topic, qos: QosProfile) -> Result<(), Invalid>
+    where
+        M: Packed + Described + DeserializeOwned + 'static,
+    {
+        let (name, dds) = self.dds_topic::<M>(topic, &qos)?;
+        let mut subscription =
+            self.node.create_subscription::<M>(&dds, Some(qos)).map_err(cannot_open(&name))?;
+        self.watch(&mut subscription, &name)?;
+        self.readers.push(Box::new(move |take| {
+            loop {
+                match subscription.take() {
+                    Ok(Some((message, info))) => {
+                        let (packet, received) = (message.into(), Instant::now());
+                        let sender = hash(&info.publisher_gid());
+                        take(Delivery::Packet { packet, sender, received });
+                    }
+                    Ok(None) => break,
+                    Err(error) => {
+                        take(Delivery::Garbled { topic, words: error.to_string() });
+                        break;
+                    }
+                }
+            }
+        }));
+        Ok(())
+    }
+
+    fn serve(&mut self, service: Service) -> Result<(), Invalid> {
+        let name = service.name(self.topics.namespace());
+        let path = Name::parse(&name).map_err(cannot_open(&name))?;
+        // Who calls cannot be known before: the usual one, unless it is said.
+        let mapping = mapping(self.mapping, [0, 0]);
+        let mut server = self
+            .node
+            .create_server(mapping, &path, &trigger(), reliable(), reliable())
+            .map_err(cannot_open(&name))?;
+        self.watch(&mut server, &name)?;
+        self.servers.push((service, server));
+        Ok(())
+    }
+
+    /// The client of a service whose server was found.
+    fn client(&self, service: &Service) -> Option<&MadeClient> {
+        self.clients.iter().find(|(other, _)| other == service)?.1.as_ref()
+    }
+
+    /// Makes clients for the servers that were found since.
+    fn look_for_servers(&mut self) {
+        let is_open = self.clients.iter().all(|(_, client)| client.is_some());
+        if is_open || self.looked.elapsed() < LOOK {
+            return;
+        }
+        self.looked = Instant::now();
+        let readers = self.context.domain_participant().discovered_readers();
+        for i in 0..self.clients.len() {
+            let (service, None) = &self.clients[i] else { continue };
+            let name = service.name(self.topics.namespace());
+            // As rmw names the topic of a service's requests.
+            let requests = format!("rq{name}Request");
+            let is_server = |topic: &str| topic == requests;
+            let server =
+                readers.iter().find(|one| is_server(&one.subscription_topic_data.topic_name));
+            let Some(server) = server else { continue };
+            let guid = server.reader_proxy.remote_reader_guid.to_bytes();
+            let mapping = mapping(self.mapping, [guid[0], guid[1]]);
+            let Ok(path) = Name::parse(&name) else { continue };
+            let made = self.node.create_client(mapping, &path, &trigger(), reliable(), reliable());
+            // One that cannot be made stays unfound, and the caller's timeout says so.
+            let Ok(mut client) = made else { continue };
+            if self.watch(&mut client, &name).is_ok() {
+                self.clients[i].1 = Some((client, Instant::now()));
+            }
+        }
+    }
+
+    /// Has the poll woken by what arrives at `source`.
+    fn watch(&self, source: &mut impl mio1::event::Source, name: &str) -> Result<(), Invalid> {
+        let token = Token(WAKE.0 + 1);
+        self.poll.registry().register(source, token, Interest::READABLE).map_err(cannot_open(name))
+    }
+}
+
+fn trigger() -> ServiceTypeName {
+    ServiceTypeName::new("std_srvs", "Trigger")
+}
+
+/// How a service is carried whose server is of this vendor.
+fn mapping(kind: MappingKind, vendor: [u8; 2]) -> ServiceMapping {
+    match kind {
+        MappingKind::Cyclone => ServiceMapping::Cyclone,
+        MappingKind::Auto if vendor == CYCLONE => ServiceMapping::Cyclone,
+        MappingKind::Basic => ServiceMapping::Basic,
+        MappingKind::Enhanced | MappingKind::Auto => ServiceMapping::Enhanced,
+    }
+}
+
+fn hash(value: &impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    value.hash(&mut hasher);
+    hasher.finish()
+}
+
+impl Transport for Ros2 {
+    fn waker(&self) -> Waker {
+        let waker = Arc::clone(&self.waker);
+        Arc::new(move || {
+            let _ = waker.wake();
+        })
+    }
+
+    fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
+        let sent = self.writers.iter().find_map(|writer| writer(packet));
+        let sent = sent.unwrap_or(Err("not this side's".into()));
+        sent.map_err(|words| cannot_send(&self.topics.line(packet.topic()).name, words))
+    }
+
+    fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
+        // What interrupts a wait is nothing to act on.
+        let _ = self.poll.poll(&mut self.events, Some(timeout));
+        self.readers.iter().for_each(|reader| reader(take));
+        for (service, server) in &self.servers {
+            while let Ok(Some((id, _))) = server.receive_request() {
+                self.call_count += 1;
+                self.calls.insert(self.call_count, id);
+                take(Delivery::Call { service: service.clone(), call: self.call_count });
+            }
+        }
+        self.look_for_servers();
+        for (service, open) in &self.clients {
+            let Some((client, _)) = open else { continue };
+            while let Ok(Some((_, answer))) = client.receive_response() {
+                take(Delivery::Answered { service: service.clone(), answer });
+            }
+        }
+    }
+
+    fn publisher_count(&self, topic: Topic) -> usize {
+        self.node.publisher_count(&self.topics.line(topic).name)
+    }
+
+    fn is_served(&mut self, service: &Service) -> bool {
+        self.client(service).is_some_and(|(_, since)| since.elapsed() > SETTLE)
+    }
+
+    fn call(&mut self, service: &Service) -> Result<(), Invalid> {
+        let name = service.name(self.topics.namespace());
+        let (client, _) = self.client(service).ok_or_else(|| cannot_send(&name, "not known"))?;
+        let sent = client.send_request(TriggerRequest::default());
+        sent.map(drop).map_err(|error| cannot_send(&name, error))
+    }
+
+    fn answer(
+        &mut self,
+        service: &Service,
+        call: u64,
+        answer: TriggerResponse,
+    ) -> Result<(), Invalid> {
+        let name = service.name(self.topics.namespace());
+        let server = self.servers.iter().find(|(other, _)| other == service);
+        let (Some((_, server)), Some(id)) = (server, self.calls.remove(&call)) else {
+            return Err(cannot_send(&name, "no call"));
+        };
+        server.send_response(id, answer).map_err(|error| cannot_send(&name, error))
+    }
+}

@@ -1,0 +1,222 @@
+//! What an arm's own computer does between the network and the servos: it takes velocity commands
+//! that are fresh and whole, stops the arm when they cease, and brakes.
+
+use crate::joints::JointNames;
+use crate::status::ArmStatus;
+use crate::transport::Packet;
+
+/// The arm is stopped when the last command has not been valid for so long; chosen: two periods at
+/// 250 Hz.
+const GRACE_S: f64 = 0.008;
+
+/// How long a stop takes; chosen: the servos' own lag of 0.02 s makes it soft, and the arm is at
+/// rest 0.1 s later.
+const RAMP_S: f64 = 0.01;
+
+/// How far a stamp may be ahead of this clock.
+const AHEAD_S: f64 = 0.005;
+
+/// Share of a limit that rounding may exceed it by.
+const ROUNDING: f64 = 1e-6;
+
+/// Two that command within this time are two at once.
+const TOGETHER_S: f64 = 0.5;
+
+/// The state between network and servos. Times are seconds of a monotonic clock.
+pub struct ArmPc {
+    names: JointNames,
+    /// Largest speed of each joint, rad/s or m/s.
+    qdot_limits: Vec<f64>,
+    /// Silence after which the arm is stopped.
+    silence_s: f64,
+    status: ArmStatus,
+    /// The last command.
+    wanted: Vec<f64>,
+    incoming: Vec<f64>,
+    applied: Vec<f64>,
+    commanded_s: Option<f64>,
+    /// Who commanded last, and when.
+    sender: Option<(u64, f64)>,
+    /// When and from which velocities a stop began.
+    stop: Option<(f64, Vec<f64>)>,
+    refused: u64,
+    refusal: String,
+}
+
+impl ArmPc {
+    /// Returns one at rest with closed brakes. Commands are valid for `valid_s`; one beyond
+    /// `qdot_limits`, the largest speeds of the joints, is refused and stops the arm.
+    pub fn new(names: JointNames, qdot_limits: Vec<f64>, valid_s: f64) -> Self {
+        let count = names.names().len();
+        let status = ArmStatus { brake: true, deadman: true, ..ArmStatus::default() };
+        Self {
+            names,
+            qdot_limits,
+            silence_s: valid_s + GRACE_S,
+            status,
+            wanted: vec![0.0; count],
+            incoming: Vec::new(),
+            applied: vec![0.0; count],
+            commanded_s: None,
+            sender: None,
+            stop: None,
+            refused: 0,
+            refusal: String::new(),
+        }
+    }
+
+    /// As it is told.
+    pub fn status(&self) -> &ArmStatus {
+        &self.status
+    }
+
+    /// Commands that were not taken.
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// Tells how often time was not kept.
+    pub fn set_overruns(&mut self, overruns: u64) {
+        self.status.overruns = overruns;
+    }
+
+    /// Presses or releases the emergency stop.
+    pub fn set_estop(&mut self, is_pressed: bool) {
+        self.status.estop = is_pressed;
+        self.brake_at_once(is_pressed);
+    }
+
+    /// Holds or releases the dead-man switch.
+    pub fn set_deadman(&mut self, is_held: bool) {
+        self.status.deadman = is_held;
+        self.brake_at_once(!is_held);
+    }
+
+    /// Stops and stays, or listens again.
+    pub fn set_hold(&mut self, is_held: bool, now_s: f64) {
+        self.status.hold = is_held;
+        if is_held {
+            self.begin_stop(now_s);
+        }
+    }
+
+    /// Raises an alarm and stops.
+    pub fn alarm(&mut self, words: &str, now_s: f64) {
+        if self.status.alarm.is_empty() {
+            words.clone_into(&mut self.status.alarm);
+        }
+        self.begin_stop(now_s);
+    }
+
+    /// Forgets alarms; the emergency stop stays as it is pressed.
+    pub fn clear(&mut self) {
+        self.status.alarm.clear();
+        self.refusal.clear();
+        self.sender = None;
+    }
+
+    /// Takes a command that came at `now_s`, at `wall_s` since 1970.
+    pub fn take(&mut self, packet: &Packet, sender: u64, now_s: f64, wall_s: f64) {
+        let mut incoming = std::mem::take(&mut self.incoming);
+        let read = self.names.read_command(packet, &mut incoming);
+        self.incoming = incoming;
+        let stamp = match read {
+            Ok(stamp) => stamp,
+            Err(error) => {
+                self.refuse(format!("command refused: {error}"));
+                let words = self.refusal.clone();
+                return self.alarm(&words, now_s);
+            }
+        };
+        if let Some(words) = self.beyond_limits() {
+            self.refuse(words.clone());
+            return self.alarm(&words, now_s);
+        }
+        if let Some([stamp_s, valid_s]) = stamp {
+            let age_s = wall_s - stamp_s;
+            if age_s > valid_s || age_s < -AHEAD_S {
+                return self.refuse(format!("its stamp is {:.0} ms old", 1e3 * age_s));
+            }
+        }
+        if let Some((other, at_s)) = self.sender
+            && other != sender
+            && now_s - at_s < TOGETHER_S
+        {
+            self.refuse("two publishers command".into());
+            return self.alarm("two publishers command", now_s);
+        }
+        self.sender = Some((sender, now_s));
+        if self.status.estop
+            || !self.status.deadman
+            || self.status.hold
+            || !self.status.alarm.is_empty()
+        {
+            return;
+        }
+        if !self.status.servo_on {
+            // It begins with a command to stand still.
+            if self.incoming.iter().any(|&qdot| qdot != 0.0) {
+                return self.refuse("a movement before a command to stand still".into());
+            }
+            (self.status.servo_on, self.status.brake) = (true, false);
+        }
+        self.stop = None;
+        self.wanted.clone_from(&self.incoming);
+        self.commanded_s = Some(now_s);
+    }
+
+    /// The velocities for the next tick.
+    pub fn advance(&mut self, now_s: f64) -> &[f64] {
+        let is_silent = self.commanded_s.is_some_and(|at_s| now_s - at_s > self.silence_s);
+        if self.status.servo_on && self.stop.is_none() && is_silent {
+            let words = match self.refusal.as_str() {
+                "" => "commands ceased".to_owned(),
+                refusal => format!("commands ceased; the last one was refused: {refusal}"),
+            };
+            self.alarm(&words, now_s);
+        }
+        match &self.stop {
+            Some((since_s, from)) => {
+                let left = (1.0 - (now_s - since_s) / RAMP_S).max(0.0);
+                let from = from.iter().map(|qdot| qdot * left);
+                self.applied.iter_mut().zip(from).for_each(|(applied, qdot)| *applied = qdot);
+                if left == 0.0 {
+                    (self.status.servo_on, self.status.brake) = (false, true);
+                }
+            }
+            None if self.status.servo_on => self.applied.clone_from(&self.wanted),
+            None => self.applied.fill(0.0),
+        }
+        &self.applied
+    }
+
+    /// Describes the first velocity of the incoming command that exceeds its joint's limit.
+    fn beyond_limits(&self) -> Option<String> {
+        let joints = self.names.names().iter().zip(&self.qdot_limits);
+        let fast = |qdot: f64, limit: f64| qdot.abs() > limit * (1.0 + ROUNDING);
+        let found = joints.zip(&self.incoming).find(|((_, limit), qdot)| fast(**qdot, **limit));
+        found.map(|((name, limit), qdot)| {
+            format!("command refused: velocity of \"{name}\" is {qdot}, its limit {limit}")
+        })
+    }
+
+    fn refuse(&mut self, words: String) {
+        self.refused += 1;
+        self.refusal = words;
+    }
+
+    fn begin_stop(&mut self, now_s: f64) {
+        if self.stop.is_none() {
+            self.stop = Some((now_s, self.applied.clone()));
+        }
+    }
+
+    fn brake_at_once(&mut self, is_braked: bool) {
+        if is_braked {
+            self.applied.fill(0.0);
+            self.stop = None;
+            self.commanded_s = None;
+            (self.status.servo_on, self.status.brake) = (false, true);
+        }
+    }
+}

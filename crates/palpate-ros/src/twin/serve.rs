@@ -1,0 +1,318 @@
+//! The loop of a twin: commands in, one tick of the simulated body, readings out, in real time.
+
+use super::arm_pc::ArmPc;
+use super::failure::{Act, FAILURES, Sender, by_name};
+use crate::joints::JointNames;
+use crate::link::Link;
+use crate::message::{Header, TriggerResponse, Wrench as WrenchMessage, WrenchStamped};
+use crate::settings::BackendSettings;
+use crate::status::ArmStatus;
+use crate::tactile;
+use crate::topics::{Service, Topic};
+use crate::transport::{Connect, Delivery, Packet};
+use nalgebra::Isometry3;
+use palpate_explore::backend::pace::{self, Pace};
+use palpate_explore::backend::{Backend, Command, Fault, Reading, Wrench};
+use palpate_explore::robot::arm::Chain;
+use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+/// Joints slower than this are at rest, rad/s or m/s; chosen, the sag of the servos is below it.
+const REST: f64 = 2e-3;
+
+/// Ticks that a twin may be late before it drops time: it catches up with less.
+const SLACK_TICKS: u32 = 10;
+
+/// Something that a twin tells while it runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Event {
+    /// It can be heard.
+    Serving,
+    /// The first movement after rest.
+    Moving,
+    /// The joints stand still again.
+    AtRest,
+    /// A failure begins or ends.
+    Failure {
+        /// Its name.
+        name: &'static str,
+        /// Whether it begins.
+        is_on: bool,
+    },
+    /// What the arm's computer says has changed.
+    Status(ArmStatus),
+    /// The explorer called a service.
+    Called(Service),
+}
+
+/// A failure that begins by itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Injection {
+    /// Its place in the table of failures.
+    pub failure: usize,
+    /// When, seconds after the first movement.
+    pub at_s: f64,
+    /// For how long; without end if none.
+    pub for_s: Option<f64>,
+}
+
+/// Services that a twin answers.
+pub fn services() -> Vec<Service> {
+    let own = FAILURES.iter().map(|failure| Service::Twin(failure.name));
+    Service::COMMON.into_iter().chain(own).collect()
+}
+
+/// A simulated arm behind topics.
+pub struct Twin {
+    body: Box<dyn Backend>,
+    settings: BackendSettings,
+    names: JointNames,
+    pc: ArmPc,
+    /// Deliveries, kept until the loop looks.
+    inbox: Receiver<Delivery>,
+    link: Link,
+    sender: Sender,
+    injections: Vec<Injection>,
+    /// Pose of `T` in the sensor's frame.
+    x_mt: Isometry3<f64>,
+    bias: Wrench,
+    /// What the sensor says next becomes its zero.
+    wants_bias: bool,
+    since: Instant,
+    moved_s: Option<f64>,
+    is_moving: bool,
+    told: ArmStatus,
+    tick: u64,
+}
+
+impl Twin {
+    /// Puts `body`, which moves `chain`, behind the topics of `settings`.
+    ///
+    /// # Errors
+    /// If the network cannot be joined, or the body cannot be brought to its start.
+    pub fn new(
+        mut body: Box<dyn Backend>,
+        chain: &Chain,
+        settings: &BackendSettings,
+        connect: Connect,
+        injections: Vec<Injection>,
+        seed: u64,
+    ) -> Result<Self, Fault> {
+        body.reset(seed)?;
+        let names = settings.joint_names(chain);
+        let (sink, inbox) = channel();
+        // The loop looks at its own pace; the link only has to hand on.
+        let link = Link::open(connect, Duration::from_millis(20), Box::new(sink))?;
+        let limits = chain.joints.iter().map(|joint| joint.qdot_limit).collect();
+        let pc = ArmPc::new(names.clone(), limits, settings.topics.command.age_s);
+        Ok(Self {
+            body,
+            settings: settings.clone(),
+            told: pc.status().clone(),
+            pc,
+            names,
+            inbox,
+            link,
+            sender: Sender::new(seed),
+            injections,
+            x_mt: chain.tool,
+            bias: Wrench::default(),
+            wants_bias: false,
+            since: Instant::now(),
+            moved_s: None,
+            is_moving: false,
+            tick: 0,
+        })
+    }
+
+    /// Serves until `stop` becomes true; `tell` hears of events with their time since 1970.
+    ///
+    /// # Errors
+    /// If the simulated body cannot go on.
+    pub fn run(
+        &mut self,
+        stop: &AtomicBool,
+        tell: &mut dyn FnMut(f64, Event),
+    ) -> Result<(), Fault> {
+        let period_s = self.body.capabilities().period_s;
+        let mut command = Command::default();
+        let mut pace = Pace::new(period_s);
+        self.since = Instant::now();
+        tell(pace::now_s(), Event::Serving);
+        while !stop.load(Ordering::Relaxed) {
+            pace.wait(SLACK_TICKS);
+            let now_s = self.since.elapsed().as_secs_f64();
+            self.listen(now_s, tell);
+            self.fail(now_s, tell);
+            self.pc.set_overruns(pace.overruns());
+            command.qdot.clear();
+            command.qdot.extend_from_slice(self.pc.advance(now_s));
+            if self.pc.status().brake {
+                self.body.brake();
+            }
+            let reading = self.body.step(&command)?;
+            let is_moving = reading.qdot.iter().any(|qdot| qdot.abs() > REST);
+            let (packets, wrench) = packets(
+                reading,
+                (&self.settings, &self.names),
+                (self.tick, period_s),
+                (&self.x_mt, &self.bias),
+            );
+            if is_moving != self.is_moving {
+                self.is_moving = is_moving;
+                tell(pace::now_s(), if is_moving { Event::Moving } else { Event::AtRest });
+            }
+            if is_moving {
+                self.moved_s.get_or_insert(now_s);
+            }
+            if let Some(wrench) = wrench.filter(|_| std::mem::take(&mut self.wants_bias)) {
+                self.bias = wrench;
+            }
+            for packet in packets {
+                self.sender.send(&self.link, packet, now_s);
+            }
+            self.tell_status(now_s, period_s, tell);
+            self.sender.send_due(&self.link, now_s);
+            self.tick += 1;
+        }
+        Ok(())
+    }
+
+    /// How often real time was not kept.
+    pub fn overruns(&self) -> u64 {
+        self.told.overruns
+    }
+
+    /// Commands that were not taken.
+    pub fn refused(&self) -> u64 {
+        self.pc.refused()
+    }
+
+    fn listen(&mut self, now_s: f64, tell: &mut dyn FnMut(f64, Event)) {
+        while let Ok(delivery) = self.inbox.try_recv() {
+            match delivery {
+                Delivery::Packet { packet, sender, received } => {
+                    if packet.topic() == Topic::Command {
+                        let at_s = received.saturating_duration_since(self.since).as_secs_f64();
+                        self.pc.take(&packet, sender, at_s.min(now_s), pace::now_s());
+                    }
+                }
+                Delivery::Garbled { words, .. } => {
+                    self.pc.alarm(&format!("command refused: {words}"), now_s);
+                }
+                Delivery::Call { service, call } => {
+                    let answer = self.serve(&service, now_s, tell);
+                    tell(pace::now_s(), Event::Called(service.clone()));
+                    self.link.answer(service, call, answer);
+                }
+                Delivery::Answered { .. } => (),
+            }
+        }
+    }
+
+    fn serve(
+        &mut self,
+        service: &Service,
+        now_s: f64,
+        tell: &mut dyn FnMut(f64, Event),
+    ) -> TriggerResponse {
+        let mut message = "done".to_owned();
+        match service {
+            Service::Hold => self.pc.set_hold(true, now_s),
+            Service::Unhold => self.pc.set_hold(false, now_s),
+            Service::Stop => self.pc.alarm("stopped by call", now_s),
+            Service::ClearFault => self.pc.clear(),
+            Service::Bias => self.wants_bias = true,
+            Service::Twin(name) => {
+                if let Some(failure) = by_name(name) {
+                    let is_on = !self.sender.is_on(failure);
+                    self.set(failure, is_on, tell);
+                    message = format!("{name} {}", if is_on { "begins" } else { "ends" });
+                }
+            }
+        }
+        TriggerResponse { success: true, message }
+    }
+
+    fn set(&mut self, failure: usize, is_on: bool, tell: &mut dyn FnMut(f64, Event)) {
+        let Some(entry) = FAILURES.get(failure) else { return };
+        self.sender.set(failure, is_on);
+        match entry.act {
+            Act::Estop => self.pc.set_estop(is_on),
+            Act::Deadman => self.pc.set_deadman(!is_on),
+            Act::Packet(_) | Act::Delay(_) => (),
+        }
+        tell(pace::now_s(), Event::Failure { name: entry.name, is_on });
+    }
+
+    /// Begins and ends the failures whose time has come.
+    fn fail(&mut self, now_s: f64, tell: &mut dyn FnMut(f64, Event)) {
+        let Some(moved_s) = self.moved_s else { return };
+        for i in 0..self.injections.len() {
+            let Injection { failure, at_s, for_s } = self.injections[i];
+            let since_s = now_s - moved_s - at_s;
+            let is_due = since_s >= 0.0 && for_s.is_none_or(|for_s| since_s < for_s);
+            if is_due && !self.sender.is_on(failure) {
+                self.set(failure, true, tell);
+            } else if !is_due && since_s >= 0.0 && self.sender.is_on(failure) {
+                self.set(failure, false, tell);
+            }
+        }
+    }
+
+    /// Tells the arm's state at its rate, and at once when it changes.
+    fn tell_status(&mut self, now_s: f64, period_s: f64, tell: &mut dyn FnMut(f64, Event)) {
+        let rate_hz = self.settings.topics.status.rate_hz;
+        let is_new = {
+            let ArmStatus { overruns, .. } = self.told;
+            ArmStatus { overruns, ..self.pc.status().clone() } != self.told
+        };
+        if !is_new && !is_due(self.tick, rate_hz, period_s) {
+            return;
+        }
+        self.told = self.pc.status().clone();
+        if is_new {
+            tell(pace::now_s(), Event::Status(self.told.clone()));
+        }
+        let message = self.told.message(pace::now_s(), self.settings.topics.device());
+        self.sender.send(&self.link, Packet::Status(message), now_s);
+    }
+}
+
+/// Whether a tick is one of those at which something is sent `rate_hz` times a second.
+fn is_due(tick: u64, rate_hz: f64, period_s: f64) -> bool {
+    let every = (1.0 / (rate_hz * period_s)).round().max(1.0) as u64;
+    tick.is_multiple_of(every)
+}
+
+/// What a reading is told as, and the wrench in the sensor's frame without bias.
+fn packets(
+    reading: &Reading,
+    (settings, names): (&BackendSettings, &JointNames),
+    (tick, period_s): (u64, f64),
+    (x_mt, bias): (&Isometry3<f64>, &Wrench),
+) -> (Vec<Packet>, Option<Wrench>) {
+    let topics = &settings.topics;
+    let stamp_s = pace::now_s();
+    let mut packets = Vec::new();
+    if is_due(tick, topics.joints.rate_hz, period_s) {
+        packets.push(Packet::Joints(names.state(stamp_s, &reading.q, &reading.qdot)));
+    }
+    let wrench = reading.wrench.map(|wrench| wrench.moved(x_mt));
+    if let Some(wrench) = wrench.filter(|_| is_due(tick, topics.wrench.rate_hz, period_s)) {
+        let message = WrenchMessage {
+            force: (wrench.force_n - bias.force_n).into(),
+            torque: (wrench.torque_nm - bias.torque_nm).into(),
+        };
+        let header = Header::new(stamp_s, "ft_sensor");
+        packets.push(Packet::Wrench(WrenchStamped { header, wrench: message }));
+    }
+    let is_shadow = topics.tactile.is_shadow();
+    let finger = usize::from(settings.finger);
+    let frames = reading.frames();
+    packets.extend(frames.map(|frame| tactile::packet(frame, stamp_s, finger, is_shadow)));
+    (packets, wrench)
+}
