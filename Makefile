@@ -15,7 +15,7 @@ DIST := palpate-$(VERSION)-x86_64-linux
 
 .PHONY: test-faults test-clusters install-clusters demo paper paper-dynamic paper-planners test check-planners check-cost hard-cases test-ros2 test-ros1 install-ros1 page-test test-mcap fuzz reference lint lint-windows bench contacts detection growth bench-peers growth-around wheel install-python test-python docs notebooks dist setup tools clean
 
-EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs)))
+EXAMPLES := $(basename $(notdir $(wildcard examples/*.rs crates/*/examples/*.rs)))
 
 demo: setup
 	cargo build --release --locked

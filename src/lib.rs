@@ -1,26 +1,33 @@
 //! Palpate: a testbed for active touch.
 //!
 //! A robot finger explores an object it cannot see; a Gaussian process keeps a belief of its
-//! surface; a planner picks the next place to touch. The folders are rooms on floors, and a file
-//! imports only from its own room and from floors below:
+//! surface; a planner picks the next place to touch.
 //!
-//! | floor | rooms | what they hold |
+//! This package holds the simulator and what is done with it. Its modules are layers: a module
+//! imports only from those below it in this table.
+//!
+//! | module | content |
+//! |---|---|
+//! | [`cli`] | commands |
+//! | [`report`] | tables, figures and the page, drawn from rows and studies |
+//! | [`study`] | accuracy, regression checks of planners, comparisons of runs |
+//! | [`experiment`] | experiment, trial, runner, store, measures, statistics, ground truth |
+//! | [`sim`] | scene, object, effects, physics of the finger, simulated bodies |
+//!
+//! A program for a robot needs none of it. It uses the packages below, which do not depend on this one,
+//! so that the explorer cannot see the ground truth:
+//!
+//! | package | here | content |
 //! |---|---|---|
-//! | 9 | [`cli`] | commands |
-//! | 8 | [`report`] | tables, figures, the page: drawn from rows and studies |
-//! | 7 | [`study`] | accuracy, checks, comparisons: questions asked of many touches |
-//! | 6 | [`experiment`] | experiment, trial, runner, store, measures, statistics, truth |
-//! | 6 | [`twin`] | a simulated arm behind a laboratory's topics |
-//! | 5 | [`sim`] | what only a simulator knows: object, effects, physics of the finger, bodies |
-//! | 4 | [`explore`] | what the robot does: belief, planner, probe, control |
-//! | 3 | [`task`], [`backend`] | what the robot is told; what is commanded and read |
-//! | 2 | [`robot`], [`gp`] | arm and finger; Gaussian processes |
-//! | 1 | [`geometry`], [`config`], [`math`] | know nothing of each other |
-//! | 0 | [`error`], [`files`], [`words`] | errors of input; files; values in messages |
+//! | `palpate-explore` | [`explore`], [`task`], [`robot`], [`backend`] | belief, planners, servo, interlocks |
+//! | `palpate-ros` | [`ros`] | an arm behind topics, its simulated twin, recordings |
+//! | `palpate-gp` | [`gp`], [`math`] | Gaussian-process regression |
+//! | `palpate-geometry` | [`geometry`] | meshes, and where rays and fingers meet them |
+//! | `palpate-input` | [`config`], [`error`], [`files`], [`words`] | settings, errors, files |
 //!
-//! [`experiment::Simulation`] is the front door: from an experiment's file to its trials. What
-//! stands below `sim` is what runs on a real arm: a [`Servo`](explore::probe::servo::Servo) is made
-//! of a task, a robot and any [`Backend`](backend::Backend), and cannot see the object.
+//! [`experiment::Simulation`] is the front door: from an experiment's file to its trials. A
+//! [`Servo`](explore::probe::servo::Servo) is made of a task, a robot and any
+//! [`Backend`](backend::Backend), simulated or real.
 //!
 //! # Units and frames
 //! Everything is SI, and names end with the unit (`depth_m`). Frame `W` is the world: the robot's

@@ -210,7 +210,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let head: String = described.lines().map(|line| format!("# {line}\n")).collect();
     let path = out.join("cheapest.toml");
     let scene = toml::to_string(&cheapest.scene)?;
-    write_whole(&path, &format!("# Written by palpate accuracy.\n{head}\n{scene}"))?;
+    write_whole(&path, format!("# Written by palpate accuracy.\n{head}\n{scene}"))?;
     print(&format!("{described}\nscene: {}", path.display()))?;
     Ok(if cheapest.is_confirmed { Ending::Done } else { Ending::Failed })
 }
@@ -309,8 +309,11 @@ fn described(cheapest: &Cheapest, criterion: Criterion, origin: Origin) -> Strin
     )
 }
 
+/// The head of a column and its cell of a variant.
+type Column = (&'static str, fn(&Variant) -> String);
+
 /// The columns of both tables; those without a value are left out.
-const COLUMNS: [(&str, fn(&Variant) -> String); 17] = [
+const COLUMNS: [Column; 17] = [
     ("variant", |it| it.name.clone()),
     ("off truth mm: mean", |it| mean(it.off_truth_m, 1e-3, 3)),
     ("95 %", |it| cell(it.off_truth_m.map(|spread| 1e3 * spread.p95), 3)),

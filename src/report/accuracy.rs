@@ -148,6 +148,9 @@ fn draw_order(canvas: &mut Canvas, order: &Order, area: Area) {
     }
 }
 
+/// The bar of a variant and the title of its panel.
+type TitledBar<'a> = (&'a dyn Fn(&Variant) -> Option<Bar>, &'a str);
+
 /// Draws each effect as a line: how far contacts move, the time of a touch, and the verdict's
 /// change.
 fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option<()> {
@@ -160,7 +163,7 @@ fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option
         let change = variant.verdict_change_m?;
         Some((1e3 * change.mean, change.interval.unwrap_or([change.mean; 2]).map(|m| 1e3 * m)))
     };
-    let panels: [(&dyn Fn(&Variant) -> Option<Bar>, &str); 3] = [
+    let panels: [TitledBar; 3] = [
         (&|variant| Some(bar(variant.contact_m?, 1e-3)), "contact moves (mm)"),
         (&time, "time of a touch changes (%)"),
         (&verdict_mm, "active − random RMSE changes (mm)"),

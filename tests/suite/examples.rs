@@ -1,6 +1,6 @@
 //! The programs of `examples/` do what they say.
 
-#[path = "../../examples/own_backend.rs"]
+#[path = "../../crates/palpate-explore/examples/own_backend.rs"]
 mod own_backend;
 #[path = "../../examples/own_measure.rs"]
 mod own_measure;
@@ -18,7 +18,7 @@ use palpate::sim::{Environment, Scene};
 /// for what this body feels is exact, and the belief knows the plane.
 #[test]
 fn the_servo_drives_a_body_that_no_simulator_made() {
-    let source = include_str!("../../examples/own_backend.rs");
+    let source = include_str!("../../crates/palpate-explore/examples/own_backend.rs");
     assert!(!source.contains("palpate::sim") && !source.contains("palpate::experiment"));
     let (belief, worst_m) = own_backend::explore(15).unwrap();
     assert!(worst_m < 1e-12, "{worst_m}");

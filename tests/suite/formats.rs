@@ -11,6 +11,9 @@ use tempfile::TempDir;
 
 use crate::common::program::{fails, folder, succeeds};
 
+#[path = "../../crates/palpate-geometry/tests/suite/gltf_sample.rs"]
+mod gltf_sample;
+
 /// A pyramid over a square: five corners, a face of four and four of three.
 const CORNERS: [[f32; 3]; 5] =
     [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 2.0, 0.0], [0.0, 2.0, 0.0], [1.0, 1.0, 3.0]];
@@ -103,10 +106,11 @@ fn ply_binary(is_little: bool) -> Vec<u8> {
 
 /// A file of every format and encoding, to be altered.
 pub fn samples() -> Vec<(&'static str, Vec<u8>)> {
+    let (document, bytes) = gltf_sample::tetrahedron();
     vec![
         ("mesh.obj", obj()),
-        ("mesh.gltf", super::import::sample_gltf()),
-        ("mesh.glb", super::import::sample_glb()),
+        ("mesh.gltf", gltf_sample::with_data_uri(document.clone(), &bytes)),
+        ("mesh.glb", gltf_sample::glb(&document, &bytes)),
         ("text.stl", stl_text(" a pyramid").into()),
         ("binary.stl", stl_binary(b"exported")),
         ("text.ply", ply_text().into()),

@@ -1,8 +1,20 @@
-//! What the robot does, on the bench as in simulation: touch, believe, plan.
+//! Active touch for a robot, real or simulated: a belief, planners, and a servo that touches.
 //!
-//! A [`Belief`](belief::Belief) takes in touches and is asked by a [`Planner`](planner::Planner)
-//! where it is unsure; a [`Probe`](probe::Probe) goes the way of an approach. Nothing here knows
-//! where the object is.
+//! A [`Belief`](belief::Belief) observes touches; a [`Planner`](planner::Planner) selects the next
+//! target from it; a [`Probe`](probe::Probe) follows the approach to it. A
+//! [`Servo`](probe::servo::Servo) is the probe of a robot: it commands any
+//! [`Backend`](backend::Backend), the trait of a body, through its interlocks. No simulator is among
+//! the dependencies, so that nothing here can see the object.
+//!
+//! | module | content |
+//! |---|---|
+//! | [`task`] | the region, targets in it, and the approach to each |
+//! | [`robot`] | the arm from a model file, the finger, its sensors |
+//! | [`backend`] | the trait of a body, faults, interlocks |
+//! | [`belief`], [`around`], [`presence`] | beliefs of a height field and of a whole object |
+//! | [`planner`] | planners, one list for both |
+//! | [`probe`], [`control`] | a touch, and the motion of the arm |
+//! | [`registration`] | the pose of finger and object, found by touch |
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -10,8 +22,8 @@
 //! use palpate_explore::gp_settings::GpSettings;
 //! use palpate_explore::planner::{self, PlanningSettings};
 //! use palpate_explore::probe::{Contact, Touch};
-//! use palpate_gp::math::seed;
 //! use palpate_explore::task::{Region, Zone};
+//! use palpate_gp::math::seed;
 //!
 //! // An interval of x, 20 cm wide; the surface there is y = 0.1·x².
 //! let zone = Zone::new([-0.1, 0.1], None);

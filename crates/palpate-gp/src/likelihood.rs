@@ -241,12 +241,13 @@ impl<'a> Likelihood<'a> {
                 slope_height.resize(d, 0.0);
                 slopes.clear();
                 slopes.resize(d * d, 0.0);
-                for axis in 0..observations.slope(j).len() {
-                    slope_height[axis] += change(row, column + 1 + axis);
+                let slopes_of_j = observations.slope(j).len();
+                for (axis, sum) in slope_height.iter_mut().take(slopes_of_j).enumerate() {
+                    *sum += change(row, column + 1 + axis);
                 }
                 for other in 0..observations.slope(i).len() {
                     slope_height[other] -= change(row + 1 + other, column);
-                    for axis in 0..observations.slope(j).len() {
+                    for axis in 0..slopes_of_j {
                         slopes[axis * d + other] = change(row + 1 + other, column + 1 + axis);
                     }
                 }

@@ -6,6 +6,28 @@
 //! | [`config`] | settings from a TOML file and `key=value` overrides, with the line of each error |
 //! | [`error`] | the error of input that cannot be used: place, value, what is allowed, how to mend it |
 //! | [`words`] | values and parser messages as users read them |
+//!
+//! ```
+//! use palpate_input::config::{Checked, Loader, Rules};
+//! use serde::Deserialize;
+//!
+//! #[derive(Deserialize)]
+//! struct Touch {
+//!     force_n: f64,
+//! }
+//!
+//! impl Checked for Touch {
+//!     fn check(&self, rules: &mut Rules) {
+//!         rules.number("force_n", self.force_n, 0.1..=5.0);
+//!     }
+//! }
+//!
+//! let mut loader = Loader::of("touch.toml".as_ref(), "force_n = 1.0".into())?;
+//! loader.set("force_n=50")?;
+//! let error = loader.finish::<Touch>().err().expect("it is too large");
+//! assert!(error.to_string().starts_with("--set force_n=50: `force_n` = 50"));
+//! # Ok::<(), palpate_input::config::ConfigError>(())
+//! ```
 
 pub mod config;
 pub mod error;

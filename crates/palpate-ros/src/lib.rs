@@ -1,7 +1,26 @@
-//! A body behind a laboratory's topics, and what the side that serves them needs.
+//! A robot arm behind ROS 1 or ROS 2 topics, its simulated twin, and recordings of touches.
 //!
-//! [`topics`] is the table of what is sent; [`arm`] is the body, a [`Backend`](super::Backend);
-//! [`transport`] is what carries, and [`connect`] makes it of settings.
+//! | module | content |
+//! |---|---|
+//! | [`arm`] | the arm: a [`Backend`](palpate_explore::backend::Backend) over topics |
+//! | [`topics`], [`message`] | the topics and services of an arm, and their messages |
+//! | [`transport`] | sends and receives; [`connect`] makes one from settings |
+//! | [`twin`] | a simulated body behind the same topics, in real time |
+//! | [`recording`] | every tick of a trial as an MCAP file, and a backend that plays it |
+//!
+//! Joints are matched by name, so that messages of a driver may order them as it likes:
+//!
+//! ```
+//! use palpate_ros::joints::JointNames;
+//!
+//! let arm = JointNames::new(vec!["shoulder".into(), "elbow".into()]);
+//! let state = JointNames::new(vec!["elbow".into(), "hand".into(), "shoulder".into()]);
+//! let message = state.state(0.0, &[0.2, 0.9, 0.1], &[0.0; 3]);
+//! let (mut q, mut qdot) = (Vec::new(), Vec::new());
+//! arm.read(&message, &mut q, &mut qdot)?;
+//! assert_eq!(q, [0.1, 0.2]);
+//! # Ok::<(), palpate_input::error::Invalid>(())
+//! ```
 
 pub mod arm;
 pub mod definition;

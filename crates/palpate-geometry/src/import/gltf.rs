@@ -74,9 +74,12 @@ fn root(json: &[u8]) -> Result<Root, Invalid> {
     })
 }
 
+/// A node with its pose.
+type PlacedNode = (Index<Node>, Matrix4<f64>);
+
 /// The nodes of the scene, parents before children, each with its pose in our upright frame S: the
 /// point p of a node N is `x_sn` p in S.
-fn placed_nodes(root: &Root) -> Result<Vec<(Index<Node>, Matrix4<f64>)>, Invalid> {
+fn placed_nodes(root: &Root) -> Result<Vec<PlacedNode>, Invalid> {
     let roots = match root.scene {
         Some(scene) => find(&root.scenes, "scene", scene)?.nodes.clone(),
         None => orphans(root)?,

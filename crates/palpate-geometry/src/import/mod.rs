@@ -19,8 +19,11 @@ mod stl;
 
 use source::{BYTES_MAX, Source};
 
+/// A reader of a format.
+type Read = fn(&Source) -> Result<RawMesh, Invalid>;
+
 /// Extensions, in lower case, and their readers.
-const FORMATS: &[(&str, fn(&Source) -> Result<RawMesh, Invalid>)] = &[
+const FORMATS: &[(&str, Read)] = &[
     ("obj", obj::read),
     ("gltf", gltf::read),
     ("glb", gltf::read),

@@ -1,9 +1,9 @@
 //! Observed slopes: against values alone, against laws, and against slow twins.
 
-use palpate::gp::kernel::{Hyperparameters, KERNELS, Kernel};
-use palpate::gp::likelihood::Likelihood;
-use palpate::gp::posterior::Scratch;
-use palpate::gp::{Mean, NoiseRatio, Observation, Observations, Posterior, Scale, Slope};
+use palpate_gp::kernel::{Hyperparameters, KERNELS, Kernel};
+use palpate_gp::likelihood::Likelihood;
+use palpate_gp::posterior::Scratch;
+use palpate_gp::{Mean, NoiseRatio, Observation, Observations, Posterior, Scale, Slope};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 

@@ -1,10 +1,10 @@
 //! A posterior through a few of its touches is what its equations say, and near the exact one.
 
 use nalgebra::{DMatrix, DVector};
-use palpate::gp::covariance::CovarianceError;
-use palpate::gp::inducing::Induced;
-use palpate::gp::kernel::{Hyperparameters, Kernel, Matern52, SquaredExponential};
-use palpate::gp::{Observations, Posterior};
+use palpate_gp::covariance::CovarianceError;
+use palpate_gp::inducing::Induced;
+use palpate_gp::kernel::{Hyperparameters, Kernel, Matern52, SquaredExponential};
+use palpate_gp::{Observations, Posterior};
 
 const KERNELS: [&dyn Kernel; 2] = [&SquaredExponential, &Matern52];
 

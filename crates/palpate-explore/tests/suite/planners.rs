@@ -1,18 +1,17 @@
 //! Planners against what they promise.
 
 use nalgebra::{Point3, Vector3};
-use palpate::experiment::Experiment;
-use palpate::explore::belief::{Belief, HeightField};
-use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::planner;
-use palpate::explore::planner::{PLANNERS, Plan, PlanningSettings, Stall};
-use palpate::explore::probe::{Contact, Touch};
-use palpate::gp::Posterior;
-use palpate::gp::kernel::SquaredExponential;
-use palpate::gp::posterior::Scratch;
-use palpate::gp::reduction::Reduction;
-use palpate::math::seed;
-use palpate::task::Zone;
+use palpate_explore::belief::{Belief, HeightField};
+use palpate_explore::gp_settings::GpSettings;
+use palpate_explore::planner;
+use palpate_explore::planner::{PLANNERS, Plan, PlanningSettings, Stall};
+use palpate_explore::probe::{Contact, Touch};
+use palpate_explore::task::Zone;
+use palpate_gp::Posterior;
+use palpate_gp::kernel::SquaredExponential;
+use palpate_gp::math::seed;
+use palpate_gp::posterior::Scratch;
+use palpate_gp::reduction::Reduction;
 use rand::RngExt;
 
 const SQUARE: Zone = Zone { datum_y_m: Some(-0.6), ..Zone::new([-0.05, 0.05], Some([0.4, 0.52])) };
@@ -294,14 +293,4 @@ fn grid_goes_from_coarse_to_fine() {
         let same = |other: &&Vec<f64>| SQUARE.distance(&place, other) < 1e-9;
         assert_eq!(places.iter().filter(same).count(), 1, "{place:?}");
     }
-}
-
-/// As `resolved.toml` of version 0.1 holds them.
-#[test]
-fn settings_of_removed_planners_are_read_and_ignored() {
-    let load = |sets: &[String]| Experiment::load("experiments/toy.toml".as_ref(), sets).unwrap();
-    assert_eq!(
-        load(&["planning.pi.margin=0.01".into(), "planning.ei.margin=0.5".into()]),
-        load(&[])
-    );
 }

@@ -3,9 +3,9 @@
 //! The curve is the toy of Yi et al. (IROS 2016), a wave on [-1, 1] and flat outside; places and
 //! heights are metres. Run it with `cargo run --example gp_alone`.
 
-use palpate::gp::covariance::CovarianceError;
-use palpate::gp::kernel::SquaredExponential;
-use palpate::gp::{Mean, Observations, Posterior, SearchBox, TouchNoise};
+use palpate_gp::covariance::CovarianceError;
+use palpate_gp::kernel::SquaredExponential;
+use palpate_gp::{Mean, Observations, Posterior, SearchBox, TouchNoise};
 
 fn toy_m(x_m: f64) -> f64 {
     let wave = if x_m.abs() <= 1.0 { (4.0 * std::f64::consts::PI * x_m).sin() } else { 0.0 };

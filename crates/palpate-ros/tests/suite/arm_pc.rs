@@ -1,9 +1,9 @@
 //! The layer between network and servos: what it takes, and how it stops.
 
-use palpate::ros::joints::JointNames;
-use palpate::ros::message::{JointTrajectory, JointTrajectoryPoint};
-use palpate::ros::transport::Packet;
-use palpate::ros::twin::arm_pc::ArmPc;
+use palpate_ros::joints::JointNames;
+use palpate_ros::message::{JointTrajectory, JointTrajectoryPoint};
+use palpate_ros::transport::Packet;
+use palpate_ros::twin::arm_pc::ArmPc;
 use proptest::prelude::*;
 
 const PERIOD_S: f64 = 0.002;
@@ -117,11 +117,11 @@ fn emergency_stop_and_dead_man_switch_stop_at_once_and_hold_softly() {
 fn command(joint_names: &[&str], velocities: &[f64]) -> Packet {
     let point = JointTrajectoryPoint {
         velocities: velocities.into(),
-        time_from_start: palpate::ros::message::Duration::from_s(VALID_S),
+        time_from_start: palpate_ros::message::Duration::from_s(VALID_S),
         ..JointTrajectoryPoint::default()
     };
     Packet::Command(JointTrajectory {
-        header: palpate::ros::message::Header::new(0.102, ""),
+        header: palpate_ros::message::Header::new(0.102, ""),
         joint_names: joint_names.iter().map(|name| (*name).into()).collect(),
         points: vec![point],
     })

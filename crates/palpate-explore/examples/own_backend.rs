@@ -4,19 +4,21 @@
 //! own_backend` explores the wall and says how well the belief knows it.
 
 use nalgebra::{Point3, Vector3};
-use palpate::backend::{Backend, Capabilities, Command, Fault, IdealContact, Reading, Sample};
-use palpate::explore::belief::{Belief, HeightField};
-use palpate::explore::gp_settings::GpSettings;
-use palpate::explore::planner;
-use palpate::explore::planner::PlanningSettings;
-use palpate::explore::probe::servo::Servo;
-use palpate::explore::probe::{Probe, Touch};
-use palpate::math::seed;
-use palpate::robot::arm::Chain;
-use palpate::robot::arm::stage::stage;
-use palpate::robot::{Finger, Robot};
-use palpate::task::touch::TouchSettings;
-use palpate::task::{Task, Zone};
+use palpate_explore::backend::{
+    Backend, Capabilities, Command, Fault, IdealContact, Reading, Sample,
+};
+use palpate_explore::belief::{Belief, HeightField};
+use palpate_explore::gp_settings::GpSettings;
+use palpate_explore::planner;
+use palpate_explore::planner::PlanningSettings;
+use palpate_explore::probe::servo::Servo;
+use palpate_explore::probe::{Probe, Touch};
+use palpate_explore::robot::arm::Chain;
+use palpate_explore::robot::arm::stage::stage;
+use palpate_explore::robot::{Finger, Robot};
+use palpate_explore::task::touch::TouchSettings;
+use palpate_explore::task::{Task, Zone};
+use palpate_gp::math::seed;
 
 /// A wall that leans: y = 0.1·x + 0.2·z.
 fn wall_y_m(x_m: f64, z_m: f64) -> f64 {
@@ -84,7 +86,7 @@ impl Backend for Slides {
 }
 
 /// What is explored, and with what.
-pub fn task_and_robot() -> Result<(Task, Robot), palpate::error::Invalid> {
+pub fn task_and_robot() -> Result<(Task, Robot), palpate_input::error::Invalid> {
     let finger = Finger { length_m: 0.0, ..Finger::default() };
     let mut zone = Zone::new([-0.05, 0.05], Some([-0.05, 0.05]));
     // Depths run along the approach: the wall is somewhere between y = 0.03 and y = −0.03.

@@ -1,6 +1,6 @@
 //! The force sensor over UDP, against a sensor that speaks as the manual says.
 
-use palpate::ros::net_ft::{NetFt, NetFtSettings, record};
+use palpate_ros::net_ft::{NetFt, NetFtSettings, record};
 use proptest::prelude::*;
 use std::net::UdpSocket;
 use std::sync::mpsc::channel;

@@ -1,7 +1,7 @@
 //! Definitions of messages against the standard ones.
 
-use palpate::ros::definition::{Definition, Described};
-use palpate::ros::message::*;
+use palpate_ros::definition::{Definition, Described};
+use palpate_ros::message::*;
 use std::collections::BTreeMap;
 
 /// The types of fields that are no messages.

@@ -1,8 +1,8 @@
 //! DIRECT asks for the places that NLopt's asks for; climbs reach their tops with few steps.
 
-use palpate::math::climb::{Climb, Manner, climb};
-use palpate::math::direct::direct;
-use palpate::math::optimize::{Bounds, Stop};
+use palpate_gp::math::climb::{Climb, Manner, climb};
+use palpate_gp::math::direct::direct;
+use palpate_gp::math::optimize::{Bounds, Stop};
 
 const BOX: Bounds = Bounds { lower: &[-2.0, -2.0], upper: &[2.0, 2.0] };
 const MANNER: Manner = Manner { first_step: 0.05, gain: 1e-9, relative_gain: 0.0, budget: 200 };

@@ -1,10 +1,10 @@
 //! The Gaussian process against values to 80 digits, against laws, and against slow twins.
 
 use nalgebra::{DMatrix, DVector, Dyn, linalg::Cholesky};
-use palpate::gp::kernel::{Hyperparameters, SquaredExponential};
-use palpate::gp::likelihood::Likelihood;
-use palpate::gp::posterior::Scratch;
-use palpate::gp::{
+use palpate_gp::kernel::{Hyperparameters, SquaredExponential};
+use palpate_gp::likelihood::Likelihood;
+use palpate_gp::posterior::Scratch;
+use palpate_gp::{
     LogNormal, Mean, NoiseRatio, Observation, Observations, Posterior, Range, Scale, Slope,
 };
 use proptest::prelude::*;

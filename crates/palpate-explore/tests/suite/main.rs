@@ -1,0 +1,3 @@
+//! Tests of the explorer, in one program.
+
+mod planners;

@@ -1,0 +1,4 @@
+//! Tests of mesh files, in one program.
+
+mod gltf_sample;
+mod import;
