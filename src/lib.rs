@@ -14,12 +14,12 @@
 //! | [`experiment`] | experiment, trial, runner, store, measures, statistics, ground truth |
 //! | [`sim`] | scene, object, effects, physics of the finger, simulated bodies |
 //!
-//! A program for a robot needs none of it. It uses the packages below, which do not depend on this one,
-//! so that the explorer cannot see the ground truth:
+//! A program for a robot needs none of it. It uses the packages below, which do not depend on this
+//! one, so that the explorer cannot see the ground truth:
 //!
 //! | package | here | content |
 //! |---|---|---|
-//! | `palpate-explore` | [`explore`], [`task`], [`robot`], [`backend`] | belief, planners, servo, interlocks |
+//! | `palpate-explore` | [`explore`], [`task`], [`robot`], [`backend`] | belief, planners, servo |
 //! | `palpate-ros` | [`ros`] | an arm behind topics, its simulated twin, recordings |
 //! | `palpate-gp` | [`gp`], [`math`] | Gaussian-process regression |
 //! | `palpate-geometry` | [`geometry`] | meshes, and where rays and fingers meet them |

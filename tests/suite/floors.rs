@@ -336,5 +336,5 @@ fn imports_are_read_whole() {
         edges[&path("palpate_explore/belief/height_field")]
             .contains(&path("palpate_explore/task/zone"))
     );
-    assert!(edges[&path("experiment/trial")].contains(&path("explore/belief")));
+    assert!(edges[&path("palpate/experiment/trial")].contains(&path("palpate_explore/belief")));
 }

@@ -3,8 +3,8 @@
 //! A [`Belief`](belief::Belief) observes touches; a [`Planner`](planner::Planner) selects the next
 //! target from it; a [`Probe`](probe::Probe) follows the approach to it. A
 //! [`Servo`](probe::servo::Servo) is the probe of a robot: it commands any
-//! [`Backend`](backend::Backend), the trait of a body, through its interlocks. No simulator is among
-//! the dependencies, so that nothing here can see the object.
+//! [`Backend`](backend::Backend), the trait of a body, through its interlocks. No simulator is
+//! among the dependencies, so that nothing here can see the object.
 //!
 //! | module | content |
 //! |---|---|
