@@ -9,6 +9,8 @@ CMAKE := $(DEPS)/bin/cmake
 # Which file of the package does not depend on the Python that fetches it.
 PLATFORM := --platform manylinux_2_28_x86_64 --python-version 3.12 --implementation cp --abi cp312
 FETCH := python3 -m pip download --quiet --no-deps --only-binary=:all: --require-hashes
+# What a program says it was built from; built by cargo alone it says "unknown".
+export PALPATE_COMMIT := $(shell git rev-parse --short=12 HEAD 2>/dev/null || echo unknown)
 PALPATE := target/release/palpate
 VERSION := $(shell sed -n '0,/^version = "\(.*\)"/s//\1/p' Cargo.toml)
 DIST := palpate-$(VERSION)-x86_64-linux
@@ -29,8 +31,8 @@ RIGID := $(filter-out $(SOFT) $(PLANNERS),$(wildcard experiments/paper/*.toml))
 
 paper: setup
 	cargo build --release --locked
-	$(PALPATE) scan scenes/container.toml
-	$(PALPATE) scan scenes/bird.toml
+	$(PALPATE) export scenes/container.toml
+	$(PALPATE) export scenes/bird.toml
 	for experiment in $(RIGID); do $(PALPATE) run $$experiment || exit; done
 
 paper-dynamic: setup

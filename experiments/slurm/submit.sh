@@ -24,7 +24,7 @@ parts=$(seq -f "$out-%g-of-$shards" 1 "$shards")
 sbatch --quiet --wait --dependency="afterok:$array" --kill-on-invalid-dep=yes --job-name=palpate-merge \
     --output="$out-merge.log" "$@" <<EOF || true
 #!/bin/sh
-exec "$palpate" merge "$out" $(echo $parts)
+exec "$palpate" report "$out" --merge $(echo $parts)
 EOF
 if [ ! -s "$out/trials.jsonl" ]; then
     echo "$out: not merged, a shard was lost; the same line goes on ($out-*.log say more)" >&2

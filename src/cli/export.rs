@@ -1,7 +1,10 @@
 //! `palpate export`.
 
+use super::find::{SCENES, find};
 use super::output::Force;
-use super::terminal::{Ending, print};
+use super::prepare::only_with;
+use super::scan::scan;
+use super::terminal::{Ending, Talk, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
 use crate::report::points::Points;
@@ -19,103 +22,156 @@ Examples:
   palpate export runs/bird --planner active --out bird.ply
   palpate export runs/bird --planner random --trial 3 --touches 60 --out bird.obj
   palpate export runs/mug --planner active --grid 128 --out mug.ply
+  palpate export scenes/container.toml --grid 41x51 --out runs/container-scan
 
-Beside FILE.ply or FILE.obj stand FILE.svg, FILE.png and FILE.pdf, the belief beside the true \
+Of a run: beside FILE.ply or FILE.obj stand FILE.svg, FILE.png and FILE.pdf, the belief beside the true \
 surface. In a PLY the standard deviation is the property `sigma_m`; in an OBJ it stands in a \
 comment below its vertex. Both are coloured by it, viridis from 0 to the largest. What the touches make \
 likelier to be no surface than one is left out. Of a run around an object it is the closed surface that is \
 believed; sigma_m is how far it may lie from there along its normal, and error_m stands beside it: how far it lies \
-from the true surface, negative inside.")]
+from the true surface, negative inside.
+
+Of a scene: a grid of targets is touched, and FOLDER holds cloud.ply (points of contact with normals), \
+cloud.csv (also targets that were missed), scan.svg, scan.png and scan.pdf (the object beside the cloud). Ctrl-C stops \
+it without writing anything; the files do not depend on the number of threads.")]
 pub(super) struct Args {
-    /// A run's folder.
-    run: PathBuf,
-    /// Whose belief.
+    /// A run's folder, a scene (.toml) with an object, or the name of one in scenes/.
+    path: PathBuf,
+    /// Of a run: whose belief.
     #[arg(long)]
-    planner: String,
-    /// Of which trial.
+    planner: Option<String>,
+    /// Of a run: of which trial.
     #[arg(long, default_value_t = 0)]
     trial: u32,
-    /// After how many touches [default: all].
+    /// Of a run: after how many touches [default: all].
     #[arg(long)]
     touches: Option<u32>,
-    /// Where to: a .ply or .obj file.
-    #[arg(long, value_name = "FILE")]
-    out: PathBuf,
-    /// Vertices along each side of the zone [default: the experiment's grid]; around an object,
-    /// cells along the surface's longest side [default: the experiment's gp.cells].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=2001))]
-    grid: Option<u16>,
+    /// Where to: of a run a .ply or .obj file, of a scene a folder [default: runs/SCENE-scan].
+    #[arg(long, value_name = "FILE|FOLDER")]
+    pub(super) out: Option<PathBuf>,
+    /// Of a run: vertices along each side of the zone, or around an object cells along the
+    /// surface's longest side [default: the experiment's grid or gp.cells]. Of a scene: targets
+    /// along x and z [default: square cells, 81 along the longer side].
+    #[arg(long, value_name = "N|NxM", value_parser = grid)]
+    pub(super) grid: Option<Grid>,
+    /// Of a scene: change one setting; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(super) set: Vec<String>,
+    /// Of a scene: threads; 0 means all cores.
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    pub(super) threads: u16,
     #[command(flatten)]
-    force: Force,
+    pub(super) force: Force,
+}
+
+/// Vertices, cells or targets along each side.
+#[derive(Clone, Copy)]
+pub(super) struct Grid(pub(super) [usize; 2]);
+
+/// Most of them along a side.
+const SIDE_MAX: usize = 2001;
+
+fn grid(text: &str) -> Result<Grid, String> {
+    let side = |text: &str| text.parse().ok().filter(|side| (2..=SIDE_MAX).contains(side));
+    let (columns, rows) = text.split_once('x').unwrap_or((text, text));
+    let sides = side(columns).zip(side(rows)).map(|(columns, rows)| Grid([columns, rows]));
+    sides.ok_or(format!("allowed is N, or NxM as in 41x51, each 2 to {SIDE_MAX}"))
+}
+
+impl Args {
+    /// Whose belief is asked for; of nobody's the name is empty.
+    fn planner(&self) -> &str {
+        self.planner.as_deref().unwrap_or_default()
+    }
+
+    /// Vertices or cells along each side of a belief.
+    fn side(&self) -> anyhow::Result<Option<usize>> {
+        let Some(Grid([columns, rows])) = self.grid else { return Ok(None) };
+        ensure!(columns == rows, "--grid {columns}x{rows}: of a run allowed is one number, N");
+        Ok(Some(columns))
+    }
+}
+
+/// Of a run the belief as a mesh, of a scene the contacts of a grid of touches.
+pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+    let is_run = args.path.is_dir();
+    let path = if is_run { args.path.clone() } else { find(&args.path, SCENES)? };
+    let options = [
+        ("--planner", args.planner.is_some(), is_run, "a run's folder"),
+        ("--trial", args.trial != 0, is_run, "a run's folder"),
+        ("--touches", args.touches.is_some(), is_run, "a run's folder"),
+        ("--set", !args.set.is_empty(), !is_run, "a scene (.toml)"),
+        ("--threads", args.threads != 0, !is_run, "a scene (.toml)"),
+    ];
+    only_with(&path, &options)?;
+    if is_run { belief(args) } else { scan(&path, args, talk) }
 }
 
 /// Cells that a belief around an object may be made of, as `gp.cells`.
-const CELLS: std::ops::RangeInclusive<u16> = 8..=256;
+const CELLS: std::ops::RangeInclusive<usize> = 8..=256;
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+fn belief(args: &Args) -> anyhow::Result<Ending> {
+    let out = args.out.as_ref().context("--out FILE: allowed is a file ending in .ply or .obj")?;
     let write: fn(&Points) -> String =
-        match args.out.extension().and_then(|extension| extension.to_str()) {
+        match out.extension().and_then(|extension| extension.to_str()) {
             Some("ply") => Points::ply,
             Some("obj") => Points::obj,
-            _ => bail!("--out {}: allowed is a file ending in .ply or .obj", args.out.display()),
+            _ => bail!("--out {}: allowed is a file ending in .ply or .obj", out.display()),
         };
-    args.force.claim_all(&args.out, &files::FORMATS)?;
-    let mut run = Run::read(&args.run)?;
+    args.force.claim_all(out, &files::FORMATS)?;
+    let mut run = Run::read(&args.path)?;
     let is_around = run.experiment.scene.around.is_some();
     ensure!(
         run.experiment.scene.zone.as_ref().is_none_or(|zone| zone.z_m.is_some()),
         "{} explored a curve, which has no mesh; its figures show it",
-        args.run.display()
+        args.path.display()
     );
     let touches = chosen(&run, args)?;
     // The run's own figure of beliefs, of this one only.
     run.experiment.report = ReportSettings {
         touch_counts: vec![touches],
         trial: args.trial,
-        planners: vec![args.planner.clone()],
+        planners: args.planner.clone().into_iter().collect(),
         ..ReportSettings::default()
     };
     let (mesh, score) =
         if is_around { closed(&mut run, args, touches)? } else { over_zone(&run, args, touches)? };
-    write_whole(&args.out, write(&mesh))?;
+    write_whole(out, write(&mesh))?;
     let figure = if is_around { figures::SOLIDS } else { figures::SURFACES };
     if let Some(svg) = (figure.draw)(&run)? {
-        files::write(&args.out, &svg)?;
+        files::write(out, &svg)?;
     }
     let score = if score.is_empty() { score } else { format!("; {score}") };
     let largest_m = mesh.deviations.iter().map(|(sd_m, _)| *sd_m).fold(0.0, f64::max);
     print(&format!(
         "{}: {} vertices, {} triangles, sigma up to {:.3} mm{score}\npicture: {}",
-        args.out.display(),
+        out.display(),
         mesh.points.len(),
         mesh.triangles.len(),
         1e3 * largest_m,
-        args.out.with_extension("png").display()
+        out.with_extension("png").display()
     ))?;
     Ok(Ending::Done)
 }
 
 /// The closed surface believed of an object, and how near it is to the truth.
 fn closed(run: &mut Run, args: &Args, touches: u32) -> anyhow::Result<(Points, String)> {
-    if let Some(cells) = args.grid {
+    if let Some(cells) = args.side()? {
         ensure!(
             CELLS.contains(&cells),
             "--grid {cells}: around an object allowed are {} to {} cells",
             CELLS.start(),
             CELLS.end()
         );
-        run.experiment.space.cells = cells.into();
+        run.experiment.space.cells = u32::try_from(cells)?;
     }
-    let of = || format!("{} had no fit after {touches} touches", args.planner);
-    let row = replay::row(run, &args.planner).with_context(of)?;
+    let planner = args.planner();
+    let of = || format!("{planner} had no fit after {touches} touches");
+    let row = replay::row(run, planner).with_context(of)?;
     let truth = whole::truth(run);
     let frame = whole::frame(&run.experiment, row, touches, truth.as_ref(), usize::MAX)?;
     let frame = frame.with_context(of)?;
-    ensure!(
-        !frame.mesh.1.is_empty(),
-        "{} believed in no surface after {touches} touches",
-        args.planner
-    );
+    ensure!(!frame.mesh.1.is_empty(), "{planner} believed in no surface after {touches} touches");
     let mut comments = vec![
         whose(run, args, touches),
         "sigma_m: how far the surface may lie from there, along its normal".into(),
@@ -128,9 +184,10 @@ fn closed(run: &mut Run, args: &Args, touches: u32) -> anyhow::Result<(Points, S
 
 /// The belief over a zone, and how near it is to the truth.
 fn over_zone(run: &Run, args: &Args, touches: u32) -> anyhow::Result<(Points, String)> {
-    let replay = Replay::new(run, &args.planner, touches)?
-        .with_context(|| format!("{} had no fit after {touches} touches", args.planner))?;
-    let grid = args.grid.map_or(run.experiment.grid as usize, usize::from);
+    let planner = args.planner();
+    let replay = Replay::new(run, planner, touches)?
+        .with_context(|| format!("{planner} had no fit after {touches} touches"))?;
+    let grid = args.side()?.unwrap_or(run.experiment.grid as usize);
     Ok((mesh(run, args, &replay, grid), replay.score()))
 }
 
@@ -139,7 +196,7 @@ fn whose(run: &Run, args: &Args, touches: u32) -> String {
     format!(
         "Palpate {}: belief of {} in trial {} of {} after {touches} touches",
         env!("CARGO_PKG_VERSION"),
-        args.planner,
+        args.planner(),
         args.trial,
         run.experiment.name,
     )
@@ -147,14 +204,14 @@ fn whose(run: &Run, args: &Args, touches: u32) -> String {
 
 /// The touch count asked for, if the run has what is asked for.
 fn chosen(run: &Run, args: &Args) -> anyhow::Result<u32> {
-    let Args { planner, trial, .. } = args;
+    let (planner, trial) = (args.planner(), &args.trial);
     let planners = &run.experiment.planners;
     ensure!(
-        planners.contains(planner),
+        planners.iter().any(|known| known == planner),
         "--planner {planner}: this run has {}",
         planners.join(", ")
     );
-    let rows = || run.rows.iter().filter(|row| row.planner == *planner);
+    let rows = || run.rows.iter().filter(|row| row.planner == planner);
     let Some(row) = rows().find(|row| row.trial == *trial) else {
         match (rows().map(|row| row.trial).min(), rows().map(|row| row.trial).max()) {
             (Some(first), Some(last)) => {

@@ -12,9 +12,10 @@ pub(super) struct KnownBodyArgs {
     /// A plate with this normal, towards the finger, in W.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers, requires = "at", allow_hyphen_values = true)]
     plate: Option<[f64; 3]>,
-    /// Where the ball's centre or a point of the plate is, in W.
+    /// Where the ball's centre or a point of the plate is, in W; of a cloud where the mesh's origin
+    /// stands at first, in the cloud's frame.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers, allow_hyphen_values = true)]
-    at: Option<[f64; 3]>,
+    pub(super) at: Option<[f64; 3]>,
 }
 
 /// Radii that a finger can touch all around.

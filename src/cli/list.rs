@@ -39,7 +39,7 @@ enum Kind {
 type Lister = fn() -> Vec<[String; 2]>;
 const KINDS: &[(Kind, &str, Lister)] = &[
     (Kind::Experiments, "experiments (palpate run NAME)", experiments),
-    (Kind::Scenes, "scenes (palpate scan NAME, watch, accuracy)", scenes),
+    (Kind::Scenes, "scenes (palpate show NAME, export, accuracy)", scenes),
     (Kind::Planners, "planners (planners = [\"NAME\"])", planners),
     (Kind::Measures, "measures", measures),
     (Kind::Effects, "effects ([effects.NAME])", effects),

@@ -12,7 +12,6 @@ mod find;
 mod host;
 mod known_body;
 mod list;
-mod merge;
 mod new;
 mod output;
 mod patience;
@@ -21,6 +20,7 @@ mod prepare;
 mod progress;
 mod reference;
 mod register;
+mod renamed;
 mod replay;
 mod report;
 mod run;
@@ -54,10 +54,10 @@ Examples:
   palpate run experiments/bird.toml --set trials=4 --set planners='[\"active\"]'
   palpate report runs/toy                   draw the figures again, without running
   palpate show my-part.obj --unit mm        check a mesh before exploring it
-  palpate scan scenes/bird.toml             touch the whole zone, write a point cloud
-  palpate watch scenes/bird_pa10.toml       watch a trial in a window
+  palpate show scenes/bird_pa10.toml --watch    a trial in a window
   palpate twin experiments/container_pa10.toml   a stand-in for the real arm, over ROS 2
   palpate export runs/bird --planner active --out bird.ply
+  palpate export scenes/bird.toml           touch the whole zone, write a point cloud
   palpate run experiments/suite/six.toml    planners on objects that differ: who is better where
   palpate check toy --baseline experiments/baselines/toy.jsonl
   palpate accuracy scenes/bird_finger.toml --tolerance 0.2mm
@@ -71,42 +71,68 @@ enum Command {
     New(new::Args),
     /// Run an experiment: planners × trials, then its report.
     Run(run::Args),
-    /// Run a recorded trial again on what was read then, and compare.
-    Replay(replay::Args),
-    /// Say what each shard of an experiment will take.
-    Plan(plan::Args),
-    /// Put the shards of a run together.
-    Merge(merge::Args),
-    /// Hold planners against each other over several runs.
-    Compare(compare::Args),
-    /// Draw a run's figures and page again from its rows.
+    /// Draw a run's figures and page again from its rows; put shards together.
     Report(report::Args),
-    /// Say what a mesh, scene, experiment or run folder holds.
+    /// Say what a mesh, scene, experiment or run folder holds; watch a trial in a window.
     Show(show::Args),
-    /// Touch a grid of targets, and write the points of contact as a cloud.
-    Scan(scan::Args),
-    /// Watch a trial in a window while it runs.
-    Watch(watch::Args),
-    /// Serve a simulated arm over a laboratory's topics in real time.
-    Twin(twin::Args),
-    /// Write a belief of a run as a mesh.
+    /// Write a run's belief as a mesh, or a scene's contacts as a point cloud.
     Export(export::Args),
-    /// Hold planners against what they were: better, ok, worse, or undecided.
+    /// Compare planners over several runs.
+    Compare(compare::Args),
+    /// Test planners against a baseline: better, ok, worse, or undecided.
     Check(check::Args),
     /// Show what accuracy costs: error and time of a scene's levels and effects.
     Accuracy(accuracy::Args),
+    /// Serve a simulated arm over a laboratory's topics in real time.
+    Twin(twin::Args),
+    /// Find by touch where the finger, a ball, a plate or an object stands.
+    Register(register::Args),
+    /// Run a recorded trial again on what was read then, and compare.
+    Replay(replay::Args),
+    /// Fit the finger's constants to recordings of it on a flat plate.
+    Calibrate(calibrate::Args),
     /// List experiments, scenes, planners, measures and effects.
     List(list::Args),
     /// Print a script with which a shell completes commands.
     Completions(completions::Args),
-    /// Find by touch where the finger stands on its mount, and a ball or plate in the world.
-    Register(register::Args),
-    /// Lay a cloud of contacts onto a mesh: where the object stands.
-    Align(align::Args),
     /// Print every command, setting and column as Markdown.
     Reference(reference::Args),
-    /// Fit the finger's constants to recordings of it on a flat plate.
-    Calibrate(calibrate::Args),
+}
+
+/// What the help lists commands under; those of no group stand under the last.
+const GROUPS: [(&str, &[&str]); 4] = [
+    ("Explore", &["new", "run", "report", "show", "export"]),
+    ("Judge", &["compare", "check", "accuracy"]),
+    ("Laboratory", &["twin", "register", "replay", "calibrate"]),
+    ("More", &[]),
+];
+
+/// The program's commands and options, with help that names commands by group.
+fn command() -> clap::Command {
+    let command = Cli::command().mut_subcommand("run", |run| {
+        let planners = list::indented(&list::planners());
+        run.after_help(format!("{}\n\nPlanners:\n{}", run::EXAMPLES, planners.trim_end()))
+    });
+    let header = *command.get_styles().get_header();
+    let named: Vec<[String; 2]> = (command.get_subcommands())
+        .map(|each| {
+            [each.get_name().into(), each.get_about().map(ToString::to_string).unwrap_or_default()]
+        })
+        .collect();
+    let is_in = |names: &[&str], name: &str| names.contains(&name);
+    let section = |(title, names): &(&str, &[&str])| {
+        let is_last = names.is_empty();
+        let is_here = |name: &str| match is_last {
+            true => !GROUPS.iter().any(|(_, names)| is_in(names, name)),
+            false => is_in(names, name),
+        };
+        let own: Vec<_> = named.iter().filter(|[name, _]| is_here(name)).cloned().collect();
+        format!("{header}{title}:{header:#}\n{}\n", list::indented(&own))
+    };
+    let commands: String = GROUPS.iter().map(section).collect();
+    command.help_template(format!(
+        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{commands}{header}Options:{header:#}\n{{options}}{{after-help}}"
+    ))
 }
 
 /// Runs the program, which was built from `commit`, on the process's arguments.
@@ -117,34 +143,14 @@ pub fn main(commit: &str) -> ExitCode {
 /// Runs the program on `arguments`, of which the first is its name, for a host; returns its exit
 /// code.
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> u8 {
-    let command = Cli::command().mut_subcommand("run", |run| {
-        let planners = list::indented(&list::planners());
-        run.after_help(format!("{}\n\nPlanners:\n{}", run::EXAMPLES, planners.trim_end()))
+    let outcome = renamed::today(arguments.into_iter().collect()).and_then(|(arguments, note)| {
+        let cli = Cli::from_arg_matches(&command().get_matches_from(arguments))
+            .unwrap_or_else(|error| error.exit());
+        if let Some(note) = note {
+            cli.talk.note(note);
+        }
+        run_command(cli, host)
     });
-    let cli = Cli::from_arg_matches(&command.get_matches_from(arguments))
-        .unwrap_or_else(|error| error.exit());
-    let outcome = match cli.command {
-        Command::New(args) => new::run(&args),
-        Command::Run(args) => run::run(&args, cli.talk, host),
-        Command::Replay(args) => replay::run(&args, cli.talk),
-        Command::Plan(args) => plan::run(&args, cli.talk),
-        Command::Merge(args) => merge::run(&args, host),
-        Command::Compare(args) => compare::run(&args),
-        Command::Report(args) => report::run(&args),
-        Command::Show(args) => show::run(&args, cli.talk),
-        Command::Scan(args) => scan::run(&args, cli.talk),
-        Command::Watch(args) => watch::run(&args, cli.talk),
-        Command::Twin(args) => twin::run(&args, cli.talk),
-        Command::Export(args) => export::run(&args),
-        Command::Accuracy(args) => accuracy::run(&args, cli.talk),
-        Command::Check(args) => check::run(&args, cli.talk),
-        Command::Register(args) => register::run(&args, cli.talk),
-        Command::Align(args) => align::run(&args, cli.talk),
-        Command::Calibrate(args) => calibrate::run(&args),
-        Command::List(args) => list::run(&args),
-        Command::Completions(args) => completions::run(&args, Cli::command()),
-        Command::Reference(_) => print(reference().trim_end()).map(|()| Ending::Done),
-    };
     match outcome {
         Ok(Ending::Done) => 0,
         Ok(Ending::Failed) => 1,
@@ -154,6 +160,26 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>, host: &Host) -> 
             terminal::error(format!("{error:#}"));
             2
         }
+    }
+}
+
+fn run_command(Cli { talk, command }: Cli, host: &Host) -> anyhow::Result<Ending> {
+    match command {
+        Command::New(args) => new::run(&args),
+        Command::Run(args) => run::run(&args, talk, host),
+        Command::Report(args) => report::run(&args, host),
+        Command::Show(args) => show::run(&args, talk),
+        Command::Export(args) => export::run(&args, talk),
+        Command::Compare(args) => compare::run(&args),
+        Command::Check(args) => check::run(&args, talk),
+        Command::Accuracy(args) => accuracy::run(&args, talk),
+        Command::Twin(args) => twin::run(&args, talk),
+        Command::Register(args) => register::run(&args, talk),
+        Command::Replay(args) => replay::run(&args, talk),
+        Command::Calibrate(args) => calibrate::run(&args),
+        Command::List(args) => list::run(&args),
+        Command::Completions(args) => completions::run(&args, Cli::command()),
+        Command::Reference(_) => print(reference().trim_end()).map(|()| Ending::Done),
     }
 }
 

@@ -1,37 +1,13 @@
-//! `palpate plan`.
+//! `palpate run --plan`: how long each shard of an experiment takes.
 
 use super::columns::{aligned, duration};
-use super::find::{EXPERIMENTS, find};
-use super::prepare::{bound_threads, simulation};
+use super::prepare::simulation;
 use super::progress::stop_on_interrupt;
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::Experiment;
 use crate::experiment::runner::{self, Shard};
-use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
-
-#[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  palpate plan bird --shards 8
-  palpate plan bird --shards 8 --threads 16 --set trials=1000
-
-Runs a few trials of every planner on as many threads, and says what each shard of `palpate run --shard I/N` will \
-take: on this machine, alone.")]
-pub(super) struct Args {
-    /// An experiment (.toml), or the name of one in experiments/.
-    experiment: PathBuf,
-    /// In how many shards it is run.
-    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    shards: u32,
-    /// Threads of each shard; 0 means all cores.
-    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
-    threads: u16,
-    /// Change one setting; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-}
 
 /// Trials of each planner that are tried for each thread; chosen: the first and last of a batch
 /// leave threads idle, and more of them less so.
@@ -40,15 +16,20 @@ const TRIED: usize = 3;
 /// Bytes in the units of `/proc`.
 const KIB: f64 = 1024.0;
 
-pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
-    let experiment = Experiment::load(&find(&args.experiment, EXPERIMENTS)?, &args.set)?;
-    bound_threads(args.threads)?;
+/// Runs a few trials of every planner on `threads` threads, 0 for all cores, and prints what each of
+/// `shards` shards will take on this machine.
+pub(super) fn plan(
+    experiment: Experiment,
+    shards: u32,
+    threads: u16,
+    talk: Talk,
+) -> anyhow::Result<Ending> {
     let begun = Instant::now();
     let simulation = simulation(experiment, talk)?;
     let set_up_s = begun.elapsed().as_secs_f64();
     let experiment = simulation.experiment();
     let stop = stop_on_interrupt("trials")?;
-    let threads = match args.threads {
+    let threads = match threads {
         0 => std::thread::available_parallelism().map_or(1, usize::from),
         threads => threads.into(),
     };
@@ -63,11 +44,11 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     let each_s = begun.elapsed().as_secs_f64() / tried as f64;
     let memory = peak_bytes().map_or("–".into(), |bytes| format!("{:.0} MB", 1e-6 * bytes));
     let mut lines = vec![["shard", "trials", "time", "memory"].map(String::from)];
-    for index in 1..=args.shards {
+    for index in 1..=shards {
         let mut own = all.clone();
-        Shard { index, count: args.shards }.keep(&mut own);
+        Shard { index, count: shards }.keep(&mut own);
         let time_s = set_up_s + each_s * own.len() as f64;
-        let shard = format!("{index}/{}", args.shards);
+        let shard = format!("{index}/{}", shards);
         lines.push([shard, own.len().to_string(), duration(time_s), memory.clone()]);
     }
     print(&format!(

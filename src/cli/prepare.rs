@@ -6,7 +6,7 @@ use super::terminal::Talk;
 use crate::experiment::{Experiment, Simulation};
 use crate::sim::simulator::Simulator;
 use crate::sim::{Environment, Scene};
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use palpate_ros::arm::Lab;
 use std::path::Path;
 use std::sync::Arc;
@@ -39,6 +39,16 @@ pub(super) fn needs_zone(scene: &Scene, path: &Path) -> anyhow::Result<()> {
         path.display()
     );
     Ok(())
+}
+
+/// Refuses an option that goes with another kind of file or folder than `path`: each is its name,
+/// whether it is given, whether it goes with this kind, and with what it goes.
+pub(super) fn only_with(path: &Path, options: &[(&str, bool, bool, &str)]) -> anyhow::Result<()> {
+    let refused = options.iter().find(|(_, is_given, is_allowed, _)| *is_given && !is_allowed);
+    match refused {
+        Some((option, _, _, what)) => bail!("{}: {option} goes with {what}", path.display()),
+        None => Ok(()),
+    }
 }
 
 /// Makes an environment ready for bodies.

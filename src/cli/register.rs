@@ -1,5 +1,6 @@
 //! `palpate register`.
 
+use super::align::{Cloud, align};
 use super::find::{SCENES, find};
 use super::known_body::KnownBodyArgs;
 use super::output::Force;
@@ -25,16 +26,20 @@ Examples:
   palpate register scenes/container_pa10.toml --ball 0.02 --at 0,-0.65,0.5
   palpate register scenes/container_pa10.toml --plate 0,1,0 --at 0,-0.65,0.5 --touches 60
   palpate register experiments/real_arm.toml --ball 0.02 --at 0,-0.65,0.5
+  palpate register models/container.obj --unit mm --cloud runs/container-scan/cloud.ply --at 0,-0.65,0.5
 
 Touches the ball or plate from many sides with many places of the finger, and writes registration.toml: \
-arm.tool_position_m and arm.tool_rotation_deg for the scene, where the body stands, and how sure each is.")]
+arm.tool_position_m and arm.tool_rotation_deg for the scene, where the body stands, and how sure each is. With --cloud nothing is touched: the contacts are laid onto the object's mesh, and \
+align.toml holds object.position_m and object.rotation_deg for a scene, and how sure they are.")]
 pub(super) struct Args {
     /// A scene with an arm, or an experiment (.toml), whose [backend] says which arm, or the name
-    /// of one.
+    /// of one; with --cloud the object's mesh (.obj, .gltf, .glb, .stl, .ply).
     file: PathBuf,
     /// What is touched, and where to about 1 cm.
     #[command(flatten)]
     body: KnownBodyArgs,
+    #[command(flatten)]
+    cloud: Cloud,
     /// How many touches.
     #[arg(long, default_value_t = 40, value_name = "N", value_parser = clap::value_parser!(u16).range(12..=1000))]
     touches: u16,
@@ -47,15 +52,21 @@ pub(super) struct Args {
     /// Change one setting; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The file to write.
-    #[arg(long, value_name = "FILE", default_value = "registration.toml")]
-    out: PathBuf,
+    /// The file to write [default: registration.toml, with --cloud align.toml].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
     #[command(flatten)]
     force: Force,
 }
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
-    args.force.claim(&args.out)?;
+    let name = if args.cloud.cloud.is_some() { "align.toml" } else { "registration.toml" };
+    let out = args.out.clone().unwrap_or_else(|| name.into());
+    args.force.claim(&out)?;
+    if let Some(cloud) = &args.cloud.cloud {
+        let position_m = args.body.at.unwrap_or_default();
+        return align((&args.file, cloud), position_m, &args.cloud, &out, talk);
+    }
     let path = find(&args.file, SCENES)?;
     let (scene, settings) = match is_experiment(&path) {
         true => {
@@ -94,7 +105,7 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         env!("CARGO_PKG_VERSION"),
         found.tables(before)
     );
-    write_whole(&args.out, &text)?;
-    print(&format!("{text}\nfile: {}", args.out.display()))?;
+    write_whole(&out, &text)?;
+    print(&format!("{text}\nfile: {}", out.display()))?;
     Ok(Ending::Done)
 }

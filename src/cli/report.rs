@@ -1,5 +1,6 @@
 //! `palpate report`.
 
+use super::host::Host;
 use super::terminal::{Ending, print};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{self, Run};
@@ -10,17 +11,28 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   palpate report runs/toy
-  palpate report runs/toy --set report.trial=3 --set report.baselines='[\"sobol\"]'")]
+  palpate report runs/toy --set report.trial=3 --set report.baselines='[\"sobol\"]'
+  palpate report runs/toy --merge runs/toy-*-of-8            of the shards of palpate run toy --shard I/8
+
+Merged rows are the bytes of a run in one process. A trial that stands in two shards or in none, or a shard of another \
+experiment, is refused.")]
 pub(super) struct Args {
-    /// A run's folder.
+    /// A run's folder; with --merge a new one.
     folder: PathBuf,
+    /// First put the run folders of these shards together.
+    #[arg(long, value_name = "SHARD", num_args = 1..)]
+    merge: Vec<PathBuf>,
     /// Change what is shown, from now on: `report.…` or `question`, and a TOML value; may be
     /// repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
 
-pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
+pub(super) fn run(args: &Args, host: &Host) -> anyhow::Result<Ending> {
+    if !args.merge.is_empty() {
+        let count = store::merge(&args.folder, &args.merge, host.commit)?;
+        print(&format!("{count} trials in {}", args.folder.display()))?;
+    }
     if !args.set.is_empty() {
         store::set_report(&args.folder, &args.set)?;
     }

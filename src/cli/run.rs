@@ -3,6 +3,7 @@
 use super::compare;
 use super::find::{EXPERIMENTS, find};
 use super::host::Host;
+use super::plan::plan;
 use super::prepare::{bound_threads, ready, simulation};
 use super::progress::{stop_on_interrupt, touch_step, touches_bar};
 use super::terminal::{Ending, Talk, error, print};
@@ -14,7 +15,7 @@ use crate::experiment::sweep::cells;
 use crate::experiment::trial::row::TrialId;
 use crate::report;
 use crate::study::compare::compare;
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use palpate_explore::planner;
 use palpate_input::config::ConfigError;
 use palpate_input::error::Invalid;
@@ -30,7 +31,8 @@ Examples:
   palpate run experiments/toy.toml --out runs/noisy --set gp.noise='[0.01, 1]' --set trials=200
   palpate run runs/toy/resolved.toml --out runs/again    the same run again, to the byte
   palpate run experiments/suite/six.toml                 planners on objects that differ
-  palpate run toy --shard 3/8                            an eighth of the trials: palpate merge
+  palpate run toy --shard 3/8                            an eighth of the trials: palpate report --merge
+  palpate run bird --plan 8 --threads 16                 how long each of 8 shards would take
 
 Press Ctrl-C to stop after the trials in hand; the same command continues where it stopped.
 On a finished run, more trials or other planners are run beside those that are there, and trials or
@@ -61,10 +63,13 @@ pub(super) struct Args {
     /// Throw away what an earlier run left in the folder.
     #[arg(long)]
     fresh: bool,
-    /// Run every N-th trial only, the I-th of N shards, in runs/NAME-I-of-N; `palpate merge` puts
-    /// them together.
+    /// Run every N-th trial only, the I-th of N shards, in runs/NAME-I-of-N; `palpate report
+    /// FOLDER --merge SHARDS` puts them together.
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
+    /// Only try a few trials, and say what each of N shards would take on this machine alone.
+    #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    plan: Option<u32>,
     /// Record every tick of every trial in recordings/PLANNER-TRIAL.mcap of the run's folder.
     #[arg(long)]
     record: bool,
@@ -94,8 +99,16 @@ pub(super) fn run(args: &Args, talk: Talk, host: &Host) -> anyhow::Result<Ending
     if cells.is_empty() {
         let out = args.out.clone();
         let experiment = with_planners(args, |sets| Experiment::load(&path, sets))?;
+        if let Some(shards) = args.plan {
+            return plan(experiment, shards, args.threads, talk);
+        }
         return run_one(args, experiment, out, &mut stop, (talk, host));
     }
+    ensure!(
+        args.plan.is_none(),
+        "{}: --plan goes with an experiment without a [sweep]",
+        path.display()
+    );
     // All of them are looked at before the first is run.
     let load = |cell| with_planners(args, |sets| Experiment::load_cell(&path, cell, sets));
     let experiments = cells.iter().map(load).collect::<Result<Vec<_>, _>>()?;

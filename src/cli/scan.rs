@@ -1,7 +1,7 @@
-//! `palpate scan`.
+//! `palpate export SCENE`: a grid of touches as a cloud of contacts.
 
-use super::find::{SCENES, find};
-use super::output::{Force, make_folder};
+use super::export::Args;
+use super::output::make_folder;
 use super::prepare::{environment, needs_zone, simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
@@ -13,59 +13,22 @@ use crate::sim::Scene;
 use anyhow::Context;
 use palpate_explore::backend::Fault;
 use palpate_explore::probe::Touch;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-#[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  palpate scan scenes/container.toml
-  palpate scan scenes/bird.toml --grid 41x51 --out runs/bird-scan --set finger.radius_m=0.003
-
-Writes cloud.ply (points of contact with normals), cloud.csv (also targets that were missed), \
-scan.svg, scan.png and scan.pdf (the object beside the cloud). Ctrl-C stops it without writing \
-anything; the files do not depend on the number of threads.")]
-pub(super) struct Args {
-    /// A scene (.toml) with an object, or the name of one in scenes/.
-    scene: PathBuf,
-    /// Targets along x and along z [default: square cells, 81 along the longer side].
-    #[arg(long, value_name = "NxM", value_parser = grid)]
-    grid: Option<[usize; 2]>,
-    /// Change one setting of the scene; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// Folder for the files [default: runs/SCENE-scan].
-    #[arg(long, value_name = "FOLDER")]
-    out: Option<PathBuf>,
-    /// Threads; 0 means all cores.
-    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
-    threads: u16,
-    #[command(flatten)]
-    force: Force,
-}
-
-/// Most targets along a side.
-const SIDE_MAX: usize = 2001;
-
-fn grid(text: &str) -> Result<[usize; 2], String> {
-    let side = |text: &str| text.parse().ok().filter(|side| (2..=SIDE_MAX).contains(side));
-    text.split_once('x')
-        .and_then(|(columns, rows)| Some([side(columns)?, side(rows)?]))
-        .ok_or(format!("allowed is NxM, as in 41x51, each 2 to {SIDE_MAX}"))
-}
-
-pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
-    let scene = Scene::load(&find(&args.scene, SCENES)?, &args.set)?;
-    needs_zone(&scene, &args.scene)?;
+/// Touches `grid` targets of the scene at `path`, and writes where they made contact.
+pub(super) fn scan(path: &Path, args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+    let scene = Scene::load(path, &args.set)?;
+    needs_zone(&scene, path)?;
     let environment = environment(scene, talk)?;
     let mesh = environment.mesh().with_context(|| {
-        format!("{} has no object, so there is no surface to scan", args.scene.display())
+        format!("{} has no object, so there is no surface to scan", path.display())
     })?;
     let zone = environment.task().zone();
-    let zone = zone.with_context(|| format!("{} has no [zone] to scan", args.scene.display()))?;
-    let name = args.scene.file_stem().unwrap_or_default().to_string_lossy();
+    let zone = zone.with_context(|| format!("{} has no [zone] to scan", path.display()))?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
     let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(format!("{name}-scan")));
     args.force.claim_folder(&folder, "cloud.ply")?;
-    let grid = args.grid.unwrap_or_else(|| scan::default_grid(zone));
+    let grid = args.grid.map_or_else(|| scan::default_grid(zone), |grid| grid.0);
     let stop = stop_on_interrupt("rows")?;
     let bar = progress_bar(talk, &name, "rows", grid[1] as u64, 0);
     let simulator = simulator(&environment, talk)?;

@@ -1,9 +1,11 @@
 //! `palpate show`.
 
+use super::find::{SCENES, find};
 use super::output::Force;
 use super::patience::with_patience;
-use super::prepare::{environment, simulator};
+use super::prepare::{environment, only_with, simulator};
 use super::terminal::{Ending, Talk, print};
+use super::watch::{Watch, watch};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::notice;
@@ -34,9 +36,15 @@ Examples:
   palpate show scenes/bird_around_pa10.toml --png bird.png   what of a whole object can be touched
   palpate show scenes/bird_pa10.toml --render bird.png       the whole scene with its robot
   palpate show experiments/toy.toml --set seed=1             every setting, defaults included
-  palpate show runs/toy")]
+  palpate show runs/toy
+  palpate show scenes/bird_pa10.toml --watch                 a trial of active in a window
+  palpate show experiments/container_pa10.toml --watch --planner sobol --speed 5
+
+In the window stand arm, finger and object, and a small ball at every contact found. Drag with the mouse to turn and move, \
+F1 lists the keys, Control+Q or closing the window ends the trial. It needs X11 or Wayland with OpenGL.")]
 pub(super) struct Args {
-    /// A mesh (.obj, .gltf, .glb, .stl, .ply), a scene or an experiment (.toml), or a run's folder.
+    /// A mesh (.obj, .gltf, .glb, .stl, .ply), a scene or an experiment (.toml), the name of a scene
+    /// in scenes/, or a run's folder.
     path: PathBuf,
     /// Unit of a mesh file's numbers [default: m].
     #[arg(long, value_name = "UNIT")]
@@ -56,6 +64,8 @@ pub(super) struct Args {
     /// Draw a scene with its robot by MuJoCo (needs a build with `--features render`).
     #[arg(long, value_name = "FILE")]
     render: Option<PathBuf>,
+    #[command(flatten)]
+    watch: Watch,
     /// Print the summary of a run's folder as JSON.
     #[arg(long)]
     json: bool,
@@ -64,48 +74,50 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
-    let extension = args.path.extension().and_then(|extension| extension.to_str());
-    let is_scene = extension == Some("toml") && !is_experiment(&args.path);
+    let path = match args.path.exists() {
+        true => args.path.clone(),
+        false => find(&args.path, SCENES)?,
+    };
+    ensure!(path.exists(), "{}: no such file or folder", path.display());
+    let extension = path.extension().and_then(|extension| extension.to_str());
+    let is_scene = extension == Some("toml") && !is_experiment(&path);
     let is_toml = extension == Some("toml");
-    let is_folder = args.path.is_dir();
+    let is_folder = path.is_dir();
     let is_mesh = !is_toml && !is_folder;
     let options = [
         ("--mjcf", args.mjcf.is_some(), is_scene, "a scene (.toml)"),
         ("--png", args.png.is_some(), is_scene, "a scene (.toml)"),
         ("--render", args.render.is_some(), is_scene, "a scene (.toml)"),
+        ("--watch", args.watch.watch, is_toml, "a scene or an experiment (.toml)"),
         ("--json", args.json, is_folder, "a run's folder"),
         ("--set", !args.set.is_empty(), is_toml, "a scene or an experiment (.toml)"),
-        ("--outside-buffers", args.outside_buffers, is_mesh, "a mesh"),
-        ("--unit", args.unit.is_some(), is_mesh, "a mesh"),
+        (
+            "--outside-buffers",
+            args.outside_buffers,
+            is_mesh,
+            "a mesh; a scene says object.outside_buffers",
+        ),
+        ("--unit", args.unit.is_some(), is_mesh, "a mesh; a scene says object.unit"),
     ];
-    for (option, is_given, is_allowed, what) in options {
-        if is_given && !is_allowed {
-            let instead = match option {
-                "--outside-buffers" => "; a scene says object.outside_buffers = true".into(),
-                "--unit" => "; a scene names the unit of its own: object.unit".into(),
-                _ => format!(", and {} is none", args.path.display()),
-            };
-            bail!("{option} goes with {what}{instead}");
-        }
-    }
+    only_with(&path, &options)?;
     for file in [&args.mjcf, &args.png, &args.render].into_iter().flatten() {
         args.force.claim(file)?;
     }
-    if !args.path.exists() {
-        bail!("{}: no such file or folder", args.path.display());
+    if args.watch.watch {
+        return watch(&path, &args.set, &args.watch, talk);
     }
     let text = match extension {
-        _ if args.path.is_dir() => run_folder(&Run::read(&args.path)?, args.json),
-        Some("toml") if is_scene => scene(args, talk)?,
-        Some("toml") => store::resolved(&Experiment::load(&args.path, &args.set)?),
+        _ if is_folder => run_folder(&Run::read(&path)?, args.json),
+        Some("toml") if is_scene => scene(&path, args, talk)?,
+        Some("toml") => store::resolved(&Experiment::load(&path, &args.set)?),
         _ => {
             let metres = args.unit.unwrap_or_default().metres();
-            let path = args.path.display();
+            let name = path.display();
             let (_, report) = with_patience(talk, |tell| {
-                tell(&format!("reading {path}"));
-                import_with(&args.path, metres, args.outside_buffers)
+                tell(&format!("reading {name}"));
+                import_with(&path, metres, args.outside_buffers)
             })?;
-            format!("{path}\n{report}\nto explore it: palpate new {path}")
+            format!("{name}\n{report}\nto explore it: palpate new {name}")
         }
     };
     print(text.trim_end())?;
@@ -130,8 +142,8 @@ fn run_folder(run: &Run, json: bool) -> String {
     }
 }
 
-fn scene(args: &Args, talk: Talk) -> anyhow::Result<String> {
-    let scene = Scene::load(&args.path, &args.set)?;
+fn scene(path: &Path, args: &Args, talk: Talk) -> anyhow::Result<String> {
+    let scene = Scene::load(path, &args.set)?;
     let mut text = toml::to_string(&scene).context("cannot write the scene")?;
     let environment = environment(scene, talk)?;
     simulator(&environment, talk)?;

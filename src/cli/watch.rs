@@ -1,6 +1,5 @@
-//! `palpate watch`.
+//! `palpate show --watch`: a trial in a window while it runs.
 
-use super::find::{SCENES, find};
 use super::prepare::simulation;
 use super::show::is_experiment;
 use super::terminal::{Ending, Talk, print};
@@ -16,36 +15,26 @@ use palpate_explore::planner::PLANNERS;
 use palpate_explore::probe::servo::Servo;
 use palpate_explore::probe::{Probe, Swept, Touch};
 use palpate_explore::task::Approach;
-use std::path::PathBuf;
+use std::path::Path;
 
+/// What trial is watched, and how fast.
 #[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  palpate watch scenes/bird_pa10.toml
-  palpate watch experiments/container_pa10.toml --planner sobol --speed 5
-  palpate watch scenes/container_finger.toml --touches 20 --set effects.thermal={}
-
-Opens MuJoCo's viewer on a trial while it runs: arm, finger and object, and a small ball at every \
-contact found. Drag with the mouse to turn and move, F1 lists the keys, Control+Q or closing the \
-window ends the trial. Needs a build with `--features viewer`, and X11 or Wayland with OpenGL.")]
-pub(super) struct Args {
-    /// A scene or an experiment (.toml) whose body is `kinematic` or `dynamic`.
-    path: PathBuf,
-    /// Planner [default: the experiment's first, or active].
-    #[arg(long, value_name = "NAME")]
+pub(super) struct Watch {
+    /// Open MuJoCo's viewer on a trial while it runs (needs a build with `--features viewer`).
+    #[arg(long)]
+    pub(super) watch: bool,
+    /// Planner of the trial [default: the experiment's first, or active].
+    #[arg(long, value_name = "NAME", requires = "watch")]
     planner: Option<String>,
     /// Touches of the trial [default: the experiment's, or 40].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=2000))]
+    #[arg(long, value_name = "N", requires = "watch", value_parser = clap::value_parser!(u32).range(1..=2000))]
     touches: Option<u32>,
     /// Which of the experiment's trials.
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", requires = "watch")]
     trial: u32,
     /// Simulated seconds in one of the clock, at most.
-    #[arg(long, default_value_t = 1.0, value_name = "X", value_parser = speed)]
+    #[arg(long, default_value_t = 1.0, value_name = "X", requires = "watch", value_parser = speed)]
     speed: f64,
-    /// Change one setting; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
 }
 
 /// Touches if nobody says how many; chosen.
@@ -56,19 +45,24 @@ fn speed(text: &str) -> Result<f64, String> {
     speed.ok_or("allowed is 0.01 to 100".into())
 }
 
-pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
-    let experiment = experiment(args)?;
+/// Shows a trial of the scene or experiment at `path` until its window is closed.
+pub(super) fn watch(
+    path: &Path,
+    sets: &[String],
+    args: &Watch,
+    talk: Talk,
+) -> anyhow::Result<Ending> {
+    let experiment = experiment(path, sets, args)?;
     let planner = planner(args, &experiment)?;
     let simulation = simulation(experiment, talk)?;
     let Some(body) = simulation.simulator().body()? else {
-        let (path, body) = (args.path.display(), simulation.experiment().scene.body.name());
+        let (path, body) = (path.display(), simulation.experiment().scene.body.name());
         bail!(
             "{path}: body = \"{body}\" touches without moving; to be watched are \"kinematic\" and \
              \"dynamic\""
         );
     };
-    let window =
-        Window::open(simulation.environment(), &format!("Palpate: {}", args.path.display()))?;
+    let window = Window::open(simulation.environment(), &format!("Palpate: {}", path.display()))?;
     let (body, sight) = Watched::new(body, args.speed);
     let servo = simulation.servo(Box::new(body), simulation.body_seed(args.trial))?;
     let mut probe = Told { servo, sight: sight.clone(), count: 0 };
@@ -86,11 +80,10 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     drawn.map(|()| Ending::Done)
 }
 
-fn experiment(args: &Args) -> anyhow::Result<Experiment> {
-    let path = find(&args.path, SCENES)?;
-    let mut experiment = match is_experiment(&path) {
-        true => Experiment::load(&path, &args.set)?,
-        false => Experiment::on(&Scene::load(&path, &args.set)?, &["active"], 1, TOUCHES),
+fn experiment(path: &Path, sets: &[String], args: &Watch) -> anyhow::Result<Experiment> {
+    let mut experiment = match is_experiment(path) {
+        true => Experiment::load(path, sets)?,
+        false => Experiment::on(&Scene::load(path, sets)?, &["active"], 1, TOUCHES),
     };
     if let Some(touches) = args.touches {
         experiment.touches = touches;
@@ -99,7 +92,7 @@ fn experiment(args: &Args) -> anyhow::Result<Experiment> {
     Ok(experiment)
 }
 
-fn planner(args: &Args, experiment: &Experiment) -> anyhow::Result<&'static planner::Entry> {
+fn planner(args: &Watch, experiment: &Experiment) -> anyhow::Result<&'static planner::Entry> {
     let name = args.planner.as_ref().or(experiment.planners.first()).map_or("", String::as_str);
     planner::by_name(name).with_context(|| {
         let known: Vec<_> = PLANNERS.iter().map(|planner| planner.name).collect();

@@ -26,7 +26,7 @@ same() {
 
 if has_parallel; then
     parallel "$PALPATE" --quiet run "$EXPERIMENT" --shard {}/8 --threads 1 --out "$OUT/{}" ::: $(seq 8) >/dev/null
-    "$PALPATE" merge "$OUT/by-parallel" $(seq -f "$OUT/%g" 8) >/dev/null
+    "$PALPATE" report "$OUT/by-parallel" --merge $(seq -f "$OUT/%g" 8) >/dev/null
     same "$OUT/by-parallel" "GNU parallel"
 fi
 

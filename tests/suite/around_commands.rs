@@ -70,7 +70,7 @@ fn planners_around_an_object_are_held_against_what_they_were() {
 #[test]
 fn what_goes_over_a_zone_refuses_a_whole_object() {
     let folder = around();
-    for command in ["scan", "accuracy"] {
+    for command in ["export", "accuracy"] {
         fails(folder.path(), &[command, "scene.toml"], &["scene.toml: [around]", "[zone]"]);
     }
     let shown = succeeds(folder.path(), &["show", "scene.toml"]);
@@ -80,7 +80,7 @@ fn what_goes_over_a_zone_refuses_a_whole_object() {
     fails(folder.path(), &mjcf, &["no model in MuJoCo", "[arm]"]);
     succeeds(folder.path(), &["show", "scene.toml", "--png", "reach.png"]);
     assert!(folder.path().join("reach.png").is_file());
-    fails(folder.path(), &["watch", "scene.toml"], &["touches without moving"]);
+    fails(folder.path(), &["show", "scene.toml", "--watch"], &["touches without moving"]);
 }
 
 /// A robot that goes around objects registers itself at one side of a body.

@@ -196,7 +196,7 @@ fn broken_command_lines_are_refused() {
         (&["run", "."], &["."]),
         (&["run", "mesh.obj"], &["mesh.obj", "not valid TOML"]),
         (&["run", "scene.toml"], &["scene.toml", "this is a scene", "palpate show"]),
-        (&["scan", "small.toml"], &["small.toml", "this is an experiment", "palpate run"]),
+        (&["export", "small.toml"], &["small.toml", "this is an experiment", "palpate run"]),
         (&["accuracy", "small.toml"], &["small.toml", "this is an experiment"]),
         (&["run", "small.toml", "--set", "trials"], &["--set trials", "key=value"]),
         (&["run", "small.toml", "--set", "=3"], &["--set =3", "key=value"]),

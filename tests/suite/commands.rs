@@ -31,6 +31,41 @@ fn experiments_and_scenes_are_found_by_name() {
     assert!(folder.path().join("runs/small/trials.jsonl").is_file());
 }
 
+/// Names of the version before still answer, with a note that says today's.
+#[test]
+fn commands_answer_to_their_old_names() {
+    let folder = folder();
+    let renamed: [(&[&str], &[&str]); 8] = [
+        (&["plan", "small.toml", "--shards", "2"], &["run EXPERIMENT --plan", "2/2"]),
+        (&["-q", "run", "small.toml", "--shard=1/2", "--out", "1"], &["rows in 1"]),
+        (&["-q", "run", "small.toml", "--shard=2/2", "--out", "2"], &["rows in 2"]),
+        (&["merge", "whole", "1", "2"], &["report FOLDER --merge", "1 trials in whole"]),
+        (&["scan", "scene.toml", "--grid=4x4", "--out=scan"], &["export SCENE", "of contact"]),
+        (
+            &["align", "scan/cloud.ply", "mesh.obj", "--position=0,0,0"],
+            &["register MESH --cloud CLOUD"],
+        ),
+        (&["watch", "scene.toml"], &["show SCENE --watch", "touches without moving"]),
+        (&["fidelity", "scene.toml", "--touches", "x"], &["invalid value 'x'"]),
+    ];
+    for (old, says) in renamed {
+        let output = said(&palpate(folder.path(), old));
+        assert!(says.iter().all(|words| output.contains(words)), "{old:?}: {output}");
+    }
+    for gone in ["stress", "bench", "cost"] {
+        fails(folder.path(), &[gone], &["is gone", "make "]);
+    }
+    fails(folder.path(), &["merge"], &["palpate report FOLDER --merge SHARDS"]);
+    fails(folder.path(), &["align", "cloud.ply"], &["palpate register MESH --cloud CLOUD"]);
+    // In the help each command stands once, under its group.
+    let help = succeeds(folder.path(), &["--help"]);
+    for (group, name) in [("Explore:", "  export "), ("Laboratory:", "  twin "), ("More:", "  list ")] {
+        assert!(help.find(group) < help.find(name), "{help}");
+        assert_eq!(help.matches(&format!("\n{name}")).count(), 1, "{help}");
+    }
+    assert!(!help.contains("merge ") && help.contains("--quiet"), "{help}");
+}
+
 #[test]
 fn shells_are_told_how_to_complete() {
     for shell in ["bash", "zsh", "fish"] {
@@ -99,10 +134,10 @@ fn files_of_others_are_replaced_by_force_only() {
     }
     fs::write(folder.path().join("notes.txt"), "mine").unwrap();
     let says = ["no cloud.ply", "--force"];
-    fails(folder.path(), &["scan", "scene.toml", "--grid", "3x3", "--out", "."], &says);
+    fails(folder.path(), &["export", "scene.toml", "--grid", "3x3", "--out", "."], &says);
     // Its own files it replaces.
     for _ in 0..2 {
-        succeeds(folder.path(), &["scan", "scene.toml", "--grid", "3x3", "--out", "new"]);
+        succeeds(folder.path(), &["export", "scene.toml", "--grid", "3x3", "--out", "new"]);
         succeeds(folder.path(), &["show", "scene.toml", "--mjcf", "scene.xml"]);
     }
     succeeds(folder.path(), &["show", "scene.toml", "--mjcf", "notes.txt", "--force"]);

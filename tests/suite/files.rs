@@ -52,8 +52,8 @@ fn what_may_never_end_is_refused_by_every_reader() {
         &["show", "zero.toml"],
         &["show", "pipe.obj"],
         &["show", "zero.stl"],
-        &["scan", "pipe.toml"],
-        &["watch", "zero.toml"],
+        &["export", "pipe.toml"],
+        &["show", "zero.toml", "--watch"],
         &["calibrate", "zero.toml"],
         &["calibrate", "pipe.toml"],
     ] {
@@ -167,7 +167,7 @@ fn gltf_buffers_outside_the_folder_are_read_by_leave_only() {
         let says =
             ["outside.bin lies outside", "object.outside_buffers = true", "--outside-buffers"];
         fails(folder.path(), &show, &says);
-        fails(folder.path(), &["scan", "gltf.toml"], &says);
+        fails(folder.path(), &["export", "gltf.toml"], &says);
         let shown = succeeds(folder.path(), &[&show[..], &["--outside-buffers"]].concat());
         assert!(shown.contains(ONE), "{uri}: {shown}");
         // A single triangle in the plane z = 0 has nothing over the zone, but it was read.

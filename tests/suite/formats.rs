@@ -220,7 +220,7 @@ fn broken_and_hostile_files_are_refused_at_their_place() {
 #[test]
 fn what_scan_and_export_write_is_read_back() {
     let folder = folder();
-    succeeds(folder.path(), &["scan", "scene.toml", "--grid", "4x5", "--out", "scan"]);
+    succeeds(folder.path(), &["export", "scene.toml", "--grid", "4x5", "--out", "scan"]);
     fails(folder.path(), &["show", "scan/cloud.ply"], &["20 points and no faces", "mesh"]);
     succeeds(folder.path(), &["run", "small.toml", "--no-report"]);
     for name in ["belief.ply", "belief.obj"] {

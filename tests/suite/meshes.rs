@@ -1,4 +1,4 @@
-//! What `palpate scan` and `palpate export` write.
+//! What `palpate export` writes.
 
 use palpate::sim::{Environment, Scene};
 use std::fs;
@@ -52,7 +52,7 @@ fn a_scan_is_the_surface_and_does_not_depend_on_threads() {
     for (out, threads) in [(&one, "1"), (&two, "2")] {
         let out = out.to_str().unwrap();
         let scene = "scenes/container.toml";
-        done(&["scan", scene, "--grid", "7x9", "--threads", threads, "--out", out]);
+        done(&["export", scene, "--grid", "7x9", "--threads", threads, "--out", out]);
     }
     for name in ["cloud.ply", "cloud.csv", "scan.svg", "scan.png", "scan.pdf"] {
         assert!(fs::read(one.join(name)).unwrap() == fs::read(two.join(name)).unwrap(), "{name}");
@@ -124,6 +124,6 @@ fn a_belief_is_exported_as_it_was_and_mistakes_say_what_is_allowed() {
 
 #[test]
 fn what_cannot_be_scanned_is_refused() {
-    assert!(refused(&["scan", "scenes/toy.toml"]).contains("no object"));
-    assert!(refused(&["scan", "scenes/bird.toml", "--grid", "1x9"]).contains("NxM"));
+    assert!(refused(&["export", "scenes/toy.toml"]).contains("no object"));
+    assert!(refused(&["export", "scenes/bird.toml", "--grid", "1x9"]).contains("NxM"));
 }

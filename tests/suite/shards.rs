@@ -55,7 +55,7 @@ fn shards_are_merged_to_the_bytes_of_one_run() {
     let merge = |out: &str, parts: &[&str]| {
         let parts: Vec<String> = parts.iter().map(|part| text(part)).collect();
         let out = text(out);
-        let mut arguments = vec!["merge", &out];
+        let mut arguments = vec!["report", &out, "--merge"];
         arguments.extend(parts.iter().map(String::as_str));
         said(&arguments)
     };

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScanTruth {
-    /// cloud.csv or cloud.ply of `palpate scan`, relative to the experiment's file; in `W`.
+    /// cloud.csv or cloud.ply of `palpate export`, relative to the experiment's file; in `W`.
     pub scan: PathBuf,
     /// A test place has a height if this many contacts lie within `within_m` of it.
     #[serde(default = "neighbours")]
@@ -164,7 +164,7 @@ pub fn read_cloud(path: &Path) -> Result<Vec<Point3<f64>>, Invalid> {
 
 /// A file without this column.
 fn no_column(path: &Path, column: &str) -> Invalid {
-    let allowed = "allowed are cloud.csv and cloud.ply of palpate scan";
+    let allowed = "allowed are cloud.csv and cloud.ply of palpate export";
     Invalid::new(format!("no column {column}")).at(path.display()).mend(allowed)
 }
 
