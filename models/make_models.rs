@@ -15,7 +15,8 @@ use std::fs;
 use std::path::Path;
 
 /// Edges whose middle is farther from the surface are split, metres. Chosen: the middle of an
-/// equal-sided triangle is 4/3 as far, well within the 0.05 mm that `tests/models.rs` asks for.
+/// equal-sided triangle is 4/3 as far, well within the 0.05 mm that `tests/suite/models.rs` asks
+/// for.
 const EDGE_ERROR_M: f64 = 2.5e-5;
 /// Rounds of splits that are evened out by relaxing. Chosen: later ones find few edges.
 const SPLIT_ROUNDS: usize = 4;
