@@ -54,7 +54,7 @@ test: setup
 # How far the tip still moves after each failure between explorer and arm: the table of docs/real-arm.md.
 # In real time, so with the machine for itself.
 test-faults: setup
-	cargo test --locked --features ros2 --test suite -- --ignored --test-threads 1 --nocapture twin_faults
+	cargo test --locked -p palpate --features ros2 --test suite -- --ignored --test-threads 1 --nocapture twin_faults
 
 # Planners are what experiments/baselines says: whoever changes one writes why (palpate check --bless).
 CHECKED := toy container bird
@@ -72,7 +72,7 @@ check-cost: setup
 # All hard cases at all severities, periods and time steps, ten minutes of processor time: writes
 # docs/hard-cases.md, and fails if an outcome is unexplained.
 hard-cases: setup
-	PALPATE_HARD_CASES=1 cargo test --locked --test suite hard::all_outcomes
+	PALPATE_HARD_CASES=1 cargo test --locked -p palpate --test suite hard::all_outcomes
 
 # Shards by GNU parallel and by a Slurm of one node, each skipped where it is not there.
 test-clusters: setup
@@ -88,7 +88,7 @@ TOUCHES := 20
 OVER_TOPICS := lab:: lab_faults::
 NAMESPACE := unshare --map-root-user --net bash tests/ros2/namespace.sh
 NO_NAMESPACE := this machine allows no network namespace (unshare --map-root-user --net)
-LAB_TESTS = cargo test --locked --features $(1) --test suite -- --ignored --test-threads 1 $(OVER_TOPICS)
+LAB_TESTS = cargo test --locked -p palpate --features $(1) --test suite -- --ignored --test-threads 1 $(OVER_TOPICS)
 
 test-ros2: setup $(DEPS)/ros2/bin/python
 	@if $(NAMESPACE) true 2>/dev/null; then \
@@ -117,7 +117,7 @@ install-ros1:
 
 # The report page in a browser; fails where there is no Chromium.
 page-test: setup
-	PALPATE_PAGE_TEST=1 cargo test --locked --test suite page
+	PALPATE_PAGE_TEST=1 cargo test --locked -p palpate --test suite page
 
 # A recording in a reader that is not ours; skipped where Python's packages cannot be fetched.
 READER := $(DEPS)/mcap/bin/python
@@ -138,13 +138,13 @@ $(READER): tests/mcap.txt
 FUZZ := 100000
 
 fuzz: setup
-	PALPATE_FUZZ=$(FUZZ) cargo test --locked --test suite fuzz::
-	PALPATE_FUZZ=$(FUZZ) cargo test --locked --test suite folders::kills
-	PALPATE_FUZZ=$(FUZZ) cargo test --locked --test suite recording::
+	PALPATE_FUZZ=$(FUZZ) cargo test --locked -p palpate --test suite fuzz::
+	PALPATE_FUZZ=$(FUZZ) cargo test --locked -p palpate --test suite folders::kills
+	PALPATE_FUZZ=$(FUZZ) cargo test --locked -p palpate --test suite recording::
 
 # docs/reference.md, from the code; a test holds it to what the code says.
 reference: setup
-	PALPATE_WRITE_REFERENCE=1 cargo test --locked --test suite reference::
+	PALPATE_WRITE_REFERENCE=1 cargo test --locked -p palpate --test suite reference::
 
 lint: setup
 	cargo fmt --all --check

@@ -31,8 +31,8 @@ pub(super) struct Cloud {
     rotation: [f64; 3],
 }
 
-/// Lays the points of `cloud` onto `mesh`, whose origin stands near `position_m` in their frame, and
-/// writes the pose to `out`.
+/// Lays the points of `cloud` onto `mesh`, whose origin stands near `position_m` in their frame,
+/// and writes the pose to `out`.
 pub(super) fn align(
     (mesh, cloud): (&Path, &Path),
     position_m: [f64; 3],

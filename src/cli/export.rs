@@ -3,7 +3,7 @@
 use super::find::{SCENES, find};
 use super::output::Force;
 use super::prepare::only_with;
-use super::scan::scan;
+use super::scan::{Grid, Scan, grid, scan};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
@@ -48,34 +48,16 @@ pub(super) struct Args {
     touches: Option<u32>,
     /// Where to: of a run a .ply or .obj file, of a scene a folder [default: runs/SCENE-scan].
     #[arg(long, value_name = "FILE|FOLDER")]
-    pub(super) out: Option<PathBuf>,
+    out: Option<PathBuf>,
     /// Of a run: vertices along each side of the zone, or around an object cells along the
     /// surface's longest side [default: the experiment's grid or gp.cells]. Of a scene: targets
     /// along x and z [default: square cells, 81 along the longer side].
     #[arg(long, value_name = "N|NxM", value_parser = grid)]
-    pub(super) grid: Option<Grid>,
-    /// Of a scene: change one setting; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    pub(super) set: Vec<String>,
-    /// Of a scene: threads; 0 means all cores.
-    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
-    pub(super) threads: u16,
+    grid: Option<Grid>,
     #[command(flatten)]
-    pub(super) force: Force,
-}
-
-/// Vertices, cells or targets along each side.
-#[derive(Clone, Copy)]
-pub(super) struct Grid(pub(super) [usize; 2]);
-
-/// Most of them along a side.
-const SIDE_MAX: usize = 2001;
-
-fn grid(text: &str) -> Result<Grid, String> {
-    let side = |text: &str| text.parse().ok().filter(|side| (2..=SIDE_MAX).contains(side));
-    let (columns, rows) = text.split_once('x').unwrap_or((text, text));
-    let sides = side(columns).zip(side(rows)).map(|(columns, rows)| Grid([columns, rows]));
-    sides.ok_or(format!("allowed is N, or NxM as in 41x51, each 2 to {SIDE_MAX}"))
+    scan: Scan,
+    #[command(flatten)]
+    force: Force,
 }
 
 impl Args {
@@ -100,11 +82,14 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
         ("--planner", args.planner.is_some(), is_run, "a run's folder"),
         ("--trial", args.trial != 0, is_run, "a run's folder"),
         ("--touches", args.touches.is_some(), is_run, "a run's folder"),
-        ("--set", !args.set.is_empty(), !is_run, "a scene (.toml)"),
-        ("--threads", args.threads != 0, !is_run, "a scene (.toml)"),
+        ("--set", !args.scan.set.is_empty(), !is_run, "a scene (.toml)"),
+        ("--threads", args.scan.threads != 0, !is_run, "a scene (.toml)"),
     ];
     only_with(&path, &options)?;
-    if is_run { belief(args) } else { scan(&path, args, talk) }
+    if is_run {
+        return belief(args);
+    }
+    scan(&path, &args.scan, (args.out.as_deref(), args.grid, args.force), talk)
 }
 
 /// Cells that a belief around an object may be made of, as `gp.cells`.

@@ -1,7 +1,7 @@
 //! Experiments and scenes by name: `bird` for `experiments/bird.toml`.
 
 use anyhow::bail;
-use palpate_input::words;
+use palpate_input::{files, words};
 use std::path::{Path, PathBuf};
 
 /// Folder of the experiments that come with the program.
@@ -28,6 +28,14 @@ pub(super) fn find(name: &Path, folder: &str) -> anyhow::Result<PathBuf> {
     let known = words::nearest(&word, &names(folder));
     let meant = known.map_or(String::new(), |known| format!(", did you mean `{known}`?"));
     bail!("{word}: no such file, and no {folder}/{}{meant}", file.display())
+}
+
+/// An experiment names planners, a scene does not; a file that is neither is read as a scene.
+pub(super) fn is_experiment(path: &Path) -> bool {
+    files::text(path, files::TEXT_MAX)
+        .ok()
+        .and_then(|text| text.parse::<toml::Table>().ok())
+        .is_some_and(|table| table.contains_key("planners") || table.contains_key("scene"))
 }
 
 /// The names of the files in `folder`, where [`find`] looks first, in order.

@@ -16,8 +16,8 @@ const TRIED: usize = 3;
 /// Bytes in the units of `/proc`.
 const KIB: f64 = 1024.0;
 
-/// Runs a few trials of every planner on `threads` threads, 0 for all cores, and prints what each of
-/// `shards` shards will take on this machine.
+/// Runs a few trials of every planner on `threads` threads, 0 for all cores, and prints what each
+/// of `shards` shards will take on this machine.
 pub(super) fn plan(
     experiment: Experiment,
     shards: u32,

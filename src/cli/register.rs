@@ -1,12 +1,11 @@
 //! `palpate register`.
 
 use super::align::{Cloud, align};
-use super::find::{SCENES, find};
+use super::find::{SCENES, find, is_experiment};
 use super::known_body::KnownBodyArgs;
 use super::output::Force;
 use super::prepare::{ready, simulator};
 use super::progress::{progress_bar, step};
-use super::show::is_experiment;
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, real_robot};

@@ -1,7 +1,6 @@
 //! `palpate export SCENE`: a grid of touches as a cloud of contacts.
 
-use super::export::Args;
-use super::output::make_folder;
+use super::output::{Force, make_folder};
 use super::prepare::{environment, needs_zone, simulator};
 use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
@@ -15,8 +14,38 @@ use palpate_explore::backend::Fault;
 use palpate_explore::probe::Touch;
 use std::path::Path;
 
-/// Touches `grid` targets of the scene at `path`, and writes where they made contact.
-pub(super) fn scan(path: &Path, args: &Args, talk: Talk) -> anyhow::Result<Ending> {
+/// How a scene is scanned.
+#[derive(clap::Args)]
+pub(super) struct Scan {
+    /// Of a scene: change one setting; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(super) set: Vec<String>,
+    /// Of a scene: threads; 0 means all cores.
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u16).range(0..=1024))]
+    pub(super) threads: u16,
+}
+
+/// Vertices, cells or targets along each side.
+#[derive(Clone, Copy)]
+pub(super) struct Grid(pub(super) [usize; 2]);
+
+/// Most of them along a side.
+const SIDE_MAX: usize = 2001;
+
+pub(super) fn grid(text: &str) -> Result<Grid, String> {
+    let side = |text: &str| text.parse().ok().filter(|side| (2..=SIDE_MAX).contains(side));
+    let (columns, rows) = text.split_once('x').unwrap_or((text, text));
+    let sides = side(columns).zip(side(rows)).map(|(columns, rows)| Grid([columns, rows]));
+    sides.ok_or(format!("allowed is N, or NxM as in 41x51, each 2 to {SIDE_MAX}"))
+}
+
+/// Touches a grid of targets of the scene at `path`, and writes where they made contact.
+pub(super) fn scan(
+    path: &Path,
+    args: &Scan,
+    (out, grid, force): (Option<&Path>, Option<Grid>, Force),
+    talk: Talk,
+) -> anyhow::Result<Ending> {
     let scene = Scene::load(path, &args.set)?;
     needs_zone(&scene, path)?;
     let environment = environment(scene, talk)?;
@@ -26,9 +55,9 @@ pub(super) fn scan(path: &Path, args: &Args, talk: Talk) -> anyhow::Result<Endin
     let zone = environment.task().zone();
     let zone = zone.with_context(|| format!("{} has no [zone] to scan", path.display()))?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    let folder = args.out.clone().unwrap_or_else(|| Path::new("runs").join(format!("{name}-scan")));
-    args.force.claim_folder(&folder, "cloud.ply")?;
-    let grid = args.grid.map_or_else(|| scan::default_grid(zone), |grid| grid.0);
+    let folder = out.map_or_else(|| Path::new("runs").join(format!("{name}-scan")), Path::to_owned);
+    force.claim_folder(&folder, "cloud.ply")?;
+    let grid = grid.map_or_else(|| scan::default_grid(zone), |grid| grid.0);
     let stop = stop_on_interrupt("rows")?;
     let bar = progress_bar(talk, &name, "rows", grid[1] as u64, 0);
     let simulator = simulator(&environment, talk)?;

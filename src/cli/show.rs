@@ -1,6 +1,6 @@
 //! `palpate show`.
 
-use super::find::{SCENES, find};
+use super::find::{SCENES, find, is_experiment};
 use super::output::Force;
 use super::patience::with_patience;
 use super::prepare::{environment, only_with, simulator};
@@ -23,7 +23,6 @@ use nalgebra::{Point3, UnitVector3};
 use palpate_explore::task::{Ball, DIRECTIONS};
 use palpate_geometry::import::import_with;
 use palpate_geometry::spread::directions;
-use palpate_input::files;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -122,14 +121,6 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
     };
     print(text.trim_end())?;
     Ok(Ending::Done)
-}
-
-/// An experiment names planners, a scene does not; a file that is neither is read as a scene.
-pub(super) fn is_experiment(path: &Path) -> bool {
-    files::text(path, files::TEXT_MAX)
-        .ok()
-        .and_then(|text| text.parse::<toml::Table>().ok())
-        .is_some_and(|table| table.contains_key("planners") || table.contains_key("scene"))
 }
 
 /// Test places along each side of the zone from which a scene's heights are described.

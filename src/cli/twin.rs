@@ -1,10 +1,9 @@
 //! `palpate twin`.
 
-use super::find::{EXPERIMENTS, SCENES, find};
+use super::find::{EXPERIMENTS, SCENES, find, is_experiment};
 use super::known_body::KnownBodyArgs;
 use super::prepare::{environment, simulator};
 use super::progress::stop_on_interrupt;
-use super::show::is_experiment;
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::Experiment;
 use crate::sim::finger::effects::wrench::WrenchEffect;

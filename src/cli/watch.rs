@@ -1,7 +1,7 @@
 //! `palpate show --watch`: a trial in a window while it runs.
 
+use super::find::is_experiment;
 use super::prepare::simulation;
-use super::show::is_experiment;
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::{CHAMFER, Measure, RMSE};

@@ -49,7 +49,8 @@ fn commands_answer_to_their_old_names() {
         (&["fidelity", "scene.toml", "--touches", "x"], &["invalid value 'x'"]),
     ];
     for (old, says) in renamed {
-        let output = said(&palpate(folder.path(), old));
+        let output = palpate(folder.path(), old);
+        let output = said(&output) + &String::from_utf8_lossy(&output.stdout);
         assert!(says.iter().all(|words| output.contains(words)), "{old:?}: {output}");
     }
     for gone in ["stress", "bench", "cost"] {
@@ -59,7 +60,9 @@ fn commands_answer_to_their_old_names() {
     fails(folder.path(), &["align", "cloud.ply"], &["palpate register MESH --cloud CLOUD"]);
     // In the help each command stands once, under its group.
     let help = succeeds(folder.path(), &["--help"]);
-    for (group, name) in [("Explore:", "  export "), ("Laboratory:", "  twin "), ("More:", "  list ")] {
+    for (group, name) in
+        [("Explore:", "  export "), ("Laboratory:", "  twin "), ("More:", "  list ")]
+    {
         assert!(help.find(group) < help.find(name), "{help}");
         assert_eq!(help.matches(&format!("\n{name}")).count(), 1, "{help}");
     }

@@ -257,7 +257,7 @@ fn planners_see_the_belief_and_nothing_else() {
         if !module_path.starts_with("palpate_explore/planner") {
             continue;
         }
-        let beliefs = ["planner", "belief", "around", "tour", "task"];
+        let beliefs = ["planner", "belief", "around", "task"];
         let beliefs = beliefs.map(|module| format!("palpate_explore/{module}"));
         let below = ["palpate_gp", "palpate_input"].map(String::from);
         let allowed = beliefs.iter().chain(&below);

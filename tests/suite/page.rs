@@ -183,7 +183,7 @@ pub fn browser_or_note() -> Option<PathBuf> {
     if browser.is_none() {
         assert!(std::env::var_os("PALPATE_PAGE_TEST").is_none(), "no Chromium in PATH");
         // Not by a macro: its output would be kept from whoever runs the tests.
-        let _ = writeln!(io::stderr(), "tests/page.rs: SKIPPED, no Chromium in PATH");
+        let _ = writeln!(io::stderr(), "tests/suite/page.rs: SKIPPED, no Chromium in PATH");
     }
     browser
 }

@@ -1,4 +1,43 @@
 //! The true surface on the test grid of an experiment.
+//!
+//! A planner cannot ask for it: one that looks at its belief compiles,
+//!
+//! ```
+//! use palpate::experiment::truth::Truth;
+//! use palpate::explore::belief::Belief;
+//! use palpate::explore::planner::{Plan, PlanError, Planner};
+//! use palpate::gp::posterior::Scratch;
+//!
+//! struct Honest;
+//!
+//! impl Planner for Honest {
+//!     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
+//!         let posterior = belief.posterior().ok_or("no fit")?;
+//!         Ok(Plan::at(vec![posterior.mean(&[0.0, 0.0], &mut Scratch::default()), 0.0]))
+//!     }
+//! }
+//! ```
+//!
+//! and one that asks for the truth too is no planner (E0050, another signature); what the oracle
+//! sees cannot be named outside of `experiment` (E0603, private).
+//!
+//! ```compile_fail,E0050
+//! use palpate::experiment::truth::Truth;
+//! use palpate::explore::belief::Belief;
+//! use palpate::explore::planner::{Plan, PlanError, Planner};
+//!
+//! struct Cheat;
+//!
+//! impl Planner for Cheat {
+//!     fn plan(&mut self, belief: &Belief, truth: &Truth) -> Result<Plan, PlanError> {
+//!         Ok(Plan::at(vec![truth.rmse_m(belief.posterior().ok_or("no fit")?).unwrap_or(0.0)]))
+//!     }
+//! }
+//! ```
+//!
+//! ```compile_fail,E0603
+//! use palpate::experiment::trial::oracle::GroundTruth;
+//! ```
 
 pub mod scan;
 pub mod scan_truth;

@@ -4,6 +4,7 @@ use super::judged::JUDGED;
 use crate::experiment::trial::row::TrialRow;
 use crate::experiment::{Experiment, Simulation};
 use palpate_input::error::Invalid;
+use palpate_input::files;
 use palpate_input::words::hex;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
@@ -135,7 +136,7 @@ impl Baseline {
     /// # Errors
     /// If it cannot be read, or a line is not what it should be.
     pub fn read(path: &Path) -> Result<Self, Invalid> {
-        let text = std::fs::read_to_string(path).map_err(|error| Invalid::io(path, error))?;
+        let text = files::text(path, files::TEXT_MAX).map_err(|error| Invalid::io(path, error))?;
         let bad = |i: usize| {
             let place = format!("{}:{}", path.display(), i + 1);
             move |error: serde_json::Error| Invalid::new(error.to_string()).at(place)

@@ -1,7 +1,7 @@
 //! Bodies that are commanded and read: simulated, recorded or real.
 //!
-//! [`Backend`] is the trait of a body, one control tick at a time. `delay`, `interlock`, `trace`,
-//! `watched` and the recorder of `recording` are bodies around other bodies.
+//! [`Backend`] is the trait of a body, one control tick at a time. `delay`, `interlock`, `trace`
+//! and `watched` are bodies around other bodies.
 
 #[allow(clippy::module_inception)]
 mod backend;

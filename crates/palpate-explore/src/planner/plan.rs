@@ -24,38 +24,7 @@ use thiserror::Error;
 /// }
 /// ```
 ///
-/// A planner cannot ask for more: no other signature is one, and what an oracle sees cannot be
-/// named outside of `experiment`.
-///
-/// ```compile_fail
-/// use palpate_explore::belief::Belief;
-/// use palpate::experiment::truth::Truth;
-/// use palpate_explore::planner::{Plan, PlanError, Planner};
-///
-/// struct Cheat;
-///
-/// impl Planner for Cheat {
-///     fn plan(&mut self, belief: &Belief, truth: &Truth) -> Result<Plan, PlanError> {
-///         Ok(Plan::at(vec![truth.rmse_m(belief.posterior().unwrap()).unwrap()]))
-///     }
-/// }
-/// ```
-///
-/// ```compile_fail
-/// use palpate::experiment::trial::oracle::GroundTruth;
-/// ```
-///
-/// ```compile_fail
-/// use palpate::experiment::trial::oracle::Oracle;
-/// ```
-///
-/// ```compile_fail
-/// use palpate_explore::belief::Belief;
-///
-/// fn peek(belief: &Belief) -> &palpate::sim::Environment {
-///     belief.environment()
-/// }
-/// ```
+/// A planner cannot ask for more: this crate knows no simulator and no truth.
 pub trait Planner: Send {
     /// The next target.
     ///

@@ -211,9 +211,13 @@ impl Outline {
         let wet = self.points.iter().filter(|point| point.wet);
         let mut met: Vec<(f64, &Sample)> =
             wet.map(|point| (body.distance_m(&(x_wt * point.p_t)), point)).collect();
-        let foremost_m = met.iter().map(|(far_m, _)| *far_m).fold(f64::INFINITY, f64::min);
+        let foremost = met.iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some(&(foremost_m, foremost)) = foremost else {
+            return (Point3::origin(), f64::INFINITY);
+        };
         met.retain(|(far_m, _)| *far_m < foremost_m + DEEPEST * self.profile.radius_m);
-        let give_m = give_m.max(0.0);
+        // Less than no give is a way that is missing: a fit that tries it finds back.
+        let (give_m, missing_m) = (give_m.max(0.0), give_m.min(0.0));
         let wanted_m3 = PI * self.profile.radius_m * give_m * give_m;
         // From above, where the curve is steeper, it is never overshot.
         let mut level_m = foremost_m + DEEPEST * self.profile.radius_m;
@@ -233,8 +237,8 @@ impl Outline {
             sum += point.p_t.coords * weight;
             weights += weight;
         }
-        let p_t = if weights > 0.0 { sum / weights } else { Vector3::zeros() };
-        (p_t.into(), level_m)
+        let p_t = if weights > 0.0 { (sum / weights).into() } else { foremost.p_t };
+        (p_t, level_m + missing_m)
     }
 
     /// Its point nearest to `body` when the fingertip stands at `x_wt`, and how far that is from
