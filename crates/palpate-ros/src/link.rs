@@ -7,7 +7,7 @@ use super::transport::{Connect, Delivery, Packet, Transport, Waker};
 use palpate_input::error::Invalid;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -35,24 +35,6 @@ struct Shared {
     waiting: Mutex<Vec<Service>>,
 }
 
-/// What a side does with what arrives, in the link's thread.
-pub trait Sink: Send {
-    /// Takes what has arrived.
-    fn take(&mut self, delivery: Delivery);
-
-    /// Called about every `period`: what is to be sent then.
-    fn tick(&mut self, send: &mut dyn FnMut(Packet)) {
-        let _ = send;
-    }
-}
-
-/// A channel keeps what arrives until its receiver looks.
-impl Sink for Sender<Delivery> {
-    fn take(&mut self, delivery: Delivery) {
-        let _ = self.send(delivery);
-    }
-}
-
 /// One side's end with its thread.
 pub struct Link {
     shared: Arc<Shared>,
@@ -61,18 +43,24 @@ pub struct Link {
 }
 
 impl Link {
-    /// Opens a transport in a thread of its own, which ticks every `period`.
+    /// Opens a transport in a thread of its own, which passes what arrives to `take`, and about
+    /// every `period` sends what `idle` returns.
     ///
     /// # Errors
     /// If it cannot be opened.
-    pub fn open(connect: Connect, period: Duration, sink: Box<dyn Sink>) -> Result<Self, Invalid> {
+    pub fn open(
+        connect: Connect,
+        period: Duration,
+        take: impl FnMut(Delivery) + Send + 'static,
+        idle: impl FnMut() -> Option<Packet> + Send + 'static,
+    ) -> Result<Self, Invalid> {
         let shared = Arc::new(Shared::default());
         let (opened, is_open) = channel();
         let inside = Arc::clone(&shared);
         let thread = std::thread::spawn(move || match connect() {
             Ok(transport) => {
                 let _ = opened.send(Ok(transport.waker()));
-                serve(transport, &inside, period, sink);
+                serve(transport, &inside, period, take, idle);
             }
             Err(error) => {
                 let _ = opened.send(Err(error));
@@ -88,8 +76,8 @@ impl Link {
         self.errand(Errand::Send(packet));
     }
 
-    /// Calls a service of the other side as soon as its server is found; the answer comes to the
-    /// sink.
+    /// Calls a service of the other side as soon as its server is found; the answer is a
+    /// delivery.
     pub fn call(&self, service: Service) {
         let mut waiting = lock(&self.shared.waiting);
         if !waiting.contains(&service) {
@@ -149,13 +137,14 @@ fn serve(
     mut transport: Box<dyn Transport>,
     shared: &Shared,
     period: Duration,
-    mut sink: Box<dyn Sink>,
+    mut take: impl FnMut(Delivery),
+    mut idle: impl FnMut() -> Option<Packet>,
 ) {
     let mut next = Instant::now() + period;
     let mut counted = Instant::now() - Duration::from_secs(1);
     while !shared.is_closed.load(Ordering::Relaxed) {
         let wait = next.saturating_duration_since(Instant::now());
-        transport.receive(wait, &mut |delivery| sink.take(delivery));
+        transport.receive(wait, &mut take);
         let mut result = Ok(());
         loop {
             let Some(errand) = lock(&shared.errands).pop_front() else { break };
@@ -173,8 +162,10 @@ fn serve(
         });
         let now = Instant::now();
         if now >= next {
-            sink.tick(&mut |packet| result = result.clone().and(transport.send(&packet)));
-            // Who was held up does not catch up.
+            if let Some(packet) = idle() {
+                result = result.and(transport.send(&packet));
+            }
+            // Missed periods are skipped.
             next = (next + period).max(now);
         }
         if counted.elapsed().as_secs_f64() > COUNTED_S {

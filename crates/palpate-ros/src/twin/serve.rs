@@ -25,6 +25,11 @@ const REST: f64 = 2e-3;
 /// Ticks that a twin may be late before it drops time: it catches up with less.
 const SLACK_TICKS: u32 = 10;
 
+/// How often the arm's state, its joints and the force are published, as drivers do.
+const STATUS_HZ: f64 = 50.0;
+const JOINTS_HZ: f64 = 250.0;
+const WRENCH_HZ: f64 = 500.0;
+
 /// Something that a twin tells while it runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -105,7 +110,8 @@ impl Twin {
         let names = settings.joint_names(chain);
         let (sink, inbox) = channel();
         // The loop looks at its own pace; the link only has to hand on.
-        let link = Link::open(connect, Duration::from_millis(20), Box::new(sink))?;
+        let take = move |delivery| drop(sink.send(delivery));
+        let link = Link::open(connect, Duration::from_millis(20), take, || None)?;
         let limits = chain.joints.iter().map(|joint| joint.qdot_limit).collect();
         let pc = ArmPc::new(names.clone(), limits, settings.topics.command.age_s);
         Ok(Self {
@@ -243,7 +249,7 @@ impl Twin {
         match entry.act {
             Act::Estop => self.pc.set_estop(is_on),
             Act::Deadman => self.pc.set_deadman(!is_on),
-            Act::Packet(_) | Act::Delay(_) => (),
+            _ => (),
         }
         tell(pace::now_s(), Event::Failure { name: entry.name, is_on });
     }
@@ -265,15 +271,12 @@ impl Twin {
 
     /// Tells the arm's state at its rate, and at once when it changes.
     fn tell_status(&mut self, now_s: f64, period_s: f64, tell: &mut dyn FnMut(f64, Event)) {
-        let rate_hz = self.settings.topics.status.rate_hz;
-        let is_new = {
-            let ArmStatus { overruns, .. } = self.told;
-            ArmStatus { overruns, ..self.pc.status().clone() } != self.told
-        };
-        if !is_new && !is_due(self.tick, rate_hz, period_s) {
+        let status = self.pc.status().clone();
+        let is_new = ArmStatus { overruns: self.told.overruns, ..status.clone() } != self.told;
+        if !is_new && !is_due(self.tick, STATUS_HZ, period_s) {
             return;
         }
-        self.told = self.pc.status().clone();
+        self.told = status;
         if is_new {
             tell(pace::now_s(), Event::Status(self.told.clone()));
         }
@@ -295,14 +298,13 @@ fn packets(
     (tick, period_s): (u64, f64),
     (x_mt, bias): (&Isometry3<f64>, &Wrench),
 ) -> (Vec<Packet>, Option<Wrench>) {
-    let topics = &settings.topics;
     let stamp_s = pace::now_s();
     let mut packets = Vec::new();
-    if is_due(tick, topics.joints.rate_hz, period_s) {
+    if is_due(tick, JOINTS_HZ, period_s) {
         packets.push(Packet::Joints(names.state(stamp_s, &reading.q, &reading.qdot)));
     }
     let wrench = reading.wrench.map(|wrench| wrench.moved(x_mt));
-    if let Some(wrench) = wrench.filter(|_| is_due(tick, topics.wrench.rate_hz, period_s)) {
+    if let Some(wrench) = wrench.filter(|_| is_due(tick, WRENCH_HZ, period_s)) {
         let message = WrenchMessage {
             force: (wrench.force_n - bias.force_n).into(),
             torque: (wrench.torque_nm - bias.torque_nm).into(),
@@ -310,9 +312,8 @@ fn packets(
         let header = Header::new(stamp_s, "ft_sensor");
         packets.push(Packet::Wrench(WrenchStamped { header, wrench: message }));
     }
-    let is_shadow = topics.tactile.is_shadow();
-    let finger = usize::from(settings.finger);
+    let (finger, message) = (usize::from(settings.finger), settings.topics.tactile.message);
     let frames = reading.frames();
-    packets.extend(frames.map(|frame| tactile::packet(frame, stamp_s, finger, is_shadow)));
+    packets.extend(frames.map(|frame| tactile::packet(frame, stamp_s, finger, message)));
     (packets, wrench)
 }
