@@ -321,8 +321,16 @@ impl LabArm {
         }
     }
 
+    /// The reading of what was heard; a fault is latched.
+    fn read(&mut self) -> Result<&Reading, Fault> {
+        match self.take_over() {
+            Ok(()) => Ok(&self.reading),
+            Err(cause) => Err(self.fault(cause)),
+        }
+    }
+
     /// Takes over what was heard.
-    fn read(&mut self) -> Result<(), LinkFault> {
+    fn take_over(&mut self) -> Result<(), LinkFault> {
         let mailbox = Arc::clone(&self.lab.mailbox);
         let mut heard = mailbox.heard();
         self.lab.check(&heard)?;
@@ -394,10 +402,7 @@ impl Backend for LabArm {
         }
         self.pace.restart();
         self.reading.applied.clone_from(&self.still);
-        match self.read() {
-            Ok(()) => Ok(&self.reading),
-            Err(cause) => Err(self.fault(cause)),
-        }
+        self.read()
     }
 
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
@@ -406,10 +411,7 @@ impl Backend for LabArm {
         self.lab.command(&command.qdot);
         self.pace.wait(1);
         self.reading.applied.clone_from(command);
-        match self.read() {
-            Ok(()) => Ok(&self.reading),
-            Err(cause) => Err(self.fault(cause)),
-        }
+        self.read()
     }
 
     /// Calls the stop of the arm's side, without waiting for its answer.

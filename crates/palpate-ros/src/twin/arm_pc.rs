@@ -144,11 +144,7 @@ impl ArmPc {
             return self.alarm("two publishers command", now_s);
         }
         self.sender = Some((sender, now_s));
-        if self.status.estop
-            || !self.status.deadman
-            || self.status.hold
-            || !self.status.alarm.is_empty()
-        {
+        if self.status.hold || self.status.needs_operator() {
             return;
         }
         if !self.status.servo_on {
