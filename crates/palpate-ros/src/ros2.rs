@@ -22,7 +22,7 @@ use rustdds::mio1::{Events, Interest, Poll, Token};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -217,12 +217,13 @@ impl Ros2 {
         let mut subscription =
             self.node.create_subscription::<M>(&dds, Some(qos)).map_err(cannot_open(&name))?;
         self.watch(&mut subscription, &name)?;
+        let hashes = BuildHasherDefault::<DefaultHasher>::new();
         self.readers.push(Box::new(move |take| {
             loop {
                 match subscription.take() {
                     Ok(Some((message, info))) => {
                         let (packet, received) = (message.into(), Instant::now());
-                        let sender = hash(&info.publisher_gid());
+                        let sender = hashes.hash_one(info.publisher_gid());
                         take(Delivery::Packet { packet, sender, received });
                     }
                     Ok(None) => break,
@@ -303,12 +304,6 @@ fn mapping(kind: MappingKind, vendor: [u8; 2]) -> ServiceMapping {
         MappingKind::Basic => ServiceMapping::Basic,
         MappingKind::Enhanced | MappingKind::Auto => ServiceMapping::Enhanced,
     }
-}
-
-fn hash(value: &impl Hash) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    value.hash(&mut hasher);
-    hasher.finish()
 }
 
 impl Transport for Ros2 {

@@ -40,10 +40,7 @@ impl Topic {
 
     /// Who publishes it.
     pub fn publisher(self) -> Side {
-        match self {
-            Self::Joints | Self::Wrench | Self::Tactile | Self::Status => Side::Arm,
-            Self::Command => Side::Explorer,
-        }
+        if self == Self::Command { Side::Explorer } else { Side::Arm }
     }
 
     /// Its key in `[backend.topics]`.
