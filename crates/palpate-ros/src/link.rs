@@ -15,18 +15,15 @@ use std::time::{Duration, Instant};
 /// How often publishers are counted; chosen, discovery takes longer.
 const COUNTED_S: f64 = 0.1;
 
-/// What is to be done by the thread.
-enum Errand {
-    Send(Packet),
-    Answer(Service, u64, TriggerResponse),
-}
+/// Sends something; done by the thread.
+type Job = Box<dyn FnOnce(&mut dyn Transport) -> Result<(), Invalid> + Send>;
 
-/// Most errands that wait; older ones are of no use.
-const ERRANDS_MAX: usize = 256;
+/// Most jobs that wait; older ones are of no use.
+const JOBS_MAX: usize = 256;
 
 #[derive(Default)]
 struct Shared {
-    errands: Mutex<VecDeque<Errand>>,
+    jobs: Mutex<VecDeque<Job>>,
     is_closed: AtomicBool,
     /// Known publishers by topic.
     publishers: [AtomicUsize; Topic::ALL.len()],
@@ -73,7 +70,7 @@ impl Link {
 
     /// Sends a packet soon.
     pub fn send(&self, packet: Packet) {
-        self.errand(Errand::Send(packet));
+        self.add(Box::new(move |transport| transport.send(&packet)));
     }
 
     /// Calls a service of the other side as soon as its server is found; the answer is a
@@ -94,7 +91,7 @@ impl Link {
 
     /// Answers a call.
     pub fn answer(&self, service: Service, call: u64, answer: TriggerResponse) {
-        self.errand(Errand::Answer(service, call, answer));
+        self.add(Box::new(move |transport| transport.answer(&service, call, answer)));
     }
 
     /// How many publishers of a topic are known, this side's own among them.
@@ -107,13 +104,13 @@ impl Link {
         lock(&self.shared.broken).clone()
     }
 
-    fn errand(&self, errand: Errand) {
-        let mut errands = lock(&self.shared.errands);
-        if errands.len() == ERRANDS_MAX {
-            errands.pop_front();
+    fn add(&self, job: Job) {
+        let mut jobs = lock(&self.shared.jobs);
+        if jobs.len() == JOBS_MAX {
+            jobs.pop_front();
         }
-        errands.push_back(errand);
-        drop(errands);
+        jobs.push_back(job);
+        drop(jobs);
         (self.waker)();
     }
 }
@@ -147,11 +144,8 @@ fn serve(
         transport.receive(wait, &mut take);
         let mut result = Ok(());
         loop {
-            let Some(errand) = lock(&shared.errands).pop_front() else { break };
-            result = result.and(match errand {
-                Errand::Send(packet) => transport.send(&packet),
-                Errand::Answer(service, call, answer) => transport.answer(&service, call, answer),
-            });
+            let Some(job) = lock(&shared.jobs).pop_front() else { break };
+            result = result.and(job(&mut *transport));
         }
         lock(&shared.waiting).retain(|service| {
             let is_found = transport.is_served(service);
@@ -178,9 +172,7 @@ fn serve(
         *lock(&shared.broken) = result.err();
     }
     // What a side says last is still sent.
-    for errand in lock(&shared.errands).drain(..) {
-        if let Errand::Send(packet) = errand {
-            let _ = transport.send(&packet);
-        }
+    for job in lock(&shared.jobs).drain(..) {
+        let _ = job(&mut *transport);
     }
 }
