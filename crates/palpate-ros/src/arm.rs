@@ -321,7 +321,7 @@ impl LabArm {
         }
     }
 
-    /// The reading of what was heard; a fault is latched.
+    /// Returns the newest reading, or latches a fault.
     fn read(&mut self) -> Result<&Reading, Fault> {
         match self.take_over() {
             Ok(()) => Ok(&self.reading),
@@ -329,7 +329,7 @@ impl LabArm {
         }
     }
 
-    /// Takes over what was heard.
+    /// Copies the newest messages into the reading.
     fn take_over(&mut self) -> Result<(), LinkFault> {
         let mailbox = Arc::clone(&self.lab.mailbox);
         let mut heard = mailbox.heard();

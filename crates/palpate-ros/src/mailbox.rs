@@ -76,13 +76,13 @@ pub(super) fn refused(topic: &str, words: impl std::fmt::Display) -> LinkFault {
 pub struct Mailbox {
     /// The arm's joints as its messages name them.
     pub names: JointNames,
-    /// Of the arm.
+    /// Table `[backend]` of the experiment.
     pub settings: BackendSettings,
     heard: Mutex<Heard>,
 }
 
 impl Mailbox {
-    /// Without messages.
+    /// Returns one without messages.
     pub fn new(names: JointNames, settings: BackendSettings) -> Self {
         let heard = Heard { since: Some(Instant::now()), ..Heard::default() };
         Self { names, settings, heard: Mutex::new(heard) }

@@ -87,7 +87,7 @@ pub enum CommandMessage {
 /// The settings of a topic, with its own defaults.
 macro_rules! topic_settings {
     ($name:ident, $topic:expr $(, $message:ident)?) => {
-        /// Name and age of a topic.
+        /// Name and age limit of a topic.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct $name {
