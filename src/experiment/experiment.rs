@@ -16,7 +16,7 @@ use palpate_explore::planner;
 use palpate_explore::planner::PlanningSettings;
 use palpate_explore::robot::arm::ArmSettings;
 use palpate_input::config::{Checked, ConfigError, Loader, Rules, is_default};
-use palpate_ros::settings::{BackendKind, BackendSettings};
+use palpate_ros::settings::{BackendKind, BackendSettings, take_former_keys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -169,6 +169,7 @@ impl Experiment {
         }
         // Version 0.1 wrote the settings of planners that were removed since.
         REMOVED.iter().for_each(|planner| drop(loader.take(&format!("planning.{planner}"))));
+        take_former_keys(&mut loader)?;
         let mut experiment: Self = loader.finish()?;
         experiment.scene.effects.moved_keys = moved_keys;
         if experiment.backend.kind != BackendKind::Simulated {

@@ -15,32 +15,23 @@ fn checked(breaks: fn(u64, &mut Reading)) -> Result<(), Fault> {
     let chain = ArmSettings::default().chain().unwrap();
     let world = World { breaks: Some((0, breaks)), ..World::real() };
     let (mut body, _) = body_of(&chain, world);
-    check_start(&mut body, &chain, Some(chain.start()), true, &GateSettings::default(), 1).map(drop)
+    check_start(&mut body, &chain, &GateSettings::default(), 1)
 }
 
 #[test]
-fn a_body_in_order_passes_and_gives_its_baseline() {
+fn a_body_in_order_passes() {
     assert_eq!(checked(|_, _| {}), Ok(()));
     let environment = shipped::environment("container_finger.toml", &["effects.wrench={}"]);
     let mut body = Simulator::new(environment.clone()).unwrap().body().unwrap().unwrap();
     let chain = environment.chain().unwrap();
-    let (home, settings) = (Some(chain.start()), GateSettings::default());
-    let baseline = check_start(body.as_mut(), &chain, home, true, &settings, 1).unwrap();
-    assert_eq!(baseline.q, chain.start());
-    assert!(baseline.frames >= 199 && baseline.electrode_counts.is_some());
-    // A bias, and noise that its mean over 200 readings takes away.
-    let bias = baseline.wrench.unwrap().force_n;
-    assert!(bias.norm() > 0.01);
-    let once = body.reset(1).unwrap().wrench.unwrap().force_n;
-    assert!((bias - once).norm() < 0.3, "{bias} {once}");
+    assert_eq!(check_start(body.as_mut(), &chain, &GateSettings::default(), 1), Ok(()));
 }
 
 #[test]
 fn what_is_not_in_order_is_said_with_its_numbers() {
     type Case = (fn(u64, &mut Reading), &'static str);
-    let cases: [Case; 8] = [
+    let cases: [Case; 7] = [
         (|_, reading| reading.q[1] = 1.7, "joint S2 stands at 1.7000, outside its limits "),
-        (|_, reading| reading.q[3] += 0.1, "joint E1 stands at "),
         (
             |tick, reading| reading.q[0] += 1e-5 * tick as f64,
             "joint S1 moved by 0.01000 while told to stand still; allowed are 0.002",

@@ -87,7 +87,7 @@ fn each_trips_on_its_cause_soon_and_stays_tripped_until_an_operator_clears_it() 
         assert_eq!(body.step(&command(7, 0)).unwrap_err(), fault);
         assert_eq!(body.reset(2).unwrap_err(), fault);
         assert_eq!(fake.commands().len(), told, "{named}: it moved after it was stopped");
-        body.operator().clear();
+        body.clear_fault();
         fake.mend();
         body.reset(2).unwrap();
         body.step(&command(7, 0)).unwrap();

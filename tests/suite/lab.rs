@@ -9,9 +9,9 @@ use palpate::robot::arm::ArmSettings;
 use palpate::ros::arm::Lab;
 use palpate::ros::connect;
 use palpate::ros::joints::JointNames;
-use palpate::ros::link::{Link, Sink};
+use palpate::ros::link::Link;
 use palpate::ros::settings::{BackendKind, BackendSettings, MappingKind};
-use palpate::ros::topics::{Service, Side};
+use palpate::ros::topics::{CommandTopic, Service, Side};
 use palpate::ros::transport::{Delivery, Packet};
 use serde_json::Value;
 use std::fs;
@@ -145,17 +145,6 @@ fn a_peer_of_another_implementation_drives_the_twin_through_a_touch() {
     }
 }
 
-/// Sends itself back what it is told, with the stamp of the command.
-struct Echo(Arc<Mutex<Vec<(f64, f64)>>>);
-
-impl Sink for Echo {
-    fn take(&mut self, delivery: Delivery) {
-        if let Delivery::Packet { packet: Packet::Joints(message), .. } = delivery {
-            self.0.lock().unwrap().push((message.header.stamp.s(), pace::now_s()));
-        }
-    }
-}
-
 /// Commands at 250 Hz to a peer of another implementation, which answers each.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
@@ -171,10 +160,18 @@ fn the_loop_loses_nothing_at_250_hz() {
     let answers: Arc<Mutex<Vec<(f64, f64)>>> = Arc::default();
     let open = connect(&network.settings, Side::Explorer, Vec::new()).unwrap();
     let period = Duration::from_millis(4);
-    let link = Link::open(open, period, Box::new(Echo(Arc::clone(&answers)))).unwrap();
+    let echo = Arc::clone(&answers);
+    let take = move |delivery| {
+        // The peer sends the stamp of the command back.
+        if let Delivery::Packet { packet: Packet::Joints(message), .. } = delivery {
+            echo.lock().unwrap().push((message.header.stamp.s(), pace::now_s()));
+        }
+    };
+    let link = Link::open(open, period, take, || None).unwrap();
+    let topic = CommandTopic { age_s: 0.02, ..CommandTopic::default() };
     let names =
         JointNames::new(["S1", "S2", "S3", "E1", "E2", "W1", "W2"].map(String::from).into());
-    let send = || link.send(names.command(pace::now_s(), 0.02, &[0.0; 7], false));
+    let send = || link.send(names.command(pace::now_s(), &[0.0; 7], &topic));
     // Until the two have found each other.
     while answers.lock().unwrap().is_empty() {
         send();

@@ -5,9 +5,8 @@ use crate::common::lab::{EXPERIMENT, Network, TwinProcess, journal, signal};
 use palpate::backend::pace;
 use palpate::ros::connect;
 use palpate::ros::joints::JointNames;
-use palpate::ros::link::{Link, Sink};
-use palpate::ros::topics::Side;
-use palpate::ros::transport::Delivery;
+use palpate::ros::link::Link;
+use palpate::ros::topics::{CommandTopic, Side};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -191,13 +190,6 @@ fn a_network_that_is_gone_and_back_is_a_stop_and_no_more() {
     assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
 }
 
-/// Hears nothing and says nothing by itself.
-struct Mute;
-
-impl Sink for Mute {
-    fn take(&mut self, _: Delivery) {}
-}
-
 /// Somebody else commands the arm, too.
 #[test]
 #[ignore = "needs a network namespace: make test-ros2"]
@@ -206,11 +198,12 @@ fn a_second_publisher_of_commands_stops_the_arm() {
     scene.twin.wait_until_it_moves();
     let before_s = pace::now_s();
     let open = connect(&scene.network.settings, Side::Explorer, Vec::new()).unwrap();
-    let second = Link::open(open, Duration::from_millis(20), Box::new(Mute)).unwrap();
+    let second = Link::open(open, Duration::from_millis(20), drop, || None).unwrap();
+    let topic = CommandTopic { age_s: 0.02, ..CommandTopic::default() };
     let joints = ["S1", "S2", "S3", "E1", "E2", "W1", "W2"].map(String::from);
     let names = JointNames::new(joints.into());
     for _ in 0..50 {
-        second.send(names.command(pace::now_s(), 0.02, &[0.0; 7], false));
+        second.send(names.command(pace::now_s(), &[0.0; 7], &topic));
         sleep(Duration::from_millis(20));
     }
     let (said, halted_s) = scene.halted();

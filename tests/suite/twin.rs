@@ -6,10 +6,8 @@ use crate::common::rig::ARM;
 use crate::common::rig::{Rig, STAGE, patient};
 use palpate::explore::probe::Touch;
 use palpate::ros::arm::Lab;
-use palpate::ros::definition::Described;
-use palpate::ros::message::{BiotacAll, Float64MultiArray};
 use palpate::ros::settings::BackendSettings;
-use palpate::ros::topics::{Service, Side};
+use palpate::ros::topics::{CommandMessage, Service, Side, TactileMessage};
 use palpate::ros::twin::serve::services;
 
 /// The contact by topics and by the body itself, for the same place.
@@ -44,8 +42,8 @@ fn an_arm_behind_topics_touches_where_the_body_itself_does() {
 #[test]
 fn other_drivers_and_other_names_touch_there_too() {
     let mut settings = patient();
-    settings.topics.tactile.type_name = BiotacAll::DEFINITION.name.into();
-    settings.topics.command.type_name = Float64MultiArray::DEFINITION.name.into();
+    settings.topics.tactile.message = TactileMessage::Fingers;
+    settings.topics.command.message = CommandMessage::Velocities;
     settings.joints = ["slide_1", "slide_2", "slide_3"].map(String::from).to_vec();
     settings.finger = 3;
     compare(STAGE, settings);

@@ -1,16 +1,15 @@
 //! An arm behind topics, as a [`Backend`]: commands out at a fixed rate, the newest of what is
 //! heard in.
 
-use super::joints::JointNames;
 use super::link::Link;
-use super::mailbox::{Heard, Mailboxes, Postman, TopicState, refused};
+use super::mailbox::{Heard, Mailbox, TopicState, refused};
 use super::net_ft::{NetFt, NetFtSettings, Record};
 use super::settings::BackendSettings;
 use super::status::ArmStatus;
 use super::topics::{Service, Side, Topic};
 use super::transport::{Connect, cannot_open};
-use palpate_explore::backend::interlock::gates::check_start;
-use palpate_explore::backend::pace::{self, Pace};
+use palpate_explore::backend::interlock::check_start;
+use palpate_explore::backend::pace::Pace;
 use palpate_explore::backend::{Backend, Capabilities, Command, Fault, LinkFault, Reading, Sample};
 use palpate_explore::robot::arm::Chain;
 use palpate_input::error::Invalid;
@@ -20,14 +19,12 @@ use std::time::{Duration, Instant};
 
 /// An arm that is connected; several bodies may use it, one after another.
 pub struct Lab {
-    settings: BackendSettings,
     chain: Chain,
-    names: JointNames,
     link: Link,
-    boxes: Mailboxes,
+    mailbox: Arc<Mailbox>,
     /// The first fault; it stays until the operator clears it.
     latched: Mutex<Option<LinkFault>>,
-    /// Fills the mailbox of forces, while it is there.
+    /// Fills in forces, while it exists.
     _net_ft: Option<NetFt>,
 }
 
@@ -61,22 +58,15 @@ impl Lab {
         connect: Connect,
     ) -> Result<Arc<Self>, LinkFault> {
         let names = settings.joint_names(chain);
-        let boxes = Mailboxes::default();
-        boxes.heard().since = Some(Instant::now());
-        let postman = Postman::new(boxes.clone(), names.clone(), settings.clone());
+        let mailbox = Arc::new(Mailbox::new(names, settings.clone()));
         let period = Duration::from_secs_f64(1.0 / settings.rate_hz);
-        let link = Link::open(connect, period, Box::new(postman))?;
-        let (settings, chain) = (settings.clone(), chain.clone());
-        let net_ft = settings.net_ft.as_ref().map(|sensor| listen(sensor, &boxes)).transpose()?;
-        let lab = Arc::new(Self {
-            settings,
-            chain,
-            names,
-            link,
-            boxes,
-            latched: Mutex::default(),
-            _net_ft: net_ft,
-        });
+        let (taker, idler) = (Arc::clone(&mailbox), Arc::clone(&mailbox));
+        let take = move |delivery| taker.take(delivery);
+        let link = Link::open(connect, period, take, move || idler.idle_command())?;
+        let sensor = settings.net_ft.as_ref();
+        let _net_ft = sensor.map(|sensor| listen(sensor, &mailbox)).transpose()?;
+        let (chain, latched) = (chain.clone(), Mutex::default());
+        let lab = Arc::new(Self { chain, link, mailbox, latched, _net_ft });
         lab.wait_for_topics()?;
         lab.check_publishers()?;
         Ok(lab)
@@ -84,19 +74,15 @@ impl Lab {
 
     /// A body on this arm; there should be one at a time.
     pub fn body(self: &Arc<Self>) -> LabArm {
-        let capabilities = Capabilities {
-            resettable: false,
-            real_time: true,
-            ..Capabilities::of(&self.chain, 1.0 / self.settings.rate_hz)
-        };
-        let joints = self.chain.joints.len();
+        let period_s = 1.0 / self.settings().rate_hz;
+        let capabilities = Capabilities::of(&self.chain, period_s);
         LabArm {
             lab: Arc::clone(self),
-            capabilities,
+            capabilities: Capabilities { resettable: false, real_time: true, ..capabilities },
             reading: Reading::default(),
             since: Instant::now(),
-            pace: Pace::new(1.0 / self.settings.rate_hz),
-            still: Command { qdot: vec![0.0; joints] },
+            pace: Pace::new(period_s),
+            still: Command { qdot: vec![0.0; self.chain.joints.len()] },
         }
     }
 
@@ -105,7 +91,11 @@ impl Lab {
     /// # Errors
     /// The first thing that is not.
     pub fn check_start(self: &Arc<Self>) -> Result<(), Fault> {
-        check_start(&mut self.body(), &self.chain, None, true, &self.settings.gates, 0).map(drop)
+        check_start(&mut self.body(), &self.chain, &self.settings().gates, 0)
+    }
+
+    fn settings(&self) -> &BackendSettings {
+        &self.mailbox.settings
     }
 
     /// Calls a service as soon as its server is found, and waits for the answer for at most the
@@ -114,16 +104,16 @@ impl Lab {
     /// # Errors
     /// If there is no server or no answer in time, or the answer is a refusal.
     pub fn call(&self, service: &Service) -> Result<(), LinkFault> {
-        self.call_within(service, self.settings.patience_s)
+        self.call_within(service, self.settings().patience_s)
     }
 
     fn call_within(&self, service: &Service, timeout_s: f64) -> Result<(), LinkFault> {
-        self.boxes.heard().answers.retain(|(other, _)| other != service);
+        self.mailbox.heard().answers.retain(|(other, _)| other != service);
         self.link.call(service.clone());
         let begun = Instant::now();
         let mut called = Instant::now();
         let words = loop {
-            let mut heard = self.boxes.heard();
+            let mut heard = self.mailbox.heard();
             let found = heard.answers.iter().position(|(other, _)| other == service);
             if let Some((_, answer)) = found.map(|i| heard.answers.swap_remove(i)) {
                 match answer.success {
@@ -148,7 +138,7 @@ impl Lab {
             }
             sleep(LOOK);
         };
-        let name = service.name(self.settings.topics.namespace());
+        let name = service.name(self.settings().topics.namespace());
         Err(Invalid::new(format!("service {name}: {words}")).into())
     }
 
@@ -158,7 +148,7 @@ impl Lab {
     /// If the arm's side does not.
     pub fn clear_fault(&self) -> Result<(), LinkFault> {
         self.call(&Service::ClearFault)?;
-        let mut heard = self.boxes.heard();
+        let mut heard = self.mailbox.heard();
         heard.refused = None;
         heard.topics.iter_mut().for_each(|state| state.stamp_s = 0.0);
         drop(heard);
@@ -173,43 +163,34 @@ impl Lab {
     fn wait_for_topics(&self) -> Result<(), LinkFault> {
         let begun = Instant::now();
         loop {
-            let missing = {
-                let heard = self.boxes.heard();
-                if let Some(refused) = &heard.refused {
-                    return Err(refused.clone());
-                }
-                let is_missing = |topic: &Topic| heard.topics[*topic as usize].at.is_none();
-                HEARD.into_iter().filter(is_missing).collect()
-            };
-            let missing: Vec<Topic> = missing;
+            let heard = self.mailbox.heard();
+            if let Some(refused) = &heard.refused {
+                return Err(refused.clone());
+            }
+            let state = |topic: &Topic| &heard.topics[*topic as usize];
+            let missing: Vec<Topic> =
+                HEARD.into_iter().filter(|topic| state(topic).at.is_none()).collect();
             if missing.is_empty() {
                 return Ok(());
             }
-            let patience_s = self.settings.patience_s;
-            if begun.elapsed().as_secs_f64() > patience_s {
-                return Err(self.nothing_heard(&missing).into());
+            let BackendSettings { patience_s, topics, .. } = self.settings();
+            if begun.elapsed().as_secs_f64() > *patience_s {
+                let name =
+                    |topic: Topic| format!("{} ({})", topics.name(topic), topics.type_name(topic));
+                let names: Vec<String> = missing.iter().copied().map(name).collect();
+                let skipped = missing.iter().filter_map(|topic| state(topic).skipped.as_ref());
+                let skipped: String =
+                    skipped.map(|why| format!(" Skipped a message: {why}.")).collect();
+                return Err(Invalid::new(format!(
+                    "nothing heard for {patience_s} s on {}; is the arm's side running, with the same \
+                     domain, and are names and types those of [backend.topics]?{skipped}",
+                    names.join(", ")
+                ))
+                .into());
             }
+            drop(heard);
             sleep(LOOK);
         }
-    }
-
-    /// The error of topics on which nothing was heard since the link was opened.
-    fn nothing_heard(&self, missing: &[Topic]) -> Invalid {
-        let name = |topic: &Topic| {
-            let line = self.settings.topics.line(*topic);
-            format!("{} ({})", line.name, line.type_name)
-        };
-        let names: Vec<String> = missing.iter().map(name).collect();
-        let heard = self.boxes.heard();
-        let skipped =
-            missing.iter().filter_map(|topic| heard.topics[*topic as usize].skipped.as_ref());
-        let skipped: String = skipped.map(|why| format!(" Skipped a message: {why}.")).collect();
-        Invalid::new(format!(
-            "nothing heard for {} s on {}; is the arm's side running, with the same domain, and are \
-             names and types those of [backend.topics]?{skipped}",
-            self.settings.patience_s,
-            names.join(", ")
-        ))
     }
 
     fn check_publishers(&self) -> Result<(), LinkFault> {
@@ -217,17 +198,15 @@ impl Lab {
         if count <= 1 {
             return Ok(());
         }
-        let topic = self.settings.topics.line(Topic::Command).name;
+        let topic = self.settings().topics.name(Topic::Command);
         let words = format!("{count} publishers on {topic}, allowed is one: this program");
         Err(Invalid::new(words).into())
     }
 
     /// Sends velocities.
     fn command(&self, qdot: &[f64]) {
-        let command = &self.settings.topics.command;
-        let packet = self.names.command(pace::now_s(), command.age_s, qdot, command.is_bare());
-        self.boxes.heard().commanded = Some(Instant::now());
-        self.link.send(packet);
+        self.mailbox.heard().commanded = Some(Instant::now());
+        self.link.send(self.mailbox.command(qdot));
     }
 
     /// Whether everything that was heard is of an age and kind that may be acted on.
@@ -239,18 +218,18 @@ impl Lab {
             return Err(LinkFault::Arm(words));
         }
         for topic in HEARD {
-            let line = self.settings.topics.line(topic);
+            let topics = &self.settings().topics;
             let state = &heard.topics[topic as usize];
-            if self.settings.is_on_change(topic) {
+            if self.settings().is_on_change(topic) {
                 if self.link.publisher_count(topic) == 0 {
-                    let words = format!("no publisher on {} any more", line.name);
+                    let words = format!("no publisher on {} any more", topics.name(topic));
                     return Err(Invalid::new(words).into());
                 }
                 continue;
             }
             let age_s = state.at.map_or(f64::MAX, |at| at.elapsed().as_secs_f64());
-            if age_s > line.age_s {
-                return Err(silent(&line.name, age_s, state).into());
+            if age_s > topics.age_s(topic) {
+                return Err(silent(&topics.name(topic), age_s, state).into());
             }
         }
         match self.link.broken() {
@@ -260,11 +239,11 @@ impl Lab {
     }
 }
 
-/// Puts what the sensor sends into its mailbox; a record with an error is a refusal.
-fn listen(settings: &NetFtSettings, boxes: &Mailboxes) -> Result<NetFt, LinkFault> {
-    let (boxes, address) = (boxes.clone(), settings.address.clone());
+/// Puts what the sensor sends into the mailbox; a record with an error is a refusal.
+fn listen(settings: &NetFtSettings, mailbox: &Arc<Mailbox>) -> Result<NetFt, LinkFault> {
+    let (mailbox, address) = (Arc::clone(mailbox), settings.address.clone());
     let take = move |record: Record| {
-        let mut heard = boxes.heard();
+        let mut heard = mailbox.heard();
         heard.topics[Topic::Wrench as usize].at = Some(Instant::now());
         heard.wrench = Some(record.wrench);
         if record.status != 0 {
@@ -295,7 +274,7 @@ impl Drop for Lab {
     /// Nobody commands any more, and the arm's side is told, so that it is no alarm.
     fn drop(&mut self) {
         let was_engaged = {
-            let mut heard = self.boxes.heard();
+            let mut heard = self.mailbox.heard();
             heard.is_ready = false;
             std::mem::take(&mut heard.is_engaged)
         };
@@ -327,7 +306,7 @@ impl LabArm {
         // No command goes to an arm that was stopped by hand: one to stand still could open its
         // brakes again.
         if matches!(cause, LinkFault::Arm(_)) {
-            let mut heard = self.lab.boxes.heard();
+            let mut heard = self.lab.mailbox.heard();
             (heard.is_engaged, heard.is_ready) = (false, false);
         }
         let cause = self.lab.latch().get_or_insert(cause).clone();
@@ -342,10 +321,18 @@ impl LabArm {
         }
     }
 
-    /// Takes over what was heard.
-    fn read(&mut self) -> Result<(), LinkFault> {
-        let boxes = self.lab.boxes.clone();
-        let mut heard = boxes.heard();
+    /// Returns the newest reading, or latches a fault.
+    fn read(&mut self) -> Result<&Reading, Fault> {
+        match self.take_over() {
+            Ok(()) => Ok(&self.reading),
+            Err(cause) => Err(self.fault(cause)),
+        }
+    }
+
+    /// Copies the newest messages into the reading.
+    fn take_over(&mut self) -> Result<(), LinkFault> {
+        let mailbox = Arc::clone(&self.lab.mailbox);
+        let mut heard = mailbox.heard();
         self.lab.check(&heard)?;
         let time_s = self.time_s();
         let dt_s = time_s - self.reading.time_s;
@@ -390,7 +377,7 @@ impl Backend for LabArm {
         let lab = Arc::clone(&self.lab);
         (self.since, self.reading) = (Instant::now(), Reading::default());
         {
-            let mut heard = lab.boxes.heard();
+            let mut heard = lab.mailbox.heard();
             heard.since = Some(self.since);
             heard.frames.clear();
             (heard.is_engaged, heard.is_ready) = (true, false);
@@ -402,23 +389,20 @@ impl Backend for LabArm {
         let begun = Instant::now();
         loop {
             sleep(LOOK);
-            let mut heard = lab.boxes.heard();
+            let mut heard = lab.mailbox.heard();
             let status = heard.status.as_ref();
             let is_ready = status.is_some_and(|status| status.refusal().is_none());
             let is_final = status.is_some_and(ArmStatus::needs_operator);
             let waited_s = begun.elapsed().as_secs_f64();
             heard.is_ready = is_ready && waited_s > HANDSHAKE_S;
             let is_done = heard.is_ready || is_final && waited_s > HANDSHAKE_S;
-            if is_done || waited_s > lab.settings.patience_s {
+            if is_done || waited_s > lab.settings().patience_s {
                 break;
             }
         }
         self.pace.restart();
         self.reading.applied.clone_from(&self.still);
-        match self.read() {
-            Ok(()) => Ok(&self.reading),
-            Err(cause) => Err(self.fault(cause)),
-        }
+        self.read()
     }
 
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
@@ -427,10 +411,7 @@ impl Backend for LabArm {
         self.lab.command(&command.qdot);
         self.pace.wait(1);
         self.reading.applied.clone_from(command);
-        match self.read() {
-            Ok(()) => Ok(&self.reading),
-            Err(cause) => Err(self.fault(cause)),
-        }
+        self.read()
     }
 
     /// Calls the stop of the arm's side, without waiting for its answer.

@@ -1,7 +1,9 @@
 //! Joints by name: which number of a message is which joint's.
 
-use super::message::JointTrajectoryPoint;
-use super::message::{Duration, Float64MultiArray, Header, JointState, JointTrajectory};
+use super::message::{
+    Duration, Float64MultiArray, Header, JointState, JointTrajectory, JointTrajectoryPoint,
+};
+use super::topics::{CommandMessage, CommandTopic};
 use super::transport::Packet;
 use palpate_input::error::Invalid;
 
@@ -81,21 +83,18 @@ impl JointNames {
         }
     }
 
-    /// A velocity command that is valid for `valid_s` from `stamp_s` on; without names and stamp
-    /// where the lab wants it so.
-    pub fn command(&self, stamp_s: f64, valid_s: f64, qdot: &[f64], is_bare: bool) -> Packet {
-        if is_bare {
-            return Packet::Velocities(Float64MultiArray {
-                data: qdot.into(),
-                ..Float64MultiArray::default()
-            });
+    /// A velocity command over `topic` at `stamp_s`.
+    pub fn command(&self, stamp_s: f64, qdot: &[f64], topic: &CommandTopic) -> Packet {
+        if topic.message == CommandMessage::Velocities {
+            let data = qdot.into();
+            return Packet::Velocities(Float64MultiArray { data, ..Float64MultiArray::default() });
         }
         Packet::Command(JointTrajectory {
             header: Header::new(stamp_s, ""),
             joint_names: self.0.clone(),
             points: vec![JointTrajectoryPoint {
                 velocities: qdot.into(),
-                time_from_start: Duration::from_s(valid_s),
+                time_from_start: Duration::from_s(topic.age_s),
                 ..JointTrajectoryPoint::default()
             }],
         })

@@ -7,7 +7,7 @@ use super::transport::{Connect, Delivery, Packet, Transport, Waker};
 use palpate_input::error::Invalid;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -15,42 +15,21 @@ use std::time::{Duration, Instant};
 /// How often publishers are counted; chosen, discovery takes longer.
 const COUNTED_S: f64 = 0.1;
 
-/// What is to be done by the thread.
-enum Errand {
-    Send(Packet),
-    Answer(Service, u64, TriggerResponse),
-}
+/// Sends something; done by the thread.
+type Job = Box<dyn FnOnce(&mut dyn Transport) -> Result<(), Invalid> + Send>;
 
-/// Most errands that wait; older ones are of no use.
-const ERRANDS_MAX: usize = 256;
+/// Most jobs that wait; older ones are of no use.
+const JOBS_MAX: usize = 256;
 
 #[derive(Default)]
 struct Shared {
-    errands: Mutex<VecDeque<Errand>>,
+    jobs: Mutex<VecDeque<Job>>,
     is_closed: AtomicBool,
     /// Known publishers by topic.
     publishers: [AtomicUsize; Topic::ALL.len()],
     broken: Mutex<Option<Invalid>>,
     /// Calls whose server has not been found yet.
     waiting: Mutex<Vec<Service>>,
-}
-
-/// What a side does with what arrives, in the link's thread.
-pub trait Sink: Send {
-    /// Takes what has arrived.
-    fn take(&mut self, delivery: Delivery);
-
-    /// Called about every `period`: what is to be sent then.
-    fn tick(&mut self, send: &mut dyn FnMut(Packet)) {
-        let _ = send;
-    }
-}
-
-/// A channel keeps what arrives until its receiver looks.
-impl Sink for Sender<Delivery> {
-    fn take(&mut self, delivery: Delivery) {
-        let _ = self.send(delivery);
-    }
 }
 
 /// One side's end with its thread.
@@ -61,18 +40,24 @@ pub struct Link {
 }
 
 impl Link {
-    /// Opens a transport in a thread of its own, which ticks every `period`.
+    /// Opens a transport in a thread of its own, which passes what arrives to `take`, and about
+    /// every `period` sends what `idle` returns.
     ///
     /// # Errors
     /// If it cannot be opened.
-    pub fn open(connect: Connect, period: Duration, sink: Box<dyn Sink>) -> Result<Self, Invalid> {
+    pub fn open(
+        connect: Connect,
+        period: Duration,
+        take: impl FnMut(Delivery) + Send + 'static,
+        idle: impl FnMut() -> Option<Packet> + Send + 'static,
+    ) -> Result<Self, Invalid> {
         let shared = Arc::new(Shared::default());
         let (opened, is_open) = channel();
         let inside = Arc::clone(&shared);
         let thread = std::thread::spawn(move || match connect() {
             Ok(transport) => {
                 let _ = opened.send(Ok(transport.waker()));
-                serve(transport, &inside, period, sink);
+                serve(transport, &inside, period, take, idle);
             }
             Err(error) => {
                 let _ = opened.send(Err(error));
@@ -85,11 +70,11 @@ impl Link {
 
     /// Sends a packet soon.
     pub fn send(&self, packet: Packet) {
-        self.errand(Errand::Send(packet));
+        self.add(Box::new(move |transport| transport.send(&packet)));
     }
 
-    /// Calls a service of the other side as soon as its server is found; the answer comes to the
-    /// sink.
+    /// Calls a service of the other side as soon as its server is found; the answer is a
+    /// delivery.
     pub fn call(&self, service: Service) {
         let mut waiting = lock(&self.shared.waiting);
         if !waiting.contains(&service) {
@@ -106,7 +91,7 @@ impl Link {
 
     /// Answers a call.
     pub fn answer(&self, service: Service, call: u64, answer: TriggerResponse) {
-        self.errand(Errand::Answer(service, call, answer));
+        self.add(Box::new(move |transport| transport.answer(&service, call, answer)));
     }
 
     /// How many publishers of a topic are known, this side's own among them.
@@ -119,13 +104,13 @@ impl Link {
         lock(&self.shared.broken).clone()
     }
 
-    fn errand(&self, errand: Errand) {
-        let mut errands = lock(&self.shared.errands);
-        if errands.len() == ERRANDS_MAX {
-            errands.pop_front();
+    fn add(&self, job: Job) {
+        let mut jobs = lock(&self.shared.jobs);
+        if jobs.len() == JOBS_MAX {
+            jobs.pop_front();
         }
-        errands.push_back(errand);
-        drop(errands);
+        jobs.push_back(job);
+        drop(jobs);
         (self.waker)();
     }
 }
@@ -149,20 +134,18 @@ fn serve(
     mut transport: Box<dyn Transport>,
     shared: &Shared,
     period: Duration,
-    mut sink: Box<dyn Sink>,
+    mut take: impl FnMut(Delivery),
+    mut idle: impl FnMut() -> Option<Packet>,
 ) {
     let mut next = Instant::now() + period;
     let mut counted = Instant::now() - Duration::from_secs(1);
     while !shared.is_closed.load(Ordering::Relaxed) {
         let wait = next.saturating_duration_since(Instant::now());
-        transport.receive(wait, &mut |delivery| sink.take(delivery));
+        transport.receive(wait, &mut take);
         let mut result = Ok(());
         loop {
-            let Some(errand) = lock(&shared.errands).pop_front() else { break };
-            result = result.and(match errand {
-                Errand::Send(packet) => transport.send(&packet),
-                Errand::Answer(service, call, answer) => transport.answer(&service, call, answer),
-            });
+            let Some(job) = lock(&shared.jobs).pop_front() else { break };
+            result = result.and(job(&mut *transport));
         }
         lock(&shared.waiting).retain(|service| {
             let is_found = transport.is_served(service);
@@ -173,8 +156,10 @@ fn serve(
         });
         let now = Instant::now();
         if now >= next {
-            sink.tick(&mut |packet| result = result.clone().and(transport.send(&packet)));
-            // Who was held up does not catch up.
+            if let Some(packet) = idle() {
+                result = result.and(transport.send(&packet));
+            }
+            // Missed periods are skipped.
             next = (next + period).max(now);
         }
         if counted.elapsed().as_secs_f64() > COUNTED_S {
@@ -187,9 +172,7 @@ fn serve(
         *lock(&shared.broken) = result.err();
     }
     // What a side says last is still sent.
-    for errand in lock(&shared.errands).drain(..) {
-        if let Errand::Send(packet) = errand {
-            let _ = transport.send(&packet);
-        }
+    for job in lock(&shared.jobs).drain(..) {
+        let _ = job(&mut *transport);
     }
 }

@@ -2,9 +2,8 @@
 //! that hold the arm still while the explorer computes.
 
 use super::joints::JointNames;
-use super::link::Sink;
 use super::message::{Time, TriggerResponse};
-use super::settings::BackendSettings;
+use super::settings::{BackendSettings, CLOCK_AHEAD_S};
 use super::status::ArmStatus;
 use super::tactile;
 use super::topics::{Service, Topic};
@@ -13,7 +12,7 @@ use palpate_explore::backend::{LinkFault, Wrench, pace};
 use palpate_explore::robot::finger::Frame;
 use palpate_input::error::Invalid;
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// Tactile frames kept until they are read.
@@ -68,84 +67,67 @@ pub struct TopicState {
     pub skipped: Option<String>,
 }
 
-/// The newest messages, shared between the link's thread and the control loop.
-#[derive(Clone, Default)]
-pub struct Mailboxes(Arc<Mutex<Heard>>);
-
-impl Mailboxes {
-    /// Locks the messages; the link's thread waits meanwhile.
-    pub fn heard(&self) -> MutexGuard<'_, Heard> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
 /// The fault of a message on `topic` that cannot be used.
 pub(super) fn refused(topic: &str, words: impl std::fmt::Display) -> LinkFault {
     Invalid::new(format!("message on {topic} refused: {words}")).into()
 }
 
-/// Fills the mailboxes.
-pub struct Postman {
-    boxes: Mailboxes,
-    names: JointNames,
-    settings: BackendSettings,
+/// The newest messages of an arm, shared between the link's thread and the control loop.
+pub struct Mailbox {
+    /// The arm's joints as its messages name them.
+    pub names: JointNames,
+    /// Table `[backend]` of the experiment.
+    pub settings: BackendSettings,
+    heard: Mutex<Heard>,
 }
 
-impl Postman {
-    /// For an arm of these joints.
-    pub fn new(boxes: Mailboxes, names: JointNames, settings: BackendSettings) -> Self {
-        Self { boxes, names, settings }
+impl Mailbox {
+    /// Returns one without messages.
+    pub fn new(names: JointNames, settings: BackendSettings) -> Self {
+        let heard = Heard { since: Some(Instant::now()), ..Heard::default() };
+        Self { names, settings, heard: Mutex::new(heard) }
     }
 
-    /// Whether a message of `topic` with this stamp may be used, by its age and order.
-    ///
-    /// # Errors
-    /// If it has no stamp, or one from the future.
-    fn is_timely(
-        &self,
-        state: &mut TopicState,
-        topic: Topic,
-        stamp: Time,
-    ) -> Result<bool, LinkFault> {
-        let line = self.settings.topics.line(topic);
-        let stamp_s = stamp.s();
-        if stamp_s == 0.0 {
-            return match self.settings.accept_unstamped {
-                true => Ok(true),
-                false => Err(refused(
-                    &line.name,
-                    "its stamp is zero, so its age is unknown; stamp it, or set \
-                     backend.accept_unstamped = true to count its age from receipt",
-                )),
-            };
-        }
-        let age_s = pace::now_s() - stamp_s;
-        if age_s < -self.settings.clock_ahead_s {
-            let ahead_ms = -1e3 * age_s;
-            let words = format!(
-                "its stamp is {ahead_ms:.0} ms in the future; are the clocks synchronised?"
-            );
-            return Err(refused(&line.name, words));
-        }
-        if stamp_s < state.stamp_s {
-            state.backward += 1;
-            return Ok(false);
-        }
-        state.stamp_s = stamp_s;
-        if self.settings.is_on_change(topic) {
-            return Ok(true);
-        }
-        state.late_s = (age_s > line.age_s).then_some(age_s);
-        Ok(age_s <= line.age_s)
+    /// Locks the messages; the link's thread waits meanwhile.
+    pub fn heard(&self) -> MutexGuard<'_, Heard> {
+        self.heard.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn take_packet(&mut self, mut packet: Packet, received: Instant) {
+    /// Takes what has arrived.
+    pub fn take(&self, delivery: Delivery) {
+        match delivery {
+            Delivery::Packet { packet, received, .. } => self.take_packet(packet, received),
+            Delivery::Garbled { topic, words } => {
+                let fault = refused(&self.settings.topics.name(topic), words);
+                self.heard().refused.get_or_insert(fault);
+            }
+            Delivery::Answered { service, answer } => self.heard().answers.push((service, answer)),
+            Delivery::Call { .. } => (),
+        }
+    }
+
+    /// Returns a command to stand still if the arm is engaged and no other command was given
+    /// lately.
+    pub fn idle_command(&self) -> Option<Packet> {
+        let heard = self.heard();
+        let silent_s = SILENT_PERIODS / self.settings.rate_hz;
+        let is_silent = heard.commanded.is_none_or(|last| last.elapsed().as_secs_f64() >= silent_s);
+        let still = || self.command(&vec![0.0; self.names.names().len()]);
+        (heard.is_engaged && is_silent).then(still)
+    }
+
+    /// The packet that commands velocities from now on.
+    pub fn command(&self, qdot: &[f64]) -> Packet {
+        self.names.command(pace::now_s(), qdot, &self.settings.topics.command)
+    }
+
+    fn take_packet(&self, mut packet: Packet, received: Instant) {
         let topic = packet.topic();
-        if topic == Topic::Wrench && self.settings.net_ft.is_some() {
+        let is_other = topic == Topic::Wrench && self.settings.net_ft.is_some();
+        if is_other || topic == Topic::Command {
             return;
         }
-        let boxes = self.boxes.clone();
-        let heard = &mut *boxes.heard();
+        let heard = &mut *self.heard();
         let stamp = packet.stamp_mut().copied().unwrap_or_default();
         if let Err(fault) = self.read(heard, &packet, stamp, received) {
             if matches!(fault, LinkFault::Arm(_)) {
@@ -164,32 +146,47 @@ impl Postman {
         received: Instant,
     ) -> Result<(), LinkFault> {
         let topic = packet.topic();
-        let refuse = |words| refused(&self.settings.topics.line(topic).name, words);
+        let refuse = |words: String| refused(&self.settings.topics.name(topic), words);
         let state = &mut heard.topics[topic as usize];
+        // Another driver, such as a hand's, may publish on the same topic.
+        if let Packet::Joints(message) = packet
+            && !self.names.are_among(&message.name)
+        {
+            let names = self.names.names();
+            let words = format!("joints {:?} are none of the arm's {names:?}", message.name);
+            state.skipped = Some(words);
+            return Ok(());
+        }
+        let mut status = None;
+        if let Packet::Status(message) = packet {
+            let device = self.settings.topics.device();
+            let read = ArmStatus::read(message, device);
+            status = read.map_err(|cause| refuse(cause.to_string()))?;
+            if status.is_none() {
+                let found: Vec<_> = message.status.iter().map(|status| &status.name).collect();
+                state.skipped = Some(format!("no status named \"{device}\" among {found:?}"));
+                return Ok(());
+            }
+        }
+        let is_timely = self.is_timely(state, topic, stamp);
+        if let Some(status) = &status {
+            // What only an operator can clear counts whatever its stamp says.
+            let is_read = status.needs_operator() || is_timely.clone()?;
+            if let Some(words) = status.refusal().filter(|_| heard.is_ready && is_read) {
+                return Err(LinkFault::Arm(words));
+            }
+        }
+        if !is_timely? {
+            return Ok(());
+        }
         match packet {
             Packet::Joints(message) => {
-                // Another driver, such as a hand's, may publish on the same topic.
-                if !self.names.are_among(&message.name) {
-                    let words = format!(
-                        "joints {:?} are none of the arm's {:?}",
-                        message.name,
-                        self.names.names()
-                    );
-                    state.skipped = Some(words);
-                    return Ok(());
-                }
-                if !self.is_timely(state, topic, stamp)? {
-                    return Ok(());
-                }
                 let read = self.names.read(message, &mut heard.q, &mut heard.qdot);
                 read.map_err(|cause| refuse(cause.to_string()))?;
             }
             Packet::Wrench(message) => {
-                if !self.is_timely(state, topic, stamp)? {
-                    return Ok(());
-                }
-                let wrench = message.wrench;
-                let (force_n, torque_nm) = (wrench.force.into(), wrench.torque.into());
+                let (force_n, torque_nm) =
+                    (message.wrench.force.into(), message.wrench.torque.into());
                 let wrench = Wrench { force_n, torque_nm };
                 let (force, torque) = (wrench.force_n.as_slice(), wrench.torque_nm.as_slice());
                 if !force.iter().chain(torque).all(|part| part.is_finite()) {
@@ -197,30 +194,8 @@ impl Postman {
                 }
                 heard.wrench = Some(wrench);
             }
-            Packet::Status(message) => {
-                let device = self.settings.topics.device();
-                let read = ArmStatus::read(message, device);
-                let Some(status) = read.map_err(|cause| refuse(cause.to_string()))? else {
-                    let found: Vec<_> = message.status.iter().map(|status| &status.name).collect();
-                    let words = format!("no status named \"{device}\" among {found:?}");
-                    state.skipped = Some(words);
-                    return Ok(());
-                };
-                // What only an operator can clear counts whatever its stamp says.
-                let is_timely = self.is_timely(state, topic, stamp);
-                let is_read = status.needs_operator() || is_timely.clone()?;
-                if let Some(words) = status.refusal().filter(|_| heard.is_ready && is_read) {
-                    return Err(LinkFault::Arm(words));
-                }
-                if !is_timely? {
-                    return Ok(());
-                }
-                heard.status = Some(status);
-            }
+            Packet::Status(_) => heard.status = status,
             Packet::Hand(_) | Packet::Fingers(_) => {
-                if !self.is_timely(state, topic, stamp)? {
-                    return Ok(());
-                }
                 let since_s = |since| received.saturating_duration_since(since).as_secs_f64();
                 let time_s = heard.since.map_or(0.0, since_s);
                 let finger = self.settings.finger;
@@ -237,32 +212,47 @@ impl Postman {
         heard.topics[topic as usize].at = Some(received);
         Ok(())
     }
-}
 
-impl Sink for Postman {
-    fn take(&mut self, delivery: Delivery) {
-        match delivery {
-            Delivery::Packet { packet, received, .. } => self.take_packet(packet, received),
-            Delivery::Garbled { topic, words } => {
-                let fault = refused(&self.settings.topics.line(topic).name, words);
-                self.boxes.heard().refused.get_or_insert(fault);
-            }
-            Delivery::Answered { service, answer } => {
-                self.boxes.heard().answers.push((service, answer));
-            }
-            Delivery::Call { .. } => (),
+    /// Whether a message of `topic` with this stamp may be used, by its age and order.
+    ///
+    /// # Errors
+    /// If it has no stamp, or one from the future.
+    fn is_timely(
+        &self,
+        state: &mut TopicState,
+        topic: Topic,
+        stamp: Time,
+    ) -> Result<bool, LinkFault> {
+        let topics = &self.settings.topics;
+        let stamp_s = stamp.s();
+        if stamp_s == 0.0 {
+            return match self.settings.accept_unstamped {
+                true => Ok(true),
+                false => Err(refused(
+                    &topics.name(topic),
+                    "its stamp is zero, so its age is unknown; stamp it, or set \
+                     backend.accept_unstamped = true to count its age from receipt",
+                )),
+            };
         }
-    }
-
-    fn tick(&mut self, send: &mut dyn FnMut(Packet)) {
-        let heard = self.boxes.heard();
-        let silent_s = SILENT_PERIODS / self.settings.rate_hz;
-        let is_silent = heard.commanded.is_none_or(|last| last.elapsed().as_secs_f64() >= silent_s);
-        if heard.is_engaged && is_silent {
-            let command = &self.settings.topics.command;
-            let still = vec![0.0; self.names.names().len()];
-            let (now_s, valid_s) = (pace::now_s(), command.age_s);
-            send(self.names.command(now_s, valid_s, &still, command.is_bare()));
+        let age_s = pace::now_s() - stamp_s;
+        if age_s < -CLOCK_AHEAD_S {
+            let ahead_ms = -1e3 * age_s;
+            let words = format!(
+                "its stamp is {ahead_ms:.0} ms in the future; are the clocks synchronised?"
+            );
+            return Err(refused(&topics.name(topic), words));
         }
+        if stamp_s < state.stamp_s {
+            state.backward += 1;
+            return Ok(false);
+        }
+        state.stamp_s = stamp_s;
+        if self.settings.is_on_change(topic) {
+            return Ok(true);
+        }
+        let is_late = age_s > topics.age_s(topic);
+        state.late_s = is_late.then_some(age_s);
+        Ok(!is_late)
     }
 }

@@ -366,41 +366,29 @@ messages! {
 
 const NANO: f64 = 1e9;
 
-/// Seconds as whole ones and nanoseconds, rounded.
-fn split(time_s: f64) -> (i32, u32) {
-    let whole_s = time_s.floor();
-    let nanosec = ((time_s - whole_s) * NANO).round();
-    match nanosec < NANO {
-        true => (whole_s as i32, nanosec as u32),
-        false => (whole_s as i32 + 1, 0),
-    }
+/// Conversions from and to seconds.
+macro_rules! seconds {
+    ($($name:ident),*) => {$(
+        impl $name {
+            /// Of seconds, rounded to nanoseconds.
+            pub fn from_s(time_s: f64) -> Self {
+                let whole_s = time_s.floor();
+                let nanosec = ((time_s - whole_s) * NANO).round();
+                match nanosec < NANO {
+                    true => Self { sec: whole_s as i32, nanosec: nanosec as u32 },
+                    false => Self { sec: whole_s as i32 + 1, nanosec: 0 },
+                }
+            }
+
+            /// In seconds.
+            pub fn s(self) -> f64 {
+                f64::from(self.sec) + f64::from(self.nanosec) / NANO
+            }
+        }
+    )*};
 }
 
-impl Time {
-    /// Of seconds, rounded to nanoseconds.
-    pub fn from_s(time_s: f64) -> Self {
-        let (sec, nanosec) = split(time_s);
-        Self { sec, nanosec }
-    }
-
-    /// In seconds.
-    pub fn s(self) -> f64 {
-        f64::from(self.sec) + f64::from(self.nanosec) / NANO
-    }
-}
-
-impl Duration {
-    /// Of seconds, rounded to nanoseconds.
-    pub fn from_s(time_s: f64) -> Self {
-        let (sec, nanosec) = split(time_s);
-        Self { sec, nanosec }
-    }
-
-    /// In seconds.
-    pub fn s(self) -> f64 {
-        f64::from(self.sec) + f64::from(self.nanosec) / NANO
-    }
-}
+seconds!(Time, Duration);
 
 impl Header {
     /// Of a moment, in seconds, in a frame.

@@ -7,7 +7,7 @@ use super::message::{
 };
 use super::network::network;
 use super::settings::{BackendSettings, MappingKind};
-use super::topics::{Service, Side, Topic, Topics};
+use super::topics::{CommandMessage, Service, Side, TactileMessage, Topic, Topics};
 use super::transport::{Delivery, Packed, Packet, Transport, Waker, cannot_open, cannot_send};
 use palpate_input::error::Invalid;
 use ros2_client::qos::{Durability, History, WhenFull};
@@ -22,7 +22,7 @@ use rustdds::mio1::{Events, Interest, Poll, Token};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -163,13 +163,13 @@ impl Ros2 {
             // One that is published on change was so before this side came.
             self.subscribe::<DiagnosticArray>(Topic::Status, latched())?;
         }
-        match self.topics.tactile.is_shadow() {
-            true => self.topic::<BiotacAll>(Topic::Tactile)?,
-            false => self.topic::<BioTacHand>(Topic::Tactile)?,
+        match self.topics.tactile.message {
+            TactileMessage::Fingers => self.topic::<BiotacAll>(Topic::Tactile)?,
+            TactileMessage::Hand => self.topic::<BioTacHand>(Topic::Tactile)?,
         }
-        match self.topics.command.is_bare() {
-            true => self.topic::<Float64MultiArray>(Topic::Command),
-            false => self.topic::<JointTrajectory>(Topic::Command),
+        match self.topics.command.message {
+            CommandMessage::Velocities => self.topic::<Float64MultiArray>(Topic::Command),
+            CommandMessage::Trajectory => self.topic::<JointTrajectory>(Topic::Command),
         }
     }
 
@@ -201,7 +201,7 @@ impl Ros2 {
         topic: Topic,
         qos: &QosProfile,
     ) -> Result<(String, rustdds::Topic), Invalid> {
-        let name = self.topics.line(topic).name.into_owned();
+        let name = self.topics.name(topic);
         let type_name = MessageTypeName::new(M::DEFINITION.package(), M::DEFINITION.short_name());
         let path = Name::parse(&name).map_err(cannot_open(&name))?;
         let dds = self.node.create_topic(&path, type_name, qos).map_err(cannot_open(&name))?;
@@ -217,12 +217,13 @@ impl Ros2 {
         let mut subscription =
             self.node.create_subscription::<M>(&dds, Some(qos)).map_err(cannot_open(&name))?;
         self.watch(&mut subscription, &name)?;
+        let hashes = BuildHasherDefault::<DefaultHasher>::new();
         self.readers.push(Box::new(move |take| {
             loop {
                 match subscription.take() {
                     Ok(Some((message, info))) => {
                         let (packet, received) = (message.into(), Instant::now());
-                        let sender = hash(&info.publisher_gid());
+                        let sender = hashes.hash_one(info.publisher_gid());
                         take(Delivery::Packet { packet, sender, received });
                     }
                     Ok(None) => break,
@@ -305,12 +306,6 @@ fn mapping(kind: MappingKind, vendor: [u8; 2]) -> ServiceMapping {
     }
 }
 
-fn hash(value: &impl Hash) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    value.hash(&mut hasher);
-    hasher.finish()
-}
-
 impl Transport for Ros2 {
     fn waker(&self) -> Waker {
         let waker = Arc::clone(&self.waker);
@@ -322,7 +317,7 @@ impl Transport for Ros2 {
     fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
         let sent = self.writers.iter().find_map(|writer| writer(packet));
         let sent = sent.unwrap_or(Err("not this side's".into()));
-        sent.map_err(|words| cannot_send(&self.topics.line(packet.topic()).name, words))
+        sent.map_err(|words| cannot_send(&self.topics.name(packet.topic()), words))
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
@@ -346,7 +341,7 @@ impl Transport for Ros2 {
     }
 
     fn publisher_count(&self, topic: Topic) -> usize {
-        self.node.publisher_count(&self.topics.line(topic).name)
+        self.node.publisher_count(&self.topics.name(topic))
     }
 
     fn is_served(&mut self, service: &Service) -> bool {

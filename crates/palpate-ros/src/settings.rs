@@ -3,12 +3,12 @@
 use super::joints::JointNames;
 use super::net_ft::NetFtSettings;
 use super::topics::{Topic, Topics};
-use palpate_explore::backend::interlock::InterlockSettings;
-use palpate_explore::backend::interlock::gates::GateSettings;
+use palpate_explore::backend::interlock::{FORMER_KEYS, GateSettings, InterlockSettings};
 use palpate_explore::robot::arm::{ArmModel, ArmSettings, Chain};
-use palpate_input::config::{Checked, Rules, is_default};
+use palpate_input::config::{Checked, ConfigError, Loader, Rules, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use toml::Value;
 
 /// Which body carries out the touches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -75,8 +75,6 @@ pub struct BackendSettings {
     pub rate_hz: f64,
     /// How long the arm's side is waited for.
     pub patience_s: f64,
-    /// How far stamps may be ahead of this machine's clock.
-    pub clock_ahead_s: f64,
     /// Whether messages without a stamp are accepted; their age then counts from receipt.
     pub accept_unstamped: bool,
     /// Whether the status is published on change only, latched (transient local): its age then says
@@ -114,7 +112,6 @@ impl Default for BackendSettings {
             finger: 0,
             rate_hz: 250.0,
             patience_s: 5.0,
-            clock_ahead_s: 0.005,
             accept_unstamped: false,
             status_on_change: false,
             net_ft: None,
@@ -123,6 +120,49 @@ impl Default for BackendSettings {
             topics: Topics::default(),
         }
     }
+}
+
+/// How far stamps may be ahead of this machine's clock, s.
+// heuristic: several times what NTP leaves between the clocks of a local network.
+pub const CLOCK_AHEAD_S: f64 = 0.005;
+
+/// Keys of version 0.1 that had no effect on a run.
+const UNUSED_KEYS: [&str; 6] = [
+    "gates.near",
+    "topics.joints.rate_hz",
+    "topics.wrench.rate_hz",
+    "topics.tactile.rate_hz",
+    "topics.status.rate_hz",
+    "topics.command.rate_hz",
+];
+
+/// Takes the keys that version 0.1 read in `[backend]`, and wrote with their defaults, out of the
+/// experiment in `loader`.
+///
+/// # Errors
+/// If one has another value than the constant that holds now: a limit of an arm does not change
+/// without notice.
+pub fn take_former_keys(loader: &mut Loader) -> Result<(), ConfigError> {
+    UNUSED_KEYS.iter().for_each(|key| drop(loader.take(&format!("backend.{key}"))));
+    let numbers = FORMER_KEYS.into_iter().chain([("clock_ahead_s", CLOCK_AHEAD_S)]);
+    let numbers = numbers.map(|(key, number)| (key.to_owned(), Value::Float(number)));
+    let types = [Topic::Joints, Topic::Wrench, Topic::Status].map(|topic| {
+        let type_name = Topics::default().type_name(topic);
+        (format!("topics.{}.type", topic.key()), Value::String(type_name.into()))
+    });
+    for (key, constant) in numbers.chain(types) {
+        let key = format!("backend.{key}");
+        let Some(value) = loader.take(&key) else { continue };
+        let is_same = match value.as_integer() {
+            Some(whole) => Some(whole as f64) == constant.as_float(),
+            None => value == constant,
+        };
+        if !is_same {
+            let allowed = format!("{constant}, which is a constant now: remove the key");
+            return Err(loader.not_allowed(&key, &value.to_string(), &allowed));
+        }
+    }
+    Ok(())
 }
 
 impl BackendSettings {
@@ -161,7 +201,6 @@ impl Checked for BackendSettings {
         });
         rules.number("rate_hz", self.rate_hz, 50.0..=RATE_MAX_HZ);
         rules.number("patience_s", self.patience_s, 0.1..=600.0);
-        rules.number("clock_ahead_s", self.clock_ahead_s, 0.0..=10.0);
         for (i, name) in self.joints.iter().enumerate() {
             let is_new = !name.is_empty() && !self.joints[..i].contains(name);
             rules.require(&format!("joints[{i}]"), format!("\"{name}\""), is_new, || {

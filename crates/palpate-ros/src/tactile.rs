@@ -1,6 +1,7 @@
 //! A tactile frame as the two drivers send it.
 
 use super::message::{BioTacData, BioTacHand, BioTacTime, Biotac, BiotacAll, Header, Time};
+use super::topics::TactileMessage;
 use super::transport::Packet;
 use palpate_explore::robot::finger::Frame;
 use palpate_explore::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS, VIBRATIONS};
@@ -8,7 +9,7 @@ use palpate_explore::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS, VIBRA
 /// Reads the frame of a finger out of a packet of the tactile topic; it gets the time `time_s`.
 /// None if the hand has no such finger, or one of another model.
 pub fn frame(packet: &Packet, finger: usize, time_s: f64) -> Option<Frame> {
-    match packet {
+    let (electrodes, pac, [pdc, tdc, tac]) = match packet {
         Packet::Hand(hand) => {
             let is_it = |data: &&BioTacData| usize::from(data.bt_position) == finger;
             // The driver counts positions from 1; with one finger its number does not matter.
@@ -16,69 +17,71 @@ pub fn frame(packet: &Packet, finger: usize, time_s: f64) -> Option<Frame> {
                 [only] => only,
                 many => many.iter().find(is_it)?,
             };
-            Some(Frame {
-                time_s,
-                electrode_counts: Some(data.electrode_data.map(f64::from)),
-                pdc_counts: Some(data.pdc_data.into()),
-                pac_counts: Some(data.pac_data.map(f64::from)),
-                tdc_counts: Some(data.tdc_data.into()),
-                tac_counts: Some(data.tac_data.into()),
-                slip: None,
-            })
+            let single = [data.pdc_data, data.tdc_data, data.tac_data].map(f64::from);
+            (data.electrode_data.map(f64::from), Some(data.pac_data.map(f64::from)), single)
         }
         Packet::Fingers(hand) => {
             let data = hand.tactiles.get(finger)?;
             let electrodes: [i16; ELECTRODES] = data.electrodes.as_slice().try_into().ok()?;
             let pac: Option<[i16; VIBRATIONS]> = data.pac.as_slice().try_into().ok();
-            Some(Frame {
-                time_s,
-                electrode_counts: Some(electrodes.map(f64::from)),
-                pdc_counts: Some(data.pdc.into()),
-                pac_counts: pac.map(|pac| pac.map(f64::from)),
-                tdc_counts: Some(data.tdc.into()),
-                tac_counts: Some(data.tac.into()),
-                slip: None,
-            })
+            let single = [data.pdc, data.tdc, data.tac].map(f64::from);
+            (electrodes.map(f64::from), pac.map(|pac| pac.map(f64::from)), single)
         }
-        _ => None,
-    }
+        _ => return None,
+    };
+    Some(Frame {
+        time_s,
+        electrode_counts: Some(electrodes),
+        pdc_counts: Some(pdc),
+        pac_counts: pac,
+        tdc_counts: Some(tdc),
+        tac_counts: Some(tac),
+        slip: None,
+    })
+}
+
+/// Puts a frame into `data` as the BioTac's own driver sends it: whole counts, 0 where there are
+/// none.
+pub fn fill(data: &mut BioTacData, frame: &Frame) {
+    let whole =
+        |counts: Option<f64>| counts.unwrap_or(0.0).clamp(0.0, FULL_SCALE_COUNTS).round() as u16;
+    data.pdc_data = whole(frame.pdc_counts);
+    data.tdc_data = whole(frame.tdc_counts);
+    data.tac_data = whole(frame.tac_counts);
+    data.pac_data = std::array::from_fn(|i| whole(frame.pac_counts.map(|all| all[i])));
+    data.electrode_data = std::array::from_fn(|i| whole(frame.electrode_counts.map(|all| all[i])));
 }
 
 /// The packet of a frame; what the frame lacks is 0 counts.
-pub fn packet(frame: &Frame, stamp_s: f64, finger: usize, is_shadow: bool) -> Packet {
-    let counts = |value: f64| value.clamp(0.0, FULL_SCALE_COUNTS).round();
-    let one = |value: Option<f64>| counts(value.unwrap_or(0.0));
-    let electrodes = frame.electrode_counts.unwrap_or_default().map(counts);
-    let pac = frame.pac_counts.unwrap_or_default().map(counts);
+pub fn packet(frame: &Frame, stamp_s: f64, finger: usize, message: TactileMessage) -> Packet {
+    let mut data = BioTacData { bt_position: finger as u16, ..BioTacData::default() };
+    fill(&mut data, frame);
     let header = Header::new(stamp_s, "");
-    if is_shadow {
-        let mut hand = BiotacAll { header, ..BiotacAll::default() };
-        if let Some(place) = hand.tactiles.get_mut(finger) {
-            *place = Biotac {
-                pac0: pac[VIBRATIONS - 2] as i16,
-                pac1: pac[VIBRATIONS - 1] as i16,
-                pac: pac.map(|value| value as i16).into(),
-                pdc: one(frame.pdc_counts) as i16,
-                tac: one(frame.tac_counts) as i16,
-                tdc: one(frame.tdc_counts) as i16,
-                electrodes: electrodes.map(|value| value as i16).into(),
-            };
-        }
-        return Packet::Fingers(Box::new(hand));
+    if message == TactileMessage::Hand {
+        let at = Time::from_s(stamp_s);
+        return Packet::Hand(Box::new(BioTacHand {
+            header,
+            hand_id: String::new(),
+            bt_data: vec![data],
+            bt_time: BioTacTime {
+                frame_start_time: at,
+                frame_end_time: at,
+                ..BioTacTime::default()
+            },
+        }));
     }
-    let at = Time::from_s(stamp_s);
-    Packet::Hand(Box::new(BioTacHand {
-        header,
-        hand_id: String::new(),
-        bt_data: vec![BioTacData {
-            bt_serial: String::new(),
-            bt_position: finger as u16,
-            tdc_data: one(frame.tdc_counts) as u16,
-            tac_data: one(frame.tac_counts) as u16,
-            pdc_data: one(frame.pdc_counts) as u16,
-            pac_data: pac.map(|value| value as u16),
-            electrode_data: electrodes.map(|value| value as u16),
-        }],
-        bt_time: BioTacTime { frame_start_time: at, frame_end_time: at, ..BioTacTime::default() },
-    }))
+    let mut hand = BiotacAll { header, ..BiotacAll::default() };
+    if let Some(place) = hand.tactiles.get_mut(finger) {
+        let pac = data.pac_data.map(|value| value as i16);
+        *place = Biotac {
+            pac0: pac[VIBRATIONS - 2],
+            pac1: pac[VIBRATIONS - 1],
+            pac: pac.into(),
+            pdc: data.pdc_data as i16,
+            tac: data.tac_data as i16,
+            tdc: data.tdc_data as i16,
+            electrodes: data.electrode_data.map(|value| value as i16).into(),
+        };
+    }
+    Packet::Fingers(Box::new(hand))
 }

@@ -1,5 +1,4 @@
-//! The table of topics, what each is called, what is sent over it, how often, and how old it may
-//! be; and the services of an arm.
+//! The topics of an arm, their names, message types and ages; and its services.
 
 use super::definition::Described;
 use super::message::{
@@ -9,7 +8,6 @@ use super::message::{
 use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 
 /// What is sent between an arm and who explores with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -42,10 +40,7 @@ impl Topic {
 
     /// Who publishes it.
     pub fn publisher(self) -> Side {
-        match self {
-            Self::Joints | Self::Wrench | Self::Tactile | Self::Status => Side::Arm,
-            Self::Command => Side::Explorer,
-        }
+        if self == Self::Command { Side::Explorer } else { Side::Arm }
     }
 
     /// Its key in `[backend.topics]`.
@@ -54,37 +49,55 @@ impl Topic {
     }
 }
 
-/// Default name, allowed types (the first is the default), rate in Hz and age in s of each topic,
-/// as drivers send them (`pa10_hardware_interface`, `kth-ros-pkg/biotac_driver`,
-/// `netft_rdt_driver`).
+/// Default name and age in s of each topic, as drivers send them (`pa10_hardware_interface`,
+/// `kth-ros-pkg/biotac_driver`, `netft_rdt_driver`).
 // heuristic: the ages; some frames of each topic may be lost.
-const USUAL: [(&str, &[&str], f64, f64); 5] = [
-    ("/joint_states", &[JointState::DEFINITION.name], 250.0, 0.05),
-    ("/ft_sensor/wrench", &[WrenchStamped::DEFINITION.name], 500.0, 0.06),
-    ("/biotac_pub", &[BioTacHand::DEFINITION.name, BiotacAll::DEFINITION.name], 100.0, 0.08),
-    ("status", &[DiagnosticArray::DEFINITION.name], 50.0, 0.2),
-    (
-        "joint_velocity_cmd",
-        &[JointTrajectory::DEFINITION.name, Float64MultiArray::DEFINITION.name],
-        250.0,
-        0.03,
-    ),
+const USUAL: [(&str, f64); 5] = [
+    ("/joint_states", 0.05),
+    ("/ft_sensor/wrench", 0.06),
+    ("/biotac_pub", 0.08),
+    ("status", 0.2),
+    ("joint_velocity_cmd", 0.03),
 ];
 
-/// A line of the table as a table of settings of its own, with its own defaults.
-macro_rules! line {
-    ($name:ident, $topic:expr) => {
-        /// A line of the table of topics.
+/// Message type of tactile frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum TactileMessage {
+    /// That of the BioTac's own driver.
+    #[default]
+    #[serde(rename = "biotac_sensors/msg/BioTacHand")]
+    Hand,
+    /// That of a Shadow hand.
+    #[serde(rename = "sr_robot_msgs/msg/BiotacAll")]
+    Fingers,
+}
+
+/// Message type of velocity commands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum CommandMessage {
+    /// With names, stamp and validity.
+    #[default]
+    #[serde(rename = "trajectory_msgs/msg/JointTrajectory")]
+    Trajectory,
+    /// As `ros_control` takes them, without names and stamp.
+    #[serde(rename = "std_msgs/msg/Float64MultiArray")]
+    Velocities,
+}
+
+/// The settings of a topic, with its own defaults.
+macro_rules! topic_settings {
+    ($name:ident, $topic:expr $(, $message:ident)?) => {
+        /// Name and age limit of a topic.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct $name {
             /// Its name; without a slash at the beginning, in the namespace.
             pub name: String,
-            /// Its message type, as in `sensor_msgs/msg/JointState`.
-            #[serde(rename = "type")]
-            pub type_name: String,
-            /// How often it is sent.
-            pub rate_hz: f64,
+            $(
+                /// Its message type.
+                #[serde(rename = "type")]
+                pub message: $message,
+            )?
             /// Age beyond which what was last received counts as lost; of a command: how long it is
             /// valid.
             pub age_s: f64,
@@ -92,46 +105,18 @@ macro_rules! line {
 
         impl Default for $name {
             fn default() -> Self {
-                let (name, types, rate_hz, age_s) = USUAL[$topic as usize];
-                Self { name: name.into(), type_name: types[0].into(), rate_hz, age_s }
-            }
-        }
-
-        impl $name {
-            fn line(&self, namespace: &str) -> Line<'_> {
-                let Self { name, type_name, rate_hz, age_s } = self;
-                let name = within(namespace, name);
-                Line { name, type_name, rate_hz: *rate_hz, age_s: *age_s }
-            }
-        }
-
-        impl Checked for $name {
-            fn check(&self, rules: &mut Rules) {
-                self.line("").check(rules, USUAL[$topic as usize].1);
+                let (name, age_s) = USUAL[$topic as usize];
+                Self { name: name.into(), $(message: $message::default(),)? age_s }
             }
         }
     };
 }
 
-line!(JointsTopic, Topic::Joints);
-line!(WrenchTopic, Topic::Wrench);
-line!(TactileTopic, Topic::Tactile);
-line!(StatusTopic, Topic::Status);
-line!(CommandTopic, Topic::Command);
-
-impl CommandTopic {
-    /// Whether commands go without names and stamp.
-    pub fn is_bare(&self) -> bool {
-        self.type_name == Float64MultiArray::DEFINITION.name
-    }
-}
-
-impl TactileTopic {
-    /// Whether the fingers are those of a Shadow hand.
-    pub fn is_shadow(&self) -> bool {
-        self.type_name == BiotacAll::DEFINITION.name
-    }
-}
+topic_settings!(JointsTopic, Topic::Joints);
+topic_settings!(WrenchTopic, Topic::Wrench);
+topic_settings!(TactileTopic, Topic::Tactile, TactileMessage);
+topic_settings!(StatusTopic, Topic::Status);
+topic_settings!(CommandTopic, Topic::Command, CommandMessage);
 
 /// Table `[backend.topics]`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -153,51 +138,45 @@ pub struct Topics {
     pub command: CommandTopic,
 }
 
-/// A line of the table, whichever it is.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Line<'a> {
-    /// Its name, with its namespace.
-    pub name: Cow<'a, str>,
-    /// Its message type.
-    pub type_name: &'a str,
-    /// How often it is sent.
-    pub rate_hz: f64,
-    /// Age beyond which it counts as lost.
-    pub age_s: f64,
-}
-
-/// `name` in `namespace`, unless it begins with a slash.
-fn within<'a>(namespace: &str, name: &'a str) -> Cow<'a, str> {
-    match name.starts_with('/') {
-        true => name.into(),
-        false => format!("{namespace}/{name}").into(),
-    }
-}
-
-impl Line<'_> {
-    fn check(&self, rules: &mut Rules, types: &[&str]) {
-        let is_plain = |c: char| c.is_ascii_alphanumeric() || "_/".contains(c);
-        let named =
-            !self.name.is_empty() && !self.name.ends_with('/') && self.name.chars().all(is_plain);
-        rules.require("name", format!("\"{}\"", self.name), named, || {
-            "letters, digits, _ and slashes".into()
-        });
-        rules.one_of("type", self.type_name, types);
-        rules.number("rate_hz", self.rate_hz, 1.0..=10_000.0);
-        rules.number("age_s", self.age_s, 1e-3..=10.0);
-    }
-}
-
 impl Topics {
-    /// The line of a topic.
-    pub fn line(&self, topic: Topic) -> Line<'_> {
-        let namespace = self.namespace();
+    /// Name, without its namespace, and age of a topic.
+    fn entry(&self, topic: Topic) -> (&str, f64) {
         match topic {
-            Topic::Joints => self.joints.line(namespace),
-            Topic::Wrench => self.wrench.line(namespace),
-            Topic::Tactile => self.tactile.line(namespace),
-            Topic::Status => self.status.line(namespace),
-            Topic::Command => self.command.line(namespace),
+            Topic::Joints => (&self.joints.name, self.joints.age_s),
+            Topic::Wrench => (&self.wrench.name, self.wrench.age_s),
+            Topic::Tactile => (&self.tactile.name, self.tactile.age_s),
+            Topic::Status => (&self.status.name, self.status.age_s),
+            Topic::Command => (&self.command.name, self.command.age_s),
+        }
+    }
+
+    /// Name of a topic, in its namespace.
+    pub fn name(&self, topic: Topic) -> String {
+        match self.entry(topic).0 {
+            name if name.starts_with('/') => name.into(),
+            name => format!("{}/{name}", self.namespace()),
+        }
+    }
+
+    /// Age beyond which what was last received on a topic counts as lost.
+    pub fn age_s(&self, topic: Topic) -> f64 {
+        self.entry(topic).1
+    }
+
+    /// Message type of a topic.
+    pub fn type_name(&self, topic: Topic) -> &'static str {
+        match topic {
+            Topic::Joints => JointState::DEFINITION.name,
+            Topic::Wrench => WrenchStamped::DEFINITION.name,
+            Topic::Tactile => match self.tactile.message {
+                TactileMessage::Hand => BioTacHand::DEFINITION.name,
+                TactileMessage::Fingers => BiotacAll::DEFINITION.name,
+            },
+            Topic::Status => DiagnosticArray::DEFINITION.name,
+            Topic::Command => match self.command.message {
+                CommandMessage::Trajectory => JointTrajectory::DEFINITION.name,
+                CommandMessage::Velocities => Float64MultiArray::DEFINITION.name,
+            },
         }
     }
 
@@ -263,20 +242,22 @@ impl Checked for Topics {
             namespace.is_none_or(|name| name.starts_with('/') && !name.ends_with('/')),
             || "a slash and a name".into(),
         );
-        rules.table("joints", &self.joints);
-        rules.table("wrench", &self.wrench);
-        rules.table("tactile", &self.tactile);
-        rules.table("status", &self.status);
-        rules.table("command", &self.command);
-        let names = Topic::ALL.map(|topic| self.line(topic).name);
-        for (i, topic) in Topic::ALL.iter().enumerate() {
-            let first = !names[..i].contains(&names[i]);
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "_/".contains(c);
+        let names = Topic::ALL.map(|topic| self.name(topic));
+        for (i, topic) in Topic::ALL.into_iter().enumerate() {
+            let (name, age_s) = self.entry(topic);
+            let is_name = !name.is_empty() && !name.ends_with('/') && name.chars().all(is_plain);
+            let key = format!("{}.name", topic.key());
+            rules.require(&key, format!("\"{name}\""), is_name, || {
+                "letters, digits, _ and slashes".into()
+            });
             rules.require(
-                &format!("{}.name", topic.key()),
+                &key,
                 format!("\"{}\"", names[i]),
-                first,
+                !names[..i].contains(&names[i]),
                 || "a name of its own".into(),
             );
+            rules.number(&format!("{}.age_s", topic.key()), age_s, 1e-3..=10.0);
         }
     }
 }

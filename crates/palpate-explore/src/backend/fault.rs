@@ -190,6 +190,25 @@ pub struct Trip {
     pub unit: &'static str,
 }
 
+impl Trip {
+    /// Returns the trip of `interlock` unless `is_fine`.
+    ///
+    /// # Errors
+    /// With what was `found` of `part`, its `limit`, and their unit.
+    pub fn unless(
+        is_fine: bool,
+        interlock: &'static str,
+        part: &str,
+        [found, limit]: [f64; 2],
+        unit: &'static str,
+    ) -> Result<(), Self> {
+        match is_fine {
+            true => Ok(()),
+            false => Err(Self { interlock, part: part.into(), found, limit, unit }),
+        }
+    }
+}
+
 impl fmt::Display for Trip {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self { interlock, part, found, limit, unit } = self;

@@ -5,11 +5,11 @@ use crate::message::{
     BioTacData, BioTacHand, BioTacTime, Duration, Header, JointState, JointTrajectory,
     JointTrajectoryPoint, Marker, Time, WrenchStamped,
 };
+use crate::tactile::fill;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Compression, McapResult, WriteOptions, Writer};
 use palpate_explore::backend::{Backend, Capabilities, Command, Fault, Reading};
-use palpate_explore::robot::finger::Frame;
 use palpate_explore::robot::finger::frame::FRAME_S;
 use palpate_input::files;
 use serde::Serialize;
@@ -284,23 +284,9 @@ impl Page {
                 frame_end_time: Time::from_s(frame.time_s),
                 ..BioTacTime::default()
             };
-            self.tactile.bt_data.iter_mut().for_each(|data| show(frame, data));
+            self.tactile.bt_data.iter_mut().for_each(|data| fill(data, frame));
             sheet.put(Topic::Tactile, time_s, &self.tactile)?;
         }
         Ok(())
-    }
-}
-
-/// A frame as the sensor's driver sends it: whole counts, 0 where there are none.
-fn show(frame: &Frame, data: &mut BioTacData) {
-    let whole = |counts: Option<f64>| counts.unwrap_or(0.0).round() as u16;
-    data.pdc_data = whole(frame.pdc_counts);
-    data.tdc_data = whole(frame.tdc_counts);
-    data.tac_data = whole(frame.tac_counts);
-    for (i, to) in data.pac_data.iter_mut().enumerate() {
-        *to = whole(frame.pac_counts.map(|all| all[i]));
-    }
-    for (i, to) in data.electrode_data.iter_mut().enumerate() {
-        *to = whole(frame.electrode_counts.map(|all| all[i]));
     }
 }

@@ -34,7 +34,7 @@ impl Census {
             loop {
                 let state = state(&uri).unwrap_or_default();
                 for (topic, shared) in Topic::ALL.into_iter().zip(&*shared) {
-                    let known = count(&state, &topics.line(topic).name).unwrap_or(0);
+                    let known = count(&state, &topics.name(topic)).unwrap_or(0);
                     shared.store(known, Ordering::Relaxed);
                 }
                 #[cfg(unix)]

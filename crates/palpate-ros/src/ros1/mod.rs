@@ -8,7 +8,7 @@ use crate::message::{
     TriggerResponse, WrenchStamped,
 };
 use crate::settings::BackendSettings;
-use crate::topics::{Service, Side, Topic, Topics};
+use crate::topics::{CommandMessage, Service, Side, TactileMessage, Topic, Topics};
 use crate::transport::{Delivery, Packed, Packet, Transport, Waker, cannot_open, cannot_send};
 use master::Census;
 use palpate_input::error::Invalid;
@@ -100,15 +100,17 @@ impl Ros1 {
         self.headed::<JointState>(side, Topic::Joints)?;
         self.headed::<WrenchStamped>(side, Topic::Wrench)?;
         self.headed::<DiagnosticArray>(side, Topic::Status)?;
-        match self.topics.tactile.is_shadow() {
-            true => self.headed::<BiotacAll>(side, Topic::Tactile)?,
-            false => self.headed::<BioTacHand>(side, Topic::Tactile)?,
+        match self.topics.tactile.message {
+            TactileMessage::Fingers => self.headed::<BiotacAll>(side, Topic::Tactile)?,
+            TactileMessage::Hand => self.headed::<BioTacHand>(side, Topic::Tactile)?,
         }
-        match self.topics.command.is_bare() {
-            true => self.topic::<Float64MultiArray>(side, Topic::Command, Into::into, |packet| {
-                Float64MultiArray::in_packet(packet).cloned()
-            }),
-            false => self.headed::<JointTrajectory>(side, Topic::Command),
+        match self.topics.command.message {
+            CommandMessage::Velocities => {
+                self.topic::<Float64MultiArray>(side, Topic::Command, Into::into, |packet| {
+                    Float64MultiArray::in_packet(packet).cloned()
+                })
+            }
+            CommandMessage::Trajectory => self.headed::<JointTrajectory>(side, Topic::Command),
         }
     }
 
@@ -137,7 +139,7 @@ impl Ros1 {
         wrap: fn(M) -> Packet,
         pick: fn(&Packet) -> Option<M>,
     ) -> Result<(), Invalid> {
-        let name = self.topics.line(topic).name.into_owned();
+        let name = self.topics.name(topic);
         if topic.publisher() == side {
             let publisher: Publisher<M> = self
                 .runtime
@@ -206,7 +208,7 @@ impl Transport for Ros1 {
     fn send(&mut self, packet: &Packet) -> Result<(), Invalid> {
         let sent = self.writers.iter().find_map(|writer| writer(&self.runtime, packet));
         let sent = sent.unwrap_or(Err("not this side's".into()));
-        sent.map_err(|words| cannot_send(&self.topics.line(packet.topic()).name, words))
+        sent.map_err(|words| cannot_send(&self.topics.name(packet.topic()), words))
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {

@@ -18,55 +18,34 @@ pub struct Counted<M> {
     pub message: M,
 }
 
-/// A message type with its name in ROS 1 and the MD5 sum of its definition (genmsg 0.6).
+/// Message types with their names in ROS 1 and the MD5 sums of their definitions (genmsg 0.6).
 macro_rules! ros1 {
-    ($type:ty, $message:ident, $name:literal, $md5:literal) => {
+    ($($type:ty: $message:ident = $name:literal, $md5:literal;)*) => {$(
         impl RosMessageType for $type {
             const DESCRIPTION: MessageDescriptor = {
                 const TEXT: &Text = &$message::DEFINITION.ros1();
                 MessageDescriptor::new::<Self>($name, $md5, TEXT.as_str(), "", &[0; 32])
             };
         }
-    };
+    )*};
 }
 
-ros1!(
-    Counted<JointState>,
-    JointState,
-    "sensor_msgs/JointState",
-    "3066dcd76a6cfaef579bd0f34173e9fd"
-);
-ros1!(
-    Counted<WrenchStamped>,
-    WrenchStamped,
-    "geometry_msgs/WrenchStamped",
-    "d78d3cb249ce23087ade7e7d0c40cfa7"
-);
-ros1!(
-    Counted<BioTacHand>,
-    BioTacHand,
-    "biotac_sensors/BioTacHand",
-    "d96f900cbfb096d61de125081e11dcab"
-);
-ros1!(Counted<BiotacAll>, BiotacAll, "sr_robot_msgs/BiotacAll", "0022d8afb0897596a0c41f523836ee37");
-ros1!(
-    Counted<DiagnosticArray>,
-    DiagnosticArray,
-    "diagnostic_msgs/DiagnosticArray",
-    "60810da900de1dd6ddd437c3503511da"
-);
-ros1!(
-    Counted<JointTrajectory>,
-    JointTrajectory,
-    "trajectory_msgs/JointTrajectory",
-    "65b4f94a94d1ed67169da35a02f33d3f"
-);
-ros1!(
-    Float64MultiArray,
-    Float64MultiArray,
-    "std_msgs/Float64MultiArray",
-    "4b7d974086d4060e7db4613a7e6c3ba4"
-);
+ros1! {
+    Counted<JointState>: JointState =
+        "sensor_msgs/JointState", "3066dcd76a6cfaef579bd0f34173e9fd";
+    Counted<WrenchStamped>: WrenchStamped =
+        "geometry_msgs/WrenchStamped", "d78d3cb249ce23087ade7e7d0c40cfa7";
+    Counted<BioTacHand>: BioTacHand =
+        "biotac_sensors/BioTacHand", "d96f900cbfb096d61de125081e11dcab";
+    Counted<BiotacAll>: BiotacAll =
+        "sr_robot_msgs/BiotacAll", "0022d8afb0897596a0c41f523836ee37";
+    Counted<DiagnosticArray>: DiagnosticArray =
+        "diagnostic_msgs/DiagnosticArray", "60810da900de1dd6ddd437c3503511da";
+    Counted<JointTrajectory>: JointTrajectory =
+        "trajectory_msgs/JointTrajectory", "65b4f94a94d1ed67169da35a02f33d3f";
+    Float64MultiArray: Float64MultiArray =
+        "std_msgs/Float64MultiArray", "4b7d974086d4060e7db4613a7e6c3ba4";
+}
 
 /// `std_srvs/Trigger`.
 pub struct Trigger;

@@ -2,6 +2,7 @@
 //! that are fresh and whole, stops the arm when they cease, and brakes.
 
 use crate::joints::JointNames;
+use crate::settings::CLOCK_AHEAD_S;
 use crate::status::ArmStatus;
 use crate::transport::Packet;
 
@@ -12,9 +13,6 @@ const GRACE_S: f64 = 0.008;
 /// How long a stop takes; chosen: the servos' own lag of 0.02 s makes it soft, and the arm is at
 /// rest 0.1 s later.
 const RAMP_S: f64 = 0.01;
-
-/// How far a stamp may be ahead of this clock.
-const AHEAD_S: f64 = 0.005;
 
 /// Share of a limit that rounding may exceed it by.
 const ROUNDING: f64 = 1e-6;
@@ -134,7 +132,7 @@ impl ArmPc {
         }
         if let Some([stamp_s, valid_s]) = stamp {
             let age_s = wall_s - stamp_s;
-            if age_s > valid_s || age_s < -AHEAD_S {
+            if age_s > valid_s || age_s < -CLOCK_AHEAD_S {
                 return self.refuse(format!("its stamp is {:.0} ms old", 1e3 * age_s));
             }
         }
@@ -146,11 +144,7 @@ impl ArmPc {
             return self.alarm("two publishers command", now_s);
         }
         self.sender = Some((sender, now_s));
-        if self.status.estop
-            || !self.status.deadman
-            || self.status.hold
-            || !self.status.alarm.is_empty()
-        {
+        if self.status.hold || self.status.needs_operator() {
             return;
         }
         if !self.status.servo_on {

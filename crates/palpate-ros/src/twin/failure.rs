@@ -23,8 +23,16 @@ pub struct Failure {
 /// What a failure does.
 #[derive(Clone, Copy)]
 pub enum Act {
-    /// To what is sent: changes it, or says that it is not sent.
-    Packet(fn(&mut Packet, &mut Memory) -> bool),
+    /// Does not send one packet in five.
+    Lose,
+    /// Sends nothing on a topic.
+    Cease(Topic),
+    /// Sends the first message of a topic again and again, with fresh stamps.
+    Freeze(Topic),
+    /// Changes packets.
+    Change(fn(&mut Packet, &mut Memory)),
+    /// Writes the flag of this name in a status, or all, as one of these texts: off, on.
+    Flags(Option<&'static str>, [&'static str; 2]),
     /// Holds what is sent back by this time.
     Delay(f64),
     /// Presses the emergency stop.
@@ -49,6 +57,9 @@ impl Memory {
     }
 }
 
+/// Share of packets that are lost.
+const LOST: f64 = 0.2;
+
 /// Force of a spike; chosen, beyond every threshold.
 const SPIKE_N: f64 = 60.0;
 
@@ -62,104 +73,68 @@ const AHEAD_S: i32 = 1;
 // heuristic: hundreds of messages stay within the age limit of 50 ms.
 const BACKWARD_S: f64 = 1e-4;
 
-/// A failure that changes packets.
-const fn of_packets(
-    name: &'static str,
-    about: &'static str,
-    change: fn(&mut Packet, &mut Memory) -> bool,
-) -> Failure {
-    Failure { name, about, act: Act::Packet(change) }
+const fn failure(name: &'static str, about: &'static str, act: Act) -> Failure {
+    Failure { name, about, act }
 }
 
 /// Every failure; one line to add one.
 pub static FAILURES: &[Failure] = &[
-    of_packets("loss", "one packet in five does not arrive", |_, memory| {
-        memory.rng.random::<f64>() > 0.2
-    }),
-    Failure { name: "latency", about: "packets are sent 20 ms late", act: Act::Delay(0.02) },
-    of_packets("noise", "0.3 N of noise on the force", |packet, memory| {
-        if let Packet::Wrench(message) = packet {
-            let force = &mut message.wrench.force;
-            for part in [&mut force.x, &mut force.y, &mut force.z] {
-                *part += NOISE_N * Distribution::<f64>::sample(&StandardNormal, &mut memory.rng);
-            }
-        }
-        true
-    }),
-    of_packets("frozen", "the same tactile frame again and again", |packet, memory| {
-        frozen(Topic::Tactile, packet, memory)
-    }),
-    of_packets(
+    failure("loss", "one packet in five does not arrive", Act::Lose),
+    failure("latency", "packets are sent 20 ms late", Act::Delay(0.02)),
+    failure("noise", "0.3 N of noise on the force", Act::Change(add_noise)),
+    failure("frozen", "the same tactile frame again and again", Act::Freeze(Topic::Tactile)),
+    failure(
         "frozen_joints",
         "the same joint positions and velocities again and again, with fresh stamps",
-        |packet, memory| frozen(Topic::Joints, packet, memory),
+        Act::Freeze(Topic::Joints),
     ),
-    of_packets(
+    failure(
         "frozen_wrench",
         "the same force and torque again and again, with fresh stamps",
-        |packet, memory| frozen(Topic::Wrench, packet, memory),
+        Act::Freeze(Topic::Wrench),
     ),
-    of_packets("force_spike", "60 N along z", |packet, _| {
-        if let Packet::Wrench(message) = packet {
-            message.wrench.force.z += SPIKE_N;
-        }
-        true
-    }),
-    of_packets("nan", "a joint position that is not a number", |packet, _| {
-        of_joints(packet, |message| message.position.iter_mut().take(1).for_each(|q| *q = f64::NAN))
-    }),
-    of_packets("six_names", "joint states of six joints", |packet, _| {
-        of_joints(packet, |message| {
-            message.name.truncate(6);
-            message.position.truncate(6);
-            message.velocity.truncate(6);
-        })
-    }),
-    of_packets("swapped_names", "the first two joints under each other's names", |packet, _| {
-        of_joints(packet, |message| message.name.swap(0, 1))
-    }),
-    of_packets("other_joints", "every other joint state is that of a hand", other_joints),
-    of_packets("future", "stamps a second ahead", |packet, _| {
-        stamped(packet, |stamp| stamp.sec += AHEAD_S)
-    }),
-    of_packets("unstamped", "stamps of zero", |packet, _| {
-        stamped(packet, |stamp| *stamp = Time::default())
-    }),
-    of_packets("backward", "stamps that run backwards by 0.1 ms a message", |packet, memory| {
-        let Some(last) = memory.first(packet).stamp_mut() else { return true };
-        *last = Time::from_s(last.s() - BACKWARD_S);
-        let earlier = *last;
-        stamped(packet, |stamp| *stamp = earlier)
-    }),
-    of_packets("no_joints", "joint states cease", |packet, _| packet.topic() != Topic::Joints),
-    of_packets("no_wrench", "forces cease", |packet, _| packet.topic() != Topic::Wrench),
-    of_packets("no_tactile", "tactile frames cease", |packet, _| packet.topic() != Topic::Tactile),
-    Failure { name: "estop", about: "the emergency stop is pressed", act: Act::Estop },
-    Failure { name: "deadman", about: "the dead-man switch is released", act: Act::Deadman },
-    of_packets("hold", "the status says hold; the arm obeys commands all the same", |packet, _| {
-        each_flag(packet, |key, _| is(key, "hold", "true"))
-    }),
-    of_packets(
+    failure("force_spike", "60 N along z", Act::Change(add_spike)),
+    failure("nan", "a joint position that is not a number", Act::Change(spoil_position)),
+    failure("six_names", "joint states of six joints", Act::Change(drop_seventh)),
+    failure(
+        "swapped_names",
+        "the first two joints under each other's names",
+        Act::Change(|packet, _| with_joints(packet, |message| message.name.swap(0, 1))),
+    ),
+    failure(
+        "other_joints",
+        "every other joint state is that of a hand",
+        Act::Change(alternate_joints),
+    ),
+    failure("future", "stamps a second ahead", Act::Change(lead)),
+    failure("unstamped", "stamps of zero", Act::Change(clear_stamp)),
+    failure("backward", "stamps that run backwards by 0.1 ms a message", Act::Change(turn_back)),
+    failure("no_joints", "joint states cease", Act::Cease(Topic::Joints)),
+    failure("no_wrench", "forces cease", Act::Cease(Topic::Wrench)),
+    failure("no_tactile", "tactile frames cease", Act::Cease(Topic::Tactile)),
+    failure("estop", "the emergency stop is pressed", Act::Estop),
+    failure("deadman", "the dead-man switch is released", Act::Deadman),
+    failure(
+        "hold",
+        "the status says hold; the arm obeys commands all the same",
+        Act::Flags(Some("hold"), ["true"; 2]),
+    ),
+    failure(
         "brake",
         "the status says that the brakes are closed; the arm obeys commands all the same",
-        |packet, _| each_flag(packet, |key, _| is(key, "brake", "true")),
+        Act::Flags(Some("brake"), ["true"; 2]),
     ),
-    of_packets(
+    failure(
         "python_flags",
         "flags of the status as Python writes them: True, False",
-        |packet, _| each_flag(packet, |_, on| spelt(on, ["False", "True"])),
+        Act::Flags(None, ["False", "True"]),
     ),
-    of_packets("number_flags", "flags of the status as numbers: 1, 0", |packet, _| {
-        each_flag(packet, |_, on| spelt(on, ["0", "1"]))
-    }),
-    of_packets("no_flags", "a status without values", |packet, _| {
-        statuses(packet).for_each(|status| status.values.clear());
-        true
-    }),
-    of_packets(
+    failure("number_flags", "flags of the status as numbers: 1, 0", Act::Flags(None, ["0", "1"])),
+    failure("no_flags", "a status without values", Act::Change(clear_flags)),
+    failure(
         "unknown_flag",
         "an emergency stop of which the status says \"unknown\"",
-        |packet, _| each_flag(packet, |key, _| is(key, "estop", "unknown")),
+        Act::Flags(Some("estop"), ["unknown"; 2]),
     ),
 ];
 
@@ -168,71 +143,93 @@ pub fn by_name(name: &str) -> Option<usize> {
     FAILURES.iter().position(|failure| failure.name == name)
 }
 
-fn frozen(topic: Topic, packet: &mut Packet, memory: &mut Memory) -> bool {
-    if packet.topic() == topic {
-        let stamp = packet.stamp_mut().copied();
-        packet.clone_from(memory.first(packet));
-        stamped(packet, |now| *now = stamp.unwrap_or_default());
+fn add_noise(packet: &mut Packet, memory: &mut Memory) {
+    if let Packet::Wrench(message) = packet {
+        let force = &mut message.wrench.force;
+        for part in [&mut force.x, &mut force.y, &mut force.z] {
+            *part += NOISE_N * Distribution::<f64>::sample(&StandardNormal, &mut memory.rng);
+        }
     }
-    true
 }
 
-fn of_joints(packet: &mut Packet, change: impl FnOnce(&mut JointState)) -> bool {
+fn add_spike(packet: &mut Packet, _: &mut Memory) {
+    if let Packet::Wrench(message) = packet {
+        message.wrench.force.z += SPIKE_N;
+    }
+}
+
+fn freeze(packet: &mut Packet, memory: &mut Memory) {
+    let stamp = packet.stamp_mut().copied();
+    packet.clone_from(memory.first(packet));
+    packet.stamp_mut().into_iter().zip(stamp).for_each(|(now, stamp)| *now = stamp);
+}
+
+fn lead(packet: &mut Packet, _: &mut Memory) {
+    packet.stamp_mut().into_iter().for_each(|stamp| stamp.sec += AHEAD_S);
+}
+
+fn clear_stamp(packet: &mut Packet, _: &mut Memory) {
+    packet.stamp_mut().into_iter().for_each(|stamp| *stamp = Time::default());
+}
+
+fn turn_back(packet: &mut Packet, memory: &mut Memory) {
+    if let (Some(last), Some(stamp)) = (memory.first(packet).stamp_mut(), packet.stamp_mut()) {
+        *last = Time::from_s(last.s() - BACKWARD_S);
+        *stamp = *last;
+    }
+}
+
+fn with_joints(packet: &mut Packet, change: impl FnOnce(&mut JointState)) {
     if let Packet::Joints(message) = packet
         && message.name.len() > 1
     {
         change(message);
     }
-    true
 }
 
-fn other_joints(packet: &mut Packet, memory: &mut Memory) -> bool {
-    let is_first = memory.kept[Topic::Joints as usize].is_none();
+fn spoil_position(packet: &mut Packet, _: &mut Memory) {
+    with_joints(packet, |message| message.position[0] = f64::NAN);
+}
+
+fn drop_seventh(packet: &mut Packet, _: &mut Memory) {
+    with_joints(packet, |message| {
+        message.name.truncate(6);
+        message.position.truncate(6);
+        message.velocity.truncate(6);
+    });
+}
+
+fn alternate_joints(packet: &mut Packet, memory: &mut Memory) {
     if let Packet::Joints(message) = packet {
-        if is_first {
-            message.name = vec!["finger_joint".into()];
-            message.position = vec![0.5];
-            message.velocity.clear();
-            memory.first(packet);
-        } else {
-            memory.kept[Topic::Joints as usize] = None;
+        if memory.kept[Topic::Joints as usize].take().is_some() {
+            return;
         }
+        message.name = vec!["finger_joint".into()];
+        message.position = vec![0.5];
+        message.velocity.clear();
+        memory.first(packet);
     }
-    true
 }
 
-fn stamped(packet: &mut Packet, change: impl FnOnce(&mut Time)) -> bool {
-    if let Some(stamp) = packet.stamp_mut() {
-        change(stamp);
-    }
-    true
-}
-
-fn statuses(packet: &mut Packet) -> impl Iterator<Item = &mut DiagnosticStatus> {
-    let all = match packet {
-        Packet::Status(message) => message.status.as_mut_slice(),
+fn statuses(packet: &mut Packet) -> &mut [DiagnosticStatus] {
+    match packet {
+        Packet::Status(message) => &mut message.status,
         _ => &mut [],
-    };
-    all.iter_mut()
+    }
 }
 
-/// Gives each flag of a status the value that `value` returns for its key and state, if it does.
-fn each_flag(packet: &mut Packet, value: impl Fn(&str, bool) -> Option<&'static str>) -> bool {
-    for entry in statuses(packet).flat_map(|status| &mut status.values) {
-        let now = entry.value.parse().ok().and_then(|on| value(&entry.key, on));
-        if let Some(now) = now {
-            entry.value = now.into();
+fn clear_flags(packet: &mut Packet, _: &mut Memory) {
+    statuses(packet).iter_mut().for_each(|status| status.values.clear());
+}
+
+fn write_flags(packet: &mut Packet, key: Option<&str>, texts: [&str; 2]) {
+    for flag in statuses(packet).iter_mut().flat_map(|status| &mut status.values) {
+        let is_on =
+            flag.value.parse::<bool>().ok().filter(|_| key.is_none_or(|key| key == flag.key));
+        if let Some(is_on) = is_on {
+            flag.value = texts[usize::from(is_on)].into();
         }
     }
-    true
-}
-
-fn is(key: &str, wanted: &str, value: &'static str) -> Option<&'static str> {
-    (key == wanted).then_some(value)
-}
-
-fn spelt(on: bool, words: [&'static str; 2]) -> Option<&'static str> {
-    Some(words[usize::from(on)])
 }
 
 /// Sends packets through the failures that are on.
@@ -271,13 +268,15 @@ impl Sender {
         let mut delay_s = 0.0;
         for (failure, _) in FAILURES.iter().zip(&self.is_on).filter(|(_, is_on)| **is_on) {
             match failure.act {
-                Act::Packet(change) => {
-                    if !change(&mut packet, &mut self.memory) {
-                        return;
-                    }
+                Act::Lose if self.memory.rng.random::<f64>() <= LOST => return,
+                Act::Cease(topic) if packet.topic() == topic => return,
+                Act::Freeze(topic) if packet.topic() == topic => {
+                    freeze(&mut packet, &mut self.memory);
                 }
+                Act::Change(change) => change(&mut packet, &mut self.memory),
+                Act::Flags(key, texts) => write_flags(&mut packet, key, texts),
                 Act::Delay(by_s) => delay_s += by_s,
-                Act::Estop | Act::Deadman => (),
+                _ => (),
             }
         }
         match delay_s > 0.0 || !self.delayed.is_empty() {

@@ -25,6 +25,11 @@ const REST: f64 = 2e-3;
 /// Ticks that a twin may be late before it drops time: it catches up with less.
 const SLACK_TICKS: u32 = 10;
 
+/// How often the arm's state, its joints and the force are published, as drivers do.
+const STATUS_HZ: f64 = 50.0;
+const JOINTS_HZ: f64 = 250.0;
+const WRENCH_HZ: f64 = 500.0;
+
 /// Something that a twin tells while it runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -86,6 +91,9 @@ pub struct Twin {
     is_moving: bool,
     told: ArmStatus,
     tick: u64,
+    period_s: f64,
+    /// Events that `run` has not passed on yet, with their time since 1970.
+    events: Vec<(f64, Event)>,
 }
 
 impl Twin {
@@ -105,10 +113,13 @@ impl Twin {
         let names = settings.joint_names(chain);
         let (sink, inbox) = channel();
         // The loop looks at its own pace; the link only has to hand on.
-        let link = Link::open(connect, Duration::from_millis(20), Box::new(sink))?;
+        let take = move |delivery| drop(sink.send(delivery));
+        let link = Link::open(connect, Duration::from_millis(20), take, || None)?;
         let limits = chain.joints.iter().map(|joint| joint.qdot_limit).collect();
         let pc = ArmPc::new(names.clone(), limits, settings.topics.command.age_s);
         Ok(Self {
+            period_s: body.capabilities().period_s,
+            events: Vec::new(),
             body,
             settings: settings.clone(),
             told: pc.status().clone(),
@@ -128,7 +139,7 @@ impl Twin {
         })
     }
 
-    /// Serves until `stop` becomes true; `tell` hears of events with their time since 1970.
+    /// Serves until `stop` becomes true; `tell` gets events with their time since 1970.
     ///
     /// # Errors
     /// If the simulated body cannot go on.
@@ -137,48 +148,42 @@ impl Twin {
         stop: &AtomicBool,
         tell: &mut dyn FnMut(f64, Event),
     ) -> Result<(), Fault> {
-        let period_s = self.body.capabilities().period_s;
         let mut command = Command::default();
-        let mut pace = Pace::new(period_s);
+        let mut pace = Pace::new(self.period_s);
         self.since = Instant::now();
-        tell(pace::now_s(), Event::Serving);
+        self.tell(Event::Serving);
         while !stop.load(Ordering::Relaxed) {
+            self.events.drain(..).for_each(|(at_s, event)| tell(at_s, event));
             pace.wait(SLACK_TICKS);
             let now_s = self.since.elapsed().as_secs_f64();
-            self.listen(now_s, tell);
-            self.fail(now_s, tell);
+            self.listen(now_s);
+            self.fail(now_s);
             self.pc.set_overruns(pace.overruns());
             command.qdot.clear();
             command.qdot.extend_from_slice(self.pc.advance(now_s));
             if self.pc.status().brake {
                 self.body.brake();
             }
-            let reading = self.body.step(&command)?;
+            let reading = self.body.step(&command)?.clone();
             let is_moving = reading.qdot.iter().any(|qdot| qdot.abs() > REST);
-            let (packets, wrench) = packets(
-                reading,
-                (&self.settings, &self.names),
-                (self.tick, period_s),
-                (&self.x_mt, &self.bias),
-            );
             if is_moving != self.is_moving {
                 self.is_moving = is_moving;
-                tell(pace::now_s(), if is_moving { Event::Moving } else { Event::AtRest });
+                self.tell(if is_moving { Event::Moving } else { Event::AtRest });
             }
             if is_moving {
                 self.moved_s.get_or_insert(now_s);
             }
-            if let Some(wrench) = wrench.filter(|_| std::mem::take(&mut self.wants_bias)) {
-                self.bias = wrench;
-            }
-            for packet in packets {
-                self.sender.send(&self.link, packet, now_s);
-            }
-            self.tell_status(now_s, period_s, tell);
+            self.publish(&reading, now_s);
+            self.publish_status(now_s);
             self.sender.send_due(&self.link, now_s);
             self.tick += 1;
         }
+        self.events.drain(..).for_each(|(at_s, event)| tell(at_s, event));
         Ok(())
+    }
+
+    fn tell(&mut self, event: Event) {
+        self.events.push((pace::now_s(), event));
     }
 
     /// How often real time was not kept.
@@ -191,7 +196,7 @@ impl Twin {
         self.pc.refused()
     }
 
-    fn listen(&mut self, now_s: f64, tell: &mut dyn FnMut(f64, Event)) {
+    fn listen(&mut self, now_s: f64) {
         while let Ok(delivery) = self.inbox.try_recv() {
             match delivery {
                 Delivery::Packet { packet, sender, received } => {
@@ -204,8 +209,8 @@ impl Twin {
                     self.pc.alarm(&format!("command refused: {words}"), now_s);
                 }
                 Delivery::Call { service, call } => {
-                    let answer = self.serve(&service, now_s, tell);
-                    tell(pace::now_s(), Event::Called(service.clone()));
+                    let answer = self.serve(&service, now_s);
+                    self.tell(Event::Called(service.clone()));
                     self.link.answer(service, call, answer);
                 }
                 Delivery::Answered { .. } => (),
@@ -213,12 +218,7 @@ impl Twin {
         }
     }
 
-    fn serve(
-        &mut self,
-        service: &Service,
-        now_s: f64,
-        tell: &mut dyn FnMut(f64, Event),
-    ) -> TriggerResponse {
+    fn serve(&mut self, service: &Service, now_s: f64) -> TriggerResponse {
         let mut message = "done".to_owned();
         match service {
             Service::Hold => self.pc.set_hold(true, now_s),
@@ -229,7 +229,7 @@ impl Twin {
             Service::Twin(name) => {
                 if let Some(failure) = by_name(name) {
                     let is_on = !self.sender.is_on(failure);
-                    self.set(failure, is_on, tell);
+                    self.set(failure, is_on);
                     message = format!("{name} {}", if is_on { "begins" } else { "ends" });
                 }
             }
@@ -237,82 +237,78 @@ impl Twin {
         TriggerResponse { success: true, message }
     }
 
-    fn set(&mut self, failure: usize, is_on: bool, tell: &mut dyn FnMut(f64, Event)) {
+    fn set(&mut self, failure: usize, is_on: bool) {
         let Some(entry) = FAILURES.get(failure) else { return };
         self.sender.set(failure, is_on);
         match entry.act {
             Act::Estop => self.pc.set_estop(is_on),
             Act::Deadman => self.pc.set_deadman(!is_on),
-            Act::Packet(_) | Act::Delay(_) => (),
+            _ => (),
         }
-        tell(pace::now_s(), Event::Failure { name: entry.name, is_on });
+        self.tell(Event::Failure { name: entry.name, is_on });
     }
 
     /// Begins and ends the failures whose time has come.
-    fn fail(&mut self, now_s: f64, tell: &mut dyn FnMut(f64, Event)) {
+    fn fail(&mut self, now_s: f64) {
         let Some(moved_s) = self.moved_s else { return };
         for i in 0..self.injections.len() {
             let Injection { failure, at_s, for_s } = self.injections[i];
             let since_s = now_s - moved_s - at_s;
             let is_due = since_s >= 0.0 && for_s.is_none_or(|for_s| since_s < for_s);
-            if is_due && !self.sender.is_on(failure) {
-                self.set(failure, true, tell);
-            } else if !is_due && since_s >= 0.0 && self.sender.is_on(failure) {
-                self.set(failure, false, tell);
+            if since_s >= 0.0 && is_due != self.sender.is_on(failure) {
+                self.set(failure, is_due);
             }
         }
     }
 
-    /// Tells the arm's state at its rate, and at once when it changes.
-    fn tell_status(&mut self, now_s: f64, period_s: f64, tell: &mut dyn FnMut(f64, Event)) {
-        let rate_hz = self.settings.topics.status.rate_hz;
-        let is_new = {
-            let ArmStatus { overruns, .. } = self.told;
-            ArmStatus { overruns, ..self.pc.status().clone() } != self.told
-        };
-        if !is_new && !is_due(self.tick, rate_hz, period_s) {
+    /// Publishes the arm's state at its rate, and at once when it changes.
+    fn publish_status(&mut self, now_s: f64) {
+        let status = self.pc.status().clone();
+        let is_new = ArmStatus { overruns: self.told.overruns, ..status.clone() } != self.told;
+        if !is_new && !self.is_due(STATUS_HZ) {
             return;
         }
-        self.told = self.pc.status().clone();
         if is_new {
-            tell(pace::now_s(), Event::Status(self.told.clone()));
+            self.tell(Event::Status(status.clone()));
         }
+        self.told = status;
         let message = self.told.message(pace::now_s(), self.settings.topics.device());
-        self.sender.send(&self.link, Packet::Status(message), now_s);
+        self.send(Packet::Status(message), now_s);
     }
-}
 
-/// Whether a tick is one of those at which something is sent `rate_hz` times a second.
-fn is_due(tick: u64, rate_hz: f64, period_s: f64) -> bool {
-    let every = (1.0 / (rate_hz * period_s)).round().max(1.0) as u64;
-    tick.is_multiple_of(every)
-}
+    /// Publishes joints, force and tactile frames of a reading.
+    fn publish(&mut self, reading: &Reading, now_s: f64) {
+        let stamp_s = pace::now_s();
+        if self.is_due(JOINTS_HZ) {
+            let message = self.names.state(stamp_s, &reading.q, &reading.qdot);
+            self.send(Packet::Joints(message), now_s);
+        }
+        if let Some(wrench) = reading.wrench.map(|wrench| wrench.moved(&self.x_mt)) {
+            if self.is_due(WRENCH_HZ) {
+                let message = WrenchMessage {
+                    force: (wrench.force_n - self.bias.force_n).into(),
+                    torque: (wrench.torque_nm - self.bias.torque_nm).into(),
+                };
+                let header = Header::new(stamp_s, "ft_sensor");
+                self.send(Packet::Wrench(WrenchStamped { header, wrench: message }), now_s);
+            }
+            if std::mem::take(&mut self.wants_bias) {
+                self.bias = wrench;
+            }
+        }
+        let (finger, message) = (self.settings.finger.into(), self.settings.topics.tactile.message);
+        for frame in reading.frames() {
+            self.send(tactile::packet(frame, stamp_s, finger, message), now_s);
+        }
+    }
 
-/// What a reading is told as, and the wrench in the sensor's frame without bias.
-fn packets(
-    reading: &Reading,
-    (settings, names): (&BackendSettings, &JointNames),
-    (tick, period_s): (u64, f64),
-    (x_mt, bias): (&Isometry3<f64>, &Wrench),
-) -> (Vec<Packet>, Option<Wrench>) {
-    let topics = &settings.topics;
-    let stamp_s = pace::now_s();
-    let mut packets = Vec::new();
-    if is_due(tick, topics.joints.rate_hz, period_s) {
-        packets.push(Packet::Joints(names.state(stamp_s, &reading.q, &reading.qdot)));
+    fn send(&mut self, packet: Packet, now_s: f64) {
+        self.sender.send(&self.link, packet, now_s);
     }
-    let wrench = reading.wrench.map(|wrench| wrench.moved(x_mt));
-    if let Some(wrench) = wrench.filter(|_| is_due(tick, topics.wrench.rate_hz, period_s)) {
-        let message = WrenchMessage {
-            force: (wrench.force_n - bias.force_n).into(),
-            torque: (wrench.torque_nm - bias.torque_nm).into(),
-        };
-        let header = Header::new(stamp_s, "ft_sensor");
-        packets.push(Packet::Wrench(WrenchStamped { header, wrench: message }));
+
+    /// Whether this tick is one of those at which something is sent `rate_hz` times a second.
+    fn is_due(&self, rate_hz: f64) -> bool {
+        let every = (1.0 / (rate_hz * self.period_s)).round().max(1.0) as u64;
+        self.tick.is_multiple_of(every)
     }
-    let is_shadow = topics.tactile.is_shadow();
-    let finger = usize::from(settings.finger);
-    let frames = reading.frames();
-    packets.extend(frames.map(|frame| tactile::packet(frame, stamp_s, finger, is_shadow)));
-    (packets, wrench)
 }

@@ -2,6 +2,7 @@
 
 use palpate_ros::joints::JointNames;
 use palpate_ros::message::{JointTrajectory, JointTrajectoryPoint};
+use palpate_ros::topics::CommandTopic;
 use palpate_ros::transport::Packet;
 use palpate_ros::twin::arm_pc::ArmPc;
 use proptest::prelude::*;
@@ -11,6 +12,10 @@ const VALID_S: f64 = 0.02;
 
 fn names() -> JointNames {
     JointNames::new(["S1", "S2", "S3"].map(String::from).to_vec())
+}
+
+fn topic() -> CommandTopic {
+    CommandTopic { age_s: VALID_S, ..CommandTopic::default() }
 }
 
 /// Faster than any of these commands.
@@ -23,10 +28,10 @@ fn arm_pc() -> ArmPc {
 /// An arm's computer that has been told to stand still and then to move, 4 ms apart, until 0.1 s.
 fn moving() -> ArmPc {
     let mut pc = arm_pc();
-    pc.take(&names().command(0.0, VALID_S, &[0.0; 3], false), 1, 0.0, 0.0);
+    pc.take(&names().command(0.0, &[0.0; 3], &topic()), 1, 0.0, 0.0);
     for i in 1..=25 {
         let now_s = f64::from(i) * 0.004;
-        pc.take(&names().command(now_s, VALID_S, &[0.1, -0.2, 0.3], false), 1, now_s, now_s);
+        pc.take(&names().command(now_s, &[0.1, -0.2, 0.3], &topic()), 1, now_s, now_s);
         pc.advance(now_s);
     }
     assert_eq!(pc.advance(0.1), [0.1, -0.2, 0.3]);
@@ -43,7 +48,7 @@ fn speeds(pc: &mut ArmPc, ticks: u32) -> Vec<f64> {
 #[test]
 fn it_moves_after_a_command_to_stand_still_only() {
     let mut pc = arm_pc();
-    pc.take(&names().command(1.0, VALID_S, &[0.1; 3], false), 1, 1.0, 1.0);
+    pc.take(&names().command(1.0, &[0.1; 3], &topic()), 1, 1.0, 1.0);
     assert_eq!(pc.advance(1.0), [0.0; 3]);
     assert!(!pc.status().servo_on && pc.status().brake);
     moving();
@@ -70,7 +75,7 @@ fn old_commands_move_nothing_neither_before_nor_after_a_stop() {
     pc.clear();
     for i in 0..200 {
         let sent_s = 0.1 + f64::from(i) * 0.004;
-        pc.take(&names().command(sent_s, VALID_S, &[0.3; 3], false), 1, 1.0, 1.0);
+        pc.take(&names().command(sent_s, &[0.3; 3], &topic()), 1, 1.0, 1.0);
         assert_eq!(pc.advance(1.0 + f64::from(i) * 1e-4), [0.0; 3]);
     }
     assert_eq!(pc.refused(), 200, "those of the last 20 ms are timely, but not to stand still");
@@ -80,20 +85,20 @@ fn old_commands_move_nothing_neither_before_nor_after_a_stop() {
 fn an_alarm_stays_until_it_is_cleared_and_it_begins_again_from_rest() {
     let mut pc = moving();
     speeds(&mut pc, 60);
-    let still = |now_s| names().command(now_s, VALID_S, &[0.0; 3], false);
+    let still = |now_s| names().command(now_s, &[0.0; 3], &topic());
     pc.take(&still(0.3), 1, 0.3, 0.3);
     assert!(!pc.status().servo_on);
     pc.clear();
     pc.take(&still(0.4), 1, 0.4, 0.4);
     assert!(pc.status().servo_on);
-    pc.take(&names().command(0.404, VALID_S, &[0.1; 3], false), 1, 0.404, 0.404);
+    pc.take(&names().command(0.404, &[0.1; 3], &topic()), 1, 0.404, 0.404);
     assert_eq!(pc.advance(0.404), [0.1; 3]);
 }
 
 #[test]
 fn a_second_publisher_stops_it() {
     let mut pc = moving();
-    pc.take(&names().command(0.102, VALID_S, &[0.1; 3], false), 2, 0.102, 0.102);
+    pc.take(&names().command(0.102, &[0.1; 3], &topic()), 2, 0.102, 0.102);
     assert_eq!(pc.status().refusal(), Some("alarm: two publishers command".into()));
     assert_eq!(speeds(&mut pc, 50).last(), Some(&0.0));
 }
@@ -185,7 +190,7 @@ proptest! {
             now_s += after_s;
             fastest = fastest.max(qdot.abs());
             let stamp_s = now_s - age_s;
-            pc.take(&names().command(stamp_s, VALID_S, &[qdot, 0.0, 0.0], false), 1, now_s, now_s);
+            pc.take(&names().command(stamp_s, &[qdot, 0.0, 0.0], &topic()), 1, now_s, now_s);
             prop_assert!(pc.advance(now_s)[0].abs() <= fastest);
         }
         pc.advance(now_s + 0.025);

@@ -10,15 +10,13 @@ use palpate_geometry::distance::{HalfSpace, OrientedBox};
 use palpate_geometry::sweep::Capsule;
 
 /// Stops the body before links come near to each other, to the table or to the object.
-pub const ENTRY: Entry = Entry {
-    name: NAME,
+pub const CLEARANCE: Entry = Entry {
+    name: "clearance",
     make: |site, settings, _| {
         let guard = Guard::new(site, settings);
         (!guard.pairs.is_empty()).then(|| Box::new(guard) as _)
     },
 };
-
-const NAME: &str = "clearance";
 
 /// Looks at the capsules of the links where the body cannot help going.
 struct Guard {
@@ -29,8 +27,8 @@ struct Guard {
     reaction_s: f64,
     /// The links in `W` at the posture looked at last.
     placed: Vec<Capsule>,
-    /// A posture, and the clearance there: until some point can have moved by that much, nobody
-    /// needs to look again.
+    /// A posture, and the clearance there: it is computed again when some point can have moved by
+    /// that much.
     looked: Option<(Joints, f64)>,
 }
 
@@ -116,12 +114,7 @@ impl Interlock for Guard {
             distance_m
         });
         below.map_or(Ok(()), |found| {
-            let part = self.name(pair);
-            Err(Trip { interlock: NAME, part, found, limit, unit: "m" })
+            Trip::unless(false, CLEARANCE.name, &self.name(pair), [found, limit], "m")
         })
-    }
-
-    fn reset(&mut self) {
-        self.looked = None;
     }
 }

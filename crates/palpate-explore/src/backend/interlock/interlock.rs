@@ -26,9 +26,6 @@ pub trait Interlock: Send {
         let _ = (now, reading);
         Ok(())
     }
-
-    /// Forgets what it remembers: the body stands at its start.
-    fn reset(&mut self) {}
 }
 
 /// How the body stands.
@@ -71,7 +68,7 @@ impl Now {
 pub struct Entry {
     /// As documentation and tests name it.
     pub name: &'static str,
-    /// Makes it; none where there is nothing to watch.
+    /// Makes it anew at each reset; `None` where there is nothing to watch.
     pub make: fn(&Site, &InterlockSettings, &Capabilities) -> Option<Box<dyn Interlock>>,
 }
 

@@ -1,26 +1,25 @@
 //! The last line before a body moves.
 
-use super::interlock::{Interlock, Now, Site, stopping_s};
-use super::joints::limited;
+use super::interlock::{Entry, Interlock, Now, Site, stopping_s};
+use super::limits::limited;
 use super::settings::InterlockSettings;
-use super::{INTERLOCKS, force};
+use super::{INTERLOCKS, force::FORCE};
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Trip, Wrench};
 use crate::robot::arm::{Jacobian, Joints};
 use nalgebra::Isometry3;
 use palpate_input::error::Invalid;
 use std::collections::VecDeque;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A body that is stopped when something is wrong, whatever it is told.
 ///
 /// The controller keeps limits along the tip's direction; this body keeps them joint by joint, and
 /// passes a command within all of them unchanged. What cannot be kept by shortening a command trips
 /// an interlock: the body is braked within its joints' accelerations and does not move again. A
-/// reset clears that of a simulated body, of a real one only an [`Operator`] does.
+/// reset clears that of a simulated body, of a real one only [`Interlocked::clear_fault`] does.
 pub struct Interlocked {
     inner: Box<dyn Backend>,
     interlocks: Vec<Box<dyn Interlock>>,
+    site: Site,
     settings: InterlockSettings,
     now: Now,
     way_back: WayBack,
@@ -29,18 +28,8 @@ pub struct Interlocked {
     reading: Reading,
     command: Command,
     fault: Option<Fault>,
-    operator: Operator,
-}
-
-/// Who may clear a fault of a real body, from wherever.
-#[derive(Clone, Debug, Default)]
-pub struct Operator(Arc<AtomicBool>);
-
-impl Operator {
-    /// Whoever looked at the body and found it fit lets the next reset clear its fault.
-    pub fn clear(&self) {
-        self.0.store(true, Ordering::Release);
-    }
+    /// Whether the next reset clears the fault of a real body.
+    is_cleared: bool,
 }
 
 impl Interlocked {
@@ -55,10 +44,10 @@ impl Interlocked {
     ) -> Result<Self, Fault> {
         let (chain, capabilities) = (site.robot.chain.clone(), inner.capabilities());
         capabilities.fit(&chain)?;
-        let made = INTERLOCKS.iter().filter_map(|entry| (entry.make)(site, settings, capabilities));
         let (q, x_wt) = (chain.home, Isometry3::identity());
-        Ok(Self {
-            interlocks: made.collect(),
+        let mut body = Self {
+            interlocks: Vec::new(),
+            site: site.clone(),
             settings: settings.clone(),
             way_back: WayBack::new(capabilities.period_s),
             command: Command { qdot: vec![0.0; chain.joints.len()] },
@@ -79,14 +68,22 @@ impl Interlocked {
             rest: None,
             reading: Reading::default(),
             fault: None,
-            operator: Operator::default(),
+            is_cleared: false,
             inner,
-        })
+        };
+        body.make_interlocks();
+        Ok(body)
     }
 
-    /// Who may clear its faults.
-    pub fn operator(&self) -> Operator {
-        self.operator.clone()
+    fn make_interlocks(&mut self) {
+        let Self { site, settings, inner, .. } = self;
+        let make = |entry: &Entry| (entry.make)(site, settings, inner.capabilities());
+        self.interlocks = INTERLOCKS.iter().filter_map(make).collect();
+    }
+
+    /// Lets the next reset succeed after a fault of a real body: an operator found it fit.
+    pub fn clear_fault(&mut self) {
+        self.is_cleared = true;
     }
 
     /// Has the inner body do `qdot` for a tick, and takes in what it says.
@@ -162,7 +159,7 @@ impl Interlocked {
         let Self { interlocks, now, reading, .. } = self;
         let mut trips = interlocks.iter_mut().filter_map(|one| one.reading(now, reading).err());
         let Some(first) = trips.next() else { return Ok(()) };
-        let other = trips.find(|_| first.interlock == force::NAME);
+        let other = trips.find(|_| first.interlock == FORCE.name);
         Err(other.unwrap_or(first))
     }
 
@@ -173,7 +170,7 @@ impl Interlocked {
     }
 
     fn trip(&mut self, trip: Trip) -> Fault {
-        let is_force = trip.interlock == force::NAME;
+        let is_force = trip.interlock == FORCE.name;
         let fault = Fault::Interlock { time_s: self.now.time_s, trip };
         let is_sound = self.brake();
         if is_force && is_sound {
@@ -198,31 +195,28 @@ impl Interlocked {
             if self.advance(&slower).is_err() {
                 return false;
             }
-            is_sound &= self.judge().map_or_else(|trip| trip.interlock == force::NAME, |()| true);
+            is_sound &= self.judge().map_or_else(|trip| trip.interlock == FORCE.name, |()| true);
         }
         is_sound
     }
 
     /// Takes the finger off what it was pressed on.
     fn go_back(&mut self) {
-        let InterlockSettings { retract_m, retract_m_s, retract_rise_n, .. } = self.settings;
+        let retract_m = self.settings.retract_m;
         let from = self.now.x_wt.translation.vector;
         let Some([begun_n, _]) = self.now.load else { return };
-        let ticks = (2.0 * retract_m / (retract_m_s * self.now.period_s)) as usize + PATIENCE_TICKS;
+        let ticks = (2.0 * retract_m / (RETRACT_M_S * self.now.period_s)) as usize + PATIENCE_TICKS;
         for _ in 0..ticks {
             if (self.now.x_wt.translation.vector - from).norm() >= retract_m {
                 break;
             }
-            let Some(back) = self.way_back.velocity(&self.now, retract_m_s) else { break };
-            let mut qdot = back;
+            let Some(mut qdot) = self.way_back.velocity(&self.now, RETRACT_M_S) else { break };
             if self.shorten(&mut qdot).is_err() || self.advance(&qdot).is_err() {
                 break;
             }
-            let is_worse = match self.now.load {
-                Some([force_n, _]) => force_n > begun_n + retract_rise_n,
-                None => true,
-            };
-            let is_other = self.judge().is_err_and(|trip| trip.interlock != force::NAME);
+            let is_worse =
+                self.now.load.is_none_or(|[force_n, _]| force_n > begun_n + RETRACT_RISE_N);
+            let is_other = self.judge().is_err_and(|trip| trip.interlock != FORCE.name);
             if is_worse || is_other {
                 break;
             }
@@ -236,6 +230,14 @@ impl Interlocked {
 // heuristic: 30 ms at 250 Hz.
 const HELD_TICKS: f64 = 8.0;
 
+/// Speed at which the finger goes back after too much force, m/s.
+// heuristic: four times the slowest contact, far below the reduced speed.
+pub const RETRACT_M_S: f64 = 0.02;
+
+/// Rise of the force at which the finger stops going back, N.
+// heuristic: well above the sensor's noise, far below a fault.
+pub const RETRACT_RISE_N: f64 = 2.0;
+
 /// Ticks beyond twice those of a way back at full speed: to start and to stop.
 const PATIENCE_TICKS: usize = 100;
 
@@ -245,7 +247,7 @@ impl Backend for Interlocked {
     }
 
     fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
-        let is_cleared = self.operator.0.swap(false, Ordering::AcqRel);
+        let is_cleared = std::mem::take(&mut self.is_cleared);
         if let Some(fault) = &self.fault
             && self.inner.capabilities().real_time
             && !is_cleared
@@ -253,8 +255,8 @@ impl Backend for Interlocked {
             return Err(fault.clone());
         }
         self.reading.copy(self.inner.reset(seed)?);
-        self.interlocks.iter_mut().for_each(|one| one.reset());
-        self.way_back.forget();
+        self.make_interlocks();
+        self.way_back.postures.clear();
         (self.fault, self.rest) = (None, None);
         (self.now.tick, self.now.sent) = (0, Joints::zeros());
         (self.now.unseen, self.now.time_s) = (Joints::zeros(), self.reading.time_s);
@@ -291,7 +293,7 @@ impl Backend for Interlocked {
             Ok(()) => Ok(&self.reading),
             Err(trip) => {
                 // Where readings cannot be trusted, nothing watches how the servos brake.
-                if trip.interlock != force::NAME && self.inner.capabilities().real_time {
+                if trip.interlock != FORCE.name && self.inner.capabilities().real_time {
                     self.inner.brake();
                 }
                 Err(self.trip(trip))
@@ -317,11 +319,6 @@ impl WayBack {
     fn new(period_s: f64) -> Self {
         let most = ((KEPT_S / period_s) as usize).clamp(1, MOST);
         Self { postures: VecDeque::with_capacity(most), most }
-    }
-
-    /// Nothing is behind.
-    fn forget(&mut self) {
-        self.postures.clear();
     }
 
     /// Adds where the body stands.

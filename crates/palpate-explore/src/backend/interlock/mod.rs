@@ -1,43 +1,49 @@
 //! Interlocks: reasons to stop a body that hold whatever it is told.
 //!
-//! An [`Interlock`] is a file here and a line in [`INTERLOCKS`]; [`Interlocked`] is a body around
-//! another that asks each of them in every tick. Before a body is moved, [`check_start`] asks it
-//! to stand still and looks at its sensors.
+//! An [`Interlock`] is an [`Entry`] of [`INTERLOCKS`]; [`Interlocked`] is a body around another
+//! that asks each of them in every tick. Before a body is moved, [`check_start`] commands it to
+//! stand still and checks its sensors.
 
 mod collision;
-mod depth;
-mod electrodes;
 mod force;
 pub mod gates;
 #[allow(clippy::module_inception)]
 mod interlock;
 mod interlocked;
-mod joints;
+mod limits;
+mod sensors;
 mod settings;
-mod silence;
-mod standstill;
-mod tip_speed;
 mod tracking;
-mod velocity;
 mod workspace;
 
-pub use gates::{Baseline, GateSettings, check_start};
+pub use gates::{GateSettings, check_start};
 pub use interlock::{Entry, Interlock, Now, Site};
-pub use interlocked::{Interlocked, Operator};
+pub use interlocked::Interlocked;
 pub use settings::{InterlockSettings, defaults};
 
 /// In the order in which they act: those that shorten a command come before those that judge what
-/// is left of it. A new one is a file and a line.
+/// is left of it.
 pub const INTERLOCKS: &[Entry] = &[
-    tip_speed::ENTRY,
-    joints::ENTRY,
-    workspace::ENTRY,
-    depth::ENTRY,
-    collision::ENTRY,
-    force::ENTRY,
-    silence::ENTRY,
-    electrodes::ENTRY,
-    standstill::ENTRY,
-    velocity::ENTRY,
-    tracking::ENTRY,
+    limits::TIP_SPEED,
+    limits::JOINT_POSITION,
+    workspace::WORKSPACE,
+    workspace::DEPTH,
+    collision::CLEARANCE,
+    force::FORCE,
+    sensors::SILENCE,
+    sensors::ELECTRODE,
+    tracking::STANDSTILL,
+    tracking::VELOCITY,
+    tracking::POSITION,
+];
+
+/// Keys of `[backend]` in files of version 0.1 that are constants now, with their values.
+pub const FORMER_KEYS: [(&str, f64); 7] = [
+    ("interlocks.force_rate_n_s", force::RISE_N_S),
+    ("interlocks.tracking_error_s", tracking::VELOCITY_S),
+    ("interlocks.follow_s", tracking::VELOCITY_S),
+    ("interlocks.retract_m_s", interlocked::RETRACT_M_S),
+    ("interlocks.retract_rise_n", interlocked::RETRACT_RISE_N),
+    ("gates.hold_s", gates::HOLD_S),
+    ("gates.still", gates::STILL),
 ];

@@ -37,8 +37,6 @@ pub struct InterlockSettings {
     /// finger's length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_limit_nm: Option<f64>,
-    /// Rise of the force that is a fault: 0.1 m/s, the speed of travel, against 20 N/mm.
-    pub force_rate_n_s: f64,
     /// Longest that the time of the joints may stand still.
     pub joint_silence_s: f64,
     /// Longest without a new reading of the force/torque sensor.
@@ -48,22 +46,16 @@ pub struct InterlockSettings {
     /// Stop a real body if an electrode, or a joint that is commanded to move, has read the same
     /// value for this long: seven tactile frames.
     pub frozen_s: f64,
-    /// Largest velocity tracking error of a joint, as a share of its largest velocity.
+    /// Stop if the velocity tracking error of a joint has been larger for 0.2 s, as a share of its
+    /// largest velocity.
     #[serde(alias = "follow_share")]
     pub tracking_error_ratio: f64,
-    /// Stop if the velocity tracking error has been larger for this long.
-    #[serde(alias = "follow_s")]
-    pub tracking_error_s: f64,
     /// Longest delay with which the joints of a real body may follow their commands: what they move
     /// within a second is compared with what was commanded up to this much earlier.
     pub tracking_lag_s: f64,
     /// How far the finger goes back, the way it came, when too much force has stopped it; 0 for not
     /// at all.
     pub retract_m: f64,
-    /// How fast.
-    pub retract_m_s: f64,
-    /// Rise of the force at which it stops going back.
-    pub retract_rise_n: f64,
 }
 
 /// By how much a force that is a fault lies above that at which a touch retreats; chosen: what a
@@ -93,17 +85,13 @@ impl Default for InterlockSettings {
             reaction_s: defaults::REACTION_S,
             force_limit_n: None,
             torque_limit_nm: None,
-            force_rate_n_s: 2000.0,
             joint_silence_s: 0.04,
             wrench_silence_s: 0.07,
             frame_silence_s: 0.2,
             frozen_s: 0.07,
             tracking_error_ratio: 0.3,
-            tracking_error_s: 0.2,
             tracking_lag_s: 0.1,
             retract_m: 0.01,
-            retract_m_s: 0.02,
-            retract_rise_n: 2.0,
         }
     }
 }
@@ -125,37 +113,28 @@ impl InterlockSettings {
 
 impl Checked for InterlockSettings {
     fn check(&self, rules: &mut Rules) {
-        if let Some(tip_speed_m_s) = self.tip_speed_m_s {
-            rules.number("tip_speed_m_s", tip_speed_m_s, 1e-3..=2.0);
+        let numbers = [
+            ("tip_speed_m_s", self.tip_speed_m_s, 1e-3..=2.0),
+            ("tip_margin_m", Some(self.tip_margin_m), 0.0..=10.0),
+            ("lowest_m", self.lowest_m, -1e3..=1e3),
+            ("depth_margin_m", Some(self.depth_margin_m), 0.0..=1.0),
+            ("clearance_m", Some(self.clearance_m), 0.0..=0.5),
+            ("reaction_s", Some(self.reaction_s), 0.0..=1.0),
+            ("force_limit_n", self.force_limit_n, 0.1..=1e5),
+            ("torque_limit_nm", self.torque_limit_nm, 1e-3..=1e4),
+            ("joint_silence_s", Some(self.joint_silence_s), 1e-3..=10.0),
+            ("wrench_silence_s", Some(self.wrench_silence_s), 1e-3..=10.0),
+            ("frame_silence_s", Some(self.frame_silence_s), 1e-2..=10.0),
+            ("frozen_s", Some(self.frozen_s), 0.05..=100.0),
+            ("tracking_error_ratio", Some(self.tracking_error_ratio), 0.01..=10.0),
+            ("tracking_lag_s", Some(self.tracking_lag_s), 0.0..=1.0),
+            ("retract_m", Some(self.retract_m), 0.0..=0.1),
+        ];
+        for (key, value, allowed) in numbers {
+            value.into_iter().for_each(|value| rules.number(key, value, allowed.clone()));
         }
-        rules.number("tip_margin_m", self.tip_margin_m, 0.0..=10.0);
-        if let Some(workspace_m) = self.workspace_m {
-            for (i, side) in workspace_m.into_iter().enumerate() {
-                rules.interval(&format!("workspace_m[{i}]"), side, -1e3..=1e3);
-            }
+        for (i, side) in self.workspace_m.into_iter().flatten().enumerate() {
+            rules.interval(&format!("workspace_m[{i}]"), side, -1e3..=1e3);
         }
-        if let Some(lowest_m) = self.lowest_m {
-            rules.number("lowest_m", lowest_m, -1e3..=1e3);
-        }
-        rules.number("depth_margin_m", self.depth_margin_m, 0.0..=1.0);
-        rules.number("clearance_m", self.clearance_m, 0.0..=0.5);
-        rules.number("reaction_s", self.reaction_s, 0.0..=1.0);
-        if let Some(force_limit_n) = self.force_limit_n {
-            rules.number("force_limit_n", force_limit_n, 0.1..=1e5);
-        }
-        if let Some(torque_limit_nm) = self.torque_limit_nm {
-            rules.number("torque_limit_nm", torque_limit_nm, 1e-3..=1e4);
-        }
-        rules.number("force_rate_n_s", self.force_rate_n_s, 1.0..=1e7);
-        rules.number("joint_silence_s", self.joint_silence_s, 1e-3..=10.0);
-        rules.number("wrench_silence_s", self.wrench_silence_s, 1e-3..=10.0);
-        rules.number("frame_silence_s", self.frame_silence_s, 1e-2..=10.0);
-        rules.number("frozen_s", self.frozen_s, 0.05..=100.0);
-        rules.number("tracking_error_ratio", self.tracking_error_ratio, 0.01..=10.0);
-        rules.number("tracking_error_s", self.tracking_error_s, 0.0..=10.0);
-        rules.number("tracking_lag_s", self.tracking_lag_s, 0.0..=1.0);
-        rules.number("retract_m", self.retract_m, 0.0..=0.1);
-        rules.number("retract_m_s", self.retract_m_s, 1e-3..=0.25);
-        rules.number("retract_rise_n", self.retract_rise_n, 0.1..=100.0);
     }
 }

@@ -1,9 +1,34 @@
-//! Joints that do not follow their commands: how far they have moved, at any speed.
+//! Joints that do not follow their commands: by their velocity, by how far they have moved at any
+//! speed, and by a position that never changes.
 
 use super::interlock::{Entry, Interlock, Now};
 use crate::backend::{Reading, Trip};
 use crate::robot::arm::Joints;
+use crate::robot::arm::chain::MAX_JOINTS;
 use std::collections::VecDeque;
+
+/// Stops a real body when a joint reads one and the same position while it is commanded to move:
+/// its driver repeats itself, and every limit would look at where the arm no longer is.
+pub const STANDSTILL: Entry = Entry {
+    name: "joint standstill",
+    make: |_, settings, capabilities| {
+        let standstill = Standstill {
+            frozen_s: settings.frozen_s.max(settings.tracking_lag_s),
+            blind_s: BLIND_SHARE * settings.joint_silence_s,
+            since_s: [None; MAX_JOINTS],
+        };
+        capabilities.real_time.then(|| Box::new(standstill) as _)
+    },
+};
+
+/// Stops a body one of whose joints moves at another velocity than was applied for some time.
+pub const VELOCITY: Entry = Entry {
+    name: "velocity tracking error",
+    make: |_, settings, _| {
+        let share = settings.tracking_error_ratio;
+        Some(Box::new(VelocityTracking { share, since_s: [None; MAX_JOINTS] }))
+    },
+};
 
 /// Stops a real body one of whose joints has moved by another angle than was commanded.
 ///
@@ -11,8 +36,8 @@ use std::collections::VecDeque;
 /// over a span by an amount between the least and the most that was commanded over spans of the
 /// same length which ended up to that much earlier. Short spans find a fast joint soon, long ones a
 /// joint at 0.1 mm/s, which moves less than the error that is always allowed for many seconds.
-pub const ENTRY: Entry = Entry {
-    name: NAME,
+pub const POSITION: Entry = Entry {
+    name: "position tracking error",
     make: |_, settings, capabilities| {
         let span = |step_s: f64| Span::new(step_s, settings.tracking_lag_s);
         let tracking =
@@ -21,7 +46,68 @@ pub const ENTRY: Entry = Entry {
     },
 };
 
-const NAME: &str = "position tracking error";
+/// Movement of any point of the robot that a position must show.
+// heuristic: three steps of an encoder of 1e-4 rad at a reach of 1 m.
+const SEEN_M: f64 = 3e-4;
+
+/// Movement of any point of the robot after which it is stopped sooner, and how soon, as a share of
+/// the time after which joints count as silent.
+// heuristic: with the way on which the arm then brakes from 0.1 m/s, below 10 mm; and later than
+// the age limit of 50 ms of joint states over topics, so that a silent topic is reported as one.
+const BLIND_M: f64 = 5e-3;
+const BLIND_SHARE: f64 = 1.5;
+
+struct Standstill {
+    frozen_s: f64,
+    blind_s: f64,
+    /// Since when each joint has been commanded without a change of its position.
+    since_s: [Option<f64>; MAX_JOINTS],
+}
+
+impl Interlock for Standstill {
+    fn reading(&mut self, now: &Now, _: &Reading) -> Result<(), Trip> {
+        for (i, joint) in now.chain.joints.iter().enumerate() {
+            let unseen_m = now.unseen[i].abs() * now.reaches_m[i];
+            if now.unseen[i] == 0.0 {
+                self.since_s[i] = None;
+                continue;
+            }
+            let found = now.time_s - *self.since_s[i].get_or_insert(now.time_s - now.period_s);
+            let limit = if unseen_m > BLIND_M { self.blind_s } else { self.frozen_s };
+            let moves = unseen_m <= SEEN_M || found <= limit;
+            Trip::unless(moves, STANDSTILL.name, &joint.name, [found, limit], "s")?;
+        }
+        Ok(())
+    }
+}
+
+/// Time for which a velocity tracking error may be larger than allowed.
+// heuristic: ten times the lag of the simulated arm's servos.
+pub const VELOCITY_S: f64 = 0.2;
+
+struct VelocityTracking {
+    /// Of the joint's speed limit.
+    share: f64,
+    /// Since when each joint's error has been too large.
+    since_s: [Option<f64>; MAX_JOINTS],
+}
+
+impl Interlock for VelocityTracking {
+    fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
+        for ((i, joint), applied) in now.chain.joints.iter().enumerate().zip(&reading.applied.qdot)
+        {
+            let (found, limit) = ((now.qdot[i] - applied).abs(), self.share * joint.qdot_limit);
+            if found <= limit {
+                self.since_s[i] = None;
+                continue;
+            }
+            let is_short = now.time_s - *self.since_s[i].get_or_insert(now.time_s) <= VELOCITY_S;
+            let (name, unit) = (VELOCITY.name, "rad/s or m/s");
+            Trip::unless(is_short, name, &joint.name, [found, limit], unit)?;
+        }
+        Ok(())
+    }
+}
 
 /// Time between the samples of each span.
 const STEPS_S: [f64; 5] = [0.0025, 0.01, 0.04, 0.16, 0.64];
@@ -65,7 +151,7 @@ impl Span {
         Self { step_s, lag_steps, samples: VecDeque::with_capacity(most), most }
     }
 
-    /// Adds a sample if a step has passed since the last one; whether it did.
+    /// Adds a sample if a step has passed since the last one; returns whether it did.
     fn push(&mut self, sample: Sample, period_s: f64) -> bool {
         // Half a tick's slack, so that a late one does not skip a step.
         let due_s = self.step_s - 0.5 * period_s;
@@ -122,17 +208,9 @@ impl Interlock for Tracking {
                 let reach_m = now.reaches_m[i];
                 let found = (low[i] - moved[i]).max(moved[i] - high[i]) * reach_m;
                 let limit = FLOOR_M + SHARE * low[i].abs().max(high[i].abs()) * reach_m;
-                if found > limit {
-                    let (part, unit) = (joint.name.to_string(), "m");
-                    return Err(Trip { interlock: NAME, part, found, limit, unit });
-                }
+                Trip::unless(found <= limit, POSITION.name, &joint.name, [found, limit], "m")?;
             }
         }
         Ok(())
-    }
-
-    fn reset(&mut self) {
-        self.spans.iter_mut().for_each(|span| span.samples.clear());
-        (self.commanded, self.time_s) = (Joints::zeros(), 0.0);
     }
 }

@@ -1,14 +1,15 @@
-//! Where fingertip and elbow may be.
+//! Where fingertip and elbow may be, and how deep the finger may go.
 
 use super::interlock::{Ahead, Entry, Interlock, Now};
 use crate::backend::Trip;
 use crate::robot::arm::Joints;
 use nalgebra::{Point3, Vector3};
+use palpate_geometry::distance::HalfSpace;
 
 /// Stops the body before its tip leaves the places of its touches by more than a margin, or tip or
 /// elbow the workspace.
-pub const ENTRY: Entry = Entry {
-    name: NAME,
+pub const WORKSPACE: Entry = Entry {
+    name: "workspace",
     make: |site, settings, _| {
         let mut rooms = Vec::new();
         if let Some([low, high]) = site.tip_w {
@@ -26,7 +27,14 @@ pub const ENTRY: Entry = Entry {
     },
 };
 
-const NAME: &str = "workspace";
+/// Stops the body before its tip goes beyond where it is to turn back by more than a margin.
+pub const DEPTH: Entry = Entry {
+    name: "depth",
+    make: |site, settings, _| {
+        let (margin_m, reaction_s) = (settings.depth_margin_m, settings.reaction_s);
+        site.farthest.map(|space| Box::new(Depth { space, margin_m, reaction_s }) as _)
+    },
+};
 
 struct Workspace {
     rooms: Vec<Room>,
@@ -42,17 +50,14 @@ struct Room {
 }
 
 impl Room {
-    /// From the nearest side, in m; negative outside.
-    fn clearance_m(&self, p_w: &Point3<f64>) -> f64 {
-        (p_w - self.low).inf(&(self.high - p_w)).min()
-    }
-
-    /// The same of the point where it is at `q`.
-    fn clearance_at_m(&self, now: &Now, q: &Joints) -> f64 {
-        self.clearance_m(&match self.elbow {
+    /// Distance of the point at `q` from the nearest side, in m; negative outside.
+    fn clearance_m(&self, now: &Now, q: &Joints) -> f64 {
+        let p_w: Point3<f64> = match self.elbow {
+            None if *q == now.q => now.x_wt.translation.vector.into(),
             None => now.chain.forward(q).translation.vector.into(),
             Some(link) => now.chain.frames(q)[link].translation.vector.into(),
-        })
+        };
+        (p_w - self.low).inf(&(self.high - p_w)).min()
     }
 }
 
@@ -61,18 +66,34 @@ impl Interlock for Workspace {
         let ahead = Ahead::of(now, qdot, self.reaction_s);
         let farthest_m = ahead.farthest_m(&now.q);
         for room in &self.rooms {
-            let here_m = match room.elbow {
-                None => room.clearance_m(&now.x_wt.translation.vector.into()),
-                Some(_) => room.clearance_at_m(now, &now.q),
-            };
-            if here_m > farthest_m {
+            if room.clearance_m(now, &now.q) > farthest_m {
                 continue;
             }
-            if let Some(found) = ahead.below(0.0, |q| room.clearance_at_m(now, q)) {
-                let part = if room.elbow.is_some() { "the elbow" } else { "the tip" }.into();
-                return Err(Trip { interlock: NAME, part, found, limit: 0.0, unit: "m inside" });
+            if let Some(found) = ahead.below(0.0, |q| room.clearance_m(now, q)) {
+                let part = if room.elbow.is_some() { "the elbow" } else { "the tip" };
+                return Trip::unless(false, WORKSPACE.name, part, [found, 0.0], "m inside");
             }
         }
         Ok(())
+    }
+}
+
+struct Depth {
+    space: HalfSpace,
+    margin_m: f64,
+    reaction_s: f64,
+}
+
+impl Interlock for Depth {
+    fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
+        let left_m = |p_w| self.margin_m - self.space.distance_m(&p_w);
+        let ahead = Ahead::of(now, qdot, self.reaction_s);
+        if left_m(now.x_wt.translation.vector.into()) > ahead.farthest_m(&now.q) {
+            return Ok(());
+        }
+        let below = ahead.below(0.0, |q| left_m(now.chain.forward(q).translation.vector.into()));
+        let found_m = self.margin_m - below.unwrap_or_default();
+        let (measures, unit) = ([found_m, self.margin_m], "m beyond the turning point");
+        Trip::unless(below.is_none(), DEPTH.name, "", measures, unit)
     }
 }

@@ -1,0 +1,96 @@
+//! Limits of the fingertip's speed, and of each joint's position, speed and acceleration.
+
+use super::interlock::{Entry, Interlock, Now};
+use crate::backend::{Reading, Trip};
+use crate::robot::arm::Joints;
+
+/// Shortens commands to the speed limit of the tip, and stops a tip whose reading is faster.
+pub const TIP_SPEED: Entry = Entry {
+    name: "tip speed",
+    make: |site, settings, capabilities| {
+        // What the controller may ask for: its way and its fastest correction.
+        let asked_m_s = site.travel_m_s + REDUCED_M_S;
+        let usual_m_s = if capabilities.real_time { REDUCED_M_S } else { asked_m_s };
+        let limit_m_s = settings.tip_speed_m_s.unwrap_or(usual_m_s);
+        Some(Box::new(TipSpeed { limit_m_s, above: 0 }))
+    },
+};
+
+/// Keeps commands within the limits, and stops a joint whose reading is far beyond one.
+pub const JOINT_POSITION: Entry =
+    Entry { name: "joint position", make: |_, _, _| Some(Box::new(JointLimits)) };
+
+/// The reduced speed of EN ISO 10218-1.
+const REDUCED_M_S: f64 = 0.25;
+
+/// Ratio of a tip speed as read to its limit from which the body is stopped.
+// heuristic: what servos overshoot.
+const OVERSHOOT: f64 = 1.2;
+
+/// Readings in a row that say so.
+const SAMPLES: u32 = 2;
+
+struct TipSpeed {
+    limit_m_s: f64,
+    above: u32,
+}
+
+impl Interlock for TipSpeed {
+    fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
+        let speed_m_s = now.tip_speed_m_s(qdot);
+        if speed_m_s > self.limit_m_s {
+            *qdot *= self.limit_m_s / speed_m_s;
+        }
+        Ok(())
+    }
+
+    fn reading(&mut self, now: &Now, _: &Reading) -> Result<(), Trip> {
+        let found = now.tip_speed_m_s(&now.qdot);
+        let limit = OVERSHOOT * self.limit_m_s;
+        self.above = if found > limit { self.above + 1 } else { 0 };
+        Trip::unless(self.above < SAMPLES, TIP_SPEED.name, "", [found, limit], "m/s")
+    }
+}
+
+/// Share by which a limit may be exceeded before it is applied: rounding, so that a command within
+/// the limits passes unchanged.
+const ROUNDING: f64 = 1e-9;
+
+/// How far beyond its limit the reading of a joint may be, rad or m.
+// heuristic: twice where the stops of the simulated arm stand.
+const BEYOND: f64 = 0.1;
+
+struct JointLimits;
+
+/// `wanted` with every joint, one by one, within its speed, within its acceleration since what was
+/// commanded last, and slow enough to stop before its limit of position.
+pub fn limited(now: &Now, wanted: &Joints) -> Joints {
+    let mut qdot = *wanted;
+    let joints = now.chain.joints.iter().zip(now.q.iter().zip(now.sent.iter()));
+    for ((joint, (&q, &sent)), qdot) in joints.zip(qdot.iter_mut()) {
+        let step = joint.qddot_limit * now.period_s;
+        let allowed = joint.fastest(q, *qdot, now.period_s) * (1.0 + ROUNDING);
+        let slow = qdot.clamp(-allowed, allowed);
+        *qdot = match (slow - sent).abs() <= step * (1.0 + ROUNDING) {
+            true => slow,
+            false => sent + step.copysign(slow - sent),
+        };
+    }
+    qdot
+}
+
+impl Interlock for JointLimits {
+    fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
+        *qdot = limited(now, qdot);
+        Ok(())
+    }
+
+    fn reading(&mut self, now: &Now, _: &Reading) -> Result<(), Trip> {
+        now.chain.joints.iter().enumerate().try_for_each(|(i, joint)| {
+            let (q, [low, high]) = (now.q[i], joint.q_limits);
+            let is_within = (low - BEYOND..=high + BEYOND).contains(&q);
+            let limit = if q > high { high } else { low };
+            Trip::unless(is_within, JOINT_POSITION.name, &joint.name, [q, limit], "rad or m")
+        })
+    }
+}

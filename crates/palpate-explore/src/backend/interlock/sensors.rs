@@ -1,0 +1,119 @@
+//! Sensors that are silent, and electrodes that cannot be right.
+
+use super::interlock::{Entry, Interlock, Now};
+use crate::backend::{Reading, Trip};
+use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
+use nalgebra::Vector3;
+
+/// Stops a body whose joints, force/torque sensor or tactile sensor are silent.
+pub const SILENCE: Entry = Entry {
+    name: "silence",
+    make: |_, settings, capabilities| {
+        let limits_s =
+            [settings.joint_silence_s, settings.wrench_silence_s, settings.frame_silence_s];
+        let repeats = capabilities.real_time;
+        Some(Box::new(Silence { limits_s, repeats, heard: [None; 3], time_s: 0.0, force_n: None }))
+    },
+};
+
+/// Stops a real body if an electrode stands at an end of its range or does not change at all: its
+/// noise is several counts. A simulated one may have no noise, and be pressed to the end.
+pub const ELECTRODE: Entry = Entry {
+    name: "electrode",
+    make: |_, settings, capabilities| {
+        let frozen_s = settings.frozen_s;
+        let electrodes = Electrodes { frozen_s, still: NOTHING, ends: [0; ELECTRODES] };
+        capabilities.real_time.then(|| Box::new(electrodes) as _)
+    },
+};
+
+const NAMES: [&str; 3] = ["silence of the joints", "silence of the force", "silence of the skin"];
+
+struct Silence {
+    limits_s: [f64; 3],
+    /// Whether a force that is the same to the last bit counts as none: a simulated one may be free
+    /// of noise.
+    repeats: bool,
+    /// The tick of the last reading of each; `None` before the first.
+    heard: [Option<u64>; 3],
+    time_s: f64,
+    force_n: Option<Vector3<f64>>,
+}
+
+impl Interlock for Silence {
+    fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
+        let force_n = reading.wrench.map(|wrench| wrench.force_n);
+        let is_new = force_n != self.force_n || !self.repeats;
+        let news = [
+            reading.time_s > self.time_s || self.heard[0].is_none(),
+            reading.wrench.is_some() && is_new,
+            reading.frames().next().is_some(),
+        ];
+        (self.time_s, self.force_n) = (reading.time_s, force_n);
+        for (i, (heard, is_news)) in self.heard.iter_mut().zip(news).enumerate() {
+            if is_news {
+                *heard = Some(now.tick);
+            }
+            let Some(heard) = heard else { continue };
+            // By ticks: the body's own time may be what stands still.
+            let (found, limit) = ((now.tick - *heard) as f64 * now.period_s, self.limits_s[i]);
+            Trip::unless(found <= limit, NAMES[i], "", [found, limit], "s")?;
+        }
+        Ok(())
+    }
+}
+
+/// Frames in a row at an end of the range.
+const FRAMES: u32 = 2;
+
+/// Frames in a row with the same value that are no chance, whatever time lies between them: there
+/// are no readings while the next touch is planned. Noise of several counts makes two the same in
+/// one of ten, so many in one of a hundred thousand.
+const STILL_FRAMES: u32 = 6;
+
+const NOTHING: [Still; ELECTRODES] =
+    [Still { count: f64::NAN, since_s: 0.0, frames: 0 }; ELECTRODES];
+
+/// Last value of an electrode.
+#[derive(Clone, Copy)]
+struct Still {
+    count: f64,
+    /// Since when it has been that.
+    since_s: f64,
+    /// In how many frames.
+    frames: u32,
+}
+
+struct Electrodes {
+    frozen_s: f64,
+    still: [Still; ELECTRODES],
+    /// Frames in a row at an end of the range.
+    ends: [u32; ELECTRODES],
+}
+
+impl Interlock for Electrodes {
+    fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
+        for counts in reading.frames().filter_map(|frame| frame.electrode_counts) {
+            for (i, &count) in counts.iter().enumerate() {
+                let still = &mut self.still[i];
+                if count != still.count {
+                    *still = Still { count, since_s: now.time_s, frames: 0 };
+                }
+                still.frames += 1;
+                let frozen_s = now.time_s - still.since_s;
+                let is_frozen = frozen_s > self.frozen_s && still.frames >= STILL_FRAMES;
+                let is_end = count <= 0.0 || count >= FULL_SCALE_COUNTS;
+                self.ends[i] = if is_end { self.ends[i] + 1 } else { 0 };
+                if self.ends[i] >= FRAMES || is_frozen {
+                    let end = if count <= 0.0 { 0.0 } else { FULL_SCALE_COUNTS };
+                    let (interlock, measures, unit) = match self.ends[i] >= FRAMES {
+                        true => ("value", [count, end], "counts"),
+                        false => ("standstill", [frozen_s, self.frozen_s], "s"),
+                    };
+                    return Trip::unless(false, interlock, &format!("E{}", i + 1), measures, unit);
+                }
+            }
+        }
+        Ok(())
+    }
+}
