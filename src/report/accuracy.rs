@@ -4,8 +4,7 @@
 use super::axes::{Axis, Panel};
 use super::canvas::{Anchor, Area, Canvas};
 use super::legend::{Legend, Swatch};
-use super::style;
-use super::style::{FAINT_INK, INK, PAPER, SMALL_PX};
+use super::style::{self, FAINT_INK, INK, SMALL_PX, dot};
 use crate::experiment::statistics::mean;
 use crate::study::accuracy::comparison::Comparison;
 use crate::study::accuracy::convergence::Order;
@@ -60,7 +59,7 @@ pub fn draw(
 
 fn draw_levels(canvas: &mut Canvas, levels: &Comparison) -> Option<()> {
     let entries: Vec<_> = (FAMILIES.iter())
-        .map(|(colour, words)| (Swatch::Circle(point(colour)), *words))
+        .map(|(colour, words)| (Swatch::Circle(dot(colour)), *words))
         .chain([
             (Swatch::Diamond(INK), "the scene as it is"),
             (Swatch::Line(style::dashed(INK, 1.3, "5 3")), "front"),
@@ -115,7 +114,7 @@ fn draw_cost(
             let ends = interval.map(|value| panel.at(*time_ms, value.max(1e-9)));
             canvas.line(ends, &style::stroke(colour, 1.2));
             match variant.level {
-                Some(_) => canvas.circle(panel.at(*time_ms, *error), 3.6, &point(colour)),
+                Some(_) => canvas.circle(panel.at(*time_ms, *error), 3.6, &dot(colour)),
                 None => canvas.diamond(panel.at(*time_ms, *error), &style::stroke(INK, 1.3)),
             }
         }
@@ -144,7 +143,7 @@ fn draw_order(canvas: &mut Canvas, order: &Order, area: Area) {
         .collect();
     panel.curve(canvas, &line, &style::dashed(FAINT_INK, 1.3, "5 3"));
     for (at, error) in &order.errors {
-        canvas.circle(panel.at(*at, *error), 3.6, &point(FAMILIES[4].0));
+        canvas.circle(panel.at(*at, *error), 3.6, &dot(FAMILIES[4].0));
     }
 }
 
@@ -187,7 +186,7 @@ fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option
             }
             if let Some((value, interval)) = measure(variant) {
                 canvas.line(interval.map(|x| panel.at(x, y)), &style::stroke(INK, 1.2));
-                canvas.circle(panel.at(value, y), 3.6, &point(FAMILIES[3].0));
+                canvas.circle(panel.at(value, y), 3.6, &dot(FAMILIES[3].0));
             }
         }
     }
@@ -200,8 +199,4 @@ fn bar(spread: Spread, unit: f64) -> Bar {
 
 fn reference_line() -> String {
     style::dashed(FAINT_INK, 1.0, "2 3")
-}
-
-fn point(colour: &str) -> String {
-    format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".7""#)
 }

@@ -1,8 +1,7 @@
 //! Axes: from data to pixels, with ticks at round numbers.
 
 use super::canvas::{Anchor, Area, Canvas, PointPx};
-use super::style;
-use super::style::{FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
+use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
 use palpate_explore::task::Zone;
 
 /// A unit of length for labels.
@@ -24,6 +23,11 @@ impl Length {
             true => Self { per_m: 1.0, symbol: "m" },
             false => MM,
         }
+    }
+
+    /// A name with the symbol behind it.
+    pub fn named(&self, name: &str) -> String {
+        format!("{name} ({})", self.symbol)
     }
 }
 
@@ -164,6 +168,7 @@ pub fn rounded(value: f64) -> String {
 }
 
 /// A rectangle with two axes.
+#[derive(Clone)]
 pub struct Panel {
     /// The rectangle that holds the data.
     pub area: Area,
@@ -187,12 +192,6 @@ impl Panel {
         };
         let (x, y) = (stretched(x, width), stretched(y, height));
         Self { area: Area { width, height, ..most }, x, y }
-    }
-
-    /// The same with its top left elsewhere.
-    pub fn moved(&self, left: f64, top: f64) -> Self {
-        let area = Area { left, top, ..self.area };
-        Self { area, x: self.x.clone(), y: self.y.clone() }
     }
 
     /// Where a value lies on the sheet.
@@ -268,8 +267,8 @@ impl Panel {
 /// A [`colour_bar`] of heights above a datum, in a unit.
 pub fn height_bar(canvas: &mut Canvas, area: Area, unit: Length, heights_m: [f64; 2]) {
     let [low, high] = heights_m.map(|height_m| height_m * unit.per_m);
-    let words = format!("height above the datum ({})", unit.symbol);
-    colour_bar(canvas, area, &Axis::linear(low, high, 6.0), &words, |t| style::height(t, 1.0));
+    let (axis, words) = (Axis::linear(low, high, 6.0), unit.named("height above the datum"));
+    colour_bar(canvas, area, &axis, &words, |t| style::height(t, 1.0));
 }
 
 /// A horizontal bar of colours with its scale below.

@@ -2,6 +2,7 @@
 
 use super::canvas::escape;
 use super::style::ON_DARK;
+use std::fmt::Display;
 
 /// A page of this kind about something called `name`; `question` may be empty.
 pub(super) fn page(kind: &str, name: &str, question: &str, body: &str) -> String {
@@ -34,6 +35,18 @@ pub(super) fn section(title: &str, body: &str, note: &str) -> String {
     }
     let title = if title.is_empty() { String::new() } else { format!("<h2>{title}</h2>\n") };
     format!("<section>\n{title}{body}<p class=\"note\">{}</p>\n</section>\n", escape(note))
+}
+
+/// A drawing with its caption as HTML.
+pub(super) fn figure(id: &str, svg: &str, caption: impl Display) -> String {
+    let svg = wide(svg, "figure");
+    format!("<figure id=\"{id}\">\n{svg}<figcaption>{caption}</figcaption>\n</figure>\n")
+}
+
+/// A list of sentences; empty without any.
+pub(super) fn list(class: &str, items: &[String]) -> String {
+    let items: String = items.iter().map(|it| format!("<li>{}</li>\n", escape(it))).collect();
+    if items.is_empty() { items } else { format!("<ul{class}>\n{items}</ul>\n") }
 }
 
 /// Drawings keep their colours for light paper; on dark paper the page gives them others. Touches

@@ -4,8 +4,7 @@ use super::canvas::escape;
 use super::figures::Figure;
 use super::files::FORMATS;
 use super::findings;
-use super::html;
-use super::html::{section, wide};
+use super::html::{self, list, section};
 use super::table::Table;
 use super::tables::{comparison, summary};
 use crate::experiment::statistics::analysis::Analysis;
@@ -37,7 +36,7 @@ pub fn html(
     let equal = comparison::equal_errors(run, &analysis.equal_errors);
     let against = comparison::comparisons(run, &analysis.comparisons);
     let parts = [
-        notices(&findings::notices(run)),
+        list(" class=\"notices\"", &findings::notices(run)),
         explorer.into(),
         found(run, analysis),
         tables("The paper, and here", &[summary::claims(run)], "told", summary::CLAIMS_NOTE),
@@ -51,15 +50,6 @@ pub fn html(
         raw_files(drawings),
     ];
     html::page("Palpate run", &run.experiment.name, &run.experiment.question, &parts.concat())
-}
-
-/// What a reader should know before anything else, a sentence each.
-fn notices(sentences: &[String]) -> String {
-    let items: String = sentences.iter().map(|it| format!("<li>{}</li>\n", escape(it))).collect();
-    match items.is_empty() {
-        true => items,
-        false => format!("<ul class=\"notices\">\n{items}</ul>\n"),
-    }
 }
 
 /// The verdict in words, then its numbers.
@@ -85,24 +75,19 @@ fn events(run: &Run) -> String {
         Some(format!("{}, trial {}: {}", row.planner, row.trial, row.failure.as_ref()?))
     });
     items.extend(failures.take(FAILURES_TOLD));
-    if items.is_empty() {
-        return String::new();
+    match list("", &items) {
+        items if items.is_empty() => items,
+        items => format!("<section>\n<h2>What else happened</h2>\n{items}</section>\n"),
     }
-    let items: String = items.iter().map(|item| format!("<li>{}</li>\n", escape(item))).collect();
-    format!("<section>\n<h2>What else happened</h2>\n<ul>\n{items}</ul>\n</section>\n")
 }
 
 fn figure(run: &Run, figure: &Figure, svg: &str) -> String {
     let name = figure.name;
     let links = FORMATS
         .map(|format| format!("<a href=\"figures/{name}.{format}\">{}</a>", format.to_uppercase()));
-    format!(
-        "<figure id=\"{name}\">\n{}<figcaption>{} <span class=\"files\">{}</span>\
-         </figcaption>\n</figure>\n",
-        wide(svg, "figure"),
-        escape(&(figure.caption)(run)),
-        links.join(" "),
-    )
+    let caption = escape(&(figure.caption)(run));
+    let caption = format!("{caption} <span class=\"files\">{}</span>", links.join(" "));
+    html::figure(name, svg, caption)
 }
 
 fn details(summary: &str, text: Option<&str>) -> String {

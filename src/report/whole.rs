@@ -1,17 +1,17 @@
 //! Beliefs of whole objects as they were: recorded touches and hyperparameters, conditioned again
 //! and made to surfaces.
 
-use super::number::digits;
-use super::replay;
-use super::solid::{Frame, Sequence, Touch as Mark, counts, section as solid_section};
+use super::figures::Figure;
+use super::replay::{self, swept, touched};
+use super::solid::{self, Frame, Sequence, Touch, counts};
+use super::table::digits;
 use crate::experiment::Experiment;
 use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
-use anyhow::{Context, ensure};
-use nalgebra::{Point3, Vector3};
+use anyhow::Context;
+use nalgebra::Point3;
 use palpate_explore::around::{ImplicitSurface, Scope};
-use palpate_explore::probe::{Contact, Swept, Touch};
 use palpate_explore::task::Task;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::coarse::coarse;
@@ -38,8 +38,29 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     let counts = counts(experiment.initial_touches, experiment.touches, planners.len(), TRIANGLES);
     let sequences = sequences(run, &planners, &counts, truth.as_ref())?;
     let mesh = truth.as_ref().map(|bvh| &**bvh.mesh());
-    solid_section(&sequences, mesh, experiment.report.trial)
+    solid::section(&sequences, mesh, experiment.report.trial)
 }
+
+/// Believed whole objects, planner by planner and touch by touch; none of a run over a zone.
+pub const FIGURE: Figure = Figure {
+    name: "solids",
+    caption: |run| {
+        format!(
+            "Believed surfaces of trial {} from the front and from behind, coloured by how far they \
+             may lie from where they are believed, with the touches.",
+            run.experiment.report.trial
+        )
+    },
+    draw: |run| {
+        let experiment = &run.experiment;
+        if experiment.scene.around.is_none() {
+            return Ok(None);
+        }
+        let (counts, truth) = (experiment.drawn_touch_counts(), truth(run));
+        let sequences = sequences(run, &experiment.drawn_planners(), &counts, truth.as_ref())?;
+        solid::figure(&sequences, truth.as_ref().map(|bvh| &**bvh.mesh()), &counts)
+    },
+};
 
 /// What `planners` made of the object in the trial that the report draws, after `counts` touches;
 /// `truth` gives the errors.
@@ -67,7 +88,7 @@ fn sequence(
     for (i, touch) in row.touches.iter().enumerate() {
         let aim = (touch.target.aim())
             .with_context(|| format!("{}: a target that is no aim", place(i + 1)))?;
-        sequence.touches.push(Mark {
+        sequence.touches.push(Touch {
             aim_w: aim.p_w,
             along_w: *aim.ahead_w,
             contact_w: touch.contact.map(Point3::from),
@@ -134,24 +155,11 @@ pub fn belief(
         let aim = touch.target.aim().context("a target that is no aim")?;
         // However the finger was rolled, it went the same way.
         let approach = ball.approach(aim, &scene.finger, scene.touch.standoff_m, 0.0);
-        let swept =
-            touch.tip.map(|tip| Swept { finger: scene.finger.clone(), p_wt: Point3::from(tip) });
-        belief.observe(aim, &approach, (&met(touch)?, swept.as_ref()));
+        let swept = swept(scene.finger.clone(), touch);
+        belief.observe(aim, &approach, (&touched(touch, None)?, swept.as_ref()));
     }
     belief.condition(before, fit)?;
     Ok(Some(belief))
-}
-
-fn met(touch: &TouchRow) -> anyhow::Result<Touch> {
-    Ok(match (touch.contact, touch.normal) {
-        (Some(p_wc), normal) => {
-            ensure!(normal.is_some(), "a contact without its normal");
-            let normal_w = normal.map_or_else(Vector3::zeros, Vector3::from);
-            Touch::Contact(Contact { p_wc: Point3::from(p_wc), normal_w })
-        }
-        (None, _) if touch.overload => Touch::Overload,
-        (None, _) => Touch::Miss,
-    })
 }
 
 /// How near a belief is to the truth, in words.

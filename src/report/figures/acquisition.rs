@@ -1,20 +1,19 @@
 //! Where the belief is unsure and what touching there changes, Fig. 6 of Yi et al. 2016.
 
+use super::Figure;
 use super::curves;
-use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, Panel, colour_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::heat_map::HeatMap;
-use crate::report::legend::{Swatch, sheet};
+use crate::report::legend::{Sheet, Swatch, miss_entry};
 use crate::report::replay::{Replay, drawn_words};
-use crate::report::style;
-use crate::report::style::{INITIAL, LATER};
+use crate::report::style::{self, INITIAL, LATER};
 use palpate_explore::belief::HeightField;
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
 
-pub(super) const FIGURE: Figure = Figure { name: "acquisition", caption, draw };
+pub(crate) const FIGURE: Figure = Figure { name: "acquisition", caption, draw };
 
 fn caption(run: &Run) -> String {
     let planner = planner(run).unwrap_or("the planner");
@@ -99,15 +98,16 @@ fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) ->
     let shape = curves::belief_panel(zone, curves::height_axis(run, unit)?, most, EQUAL_HEIGHT_PX);
     let size = [width, shape.area.bottom() + GAPS_PX.1 + CURVE_PX.2 + 56.0];
     let entries = curves::entries(run, [found]);
-    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (width - LEFT_PX, ""), entries);
+    let panels = (shape.area, [step_px, 0.0]);
+    let mut sheet = Sheet::new(size, panels, (width - LEFT_PX, ""), entries);
     for (column, (replay, read)) in replays.iter().zip(&read).enumerate() {
-        let above = shape.moved(LEFT_PX + column as f64 * step_px, TOP_PX + more_px);
+        let above = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
         let top = above.area.bottom() + GAPS_PX.1;
         let area = Area { top, height: CURVE_PX.2, ..above.area };
         let below = Panel { area, x: shape.x.clone(), y: Axis::linear(0.0, largest, 4.0) };
-        draw_column(&mut canvas, run, planner, (replay, read), [above, below]);
+        draw_column(&mut sheet.canvas, run, planner, (replay, read), [above, below]);
     }
-    Some(canvas.finish())
+    Some(sheet.canvas.finish())
 }
 
 fn readings(places: Vec<Vec<f64>>, replay: &Replay) -> Vec<Reading> {
@@ -130,12 +130,11 @@ fn draw_column(
 ) {
     let unit = Length::of(replay.belief.zone());
     let colour = style::planner(&run.experiment.planners, planner);
-    let words = |name: &str| format!("{name} ({})", unit.symbol);
     above.frame(canvas);
-    above.label(canvas, &title(planner, replay), "", &words("height"));
+    above.label(canvas, &title(planner, replay), "", &unit.named("height"));
     curves::draw_belief(canvas, &above, run, replay, colour);
     below.frame(canvas);
-    below.label(canvas, "", &words("x"), &words("deviation"));
+    below.label(canvas, "", &unit.named("x"), &unit.named("deviation"));
     let curve: Vec<(f64, f64)> = read
         .iter()
         .map(|(place, sd_m, is_drawn)| (place[0], if *is_drawn { *sd_m } else { f64::NAN }))
@@ -169,8 +168,9 @@ fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> O
     let step_px = (shape.area.width + 84.0).max(MAP_STEP_PX);
     let width = LEFT_PX + 2.0 * step_px;
     let size = [width, shape.area.bottom() + 108.0];
-    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (width - LEFT_PX, ""), entries);
-    let shape = shape.moved(LEFT_PX, TOP_PX + more_px);
+    let panels = (shape.area, [step_px, 0.0]);
+    let mut sheet = Sheet::new(size, panels, (width - LEFT_PX, ""), entries);
+    let shape = Panel { area: sheet.area(0, 0.0), ..shape };
     // The zone's part of a panel, all of it unless the zone is far from square.
     let [[left, bottom], [right, top]] = [shape.at(x[0], z[0]), shape.at(x[1], z[1])];
     let map_area = Area { left, top, width: right - left, height: bottom - top };
@@ -187,11 +187,11 @@ fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> O
     let scale = Axis::linear(0.0, largest, 5.0);
     for (column, (replay, map)) in replays.iter().zip(&maps).enumerate() {
         let area = Area { left: map_area.left + column as f64 * step_px, ..map_area };
-        let panel = shape.moved(LEFT_PX + column as f64 * step_px, shape.area.top);
-        panel.frame(&mut canvas);
-        map.draw(&mut canvas, area, |value| style::deviation(scale.fraction(value)));
-        let words = |name: &str| format!("{name} ({})", unit.symbol);
-        panel.label(&mut canvas, &title(planner, replay), &words("x"), &words("z"));
+        let panel = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
+        let canvas = &mut sheet.canvas;
+        panel.frame(canvas);
+        map.draw(canvas, area, |value| style::deviation(scale.fraction(value)));
+        panel.label(canvas, &title(planner, replay), &unit.named("x"), &unit.named("z"));
         let on_map = |place: &[f64]| panel.at(place[0] * unit.per_m, place[1] * unit.per_m);
         canvas.clipped(panel.area, |canvas| {
             replay.draw_marks(canvas, 1.6, |place, _| on_map(place));
@@ -203,7 +203,7 @@ fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> O
     }
     let top = shape.area.bottom() + 62.0;
     let bar = Area { left: 0.5 * width - 60.0, top, width: 320.0, height: 13.0 };
-    let words = format!("standard deviation ({})", unit.symbol);
-    colour_bar(&mut canvas, bar, &scale, &words, style::deviation);
-    Some(canvas.finish())
+    let words = unit.named("standard deviation");
+    colour_bar(&mut sheet.canvas, bar, &scale, &words, style::deviation);
+    Some(sheet.canvas.finish())
 }

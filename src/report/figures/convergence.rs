@@ -1,20 +1,17 @@
 //! Errors against touches, Fig. 4 of Yi et al. 2016.
 
-use super::figure::Figure;
-use crate::experiment::measure::metrics;
-use crate::experiment::measure::{Aggregate, MEASURES, Measure, R, Scale};
+use super::Figure;
+use crate::experiment::measure::{Aggregate, MEASURES, Measure, R, Scale, metrics};
 use crate::experiment::statistics::curve_table;
-use crate::experiment::statistics::summary;
-use crate::experiment::statistics::summary::CurvePoint;
+use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Panel};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{Swatch, sheet};
-use crate::report::style;
-use crate::report::style::FAINT_INK;
+use crate::report::legend::{Sheet, Swatch};
+use crate::report::style::{self, FAINT_INK};
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
-pub(super) const FIGURE: Figure = Figure { name: "convergence", caption, draw };
+pub(crate) const FIGURE: Figure = Figure { name: "convergence", caption, draw };
 
 /// Eq. 5 of any positive constant.
 fn constant_r(run: &Run) -> Option<f64> {
@@ -79,22 +76,16 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let dashed = constant.map(|_| (Swatch::Line(constant_line()), "R of any constant"));
     let rows = shown.len().div_ceil(2) as f64;
     let size = [WIDTH, 66.0 - 12.0 + rows * (PANEL.1 + GAP.1)];
-    let legend_px = WIDTH - 2.0 * LEFT_PX;
-    let entries = swatches.chain(dashed);
-    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (legend_px, ""), entries);
-    let top = 66.0 + more_px;
+    let legend = (WIDTH - 2.0 * LEFT_PX, "");
+    let first = Area { left: LEFT_PX, top: 66.0, width: PANEL.0, height: PANEL.1 };
+    let panels = (first, [PANEL.0 + GAP.0, PANEL.1 + GAP.1]);
+    let mut sheet = Sheet::new(size, panels, legend, swatches.chain(dashed));
     for (i, measure) in shown.into_iter().enumerate() {
-        let (column, row) = ((i % 2) as f64, (i / 2) as f64);
-        let area = Area {
-            left: LEFT_PX + column * (PANEL.0 + GAP.0),
-            top: top + row * (PANEL.1 + GAP.1),
-            width: PANEL.0,
-            height: PANEL.1,
-        };
+        let area = sheet.area(i % 2, (i / 2) as f64);
         let constant = constant.filter(|_| measure.id == R.id);
-        draw_measure(&mut canvas, area, run, measure, (&x, &curves, constant));
+        draw_measure(&mut sheet.canvas, area, run, measure, (&x, &curves, constant));
     }
-    Ok(Some(canvas.finish()))
+    Ok(Some(sheet.canvas.finish()))
 }
 
 fn draw_measure(
