@@ -219,13 +219,14 @@ impl Panel {
         canvas.rect(self.area, &style::stroke(FAINT_INK, 1.0));
     }
 
-    /// What stands above and beside the panel; empty words are left out.
-    pub fn label(&self, canvas: &mut Canvas, title: &str, x: &str, y: &str) {
+    /// Grid lines, ticks and frame with a title and the names of the axes; empty words are left out.
+    pub fn titled_frame(&self, canvas: &mut Canvas, title: &str, x: &str, y: &str) {
+        self.frame(canvas);
         canvas.title([self.area.centre()[0], self.area.top - 9.0], title);
         self.name_axes(canvas, x, y);
     }
 
-    /// What stands beside the panel.
+    /// The names of the axes.
     pub fn name_axes(&self, canvas: &mut Canvas, x: &str, y: &str) {
         let [centre_x, centre_y] = self.area.centre();
         canvas.text([centre_x, self.area.bottom() + 35.0], x, TEXT_PX, Anchor::Middle);

@@ -45,22 +45,22 @@ impl HeatMap {
     /// Fills `area`, z upwards.
     pub fn draw(&self, canvas: &mut Canvas, area: Area, colour: impl Fn(f64) -> String) {
         let largest = self.largest();
-        let level = |cell: usize| match largest > 0.0 {
-            true => ((self.values[cell] / largest * LEVELS as f64) as usize).min(LEVELS - 1),
-            false => 0,
+        let level = |(value, is_drawn): (&f64, &bool)| {
+            let share = if largest > 0.0 { value / largest } else { 0.0 };
+            is_drawn.then(|| ((share * LEVELS as f64) as usize).min(LEVELS - 1))
         };
+        let levels: Vec<Option<usize>> =
+            self.values.iter().zip(&self.is_drawn).map(level).collect();
         // Ends of cells are written as they are, so that neighbours meet without a gap.
         let left =
             |column: usize| number(area.left + column as f64 * area.width / self.columns as f64);
         let top = |row: usize| number(area.bottom() - row as f64 * area.height / self.rows as f64);
         let mut outlines = vec![String::new(); LEVELS];
-        for row in 0..self.rows {
-            let cells: Vec<usize> = (row * self.columns..(row + 1) * self.columns).collect();
-            let looks = |cell: usize| self.is_drawn[cell].then(|| level(cell));
+        for (row, levels) in levels.chunks(self.columns).enumerate() {
             let mut begin = 0;
-            for run in cells.chunk_by(|a, b| looks(*a) == looks(*b)) {
+            for run in levels.chunk_by(|a, b| a == b) {
                 let end = begin + run.len();
-                if let Some(level) = looks(run[0]) {
+                if let Some(level) = run[0] {
                     let (x0, x1, y0, y1) = (left(begin), left(end), top(row + 1), top(row));
                     outlines[level] += &format!("M{x0} {y0}H{x1}V{y1}H{x0}z");
                 }

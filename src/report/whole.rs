@@ -58,7 +58,7 @@ pub const FIGURE: Figure = Figure {
         }
         let (counts, truth) = (experiment.drawn_touch_counts(), truth(run));
         let sequences = sequences(run, &experiment.drawn_planners(), &counts, truth.as_ref())?;
-        solid::figure(&sequences, truth.as_ref().map(|bvh| &**bvh.mesh()), &counts)
+        Ok(solid::figure(&sequences, truth.as_ref().map(|bvh| &**bvh.mesh()), &counts))
     },
 };
 
@@ -119,6 +119,7 @@ pub fn frame(
     let Some(surface) = belief.surface() else { return Ok(None) };
     let mesh = surface.mesh(experiment.space.cells).map(|mesh| coarse(&mesh, most));
     let mesh = mesh.unwrap_or_default();
+    let shape = touches.last().and_then(|touch| touch.shape.as_ref());
     let error = |bvh: &MeshBvh, p_w: &Point3<f64>| {
         let distance_m = bvh.closest_point(p_w).distance_m;
         if bvh.surrounds(p_w) { -distance_m } else { distance_m }
@@ -127,10 +128,7 @@ pub fn frame(
         touches: count,
         sd_m: surface.offsets_m(&mesh.0),
         error_m: truth.map_or(Vec::new(), |bvh| mesh.0.iter().map(|p_w| error(bvh, p_w)).collect()),
-        score: touches
-            .last()
-            .and_then(|touch| Some(score(touch.shape.as_ref()?)))
-            .unwrap_or_default(),
+        score: shape.map(score).unwrap_or_default(),
         mesh,
     }))
 }

@@ -130,11 +130,9 @@ fn draw_column(
 ) {
     let unit = Length::of(replay.belief.zone());
     let colour = style::planner(&run.experiment.planners, planner);
-    above.frame(canvas);
-    above.label(canvas, &title(planner, replay), "", &unit.named("height"));
+    above.titled_frame(canvas, &title(planner, replay), "", &unit.named("height"));
     curves::draw_belief(canvas, &above, run, replay, colour);
-    below.frame(canvas);
-    below.label(canvas, "", &unit.named("x"), &unit.named("deviation"));
+    below.titled_frame(canvas, "", &unit.named("x"), &unit.named("deviation"));
     let curve: Vec<(f64, f64)> = read
         .iter()
         .map(|(place, sd_m, is_drawn)| (place[0], if *is_drawn { *sd_m } else { f64::NAN }))
@@ -189,9 +187,8 @@ fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> O
         let area = Area { left: map_area.left + column as f64 * step_px, ..map_area };
         let panel = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
         let canvas = &mut sheet.canvas;
-        panel.frame(canvas);
+        panel.titled_frame(canvas, &title(planner, replay), &unit.named("x"), &unit.named("z"));
         map.draw(canvas, area, |value| style::deviation(scale.fraction(value)));
-        panel.label(canvas, &title(planner, replay), &unit.named("x"), &unit.named("z"));
         let on_map = |place: &[f64]| panel.at(place[0] * unit.per_m, place[1] * unit.per_m);
         canvas.clipped(panel.area, |canvas| {
             replay.draw_marks(canvas, 1.6, |place, _| on_map(place));

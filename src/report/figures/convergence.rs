@@ -118,8 +118,7 @@ fn draw_measure(
     };
     let Some(y) = y else { return };
     let panel = Panel { area, x: x.clone(), y };
-    panel.frame(canvas);
-    panel.label(canvas, &told(measure), "touches", &named(measure));
+    panel.titled_frame(canvas, &told(measure), "touches", &named(measure));
     if let Some(score) = constant {
         let (low, high) = x.range();
         panel.curve(canvas, &[(low, score), (high, score)], &constant_line());

@@ -67,9 +67,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     for (column, row) in rows.iter().enumerate() {
         let panel = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
         let canvas = &mut sheet.canvas;
-        panel.frame(canvas);
         let z = if column == 0 { unit.named("z") } else { String::new() };
-        panel.label(canvas, &row.planner, &unit.named("x"), &z);
+        panel.titled_frame(canvas, &row.planner, &unit.named("x"), &z);
         let at = |place: &[f64]| panel.at(place[0] * unit.per_m, place[1] * unit.per_m);
         canvas.clipped(panel.area, |canvas| {
             for (count, touch) in row.touches.iter().enumerate() {

@@ -28,15 +28,7 @@ const PLAIN: f64 = 0.6;
 /// Surfaces after some touch counts from the front and from behind, coloured by their standard
 /// deviation, with the touches on them and the true one on the right, as SVG; none if there is
 /// nothing to be drawn, or no number to colour it by. Everything is of one scale.
-///
-/// # Errors
-/// If a sequence does not fit together.
-pub fn figure(
-    sequences: &[Sequence],
-    truth: Option<&Mesh>,
-    counts: &[u32],
-) -> anyhow::Result<Option<String>> {
-    sequences.iter().try_for_each(Sequence::check)?;
+pub fn figure(sequences: &[Sequence], truth: Option<&Mesh>, counts: &[u32]) -> Option<String> {
     let truth = truth.map(|mesh| coarse(mesh, TRUTH_TRIANGLES));
     let frames = sequences.iter().flat_map(|sequence| &sequence.frames);
     let drawn: Vec<&Frame> = frames.filter(|frame| counts.contains(&frame.touches)).collect();
@@ -47,7 +39,7 @@ pub fn figure(
     let points: Vec<_> = points.map(|p_w| p_w.coords).collect();
     let ends_m = deviation_range(drawn.iter().flat_map(|frame| &frame.sd_m));
     let axis = ends_m.and_then(|ends_m| Axis::log(ends_m.map(|end_m| end_m * MM.per_m)));
-    let (Some(axis), false) = (axis, points.is_empty()) else { return Ok(None) };
+    let axis = axis.filter(|_| !points.is_empty())?;
 
     let columns = counts.len() + usize::from(truth.is_some());
     let width = (columns as f64 * PANEL.0).max(WIDTH_MIN_PX);
@@ -75,7 +67,7 @@ pub fn figure(
     let left = (0.5 * width).max(BAR_LEFT_MIN_PX) + MARGIN.0;
     let bar = Area { left, top, width: BAR_PX, height: 13.0 };
     colour_bar(&mut sheet.canvas, bar, &axis, "standard deviation σ (mm)", style::deviation);
-    Ok(Some(sheet.canvas.finish()))
+    Some(sheet.canvas.finish())
 }
 
 fn belief(view: &View, canvas: &mut Canvas, (sequence, count): (&Sequence, u32), axis: &Axis) {

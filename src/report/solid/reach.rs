@@ -36,8 +36,16 @@ pub fn picture(
     let points: Vec<Vector3<f64>> = drawn.0.iter().map(|p_w| p_w.coords).chain(marks).collect();
     let width = 2.0 * PANEL.0;
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + PANEL.1 + FOOT_PX];
+    let entries = [
+        (spots, Swatch::Box(LEGEND[0]), "the finger can touch it"),
+        (spots, Swatch::Box(LEGEND[1]), "no straight way leads there"),
+        (sides, Swatch::Circle(style::visible(MARKS[0])), "side it comes from"),
+        (sides, Swatch::Cross(MARKS[1]), "side it cannot come from"),
+    ];
+    let entries = entries.into_iter().filter(|(marks, ..)| !marks.is_empty());
+    let entries = entries.map(|(_, swatch, words)| (swatch, words));
     let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
-    let mut sheet = Sheet::new(size, (first, PANEL.into()), (width, ""), entries(spots, sides));
+    let mut sheet = Sheet::new(size, (first, PANEL.into()), (width, ""), entries);
     let px_per_m = scale(&points, first);
     for (column, is_behind) in [false, true].into_iter().enumerate() {
         let view = View::new(sheet.area(column, 0.0), is_behind, px_per_m, &points);
@@ -76,23 +84,6 @@ fn triangles_reached(
         spot.is_none_or(|(_, is_reached)| *is_reached)
     };
     triangles.iter().map(nearest).collect()
-}
-
-fn entries(
-    spots: &[(Point3<f64>, bool)],
-    sides: &[(Point3<f64>, bool)],
-) -> impl Iterator<Item = (Swatch, &'static str)> {
-    let of_spots = [
-        (Swatch::Box(LEGEND[0]), "the finger can touch it"),
-        (Swatch::Box(LEGEND[1]), "no straight way leads there"),
-    ];
-    let of_sides = [
-        (Swatch::Circle(style::visible(MARKS[0])), "side it comes from"),
-        (Swatch::Cross(MARKS[1]), "side it cannot come from"),
-    ];
-    let (has_spots, has_sides) = (!spots.is_empty(), !sides.is_empty());
-    let of_spots = of_spots.into_iter().filter(move |_| has_spots);
-    of_spots.chain(of_sides.into_iter().filter(move |_| has_sides))
 }
 
 #[cfg(test)]

@@ -5,7 +5,6 @@ use crate::experiment::measure::{Direction, MEASURES, Measure, in_files};
 use crate::experiment::statistics::comparison::Comparison;
 use crate::experiment::statistics::equal_error::{EqualError, Estimate, errors};
 use crate::experiment::store::Run;
-
 use crate::report::table::{Cell, Column, Table, digits, titled, with_interval};
 
 /// The table of `comparison.csv`: a row per planner, baseline and measure after the last touch.

@@ -5,7 +5,6 @@ use crate::experiment::measure::{self, MEASURES, Measure};
 use crate::experiment::statistics::curve_table::{columns, curve_table};
 use crate::experiment::statistics::summary::{self, CurvePoint, Events, typical};
 use crate::experiment::store::Run;
-
 use crate::report::table::{Cell, Column, Table, shown, titled};
 use serde_json::{Value, json};
 
