@@ -4,7 +4,7 @@
 use super::axes::{Axis, Panel};
 use super::canvas::Area;
 use super::findings::HONEST;
-use super::html::{figure, page, section};
+use super::html::{figure, page, tables};
 use super::legend::{Sheet, Swatch};
 use super::style::{self, FAINT_INK};
 use super::table::{Cell, Column, Table, verdict};
@@ -122,9 +122,9 @@ pub fn note(against: &str) -> String {
 
 /// The page.
 pub fn html(name: &str, question: &str, compared: &Compared) -> String {
-    let over_all =
-        section("Over all objects", &overall(compared).html("named"), &note(&compared.against));
-    let each = section("Object by object", &each(compared).html("named"), "");
+    let note = note(&compared.against);
+    let over_all = tables("Over all objects", &[overall(compared)], "named", &note);
+    let each = tables("Object by object", &[each(compared)], "named", "");
     let profiles = "Which share of the trials has how small an error, averaged over the objects; further \
                     left is better.";
     let reliability = "Of the places that are given a probability of a surface, how many have one; on the \

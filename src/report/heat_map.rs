@@ -9,48 +9,41 @@ const CELL_PX: f64 = 4.0;
 /// Colours told apart; neighbours in a row that share one become one rectangle.
 const LEVELS: usize = 64;
 
+/// A place, the value there, and whether it is drawn.
+pub type Reading = (Vec<f64>, f64, bool);
+
 /// Values over a zone, x varying fastest.
 pub struct HeatMap {
     columns: usize,
     rows: usize,
-    values: Vec<f64>,
-    is_drawn: Vec<bool>,
+    /// The readings at the middles of the cells.
+    pub readings: Vec<Reading>,
 }
 
 impl HeatMap {
-    /// Reads values, and whether they are drawn, at the middles of the cells of a map of the size
-    /// of `area`.
-    pub fn read(
-        zone: &Zone,
-        area: Area,
-        read: impl FnOnce(Vec<Vec<f64>>) -> Vec<(f64, bool)>,
-    ) -> Self {
+    /// A map of the size of `area`; `read` is given the middles of its cells.
+    pub fn new(zone: &Zone, area: Area, read: impl FnOnce(Vec<Vec<f64>>) -> Vec<Reading>) -> Self {
         let cells = |side_px: f64| (side_px / CELL_PX).round().max(1.0) as usize;
         let (columns, rows) = (cells(area.width), cells(area.height));
-        let (values, is_drawn) = read(middles(zone, columns, rows).collect()).into_iter().unzip();
-        Self { columns, rows, values, is_drawn }
+        let middle = |i: usize, count: usize| (i as f64 + 0.5) / count as f64;
+        let at = |k| zone.at(&[middle(k % columns, columns), middle(k / columns, rows)]);
+        Self { columns, rows, readings: read((0..columns * rows).map(at).collect()) }
     }
 
     /// The largest value drawn; 0 of none.
     pub fn largest(&self) -> f64 {
-        let drawn = self.values.iter().zip(&self.is_drawn).filter(|(_, is_drawn)| **is_drawn);
-        drawn.map(|(value, _)| *value).fold(0.0, f64::max)
-    }
-
-    /// The middles of the cells with their values.
-    pub fn places<'a>(&'a self, zone: &'a Zone) -> impl Iterator<Item = (Vec<f64>, f64)> + 'a {
-        middles(zone, self.columns, self.rows).zip(self.values.iter().copied())
+        let drawn = self.readings.iter().filter(|(.., is_drawn)| *is_drawn);
+        drawn.map(|(_, value, _)| *value).fold(0.0, f64::max)
     }
 
     /// Fills `area`, z upwards.
     pub fn draw(&self, canvas: &mut Canvas, area: Area, colour: impl Fn(f64) -> String) {
         let largest = self.largest();
-        let level = |(value, is_drawn): (&f64, &bool)| {
+        let level = |(_, value, is_drawn): &Reading| {
             let share = if largest > 0.0 { value / largest } else { 0.0 };
             is_drawn.then(|| ((share * LEVELS as f64) as usize).min(LEVELS - 1))
         };
-        let levels: Vec<Option<usize>> =
-            self.values.iter().zip(&self.is_drawn).map(level).collect();
+        let levels: Vec<Option<usize>> = self.readings.iter().map(level).collect();
         // Ends of cells are written as they are, so that neighbours meet without a gap.
         let left =
             |column: usize| number(area.left + column as f64 * area.width / self.columns as f64);
@@ -73,11 +66,4 @@ impl HeatMap {
             canvas.outline(outline, &attributes);
         }
     }
-}
-
-/// The middles of cells, x varying fastest.
-fn middles(zone: &Zone, columns: usize, rows: usize) -> impl Iterator<Item = Vec<f64>> {
-    let middle = |i: usize, count: usize| (i as f64 + 0.5) / count as f64;
-    (0..columns * rows)
-        .map(move |k| zone.at(&[middle(k % columns, columns), middle(k / columns, rows)]))
 }

@@ -4,8 +4,7 @@ use super::canvas::escape;
 use super::figures::Figure;
 use super::files::FORMATS;
 use super::findings;
-use super::html::{self, list, section};
-use super::table::Table;
+use super::html::{self, list, section, tables};
 use super::tables::{comparison, summary};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::Run;
@@ -63,22 +62,13 @@ fn found(run: &Run, analysis: &Analysis) -> String {
     format!("<section>\n<h2>Found</h2>\n{verdict}{numbers}</section>\n")
 }
 
-/// A section of tables of one class; empty if none of them has a row.
-fn tables(title: &str, tables: &[Table], class: &str, note: &str) -> String {
-    let with_rows = tables.iter().filter(|table| !table.rows.is_empty());
-    section(title, &with_rows.map(|table| table.html(class)).collect::<String>(), note)
-}
-
 fn events(run: &Run) -> String {
     let mut items = summary::happened(run);
     let failures = run.rows.iter().filter_map(|row| {
         Some(format!("{}, trial {}: {}", row.planner, row.trial, row.failure.as_ref()?))
     });
     items.extend(failures.take(FAILURES_TOLD));
-    match list("", &items) {
-        items if items.is_empty() => items,
-        items => format!("<section>\n<h2>What else happened</h2>\n{items}</section>\n"),
-    }
+    section("What else happened", &list("", &items))
 }
 
 fn figure(run: &Run, figure: &Figure, svg: &str) -> String {
@@ -105,5 +95,5 @@ fn raw_files(drawings: &[(&Figure, String)]) -> String {
     if !drawings.is_empty() {
         items += "<li><a href=\"figures/\">figures</a>: each figure as SVG, PNG and PDF</li>\n";
     }
-    format!("<section>\n<h2>Files beside this page</h2>\n<ul>\n{items}</ul>\n</section>\n")
+    section("Files beside this page", &format!("<ul>\n{items}</ul>\n"))
 }

@@ -14,6 +14,9 @@ use palpate_explore::robot::finger::Finger;
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
 
+/// The score of a belief that there is none of.
+pub const NOT_REACHED: &str = "not reached in this trial";
+
 /// One planner's belief after some touches of the trial that the report draws.
 pub struct Replay<'a> {
     /// What was known.
@@ -66,20 +69,6 @@ impl<'a> Replay<'a> {
             next: row.touches.get(count as usize),
             initial_touches: run.experiment.initial_touches as usize,
         }))
-    }
-
-    /// The same with a score in words, also where there is no belief.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
-    pub fn scored(
-        run: &'a Run,
-        planner: &str,
-        count: u32,
-    ) -> anyhow::Result<(Option<Self>, String)> {
-        let replay = Self::new(run, planner, count)?;
-        let score = replay.as_ref().map_or("not reached in this trial".into(), Self::score);
-        Ok((replay, score))
     }
 
     /// Every touch with whether it is one of the initial ones.

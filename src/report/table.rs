@@ -6,7 +6,6 @@ use crate::experiment::measure::{Direction, Measure};
 use crate::experiment::statistics::equal_error::Estimate;
 use crate::experiment::store::write_whole;
 use crate::report::canvas::escape;
-use crate::report::html::wide;
 use anyhow::Context;
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -309,6 +308,13 @@ pub fn aligned(lines: &[impl AsRef<[String]>]) -> String {
         text.push('\n');
     }
     text
+}
+
+/// A box of a page that scrolls where the page is narrower, by keyboard too.
+pub(super) fn wide(content: &str, what: &str) -> String {
+    format!(
+        "<div class=\"wide\" role=\"region\" aria-label=\"{what}\" tabindex=\"0\">{content}</div>\n"
+    )
 }
 
 /// A number with three significant digits.

@@ -124,7 +124,13 @@ fn draw_measure(
         panel.curve(canvas, &[(low, score), (high, score)], &constant_line());
     }
     for (colour, readings) in &read {
-        draw_curve(canvas, &panel, readings, colour);
+        let band = |it: &Reading| it.3.map(|[low, high]| (it.0, low, high));
+        panel.band(canvas, &readings.iter().filter_map(band).collect::<Vec<_>>(), colour);
+        let curve = |value: fn(&Reading) -> Option<f64>| -> Vec<(f64, f64)> {
+            readings.iter().filter_map(|it| Some((it.0, value(it)?))).collect()
+        };
+        panel.curve(canvas, &curve(|it| it.2), &style::dashed(colour, 1.3, "1.5 3"));
+        panel.curve(canvas, &curve(|it| Some(it.1)), &style::stroke(colour, 2.0));
     }
 }
 
@@ -164,21 +170,4 @@ fn told(measure: &Measure) -> String {
 /// The line at what any constant scores.
 fn constant_line() -> String {
     style::dashed(FAINT_INK, 1.0, "5 4")
-}
-
-/// A curve with its band, and a dotted one beside it.
-fn draw_curve(canvas: &mut Canvas, panel: &Panel, readings: &[Reading], colour: &str) {
-    let band: Vec<(f64, f64, f64)> = readings
-        .iter()
-        .filter_map(|(touches, _, _, band)| band.map(|[low, high]| (*touches, low, high)))
-        .collect();
-    panel.band(canvas, &band, colour);
-    let dotted: Vec<(f64, f64)> = readings
-        .iter()
-        .filter_map(|(touches, _, beside, _)| Some((*touches, (*beside)?)))
-        .collect();
-    panel.curve(canvas, &dotted, &style::dashed(colour, 1.3, "1.5 3"));
-    let curve: Vec<(f64, f64)> =
-        readings.iter().map(|(touches, value, ..)| (*touches, *value)).collect();
-    panel.curve(canvas, &curve, &style::stroke(colour, 2.0));
 }

@@ -5,7 +5,7 @@ use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, MM, Panel};
 use crate::report::canvas::{Anchor, Area, Canvas};
 use crate::report::legend::{Sheet, Swatch, miss_entry};
-use crate::report::replay::{self, Replay, drawn_words};
+use crate::report::replay::{self, NOT_REACHED, Replay, drawn_words};
 use crate::report::style::{self, FAINT_INK, INITIAL, INK, LATER, SMALL_PX, TRUTH};
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
@@ -52,7 +52,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
             let area = sheet.area(column, row as f64);
             let panel = Panel { area, ..shape.clone() };
             let canvas = &mut sheet.canvas;
-            let (replay, score) = Replay::scored(run, planner, count)?;
+            let replay = Replay::new(run, planner, count)?;
+            let score = replay.as_ref().map_or(NOT_REACHED.into(), Replay::score);
             let is_last_row = row + 1 == planners.len();
             panel.frame(canvas);
             let x_label = if is_last_row { unit.named("x") } else { String::new() };

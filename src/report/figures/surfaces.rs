@@ -6,7 +6,7 @@ use crate::report::axes::{Axis, Length, height_bar};
 use crate::report::canvas::{Area, Canvas};
 use crate::report::legend::{Sheet, miss_entry, touch_entries};
 use crate::report::relief::{ON_RELIEF, Relief, ReliefPanel, Space};
-use crate::report::replay::{self, Grid, Replay, drawn_words};
+use crate::report::replay::{self, Grid, NOT_REACHED, Replay, drawn_words};
 use crate::report::style;
 use nalgebra::Vector3;
 use palpate_explore::task::Zone;
@@ -65,7 +65,8 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
         for (column, &count) in counts.iter().enumerate() {
             let panel = ReliefPanel::new(unit, sheet.area(column, row as f64), space);
             let canvas = &mut sheet.canvas;
-            let (replay, score) = Replay::scored(run, planner, count)?;
+            let replay = Replay::new(run, planner, count)?;
+            let score = replay.as_ref().map_or(NOT_REACHED.into(), Replay::score);
             panel.frame(canvas, &format!("{planner}, {count} touches"), &score);
             if let Some(replay) = replay {
                 let mut scratch = Scratch::default();
