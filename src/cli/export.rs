@@ -4,10 +4,9 @@ use super::output::Force;
 use super::terminal::{Ending, print};
 use crate::experiment::report_settings::ReportSettings;
 use crate::experiment::store::{Run, write_whole};
-use crate::report::figures::surfaces;
 use crate::report::points::Points;
 use crate::report::replay::{self, Replay};
-use crate::report::{files, style, whole};
+use crate::report::{figures, files, style, whole};
 use anyhow::{Context, bail, ensure};
 use nalgebra::Vector3;
 use palpate_explore::task::zone::grid_triangles;
@@ -79,7 +78,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<Ending> {
     let (mesh, score) =
         if is_around { closed(&mut run, args, touches)? } else { over_zone(&run, args, touches)? };
     write_whole(&args.out, write(&mesh))?;
-    let figure = if is_around { whole::FIGURE } else { surfaces::FIGURE };
+    let figure = if is_around { figures::SOLIDS } else { figures::SURFACES };
     if let Some(svg) = (figure.draw)(&run)? {
         files::write(&args.out, &svg)?;
     }

@@ -68,12 +68,6 @@ impl Axis {
         Some(Self { low, high, is_log: true, aim: 5.0, step_min: 0.0 })
     }
 
-    /// The same middle with a range `times` as long.
-    fn stretched(self, times: f64) -> Self {
-        let [middle, half] = [0.5 * (self.low + self.high), 0.5 * times * (self.high - self.low)];
-        Self { low: middle - half, high: middle + half, ..self }
-    }
-
     /// Smallest and largest value.
     pub fn range(&self) -> (f64, f64) {
         (self.low, self.high)
@@ -187,8 +181,10 @@ impl Panel {
         let px_per_unit = (most.width / lengths[0]).min(most.height / lengths[1]);
         let [width, height] = lengths.map(|length| (length * px_per_unit).max(LEAST_PX));
         let stretched = |axis: Axis, side_px: f64| {
-            let times = side_px / px_per_unit / (axis.high - axis.low);
-            axis.stretched(times)
+            let length = axis.high - axis.low;
+            let times = side_px / px_per_unit / length;
+            let [middle, half] = [0.5 * (axis.low + axis.high), 0.5 * times * length];
+            Axis { low: middle - half, high: middle + half, ..axis }
         };
         let (x, y) = (stretched(x, width), stretched(y, height));
         Self { area: Area { width, height, ..most }, x, y }

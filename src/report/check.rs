@@ -137,35 +137,30 @@ pub fn draw(name: &str, held: &Held, rules: &Rules) -> String {
     let tolerated = Area { left, top, width: right - left, height: bottom - top };
     canvas.rect(tolerated, &style::fill(GRID, 0.6));
     canvas.line([[at(0.0), top], [at(0.0), bottom]], &style::stroke(FAINT_INK, 1.0));
-    let mut y = TOP_PX + 4.0;
-    let mut line = |canvas: &mut Canvas, words: &str, draw: &dyn Fn(&mut Canvas, f64)| {
-        canvas.text([LEFT_PX - 10.0, y + 4.0], words, SMALL_PX, Anchor::End);
-        draw(canvas, y);
-        y += LINE_PX;
-    };
-    for planner in &held.planners {
-        let colour = style::planner(&[], &planner.name);
-        if planner.judgements.is_empty() {
+    let lines = held.planners.iter().flat_map(|planner| {
+        let bare = planner.judgements.is_empty().then_some((planner, None));
+        let judged = planner.judgements.iter().map(move |judgement| (planner, Some(judgement)));
+        bare.into_iter().chain(judged)
+    });
+    for (i, (planner, judgement)) in lines.enumerate() {
+        let y = TOP_PX + 4.0 + i as f64 * LINE_PX;
+        let mut text = |x: f64, words: &str, anchor, ink| {
+            canvas.coloured_text([x, y + 4.0], words, SMALL_PX, anchor, ink);
+        };
+        let Some(judgement) = judgement else {
+            text(LEFT_PX - 10.0, &planner.name, Anchor::End, INK);
             let words = format!("{}, {} trials", word(planner.verdict), planner.trials);
-            line(&mut canvas, &planner.name, &|canvas, y| {
-                canvas.text([at(0.0) + 8.0, y + 4.0], &words, SMALL_PX, Anchor::Start);
-            });
-        }
-        for judgement in &planner.judgements {
-            let allowed = judgement.judged.allowed(rules.tolerance);
-            let words = format!("{}, {}", planner.name, judgement.judged.title);
-            line(&mut canvas, &words, &|canvas, y| {
-                let ends = judgement.sequence.interval.map(|end| [at(end / allowed), y]);
-                canvas.line(ends, &style::stroke(colour, 2.0));
-                let mean = [at(judgement.sequence.mean / allowed), y];
-                canvas.circle(mean, 4.0, &style::fill(colour, 1.0));
-                let is_open = judgement.verdict >= Verdict::Undecided;
-                let (right, ink) =
-                    (LEFT_PX + WIDTH_PX + 8.0, if is_open { INK } else { FAINT_INK });
-                let words = word(judgement.verdict);
-                canvas.coloured_text([right, y + 4.0], words, SMALL_PX, Anchor::Start, ink);
-            });
-        }
+            text(at(0.0) + 8.0, &words, Anchor::Start, INK);
+            continue;
+        };
+        let words = format!("{}, {}", planner.name, judgement.judged.title);
+        text(LEFT_PX - 10.0, &words, Anchor::End, INK);
+        let ink = if judgement.verdict >= Verdict::Undecided { INK } else { FAINT_INK };
+        text(LEFT_PX + WIDTH_PX + 8.0, word(judgement.verdict), Anchor::Start, ink);
+        let (colour, sequence) = (style::planner(&[], &planner.name), &judgement.sequence);
+        let at = |error: f64| [at(error / judgement.judged.allowed(rules.tolerance)), y];
+        canvas.line(sequence.interval.map(at), &style::stroke(colour, 2.0));
+        canvas.circle(at(sequence.mean), 4.0, &style::fill(colour, 1.0));
     }
     let percent = 100.0 * rules.tolerance;
     let ticks = [format!("−{percent} %"), "as it was".into(), format!("+{percent} %")];

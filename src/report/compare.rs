@@ -201,26 +201,25 @@ pub fn profiles(compared: &Compared) -> Option<String> {
 /// Reliability over all objects: of the places that are given a probability of a surface, how many
 /// have one; none where every object fills its zone.
 fn reliability(compared: &Compared) -> Option<String> {
-    let curves: Vec<_> = compared.contenders.iter().map(reliability_curve).collect();
+    /// Fewest places of a point, over all objects and trials. heuristic: 50 tell a share to 7 %.
+    const PLACES_MIN: u32 = 50;
+    // The middle of each tenth, and the share of its places that have a surface.
+    let curve = |contender: &Contender| -> Vec<(f64, f64)> {
+        let share = |tenth: usize| {
+            let counts = contender.results.iter().map(|result| result.reliability[tenth]);
+            let [all, there] =
+                counts.fold([0, 0], |[all, there], [more, of_them]| [all + more, there + of_them]);
+            let middle = (tenth as f64 + 0.5) / TENTHS as f64;
+            (all >= PLACES_MIN).then(|| (middle, f64::from(there) / f64::from(all)))
+        };
+        (0..TENTHS).filter_map(share).collect()
+    };
+    let curves: Vec<_> = compared.contenders.iter().map(curve).collect();
     let area = Area { left: 70.0, top: 60.0, width: 300.0, height: 300.0 };
     let names = ["probability of a surface, in tenths", "share that has one"];
     let is_known = curves.iter().any(|curve| !curve.is_empty());
     let axes = (area, Axis::linear(0.0, 1.0, 6.0), names);
     is_known.then(|| draw(compared, axes, curves, [[0.0, 0.0], [1.0, 1.0]]))
-}
-
-/// The middle of each tenth, and the share of its places that have a surface.
-fn reliability_curve(contender: &Contender) -> Vec<(f64, f64)> {
-    /// Fewest places of a point, over all objects and trials. heuristic: 50 tell a share to 7 %.
-    const PLACES_MIN: u32 = 50;
-    let share = |tenth: usize| {
-        let counts = contender.results.iter().map(|result| result.reliability[tenth]);
-        let [all, there] =
-            counts.fold([0, 0], |[all, there], [more, of_them]| [all + more, there + of_them]);
-        let middle = (tenth as f64 + 0.5) / TENTHS as f64;
-        (all >= PLACES_MIN).then(|| (middle, f64::from(there) / f64::from(all)))
-    };
-    (0..TENTHS).filter_map(share).collect()
 }
 
 /// One panel with a curve for each contender, whose names are above it, and a dashed line of

@@ -1,4 +1,4 @@
-//! What a run found, in words and numbers taken from its rows, and what it decides.
+//! The findings of a run in sentences, from its rows, and its verdict.
 
 use super::table::{digits, shown, verdict};
 use crate::experiment::measure::metrics::constant_r;
@@ -13,7 +13,7 @@ use crate::experiment::store::Run;
 /// The mean of Eq. 5 that counts as found, as where the paper says "almost 1".
 const R_FOUND: f64 = 0.99;
 
-/// What a reader should know before the numbers: a sentence each.
+/// Warnings before the numbers, a sentence each.
 pub fn notices(run: &Run) -> Vec<String> {
     let total = run.experiment.trials as usize * run.experiment.planners.len();
     let is_partial = run.rows.len() < total;
@@ -168,7 +168,7 @@ fn against_baseline(run: &Run, curves: &[Curve]) -> Option<String> {
     needed(run, &others, &goal, is_met)
 }
 
-/// Shares of the truth that a 95 % band may hold and still count as honest; chosen.
+/// Shares of the truth in a 95 % band that count as calibrated. heuristic.
 pub(super) const HONEST: std::ops::RangeInclusive<f64> = 0.9..=0.98;
 
 /// The share of the truth that the 95 % band of a curve's last belief holds.

@@ -6,7 +6,7 @@ use palpate_explore::task::Zone;
 
 /// About the size of a cell in pixels.
 const CELL_PX: f64 = 4.0;
-/// Colours told apart; neighbours in a row that share one become one rectangle.
+/// Number of colours; neighbours in a row that share one become one rectangle.
 const LEVELS: usize = 64;
 
 /// A place, the value there, and whether it is drawn.

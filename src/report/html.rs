@@ -1,4 +1,4 @@
-//! What pages are made of: one file that needs nothing beside it.
+//! Parts of pages, each a file that needs nothing beside it.
 
 use super::canvas::escape;
 use super::style::ON_DARK;

@@ -54,7 +54,8 @@ pub struct Sheet {
     pub canvas: Canvas,
     first: Area,
     step: [f64; 2],
-    bottom: f64,
+    /// The bottom edge of the drawing.
+    pub bottom: f64,
 }
 
 impl Sheet {
@@ -83,11 +84,6 @@ impl Sheet {
     pub fn area(&self, column: usize, row: f64) -> Area {
         let left = self.first.left + column as f64 * self.step[0];
         Area { left, top: self.first.top + row * self.step[1], ..self.first }
-    }
-
-    /// The bottom edge of the drawing.
-    pub fn bottom(&self) -> f64 {
-        self.bottom
     }
 }
 

@@ -40,8 +40,8 @@ use std::path::Path;
 pub const FIGURES: &[Figure] = &[
     figures::convergence::FIGURE,
     figures::curves::FIGURE,
-    figures::surfaces::FIGURE,
-    whole::FIGURE,
+    figures::SURFACES,
+    figures::SOLIDS,
     figures::targets::FIGURE,
     figures::acquisition::FIGURE,
 ];
@@ -52,11 +52,12 @@ pub const FIGURES: &[Figure] = &[
 /// If a file cannot be written.
 pub fn write_tables(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()> {
     let Analysis { comparisons, equal_errors } = analysis;
-    tables::summary::file(run, |_| true).write_csv(&folder.join("summary.csv"))?;
-    let comparison = tables::comparison::comparison_file(comparisons);
-    comparison.write_csv(&folder.join("comparison.csv"))?;
-    let equal_error = tables::comparison::equal_error_file(equal_errors);
-    equal_error.write_csv(&folder.join("equal_error.csv"))
+    let files = [
+        ("summary.csv", tables::summary::file(run, |_| true)),
+        ("comparison.csv", tables::comparison::comparison_file(comparisons)),
+        ("equal_error.csv", tables::comparison::equal_error_file(equal_errors)),
+    ];
+    files.iter().try_for_each(|(name, table)| table.write_csv(&folder.join(name)))
 }
 
 /// Draws everything into the run's folder: `figures/*.svg`, the same as `.png` and `.pdf`,

@@ -20,7 +20,7 @@ const RAW: &[(&str, &str)] = &[
     ("manifest.json", "what ran it"),
 ];
 
-/// Failures told one by one; more are only counted.
+/// Failures listed one by one; more are only counted.
 const FAILURES_TOLD: usize = 10;
 
 /// The page as HTML; `explorer` is its moving part, `settings` and `manifest` are the texts of the

@@ -6,7 +6,7 @@ use std::fmt::Write;
 /// Points in `W`, in metres; joined to a surface or not.
 #[derive(Default)]
 pub struct Points {
-    /// What the file says of itself, a line each.
+    /// Comments at the top of the file, a line each.
     pub comments: Vec<String>,
     /// The points with their unit normals.
     pub points: Vec<(Point3<f64>, Vector3<f64>)>,

@@ -30,7 +30,7 @@ fn allowed() -> BTreeMap<String, String> {
     let Ok(complete) = toml::from_str::<Experiment>(COMPLETE) else { return BTreeMap::new() };
     let complete = Experiment { scene: complete.scene.with_all_effects(), ..complete };
     let rules = Rules::of(&complete).into_iter();
-    // What holds for every entry is said of the whole.
+    // A rule of every entry is listed once.
     rules.map(|(key, allowed)| (whole(&key), allowed)).collect()
 }
 

@@ -118,7 +118,7 @@ pub fn title(canvas: &mut Canvas, area: Area, title: &str, score: &str) {
 
 /// A panel with a title, a space in it, and the ends of its axes.
 pub struct ReliefPanel {
-    /// What is drawn on it.
+    /// The space that is drawn.
     pub space: Space,
     /// Where points (x, height, z) of the space lie on the sheet.
     pub camera: Camera,

@@ -19,7 +19,7 @@ pub const NOT_REACHED: &str = "not reached in this trial";
 
 /// One planner's belief after some touches of the trial that the report draws.
 pub struct Replay<'a> {
-    /// What was known.
+    /// The belief.
     pub belief: HeightField,
     /// The posterior of the surface.
     pub surface: Posterior,
@@ -71,9 +71,10 @@ impl<'a> Replay<'a> {
         }))
     }
 
-    /// Every touch with whether it is one of the initial ones.
-    pub fn marks(&self) -> impl Iterator<Item = (&TouchRow, bool)> {
-        self.touches.iter().enumerate().map(|(i, touch)| (touch, i < self.initial_touches))
+    /// Every touch with its colour.
+    pub fn marks(&self) -> impl Iterator<Item = (&TouchRow, &'static str)> {
+        let colour = |i| style::touch(i < self.initial_touches);
+        self.touches.iter().enumerate().map(move |(i, touch)| (touch, colour(i)))
     }
 
     /// Its agreement with the truth, in words.
@@ -99,8 +100,7 @@ impl<'a> Replay<'a> {
         width: f64,
         at: impl Fn(&[f64], Option<f64>) -> PointPx,
     ) {
-        for (touch, is_initial) in self.marks() {
-            let colour = style::touch(is_initial);
+        for (touch, colour) in self.marks() {
             match contact(self.belief.zone(), touch) {
                 Some((place, height_m)) => canvas.cross(at(&place, Some(height_m)), colour),
                 None => {

@@ -43,24 +43,20 @@ pub const BAND_OPACITY: f64 = 0.22;
 const SPARE: [&str; 8] =
     ["#e69f00", "#56b4e9", "#000000", "#7a5195", "#8c6d31", "#667788", "#2f8f8f", "#b0305c"];
 
-/// Planners with a colour of their own.
-const OWN: [&str; 3] = ["active", "random", "sobol"];
+/// Planners with a colour of their own, as in the paper.
+const OWN: [(&str, &str); 3] = [("active", "#0072b2"), ("random", "#d55e00"), ("sobol", "#cc79a7")];
 
-/// The colour of a planner; the paper's two keep theirs.
+/// The colour of a planner.
 pub fn planner(planners: &[String], name: &str) -> &'static str {
-    match name {
-        "active" => "#0072b2",
-        "random" => "#d55e00",
-        "sobol" => "#cc79a7",
-        _ => {
-            let is_spare = |planner: &&String| !OWN.contains(&planner.as_str());
-            let index = planners.iter().filter(is_spare).position(|planner| planner == name);
-            SPARE[index.unwrap_or(0) % SPARE.len()]
-        }
-    }
+    let own = |name: &str| OWN.iter().find(|(planner, _)| *planner == name);
+    let mut others = planners.iter().filter(|planner| own(planner).is_none());
+    own(name).map_or_else(
+        || SPARE[others.position(|planner| planner == name).unwrap_or(0) % SPARE.len()],
+        |(_, colour)| colour,
+    )
 }
 
-/// What takes the place of a colour of drawings where they stand on dark paper.
+/// Colours of drawings on light paper, each with the one that replaces it on dark paper.
 pub const ON_DARK: [(&str, &str); 19] = [
     (PAPER, "#16191d"),
     (INK, "#e6e6e6"),

@@ -40,7 +40,7 @@ pub struct Cell {
     /// The standard error of a mean.
     error: Option<f64>,
     interval: Option<[f64; 2]>,
-    /// What it establishes: "better" or "worse".
+    /// The verdict: "better" or "worse".
     verdict: Option<&'static str>,
 }
 
@@ -269,8 +269,7 @@ impl Table {
     }
 }
 
-/// What an interval establishes that does not hold `even`, where both are as good; `direction` is
-/// better.
+/// The verdict of an interval that excludes `even`, where both are as good; `direction` is better.
 pub fn verdict(
     interval: Option<[f64; 2]>,
     even: f64,

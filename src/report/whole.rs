@@ -16,7 +16,7 @@ use palpate_explore::task::Task;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::coarse::coarse;
 
-/// Triangles of a surface that is drawn; chosen, so that a page stays a few megabytes.
+/// Triangles of a surface that is drawn. heuristic: a page stays a few megabytes.
 const TRIANGLES: usize = 3000;
 
 /// The true surface that the run keeps, with its search tree; none of a run without it.
@@ -62,44 +62,39 @@ pub const FIGURE: Figure = Figure {
     },
 };
 
-/// What `planners` made of the object in the trial that the report draws, after `counts` touches;
-/// `truth` gives the errors.
+/// The beliefs of `planners` in the trial that the report draws, after `counts` touches; `truth`
+/// gives the errors.
 ///
 /// # Errors
 /// If the recorded touches do not belong to the object or cannot be conditioned on.
-pub fn sequences(
+fn sequences(
     run: &Run,
     planners: &[&str],
     counts: &[u32],
     truth: Option<&MeshBvh>,
 ) -> anyhow::Result<Vec<Sequence>> {
-    let rows = planners.iter().filter_map(|planner| replay::row(run, planner));
-    rows.map(|row| sequence(&run.experiment, row, counts, truth)).collect()
-}
-
-fn sequence(
-    experiment: &Experiment,
-    row: &TrialRow,
-    counts: &[u32],
-    truth: Option<&MeshBvh>,
-) -> anyhow::Result<Sequence> {
-    let place = |count: usize| format!("trial {} of {}, touch {count}", row.trial, row.planner);
-    let mut sequence = Sequence { planner: row.planner.clone(), ..Sequence::default() };
-    for (i, touch) in row.touches.iter().enumerate() {
-        let aim = (touch.target.aim())
-            .with_context(|| format!("{}: a target that is no aim", place(i + 1)))?;
-        sequence.touches.push(Touch {
-            aim_w: aim.p_w,
-            along_w: *aim.ahead_w,
-            contact_w: touch.contact.map(Point3::from),
-            is_initial: i < experiment.initial_touches as usize,
-        });
-    }
-    for &count in counts {
-        let of = || format!("{} cannot be drawn", place(count as usize));
-        sequence.frames.extend(frame(experiment, row, count, truth, TRIANGLES).with_context(of)?);
-    }
-    Ok(sequence)
+    let initial_touches = run.experiment.initial_touches as usize;
+    let sequence = |row: &TrialRow| -> anyhow::Result<Sequence> {
+        let place = |count: usize| format!("trial {} of {}, touch {count}", row.trial, row.planner);
+        let mut sequence = Sequence { planner: row.planner.clone(), ..Sequence::default() };
+        for (i, touch) in row.touches.iter().enumerate() {
+            let no_aim = || format!("{}: a target that is no aim", place(i + 1));
+            let aim = touch.target.aim().with_context(no_aim)?;
+            sequence.touches.push(Touch {
+                aim_w: aim.p_w,
+                along_w: *aim.ahead_w,
+                contact_w: touch.contact.map(Point3::from),
+                is_initial: i < initial_touches,
+            });
+        }
+        for &count in counts {
+            let frame = frame(&run.experiment, row, count, truth, TRIANGLES);
+            let undrawn = || format!("{} cannot be drawn", place(count as usize));
+            sequence.frames.extend(frame.with_context(undrawn)?);
+        }
+        Ok(sequence)
+    };
+    planners.iter().filter_map(|planner| replay::row(run, planner)).map(sequence).collect()
 }
 
 /// The belief after `count` touches, made coarser if it has more than `most` triangles; none if the
@@ -119,6 +114,11 @@ pub fn frame(
     let Some(surface) = belief.surface() else { return Ok(None) };
     let mesh = surface.mesh(experiment.space.cells).map(|mesh| coarse(&mesh, most));
     let mesh = mesh.unwrap_or_default();
+    let score = |shape: &ShapeMetrics| {
+        let chamfer = shape.chamfer_m.map(|chamfer_m| digits(1e3 * chamfer_m));
+        let chamfer = chamfer.map_or("no surface".into(), |mm| format!("Chamfer {mm} mm"));
+        format!("{chamfer}, F {:.2} at 1 %", shape.f_1)
+    };
     let shape = touches.last().and_then(|touch| touch.shape.as_ref());
     let error = |bvh: &MeshBvh, p_w: &Point3<f64>| {
         let distance_m = bvh.closest_point(p_w).distance_m;
@@ -133,7 +133,7 @@ pub fn frame(
     }))
 }
 
-/// What was believed after `touches`; none without a fit then.
+/// The belief after `touches`; none without a fit then.
 ///
 /// # Errors
 /// If they do not belong to the object or cannot be conditioned on.
@@ -158,12 +158,4 @@ pub fn belief(
     }
     belief.condition(before, fit)?;
     Ok(Some(belief))
-}
-
-/// How near a belief is to the truth, in words.
-pub fn score(shape: &ShapeMetrics) -> String {
-    let chamfer = shape
-        .chamfer_m
-        .map_or("no surface".into(), |chamfer_m| format!("Chamfer {} mm", digits(1e3 * chamfer_m)));
-    format!("{chamfer}, F {:.2} at 1 %", shape.f_1)
 }

@@ -134,7 +134,7 @@ fn draw_measure(
     }
 }
 
-/// What is drawn of a measure after some touches: where there is one, its median.
+/// The value of a measure after some touches: its median, or its mean if it has no median.
 fn reading(run: &Run, measure: &Measure, point: &CurvePoint) -> Option<Reading> {
     let per_si = measure.unit.per_si;
     let summary = point.of(measure)?;
@@ -157,7 +157,7 @@ fn named(measure: &Measure) -> String {
     }
 }
 
-/// What is drawn of it, and what dotted beside it.
+/// The statistic that the solid line shows, and that of the dotted one.
 fn told(measure: &Measure) -> String {
     match (measure.scale, measure.aggregate) {
         (Scale::LogBeside(other), _) => format!("median; dotted: {}", other.title),

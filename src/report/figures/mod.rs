@@ -3,8 +3,11 @@
 pub(super) mod acquisition;
 pub(super) mod convergence;
 pub(super) mod curves;
-pub mod surfaces;
+pub(super) mod surfaces;
 pub(super) mod targets;
+
+pub use super::whole::FIGURE as SOLIDS;
+pub use surfaces::FIGURE as SURFACES;
 
 use crate::experiment::store::Run;
 

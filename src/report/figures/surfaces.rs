@@ -90,12 +90,12 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     }
     // Its words are on the left, in whatever font a browser has.
     let left = (0.5 * width - 60.0).max(BAR_LEFT_MIN_PX);
-    let bar = Area { left, top: sheet.bottom() - FOOT_PX + 14.0, width: 320.0, height: 13.0 };
+    let bar = Area { left, top: sheet.bottom - FOOT_PX + 14.0, width: 320.0, height: 13.0 };
     height_bar(&mut sheet.canvas, bar, unit, space.height_m);
     Ok(Some(sheet.canvas.finish()))
 }
 
-/// What is drawn: the zone, and heights around the truth and the drawn touches; none in 1-D.
+/// The drawn space: the zone, and heights around the truth and the drawn touches; none in 1-D.
 fn space(run: &Run, zone: &Zone) -> Option<Space> {
     let (low, high) =
         Axis::around(replay::heights_m(run, run.experiment.drawn_planners()), 0.08, 5.0)?.range();
@@ -105,8 +105,7 @@ fn space(run: &Run, zone: &Zone) -> Option<Space> {
 /// Marks touches: a point where one met the surface, hollow if that is hidden; a diamond at the
 /// back where it met nothing.
 fn mark(panel: &ReliefPanel, canvas: &mut Canvas, zone: &Zone, relief: &Relief, replay: &Replay) {
-    for (touch, is_initial) in replay.marks() {
-        let colour = style::touch(is_initial);
+    for (touch, colour) in replay.marks() {
         match replay::contact(zone, touch) {
             Some((place, height)) => {
                 let point = Vector3::new(place[0], height, place[1]);

@@ -62,7 +62,7 @@ pub fn figure(sequences: &[Sequence], truth: Option<&Mesh>, counts: &[u32]) -> O
             view.relief(&mut sheet.canvas, truth, |_, light| style::height(PLAIN, light));
         }
     }
-    let top = sheet.bottom() - FOOT_PX + 14.0;
+    let top = sheet.bottom - FOOT_PX + 14.0;
     View::draw_scale(&mut sheet.canvas, px_per_m, [MARGIN.0, top]);
     let left = (0.5 * width).max(BAR_LEFT_MIN_PX) + MARGIN.0;
     let bar = Area { left, top, width: BAR_PX, height: 13.0 };

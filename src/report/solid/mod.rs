@@ -1,7 +1,6 @@
 //! Beliefs of whole objects, as closed surfaces: to turn on the page, as a figure, as files.
 //!
-//! What is drawn is given as plain triangles with numbers at their vertices, in `W` and metres.
-//! Where they are from is not known here.
+//! A surface is given as plain triangles with numbers at their vertices, in `W` and metres.
 
 mod figure;
 mod panel;
@@ -17,14 +16,14 @@ use crate::report::style;
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::solids::{Triangles, normals};
 
-/// What a planner's touches made of an object.
+/// The touches of a planner and its beliefs after some of them.
 #[derive(Clone, Debug, Default)]
 pub struct Sequence {
     /// Whose.
     pub planner: String,
     /// Every touch, in order.
     pub touches: Vec<Touch>,
-    /// What was believed, by rising touch counts.
+    /// Believed surfaces, by rising touch counts.
     pub frames: Vec<Frame>,
 }
 
@@ -73,7 +72,7 @@ impl Frame {
         let (vertices, triangles) = &self.mesh;
         let finite = self.sd_m.iter().copied().filter(|sd_m| sd_m.is_finite());
         let largest_m = finite.fold(f64::MIN_POSITIVE, f64::max);
-        // What is not known is shown as the least sure.
+        // An unknown deviation is shown as the largest.
         let share = |sd_m: f64| if sd_m.is_finite() { sd_m / largest_m } else { 1.0 };
         let deviations = self.sd_m.iter().map(|&sd_m| (sd_m, style::deviation_rgb(share(sd_m))));
         Points {

@@ -1,4 +1,4 @@
-//! What of a whole object can be touched: its surface, and the sides from which the finger comes.
+//! The reachable part of a whole object: its surface, and the sides from which the finger comes.
 
 use super::panel::{View, scale};
 use super::section::TRUTH_TRIANGLES;
@@ -16,7 +16,7 @@ const MARGIN: (f64, f64) = (20.0, 40.0);
 const FOOT_PX: f64 = 40.0;
 const RADIUS_PX: f64 = 4.0;
 
-/// Colours of what is reached and of what is not, of surfaces and of marks; chosen, so that they
+/// Colours of reached and unreached parts, of surfaces and of marks. heuristic: they
 /// differ in print and for the colour-blind.
 const SURFACE: [[u32; 2]; 2] = [[0xb2becd; 2], [0xd55e00; 2]];
 const MARKS: [&str; 2] = ["#0072b2", "#d55e00"];
@@ -66,7 +66,7 @@ pub fn picture(
             }
         });
     }
-    let top = sheet.bottom() - FOOT_PX + 8.0;
+    let top = sheet.bottom - FOOT_PX + 8.0;
     View::draw_scale(&mut sheet.canvas, px_per_m, [MARGIN.0, top]);
     sheet.canvas.finish()
 }

@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 
 const SCRIPTS: [&str; 3] = [PARTS, include_str!("surface.js"), include_str!("solid.js")];
 
-/// Most triangles of the true surface that are shown; chosen, 80 kB of a page.
+/// Most triangles of the true surface that are shown. heuristic: 80 kB of a page.
 pub(super) const TRUTH_TRIANGLES: usize = 8000;
 
 const COLOURS: [(&str, &str); 2] = [("deviation", "σ"), ("error", "error")];
@@ -64,9 +64,9 @@ const HELP: &str = "Hollow touches lie behind the surface, diamonds met nothing.
                     keys. Two fingers, the keys + and −, or the wheel once the surface was clicked \
                     zoom; 0 is as at first.";
 
-/// The least share where all are alike; chosen.
+/// The least share where all are alike. heuristic.
 const ALIKE_SHARE: f64 = 0.1;
-/// Ends of deviations where there are none; chosen.
+/// Ends of deviations where there are none. heuristic.
 const NONE_M: [f64; 2] = [1e-4, 1e-2];
 
 /// The data of beliefs in an object and of its true surface; `None` if there is nothing to be drawn.

@@ -92,7 +92,7 @@ pub fn json(run: &Run) -> Value {
     })
 }
 
-/// What a publication says beside what came out: a row for each measure of each claim.
+/// The claims of a publication beside the results: a row for each measure of each claim.
 pub fn claims(run: &Run) -> Table {
     let planners = &run.experiment.planners;
     let heads = ["paper", "it says", "here after", "measure"].map(Column::new).into_iter();
@@ -123,7 +123,7 @@ pub fn claims(run: &Run) -> Table {
 /// A note on the cells of [`claims`].
 pub const CLAIMS_NOTE: &str = "What Yi et al. 2016 say, and the same here, over the trials.";
 
-/// What happened to the trials besides their errors, a line each.
+/// Events in the trials besides their errors, a line for each planner.
 pub fn happened(run: &Run) -> Vec<String> {
     let of = |planner: &String| told(planner, &summary::events(&run.rows, planner));
     let unlisted = (run.unlisted > 0).then(|| {
@@ -136,7 +136,7 @@ pub fn happened(run: &Run) -> Vec<String> {
     run.experiment.planners.iter().filter_map(of).chain(unlisted).collect()
 }
 
-/// What happened to a planner's trials, in a line; none if nothing did.
+/// The events in a planner's trials, in a line; none if there were none.
 fn told(planner: &str, events: &Events) -> Option<String> {
     let counts = [
         (events.failures, "failed trials"),
