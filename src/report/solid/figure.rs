@@ -88,15 +88,14 @@ fn belief(view: &View, canvas: &mut Canvas, (sequence, count): (&Sequence, u32),
         }
     };
     let relief = view.relief(canvas, &frame.mesh, colour);
-    let touches = sequence.touches(frame);
     canvas.grouped(ON_RELIEF, |canvas| {
-        for (i, touch) in touches.iter().enumerate() {
+        for (i, touch) in sequence.touches.iter().take(count as usize).enumerate() {
             let colour = style::touch(touch.is_initial);
             let p_w = touch.contact_w.unwrap_or(touch.aim_w).coords;
             let at = view.camera.at(&p_w);
             // A touch that met nothing may have been sent beside all that is drawn.
             if touch.contact_w.is_some() {
-                let radius = RADII_PX[usize::from(i + 1 == touches.len())];
+                let radius = RADII_PX[usize::from(i + 1 == count as usize)];
                 relief.mark(canvas, (&view.camera, &p_w), radius, colour);
             } else if inner(view.area).contains(at) {
                 canvas.diamond(at, &style::stroke(colour, 1.3));

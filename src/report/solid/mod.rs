@@ -58,13 +58,6 @@ pub struct Frame {
     pub score: String,
 }
 
-impl Sequence {
-    /// The touches before a frame.
-    fn touches(&self, frame: &Frame) -> &[Touch] {
-        self.touches.get(..frame.touches as usize).unwrap_or(&self.touches)
-    }
-}
-
 impl Frame {
     /// Its vertices with their normals, σ and errors, coloured by σ from 0 to the largest, and its
     /// triangles; what the file says of itself stands in `comments`.
