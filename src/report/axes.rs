@@ -215,7 +215,7 @@ impl Panel {
         canvas.rect(self.area, &style::stroke(FAINT_INK, 1.0));
     }
 
-    /// Grid lines, ticks and frame with a title and the names of the axes; empty words are left out.
+    /// Grid lines, ticks and frame with a title and the names of the axes, unless they are empty.
     pub fn titled_frame(&self, canvas: &mut Canvas, title: &str, x: &str, y: &str) {
         self.frame(canvas);
         canvas.title([self.area.centre()[0], self.area.top - 9.0], title);

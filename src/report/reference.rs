@@ -40,8 +40,8 @@ fn whole(key: &str) -> String {
     parts.collect()
 }
 
-/// Adds the table of settings `prefix` and then the tables within it; `root` is the whole schema, and
-/// `allowed` holds the allowed values by key.
+/// Adds the table of settings `prefix` and then the tables within it; `root` is the whole schema,
+/// and `allowed` holds the allowed values by key.
 fn add_table(
     text: &mut String,
     (root, allowed): (&Value, &BTreeMap<String, String>),

@@ -1,5 +1,5 @@
-//! The part of the page that moves: one planner's belief touch by touch, to turn and to colour. This
-//! is its frame: choices, slider, words, data, script.
+//! The interactive part of the page: one planner's belief touch by touch, to turn and to colour.
+//! This is its frame: choices, slider, words, data, script.
 //!
 //! It is drawn by a few hundred lines of script of our own. A plotting library would add three to
 //! four megabytes to every page, and still leave the touches behind a surface to be told apart.

@@ -53,8 +53,8 @@ impl View {
         relief::title(canvas, self.area, &format!("{words}{behind}"), score);
     }
 
-    /// Draws the triangles that face the viewer, each as bright as its corners are and in the colour
-    /// that its place in the list and its light have.
+    /// Draws the triangles that face the viewer, each as bright as its corners are and in the
+    /// colour that its place in the list and its light have.
     pub(super) fn relief(
         &self,
         canvas: &mut Canvas,

@@ -69,7 +69,7 @@ const ALIKE_SHARE: f64 = 0.1;
 /// Ends of deviations where there are none. heuristic.
 const NONE_M: [f64; 2] = [1e-4, 1e-2];
 
-/// The data of beliefs in an object and of its true surface; `None` if there is nothing to be drawn.
+/// The data of beliefs in an object and of its true surface; `None` if there is nothing to draw.
 ///
 /// # Errors
 /// If a mesh has more vertices than can be drawn.
