@@ -61,8 +61,7 @@ fn drawn(panels: &[(&str, &[Curve])]) -> Option<String> {
         let x = Axis::log(points().map(|(n, _)| *n))?;
         let y = Axis::log(points().map(|(_, value)| *value))?;
         let panel = Panel { area, x, y };
-        panel.frame(&mut canvas);
-        panel.label(&mut canvas, "", "touches n", unit);
+        panel.titled_frame(&mut canvas, "", "touches n", unit);
         for curve in *curves {
             panel.curve(&mut canvas, &curve.values, &stroke(curve));
             if let Some((last, value)) = curve.values.last() {

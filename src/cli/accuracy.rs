@@ -8,7 +8,7 @@ use super::progress::{progress_bar, step, stop_on_interrupt};
 use super::terminal::{Ending, Talk, print};
 use crate::experiment::statistics::Paired;
 use crate::experiment::store::write_whole;
-use crate::report::number::with_interval;
+use crate::report::table::with_interval;
 use crate::report::{accuracy, files};
 use crate::sim::Scene;
 use crate::study::accuracy::comparison::{Cheapest, Comparison, Effort};

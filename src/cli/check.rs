@@ -1,6 +1,5 @@
 //! `palpate check`.
 
-use super::columns::aligned;
 use super::find::{EXPERIMENTS, find};
 use super::output::Force;
 use super::prepare::{bound_threads, simulation};
@@ -9,7 +8,7 @@ use super::terminal::{Ending, Talk, print};
 use crate::experiment::runner::{self, Progress};
 use crate::experiment::store::write_whole;
 use crate::experiment::{Experiment, Simulation};
-use crate::report::check::{figure, junit, lines};
+use crate::report::check::{draw, junit, markdown, remarks, table, word};
 use crate::study::check::{Baseline, Held, Rules, Verdict, differs, hold};
 use anyhow::{Context, bail};
 use std::path::PathBuf;
@@ -112,26 +111,24 @@ pub(super) fn run(args: &Args, talk: Talk) -> anyhow::Result<Ending> {
 }
 
 fn tell(args: &Args, name: &str, old: &Baseline, held: &Held, rules: &Rules) -> anyhow::Result<()> {
-    let mut table = vec![lines::HEAD.map(String::from)];
-    table.extend(lines::rows(held));
     let file = args.baseline.display();
-    let mut text = format!("{name} against {file} ({})\n{}", old.header.why, aligned(&table));
-    for remark in lines::remarks(held, rules, args.max_trials) {
+    let mut text = format!("{name} against {file} ({})\n{}", old.header.why, table(held).text());
+    for remark in remarks(held, rules, args.max_trials) {
         text += &format!("{remark}\n");
     }
-    text += lines::word(held.verdict());
+    text += word(held.verdict());
     print(&text)?;
     let write = |path: &PathBuf, text: String| {
         write_whole(path, &text).with_context(|| path.display().to_string())
     };
     if let Some(path) = &args.junit {
-        write(path, junit::text(name, held, rules, args.max_trials)?)?;
+        write(path, junit(name, held, rules, args.max_trials)?)?;
     }
     if let Some(path) = &args.markdown {
-        write(path, lines::markdown(name, held, rules, args.max_trials))?;
+        write(path, markdown(name, held, rules, args.max_trials))?;
     }
     if let Some(path) = &args.svg {
-        write(path, figure::draw(name, held, rules))?;
+        write(path, draw(name, held, rules))?;
     }
     Ok(())
 }

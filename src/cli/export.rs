@@ -164,7 +164,7 @@ fn closed(run: &mut Run, args: &Args, touches: u32) -> anyhow::Result<(Points, S
     if !frame.error_m.is_empty() {
         comments.push("error_m: distance from the true surface, negative inside".into());
     }
-    Ok((frame.points(comments)?, frame.score))
+    Ok((frame.points(comments), frame.score))
 }
 
 /// The belief over a zone, and how near it is to the truth.

@@ -3,9 +3,8 @@
 
 use super::axes::{Axis, Panel};
 use super::canvas::{Anchor, Area, Canvas};
-use super::legend::{Legend, Swatch};
-use super::style;
-use super::style::{FAINT_INK, INK, PAPER, SMALL_PX};
+use super::legend::{Sheet, Swatch};
+use super::style::{self, FAINT_INK, INK, SMALL_PX, dot};
 use crate::experiment::statistics::mean;
 use crate::study::accuracy::comparison::Comparison;
 use crate::study::accuracy::convergence::Order;
@@ -34,6 +33,15 @@ const TOP_PX: f64 = 66.0;
 const LINE_PX: f64 = 18.0;
 const NAME_PX: f64 = 140.0;
 
+/// An error of a variant, its unit and its name.
+type Measure = (fn(&Variant) -> Option<Spread>, f64, &'static str);
+
+const ERRORS: [Measure; 3] = [
+    (|it| it.contact_m, 1e-3, "contact off the reference's (mm)"),
+    (|it| it.force_n, 1.0, "force off the reference's (N)"),
+    (|it| it.off_truth_m, 1e-3, "contact off the true surface (mm)"),
+];
+
 /// Draws levels and effects, as far as they were compared; `None` without a variant that differs
 /// from its reference.
 pub fn draw(
@@ -44,39 +52,31 @@ pub fn draw(
     let top_px = if levels.is_some() { TOP_PX + 2.0 * ROW_PX } else { TOP_PX };
     let lines_px = effects.map_or(0.0, |effects| effects.variants.len() as f64 * LINE_PX);
     let bottom_px = if effects.is_some() { 54.0 } else { -30.0 };
-    let mut canvas = Canvas::new(LEFT_PX + 3.0 * STEP_PX - 60.0, top_px + lines_px + bottom_px);
+    let size = [LEFT_PX + 3.0 * STEP_PX - 60.0, top_px + lines_px + bottom_px];
+    let families = FAMILIES.iter().map(|(colour, words)| (Swatch::Circle(dot(colour)), *words));
+    let entries = families.chain([
+        (Swatch::Diamond(INK), "the scene as it is"),
+        (Swatch::Line(style::dashed(INK, 1.3, "5 3")), "front"),
+        (Swatch::Line(reference_line()), "time of the reference"),
+    ]);
+    let first = Area { left: LEFT_PX, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };
+    let entries = entries.filter(|_| levels.is_some());
+    let mut sheet = Sheet::new(size, (first, [STEP_PX, ROW_PX]), (size[0], ""), entries);
     if let Some(levels) = levels {
-        draw_levels(&mut canvas, levels)?;
+        for (column, error) in ERRORS.into_iter().enumerate() {
+            let area = sheet.area(column, 0.0);
+            draw_cost(&mut sheet.canvas, area, levels, error)?;
+        }
     }
     for (column, order) in orders.iter().enumerate() {
-        draw_order(&mut canvas, order, area(column, 1));
+        let area = sheet.area(column, 1.0);
+        draw_order(&mut sheet.canvas, order, area);
     }
     if let Some(effects) = effects {
-        let first = Area { top: top_px, height: lines_px, ..area(0, 0) };
-        draw_effects(&mut canvas, &effects.variants, first)?;
+        let first = Area { top: top_px, height: lines_px, ..first };
+        draw_effects(&mut sheet.canvas, &effects.variants, first)?;
     }
-    Some(canvas.finish())
-}
-
-fn draw_levels(canvas: &mut Canvas, levels: &Comparison) -> Option<()> {
-    let entries: Vec<_> = (FAMILIES.iter())
-        .map(|(colour, words)| (Swatch::Circle(point(colour)), *words))
-        .chain([
-            (Swatch::Diamond(INK), "the scene as it is"),
-            (Swatch::Line(style::dashed(INK, 1.3, "5 3")), "front"),
-            (Swatch::Line(reference_line()), "time of the reference"),
-        ])
-        .collect();
-    Legend::new(LEFT_PX + 2.0 * STEP_PX + PANEL_PX.0, entries).draw(canvas, [LEFT_PX, 20.0]);
-    draw_cost(canvas, levels, (0, 1e-3, "contact off the reference's (mm)"), |it| it.contact_m)?;
-    draw_cost(canvas, levels, (1, 1.0, "force off the reference's (N)"), |it| it.force_n)?;
-    draw_cost(canvas, levels, (2, 1e-3, "contact off the true surface (mm)"), |it| it.off_truth_m)
-}
-
-fn area(column: usize, row: usize) -> Area {
-    let left = LEFT_PX + column as f64 * STEP_PX;
-    let top = TOP_PX + row as f64 * ROW_PX;
-    Area { left, top, width: PANEL_PX.0, height: PANEL_PX.1 }
+    Some(sheet.canvas.finish())
 }
 
 fn colour(level: &Level) -> &'static str {
@@ -87,11 +87,10 @@ fn colour(level: &Level) -> &'static str {
 /// Draws an error over the wall time of a touch.
 fn draw_cost(
     canvas: &mut Canvas,
+    area: Area,
     levels: &Comparison,
-    (column, unit, words): (usize, f64, &str),
-    measure: fn(&Variant) -> Option<Spread>,
+    (measure, unit, words): Measure,
 ) -> Option<()> {
-    let area = area(column, 0);
     let mut points: Vec<(f64, Bar, &Variant)> = (levels.variants.iter())
         .filter_map(|variant| Some((1e3 * variant.wall_s?, bar(measure(variant)?, unit), variant)))
         .collect();
@@ -101,8 +100,7 @@ fn draw_cost(
     let reference_ms = 1e3 * levels.reference.wall_s?;
     let times_ms = points.iter().map(|(time_ms, ..)| *time_ms).chain([reference_ms]);
     let panel = Panel { area, x: Axis::log(times_ms)?, y: Axis::log(ends)? };
-    panel.frame(canvas);
-    panel.label(canvas, "", "wall time of a touch (ms)", words);
+    panel.titled_frame(canvas, "", "wall time of a touch (ms)", words);
     canvas.clipped(area, |canvas| {
         let mut least = f64::INFINITY;
         let mut corners = Vec::new();
@@ -115,7 +113,7 @@ fn draw_cost(
             let ends = interval.map(|value| panel.at(*time_ms, value.max(1e-9)));
             canvas.line(ends, &style::stroke(colour, 1.2));
             match variant.level {
-                Some(_) => canvas.circle(panel.at(*time_ms, *error), 3.6, &point(colour)),
+                Some(_) => canvas.circle(panel.at(*time_ms, *error), 3.6, &dot(colour)),
                 None => canvas.diamond(panel.at(*time_ms, *error), &style::stroke(INK, 1.3)),
             }
         }
@@ -130,9 +128,8 @@ fn draw_order(canvas: &mut Canvas, order: &Order, area: Area) {
     let (x, y): (Vec<f64>, Vec<f64>) = order.errors.iter().copied().unzip();
     let (Some(x_axis), Some(y_axis)) = (Axis::log(x), Axis::log(y)) else { return };
     let panel = Panel { area, x: x_axis, y: y_axis };
-    panel.frame(canvas);
     let words = format!("order {:.2}; dashed: {}", order.observed, order.expected);
-    panel.label(canvas, &words, order.axis, "mean error of the force (N)");
+    panel.titled_frame(canvas, &words, order.axis, "mean error of the force (N)");
     // The line of the expected order through the middle of the measured points.
     let logs: Vec<f64> = (order.errors.iter())
         .map(|(at, error)| error.ln() + order.expected * at.ln())
@@ -144,7 +141,7 @@ fn draw_order(canvas: &mut Canvas, order: &Order, area: Area) {
         .collect();
     panel.curve(canvas, &line, &style::dashed(FAINT_INK, 1.3, "5 3"));
     for (at, error) in &order.errors {
-        canvas.circle(panel.at(*at, *error), 3.6, &point(FAMILIES[4].0));
+        canvas.circle(panel.at(*at, *error), 3.6, &dot(FAMILIES[4].0));
     }
 }
 
@@ -177,8 +174,7 @@ fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option
         // So few ticks that there are none: the lines have names.
         let y = Axis::linear(0.5, effects.len() as f64 + 0.5, 1e-6);
         let panel = Panel { area, x: Axis::around(ends, 0.05, 5.0)?, y };
-        panel.frame(canvas);
-        panel.label(canvas, "", words, "");
+        panel.titled_frame(canvas, "", words, "");
         for (line, variant) in effects.iter().enumerate() {
             let y = (effects.len() - line) as f64;
             if column == 0 {
@@ -187,7 +183,7 @@ fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option
             }
             if let Some((value, interval)) = measure(variant) {
                 canvas.line(interval.map(|x| panel.at(x, y)), &style::stroke(INK, 1.2));
-                canvas.circle(panel.at(value, y), 3.6, &point(FAMILIES[3].0));
+                canvas.circle(panel.at(value, y), 3.6, &dot(FAMILIES[3].0));
             }
         }
     }
@@ -200,8 +196,4 @@ fn bar(spread: Spread, unit: f64) -> Bar {
 
 fn reference_line() -> String {
     style::dashed(FAINT_INK, 1.0, "2 3")
-}
-
-fn point(colour: &str) -> String {
-    format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".7""#)
 }

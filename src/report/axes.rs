@@ -1,8 +1,7 @@
 //! Axes: from data to pixels, with ticks at round numbers.
 
 use super::canvas::{Anchor, Area, Canvas, PointPx};
-use super::style;
-use super::style::{FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
+use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
 use palpate_explore::task::Zone;
 
 /// A unit of length for labels.
@@ -24,6 +23,11 @@ impl Length {
             true => Self { per_m: 1.0, symbol: "m" },
             false => MM,
         }
+    }
+
+    /// A name with the symbol behind it.
+    pub fn named(&self, name: &str) -> String {
+        format!("{name} ({})", self.symbol)
     }
 }
 
@@ -62,12 +66,6 @@ impl Axis {
         let (low, high) = range(values.into_iter().filter(|&value| value > 0.0))?;
         let [low, high] = [low / 1.25, high * 1.25];
         Some(Self { low, high, is_log: true, aim: 5.0, step_min: 0.0 })
-    }
-
-    /// The same middle with a range `times` as long.
-    fn stretched(self, times: f64) -> Self {
-        let [middle, half] = [0.5 * (self.low + self.high), 0.5 * times * (self.high - self.low)];
-        Self { low: middle - half, high: middle + half, ..self }
     }
 
     /// Smallest and largest value.
@@ -164,6 +162,7 @@ pub fn rounded(value: f64) -> String {
 }
 
 /// A rectangle with two axes.
+#[derive(Clone)]
 pub struct Panel {
     /// The rectangle that holds the data.
     pub area: Area,
@@ -182,17 +181,13 @@ impl Panel {
         let px_per_unit = (most.width / lengths[0]).min(most.height / lengths[1]);
         let [width, height] = lengths.map(|length| (length * px_per_unit).max(LEAST_PX));
         let stretched = |axis: Axis, side_px: f64| {
-            let times = side_px / px_per_unit / (axis.high - axis.low);
-            axis.stretched(times)
+            let length = axis.high - axis.low;
+            let times = side_px / px_per_unit / length;
+            let [middle, half] = [0.5 * (axis.low + axis.high), 0.5 * times * length];
+            Axis { low: middle - half, high: middle + half, ..axis }
         };
         let (x, y) = (stretched(x, width), stretched(y, height));
         Self { area: Area { width, height, ..most }, x, y }
-    }
-
-    /// The same with its top left elsewhere.
-    pub fn moved(&self, left: f64, top: f64) -> Self {
-        let area = Area { left, top, ..self.area };
-        Self { area, x: self.x.clone(), y: self.y.clone() }
     }
 
     /// Where a value lies on the sheet.
@@ -220,13 +215,14 @@ impl Panel {
         canvas.rect(self.area, &style::stroke(FAINT_INK, 1.0));
     }
 
-    /// What stands above and beside the panel; empty words are left out.
-    pub fn label(&self, canvas: &mut Canvas, title: &str, x: &str, y: &str) {
+    /// Grid lines, ticks and frame with a title and the names of the axes, unless they are empty.
+    pub fn titled_frame(&self, canvas: &mut Canvas, title: &str, x: &str, y: &str) {
+        self.frame(canvas);
         canvas.title([self.area.centre()[0], self.area.top - 9.0], title);
         self.name_axes(canvas, x, y);
     }
 
-    /// What stands beside the panel.
+    /// The names of the axes.
     pub fn name_axes(&self, canvas: &mut Canvas, x: &str, y: &str) {
         let [centre_x, centre_y] = self.area.centre();
         canvas.text([centre_x, self.area.bottom() + 35.0], x, TEXT_PX, Anchor::Middle);
@@ -268,8 +264,8 @@ impl Panel {
 /// A [`colour_bar`] of heights above a datum, in a unit.
 pub fn height_bar(canvas: &mut Canvas, area: Area, unit: Length, heights_m: [f64; 2]) {
     let [low, high] = heights_m.map(|height_m| height_m * unit.per_m);
-    let words = format!("height above the datum ({})", unit.symbol);
-    colour_bar(canvas, area, &Axis::linear(low, high, 6.0), &words, |t| style::height(t, 1.0));
+    let (axis, words) = (Axis::linear(low, high, 6.0), unit.named("height above the datum"));
+    colour_bar(canvas, area, &axis, &words, |t| style::height(t, 1.0));
 }
 
 /// A horizontal bar of colours with its scale below.

@@ -4,8 +4,7 @@
 //! back end takes whole pixels would make steps of smooth curves. Points that are not finite
 //! are left out, so no drawing holds a NaN.
 
-use super::style::{FONT, INK, PAPER, TEXT_PX};
-use std::fmt::Write;
+use super::style::{FONT, INK, PAPER, TEXT_PX, stroke};
 
 /// A point in pixels, x to the right, y down.
 pub type PointPx = [f64; 2];
@@ -98,15 +97,8 @@ impl Canvas {
 
     /// A rectangle.
     pub fn rect(&mut self, area: Area, attributes: &str) {
-        self.polygon(
-            [
-                [area.left, area.top],
-                [area.right(), area.top],
-                [area.right(), area.bottom()],
-                [area.left, area.bottom()],
-            ],
-            attributes,
-        );
+        let (Area { left, top, .. }, right, bottom) = (area, area.right(), area.bottom());
+        self.polygon([[left, top], [right, top], [right, bottom], [left, bottom]], attributes);
     }
 
     /// A circle.
@@ -123,17 +115,10 @@ impl Canvas {
             return;
         }
         const ARM: f64 = 3.6;
-        let data = format!(
-            "M{}l{} {}M{}l{} -{}",
-            pair([x - ARM, y - ARM]),
-            2.0 * ARM,
-            2.0 * ARM,
-            pair([x - ARM, y + ARM]),
-            2.0 * ARM,
-            2.0 * ARM
-        );
-        self.outline(&data, &super::style::stroke(PAPER, 4.0));
-        self.outline(&data, &super::style::stroke(colour, 1.9));
+        let (side, ends) = (2.0 * ARM, [y - ARM, y + ARM].map(|y| pair([x - ARM, y])));
+        let data = format!("M{}l{side} {side}M{}l{side} -{side}", ends[0], ends[1]);
+        self.outline(&data, &stroke(PAPER, 4.0));
+        self.outline(&data, &stroke(colour, 1.9));
     }
 
     /// A small square on its corner.
@@ -167,15 +152,15 @@ impl Canvas {
     }
 
     fn words(&mut self, words: &str, size: f64, anchor: Anchor, colour: &str, attributes: &str) {
+        if words.is_empty() {
+            return;
+        }
+        let words = escape(words);
         let anchor = match anchor {
             Anchor::Start => "start",
             Anchor::Middle => "middle",
             Anchor::End => "end",
         };
-        if words.is_empty() {
-            return;
-        }
-        let words = escape(words);
         self.push(&format!(
             r#"<text {attributes} font-size="{size}" text-anchor="{anchor}" fill="{colour}">{words}</text>"#
         ));
@@ -235,14 +220,11 @@ impl Canvas {
     pub fn finish(mut self) -> String {
         self.write_titles();
         let [width, height] = [self.width, self.height].map(number);
-        let mut svg = String::new();
-        let _ = write!(
-            svg,
-            r#"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="{FONT}">"#
-        );
-        let _ = write!(
-            svg,
-            "\n<!-- drawn by Palpate -->\n<rect width=\"100%\" height=\"100%\" fill=\"{PAPER}\"/>\n"
+        let svg = format!(
+            r#"<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" font-family="{FONT}">
+<!-- drawn by Palpate -->
+<rect width="100%" height="100%" fill="{PAPER}"/>
+"#
         );
         svg + &self.body + "</svg>\n"
     }

@@ -4,8 +4,8 @@
 use super::axes::{Axis, Panel};
 use super::canvas::Area;
 use super::findings::HONEST;
-use super::html::{page, section, wide};
-use super::legend::{Swatch, sheet};
+use super::html::{figure, page, tables};
+use super::legend::{Sheet, Swatch};
 use super::style::{self, FAINT_INK};
 use super::table::{Cell, Column, Table, verdict};
 use crate::experiment::measure::Direction;
@@ -28,7 +28,7 @@ fn error_on(contender: &Contender, object: usize) -> Option<Estimate> {
 
 fn judged(error: Option<Estimate>) -> Cell {
     let interval = error.and_then(|error| error.interval);
-    Cell::from(error).judged(interval, 1.0, Direction::Less)
+    Cell::estimate(error).judged(interval, 1.0, Direction::Less)
 }
 
 /// A row for each planner: over all objects.
@@ -39,14 +39,14 @@ pub fn overall(compared: &Compared) -> Table {
         Column::new("error"),
         Column::new("better on"),
         Column::new("worse on"),
-        Column::new("gap closed").unit("%", 100.0).decimals(0),
-        Column::new("missed").unit("%", 100.0).decimals(1),
-        Column::new("stalled").unit("%", 100.0).decimals(1),
-        Column::new("travel").unit("m", 1.0).decimals(2),
+        Column::new("gap closed").unit("%", 100.0, 0),
+        Column::new("missed").unit("%", 100.0, 1),
+        Column::new("stalled").unit("%", 100.0, 1),
+        Column::new("travel").unit("m", 1.0, 2),
         Column::new("in the band"),
-        Column::new("Brier").decimals(3),
-        Column::new("IoU").decimals(3),
-        Column::new(format!("better than {}", compared.against)).decimals(2),
+        Column::new("Brier").unit("", 1.0, 3),
+        Column::new("IoU").unit("", 1.0, 3),
+        Column::new(format!("better than {}", compared.against)).unit("", 1.0, 2),
     ]);
     let all: Vec<usize> = (0..count).collect();
     let reference = compared.contenders.iter().find(|it| it.name == compared.against);
@@ -67,7 +67,7 @@ pub fn overall(compared: &Compared) -> Table {
             judged(geometric(&contender.scores(), SEED)),
             on("better"),
             on("worse"),
-            gap_closed(compared, contender, &all, SEED).into(),
+            Cell::estimate(gap_closed(compared, contender, &all, SEED)),
             mean_of(|result| result.missed),
             mean_of(|result| result.stalled),
             mean_of(|result| result.travel_m),
@@ -101,7 +101,7 @@ pub fn interquartiles(compared: &Compared) -> Table {
             Some(object) => interquartile(&[scores[*object]], SEED),
             None => interquartile(scores, SEED),
         };
-        found.map(Cell::from)
+        found.map(Cell::estimate)
     })
 }
 
@@ -122,28 +122,20 @@ pub fn note(against: &str) -> String {
 
 /// The page.
 pub fn html(name: &str, question: &str, compared: &Compared) -> String {
-    let over_all =
-        section("Over all objects", &overall(compared).html("named"), &note(&compared.against));
-    let each = section("Object by object", &each(compared).html("named"), "");
-    let figure = |id: &str, svg: Option<String>, caption: &str| {
-        svg.map_or(String::new(), |svg| {
-            let svg = wide(&svg, "figure");
-            format!("<figure id=\"{id}\">\n{svg}<figcaption>{caption}</figcaption>\n</figure>\n")
-        })
-    };
-    let profiles = figure(
-        "profiles",
-        profiles(compared),
-        "Which share of the trials has how small an error, averaged over the objects; further left is \
-         better.",
-    );
-    let reliability = figure(
-        "reliability",
-        reliability(compared),
-        "Of the places that are given a probability of a surface, how many have one; on the diagonal the \
-         belief is honest.",
-    );
-    page("Palpate suite", name, question, &[over_all, profiles, reliability, each].concat())
+    let note = note(&compared.against);
+    let over_all = tables("Over all objects", &[overall(compared)], "named", &note);
+    let each = tables("Object by object", &[each(compared)], "named", "");
+    let profiles = "Which share of the trials has how small an error, averaged over the objects; further \
+                    left is better.";
+    let reliability = "Of the places that are given a probability of a surface, how many have one; on the \
+                       diagonal the belief is honest.";
+    let figures = [
+        ("profiles", self::profiles(compared), profiles),
+        ("reliability", self::reliability(compared), reliability),
+    ];
+    let figures = figures
+        .map(|(id, svg, caption)| svg.map_or(String::new(), |svg| figure(id, &svg, caption)));
+    page("Palpate suite", name, question, &[over_all, figures.concat(), each].concat())
 }
 
 /// The table of `suite.csv`: a row per object and planner.
@@ -175,7 +167,7 @@ pub fn file(compared: &Compared) -> Table {
                 name.as_str().into(),
                 contender.name.as_str().into(),
                 result.scores.len().into(),
-                error_on(contender, object).into(),
+                Cell::estimate(error_on(contender, object)),
                 gap.map(|gap| gap.value).into(),
                 result.missed.into(),
                 result.stalled.into(),
@@ -209,26 +201,25 @@ pub fn profiles(compared: &Compared) -> Option<String> {
 /// Reliability over all objects: of the places that are given a probability of a surface, how many
 /// have one; none where every object fills its zone.
 fn reliability(compared: &Compared) -> Option<String> {
-    let curves: Vec<_> = compared.contenders.iter().map(reliability_curve).collect();
+    /// Fewest places of a point, over all objects and trials. heuristic: 50 tell a share to 7 %.
+    const PLACES_MIN: u32 = 50;
+    // The middle of each tenth, and the share of its places that have a surface.
+    let curve = |contender: &Contender| -> Vec<(f64, f64)> {
+        let share = |tenth: usize| {
+            let counts = contender.results.iter().map(|result| result.reliability[tenth]);
+            let [all, there] =
+                counts.fold([0, 0], |[all, there], [more, of_them]| [all + more, there + of_them]);
+            let middle = (tenth as f64 + 0.5) / TENTHS as f64;
+            (all >= PLACES_MIN).then(|| (middle, f64::from(there) / f64::from(all)))
+        };
+        (0..TENTHS).filter_map(share).collect()
+    };
+    let curves: Vec<_> = compared.contenders.iter().map(curve).collect();
     let area = Area { left: 70.0, top: 60.0, width: 300.0, height: 300.0 };
     let names = ["probability of a surface, in tenths", "share that has one"];
     let is_known = curves.iter().any(|curve| !curve.is_empty());
     let axes = (area, Axis::linear(0.0, 1.0, 6.0), names);
     is_known.then(|| draw(compared, axes, curves, [[0.0, 0.0], [1.0, 1.0]]))
-}
-
-/// The middle of each tenth, and the share of its places that have a surface.
-fn reliability_curve(contender: &Contender) -> Vec<(f64, f64)> {
-    /// Fewest places of a point, over all objects and trials. heuristic: 50 tell a share to 7 %.
-    const PLACES_MIN: u32 = 50;
-    let share = |tenth: usize| {
-        let counts = contender.results.iter().map(|result| result.reliability[tenth]);
-        let [all, there] =
-            counts.fold([0, 0], |[all, there], [more, of_them]| [all + more, there + of_them]);
-        let middle = (tenth as f64 + 0.5) / TENTHS as f64;
-        (all >= PLACES_MIN).then(|| (middle, f64::from(there) / f64::from(all)))
-    };
-    (0..TENTHS).filter_map(share).collect()
 }
 
 /// One panel with a curve for each contender, whose names are above it, and a dashed line of
@@ -245,15 +236,15 @@ fn draw(
     let swatches = strokes.iter().cloned().map(Swatch::Line);
     let entries = swatches.zip(names.iter().map(String::as_str));
     let size = [area.right() + 20.0, area.bottom() + 50.0];
-    let (mut canvas, more_px) = sheet(size, [area.left, 22.0], (area.width, ""), entries);
-    let area = Area { top: area.top + more_px, ..area };
-    let panel = Panel { area, x, y: Axis::linear(0.0, 1.0, 6.0) };
-    panel.frame(&mut canvas);
+    let mut sheet = Sheet::new(size, (area, [0.0; 2]), (area.width, ""), entries);
+    let panel = Panel { area: sheet.area(0, 0.0), x, y: Axis::linear(0.0, 1.0, 6.0) };
+    let canvas = &mut sheet.canvas;
+    panel.frame(canvas);
     let ends = reference.map(|[x, y]| panel.at(x, y));
     canvas.line(ends, &style::dashed(FAINT_INK, 1.0, "4 3"));
     for (curve, stroke) in curves.iter().zip(&strokes) {
-        panel.curve(&mut canvas, curve, stroke);
+        panel.curve(canvas, curve, stroke);
     }
-    panel.name_axes(&mut canvas, x_name, y_name);
-    canvas.finish()
+    panel.name_axes(canvas, x_name, y_name);
+    sheet.canvas.finish()
 }

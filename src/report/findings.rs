@@ -1,23 +1,19 @@
-//! What a run found, in words and numbers taken from its rows, and what it decides.
+//! The findings of a run in sentences, from its rows, and its verdict.
 
-use super::number::{digits, with_error};
-use super::table::verdict;
-use crate::experiment::measure;
-use crate::experiment::measure::Direction;
+use super::table::{digits, shown, verdict};
 use crate::experiment::measure::metrics::constant_r;
 use crate::experiment::measure::{
-    CENTRED_R, CHAMFER, COVERAGE, EDGE_RMSE, Measure, R, REPEATABILITY, RMSE,
+    self, CENTRED_R, CHAMFER, COVERAGE, Direction, EDGE_RMSE, Measure, R, REPEATABILITY, RMSE,
     VERIFICATION_COVERAGE, VERIFICATION_RMSE,
 };
 use crate::experiment::statistics::analysis::Analysis;
-use crate::experiment::statistics::summary;
-use crate::experiment::statistics::summary::CurvePoint;
+use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;
 
 /// The mean of Eq. 5 that counts as found, as where the paper says "almost 1".
 const R_FOUND: f64 = 0.99;
 
-/// What a reader should know before the numbers: a sentence each.
+/// Warnings before the numbers, a sentence each.
 pub fn notices(run: &Run) -> Vec<String> {
     let total = run.experiment.trials as usize * run.experiment.planners.len();
     let is_partial = run.rows.len() < total;
@@ -28,35 +24,34 @@ pub fn notices(run: &Run) -> Vec<String> {
 /// Sentences, the most important first.
 pub fn sentences(run: &Run) -> Vec<String> {
     let planners = &run.experiment.planners;
-    let curves: Vec<Curve> = planners
-        .iter()
+    let curves: Vec<Curve> = (planners.iter())
         .map(|name| (name.as_str(), summary::curve(&run.experiment, &run.rows, name)))
         .filter(|(_, points)| !points.is_empty())
         .collect();
-    let mut sentences = Vec::new();
     if curves.is_empty() {
-        sentences
-            .push("No trial got as far as its first fit, so there is nothing to say yet.".into());
-        return sentences;
+        return vec![
+            "No trial got as far as its first fit, so there is nothing to say yet.".into(),
+        ];
     }
-    sentences.extend(verified(run, &curves));
-    if run.experiment.scene.around.is_some() {
-        sentences.extend(shapes(run, &curves));
-        sentences.extend(against_baseline(run, &curves));
-        return sentences;
-    }
-    if !run.truth.is_known() {
-        return sentences;
-    }
-    sentences.extend(scores(run, &curves));
+    let verified = verified(run, &curves);
+    let found = if run.experiment.scene.around.is_some() {
+        vec![shapes(run, &curves), against_baseline(run, &curves)]
+    } else if run.truth.is_known() {
+        let (needed, against) = (r_needed(run, &curves), against_baseline(run, &curves));
+        vec![scores(run, &curves), needed, against, honesty(&curves)]
+    } else {
+        Vec::new()
+    };
+    verified.into_iter().chain(found.into_iter().flatten()).collect()
+}
+
+/// The touches after which each planner has found the surface by the mean of Eq. 5.
+fn r_needed(run: &Run, curves: &[Curve]) -> Option<String> {
     let constant = constant_r(run.truth.heights_m.iter().flatten())
         .map_or(String::new(), |score| format!(" (a constant height scores {score:.3})"));
     let goal = format!("a mean R of {R_FOUND}{constant}");
     let is_found = |point: &CurvePoint| point.of(&R).is_some_and(|r| r.mean >= R_FOUND);
-    sentences.extend(needed(run, &curves, &goal, is_found));
-    sentences.extend(against_baseline(run, &curves));
-    sentences.extend(honesty(&curves));
-    sentences
+    needed(run, curves, &goal, is_found)
 }
 
 /// A planner's name with its curve.
@@ -100,7 +95,8 @@ fn scores(run: &Run, curves: &[Curve]) -> Option<String> {
         let point = at(points, count)?;
         let mean = |measure: &Measure| {
             let summary = point.of(measure)?;
-            Some(with_error(measure, summary.mean, summary.error))
+            let error = summary.error.map(|error| format!(" ± {}", shown(measure, error)));
+            Some(shown(measure, summary.mean) + &error.unwrap_or_default())
         };
         let (r, centred, rmse) = (mean(&R)?, mean(&CENTRED_R)?, median(point, &RMSE)?);
         let edge = median(point, &EDGE_RMSE)
@@ -172,7 +168,7 @@ fn against_baseline(run: &Run, curves: &[Curve]) -> Option<String> {
     needed(run, &others, &goal, is_met)
 }
 
-/// Shares of the truth that a 95 % band may hold and still count as honest; chosen.
+/// Shares of the truth in a 95 % band that count as calibrated. heuristic.
 pub(super) const HONEST: std::ops::RangeInclusive<f64> = 0.9..=0.98;
 
 /// The share of the truth that the 95 % band of a curve's last belief holds.
@@ -200,9 +196,9 @@ pub fn verdicts(run: &Run, analysis: &Analysis) -> Vec<String> {
 
 /// The planners that are nearer the truth after the last touch than the first baseline.
 fn nearness(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
+    let id = run.experiment.error().id;
     let found = analysis.comparisons.iter();
-    let found =
-        found.filter(|it| it.baseline == baseline && it.measure.id == run.experiment.error().id);
+    let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
     let verdicts =
         found.map(|it| (it.planner, verdict(it.paired.interval, 0.0, it.measure.direction)));
     let words = [
@@ -210,70 +206,60 @@ fn nearness(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
         format!("farther from the truth than {baseline}"),
         format!("not told apart from {baseline}"),
     ];
-    let clauses = clauses(&sorted(verdicts.collect())?, ["is", "are"], words);
+    let clauses = clauses(verdicts.map(by_verdict), ["is", "are"], words)?;
     Some(format!("After {} touches {clauses}.", run.experiment.touches))
 }
 
 /// The planners that need fewer touches than the first baseline for the error that it ends with.
 fn effort(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
+    let id = run.experiment.error().id;
     let found = analysis.equal_errors.iter();
-    let found =
-        found.filter(|it| it.baseline == baseline && it.measure.id == run.experiment.error().id);
+    let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
     let verdicts = found.map(|it| (it.planner, verdict(it.ratio.interval, 1.0, Direction::Less)));
     let words = ["fewer touches", "more touches", "about as many, as far as these trials tell"];
-    let clauses = clauses(&sorted(verdicts.collect())?, ["needs", "need"], words.map(String::from));
+    let words = words.map(String::from);
+    let clauses = clauses(verdicts.map(by_verdict), ["needs", "need"], words)?;
     Some(format!("For the error that {baseline} reaches, {clauses}."))
 }
 
 /// The planners whose last bands hold as much of the truth as they say.
 fn trust(run: &Run) -> Option<String> {
-    let shares = run.experiment.planners.iter().filter_map(|name| {
+    let groups = run.experiment.planners.iter().filter_map(|name| {
         let points = summary::curve(&run.experiment, &run.rows, name);
-        Some((name.as_str(), share_in_band(&points)?))
+        let group = match share_in_band(&points)? {
+            share if HONEST.contains(&share) => 0,
+            share if share < *HONEST.start() => 1,
+            _ => 2,
+        };
+        Some((name.as_str(), group))
     });
-    let shares: Vec<(&str, f64)> = shares.collect();
-    let with = |is_it: fn(f64) -> bool| -> Vec<&str> {
-        shares.iter().filter(|(_, share)| is_it(*share)).map(|(name, _)| *name).collect()
-    };
-    let which = [
-        with(|share| HONEST.contains(&share)),
-        with(|share| share < *HONEST.start()),
-        with(|share| share > *HONEST.end()),
-    ];
     let words = [
         "about as far off as it says",
         "too sure of itself",
         "less sure of itself than it could be",
     ];
-    let clauses = clauses(&which, ["is", "is"], words.map(String::from));
-    (!shares.is_empty()).then(|| format!("The last belief of {clauses}."))
+    let clauses = clauses(groups, ["is", "is"], words.map(String::from))?;
+    Some(format!("The last belief of {clauses}."))
 }
 
-/// Planners that are better, worse and neither; `None` without planners.
-fn sorted<'a>(verdicts: Vec<(&'a str, Option<&'static str>)>) -> Option<[Vec<&'a str>; 3]> {
-    let with = |word: Option<&str>| -> Vec<&'a str> {
-        verdicts.iter().filter(|(_, it)| *it == word).map(|(name, _)| *name).collect()
+/// A planner with its group: better, worse, neither.
+fn by_verdict<'a>((planner, verdict): (&'a str, Option<&str>)) -> (&'a str, usize) {
+    (planner, verdict.map_or(2, |word| usize::from(word != "better")))
+}
+
+/// A clause for each of three groups of planners that is not empty; `None` without planners.
+fn clauses<'a>(
+    planners: impl Iterator<Item = (&'a str, usize)>,
+    [one, many]: [&str; 2],
+    words: [String; 3],
+) -> Option<String> {
+    let mut groups = [const { Vec::new() }; 3];
+    planners.for_each(|(name, group)| groups[group].push(name));
+    let clause = |(names, words): (&Vec<&str>, String)| match &names[..] {
+        [] => None,
+        [name] => Some(format!("{name} {one} {words}")),
+        [names @ .., last] => Some(format!("{} and {last} {many} {words}", names.join(", "))),
     };
-    (!verdicts.is_empty()).then(|| [Some("better"), Some("worse"), None].map(with))
-}
-
-/// A clause for each group of planners that is not empty.
-fn clauses(groups: &[Vec<&str>; 3], [one, many]: [&str; 2], words: [String; 3]) -> String {
-    let said = groups.iter().zip(words).filter(|(names, _)| !names.is_empty());
-    let clauses: Vec<String> = said
-        .map(|(names, words)| {
-            let verb = if names.len() == 1 { one } else { many };
-            format!("{} {verb} {words}", listed(names))
-        })
-        .collect();
-    clauses.join("; ")
-}
-
-/// a, b and c.
-fn listed(names: &[&str]) -> String {
-    match names {
-        [] => String::new(),
-        [name] => (*name).into(),
-        [names @ .., last] => format!("{} and {last}", names.join(", ")),
-    }
+    let clauses: Vec<String> = groups.iter().zip(words).filter_map(clause).collect();
+    (!clauses.is_empty()).then(|| clauses.join("; "))
 }

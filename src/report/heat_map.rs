@@ -6,61 +6,54 @@ use palpate_explore::task::Zone;
 
 /// About the size of a cell in pixels.
 const CELL_PX: f64 = 4.0;
-/// Colours told apart; neighbours in a row that share one become one rectangle.
+/// Number of colours; neighbours in a row that share one become one rectangle.
 const LEVELS: usize = 64;
+
+/// A place, the value there, and whether it is drawn.
+pub type Reading = (Vec<f64>, f64, bool);
 
 /// Values over a zone, x varying fastest.
 pub struct HeatMap {
     columns: usize,
     rows: usize,
-    values: Vec<f64>,
-    is_drawn: Vec<bool>,
+    /// The readings at the middles of the cells.
+    pub readings: Vec<Reading>,
 }
 
 impl HeatMap {
-    /// Reads values, and whether they are drawn, at the middles of the cells of a map of the size
-    /// of `area`.
-    pub fn read(
-        zone: &Zone,
-        area: Area,
-        read: impl FnOnce(Vec<Vec<f64>>) -> Vec<(f64, bool)>,
-    ) -> Self {
+    /// A map of the size of `area`; `read` is given the middles of its cells.
+    pub fn new(zone: &Zone, area: Area, read: impl FnOnce(Vec<Vec<f64>>) -> Vec<Reading>) -> Self {
         let cells = |side_px: f64| (side_px / CELL_PX).round().max(1.0) as usize;
         let (columns, rows) = (cells(area.width), cells(area.height));
-        let (values, is_drawn) = read(middles(zone, columns, rows).collect()).into_iter().unzip();
-        Self { columns, rows, values, is_drawn }
+        let middle = |i: usize, count: usize| (i as f64 + 0.5) / count as f64;
+        let at = |k| zone.at(&[middle(k % columns, columns), middle(k / columns, rows)]);
+        Self { columns, rows, readings: read((0..columns * rows).map(at).collect()) }
     }
 
     /// The largest value drawn; 0 of none.
     pub fn largest(&self) -> f64 {
-        let drawn = self.values.iter().zip(&self.is_drawn).filter(|(_, is_drawn)| **is_drawn);
-        drawn.map(|(value, _)| *value).fold(0.0, f64::max)
-    }
-
-    /// The middles of the cells with their values.
-    pub fn places<'a>(&'a self, zone: &'a Zone) -> impl Iterator<Item = (Vec<f64>, f64)> + 'a {
-        middles(zone, self.columns, self.rows).zip(self.values.iter().copied())
+        let drawn = self.readings.iter().filter(|(.., is_drawn)| *is_drawn);
+        drawn.map(|(_, value, _)| *value).fold(0.0, f64::max)
     }
 
     /// Fills `area`, z upwards.
     pub fn draw(&self, canvas: &mut Canvas, area: Area, colour: impl Fn(f64) -> String) {
         let largest = self.largest();
-        let level = |cell: usize| match largest > 0.0 {
-            true => ((self.values[cell] / largest * LEVELS as f64) as usize).min(LEVELS - 1),
-            false => 0,
+        let level = |(_, value, is_drawn): &Reading| {
+            let share = if largest > 0.0 { value / largest } else { 0.0 };
+            is_drawn.then(|| ((share * LEVELS as f64) as usize).min(LEVELS - 1))
         };
+        let levels: Vec<Option<usize>> = self.readings.iter().map(level).collect();
         // Ends of cells are written as they are, so that neighbours meet without a gap.
         let left =
             |column: usize| number(area.left + column as f64 * area.width / self.columns as f64);
         let top = |row: usize| number(area.bottom() - row as f64 * area.height / self.rows as f64);
         let mut outlines = vec![String::new(); LEVELS];
-        for row in 0..self.rows {
-            let cells: Vec<usize> = (row * self.columns..(row + 1) * self.columns).collect();
-            let looks = |cell: usize| self.is_drawn[cell].then(|| level(cell));
+        for (row, levels) in levels.chunks(self.columns).enumerate() {
             let mut begin = 0;
-            for run in cells.chunk_by(|a, b| looks(*a) == looks(*b)) {
+            for run in levels.chunk_by(|a, b| a == b) {
                 let end = begin + run.len();
-                if let Some(level) = looks(run[0]) {
+                if let Some(level) = run[0] {
                     let (x0, x1, y0, y1) = (left(begin), left(end), top(row + 1), top(row));
                     outlines[level] += &format!("M{x0} {y0}H{x1}V{y1}H{x0}z");
                 }
@@ -73,11 +66,4 @@ impl HeatMap {
             canvas.outline(outline, &attributes);
         }
     }
-}
-
-/// The middles of cells, x varying fastest.
-fn middles(zone: &Zone, columns: usize, rows: usize) -> impl Iterator<Item = Vec<f64>> {
-    let middle = |i: usize, count: usize| (i as f64 + 0.5) / count as f64;
-    (0..columns * rows)
-        .map(move |k| zone.at(&[middle(k % columns, columns), middle(k / columns, rows)]))
 }

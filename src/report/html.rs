@@ -1,7 +1,9 @@
-//! What pages are made of: one file that needs nothing beside it.
+//! Parts of pages, each a file that needs nothing beside it.
 
 use super::canvas::escape;
 use super::style::ON_DARK;
+use super::table::{Table, wide};
+use std::fmt::Display;
 
 /// A page of this kind about something called `name`; `question` may be empty.
 pub(super) fn page(kind: &str, name: &str, question: &str, body: &str) -> String {
@@ -19,21 +21,31 @@ pub(super) fn page(kind: &str, name: &str, question: &str, body: &str) -> String
     )
 }
 
-/// What scrolls in its own box where the page is narrower, by keyboard too.
-pub(super) fn wide(content: &str, what: &str) -> String {
-    format!(
-        "<div class=\"wide\" role=\"region\" aria-label=\"{what}\" tabindex=\"0\">{content}</div>\n"
-    )
+/// A section of a page with a title, unless that is empty; empty without a body.
+pub(super) fn section(title: &str, body: &str) -> String {
+    let title = if title.is_empty() { String::new() } else { format!("<h2>{title}</h2>\n") };
+    if body.is_empty() { String::new() } else { format!("<section>\n{title}{body}</section>\n") }
 }
 
-/// A section of a page with a title, unless that is empty, and a note below its body; empty without
-/// a body.
-pub(super) fn section(title: &str, body: &str, note: &str) -> String {
-    if body.is_empty() {
-        return String::new();
+/// A section with tables that are not empty, and a note below them.
+pub(super) fn tables(title: &str, tables: &[Table], class: &str, note: &str) -> String {
+    let tables = tables.iter().filter(|table| !table.rows.is_empty());
+    match tables.map(|table| table.html(class)).collect::<String>() {
+        body if body.is_empty() => body,
+        body => section(title, &format!("{body}<p class=\"note\">{}</p>\n", escape(note))),
     }
-    let title = if title.is_empty() { String::new() } else { format!("<h2>{title}</h2>\n") };
-    format!("<section>\n{title}{body}<p class=\"note\">{}</p>\n</section>\n", escape(note))
+}
+
+/// A drawing with its caption as HTML.
+pub(super) fn figure(id: &str, svg: &str, caption: impl Display) -> String {
+    let svg = wide(svg, "figure");
+    format!("<figure id=\"{id}\">\n{svg}<figcaption>{caption}</figcaption>\n</figure>\n")
+}
+
+/// A list of sentences; empty without any.
+pub(super) fn list(class: &str, items: &[String]) -> String {
+    let items: String = items.iter().map(|it| format!("<li>{}</li>\n", escape(it))).collect();
+    if items.is_empty() { items } else { format!("<ul{class}>\n{items}</ul>\n") }
 }
 
 /// Drawings keep their colours for light paper; on dark paper the page gives them others. Touches

@@ -1,8 +1,8 @@
 //! A legend: swatches with their words, in as many rows as they need.
 
 use super::canvas::{Anchor, Area, Canvas, PointPx};
-use super::style;
-use super::style::{INITIAL, LATER, TEXT_PX};
+use super::style::{self, INITIAL, LATER, TEXT_PX};
+use crate::experiment::store::Run;
 
 /// From one row to the next.
 const ROW_PX: f64 = 20.0;
@@ -48,23 +48,50 @@ impl<'a> Legend<'a> {
     }
 }
 
-/// A sheet of `size` with a legend, the middle of its first row's left end at `at`, drawn in a
-/// group of `attributes`; it grows by the rows that the legend needs behind the first, which are
-/// returned in pixels.
-pub fn sheet<'a>(
-    [width, height]: [f64; 2],
-    at: PointPx,
-    (width_px, attributes): (f64, &str),
-    entries: impl IntoIterator<Item = (Swatch, &'a str)>,
-) -> (Canvas, f64) {
-    let legend = Legend::new(width_px, entries);
-    let more_px = legend.more_px();
-    let mut canvas = Canvas::new(width, height + more_px);
-    match attributes {
-        "" => legend.draw(&mut canvas, at),
-        attributes => canvas.grouped(attributes, |canvas| legend.draw(canvas, at)),
+/// A drawing with a legend above panels of one size in columns and rows.
+pub struct Sheet {
+    /// The drawing, with the legend on it.
+    pub canvas: Canvas,
+    first: Area,
+    step: [f64; 2],
+    /// The bottom edge of the drawing.
+    pub bottom: f64,
+}
+
+impl Sheet {
+    /// A drawing of `size` with a legend of a width, drawn in a group of `attributes`, and `step`
+    /// from one panel to the next. It grows, and `first` moves down, by the rows that the legend
+    /// needs behind the first.
+    pub fn new<'a>(
+        [width, height]: [f64; 2],
+        (first, step): (Area, [f64; 2]),
+        (legend_px, attributes): (f64, &str),
+        entries: impl IntoIterator<Item = (Swatch, &'a str)>,
+    ) -> Self {
+        let legend = Legend::new(legend_px, entries);
+        let bottom = height + legend.more_px();
+        let mut canvas = Canvas::new(width, bottom);
+        let at = [first.left, 20.0];
+        match attributes {
+            "" => legend.draw(&mut canvas, at),
+            attributes => canvas.grouped(attributes, |canvas| legend.draw(canvas, at)),
+        }
+        let first = Area { top: first.top + legend.more_px(), ..first };
+        Self { canvas, first, step, bottom }
     }
-    (canvas, more_px)
+
+    /// The rectangle of a panel.
+    pub fn area(&self, column: usize, row: f64) -> Area {
+        let left = self.first.left + column as f64 * self.step[0];
+        Area { left, top: self.first.top + row * self.step[1], ..self.first }
+    }
+}
+
+/// The entry of touches that met nothing, if there are any.
+pub fn miss_entry(run: &Run) -> Option<(Swatch, &'static str)> {
+    let mut touches = run.rows.iter().flat_map(|row| &row.touches);
+    let is_missed = touches.any(|touch| touch.contact.is_none());
+    is_missed.then_some(MISS)
 }
 
 /// The entry of touches that met nothing.

@@ -2,7 +2,6 @@
 
 pub mod accuracy;
 pub mod axes;
-pub mod camera;
 pub mod canvas;
 pub mod check;
 pub mod compare;
@@ -13,7 +12,6 @@ pub mod findings;
 pub mod heat_map;
 mod html;
 pub mod legend;
-pub mod number;
 pub mod page;
 pub mod points;
 pub mod reference;
@@ -23,15 +21,30 @@ pub mod scan;
 pub mod solid;
 pub mod style;
 pub mod table;
-pub mod tables;
+pub mod tables {
+    //! The tables of a run, on its page and in its folder.
+
+    pub mod comparison;
+    pub mod summary;
+}
 pub mod whole;
 
-pub use figures::{FIGURES, Figure};
+pub use figures::Figure;
 
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::{FIGURES as FIGURES_FOLDER, MANIFEST, RESOLVED, Run, write_whole};
 use anyhow::Context;
 use std::path::Path;
+
+/// Every figure in the order of the page; one line to add one.
+pub const FIGURES: &[Figure] = &[
+    figures::convergence::FIGURE,
+    figures::curves::FIGURE,
+    figures::SURFACES,
+    figures::SOLIDS,
+    figures::targets::FIGURE,
+    figures::acquisition::FIGURE,
+];
 
 /// Writes the run's tables into its folder: `summary.csv`, `comparison.csv`, `equal_error.csv`.
 ///
@@ -39,11 +52,12 @@ use std::path::Path;
 /// If a file cannot be written.
 pub fn write_tables(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()> {
     let Analysis { comparisons, equal_errors } = analysis;
-    tables::summary::file(run, |_| true).write_csv(&folder.join("summary.csv"))?;
-    let comparison = tables::comparison::comparison_file(comparisons);
-    comparison.write_csv(&folder.join("comparison.csv"))?;
-    let equal_error = tables::comparison::equal_error_file(equal_errors);
-    equal_error.write_csv(&folder.join("equal_error.csv"))
+    let files = [
+        ("summary.csv", tables::summary::file(run, |_| true)),
+        ("comparison.csv", tables::comparison::comparison_file(comparisons)),
+        ("equal_error.csv", tables::comparison::equal_error_file(equal_errors)),
+    ];
+    files.iter().try_for_each(|(name, table)| table.write_csv(&folder.join(name)))
 }
 
 /// Draws everything into the run's folder: `figures/*.svg`, the same as `.png` and `.pdf`,
@@ -68,10 +82,7 @@ pub fn write(run: &Run, analysis: &Analysis, folder: &Path) -> anyhow::Result<()
     let text =
         |name| palpate_input::files::text(&folder.join(name), palpate_input::files::TEXT_MAX).ok();
     let (settings, manifest) = (text(RESOLVED), text(MANIFEST));
-    let explorer = match run.experiment.scene.around {
-        None => explorer::section(run)?,
-        Some(_) => whole::section(run)?,
-    };
+    let explorer = explorer::zone::section(run)? + &whole::section(run)?;
     let files = [settings.as_deref(), manifest.as_deref()];
     let html = page::html(run, analysis, &drawings, &explorer, files);
     Ok(write_whole(&folder.join("report.html"), &html)?)

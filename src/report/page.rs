@@ -4,9 +4,7 @@ use super::canvas::escape;
 use super::figures::Figure;
 use super::files::FORMATS;
 use super::findings;
-use super::html;
-use super::html::{section, wide};
-use super::table::Table;
+use super::html::{self, list, section, tables};
 use super::tables::{comparison, summary};
 use crate::experiment::statistics::analysis::Analysis;
 use crate::experiment::store::Run;
@@ -22,7 +20,7 @@ const RAW: &[(&str, &str)] = &[
     ("manifest.json", "what ran it"),
 ];
 
-/// Failures told one by one; more are only counted.
+/// Failures listed one by one; more are only counted.
 const FAILURES_TOLD: usize = 10;
 
 /// The page as HTML; `explorer` is its moving part, `settings` and `manifest` are the texts of the
@@ -37,7 +35,7 @@ pub fn html(
     let equal = comparison::equal_errors(run, &analysis.equal_errors);
     let against = comparison::comparisons(run, &analysis.comparisons);
     let parts = [
-        notices(&findings::notices(run)),
+        list(" class=\"notices\"", &findings::notices(run)),
         explorer.into(),
         found(run, analysis),
         tables("The paper, and here", &[summary::claims(run)], "told", summary::CLAIMS_NOTE),
@@ -53,15 +51,6 @@ pub fn html(
     html::page("Palpate run", &run.experiment.name, &run.experiment.question, &parts.concat())
 }
 
-/// What a reader should know before anything else, a sentence each.
-fn notices(sentences: &[String]) -> String {
-    let items: String = sentences.iter().map(|it| format!("<li>{}</li>\n", escape(it))).collect();
-    match items.is_empty() {
-        true => items,
-        false => format!("<ul class=\"notices\">\n{items}</ul>\n"),
-    }
-}
-
 /// The verdict in words, then its numbers.
 fn found(run: &Run, analysis: &Analysis) -> String {
     let verdict = match findings::verdicts(run, analysis).join(" ") {
@@ -73,36 +62,22 @@ fn found(run: &Run, analysis: &Analysis) -> String {
     format!("<section>\n<h2>Found</h2>\n{verdict}{numbers}</section>\n")
 }
 
-/// A section of tables of one class; empty if none of them has a row.
-fn tables(title: &str, tables: &[Table], class: &str, note: &str) -> String {
-    let with_rows = tables.iter().filter(|table| !table.rows.is_empty());
-    section(title, &with_rows.map(|table| table.html(class)).collect::<String>(), note)
-}
-
 fn events(run: &Run) -> String {
     let mut items = summary::happened(run);
     let failures = run.rows.iter().filter_map(|row| {
         Some(format!("{}, trial {}: {}", row.planner, row.trial, row.failure.as_ref()?))
     });
     items.extend(failures.take(FAILURES_TOLD));
-    if items.is_empty() {
-        return String::new();
-    }
-    let items: String = items.iter().map(|item| format!("<li>{}</li>\n", escape(item))).collect();
-    format!("<section>\n<h2>What else happened</h2>\n<ul>\n{items}</ul>\n</section>\n")
+    section("What else happened", &list("", &items))
 }
 
 fn figure(run: &Run, figure: &Figure, svg: &str) -> String {
     let name = figure.name;
     let links = FORMATS
         .map(|format| format!("<a href=\"figures/{name}.{format}\">{}</a>", format.to_uppercase()));
-    format!(
-        "<figure id=\"{name}\">\n{}<figcaption>{} <span class=\"files\">{}</span>\
-         </figcaption>\n</figure>\n",
-        wide(svg, "figure"),
-        escape(&(figure.caption)(run)),
-        links.join(" "),
-    )
+    let caption = escape(&(figure.caption)(run));
+    let caption = format!("{caption} <span class=\"files\">{}</span>", links.join(" "));
+    html::figure(name, svg, caption)
 }
 
 fn details(summary: &str, text: Option<&str>) -> String {
@@ -120,5 +95,5 @@ fn raw_files(drawings: &[(&Figure, String)]) -> String {
     if !drawings.is_empty() {
         items += "<li><a href=\"figures/\">figures</a>: each figure as SVG, PNG and PDF</li>\n";
     }
-    format!("<section>\n<h2>Files beside this page</h2>\n<ul>\n{items}</ul>\n</section>\n")
+    section("Files beside this page", &format!("<ul>\n{items}</ul>\n"))
 }

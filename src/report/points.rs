@@ -6,7 +6,7 @@ use std::fmt::Write;
 /// Points in `W`, in metres; joined to a surface or not.
 #[derive(Default)]
 pub struct Points {
-    /// What the file says of itself, a line each.
+    /// Comments at the top of the file, a line each.
     pub comments: Vec<String>,
     /// The points with their unit normals.
     pub points: Vec<(Point3<f64>, Vector3<f64>)>,
@@ -23,19 +23,18 @@ impl Points {
     /// As PLY: `x y z nx ny nz`, with deviations `red green blue sigma_m`, with errors `error_m`.
     pub fn ply(&self) -> String {
         let mut text = String::from("ply\nformat ascii 1.0\n");
-        for comment in &self.comments {
-            let _ = writeln!(text, "comment {comment}");
-        }
-        let _ = writeln!(text, "element vertex {}", self.points.len());
-        for property in ["x", "y", "z", "nx", "ny", "nz"] {
-            let _ = writeln!(text, "property float {property}");
-        }
+        self.comments.iter().for_each(|comment| text += &format!("comment {comment}\n"));
+        text += &format!("element vertex {}\n", self.points.len());
+        let floats = |names: &[&str]| -> String {
+            names.iter().map(|name| format!("property float {name}\n")).collect()
+        };
+        text += &floats(&["x", "y", "z", "nx", "ny", "nz"]);
         if !self.deviations.is_empty() {
-            text += "property uchar red\nproperty uchar green\nproperty uchar blue\n\
-                     property float sigma_m\n";
+            text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+            text += &floats(&["sigma_m"]);
         }
         if !self.errors_m.is_empty() {
-            text += "property float error_m\n";
+            text += &floats(&["error_m"]);
         }
         if !self.triangles.is_empty() {
             let count = self.triangles.len();
@@ -62,9 +61,7 @@ impl Points {
     /// read it, and deviation and error stand in a comment.
     pub fn obj(&self) -> String {
         let mut text = String::new();
-        for comment in &self.comments {
-            let _ = writeln!(text, "# {comment}");
-        }
+        self.comments.iter().for_each(|comment| text += &format!("# {comment}\n"));
         if !self.deviations.is_empty() {
             let error = if self.errors_m.is_empty() { "" } else { " error_m" };
             let _ =

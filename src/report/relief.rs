@@ -1,18 +1,87 @@
 //! A height field or a mesh as a shaded relief in a panel: orthographic view, painter's algorithm.
 
 use super::axes::{Axis, Length, rounded};
-use super::camera::{AZIMUTH_DEG, Camera};
 use super::canvas::{Anchor, Area, Canvas, PointPx, pair};
 use super::style::{self, FAINT_INK, SMALL_PX};
 use nalgebra::Vector3;
-use palpate_geometry::mesh::Mesh;
 
-/// Whence light falls: from the front, so that no relief is dark, and from the viewer's side.
+/// Direction of the light: from the front, so that no relief is dark, and from the viewer's side.
 const LIGHT: Vector3<f64> = Vector3::new(0.45, 0.7, 0.55);
 /// Share of light that comes from everywhere.
 const AMBIENT: f64 = 0.35;
 /// Relief less deep than this share of the zone's longer side is stretched to it.
 const DEPTH_MIN: f64 = 0.25;
+
+/// The default azimuth of the viewer, turned about z from y, the direction of touch. heuristic:
+/// neither side of a bulge hides much.
+pub const AZIMUTH_DEG: f64 = 38.0;
+/// How far the viewer is raised. heuristic: likewise.
+const ELEVATION_DEG: f64 = 24.0;
+
+/// Attributes of marks whose colours do not change with the paper's, because the relief's do not.
+pub const ON_RELIEF: &str = r#"class="relief""#;
+
+/// A viewer at infinity, and where a point lies on a sheet.
+pub struct Camera {
+    right: Vector3<f64>,
+    up: Vector3<f64>,
+    toward: Vector3<f64>,
+    /// Factor by which y is stretched.
+    stretch: f64,
+    scale: f64,
+    shift: PointPx,
+}
+
+impl Camera {
+    /// A viewer turned about z from y towards x, with one pixel a metre about the sheet's corner.
+    pub fn toward(azimuth_deg: f64, stretch: f64) -> Self {
+        let (sin_a, cos_a) = azimuth_deg.to_radians().sin_cos();
+        let (sin_e, cos_e) = ELEVATION_DEG.to_radians().sin_cos();
+        let toward = Vector3::new(sin_a * cos_e, cos_a * cos_e, sin_e);
+        let right = Vector3::new(-cos_a, sin_a, 0.0);
+        Self { right, up: toward.cross(&right), toward, stretch, scale: 1.0, shift: [0.0, 0.0] }
+    }
+
+    /// Pixels per metre at which all `points` fit into `area`.
+    pub fn scale(&self, points: &[Vector3<f64>], area: Area) -> f64 {
+        let [low, high] = self.ends(points);
+        (area.width / (high[0] - low[0])).min(area.height / (high[1] - low[1]))
+    }
+
+    /// The same with so many pixels a metre, and all `points` about the middle of `area`.
+    pub fn scaled(self, px_per_m: f64, points: &[Vector3<f64>], area: Area) -> Self {
+        let ([low, high], centre) = (self.ends(points), area.centre());
+        let shift = std::array::from_fn(|i| centre[i] - px_per_m * 0.5 * (low[i] + high[i]));
+        Self { scale: px_per_m, shift, ..self }
+    }
+
+    /// The corners of a rectangle around points of the sheet.
+    fn ends(&self, points: &[Vector3<f64>]) -> [PointPx; 2] {
+        let end = |start: f64, farther: fn(f64, f64) -> f64| {
+            let at = points.iter().map(|point| self.at(point));
+            at.fold([start; 2], |end, at| [farther(end[0], at[0]), farther(end[1], at[1])])
+        };
+        [end(f64::MAX, f64::min), end(f64::MIN, f64::max)]
+    }
+
+    fn stretched(&self, p: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::new(p.x, p.y * self.stretch, p.z)
+    }
+
+    /// Where a point in metres lies on the sheet.
+    pub fn at(&self, p: &Vector3<f64>) -> PointPx {
+        let p = self.stretched(p);
+        [
+            self.shift[0] + self.scale * p.dot(&self.right),
+            self.shift[1] - self.scale * p.dot(&self.up),
+        ]
+    }
+
+    /// How near the viewer a point is, in pixels.
+    pub fn nearness(&self, p: &Vector3<f64>) -> f64 {
+        self.scale * self.stretched(p).dot(&self.toward)
+    }
+}
 
 /// The space that is drawn, in metres; heights grow towards the viewer.
 #[derive(Clone, Copy, Debug)]
@@ -32,10 +101,6 @@ impl Space {
         let side = length(self.x_m).max(length(self.z_m));
         (DEPTH_MIN * side / length(self.height_m)).max(1.0)
     }
-
-    fn corners(&self) -> impl Iterator<Item = [f64; 3]> {
-        (0..8).map(|i| [self.x_m[i & 1], self.height_m[(i >> 1) & 1], self.z_m[(i >> 2) & 1]])
-    }
 }
 
 /// Room for the title of a panel.
@@ -44,11 +109,19 @@ const TITLE_PX: f64 = 42.0;
 /// The shortest side along which its name fits between the numbers at its ends.
 const UPWARD_MIN_PX: f64 = 80.0;
 
+/// Writes the title of a panel and a score below it.
+pub fn title(canvas: &mut Canvas, area: Area, title: &str, score: &str) {
+    let middle = area.centre()[0];
+    canvas.title([middle, area.top + 14.0], title);
+    canvas.coloured_text([middle, area.top + 31.0], score, SMALL_PX, Anchor::Middle, FAINT_INK);
+}
+
 /// A panel with a title, a space in it, and the ends of its axes.
 pub struct ReliefPanel {
-    /// What is drawn on it.
+    /// The space that is drawn.
     pub space: Space,
-    camera: Camera,
+    /// Where points (x, height, z) of the space lie on the sheet.
+    pub camera: Camera,
     area: Area,
     unit: Length,
 }
@@ -62,75 +135,60 @@ impl ReliefPanel {
             width: area.width - 42.0,
             height: area.height - TITLE_PX - 30.0,
         };
-        let panel = Self { space, camera: Camera::toward(AZIMUTH_DEG), area, unit };
-        let corners: Vec<_> = space.corners().map(|corner| panel.stretched(corner)).collect();
-        let px_per_m = panel.camera.scale(&corners, inner);
-        Self { camera: panel.camera.scaled(px_per_m, &corners, inner), ..panel }
-    }
-
-    /// Where the point (x, height, z) in metres lies on the sheet.
-    pub fn at(&self, point: [f64; 3]) -> PointPx {
-        self.camera.at(&self.stretched(point))
-    }
-
-    /// How near the viewer a point is, in pixels.
-    pub fn nearness(&self, point: [f64; 3]) -> f64 {
-        self.camera.nearness(&self.stretched(point))
-    }
-
-    fn stretched(&self, [x, height, z]: [f64; 3]) -> Vector3<f64> {
-        Vector3::new(x, height * self.space.stretch(), z)
+        let Space { x_m, z_m, height_m } = space;
+        let corner = |i: usize| Vector3::new(x_m[i & 1], height_m[(i >> 1) & 1], z_m[(i >> 2) & 1]);
+        let corners: Vec<_> = (0..8).map(corner).collect();
+        let camera = Camera::toward(AZIMUTH_DEG, space.stretch());
+        let px_per_m = camera.scale(&corners, inner);
+        Self { space, camera: camera.scaled(px_per_m, &corners, inner), area, unit }
     }
 
     /// Title, the zone behind the object, and the ends of its axes.
     pub fn frame(&self, canvas: &mut Canvas, title: &str, score: &str) {
-        let middle = self.area.centre()[0];
-        let top = self.area.top;
-        canvas.title([middle, top + 14.0], title);
-        canvas.coloured_text([middle, top + 31.0], score, SMALL_PX, Anchor::Middle, FAINT_INK);
+        self::title(canvas, self.area, title, score);
         let Space { x_m: [x0, x1], z_m: [z0, z1], height_m: [back, front] } = self.space;
-        let corner = |x, height, z| self.at([x, height, z]);
+        let corner = |x, height, z| self.camera.at(&Vector3::new(x, height, z));
         let stroke = style::stroke(style::FRAME, 0.9);
         let back_wall = [[x0, z0], [x1, z0], [x1, z1], [x0, z1]];
         canvas.polygon(back_wall.map(|[x, z]| corner(x, back, z)), &stroke);
         let floor = [[x0, back], [x1, back], [x1, front], [x0, front]];
         canvas.polygon(floor.map(|[x, height]| corner(x, height, z0)), &stroke);
-        let label = |canvas: &mut Canvas, at: PointPx, words: &str, shift: PointPx, anchor| {
-            let at = [at[0] + shift[0], at[1] + shift[1]];
+        let mut label = |[x, y]: PointPx, words: &str, shift: PointPx, anchor| {
+            let at = [x + shift[0], y + shift[1]];
             canvas.coloured_text(at, words, SMALL_PX, anchor, FAINT_INK);
         };
         let number = |value_m: f64| rounded(value_m * self.unit.per_m);
         for x in [x0, x1] {
-            label(canvas, corner(x, front, z0), &number(x), [-2.0, 14.0], Anchor::Middle);
+            label(corner(x, front, z0), &number(x), [-2.0, 14.0], Anchor::Middle);
         }
-        let words = format!("x ({})", self.unit.symbol);
-        label(canvas, corner(0.5 * (x0 + x1), front, z0), &words, [-6.0, 19.0], Anchor::Middle);
+        label(
+            corner(0.5 * (x0 + x1), front, z0),
+            &self.unit.named("x"),
+            [-6.0, 19.0],
+            Anchor::Middle,
+        );
         for z in [z0, z1] {
-            label(canvas, corner(x1, back, z), &number(z), [-5.0, 4.0], Anchor::End);
+            label(corner(x1, back, z), &number(z), [-5.0, 4.0], Anchor::End);
         }
-        let words = format!("z ({})", self.unit.symbol);
         let [[_, bottom], top] = [z0, z1].map(|z| corner(x1, back, z));
         match bottom - top[1] > UPWARD_MIN_PX {
             true => {
                 let middle = [top[0] - 8.0, 0.5 * (bottom + top[1])];
-                canvas.upward_text(middle, &words, SMALL_PX, FAINT_INK);
+                canvas.upward_text(middle, &self.unit.named("z"), SMALL_PX, FAINT_INK);
             }
-            false => label(canvas, top, &words, [-5.0, -12.0], Anchor::End),
+            false => label(top, &self.unit.named("z"), [-5.0, -12.0], Anchor::End),
         }
     }
 }
 
 /// A part of a surface, as it is drawn.
-pub struct Face {
-    /// Its corners on the sheet.
-    pub outline: Vec<PointPx>,
-    /// How near the viewer its middle is, in pixels.
-    pub nearness: f64,
-    /// Its colour.
-    pub colour: String,
+struct Face {
+    outline: Vec<PointPx>,
+    nearness: f64,
+    colour: String,
 }
 
-/// A surface as faces, ready to be drawn.
+/// A surface as faces, far ones first.
 pub struct Relief {
     faces: Vec<Face>,
 }
@@ -140,44 +198,53 @@ impl Relief {
     /// surface. Heights are coloured along `axis`.
     pub fn new(
         panel: &ReliefPanel,
-        xs: &[f64],
-        zs: &[f64],
+        [xs, zs]: [&[f64]; 2],
         heights_m: &[Option<f64>],
         axis: &Axis,
     ) -> Self {
         let [low, high] = panel.space.height_m;
-        let corner = |i: usize, j: usize| -> Option<[f64; 3]> {
+        let corner = |(i, j): (usize, usize)| -> Option<Vector3<f64>> {
             let height = (*heights_m.get(j * xs.len() + i)?)?;
-            height.is_finite().then_some([xs[i], height.clamp(low, high), zs[j]])
+            let is_known = height.is_finite();
+            is_known.then(|| Vector3::new(xs[i], height.clamp(low, high), zs[j]))
         };
-        let mut faces = Vec::new();
-        for j in 1..zs.len() {
-            for i in 1..xs.len() {
-                let around = [(i - 1, j - 1), (i, j - 1), (i, j), (i - 1, j)];
-                let corners: Vec<[f64; 3]> =
-                    around.into_iter().filter_map(|(i, j)| corner(i, j)).collect();
-                // Three of four still make a face, which smooths the outline of an object.
-                if corners.len() >= 3 {
-                    faces.push(face(panel, &corners, normal(panel, &corners), axis));
-                }
-            }
-        }
-        Self::sorted(faces)
+        let cells = (1..zs.len()).flat_map(|j| (1..xs.len()).map(move |i| (i, j)));
+        let face = |(i, j): (usize, usize)| {
+            let around = [(i - 1, j - 1), (i, j - 1), (i, j), (i - 1, j)];
+            let corners: Vec<_> = around.into_iter().filter_map(corner).collect();
+            // Three of four still make a face, which smooths the outline of an object.
+            (corners.len() >= 3).then(|| {
+                let normal = normal(&panel.camera, &corners);
+                let colour = height_colour(axis, &corners, &normal);
+                (corners, colour)
+            })
+        };
+        Self::of(&panel.camera, cells.filter_map(face))
     }
 
-    /// The triangles of a mesh that face the viewer; heights are measured from a datum.
-    pub fn of_mesh(panel: &ReliefPanel, mesh: &Mesh, datum_y_m: f64, axis: &Axis) -> Self {
-        let seen = mesh.iter_corners().filter_map(|corners| {
-            let [a, b, c] = corners.map(|p_w| [p_w.x, p_w.y - datum_y_m, p_w.z]);
-            let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-            // A sound mesh has no triangle without an area.
-            (panel.camera.sees(&normal)).then(|| face(panel, &[a, b, c], normal.normalize(), axis))
+    /// The triangles that face the viewer, each in the colour of its place in the list, its corners
+    /// and its unit normal.
+    pub fn of_triangles(
+        camera: &Camera,
+        triangles: impl IntoIterator<Item = [Vector3<f64>; 3]>,
+        colour: impl Fn(usize, &[Vector3<f64>], Vector3<f64>) -> String,
+    ) -> Self {
+        let seen = triangles.into_iter().enumerate().filter_map(|(i, corners)| {
+            let [a, b, c] = corners;
+            let normal = (b - a).cross(&(c - a)).try_normalize(0.0)?;
+            let is_seen = normal.dot(&camera.toward) > 0.0;
+            is_seen.then(|| (corners.to_vec(), colour(i, &corners, normal)))
         });
-        Self::sorted(seen.collect())
+        Self::of(camera, seen)
     }
 
-    /// Puts far faces first.
-    pub fn sorted(mut faces: Vec<Face>) -> Self {
+    fn of(camera: &Camera, faces: impl Iterator<Item = (Vec<Vector3<f64>>, String)>) -> Self {
+        let face = |(corners, colour): (Vec<Vector3<f64>>, String)| {
+            let nearness = corners.iter().map(|corner| camera.nearness(corner)).sum::<f64>();
+            let outline = corners.iter().map(|corner| camera.at(corner)).collect();
+            Face { outline, nearness: nearness / corners.len() as f64, colour }
+        };
+        let mut faces: Vec<Face> = faces.map(face).collect();
         faces.sort_by(|a, b| a.nearness.total_cmp(&b.nearness));
         Self { faces }
     }
@@ -195,56 +262,50 @@ impl Relief {
         });
     }
 
-    /// Whether it hides a point of the sheet that is as near as this, on the surface or behind it.
-    pub fn hides(&self, at: PointPx, nearness: f64) -> bool {
+    /// Whether it hides a point, on the surface or behind it.
+    pub fn hides(&self, camera: &Camera, p: &Vector3<f64>) -> bool {
         // A contact on the surface is not hidden by the faces around it.
         const ON_SURFACE_PX: f64 = 8.0;
-        let nearness = nearness + ON_SURFACE_PX;
+        let (at, nearness) = (camera.at(p), camera.nearness(p) + ON_SURFACE_PX);
         (self.faces.iter()).any(|face| face.nearness > nearness && contains(&face.outline, at))
     }
 
-    /// Draws a touch at a point of the sheet and as near as this; hollow if the surface hides it.
+    /// Draws a touch at a point; hollow if the surface hides it.
     pub fn mark(
         &self,
         canvas: &mut Canvas,
-        (at, nearness): (PointPx, f64),
+        (camera, p): (&Camera, &Vector3<f64>),
         radius: f64,
         colour: &str,
     ) {
-        let attributes = match self.hides(at, nearness) {
+        let attributes = match self.hides(camera, p) {
             true => style::hidden(colour),
             false => style::visible(colour),
         };
-        canvas.circle(at, radius, &attributes);
+        canvas.circle(camera.at(p), radius, &attributes);
     }
 }
 
 /// Unit normal of a height field's face, towards the front.
-fn normal(panel: &ReliefPanel, corners: &[[f64; 3]]) -> Vector3<f64> {
-    let [first, second, third] =
-        [corners[0], corners[1], corners[corners.len() - 1]].map(|corner| panel.stretched(corner));
-    let opposite = panel.stretched(corners[2]);
+fn normal(camera: &Camera, corners: &[Vector3<f64>]) -> Vector3<f64> {
+    let corners: Vec<_> = corners.iter().map(|corner| camera.stretched(corner)).collect();
     // Of a quadrilateral, its diagonals span the mean plane.
-    let (along, across) = match corners.len() {
-        4 => (opposite - first, third - second),
-        _ => (second - first, third - first),
+    let (along, across) = match corners[..] {
+        [a, b, c, d] => (c - a, d - b),
+        _ => (corners[1] - corners[0], corners[2] - corners[0]),
     };
     let normal = along.cross(&across).try_normalize(0.0).unwrap_or_else(Vector3::y);
     if normal.y < 0.0 { -normal } else { normal }
 }
 
-fn face(panel: &ReliefPanel, corners: &[[f64; 3]], normal: Vector3<f64>, axis: &Axis) -> Face {
-    let count = corners.len() as f64;
-    let mean_height = corners.iter().map(|corner| corner[1]).sum::<f64>() / count;
-    Face {
-        outline: corners.iter().map(|&corner| panel.at(corner)).collect(),
-        nearness: corners.iter().map(|&corner| panel.nearness(corner)).sum::<f64>() / count,
-        colour: style::height(axis.fraction(mean_height), brightness(normal)),
-    }
+/// The colour of a face by the mean height of its corners along `axis`, and its light.
+pub fn height_colour(axis: &Axis, corners: &[Vector3<f64>], normal: &Vector3<f64>) -> String {
+    let mean = corners.iter().map(|corner| corner.y).sum::<f64>() / corners.len() as f64;
+    style::height(axis.fraction(mean), brightness(normal))
 }
 
 /// Brightness of a matt face of this unit normal (x, height, z), 0..1.
-pub fn brightness(normal: Vector3<f64>) -> f64 {
+pub fn brightness(normal: &Vector3<f64>) -> f64 {
     AMBIENT + (1.0 - AMBIENT) * normal.dot(&LIGHT.normalize()).max(0.0)
 }
 

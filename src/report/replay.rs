@@ -1,22 +1,25 @@
 //! Beliefs as they were: a recorded trial's touches and hyperparameters, conditioned again.
 
-use crate::experiment::Experiment;
 use crate::experiment::measure::metrics::Metrics;
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::report::canvas::{Canvas, PointPx};
-use crate::report::number::digits;
-use crate::report::style::{self, INITIAL, LATER};
+use crate::report::style;
+use crate::report::table::digits;
 use anyhow::{Context, ensure};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::belief::HeightField;
 use palpate_explore::probe::{Contact, Swept, Touch};
+use palpate_explore::robot::finger::Finger;
 use palpate_explore::task::Zone;
 use palpate_gp::Posterior;
 
+/// The score of a belief that there is none of.
+pub const NOT_REACHED: &str = "not reached in this trial";
+
 /// One planner's belief after some touches of the trial that the report draws.
 pub struct Replay<'a> {
-    /// What was known.
+    /// The belief.
     pub belief: HeightField,
     /// The posterior of the surface.
     pub surface: Posterior,
@@ -36,48 +39,24 @@ impl<'a> Replay<'a> {
     /// # Errors
     /// If the recorded touches do not belong to the zone or cannot be conditioned on.
     pub fn new(run: &'a Run, planner: &str, count: u32) -> anyhow::Result<Option<Self>> {
-        row(run, planner).map_or(Ok(None), |row| Self::of(&run.experiment, row, count))
-    }
-
-    /// The same with a score in words, also where there is no belief.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
-    pub fn scored(
-        run: &'a Run,
-        planner: &str,
-        count: u32,
-    ) -> anyhow::Result<(Option<Self>, String)> {
-        let replay = Self::new(run, planner, count)?;
-        let score = replay.as_ref().map_or("not reached in this trial".into(), Self::score);
-        Ok((replay, score))
-    }
-
-    /// The belief of the trial `row` after `count` touches; none if it ended before, or had no fit
-    /// then.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
-    pub fn of(
-        experiment: &Experiment,
-        row: &'a TrialRow,
-        count: u32,
-    ) -> anyhow::Result<Option<Self>> {
+        let Some(row) = row(run, planner) else { return Ok(None) };
         let Some(touches) = row.touches.get(..count as usize) else { return Ok(None) };
         let Some(last) = touches.last() else { return Ok(None) };
-        let Some(fit) = &last.fit else { return Ok(None) };
-        let Some(zone) = &experiment.scene.zone else { return Ok(None) };
+        let (Some(fit), Some(zone)) = (&last.fit, &run.experiment.scene.zone) else {
+            return Ok(None);
+        };
         let place = || format!("trial {} of {}, touch {count}", row.trial, row.planner);
-        let mut belief = HeightField::new(zone.clone(), experiment.gp.clone());
+        let mut belief = HeightField::new(zone.clone(), run.experiment.gp.clone());
         for touch in touches {
             let target = touch.target.place().filter(|it| it.len() == zone.dimension());
             let target = target.with_context(|| {
                 format!("{}: a target that is no place of the zone: {:?}", place(), touch.target)
             })?;
-            belief.observe(target, &met(zone, touch));
-            if let Some(tip) = touch.tip {
-                let finger = experiment.scene.finger.clone();
-                belief.observe_swept(&Swept { finger, p_wt: Point3::from(tip) });
+            // A normal that is not recorded was not observed.
+            let touched = touched(touch, Some(-zone.ahead_w().into_inner()))?;
+            belief.observe(target, &touched);
+            if let Some(swept) = swept(run.experiment.scene.finger.clone(), touch) {
+                belief.observe_swept(&swept);
             }
         }
         belief.condition(fit).with_context(place)?;
@@ -88,13 +67,14 @@ impl<'a> Replay<'a> {
             metrics: last.metrics,
             touches,
             next: row.touches.get(count as usize),
-            initial_touches: experiment.initial_touches as usize,
+            initial_touches: run.experiment.initial_touches as usize,
         }))
     }
 
-    /// Every touch with whether it is one of the initial ones.
-    pub fn marks(&self) -> impl Iterator<Item = (&TouchRow, bool)> {
-        self.touches.iter().enumerate().map(|(i, touch)| (touch, i < self.initial_touches))
+    /// Every touch with its colour.
+    pub fn marks(&self) -> impl Iterator<Item = (&TouchRow, &'static str)> {
+        let colour = |i| style::touch(i < self.initial_touches);
+        self.touches.iter().enumerate().map(move |(i, touch)| (touch, colour(i)))
     }
 
     /// Its agreement with the truth, in words.
@@ -120,8 +100,7 @@ impl<'a> Replay<'a> {
         width: f64,
         at: impl Fn(&[f64], Option<f64>) -> PointPx,
     ) {
-        for (touch, is_initial) in self.marks() {
-            let colour = if is_initial { INITIAL } else { LATER };
+        for (touch, colour) in self.marks() {
             match contact(self.belief.zone(), touch) {
                 Some((place, height_m)) => canvas.cross(at(&place, Some(height_m)), colour),
                 None => {
@@ -210,13 +189,25 @@ pub fn heights_m<'a>(
     run.truth.heights_m.iter().flatten().copied().chain(touched)
 }
 
-fn met(zone: &Zone, touch: &TouchRow) -> Touch {
-    match touch.contact {
-        // A normal that is not recorded was not observed.
-        Some(p_wc) => Touch::Contact(Contact {
-            p_wc: Point3::from(p_wc),
-            normal_w: touch.normal.map_or_else(|| -zone.ahead_w().into_inner(), Vector3::from),
-        }),
+/// A recorded touch as it was observed; `normal_w` is that of a contact without one.
+///
+/// # Errors
+/// If there is a contact without a normal.
+pub(super) fn touched(touch: &TouchRow, normal_w: Option<Vector3<f64>>) -> anyhow::Result<Touch> {
+    Ok(match touch.contact.map(Point3::from) {
+        Some(p_wc) => {
+            let normal_w = touch.normal.map(Vector3::from).or(normal_w);
+            Touch::Contact(Contact {
+                p_wc,
+                normal_w: normal_w.context("a contact without its normal")?,
+            })
+        }
+        None if touch.overload => Touch::Overload,
         None => Touch::Miss,
-    }
+    })
+}
+
+/// The volume that the finger swept in a recorded touch, if it is known.
+pub(super) fn swept(finger: Finger, touch: &TouchRow) -> Option<Swept> {
+    Some(Swept { finger, p_wt: Point3::from(touch.tip?) })
 }

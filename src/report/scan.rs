@@ -3,15 +3,15 @@
 
 use super::axes::{Axis, Length, height_bar};
 use super::canvas::{Area, Canvas};
-use super::relief::{Relief, ReliefPanel, Space, brightness};
+use super::relief::{Relief, ReliefPanel, Space, height_colour};
 use super::style::{self, LATER};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::task::Zone;
 use palpate_geometry::mesh::Mesh;
 
-/// Sizes of a panel of a scene and of a scan.
-const ZONE_PX: (f64, f64) = (560.0, 560.0);
-const SCAN_PX: (f64, f64) = (430.0, 480.0);
+/// Size of a panel of a scene and of a scan.
+const ZONE_PX: [f64; 2] = [560.0, 560.0];
+const SCAN_PX: [f64; 2] = [430.0, 480.0];
 const FOOT_PX: f64 = 64.0;
 /// Places along each side of the zone from which its heights are known. heuristic: as a report.
 const GRID: usize = 41;
@@ -19,60 +19,57 @@ const GRID: usize = 41;
 /// True height above the datum at a place of a zone, m; none where there is no surface.
 pub type Heights<'a> = &'a dyn Fn(&[f64]) -> Option<f64>;
 
+/// A point of contact with its normal, in `W`.
+type Contact = (Point3<f64>, Vector3<f64>);
+
 /// A mesh in `W` with the rim of the zone on it as SVG, its heights above the datum coloured; none
 /// without a second coordinate or a surface.
 pub fn zone_picture(zone: &Zone, mesh: &Mesh, height_m: Heights) -> Option<String> {
-    zone.z_m?;
-    let unit = Length::of(zone);
-    let grid = zone.grid(GRID);
-    let heights_m = grid.iter().filter_map(|place| height_m(place));
+    let heights_m = zone.grid(GRID).into_iter().filter_map(|place| height_m(&place));
     let axis = Axis::around(heights_m, 0.04, 5.0)?;
-    let mut canvas = Canvas::new(ZONE_PX.0, ZONE_PX.1 + FOOT_PX);
-    let area = Area { left: 0.0, top: 8.0, width: ZONE_PX.0, height: ZONE_PX.1 };
-    draw_object(&mut canvas, area, (zone, mesh, height_m), &axis);
-    let bar = Area { left: 210.0, top: ZONE_PX.1 + 20.0, width: 300.0, height: 13.0 };
-    height_bar(&mut canvas, bar, unit, axis.range().into());
-    Some(canvas.finish())
+    draw((zone, mesh, height_m), &axis, None)
 }
 
 /// The object on the left with the zone's rim on it, the points of contact on the right, as SVG;
 /// none without points.
-pub fn picture(
-    (zone, mesh, height_m): (&Zone, &Mesh, Heights),
-    points: &[(Point3<f64>, Vector3<f64>)],
+pub fn picture(object: (&Zone, &Mesh, Heights), contacts: &[Contact]) -> Option<String> {
+    let heights_m = contacts.iter().map(|(p_w, _)| object.0.height_m(p_w));
+    draw(object, &Axis::around(heights_m, 0.04, 5.0)?, Some(contacts))
+}
+
+/// Heights are coloured along `axis`.
+fn draw(
+    object: (&Zone, &Mesh, Heights),
+    axis: &Axis,
+    contacts: Option<&[Contact]>,
 ) -> Option<String> {
+    let zone = object.0;
+    let space = Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: axis.range().into() };
     let unit = Length::of(zone);
-    let x_zw = zone.x_wz().inverse();
-    let heights_m = || points.iter().map(|(p_w, _)| zone.height_m(p_w));
-    let inside = Axis::around(heights_m(), 0.04, 5.0)?;
-
-    let mut canvas = Canvas::new(2.0 * SCAN_PX.0, SCAN_PX.1 + FOOT_PX);
-    let area = |column: f64| Area {
-        left: column * SCAN_PX.0,
-        top: 8.0,
-        width: SCAN_PX.0,
-        height: SCAN_PX.1,
+    let ([width, height], columns, bar_px) = match contacts {
+        None => (ZONE_PX, 1.0, 210.0),
+        Some(_) => (SCAN_PX, 2.0, SCAN_PX[0] - 60.0),
     };
-    draw_object(&mut canvas, area(0.0), (zone, mesh, height_m), &inside);
-
-    let (low, high) = inside.range();
-    let space = Space { x_m: zone.x_m, z_m: zone.z_m?, height_m: [low, high] };
-    let panel = ReliefPanel::new(unit, area(1.0), space);
-    panel.frame(&mut canvas, &format!("{} points of contact", points.len()), "");
-    let mut seen: Vec<_> = points
-        .iter()
-        .map(|(p_w, normal_w)| {
-            let (p_z, normal_z) = (x_zw * p_w, x_zw.rotation * normal_w);
-            ([p_z.x, p_z.y - zone.datum_y_m(), p_z.z], normal_z)
-        })
-        .collect();
-    seen.sort_by(|(a, _), (b, _)| panel.nearness(*a).total_cmp(&panel.nearness(*b)));
-    for (point, normal) in seen {
-        let colour = style::height(inside.fraction(point[1]), brightness(normal));
-        canvas.circle(panel.at(point), 2.0, &style::fill(&colour, 1.0));
+    let mut canvas = Canvas::new(columns * width, height + FOOT_PX);
+    let first = Area { left: 0.0, top: 8.0, width, height };
+    draw_object(&mut canvas, first, object, axis);
+    if let Some(contacts) = contacts {
+        let panel = ReliefPanel::new(unit, Area { left: width, ..first }, space);
+        panel.frame(&mut canvas, &format!("{} points of contact", contacts.len()), "");
+        let (camera, x_zw) = (&panel.camera, zone.x_wz().inverse());
+        let in_zone = |(p_w, normal_w): &Contact| {
+            let p_z = (x_zw * p_w).coords - zone.datum_y_m() * Vector3::y();
+            (p_z, x_zw.rotation * normal_w)
+        };
+        let mut seen: Vec<_> = contacts.iter().map(in_zone).collect();
+        seen.sort_by(|(a, _), (b, _)| camera.nearness(a).total_cmp(&camera.nearness(b)));
+        for (point, normal) in seen {
+            let colour = height_colour(axis, &[point], &normal);
+            canvas.circle(camera.at(&point), 2.0, &style::fill(&colour, 1.0));
+        }
     }
-    let bar = Area { left: SCAN_PX.0 - 60.0, top: SCAN_PX.1 + 20.0, width: 300.0, height: 13.0 };
-    height_bar(&mut canvas, bar, unit, [low, high]);
+    let bar = Area { left: bar_px, top: height + 20.0, width: 300.0, height: 13.0 };
+    height_bar(&mut canvas, bar, unit, space.height_m);
     Some(canvas.finish())
 }
 
@@ -106,13 +103,16 @@ fn draw_object(
     let area = Area { left: area.left + LEFT_PX, width: area.width - LEFT_PX, ..area };
     let panel = ReliefPanel::new(unit, area, space);
     panel.frame(canvas, "the object, and the zone on it", "");
-    Relief::of_mesh(&panel, mesh, zone.datum_y_m(), axis).draw(canvas);
+    let at = |x_m, height_m, z_m| panel.camera.at(&Vector3::new(x_m, height_m, z_m));
+    let datum = zone.datum_y_m() * Vector3::y();
+    let triangles = mesh.iter_corners().map(|corners| corners.map(|p_z| p_z.coords - datum));
+    let colour = |_, corners: &[Vector3<f64>], normal| height_colour(axis, corners, &normal);
+    Relief::of_triangles(&panel.camera, triangles, colour).draw(canvas);
     for side in rim(zone) {
         // Where the zone looks past the object, its rim is seen at the height of the datum.
-        let at_datum = side.iter().map(|place| panel.at([place[0], 0.0, place[1]]));
+        let at_datum = side.iter().map(|place| at(place[0], 0.0, place[1]));
         canvas.line(at_datum, &style::stroke(LATER, 0.6));
-        let on_surface =
-            side.iter().map(|place| Some(panel.at([place[0], height_m(place)?, place[1]])));
+        let on_surface = side.iter().map(|place| Some(at(place[0], height_m(place)?, place[1])));
         let on_surface: Vec<_> = on_surface.collect();
         for part in on_surface.split(Option::is_none) {
             canvas.line(part.iter().flatten().copied(), &style::stroke(LATER, 2.0));

@@ -23,12 +23,15 @@ pub const PAPER: &str = "#ffffff";
 pub const FRAME: &str = "#9a9a9a";
 /// The true surface.
 pub const TRUTH: &str = "#009e73";
-/// The same as red, green and blue.
-pub const TRUTH_RGB: [f64; 3] = [0.0, 158.0, 115.0];
 /// Touches that every planner starts with.
 pub const INITIAL: &str = "#0046c8";
 /// Touches that a planner chose.
 pub const LATER: &str = "#d00000";
+/// The colour of a touch.
+pub fn touch(is_initial: bool) -> &'static str {
+    if is_initial { INITIAL } else { LATER }
+}
+
 /// The place where the belief is least sure.
 pub const MAXIMUM: &str = "#000000";
 
@@ -40,24 +43,20 @@ pub const BAND_OPACITY: f64 = 0.22;
 const SPARE: [&str; 8] =
     ["#e69f00", "#56b4e9", "#000000", "#7a5195", "#8c6d31", "#667788", "#2f8f8f", "#b0305c"];
 
-/// Planners with a colour of their own.
-const OWN: [&str; 3] = ["active", "random", "sobol"];
+/// Planners with a colour of their own, as in the paper.
+const OWN: [(&str, &str); 3] = [("active", "#0072b2"), ("random", "#d55e00"), ("sobol", "#cc79a7")];
 
-/// The colour of a planner; the paper's two keep theirs.
+/// The colour of a planner.
 pub fn planner(planners: &[String], name: &str) -> &'static str {
-    match name {
-        "active" => "#0072b2",
-        "random" => "#d55e00",
-        "sobol" => "#cc79a7",
-        _ => {
-            let is_spare = |planner: &&String| !OWN.contains(&planner.as_str());
-            let index = planners.iter().filter(is_spare).position(|planner| planner == name);
-            SPARE[index.unwrap_or(0) % SPARE.len()]
-        }
-    }
+    let own = |name: &str| OWN.iter().find(|(planner, _)| *planner == name);
+    let mut others = planners.iter().filter(|planner| own(planner).is_none());
+    own(name).map_or_else(
+        || SPARE[others.position(|planner| planner == name).unwrap_or(0) % SPARE.len()],
+        |(_, colour)| colour,
+    )
 }
 
-/// What takes the place of a colour of drawings where they stand on dark paper.
+/// Colours of drawings on light paper, each with the one that replaces it on dark paper.
 pub const ON_DARK: [(&str, &str); 19] = [
     (PAPER, "#16191d"),
     (INK, "#e6e6e6"),
@@ -89,11 +88,12 @@ pub fn on_both(colour: &'static str) -> [&'static str; 2] {
 /// The colours of a moving picture of touches, for its script.
 pub fn touch_colours() -> Value {
     json!({
-        "deviation": DEVIATION,
-        "error": ERROR,
-        "truth": TRUTH_RGB,
+        "deviation": DEVIATION.map(rgb),
+        "error": ERROR.map(rgb),
+        "truth": rgb(0x009e73),
         "initial": on_both(INITIAL),
         "later": on_both(LATER),
+        "height": HEIGHT.map(rgb),
     })
 }
 
@@ -114,6 +114,11 @@ pub fn fill(colour: &str, opacity: f64) -> String {
     format!(r#"fill="{colour}" fill-opacity="{opacity}""#)
 }
 
+/// Attributes of a small point.
+pub fn dot(colour: &str) -> String {
+    format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".7""#)
+}
+
 /// Attributes of a touch that is seen.
 pub fn visible(colour: &str) -> String {
     format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".9""#)
@@ -125,37 +130,20 @@ pub fn hidden(colour: &str) -> String {
 }
 
 /// Viridis, dark to light.
-pub const DEVIATION: [[f64; 3]; 9] = [
-    [68.0, 1.0, 84.0],
-    [71.0, 44.0, 122.0],
-    [59.0, 81.0, 139.0],
-    [44.0, 113.0, 142.0],
-    [33.0, 144.0, 141.0],
-    [39.0, 173.0, 129.0],
-    [92.0, 200.0, 99.0],
-    [170.0, 220.0, 50.0],
-    [253.0, 231.0, 37.0],
-];
+pub const DEVIATION: [u32; 9] =
+    [0x440154, 0x472c7a, 0x3b518b, 0x2c718e, 0x21908d, 0x27ad81, 0x5cc863, 0xaadc32, 0xfde725];
 
 /// Slate to cream: pale enough for blue and red points to stand out under shading.
-pub const HEIGHT: [[f64; 3]; 5] = [
-    [104.0, 134.0, 158.0],
-    [150.0, 178.0, 184.0],
-    [196.0, 211.0, 196.0],
-    [230.0, 228.0, 193.0],
-    [252.0, 238.0, 190.0],
-];
+pub const HEIGHT: [u32; 5] = [0x68869e, 0x96b2b8, 0xc4d3c4, 0xe6e4c1, 0xfceebe];
 
 /// ColorBrewer's PuOr: too low, right, too high; neither end is the colour of a touch.
-pub const ERROR: [[f64; 3]; 7] = [
-    [84.0, 39.0, 136.0],
-    [153.0, 142.0, 195.0],
-    [216.0, 218.0, 235.0],
-    [247.0, 247.0, 247.0],
-    [254.0, 224.0, 182.0],
-    [241.0, 163.0, 64.0],
-    [179.0, 88.0, 6.0],
-];
+pub const ERROR: [u32; 7] = [0x542788, 0x998ec3, 0xd8daeb, 0xf7f7f7, 0xfee0b6, 0xf1a340, 0xb35806];
+
+/// Red, green and blue of a colour, 0..255.
+pub fn rgb(colour: u32) -> [f64; 3] {
+    let [_, red, green, blue] = colour.to_be_bytes().map(f64::from);
+    [red, green, blue]
+}
 
 /// Colour of a standard deviation, 0..1 of the largest.
 pub fn deviation(fraction: f64) -> String {
@@ -167,9 +155,11 @@ pub fn deviation_rgb(fraction: f64) -> [u8; 3] {
     between(&DEVIATION, fraction).map(|channel| channel.round() as u8)
 }
 
-/// Colour of what is `map` at a fraction of it, under light of strength 0..1.
-pub fn lit(map: &[[f64; 3]], fraction: f64, light: f64) -> String {
-    hex(between(map, fraction).map(|channel| channel * light))
+/// Colour at a fraction of `map`, under light of strength 0..1.
+pub fn lit(map: &[u32], fraction: f64, light: f64) -> String {
+    let channels = between(map, fraction).map(|channel| (channel * light).round() as u8);
+    let [red, green, blue] = channels;
+    format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
 /// Colour of a height, 0..1 of the range, under light of strength 0..1.
@@ -177,14 +167,9 @@ pub fn height(fraction: f64, light: f64) -> String {
     lit(&HEIGHT, fraction, light)
 }
 
-fn between(map: &[[f64; 3]], fraction: f64) -> [f64; 3] {
+fn between(map: &[u32], fraction: f64) -> [f64; 3] {
     let place = fraction.clamp(0.0, 1.0) * (map.len() - 1) as f64;
     let below = (place as usize).min(map.len() - 2);
-    let t = place - below as f64;
-    std::array::from_fn(|i| map[below][i] + t * (map[below + 1][i] - map[below][i]))
-}
-
-fn hex(rgb: [f64; 3]) -> String {
-    let [red, green, blue] = rgb.map(|channel| channel.round() as u8);
-    format!("#{red:02x}{green:02x}{blue:02x}")
+    let (t, low, high) = (place - below as f64, rgb(map[below]), rgb(map[below + 1]));
+    std::array::from_fn(|i| low[i] + t * (high[i] - low[i]))
 }

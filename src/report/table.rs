@@ -2,12 +2,10 @@
 //!
 //! Readers are shown rounded numbers in the column's unit; files hold every digit, in SI units.
 
-use crate::experiment::measure::Direction;
+use crate::experiment::measure::{Direction, Measure};
 use crate::experiment::statistics::equal_error::Estimate;
 use crate::experiment::store::write_whole;
 use crate::report::canvas::escape;
-use crate::report::html::wide;
-use crate::report::number::{digits, with_interval};
 use anyhow::Context;
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -28,29 +26,22 @@ pub struct Column {
     title: Option<String>,
     note: &'static str,
     symbol: &'static str,
-    per_si: Option<f64>,
-    decimals: Option<usize>,
+    /// How many of its unit make one of the SI unit, and decimals; three significant digits of the
+    /// SI unit where there are none.
+    scale: Option<(f64, usize)>,
     has_interval: bool,
 }
 
-/// A value in a table.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum Cell {
-    /// No value.
-    #[default]
-    Empty,
-    /// Words, or a number that is shown in its own way.
-    Text(String),
-    /// A count.
-    Count(usize),
-    /// A number, in SI units.
-    Number(f64),
-    /// A mean with its standard error.
-    Mean(f64, Option<f64>),
-    /// A number with its interval.
-    Interval(Estimate),
-    /// A value and what it establishes: "better" or "worse".
-    Verdict(Box<Cell>, &'static str),
+/// A value in a table; the default is none.
+#[derive(Clone, Debug, Default)]
+pub struct Cell {
+    /// Words, a count, or a number in SI units, as files hold it.
+    value: Value,
+    /// The standard error of a mean.
+    error: Option<f64>,
+    interval: Option<[f64; 2]>,
+    /// The verdict: "better" or "worse".
+    verdict: Option<&'static str>,
 }
 
 impl Column {
@@ -70,14 +61,10 @@ impl Column {
         Self { note, ..self }
     }
 
-    /// With the unit in which its numbers are shown, of which `per_si` make one of the SI unit.
-    pub fn unit(self, symbol: &'static str, per_si: f64) -> Self {
-        Self { symbol, per_si: Some(per_si), ..self }
-    }
-
-    /// With as many decimals of its numbers.
-    pub fn decimals(self, decimals: usize) -> Self {
-        Self { decimals: Some(decimals), ..self }
+    /// With the unit in which its numbers are shown, of which `per_si` make one of the SI unit, and
+    /// their decimals.
+    pub fn unit(self, symbol: &'static str, per_si: f64, decimals: usize) -> Self {
+        Self { symbol, scale: Some((per_si, decimals)), ..self }
     }
 
     /// With the ends of an interval behind it in files, as `NAME_low` and `NAME_high`.
@@ -86,121 +73,62 @@ impl Column {
     }
 
     fn shown(&self, value: f64) -> String {
-        let value = value * self.per_si.unwrap_or(1.0);
-        match self.decimals {
-            Some(decimals) if value.is_finite() => format!("{value:.decimals$}"),
+        match self.scale {
+            Some((per_si, decimals)) if value.is_finite() => {
+                format!("{:.decimals$}", per_si * value)
+            }
             _ => digits(value),
         }
     }
 
-    /// The head, with `before` between it and the unit.
-    fn head(&self, head: &str, before: &str) -> String {
-        let before = if self.symbol.is_empty() { "" } else { before };
-        format!("{head}{before}{}", self.symbol)
-    }
-
-    /// The head on a terminal.
-    fn short(&self) -> String {
-        self.head(&self.name, " ")
-    }
-
-    /// The head on a page.
-    fn long(&self) -> String {
-        self.head(self.title.as_ref().unwrap_or(&self.name), ", ")
-    }
-
-    /// Its columns in files, each with its note.
-    fn in_files(&self) -> Vec<(String, &'static str)> {
-        let mut columns = vec![(self.name.clone(), self.note)];
-        if self.has_interval {
-            columns
-                .push((format!("{}_low", self.name), "Lower end of its 95 % bootstrap interval."));
-            columns.push((format!("{}_high", self.name), "Upper end."));
-        }
-        columns
+    /// The head with its unit: the title where there is room, the name on a terminal.
+    fn head(&self, has_room: bool) -> String {
+        let (head, before) = match (&self.title, has_room) {
+            (Some(title), true) => (title, ", "),
+            (None, true) => (&self.name, ", "),
+            (_, false) => (&self.name, " "),
+        };
+        if self.symbol.is_empty() { head.clone() } else { format!("{head}{before}{}", self.symbol) }
     }
 }
 
 impl Cell {
+    /// An estimate with its interval.
+    pub fn estimate(estimate: impl Into<Option<Estimate>>) -> Self {
+        let estimate = estimate.into();
+        let interval = estimate.and_then(|estimate| estimate.interval);
+        Self { interval, ..Self::from(estimate.map(|estimate| estimate.value)) }
+    }
+
+    /// A mean with its standard error.
+    pub fn mean(mean: f64, error: Option<f64>) -> Self {
+        Self { error, ..Self::from(mean) }
+    }
+
     /// With what the interval of an estimate establishes in which `direction` is better and both
     /// are as good at `even`.
     pub fn judged(self, interval: Option<[f64; 2]>, even: f64, direction: Direction) -> Self {
-        match verdict(interval, even, direction) {
-            Some(word) => Self::Verdict(Box::new(self), word),
-            None => self,
-        }
+        Self { verdict: verdict(interval, even, direction), ..self }
     }
 
     fn words(&self, column: &Column) -> String {
-        match self {
-            Self::Empty => "-".into(),
-            Self::Text(words) => words.clone(),
-            Self::Count(count) => count.to_string(),
-            Self::Number(value) | Self::Mean(value, None) => column.shown(*value),
-            Self::Mean(value, Some(error)) => {
-                format!("{} ± {}", column.shown(*value), column.shown(*error))
+        let shown = |value| column.shown(value);
+        match (&self.value, self.error) {
+            (Value::Null, _) => "-".into(),
+            (Value::String(words), _) => words.clone(),
+            (Value::Number(number), error) if number.is_f64() => {
+                let value = number.as_f64().unwrap_or(f64::NAN);
+                let error = error.map_or(String::new(), |error| format!(" ± {}", shown(error)));
+                with_interval(value, self.interval, &shown) + &error
             }
-            Self::Interval(Estimate { value, interval }) => {
-                with_interval(*value, *interval, &|value| column.shown(value))
-            }
-            Self::Verdict(cell, _) => cell.words(column),
+            (count, _) => count.to_string(),
         }
     }
-
-    /// Its values in the columns that its column has in files.
-    fn in_files(&self, column: &Column) -> Vec<Value> {
-        let mut values = vec![match self {
-            Self::Empty => Value::Null,
-            Self::Text(words) => words.as_str().into(),
-            Self::Count(count) => (*count).into(),
-            Self::Number(value) | Self::Mean(value, _) => (*value).into(),
-            Self::Interval(estimate) => estimate.value.into(),
-            Self::Verdict(cell, _) => return cell.in_files(column),
-        }];
-        if column.has_interval {
-            let ends = match self {
-                Self::Interval(Estimate { interval: Some(ends), .. }) => ends.map(Value::from),
-                _ => [Value::Null, Value::Null],
-            };
-            values.extend(ends);
-        }
-        values
-    }
 }
 
-impl From<&str> for Cell {
-    fn from(words: &str) -> Self {
-        Self::Text(words.into())
-    }
-}
-
-impl From<String> for Cell {
-    fn from(words: String) -> Self {
-        Self::Text(words)
-    }
-}
-
-impl From<usize> for Cell {
-    fn from(count: usize) -> Self {
-        Self::Count(count)
-    }
-}
-
-impl From<f64> for Cell {
-    fn from(value: f64) -> Self {
-        Self::Number(value)
-    }
-}
-
-impl From<Estimate> for Cell {
-    fn from(estimate: Estimate) -> Self {
-        Self::Interval(estimate)
-    }
-}
-
-impl<T: Into<Cell>> From<Option<T>> for Cell {
-    fn from(value: Option<T>) -> Self {
-        value.map_or(Self::Empty, T::into)
+impl<T: Into<Value>> From<T> for Cell {
+    fn from(value: T) -> Self {
+        Self { value: value.into(), ..Self::default() }
     }
 }
 
@@ -218,14 +146,13 @@ impl Table {
         columns: Vec<(Column, C)>,
         cell: impl Fn(&R, &C) -> Option<Cell>,
     ) -> Self {
-        let mut table = Self::default();
         let (heads, keys): (Vec<Column>, Vec<C>) = columns.into_iter().unzip();
-        table.columns = [Column::new(corner)].into_iter().chain(heads).collect();
+        let mut table = Self::new([Column::new(corner)].into_iter().chain(heads));
         for (name, row) in rows {
             let cells: Vec<Option<Cell>> = keys.iter().map(|column| cell(&row, column)).collect();
             if cells.iter().any(Option::is_some) {
-                let cells = cells.into_iter().map(Cell::from);
-                table.rows.push([Cell::Text(name)].into_iter().chain(cells).collect());
+                let cells = cells.into_iter().map(Option::unwrap_or_default);
+                table.rows.push([name.into()].into_iter().chain(cells).collect());
             }
         }
         table.without_empty()
@@ -233,14 +160,23 @@ impl Table {
 
     /// The same without the columns that have no value in any row.
     pub fn without_empty(mut self) -> Self {
-        let is_empty = |column: usize| self.rows.iter().all(|row| row[column] == Cell::Empty);
-        for column in
-            (0..self.columns.len()).rev().filter(|&column| is_empty(column)).collect::<Vec<_>>()
-        {
-            self.columns.remove(column);
-            self.rows.iter_mut().for_each(|row| drop(row.remove(column)));
+        for column in (0..self.columns.len()).rev() {
+            if self.rows.iter().all(|row| row[column].value.is_null()) {
+                self.columns.remove(column);
+                self.rows.iter_mut().for_each(|row| drop(row.remove(column)));
+            }
         }
         self
+    }
+
+    /// The words of its cells, each with its verdict.
+    fn words(&self) -> impl Iterator<Item = Vec<(String, Option<&'static str>)>> {
+        let words = |(cell, column): (&Cell, &Column)| (cell.words(column), cell.verdict);
+        self.rows.iter().map(move |row| row.iter().zip(&self.columns).map(words).collect())
+    }
+
+    fn heads(&self, has_room: bool) -> Vec<String> {
+        self.columns.iter().map(|column| column.head(has_room)).collect()
     }
 
     /// Aligned columns for a terminal, a verdict behind its value; empty without rows.
@@ -248,24 +184,31 @@ impl Table {
         if self.rows.is_empty() {
             return String::new();
         }
-        let line = |row: &Vec<Cell>| -> Vec<String> {
-            let words = |(cell, column): (&Cell, &Column)| match cell {
-                Cell::Verdict(cell, word) => format!("{} {word}", cell.words(column)),
-                cell => cell.words(column),
-            };
-            row.iter().zip(&self.columns).map(words).collect()
+        let judged = |(words, verdict): (String, Option<&str>)| match verdict {
+            Some(verdict) => format!("{words} {verdict}"),
+            None => words,
         };
-        let head = self.columns.iter().map(Column::short).collect();
-        aligned(&[head].into_iter().chain(self.rows.iter().map(line)).collect::<Vec<_>>())
+        let lines = self.words().map(|row| row.into_iter().map(judged).collect());
+        aligned(&[self.heads(false)].into_iter().chain(lines).collect::<Vec<_>>())
     }
 
     /// The columns in files, each with its note.
     pub fn file_columns(&self) -> Vec<(String, &'static str)> {
-        self.columns.iter().flat_map(Column::in_files).collect()
+        let columns = |Column { name, note, has_interval, .. }: &Column| {
+            let low = (format!("{name}_low"), "Lower end of its 95 % bootstrap interval.");
+            let high = (format!("{name}_high"), "Upper end.");
+            let ends = has_interval.then_some([low, high]);
+            [(name.clone(), *note)].into_iter().chain(ends.into_iter().flatten())
+        };
+        self.columns.iter().flat_map(columns).collect()
     }
 
     fn file_rows(&self) -> impl Iterator<Item = Vec<Value>> {
-        let values = |(cell, column): (&Cell, &Column)| cell.in_files(column);
+        let values = |(cell, column): (&Cell, &Column)| {
+            let ends = cell.interval.map_or([Value::Null, Value::Null], |it| it.map(Value::from));
+            let ends = column.has_interval.then_some(ends);
+            [cell.value.clone()].into_iter().chain(ends.into_iter().flatten())
+        };
         self.rows.iter().map(move |row| row.iter().zip(&self.columns).flat_map(values).collect())
     }
 
@@ -293,21 +236,21 @@ impl Table {
 
     /// A table of a page, in a box of its own; `class` is its class there.
     pub fn html(&self, class: &str) -> String {
-        let head = |column: &Column| format!("<th>{}</th>", escape(&column.long()));
-        let heads: String = self.columns.iter().map(head).collect();
-        let cell = |(i, (cell, column)): (usize, (&Cell, &Column))| {
-            let words = escape(&cell.words(column));
-            match cell {
+        let head = |head: &String| format!("<th>{}</th>", escape(head));
+        let heads: String = self.heads(true).iter().map(head).collect();
+        let cell = |(i, (words, verdict)): (usize, (String, Option<&str>))| {
+            let words = escape(&words);
+            match verdict {
                 _ if i == 0 => format!("<th scope=\"row\">{words}</th>"),
-                Cell::Verdict(_, word) => format!("<td class=\"{word}\">{words}: {word}</td>"),
-                _ => format!("<td>{words}</td>"),
+                Some(word) => format!("<td class=\"{word}\">{words}: {word}</td>"),
+                None => format!("<td>{words}</td>"),
             }
         };
-        let row = |row: &Vec<Cell>| {
-            let cells: String = row.iter().zip(&self.columns).enumerate().map(cell).collect();
+        let row = |row: Vec<(String, Option<&str>)>| {
+            let cells: String = row.into_iter().enumerate().map(cell).collect();
             format!("<tr>{cells}</tr>\n")
         };
-        let rows: String = self.rows.iter().map(row).collect();
+        let rows: String = self.words().map(row).collect();
         let table = format!(
             "<table class=\"{class}\">\n<thead><tr>{heads}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table>"
         );
@@ -320,17 +263,13 @@ impl Table {
             let cells = cells.iter().map(|words| words.replace('|', "\\|").replace('\n', " "));
             format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
         };
-        let words = |row: &Vec<Cell>| -> Vec<String> {
-            row.iter().zip(&self.columns).map(|(cell, column)| cell.words(column)).collect()
-        };
-        let rows: String = self.rows.iter().map(|row| line(words(row))).collect();
+        let words = self.words().map(|row| row.into_iter().map(|(words, _)| words).collect());
         let rule = "|---".repeat(self.columns.len());
-        line(self.columns.iter().map(Column::long).collect()) + &rule + "|\n" + &rows
+        line(self.heads(true)) + &rule + "|\n" + &words.map(line).collect::<String>()
     }
 }
 
-/// What an interval establishes that does not hold `even`, where both are as good; `direction` is
-/// better.
+/// The verdict of an interval that excludes `even`, where both are as good; `direction` is better.
 pub fn verdict(
     interval: Option<[f64; 2]>,
     even: f64,
@@ -368,4 +307,45 @@ pub fn aligned(lines: &[impl AsRef<[String]>]) -> String {
         text.push('\n');
     }
     text
+}
+
+/// A box of a page that scrolls where the page is narrower, by keyboard too.
+pub(super) fn wide(content: &str, what: &str) -> String {
+    format!(
+        "<div class=\"wide\" role=\"region\" aria-label=\"{what}\" tabindex=\"0\">{content}</div>\n"
+    )
+}
+
+/// A number with three significant digits.
+pub fn digits(value: f64) -> String {
+    if !value.is_finite() {
+        return "–".into();
+    }
+    let power = value.abs().max(1e-9).log10().floor();
+    let decimals = (2.0 - power).clamp(0.0, 6.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// A value of a measure in the unit it is shown in.
+pub fn shown(measure: &Measure, value: f64) -> String {
+    format!("{:.*}", measure.unit.decimals, measure.unit.per_si * value)
+}
+
+/// A number and its interval, if it has one.
+pub fn with_interval(
+    value: f64,
+    interval: Option<[f64; 2]>,
+    shown: &dyn Fn(f64) -> String,
+) -> String {
+    let interval =
+        interval.map_or(String::new(), |[low, high]| format!(" [{}, {}]", shown(low), shown(high)));
+    format!("{}{interval}", shown(value))
+}
+
+/// The title of a measure with the unit it is shown in.
+pub fn titled(measure: &Measure) -> String {
+    match measure.unit.symbol {
+        "" => measure.title.into(),
+        unit => format!("{}, {unit}", measure.title),
+    }
 }

@@ -1,22 +1,22 @@
 //! Beliefs of whole objects as they were: recorded touches and hyperparameters, conditioned again
 //! and made to surfaces.
 
-use super::number::digits;
-use super::replay;
-use super::solid::{Frame, Sequence, Touch as Mark, counts, section as solid_section};
+use super::figures::Figure;
+use super::replay::{self, swept, touched};
+use super::solid::{self, Frame, Sequence, Touch, counts};
+use super::table::digits;
 use crate::experiment::Experiment;
 use crate::experiment::measure::shape::ShapeMetrics;
 use crate::experiment::store::Run;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
-use anyhow::{Context, ensure};
-use nalgebra::{Point3, Vector3};
+use anyhow::Context;
+use nalgebra::Point3;
 use palpate_explore::around::{ImplicitSurface, Scope};
-use palpate_explore::probe::{Contact, Swept, Touch};
 use palpate_explore::task::Task;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::coarse::coarse;
 
-/// Triangles of a surface that is drawn; chosen, so that a page stays a few megabytes.
+/// Triangles of a surface that is drawn. heuristic: a page stays a few megabytes.
 const TRIANGLES: usize = 3000;
 
 /// The true surface that the run keeps, with its search tree; none of a run without it.
@@ -38,47 +38,63 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     let counts = counts(experiment.initial_touches, experiment.touches, planners.len(), TRIANGLES);
     let sequences = sequences(run, &planners, &counts, truth.as_ref())?;
     let mesh = truth.as_ref().map(|bvh| &**bvh.mesh());
-    solid_section(&sequences, mesh, experiment.report.trial)
+    solid::section(&sequences, mesh, experiment.report.trial)
 }
 
-/// What `planners` made of the object in the trial that the report draws, after `counts` touches;
-/// `truth` gives the errors.
+/// Believed whole objects, planner by planner and touch by touch; none of a run over a zone.
+pub const FIGURE: Figure = Figure {
+    name: "solids",
+    caption: |run| {
+        format!(
+            "Believed surfaces of trial {} from the front and from behind, coloured by how far they \
+             may lie from where they are believed, with the touches.",
+            run.experiment.report.trial
+        )
+    },
+    draw: |run| {
+        let experiment = &run.experiment;
+        if experiment.scene.around.is_none() {
+            return Ok(None);
+        }
+        let (counts, truth) = (experiment.drawn_touch_counts(), truth(run));
+        let sequences = sequences(run, &experiment.drawn_planners(), &counts, truth.as_ref())?;
+        Ok(solid::figure(&sequences, truth.as_ref().map(|bvh| &**bvh.mesh()), &counts))
+    },
+};
+
+/// The beliefs of `planners` in the trial that the report draws, after `counts` touches; `truth`
+/// gives the errors.
 ///
 /// # Errors
 /// If the recorded touches do not belong to the object or cannot be conditioned on.
-pub fn sequences(
+fn sequences(
     run: &Run,
     planners: &[&str],
     counts: &[u32],
     truth: Option<&MeshBvh>,
 ) -> anyhow::Result<Vec<Sequence>> {
-    let rows = planners.iter().filter_map(|planner| replay::row(run, planner));
-    rows.map(|row| sequence(&run.experiment, row, counts, truth)).collect()
-}
-
-fn sequence(
-    experiment: &Experiment,
-    row: &TrialRow,
-    counts: &[u32],
-    truth: Option<&MeshBvh>,
-) -> anyhow::Result<Sequence> {
-    let place = |count: usize| format!("trial {} of {}, touch {count}", row.trial, row.planner);
-    let mut sequence = Sequence { planner: row.planner.clone(), ..Sequence::default() };
-    for (i, touch) in row.touches.iter().enumerate() {
-        let aim = (touch.target.aim())
-            .with_context(|| format!("{}: a target that is no aim", place(i + 1)))?;
-        sequence.touches.push(Mark {
-            aim_w: aim.p_w,
-            along_w: *aim.ahead_w,
-            contact_w: touch.contact.map(Point3::from),
-            is_initial: i < experiment.initial_touches as usize,
-        });
-    }
-    for &count in counts {
-        let of = || format!("{} cannot be drawn", place(count as usize));
-        sequence.frames.extend(frame(experiment, row, count, truth, TRIANGLES).with_context(of)?);
-    }
-    Ok(sequence)
+    let initial_touches = run.experiment.initial_touches as usize;
+    let sequence = |row: &TrialRow| -> anyhow::Result<Sequence> {
+        let place = |count: usize| format!("trial {} of {}, touch {count}", row.trial, row.planner);
+        let mut sequence = Sequence { planner: row.planner.clone(), ..Sequence::default() };
+        for (i, touch) in row.touches.iter().enumerate() {
+            let no_aim = || format!("{}: a target that is no aim", place(i + 1));
+            let aim = touch.target.aim().with_context(no_aim)?;
+            sequence.touches.push(Touch {
+                aim_w: aim.p_w,
+                along_w: *aim.ahead_w,
+                contact_w: touch.contact.map(Point3::from),
+                is_initial: i < initial_touches,
+            });
+        }
+        for &count in counts {
+            let frame = frame(&run.experiment, row, count, truth, TRIANGLES);
+            let undrawn = || format!("{} cannot be drawn", place(count as usize));
+            sequence.frames.extend(frame.with_context(undrawn)?);
+        }
+        Ok(sequence)
+    };
+    planners.iter().filter_map(|planner| replay::row(run, planner)).map(sequence).collect()
 }
 
 /// The belief after `count` touches, made coarser if it has more than `most` triangles; none if the
@@ -98,6 +114,12 @@ pub fn frame(
     let Some(surface) = belief.surface() else { return Ok(None) };
     let mesh = surface.mesh(experiment.space.cells).map(|mesh| coarse(&mesh, most));
     let mesh = mesh.unwrap_or_default();
+    let score = |shape: &ShapeMetrics| {
+        let chamfer = shape.chamfer_m.map(|chamfer_m| digits(1e3 * chamfer_m));
+        let chamfer = chamfer.map_or("no surface".into(), |mm| format!("Chamfer {mm} mm"));
+        format!("{chamfer}, F {:.2} at 1 %", shape.f_1)
+    };
+    let shape = touches.last().and_then(|touch| touch.shape.as_ref());
     let error = |bvh: &MeshBvh, p_w: &Point3<f64>| {
         let distance_m = bvh.closest_point(p_w).distance_m;
         if bvh.surrounds(p_w) { -distance_m } else { distance_m }
@@ -106,15 +128,12 @@ pub fn frame(
         touches: count,
         sd_m: surface.offsets_m(&mesh.0),
         error_m: truth.map_or(Vec::new(), |bvh| mesh.0.iter().map(|p_w| error(bvh, p_w)).collect()),
-        score: touches
-            .last()
-            .and_then(|touch| Some(score(touch.shape.as_ref()?)))
-            .unwrap_or_default(),
+        score: shape.map(score).unwrap_or_default(),
         mesh,
     }))
 }
 
-/// What was believed after `touches`; none without a fit then.
+/// The belief after `touches`; none without a fit then.
 ///
 /// # Errors
 /// If they do not belong to the object or cannot be conditioned on.
@@ -134,30 +153,9 @@ pub fn belief(
         let aim = touch.target.aim().context("a target that is no aim")?;
         // However the finger was rolled, it went the same way.
         let approach = ball.approach(aim, &scene.finger, scene.touch.standoff_m, 0.0);
-        let swept =
-            touch.tip.map(|tip| Swept { finger: scene.finger.clone(), p_wt: Point3::from(tip) });
-        belief.observe(aim, &approach, (&met(touch)?, swept.as_ref()));
+        let swept = swept(scene.finger.clone(), touch);
+        belief.observe(aim, &approach, (&touched(touch, None)?, swept.as_ref()));
     }
     belief.condition(before, fit)?;
     Ok(Some(belief))
-}
-
-fn met(touch: &TouchRow) -> anyhow::Result<Touch> {
-    Ok(match (touch.contact, touch.normal) {
-        (Some(p_wc), normal) => {
-            ensure!(normal.is_some(), "a contact without its normal");
-            let normal_w = normal.map_or_else(Vector3::zeros, Vector3::from);
-            Touch::Contact(Contact { p_wc: Point3::from(p_wc), normal_w })
-        }
-        (None, _) if touch.overload => Touch::Overload,
-        (None, _) => Touch::Miss,
-    })
-}
-
-/// How near a belief is to the truth, in words.
-pub fn score(shape: &ShapeMetrics) -> String {
-    let chamfer = shape
-        .chamfer_m
-        .map_or("no surface".into(), |chamfer_m| format!("Chamfer {} mm", digits(1e3 * chamfer_m)));
-    format!("{chamfer}, F {:.2} at 1 %", shape.f_1)
 }

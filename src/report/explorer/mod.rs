@@ -1,51 +1,118 @@
-//! The part of the page that moves: one planner's belief touch by touch, to turn and to colour.
+//! The interactive part of the page: one planner's belief touch by touch, to turn and to colour.
+//! This is its frame: choices, slider, words, data, script.
 //!
 //! It is drawn by a few hundred lines of script of our own. A plotting library would add three to
 //! four megabytes to every page, and still leave the touches behind a surface to be told apart.
 
-pub(super) mod frames;
-pub(super) mod shell;
+pub mod zone;
 
-use super::replay::drawn_words;
-use crate::experiment::store::Run;
-use shell::{PARTS, Shell};
+use super::canvas::escape;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::Value;
 
-const SCRIPTS: [&str; 4] =
-    [PARTS, include_str!("relief.js"), include_str!("curve.js"), include_str!("heights.js")];
+/// The script that views of surfaces share.
+pub const PARTS: &str = include_str!("parts.js");
+const CONTROLS: &str = include_str!("explorer.js");
+const STYLE: &str = include_str!("explorer.css");
 
-/// The colour maps of a surface: what a view calls them, and what people do.
-const COLOURS: [(&str, &str); 3] = [("height", "height"), ("deviation", "σ"), ("error", "error")];
+/// Most bytes that all frames may take. heuristic: a page stays below three megabytes.
+const BYTES_MAX: usize = 1_600_000;
 
-/// The section as HTML; empty if no planner has a belief to show.
-///
-/// # Errors
-/// If the recorded touches do not belong to the zone or cannot be conditioned on.
-pub fn section(run: &Run) -> anyhow::Result<String> {
-    let Some((data, planners, frames)) = frames::data(run)? else { return Ok(String::new()) };
-    // In a curve the truth hides nothing, so there it is shown from the start.
-    let (class, colours, is_shown, help) = match data["z"].is_null() {
-        true => ("curve", &[][..], true, "Drag the slider, or use the arrow keys."),
-        false => ("surface", &COLOURS[..], false, HELP),
-    };
-    let shell = Shell {
-        planners,
-        colours,
-        truth: Some(is_shown),
-        class,
-        frames,
-        note: format!(
-            "Trial {}. Blue: the {} initial touches; red: those the planner chose; the last one is \
-             larger.{} {help}",
-            run.experiment.report.trial,
-            run.experiment.initial_touches,
-            drawn_words(run)
-        ),
-        scripts: &SCRIPTS,
-    };
-    shell.html(&data)
+/// Deviations smaller than this share of the largest are shown as that. heuristic.
+pub(super) const LEAST_SHARE: f64 = 1e-4;
+
+/// A picture that moves, touch by touch.
+pub struct Shell<'a> {
+    /// The colour maps: the name that scripts know, and the label. The first one is shown at first.
+    pub colours: &'a [(&'a str, &'a str)],
+    /// Whether the true surface is shown at first; none if it is not known.
+    pub truth: Option<bool>,
+    /// The class of its canvas.
+    pub class: &'a str,
+    /// The explanation below it, as HTML.
+    pub note: String,
+    /// Scripts with a function `viewOf` of a canvas, which returns what draws a state on it.
+    pub scripts: &'a [&'a str],
 }
 
-const HELP: &str = "Hollow touches lie behind the surface, diamonds met nothing. Green: where the \
-                    true surface stands out of the belief. Lines join equal heights. Drag the \
-                    surface to turn it, the slider to go through the touches; both also follow the \
-                    arrow keys.";
+impl Shell<'_> {
+    /// The section as HTML around `data`, which the scripts are given: `planners`, each with its
+    /// `name` and its `frames`. The first planner is shown at first, after its last frame.
+    pub fn html(&self, data: &Value) -> String {
+        let planners = data["planners"].as_array().map_or(&[][..], Vec::as_slice);
+        let names = planners.iter().map(|planner| planner["name"].as_str().unwrap_or_default());
+        let names = names.enumerate().map(|(i, name)| (i.to_string(), escape(name)));
+        let mut controls = choice("planner", names);
+        if !self.colours.is_empty() {
+            controls += &choice("colour", self.colours.iter().copied());
+        }
+        if let Some(is_shown) = self.truth {
+            let checked = if is_shown { " checked" } else { "" };
+            controls += &format!(
+                "<label><input type=\"checkbox\" name=\"truth\"{checked}> true surface</label>\n"
+            );
+        }
+        // Nothing in the data may end the script it stands in.
+        let json = data.to_string().replace('<', "\\u003c");
+        let last = planners[0]["frames"].as_array().map_or(0, Vec::len).saturating_sub(1);
+        format!(
+            "<section id=\"explorer\">\n<style>{STYLE}</style>\n<h2>Touch by touch</h2>\n\
+             <noscript><p class=\"note\">This part needs JavaScript; the figures below do not.</p>\
+             </noscript>\n<div class=\"controls\">\n{controls}</div>\n\
+             <canvas class=\"{}\" role=\"img\" tabindex=\"0\"></canvas>\n\
+             <div class=\"time\"><button type=\"button\">Play</button>\
+             <input type=\"range\" min=\"0\" max=\"{last}\" value=\"{last}\" aria-label=\"touches\">\
+             </div>\n<output></output>\n<p class=\"note\">{}</p>\n\
+             <script type=\"application/json\" id=\"explorer-data\">{json}</script>\n\
+             <script>\n{}\n{CONTROLS}</script>\n</section>\n",
+            self.class,
+            self.note,
+            self.scripts.join("\n"),
+        )
+    }
+}
+
+/// Touch counts with a frame: as many as there is room for, the first and the last among them,
+/// where the frames of one count take `bytes`.
+pub fn counts(first: u32, last: u32, bytes: usize) -> Vec<u32> {
+    let room = (BYTES_MAX / bytes.max(1)).max(2);
+    let step = (last.saturating_sub(first) as usize).div_ceil(room - 1).max(1);
+    (first..last).step_by(step).chain([last]).collect()
+}
+
+/// Radio buttons, the first one chosen.
+fn choice<T: std::fmt::Display>(name: &str, options: impl Iterator<Item = (T, T)>) -> String {
+    let buttons: String = (options.enumerate())
+        .map(|(i, (value, words))| {
+            let checked = if i == 0 { " checked" } else { "" };
+            format!(
+                "<label><input type=\"radio\" name=\"{name}\" value=\"{value}\"{checked}> \
+                 {words}</label>"
+            )
+        })
+        .collect();
+    format!("<fieldset><legend>{name}</legend>{buttons}</fieldset>\n")
+}
+
+/// A number with no more digits than show; one that is not finite becomes null in JSON.
+pub fn short(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
+
+/// Numbers from 0 to 1 as text: sixteen bits each, the lower eight first; the highest code is none.
+pub fn encode(shares: impl Iterator<Item = f64>) -> String {
+    let code = |share: f64| match share.is_nan() {
+        true => u16::MAX,
+        false => (65534.0 * share.clamp(0.0, 1.0)).round() as u16,
+    };
+    STANDARD.encode(shares.flat_map(|share| code(share).to_le_bytes()).collect::<Vec<u8>>())
+}
+
+/// Positive numbers as text by their logarithms, from 0 at `least` to 1 at `most`.
+pub fn encode_log([least, most]: [f64; 2], values: impl Iterator<Item = f64>) -> String {
+    encode(values.map(|value| match value.is_finite() {
+        true => (value / least).ln() / (most / least).ln(),
+        false => f64::NAN,
+    }))
+}

@@ -1,20 +1,19 @@
 //! Where the belief is unsure and what touching there changes, Fig. 6 of Yi et al. 2016.
 
+use super::Figure;
 use super::curves;
-use super::figure::{Figure, miss_entry};
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, Panel, colour_bar};
-use crate::report::canvas::{Area, Canvas};
-use crate::report::heat_map::HeatMap;
-use crate::report::legend::{Swatch, sheet};
+use crate::report::canvas::Area;
+use crate::report::heat_map::{HeatMap, Reading};
+use crate::report::legend::{Sheet, Swatch, miss_entry};
 use crate::report::replay::{Replay, drawn_words};
-use crate::report::style;
-use crate::report::style::{INITIAL, LATER};
+use crate::report::style::{self, INITIAL, LATER};
 use palpate_explore::belief::HeightField;
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
 
-pub(super) const FIGURE: Figure = Figure { name: "acquisition", caption, draw };
+pub(crate) const FIGURE: Figure = Figure { name: "acquisition", caption, draw };
 
 fn caption(run: &Run) -> String {
     let planner = planner(run).unwrap_or("the planner");
@@ -55,12 +54,11 @@ fn deviation_m(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> f6
 }
 
 /// Where the deviation is largest: what the planner found, or else the largest of `read`.
-fn maximum(replay: &Replay, read: impl Iterator<Item = (Vec<f64>, f64)>) -> Option<Vec<f64>> {
-    let planned = replay
-        .next
-        .filter(|next| next.planned_sd_m.is_some() && next.stall.is_none())
-        .and_then(|next| next.target.place().map(<[f64]>::to_vec));
-    planned.or_else(|| read.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(place, _)| place))
+fn maximum<'a>(replay: &'a Replay, read: &'a [Reading]) -> Option<&'a [f64]> {
+    let next = replay.next.filter(|next| next.planned_sd_m.is_some() && next.stall.is_none());
+    let largest = || read.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    let planned = next.and_then(|next| next.target.place());
+    planned.or_else(|| largest().map(|(place, ..)| place.as_slice()))
 }
 
 fn title(planner: &str, replay: &Replay) -> String {
@@ -83,9 +81,6 @@ const EQUAL_HEIGHT_PX: f64 = 420.0;
 /// From one panel to the next, and from a belief to its deviation.
 const GAPS_PX: (f64, f64) = (66.0, 40.0);
 
-/// A place, the deviation there, and whether it is drawn.
-type Reading = (Vec<f64>, f64, bool);
-
 fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> Option<String> {
     let unit = Length::of(zone);
     let read: Vec<Vec<Reading>> =
@@ -99,15 +94,30 @@ fn draw_curves((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) ->
     let shape = curves::belief_panel(zone, curves::height_axis(run, unit)?, most, EQUAL_HEIGHT_PX);
     let size = [width, shape.area.bottom() + GAPS_PX.1 + CURVE_PX.2 + 56.0];
     let entries = curves::entries(run, [found]);
-    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (width - LEFT_PX, ""), entries);
+    let panels = (shape.area, [step_px, 0.0]);
+    let mut sheet = Sheet::new(size, panels, (width - LEFT_PX, ""), entries);
+    let colour = style::planner(&run.experiment.planners, planner);
     for (column, (replay, read)) in replays.iter().zip(&read).enumerate() {
-        let above = shape.moved(LEFT_PX + column as f64 * step_px, TOP_PX + more_px);
+        let above = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
         let top = above.area.bottom() + GAPS_PX.1;
         let area = Area { top, height: CURVE_PX.2, ..above.area };
         let below = Panel { area, x: shape.x.clone(), y: Axis::linear(0.0, largest, 4.0) };
-        draw_column(&mut canvas, run, planner, (replay, read), [above, below]);
+        let canvas = &mut sheet.canvas;
+        above.titled_frame(canvas, &title(planner, replay), "", &unit.named("height"));
+        curves::draw_belief(canvas, &above, run, replay, colour);
+        below.titled_frame(canvas, "", &unit.named("x"), &unit.named("deviation"));
+        let drawn = |sd_m: f64, is_drawn: bool| if is_drawn { sd_m * unit.per_m } else { f64::NAN };
+        let curve: Vec<(f64, f64)> = (read.iter())
+            .map(|(place, sd_m, is_drawn)| (place[0] * unit.per_m, drawn(*sd_m, *is_drawn)))
+            .collect();
+        below.curve(canvas, &curve, &style::stroke(colour, 1.8));
+        if let Some(place) = maximum(replay, read) {
+            let sd_m = deviation_m(&replay.belief, place, &mut Scratch::default());
+            let at = below.at(place[0] * unit.per_m, sd_m * unit.per_m);
+            canvas.clipped(below.area, |canvas| canvas.circle(at, 6.0, &ring(style::MAXIMUM)));
+        }
     }
-    Some(canvas.finish())
+    Some(sheet.canvas.finish())
 }
 
 fn readings(places: Vec<Vec<f64>>, replay: &Replay) -> Vec<Reading> {
@@ -118,36 +128,6 @@ fn readings(places: Vec<Vec<f64>>, replay: &Replay) -> Vec<Reading> {
         (place, sd_m, is_drawn)
     };
     places.into_iter().zip(drawn).map(read).collect()
-}
-
-/// The belief in the panel above and its deviation in the one below.
-fn draw_column(
-    canvas: &mut Canvas,
-    run: &Run,
-    planner: &str,
-    (replay, read): (&Replay, &[Reading]),
-    [above, below]: [Panel; 2],
-) {
-    let unit = Length::of(replay.belief.zone());
-    let colour = style::planner(&run.experiment.planners, planner);
-    let words = |name: &str| format!("{name} ({})", unit.symbol);
-    above.frame(canvas);
-    above.label(canvas, &title(planner, replay), "", &words("height"));
-    curves::draw_belief(canvas, &above, run, replay, colour);
-    below.frame(canvas);
-    below.label(canvas, "", &words("x"), &words("deviation"));
-    let curve: Vec<(f64, f64)> = read
-        .iter()
-        .map(|(place, sd_m, is_drawn)| (place[0], if *is_drawn { *sd_m } else { f64::NAN }))
-        .map(|(x, sd_m)| (x * unit.per_m, sd_m * unit.per_m))
-        .collect();
-    below.curve(canvas, &curve, &style::stroke(colour, 1.8));
-    let places = read.iter().map(|(place, sd_m, _)| (place.clone(), *sd_m));
-    if let Some(place) = maximum(replay, places) {
-        let sd_m = deviation_m(&replay.belief, &place, &mut Scratch::default());
-        let at = below.at(place[0] * unit.per_m, sd_m * unit.per_m);
-        canvas.clipped(below.area, |canvas| canvas.circle(at, 6.0, &ring(style::MAXIMUM)));
-    }
 }
 
 /// Size of a map at most: its axes are equal.
@@ -169,41 +149,34 @@ fn draw_maps((run, zone): (&Run, &Zone), planner: &str, replays: &[Replay]) -> O
     let step_px = (shape.area.width + 84.0).max(MAP_STEP_PX);
     let width = LEFT_PX + 2.0 * step_px;
     let size = [width, shape.area.bottom() + 108.0];
-    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (width - LEFT_PX, ""), entries);
-    let shape = shape.moved(LEFT_PX, TOP_PX + more_px);
+    let panels = (shape.area, [step_px, 0.0]);
+    let mut sheet = Sheet::new(size, panels, (width - LEFT_PX, ""), entries);
+    let shape = Panel { area: sheet.area(0, 0.0), ..shape };
     // The zone's part of a panel, all of it unless the zone is far from square.
     let [[left, bottom], [right, top]] = [shape.at(x[0], z[0]), shape.at(x[1], z[1])];
     let map_area = Area { left, top, width: right - left, height: bottom - top };
-    let maps: Vec<HeatMap> = replays
-        .iter()
-        .map(|replay| {
-            HeatMap::read(zone, map_area, |places| {
-                let read = readings(places, replay).into_iter();
-                read.map(|(_, sd_m, is_drawn)| (unit.per_m * sd_m, is_drawn)).collect()
-            })
-        })
-        .collect();
+    let map = |replay| HeatMap::new(zone, map_area, |places| readings(places, replay));
+    let maps: Vec<HeatMap> = replays.iter().map(map).collect();
     let largest = maps.iter().map(HeatMap::largest).fold(0.0, f64::max);
-    let scale = Axis::linear(0.0, largest, 5.0);
+    let scale = Axis::linear(0.0, largest * unit.per_m, 5.0);
     for (column, (replay, map)) in replays.iter().zip(&maps).enumerate() {
         let area = Area { left: map_area.left + column as f64 * step_px, ..map_area };
-        let panel = shape.moved(LEFT_PX + column as f64 * step_px, shape.area.top);
-        panel.frame(&mut canvas);
-        map.draw(&mut canvas, area, |value| style::deviation(scale.fraction(value)));
-        let words = |name: &str| format!("{name} ({})", unit.symbol);
-        panel.label(&mut canvas, &title(planner, replay), &words("x"), &words("z"));
+        let panel = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
+        let canvas = &mut sheet.canvas;
+        panel.titled_frame(canvas, &title(planner, replay), &unit.named("x"), &unit.named("z"));
+        map.draw(canvas, area, |value| style::deviation(scale.fraction(value * unit.per_m)));
         let on_map = |place: &[f64]| panel.at(place[0] * unit.per_m, place[1] * unit.per_m);
         canvas.clipped(panel.area, |canvas| {
             replay.draw_marks(canvas, 1.6, |place, _| on_map(place));
-            if let Some(place) = maximum(replay, map.places(zone)) {
-                canvas.circle(on_map(&place), 7.0, &style::stroke(style::PAPER, 5.0));
-                canvas.circle(on_map(&place), 7.0, &ring(style::MAXIMUM));
+            if let Some(place) = maximum(replay, &map.readings) {
+                canvas.circle(on_map(place), 7.0, &style::stroke(style::PAPER, 5.0));
+                canvas.circle(on_map(place), 7.0, &ring(style::MAXIMUM));
             }
         });
     }
     let top = shape.area.bottom() + 62.0;
     let bar = Area { left: 0.5 * width - 60.0, top, width: 320.0, height: 13.0 };
-    let words = format!("standard deviation ({})", unit.symbol);
-    colour_bar(&mut canvas, bar, &scale, &words, style::deviation);
-    Some(canvas.finish())
+    let words = unit.named("standard deviation");
+    colour_bar(&mut sheet.canvas, bar, &scale, &words, style::deviation);
+    Some(sheet.canvas.finish())
 }

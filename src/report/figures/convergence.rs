@@ -1,20 +1,17 @@
 //! Errors against touches, Fig. 4 of Yi et al. 2016.
 
-use super::figure::Figure;
-use crate::experiment::measure::metrics;
-use crate::experiment::measure::{Aggregate, MEASURES, Measure, R, Scale};
+use super::Figure;
+use crate::experiment::measure::{Aggregate, MEASURES, Measure, R, Scale, metrics};
 use crate::experiment::statistics::curve_table;
-use crate::experiment::statistics::summary;
-use crate::experiment::statistics::summary::CurvePoint;
+use crate::experiment::statistics::summary::{self, CurvePoint};
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Panel};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{Swatch, sheet};
-use crate::report::style;
-use crate::report::style::FAINT_INK;
+use crate::report::legend::{Sheet, Swatch};
+use crate::report::style::{self, FAINT_INK};
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
-pub(super) const FIGURE: Figure = Figure { name: "convergence", caption, draw };
+pub(crate) const FIGURE: Figure = Figure { name: "convergence", caption, draw };
 
 /// Eq. 5 of any positive constant.
 fn constant_r(run: &Run) -> Option<f64> {
@@ -79,22 +76,16 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let dashed = constant.map(|_| (Swatch::Line(constant_line()), "R of any constant"));
     let rows = shown.len().div_ceil(2) as f64;
     let size = [WIDTH, 66.0 - 12.0 + rows * (PANEL.1 + GAP.1)];
-    let legend_px = WIDTH - 2.0 * LEFT_PX;
-    let entries = swatches.chain(dashed);
-    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (legend_px, ""), entries);
-    let top = 66.0 + more_px;
+    let legend = (WIDTH - 2.0 * LEFT_PX, "");
+    let first = Area { left: LEFT_PX, top: 66.0, width: PANEL.0, height: PANEL.1 };
+    let panels = (first, [PANEL.0 + GAP.0, PANEL.1 + GAP.1]);
+    let mut sheet = Sheet::new(size, panels, legend, swatches.chain(dashed));
     for (i, measure) in shown.into_iter().enumerate() {
-        let (column, row) = ((i % 2) as f64, (i / 2) as f64);
-        let area = Area {
-            left: LEFT_PX + column * (PANEL.0 + GAP.0),
-            top: top + row * (PANEL.1 + GAP.1),
-            width: PANEL.0,
-            height: PANEL.1,
-        };
+        let area = sheet.area(i % 2, (i / 2) as f64);
         let constant = constant.filter(|_| measure.id == R.id);
-        draw_measure(&mut canvas, area, run, measure, (&x, &curves, constant));
+        draw_measure(&mut sheet.canvas, area, run, measure, (&x, &curves, constant));
     }
-    Ok(Some(canvas.finish()))
+    Ok(Some(sheet.canvas.finish()))
 }
 
 fn draw_measure(
@@ -127,18 +118,23 @@ fn draw_measure(
     };
     let Some(y) = y else { return };
     let panel = Panel { area, x: x.clone(), y };
-    panel.frame(canvas);
-    panel.label(canvas, &told(measure), "touches", &named(measure));
+    panel.titled_frame(canvas, &told(measure), "touches", &named(measure));
     if let Some(score) = constant {
         let (low, high) = x.range();
         panel.curve(canvas, &[(low, score), (high, score)], &constant_line());
     }
     for (colour, readings) in &read {
-        draw_curve(canvas, &panel, readings, colour);
+        let band = |it: &Reading| it.3.map(|[low, high]| (it.0, low, high));
+        panel.band(canvas, &readings.iter().filter_map(band).collect::<Vec<_>>(), colour);
+        let curve = |value: fn(&Reading) -> Option<f64>| -> Vec<(f64, f64)> {
+            readings.iter().filter_map(|it| Some((it.0, value(it)?))).collect()
+        };
+        panel.curve(canvas, &curve(|it| it.2), &style::dashed(colour, 1.3, "1.5 3"));
+        panel.curve(canvas, &curve(|it| Some(it.1)), &style::stroke(colour, 2.0));
     }
 }
 
-/// What is drawn of a measure after some touches: where there is one, its median.
+/// The value of a measure after some touches: its median, or its mean if it has no median.
 fn reading(run: &Run, measure: &Measure, point: &CurvePoint) -> Option<Reading> {
     let per_si = measure.unit.per_si;
     let summary = point.of(measure)?;
@@ -161,7 +157,7 @@ fn named(measure: &Measure) -> String {
     }
 }
 
-/// What is drawn of it, and what dotted beside it.
+/// The statistic that the solid line shows, and that of the dotted one.
 fn told(measure: &Measure) -> String {
     match (measure.scale, measure.aggregate) {
         (Scale::LogBeside(other), _) => format!("median; dotted: {}", other.title),
@@ -174,21 +170,4 @@ fn told(measure: &Measure) -> String {
 /// The line at what any constant scores.
 fn constant_line() -> String {
     style::dashed(FAINT_INK, 1.0, "5 4")
-}
-
-/// A curve with its band, and a dotted one beside it.
-fn draw_curve(canvas: &mut Canvas, panel: &Panel, readings: &[Reading], colour: &str) {
-    let band: Vec<(f64, f64, f64)> = readings
-        .iter()
-        .filter_map(|(touches, _, _, band)| band.map(|[low, high]| (*touches, low, high)))
-        .collect();
-    panel.band(canvas, &band, colour);
-    let dotted: Vec<(f64, f64)> = readings
-        .iter()
-        .filter_map(|(touches, _, beside, _)| Some((*touches, (*beside)?)))
-        .collect();
-    panel.curve(canvas, &dotted, &style::dashed(colour, 1.3, "1.5 3"));
-    let curve: Vec<(f64, f64)> =
-        readings.iter().map(|(touches, value, ..)| (*touches, *value)).collect();
-    panel.curve(canvas, &curve, &style::stroke(colour, 2.0));
 }

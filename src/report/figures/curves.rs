@@ -1,17 +1,16 @@
 //! Beliefs of a curve after some touches, Fig. 3 of Yi et al. 2016.
 
-use super::figure::{Figure, miss_entry};
+use super::Figure;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, MM, Panel};
 use crate::report::canvas::{Anchor, Area, Canvas};
-use crate::report::legend::{Swatch, sheet};
-use crate::report::replay::{self, Replay, drawn_words};
-use crate::report::style;
-use crate::report::style::{FAINT_INK, INITIAL, INK, LATER, SMALL_PX, TRUTH};
+use crate::report::legend::{Sheet, Swatch, miss_entry};
+use crate::report::replay::{self, NOT_REACHED, Replay, drawn_words};
+use crate::report::style::{self, FAINT_INK, INITIAL, INK, LATER, SMALL_PX, TRUTH};
 use palpate_explore::task::Zone;
 use palpate_gp::posterior::Scratch;
 
-pub(super) const FIGURE: Figure = Figure { name: "curves", caption, draw };
+pub(crate) const FIGURE: Figure = Figure { name: "curves", caption, draw };
 
 fn caption(run: &Run) -> String {
     format!(
@@ -42,37 +41,35 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     }
     let unit = Length::of(zone);
     let Some(y) = height_axis(run, unit) else { return Ok(None) };
-    let most = Area { left: 0.0, top: 0.0, width: PANEL.0, height: PANEL.1 };
-    let panel = belief_panel(zone, y, most, EQUAL_HEIGHT_PX);
-    let step = (PANEL.0 + GAP.0, panel.area.height + GAP.1);
-    let (columns, rows) = (counts.len() as f64, planners.len() as f64);
-    let width = MARGIN.0 + columns * step.0;
-    let size = [width, MARGIN.1 + rows * step.1];
-    let (mut canvas, more_px) =
-        sheet(size, [MARGIN.0, 20.0], (width - MARGIN.0, ""), entries(run, []));
-    let top = MARGIN.1 + more_px;
+    let most = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
+    let shape = belief_panel(zone, y, most, EQUAL_HEIGHT_PX);
+    let step = [PANEL.0 + GAP.0, shape.area.height + GAP.1];
+    let legend_px = counts.len() as f64 * step[0];
+    let size = [MARGIN.0 + legend_px, MARGIN.1 + planners.len() as f64 * step[1]];
+    let mut sheet = Sheet::new(size, (shape.area, step), (legend_px, ""), entries(run, []));
     for (row, planner) in planners.iter().enumerate() {
         for (column, &count) in counts.iter().enumerate() {
-            let left = MARGIN.0 + column as f64 * step.0;
-            let panel = panel.moved(left, top + row as f64 * step.1);
-            let area = panel.area;
-            let (replay, score) = Replay::scored(run, planner, count)?;
+            let area = sheet.area(column, row as f64);
+            let panel = Panel { area, ..shape.clone() };
+            let canvas = &mut sheet.canvas;
+            let replay = Replay::new(run, planner, count)?;
+            let score = replay.as_ref().map_or(NOT_REACHED.into(), Replay::score);
             let is_last_row = row + 1 == planners.len();
-            panel.frame(&mut canvas);
-            let x_label = if is_last_row { format!("x ({})", unit.symbol) } else { String::new() };
-            let y_label = format!("{planner}: height ({})", unit.symbol);
+            panel.frame(canvas);
+            let x_label = if is_last_row { unit.named("x") } else { String::new() };
+            let y_label = unit.named(&format!("{planner}: height"));
             let middle = area.left + 0.5 * PANEL.0;
             canvas.title([middle, area.top - 24.0], &format!("{count} touches"));
             let above = [middle, area.top - 8.0];
             canvas.coloured_text(above, &score, SMALL_PX, Anchor::Middle, FAINT_INK);
-            panel.name_axes(&mut canvas, &x_label, if column == 0 { &y_label } else { "" });
+            panel.name_axes(canvas, &x_label, if column == 0 { &y_label } else { "" });
             if let Some(replay) = replay {
                 let colour = style::planner(&run.experiment.planners, planner);
-                draw_belief(&mut canvas, &panel, run, &replay, colour);
+                draw_belief(canvas, &panel, run, &replay, colour);
             }
         }
     }
-    Ok(Some(canvas.finish()))
+    Ok(Some(sheet.canvas.finish()))
 }
 
 /// A panel of heights over the zone, as large as `most`; its axes are equal where both are

@@ -1,23 +1,22 @@
-//! The figures of a run. To add one: write its file here and give it a line in [`FIGURES`].
+//! The figures of runs over a zone, a file each.
 
-mod acquisition;
-mod convergence;
-mod curves;
-mod figure;
-mod solids;
-mod surfaces;
-mod targets;
+pub(super) mod acquisition;
+pub(super) mod convergence;
+pub(super) mod curves;
+pub(super) mod surfaces;
+pub(super) mod targets;
 
-pub use figure::Figure;
-pub use solids::FIGURE as SOLIDS;
+pub use super::whole::FIGURE as SOLIDS;
 pub use surfaces::FIGURE as SURFACES;
 
-/// Every figure in the order of the page; one line to add one.
-pub const FIGURES: &[Figure] = &[
-    convergence::FIGURE,
-    curves::FIGURE,
-    surfaces::FIGURE,
-    solids::FIGURE,
-    targets::FIGURE,
-    acquisition::FIGURE,
-];
+use crate::experiment::store::Run;
+
+/// A drawing of a run.
+pub struct Figure {
+    /// Names its files.
+    pub name: &'static str,
+    /// Says what it shows, and which figure of Yi et al. 2016 it corresponds to.
+    pub caption: fn(&Run) -> String,
+    /// Draws it as SVG; none if the run has nothing to show in it.
+    pub draw: fn(&Run) -> anyhow::Result<Option<String>>,
+}

@@ -1,17 +1,16 @@
 //! Where the finger was sent and where it met the object, seen along the approach.
 
-use super::figure::{Figure, miss_entry};
+use super::Figure;
 use crate::experiment::statistics::summary::median_shift_m;
 use crate::experiment::store::Run;
 use crate::report::axes::{Axis, Length, Panel};
 use crate::report::canvas::Area;
-use crate::report::legend::{Swatch, sheet};
-use crate::report::number::digits;
+use crate::report::legend::{Sheet, Swatch, miss_entry};
 use crate::report::replay;
-use crate::report::style;
-use crate::report::style::{FAINT_INK, INITIAL, LATER, PAPER};
+use crate::report::style::{self, FAINT_INK, INITIAL, LATER, dot};
+use crate::report::table::digits;
 
-pub(super) const FIGURE: Figure = Figure { name: "targets", caption, draw };
+pub(crate) const FIGURE: Figure = Figure { name: "targets", caption, draw };
 
 fn caption(run: &Run) -> String {
     let zone = run.experiment.scene.zone.as_ref();
@@ -54,46 +53,41 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     };
     let mut entries = vec![
         (Swatch::Circle(ring(LATER)), "target"),
-        (Swatch::Circle(point(INITIAL)), "contact of an initial touch"),
-        (Swatch::Circle(point(LATER)), "of a later one"),
+        (Swatch::Circle(dot(INITIAL)), "contact of an initial touch"),
+        (Swatch::Circle(dot(LATER)), "of a later one"),
     ];
     entries.extend(miss_entry(run));
     let most = Area { left: LEFT_PX, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };
     let shape = Panel::equal(most, axis(zone.x_m), axis(z_m));
-    let Area { width: panel_px, height: panel_height_px, .. } = shape.area;
-    let step_px = panel_px + 84.0;
+    let step_px = shape.area.width + 84.0;
     let width = (LEFT_PX + rows.len() as f64 * step_px).max(WIDTH_MIN_PX);
-    let size = [width, TOP_PX + panel_height_px + 60.0];
-    let (mut canvas, more_px) = sheet(size, [LEFT_PX, 20.0], (width - LEFT_PX, ""), entries);
+    let size = [width, TOP_PX + shape.area.height + 60.0];
+    let panels = (shape.area, [step_px, 0.0]);
+    let mut sheet = Sheet::new(size, panels, (width - LEFT_PX, ""), entries);
     for (column, row) in rows.iter().enumerate() {
-        let panel = shape.moved(LEFT_PX + column as f64 * step_px, TOP_PX + more_px);
-        panel.frame(&mut canvas);
-        let [x, z] = ["x", "z"].map(|name| format!("{name} ({})", unit.symbol));
-        panel.label(&mut canvas, &row.planner, &x, if column == 0 { &z } else { "" });
+        let panel = Panel { area: sheet.area(column, 0.0), ..shape.clone() };
+        let canvas = &mut sheet.canvas;
+        let z = if column == 0 { unit.named("z") } else { String::new() };
+        panel.titled_frame(canvas, &row.planner, &unit.named("x"), &z);
         let at = |place: &[f64]| panel.at(place[0] * unit.per_m, place[1] * unit.per_m);
         canvas.clipped(panel.area, |canvas| {
             for (count, touch) in row.touches.iter().enumerate() {
-                let initial = count < run.experiment.initial_touches as usize;
-                let colour = if initial { INITIAL } else { LATER };
+                let colour = style::touch(count < run.experiment.initial_touches as usize);
                 let target = at(&touch.target.numbers());
                 match replay::contact(zone, touch) {
                     Some((place, _)) => {
                         canvas.line([target, at(&place)], &style::stroke(FAINT_INK, 0.9));
                         canvas.circle(target, 2.6, &ring(colour));
-                        canvas.circle(at(&place), 2.6, &point(colour));
+                        canvas.circle(at(&place), 2.6, &dot(colour));
                     }
                     None => canvas.diamond(target, &style::stroke(colour, 1.3)),
                 }
             }
         });
     }
-    Ok(Some(canvas.finish()))
+    Ok(Some(sheet.canvas.finish()))
 }
 
 fn ring(colour: &str) -> String {
     style::stroke(colour, 1.1)
-}
-
-fn point(colour: &str) -> String {
-    format!(r#"fill="{colour}" stroke="{PAPER}" stroke-width=".7""#)
 }

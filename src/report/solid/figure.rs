@@ -1,13 +1,13 @@
 //! The same surfaces as a figure: a row of touch counts for each planner and each side.
 
-use super::panel::{ON_SURFACE, View, inner, scale};
+use super::panel::{View, inner, scale};
 use super::section::{TRUTH_TRIANGLES, deviation_range};
-use super::{Frame, Sequence, Touch};
+use super::{Frame, Sequence};
 use crate::report::axes::{Axis, MM, colour_bar};
 use crate::report::canvas::{Area, Canvas};
-use crate::report::legend::{MISS, sheet, touch_entries};
-use crate::report::relief::Relief;
-use crate::report::style::{self, INITIAL, LATER};
+use crate::report::legend::{MISS, Sheet, touch_entries};
+use crate::report::relief::ON_RELIEF;
+use crate::report::style;
 use palpate_geometry::coarse::coarse;
 use palpate_geometry::mesh::Mesh;
 
@@ -21,20 +21,14 @@ const WIDTH_MIN_PX: f64 = BAR_LEFT_MIN_PX + BAR_PX;
 /// A touch, and the last one.
 const RADII_PX: [f64; 2] = [3.1, 4.6];
 /// The colour of a surface where its number is not known.
-const UNKNOWN: [[f64; 3]; 2] = [[205.0; 3]; 2];
+const UNKNOWN: [u32; 2] = [0xcdcdcd; 2];
+/// Where of its colours the true surface lies, which has no numbers.
+const PLAIN: f64 = 0.6;
 
 /// Surfaces after some touch counts from the front and from behind, coloured by their standard
 /// deviation, with the touches on them and the true one on the right, as SVG; none if there is
 /// nothing to be drawn, or no number to colour it by. Everything is of one scale.
-///
-/// # Errors
-/// If a sequence does not fit together.
-pub fn figure(
-    sequences: &[Sequence],
-    truth: Option<&Mesh>,
-    counts: &[u32],
-) -> anyhow::Result<Option<String>> {
-    sequences.iter().try_for_each(Sequence::check)?;
+pub fn figure(sequences: &[Sequence], truth: Option<&Mesh>, counts: &[u32]) -> Option<String> {
     let truth = truth.map(|mesh| coarse(mesh, TRUTH_TRIANGLES));
     let frames = sequences.iter().flat_map(|sequence| &sequence.frames);
     let drawn: Vec<&Frame> = frames.filter(|frame| counts.contains(&frame.touches)).collect();
@@ -45,7 +39,7 @@ pub fn figure(
     let points: Vec<_> = points.map(|p_w| p_w.coords).collect();
     let ends_m = deviation_range(drawn.iter().flat_map(|frame| &frame.sd_m));
     let axis = ends_m.and_then(|ends_m| Axis::log(ends_m.map(|end_m| end_m * MM.per_m)));
-    let (Some(axis), false) = (axis, points.is_empty()) else { return Ok(None) };
+    let axis = axis.filter(|_| !points.is_empty())?;
 
     let columns = counts.len() + usize::from(truth.is_some());
     let width = (columns as f64 * PANEL.0).max(WIDTH_MIN_PX);
@@ -53,31 +47,27 @@ pub fn figure(
     let entries = touch_entries().into_iter().chain(is_missed.then_some(MISS));
     let rows = sequences.iter().flat_map(|it| [false, true].map(|is_behind| (it, is_behind)));
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + rows.clone().count() as f64 * PANEL.1 + FOOT_PX];
-    let (mut canvas, more_px) = sheet(size, [MARGIN.0, 20.0], (width, ON_SURFACE), entries);
-    let top = MARGIN.1 + more_px;
-    let area = |row: usize, column: usize| Area {
-        left: MARGIN.0 + column as f64 * PANEL.0,
-        top: top + row as f64 * PANEL.1,
-        width: PANEL.0,
-        height: PANEL.1,
-    };
-    let px_per_m = scale(&points, area(0, 0));
+    let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
+    let mut sheet = Sheet::new(size, (first, PANEL.into()), (width, ON_RELIEF), entries);
+    let px_per_m = scale(&points, first);
     for (row, (sequence, is_behind)) in rows.enumerate() {
-        for (column, &count) in counts.iter().enumerate() {
-            let view = View::new(area(row, column), is_behind, px_per_m, &points);
-            belief(&view, &mut canvas, (sequence, count), &axis);
+        let area = |column: usize| sheet.area(column, row as f64);
+        let views = (0..columns).map(|it| View::new(area(it), is_behind, px_per_m, &points));
+        let views: Vec<View> = views.collect();
+        for (view, &count) in views.iter().zip(counts) {
+            belief(view, &mut sheet.canvas, (sequence, count), &axis);
         }
-        if let Some(truth) = &truth {
-            let view = View::new(area(row, counts.len()), is_behind, px_per_m, &points);
-            view.truth(&mut canvas, truth);
+        if let (Some(truth), Some(view)) = (&truth, views.last()) {
+            view.title(&mut sheet.canvas, "true object", "");
+            view.relief(&mut sheet.canvas, truth, |_, light| style::height(PLAIN, light));
         }
     }
-    let foot = size[1] + more_px - FOOT_PX + 14.0;
-    View::draw_scale(&mut canvas, px_per_m, [MARGIN.0, foot]);
+    let top = sheet.bottom - FOOT_PX + 14.0;
+    View::draw_scale(&mut sheet.canvas, px_per_m, [MARGIN.0, top]);
     let left = (0.5 * width).max(BAR_LEFT_MIN_PX) + MARGIN.0;
-    let bar = Area { left, top: foot, width: BAR_PX, height: 13.0 };
-    colour_bar(&mut canvas, bar, &axis, "standard deviation σ (mm)", style::deviation);
-    Ok(Some(canvas.finish()))
+    let bar = Area { left, top, width: BAR_PX, height: 13.0 };
+    colour_bar(&mut sheet.canvas, bar, &axis, "standard deviation σ (mm)", style::deviation);
+    Some(sheet.canvas.finish())
 }
 
 fn belief(view: &View, canvas: &mut Canvas, (sequence, count): (&Sequence, u32), axis: &Axis) {
@@ -97,26 +87,19 @@ fn belief(view: &View, canvas: &mut Canvas, (sequence, count): (&Sequence, u32),
             _ => style::lit(&UNKNOWN, 0.0, light),
         }
     };
-    let relief = view.relief(&frame.mesh, colour);
-    relief.draw(canvas);
-    let touches = sequence.touches(frame);
-    canvas.grouped(ON_SURFACE, |canvas| {
-        for (i, touch) in touches.iter().enumerate() {
-            mark(view, canvas, touch, &relief, i + 1 == touches.len());
+    let relief = view.relief(canvas, &frame.mesh, colour);
+    canvas.grouped(ON_RELIEF, |canvas| {
+        for (i, touch) in sequence.touches.iter().take(count as usize).enumerate() {
+            let colour = style::touch(touch.is_initial);
+            let p_w = touch.contact_w.unwrap_or(touch.aim_w).coords;
+            let at = view.camera.at(&p_w);
+            // A touch that met nothing may have been sent beside all that is drawn.
+            if touch.contact_w.is_some() {
+                let radius = RADII_PX[usize::from(i + 1 == count as usize)];
+                relief.mark(canvas, (&view.camera, &p_w), radius, colour);
+            } else if inner(view.area).contains(at) {
+                canvas.diamond(at, &style::stroke(colour, 1.3));
+            }
         }
     });
-}
-
-/// A touch: a point where it met the object, hollow if that is hidden; a diamond where it was sent
-/// if it met nothing, which may be beside all that is drawn.
-fn mark(view: &View, canvas: &mut Canvas, touch: &Touch, relief: &Relief, is_last: bool) {
-    let colour = if touch.is_initial { INITIAL } else { LATER };
-    let p_w = touch.contact_w.unwrap_or(touch.aim_w).coords;
-    let at = view.camera.at(&p_w);
-    if touch.contact_w.is_some() {
-        let nearness = view.camera.nearness(&p_w);
-        relief.mark(canvas, (at, nearness), RADII_PX[usize::from(is_last)], colour);
-    } else if inner(view.area).contains(at) {
-        canvas.diamond(at, &style::stroke(colour, 1.3));
-    }
 }

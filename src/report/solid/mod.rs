@@ -1,7 +1,6 @@
 //! Beliefs of whole objects, as closed surfaces: to turn on the page, as a figure, as files.
 //!
-//! What is drawn is given as plain triangles with numbers at their vertices, in `W` and metres.
-//! Where they are from is not known here.
+//! A surface is given as plain triangles with numbers at their vertices, in `W` and metres.
 
 mod figure;
 mod panel;
@@ -14,18 +13,17 @@ pub use section::{counts, section};
 
 use crate::report::points::Points;
 use crate::report::style;
-use anyhow::{Context, bail, ensure};
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::solids::{Triangles, normals};
 
-/// What a planner's touches made of an object.
+/// The touches of a planner and its beliefs after some of them.
 #[derive(Clone, Debug, Default)]
 pub struct Sequence {
     /// Whose.
     pub planner: String,
     /// Every touch, in order.
     pub touches: Vec<Touch>,
-    /// What was believed, by rising touch counts.
+    /// Believed surfaces, by rising touch counts.
     pub frames: Vec<Frame>,
 }
 
@@ -60,60 +58,22 @@ pub struct Frame {
     pub score: String,
 }
 
-impl Sequence {
-    /// # Errors
-    /// If a frame has more touches than there are, or its numbers are not those of its mesh.
-    fn check(&self) -> anyhow::Result<()> {
-        for frame in &self.frames {
-            let place = || format!("{} after {} touches", self.planner, frame.touches);
-            let known = self.touches.len();
-            ensure!(frame.touches as usize <= known, "{}: {known} touches are known", place());
-            frame.check().with_context(place)?;
-        }
-        Ok(())
-    }
-
-    /// The touches before a frame.
-    fn touches(&self, frame: &Frame) -> &[Touch] {
-        self.touches.get(..frame.touches as usize).unwrap_or(&self.touches)
-    }
-}
-
 impl Frame {
     /// Its vertices with their normals, σ and errors, coloured by σ from 0 to the largest, and its
     /// triangles; what the file says of itself stands in `comments`.
-    ///
-    /// # Errors
-    /// If its numbers are not those of its mesh.
-    pub fn points(&self, comments: Vec<String>) -> anyhow::Result<Points> {
-        self.check()?;
+    pub fn points(&self, comments: Vec<String>) -> Points {
         let (vertices, triangles) = &self.mesh;
         let finite = self.sd_m.iter().copied().filter(|sd_m| sd_m.is_finite());
         let largest_m = finite.fold(f64::MIN_POSITIVE, f64::max);
-        // What is not known is shown as the least sure.
+        // An unknown deviation is shown as the largest.
         let share = |sd_m: f64| if sd_m.is_finite() { sd_m / largest_m } else { 1.0 };
         let deviations = self.sd_m.iter().map(|&sd_m| (sd_m, style::deviation_rgb(share(sd_m))));
-        Ok(Points {
+        Points {
             comments,
             points: vertices.iter().copied().zip(normals(vertices, triangles)).collect(),
             deviations: deviations.collect(),
             errors_m: self.error_m.clone(),
             triangles: triangles.iter().map(|corners| corners.map(|i| i as usize)).collect(),
-        })
-    }
-
-    /// # Errors
-    /// If its numbers are not those of its mesh.
-    fn check(&self) -> anyhow::Result<()> {
-        let (vertices, triangles) = &self.mesh;
-        let (count, sds, errors) = (vertices.len(), self.sd_m.len(), self.error_m.len());
-        ensure!(sds == count, "{sds} standard deviations of {count} vertices");
-        ensure!(errors == count || errors == 0, "{errors} errors of {count} vertices");
-        let is_finite = vertices.iter().all(|p_w| p_w.coords.iter().all(|x_m| x_m.is_finite()));
-        ensure!(is_finite, "a vertex that is not finite");
-        match triangles.as_flattened().iter().find(|&&vertex| vertex as usize >= count) {
-            Some(vertex) => bail!("vertex {vertex} of {count}, counted from 0"),
-            None => Ok(()),
         }
     }
 }

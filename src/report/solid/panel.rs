@@ -1,10 +1,9 @@
 //! One view of a solid on a sheet: from the front or from behind, lit by the viewer.
 
 use crate::report::axes::{Axis, MM};
-use crate::report::camera::{AZIMUTH_DEG, Camera};
 use crate::report::canvas::{Anchor, Area, Canvas, PointPx};
-use crate::report::relief::{Face, Relief, brightness};
-use crate::report::style::{self, FAINT_INK, INK, SMALL_PX};
+use crate::report::relief::{self, AZIMUTH_DEG, Camera, Relief, brightness};
+use crate::report::style::{self, INK, SMALL_PX};
 use nalgebra::Vector3;
 use palpate_geometry::solids::{Triangles, normals};
 
@@ -13,14 +12,10 @@ const TITLE_PX: f64 = 38.0;
 const GAP_PX: f64 = 8.0;
 /// The most that the bar of the scale is long.
 const SCALE_PX: f64 = 60.0;
-/// Where of its colours a surface lies that has no numbers.
-const PLAIN: f64 = 0.6;
-/// Marks whose colours do not change with the paper's, for the surface's do not.
-pub(super) const ON_SURFACE: &str = r#"class="relief""#;
 
 /// The viewer in front, on the side that a finger touches along −y, or behind.
 fn camera(is_behind: bool) -> Camera {
-    Camera::toward(AZIMUTH_DEG + if is_behind { 180.0 } else { 0.0 })
+    Camera::toward(AZIMUTH_DEG + if is_behind { 180.0 } else { 0.0 }, 1.0)
 }
 
 /// Pixels per metre, so that `points` fit into a panel from both sides.
@@ -55,43 +50,35 @@ impl View {
 
     pub(super) fn title(&self, canvas: &mut Canvas, words: &str, score: &str) {
         let behind = if self.is_behind { ", from behind" } else { "" };
-        let [middle, top] = [self.area.centre()[0], self.area.top];
-        canvas.title([middle, top + 14.0], &format!("{words}{behind}"));
-        canvas.coloured_text([middle, top + 31.0], score, SMALL_PX, Anchor::Middle, FAINT_INK);
+        relief::title(canvas, self.area, &format!("{words}{behind}"), score);
     }
 
-    pub(super) fn truth(&self, canvas: &mut Canvas, truth: &Triangles) {
-        self.title(canvas, "true object", "");
-        self.relief(truth, |_, light| style::height(PLAIN, light)).draw(canvas);
-    }
-
-    /// The triangles that face the viewer, each as bright as its corners are and in the colour that
-    /// its place in the list and its light have.
-    pub(super) fn relief(&self, mesh: &Triangles, colour: impl Fn(usize, f64) -> String) -> Relief {
-        let (vertices, triangles) = mesh;
+    /// Draws the triangles that face the viewer, each as bright as its corners are and in the
+    /// colour that its place in the list and its light have.
+    pub(super) fn relief(
+        &self,
+        canvas: &mut Canvas,
+        (vertices, triangles): &Triangles,
+        colour: impl Fn(usize, f64) -> String,
+    ) -> Relief {
         let outward = normals(vertices, triangles);
         // The light goes with the viewer.
         let lit = |normal: Vector3<f64>| match self.is_behind {
             true => Vector3::new(-normal.x, -normal.y, normal.z),
             false => normal,
         };
-        let face = |(triangle, &corners): (usize, &[u32; 3])| {
-            let [a, b, c] = corners.map(|vertex| vertices[vertex as usize].coords);
-            let normal = (b - a).cross(&(c - a)).try_normalize(0.0)?;
-            let smooth: Vector3<f64> = corners.iter().map(|&vertex| outward[vertex as usize]).sum();
-            self.camera.sees(&normal).then(|| Face {
-                outline: [a, b, c].map(|corner| self.camera.at(&corner)).to_vec(),
-                nearness: self.camera.nearness(&((a + b + c) / 3.0)),
-                colour: colour(
-                    triangle,
-                    brightness(lit(smooth.try_normalize(0.0).unwrap_or(normal))),
-                ),
-            })
-        };
-        Relief::sorted(triangles.iter().enumerate().filter_map(face).collect())
+        let corners = triangles.iter().map(|it| it.map(|vertex| vertices[vertex as usize].coords));
+        let relief = Relief::of_triangles(&self.camera, corners, |triangle, _, normal| {
+            let corners = triangles[triangle].iter();
+            let smooth: Vector3<f64> = corners.map(|&vertex| outward[vertex as usize]).sum();
+            let normal = lit(smooth.try_normalize(0.0).unwrap_or(normal));
+            colour(triangle, brightness(&normal))
+        });
+        relief.draw(canvas);
+        relief
     }
 
-    /// How long a round number of millimetres is.
+    /// Draws a bar of a round number of millimetres.
     pub(super) fn draw_scale(canvas: &mut Canvas, px_per_m: f64, [left, top]: PointPx) {
         let most_mm = SCALE_PX / px_per_m * MM.per_m;
         let ticks = Axis::linear(0.0, most_mm, 3.0).ticks();

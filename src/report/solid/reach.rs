@@ -1,9 +1,10 @@
-//! What of a whole object can be touched: its surface, and the sides from which the finger comes.
+//! The reachable part of a whole object: its surface, and the sides from which the finger comes.
 
-use super::panel::{ON_SURFACE, View, scale};
+use super::panel::{View, scale};
 use super::section::TRUTH_TRIANGLES;
 use crate::report::canvas::Area;
-use crate::report::legend::{Swatch, sheet};
+use crate::report::legend::{Sheet, Swatch};
+use crate::report::relief::ON_RELIEF;
 use crate::report::style;
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::coarse::coarse;
@@ -15,9 +16,9 @@ const MARGIN: (f64, f64) = (20.0, 40.0);
 const FOOT_PX: f64 = 40.0;
 const RADIUS_PX: f64 = 4.0;
 
-/// Colours of what is reached and of what is not, of surfaces and of marks; chosen, so that they
+/// Colours of reached and unreached parts, of surfaces and of marks. heuristic: they
 /// differ in print and for the colour-blind.
-const SURFACE: [[[f64; 3]; 2]; 2] = [[[178.0, 190.0, 205.0]; 2], [[213.0, 94.0, 0.0]; 2]];
+const SURFACE: [[u32; 2]; 2] = [[0xb2becd; 2], [0xd55e00; 2]];
 const MARKS: [&str; 2] = ["#0072b2", "#d55e00"];
 const LEGEND: [&str; 2] = ["#b2becd", "#d55e00"];
 
@@ -35,26 +36,29 @@ pub fn picture(
     let points: Vec<Vector3<f64>> = drawn.0.iter().map(|p_w| p_w.coords).chain(marks).collect();
     let width = 2.0 * PANEL.0;
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + PANEL.1 + FOOT_PX];
-    let (mut canvas, more_px) = sheet(size, [MARGIN.0, 20.0], (width, ""), entries(spots, sides));
-    let area = |column: usize| Area {
-        left: MARGIN.0 + column as f64 * PANEL.0,
-        top: MARGIN.1 + more_px,
-        width: PANEL.0,
-        height: PANEL.1,
-    };
-    let px_per_m = scale(&points, area(0));
+    let entries = [
+        (spots, Swatch::Box(LEGEND[0]), "the finger can touch it"),
+        (spots, Swatch::Box(LEGEND[1]), "no straight way leads there"),
+        (sides, Swatch::Circle(style::visible(MARKS[0])), "side it comes from"),
+        (sides, Swatch::Cross(MARKS[1]), "side it cannot come from"),
+    ];
+    let entries = entries.into_iter().filter(|(marks, ..)| !marks.is_empty());
+    let entries = entries.map(|(_, swatch, words)| (swatch, words));
+    let first = Area { left: MARGIN.0, top: MARGIN.1, width: PANEL.0, height: PANEL.1 };
+    let mut sheet = Sheet::new(size, (first, PANEL.into()), (width, ""), entries);
+    let px_per_m = scale(&points, first);
     for (column, is_behind) in [false, true].into_iter().enumerate() {
-        let view = View::new(area(column), is_behind, px_per_m, &points);
-        view.title(&mut canvas, "what can be touched", "");
-        let relief = view.relief(&drawn, |triangle, light| {
+        let view = View::new(sheet.area(column, 0.0), is_behind, px_per_m, &points);
+        let canvas = &mut sheet.canvas;
+        view.title(canvas, "what can be touched", "");
+        let relief = view.relief(canvas, &drawn, |triangle, light| {
             style::lit(&SURFACE[usize::from(!is_reached[triangle])], 0.0, light)
         });
-        relief.draw(&mut canvas);
-        canvas.grouped(ON_SURFACE, |canvas| {
+        canvas.grouped(ON_RELIEF, |canvas| {
             for (p_w, is_reached) in sides {
                 let at = view.camera.at(&p_w.coords);
                 let colour = MARKS[usize::from(!is_reached)];
-                match relief.hides(at, view.camera.nearness(&p_w.coords)) {
+                match relief.hides(&view.camera, &p_w.coords) {
                     true => {}
                     false if *is_reached => canvas.circle(at, RADIUS_PX, &style::visible(colour)),
                     false => canvas.cross(at, colour),
@@ -62,8 +66,9 @@ pub fn picture(
             }
         });
     }
-    View::draw_scale(&mut canvas, px_per_m, [MARGIN.0, size[1] + more_px - FOOT_PX + 8.0]);
-    canvas.finish()
+    let top = sheet.bottom - FOOT_PX + 8.0;
+    View::draw_scale(&mut sheet.canvas, px_per_m, [MARGIN.0, top]);
+    sheet.canvas.finish()
 }
 
 /// Of each triangle, whether the finger can touch the spot that is nearest to its middle.
@@ -79,23 +84,6 @@ fn triangles_reached(
         spot.is_none_or(|(_, is_reached)| *is_reached)
     };
     triangles.iter().map(nearest).collect()
-}
-
-fn entries(
-    spots: &[(Point3<f64>, bool)],
-    sides: &[(Point3<f64>, bool)],
-) -> impl Iterator<Item = (Swatch, &'static str)> {
-    let of_spots = [
-        (Swatch::Box(LEGEND[0]), "the finger can touch it"),
-        (Swatch::Box(LEGEND[1]), "no straight way leads there"),
-    ];
-    let of_sides = [
-        (Swatch::Circle(style::visible(MARKS[0])), "side it comes from"),
-        (Swatch::Cross(MARKS[1]), "side it cannot come from"),
-    ];
-    let (has_spots, has_sides) = (!spots.is_empty(), !sides.is_empty());
-    let of_spots = of_spots.into_iter().filter(move |_| has_spots);
-    of_spots.chain(of_sides.into_iter().filter(move |_| has_sides))
 }
 
 #[cfg(test)]

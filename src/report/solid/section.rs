@@ -3,8 +3,7 @@
 
 use super::{Frame, Sequence, Touch};
 use crate::report::axes::{self, MM};
-use crate::report::explorer::frames::{encode, short};
-use crate::report::explorer::shell::{self, PARTS, Shell};
+use crate::report::explorer::{self, LEAST_SHARE, PARTS, Shell, encode, encode_log, short};
 use crate::report::style;
 use anyhow::ensure;
 use base64::Engine;
@@ -19,7 +18,7 @@ use serde_json::{Value, json};
 
 const SCRIPTS: [&str; 3] = [PARTS, include_str!("surface.js"), include_str!("solid.js")];
 
-/// Most triangles of the true surface that are shown; chosen, 80 kB of a page.
+/// Most triangles of the true surface that are shown. heuristic: 80 kB of a page.
 pub(super) const TRUTH_TRIANGLES: usize = 8000;
 
 const COLOURS: [(&str, &str); 2] = [("deviation", "σ"), ("error", "error")];
@@ -28,39 +27,36 @@ const COLOURS: [(&str, &str); 2] = [("deviation", "σ"), ("error", "error")];
 /// last among them, where the surfaces of `planners` planners have about `triangles` triangles
 /// each.
 pub fn counts(first: u32, last: u32, planners: usize, triangles: usize) -> Vec<u32> {
-    shell::counts(first, last, BYTES_OF_TRIANGLE * planners * triangles)
+    explorer::counts(first, last, BYTES_OF_TRIANGLE * planners * triangles)
 }
 
 /// The section as HTML; empty if no planner has a belief to show. `trial` is said in words, and
 /// `truth` is what can be laid over.
 ///
 /// # Errors
-/// If a sequence does not fit together, or a mesh has more vertices than can be drawn.
+/// If a mesh has more vertices than can be drawn.
 pub fn section(sequences: &[Sequence], truth: Option<&Mesh>, trial: u32) -> anyhow::Result<String> {
-    sequences.iter().try_for_each(Sequence::check)?;
     let shown: Vec<&Sequence> =
         sequences.iter().filter(|sequence| !sequence.frames.is_empty()).collect();
     let Some(first) = shown.first() else { return Ok(String::new()) };
     let truth = truth.map(|mesh| coarse(mesh, TRUTH_TRIANGLES));
-    let Some((data, has_errors)) = data(&shown, truth.as_ref())? else { return Ok(String::new()) };
+    let Some(data) = data(&shown, truth.as_ref())? else { return Ok(String::new()) };
     let initial = first.touches.iter().filter(|touch| touch.is_initial).count();
     let green = match truth {
         Some(_) => " Green: where the true surface stands out of the belief.",
         None => "",
     };
     let shell = Shell {
-        planners: shown.iter().map(|sequence| sequence.planner.as_str()).collect(),
-        colours: if has_errors { &COLOURS } else { &COLOURS[..1] },
+        colours: if data["error_range"].is_null() { &COLOURS[..1] } else { &COLOURS },
         truth: truth.as_ref().map(|_| false),
         class: "surface",
-        frames: first.frames.len(),
         note: format!(
             "Trial {trial}. Blue: the {initial} initial touches; red: those the planner chose; the \
              last one is larger, and an arrow shows how the finger came.{green} {HELP}"
         ),
         scripts: &SCRIPTS,
     };
-    shell.html(&data)
+    Ok(shell.html(&data))
 }
 
 const HELP: &str = "Hollow touches lie behind the surface, diamonds met nothing. Drag the surface \
@@ -68,27 +64,19 @@ const HELP: &str = "Hollow touches lie behind the surface, diamonds met nothing.
                     keys. Two fingers, the keys + and −, or the wheel once the surface was clicked \
                     zoom; 0 is as at first.";
 
-/// Deviations smaller than this share of the largest are shown as that; chosen.
-const LEAST_SHARE: f64 = 1e-4;
-/// The least share where all are alike; chosen.
+/// The least share where all are alike. heuristic.
 const ALIKE_SHARE: f64 = 0.1;
-/// Ends of deviations where there are none; chosen.
+/// Ends of deviations where there are none. heuristic.
 const NONE_M: [f64; 2] = [1e-4, 1e-2];
 
-/// The data of beliefs in an object and of its true surface, and whether it has errors; `None` if
-/// there is nothing to be drawn.
+/// The data of beliefs in an object and of its true surface; `None` if there is nothing to draw.
 ///
 /// # Errors
 /// If a mesh has more vertices than can be drawn.
-fn data(
-    sequences: &[&Sequence],
-    truth: Option<&Triangles>,
-) -> anyhow::Result<Option<(Value, bool)>> {
+fn data(sequences: &[&Sequence], truth: Option<&Triangles>) -> anyhow::Result<Option<Value>> {
     let frames = || sequences.iter().flat_map(|sequence| &sequence.frames);
-    let contacts = || {
-        let touches = sequences.iter().flat_map(|sequence| &sequence.touches);
-        touches.filter_map(|touch| touch.contact_w.as_ref())
-    };
+    let touches = || sequences.iter().flat_map(|sequence| &sequence.touches);
+    let contacts = || touches().filter_map(|touch| touch.contact_w.as_ref());
     let meshes = || frames().map(|frame| &frame.mesh).chain(truth);
     let points = || meshes().flat_map(|(vertices, _)| vertices).chain(contacts());
     let Some(cube) = Cube::around(points()) else { return Ok(None) };
@@ -105,8 +93,8 @@ fn data(
             "frames": frames.collect::<anyhow::Result<Vec<_>>>()?,
         }))
     };
-    let truth = truth.map(|(vertices, triangles)| Coded::new(cube, vertices, triangles));
-    let data = json!({
+    let truth = truth.map(|mesh| Coded::new(cube, mesh));
+    Ok(Some(json!({
         "unit": MM.symbol,
         // The ends of the codes of a position, from the middle of everything.
         "cube": in_mm([-0.5 * cube.side_m, 0.5 * cube.side_m]),
@@ -117,8 +105,7 @@ fn data(
         "truth": truth.transpose()?,
         "colours": style::touch_colours(),
         "planners": sequences.iter().map(planner).collect::<anyhow::Result<Vec<_>>>()?,
-    });
-    Ok(Some((data, errors.is_some())))
+    })))
 }
 
 /// Ends of the finite deviations above zero, apart, if there is one.
@@ -136,28 +123,28 @@ fn error_range<'a>(errors_m: impl Iterator<Item = &'a f64>) -> Option<[f64; 2]> 
 }
 
 /// A belief with its numbers coded between the ends of deviations and of errors, in metres.
-fn coded(
-    frame: &Frame,
+fn coded<'a>(
+    frame: &'a Frame,
     cube: Cube,
     (deviations, errors): ([f64; 2], Option<[f64; 2]>),
 ) -> anyhow::Result<Value> {
-    let (vertices, triangles) = &frame.mesh;
-    let mesh = Coded::new(cube, vertices, triangles)?;
-    let known = |value: f64| if value.is_finite() { value } else { f64::NAN };
-    let of = |values: &[f64], share: &dyn Fn(f64) -> f64| {
-        encode(mesh.order.iter().map(|&vertex| share(known(values[vertex as usize]))))
-    };
-    let [least, most] = deviations;
-    let deviation = of(&frame.sd_m, &|sd_m| (sd_m / least).ln() / (most / least).ln());
+    let mesh = Coded::new(cube, &frame.mesh)?;
+    let ordered = |values: &'a [f64]| mesh.order.iter().map(|&vertex| values[vertex as usize]);
     let error = errors.filter(|_| !frame.error_m.is_empty()).map(|[low, high]| {
-        of(&frame.error_m, &|error_m| 0.5 * (1.0 + error_m / (0.5 * (high - low))))
+        let half_m = 0.5 * (high - low);
+        encode(ordered(&frame.error_m).map(|error_m| match error_m.is_finite() {
+            true => 0.5 * (1.0 + error_m / half_m),
+            false => f64::NAN,
+        }))
     });
-    let mut coded = json!(mesh);
-    coded["touches"] = json!(frame.touches);
-    coded["score"] = json!(frame.score);
-    coded["deviation"] = json!(deviation);
-    coded["error"] = json!(error);
-    Ok(coded)
+    Ok(json!({
+        "positions": mesh.positions,
+        "corners": mesh.corners,
+        "touches": frame.touches,
+        "score": frame.score,
+        "deviation": encode_log(deviations, ordered(&frame.sd_m)),
+        "error": error,
+    }))
 }
 
 /// A touch, from the middle of everything.
@@ -223,7 +210,7 @@ impl Coded {
     ///
     /// # Errors
     /// If more vertices are used than sixteen bits can count.
-    fn new(cube: Cube, vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> anyhow::Result<Self> {
+    fn new(cube: Cube, (vertices, triangles): &Triangles) -> anyhow::Result<Self> {
         let mut numbers = vec![None; vertices.len()];
         let (mut order, mut corners) = (Vec::new(), Vec::new());
         for &vertex in triangles.as_flattened() {

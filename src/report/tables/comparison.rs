@@ -1,13 +1,11 @@
 //! The planners of a run against its baselines, in every measure and in touches to equal error: as
 //! tables of the page and as files.
 
-use super::titled;
 use crate::experiment::measure::{Direction, MEASURES, Measure, in_files};
 use crate::experiment::statistics::comparison::Comparison;
 use crate::experiment::statistics::equal_error::{EqualError, Estimate, errors};
 use crate::experiment::store::Run;
-use crate::report::number::{digits, with_interval};
-use crate::report::table::{Cell, Column, Table};
+use crate::report::table::{Cell, Column, Table, digits, titled, with_interval};
 
 /// The table of `comparison.csv`: a row per planner, baseline and measure after the last touch.
 pub fn comparison_file(found: &[Comparison]) -> Table {
@@ -25,7 +23,7 @@ pub fn comparison_file(found: &[Comparison]) -> Table {
     for Comparison { planner, baseline, measure, paired } in found {
         let difference = Estimate { value: paired.mean, interval: paired.interval };
         let names = [*planner, *baseline, measure.id].map(Cell::from);
-        let numbers = [paired.trials.into(), difference.into(), paired.won.into()];
+        let numbers = [paired.trials.into(), Cell::estimate(difference), paired.won.into()];
         table.rows.push(names.into_iter().chain(numbers).collect());
     }
     table
@@ -94,7 +92,7 @@ pub fn equal_error_file(found: &[EqualError]) -> Table {
     for it in found {
         let names = [it.planner, it.baseline, it.measure.id].map(Cell::from);
         let numbers = [it.trials.into(), it.goal.into(), it.baseline_touches.into()];
-        let estimates = [it.touches, it.ratio, it.path_ratio].map(Cell::from);
+        let estimates = [it.touches, it.ratio, it.path_ratio].map(Cell::estimate);
         table.rows.push(names.into_iter().chain(numbers).chain(estimates).collect());
     }
     table

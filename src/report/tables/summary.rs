@@ -1,13 +1,11 @@
 //! The curves of a run as tables: of the page, of the terminal and as a file; and what a
 //! publication says beside what came out.
 
-use super::titled;
 use crate::experiment::measure::{self, MEASURES, Measure};
 use crate::experiment::statistics::curve_table::{columns, curve_table};
 use crate::experiment::statistics::summary::{self, CurvePoint, Events, typical};
 use crate::experiment::store::Run;
-use crate::report::number::shown;
-use crate::report::table::{Cell, Column, Table};
+use crate::report::table::{Cell, Column, Table, shown, titled};
 use serde_json::{Value, json};
 
 /// A row for each planner and tabled touch count; columns without a value are left out.
@@ -24,8 +22,7 @@ pub fn table(run: &Run) -> Table {
         let kind = if *is_median { "median" } else { "mean" };
         Column::new(format!("{kind} {}", measure.stem().replace('_', " ")))
             .title(format!("{kind} {}", measure.title))
-            .unit(measure.unit.symbol, measure.unit.per_si)
-            .decimals(measure.unit.decimals)
+            .unit(measure.unit.symbol, measure.unit.per_si, measure.unit.decimals)
     };
     let start = ["touches", "planner"].map(Column::new).into_iter();
     let mut table = Table::new(start.chain(aggregates.iter().map(column)));
@@ -36,9 +33,9 @@ pub fn table(run: &Run) -> Table {
         for point in curves.iter().flatten().filter(|point| point.touches == count) {
             let start = [Cell::from(count as usize), point.planner.as_str().into()];
             let value = |(measure, is_median): &(&Measure, bool)| match point.of(measure) {
-                None => Cell::Empty,
+                None => Cell::default(),
                 Some(summary) if *is_median => summary.median.into(),
-                Some(summary) => Cell::Mean(summary.mean, summary.error),
+                Some(summary) => Cell::mean(summary.mean, summary.error),
             };
             table.rows.push(start.into_iter().chain(aggregates.iter().map(value)).collect());
         }
@@ -95,7 +92,7 @@ pub fn json(run: &Run) -> Value {
     })
 }
 
-/// What a publication says beside what came out: a row for each measure of each claim.
+/// The claims of a publication beside the results: a row for each measure of each claim.
 pub fn claims(run: &Run) -> Table {
     let planners = &run.experiment.planners;
     let heads = ["paper", "it says", "here after", "measure"].map(Column::new).into_iter();
@@ -126,7 +123,7 @@ pub fn claims(run: &Run) -> Table {
 /// A note on the cells of [`claims`].
 pub const CLAIMS_NOTE: &str = "What Yi et al. 2016 say, and the same here, over the trials.";
 
-/// What happened to the trials besides their errors, a line each.
+/// Events in the trials besides their errors, a line for each planner.
 pub fn happened(run: &Run) -> Vec<String> {
     let of = |planner: &String| told(planner, &summary::events(&run.rows, planner));
     let unlisted = (run.unlisted > 0).then(|| {
@@ -139,7 +136,7 @@ pub fn happened(run: &Run) -> Vec<String> {
     run.experiment.planners.iter().filter_map(of).chain(unlisted).collect()
 }
 
-/// What happened to a planner's trials, in a line; none if nothing did.
+/// The events in a planner's trials, in a line; none if there were none.
 fn told(planner: &str, events: &Events) -> Option<String> {
     let counts = [
         (events.failures, "failed trials"),

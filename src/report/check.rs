@@ -1,0 +1,172 @@
+//! A check as tables and sentences, as Markdown, as the XML that continuous integration reads, and
+//! drawn.
+
+use super::canvas::{Anchor, Area, Canvas};
+use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
+use super::table::{Cell, Column, Table};
+use crate::study::check::{Held, Judgement, Planner, Rules, Verdict};
+use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
+
+/// The name of a verdict.
+pub fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Identical => "identical",
+        Verdict::Better => "better",
+        Verdict::Ok => "ok",
+        Verdict::Undecided => "undecided",
+        Verdict::Worse => "WORSE",
+        Verdict::Missing => "MISSING",
+    }
+}
+
+/// A row for each measure of each planner, or one for a planner without any.
+pub fn table(held: &Held) -> Table {
+    let heads = ["planner", "measure", "change", "95 % interval, at any time", "verdict", "trials"];
+    let mut table = Table::new(heads.map(Column::new));
+    table.rows =
+        (held.planners.iter().flat_map(rows)).map(|cells| cells.map(Cell::from).into()).collect();
+    table
+}
+
+fn rows(planner: &Planner) -> Vec<[String; 6]> {
+    let trials = planner.trials.to_string();
+    let row = |judgement: &Judgement| {
+        let [low, high] = judgement.sequence.interval.map(|end| percent(judgement, end));
+        let change = percent(judgement, judgement.sequence.mean);
+        let interval = format!("{low} to {high}");
+        let (title, verdict) = (judgement.judged.title, word(judgement.verdict));
+        [&planner.name, title, &change, &interval, verdict, &trials].map(String::from)
+    };
+    match planner.judgements.is_empty() {
+        true => {
+            vec![[&planner.name, "", "", "", word(planner.verdict), &trials].map(String::from)]
+        }
+        false => planner.judgements.iter().map(row).collect(),
+    }
+}
+
+fn percent(judgement: &Judgement, difference: f64) -> String {
+    let percent = judgement.judged.percent(difference);
+    if percent.is_finite() { format!("{percent:+.1} %") } else { "–".into() }
+}
+
+/// Remarks on a check, a sentence each.
+pub fn remarks(held: &Held, rules: &Rules, most: u32) -> Vec<String> {
+    let settings = "settings, or the object's file, are not those of the baseline";
+    let mut remarks: Vec<String> =
+        (!held.same_settings).then(|| settings.into()).into_iter().collect();
+    for planner in &held.planners {
+        let name = &planner.name;
+        remarks.extend(planner.failed.as_ref().map(|(count, reason)| {
+            format!(
+                "{name}: {count} trials failed that did not in the baseline; the first: {reason}"
+            )
+        }));
+        remarks.extend(planner.judgements.first().map(|first| {
+            let percent = 100.0 * rules.tolerance;
+            let wanted = first.wanted.map_or("more than 100000".into(), |count| count.to_string());
+            let is_open = first.verdict == Verdict::Undecided;
+            let then = if is_open {
+                format!("; {most} were allowed (--max-trials)")
+            } else {
+                String::new()
+            };
+            let title = first.judged.title;
+            format!("{name}: a loss of {percent} % of {title} takes {wanted} trials to tell{then}")
+        }));
+    }
+    remarks
+}
+
+/// The whole check as Markdown.
+pub fn markdown(name: &str, held: &Held, rules: &Rules, most: u32) -> String {
+    let mut text = format!("### {name}: {}\n\n{}", word(held.verdict()), table(held).markdown());
+    remarks(held, rules, most).iter().for_each(|remark| text += &format!("\n* {remark}"));
+    text + "\n"
+}
+
+/// The check as JUnit XML, a test case for each planner: worse and missing are failures, undecided
+/// is an error, because it must not pass.
+///
+/// # Errors
+/// If a name cannot stand in XML.
+pub fn junit(name: &str, held: &Held, rules: &Rules, most: u32) -> Result<String, SerializeError> {
+    let mut report = Report::new("palpate check");
+    let mut suite = TestSuite::new(name);
+    for planner in &held.planners {
+        let mut case = TestCase::new(planner.name.clone(), status(planner));
+        case.set_classname(format!("palpate.{name}"));
+        let lines: Vec<String> = rows(planner).iter().map(|row| row[1..].join("  ")).collect();
+        case.set_system_out(lines.join("\n"));
+        suite.add_test_case(case);
+    }
+    suite.set_system_out(remarks(held, rules, most).join("\n"));
+    report.add_test_suite(suite);
+    report.to_string()
+}
+
+fn status(planner: &Planner) -> TestCaseStatus {
+    let kind = match planner.verdict {
+        Verdict::Identical | Verdict::Better | Verdict::Ok => return TestCaseStatus::success(),
+        Verdict::Worse | Verdict::Missing => NonSuccessKind::Failure,
+        Verdict::Undecided => NonSuccessKind::Error,
+    };
+    let mut status = TestCaseStatus::non_success(kind);
+    status.set_message(word(planner.verdict));
+    status
+}
+
+const LEFT_PX: f64 = 300.0;
+const WIDTH_PX: f64 = 360.0;
+const RIGHT_PX: f64 = 90.0;
+const TOP_PX: f64 = 46.0;
+const LINE_PX: f64 = 22.0;
+
+/// The axis reaches from −4 to 4 tolerances; what lies beyond is cut off there.
+const REACH: f64 = 4.0;
+
+/// Draws each measure's change with its interval, and what is tolerated.
+pub fn draw(name: &str, held: &Held, rules: &Rules) -> String {
+    let lines: usize = held.planners.iter().map(|planner| planner.judgements.len().max(1)).sum();
+    let bottom = TOP_PX + lines as f64 * LINE_PX + 6.0;
+    let mut canvas = Canvas::new(LEFT_PX + WIDTH_PX + RIGHT_PX, bottom + 34.0);
+    let at = |share: f64| LEFT_PX + WIDTH_PX * (0.5 + 0.5 * (share / REACH).clamp(-1.0, 1.0));
+    let title = format!("{name}: {}", word(held.verdict()));
+    canvas.text([LEFT_PX + 0.5 * WIDTH_PX, 20.0], &title, TEXT_PX, Anchor::Middle);
+    let [left, top, right] = [at(-1.0), TOP_PX - 10.0, at(1.0)];
+    let tolerated = Area { left, top, width: right - left, height: bottom - top };
+    canvas.rect(tolerated, &style::fill(GRID, 0.6));
+    canvas.line([[at(0.0), top], [at(0.0), bottom]], &style::stroke(FAINT_INK, 1.0));
+    let lines = held.planners.iter().flat_map(|planner| {
+        let bare = planner.judgements.is_empty().then_some((planner, None));
+        let judged = planner.judgements.iter().map(move |judgement| (planner, Some(judgement)));
+        bare.into_iter().chain(judged)
+    });
+    for (i, (planner, judgement)) in lines.enumerate() {
+        let y = TOP_PX + 4.0 + i as f64 * LINE_PX;
+        let mut text = |x: f64, words: &str, anchor, ink| {
+            canvas.coloured_text([x, y + 4.0], words, SMALL_PX, anchor, ink);
+        };
+        let Some(judgement) = judgement else {
+            text(LEFT_PX - 10.0, &planner.name, Anchor::End, INK);
+            let words = format!("{}, {} trials", word(planner.verdict), planner.trials);
+            text(at(0.0) + 8.0, &words, Anchor::Start, INK);
+            continue;
+        };
+        let words = format!("{}, {}", planner.name, judgement.judged.title);
+        text(LEFT_PX - 10.0, &words, Anchor::End, INK);
+        let ink = if judgement.verdict >= Verdict::Undecided { INK } else { FAINT_INK };
+        text(LEFT_PX + WIDTH_PX + 8.0, word(judgement.verdict), Anchor::Start, ink);
+        let (colour, sequence) = (style::planner(&[], &planner.name), &judgement.sequence);
+        let at = |error: f64| [at(error / judgement.judged.allowed(rules.tolerance)), y];
+        canvas.line(sequence.interval.map(at), &style::stroke(colour, 2.0));
+        canvas.circle(at(sequence.mean), 4.0, &style::fill(colour, 1.0));
+    }
+    let percent = 100.0 * rules.tolerance;
+    let ticks = [format!("−{percent} %"), "as it was".into(), format!("+{percent} %")];
+    for (share, words) in [-1.0, 0.0, 1.0].into_iter().zip(ticks) {
+        canvas.text([at(share), bottom + 14.0], &words, SMALL_PX, Anchor::Middle);
+    }
+    canvas.text([at(0.0), bottom + 29.0], "less is better", SMALL_PX, Anchor::Middle);
+    canvas.finish()
+}

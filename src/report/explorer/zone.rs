@@ -1,0 +1,159 @@
+//! Beliefs over a zone on a grid after many touch counts, in few bytes.
+
+use super::{LEAST_SHARE, PARTS, Shell, counts, encode, encode_log, short};
+use crate::experiment::store::Run;
+use crate::experiment::trial::row::TouchRow;
+use crate::report::axes::{self, Axis, Length};
+use crate::report::relief::Space;
+use crate::report::replay::{self, Grid, Replay, drawn_words};
+use crate::report::style;
+use palpate_explore::task::Zone;
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
+use serde_json::{Value, json};
+
+const SCRIPTS: [&str; 4] =
+    [PARTS, include_str!("relief.js"), include_str!("curve.js"), include_str!("heights.js")];
+
+/// The colour maps of a surface: their names in scripts, and their labels.
+const COLOURS: [(&str, &str); 3] = [("height", "height"), ("deviation", "σ"), ("error", "error")];
+
+/// The section as HTML; empty if no planner has a belief to show.
+///
+/// # Errors
+/// If the recorded touches do not belong to the zone or cannot be conditioned on.
+pub fn section(run: &Run) -> anyhow::Result<String> {
+    let Some(data) = data(run)? else { return Ok(String::new()) };
+    // In a curve the truth hides nothing, so there it is shown from the start.
+    let (class, colours, is_shown, help) = match data["z"].is_null() {
+        true => ("curve", &[][..], true, "Drag the slider, or use the arrow keys."),
+        false => ("surface", &COLOURS[..], false, HELP),
+    };
+    let note = format!(
+        "Trial {}. Blue: the {} initial touches; red: those the planner chose; the last one is \
+         larger.{} {help}",
+        run.experiment.report.trial,
+        run.experiment.initial_touches,
+        drawn_words(run)
+    );
+    Ok(Shell { colours, truth: Some(is_shown), class, note, scripts: &SCRIPTS }.html(&data))
+}
+
+const HELP: &str = "Hollow touches lie behind the surface, diamonds met nothing. Green: where the \
+                    true surface stands out of the belief. Lines join equal heights. Drag the \
+                    surface to turn it, the slider to go through the touches; both also follow the \
+                    arrow keys.";
+
+/// Most places along the side of a curve and of a surface. heuristic: more would not show at the
+/// size of the page.
+const PLACES_MAX: [usize; 2] = [301, 41];
+/// Bytes of one place in one frame: two for the mean, two for the deviation, in base 64.
+const BYTES_OF_PLACE: usize = 6;
+/// Room above and below the heights of a curve, for its bands, and of a surface. heuristic.
+const MARGIN: [f64; 2] = [0.3, 0.08];
+
+/// A belief on the grid, in metres.
+struct Frame {
+    touches: u32,
+    score: String,
+    /// None where no belief is drawn.
+    means_m: Vec<Option<f64>>,
+    deviations_m: Vec<f64>,
+}
+
+impl Frame {
+    fn of(replay: &Replay, places: &[&[f64]]) -> Self {
+        let predictions = replay.surface.predict(places.iter().copied());
+        let drawn = replay.is_drawn(places.iter().copied()).into_iter().zip(&predictions);
+        Self {
+            touches: replay.touches.len() as u32,
+            score: replay.score(),
+            means_m: drawn.map(|(is_drawn, it)| is_drawn.then_some(it.mean)).collect(),
+            deviations_m: predictions.iter().map(|it| it.variance.sqrt()).collect(),
+        }
+    }
+}
+
+/// The data of the trial that the report draws, replayed; lengths are in the unit of the page.
+/// `None` if there is nothing to show.
+fn data(run: &Run) -> anyhow::Result<Option<Value>> {
+    let experiment = &run.experiment;
+    let Some(zone) = &experiment.scene.zone else { return Ok(None) };
+    let kind = zone.dimension() - 1;
+    let names = || experiment.planners.iter().map(String::as_str);
+    let heights_m = replay::heights_m(run, names());
+    let Some(axis) = Axis::around(heights_m, MARGIN[kind], 5.0) else { return Ok(None) };
+    let grid = Grid::new(run, zone.dimension(), PLACES_MAX[kind])?;
+    let places: Vec<&[f64]> = grid.places().collect();
+    let (first, last) = (experiment.initial_touches, experiment.touches);
+    let touch_counts = counts(first, last, BYTES_OF_PLACE * names().len() * places.len());
+    let mut beliefs = Vec::new();
+    for name in names() {
+        let frame = |&count: &u32| {
+            let replay = Replay::new(run, name, count)?;
+            anyhow::Ok(replay.map(|replay| Frame::of(&replay, &places)))
+        };
+        let frames: Vec<Option<Frame>> =
+            touch_counts.par_iter().map(frame).collect::<anyhow::Result<_>>()?;
+        let frames: Vec<Frame> = frames.into_iter().flatten().collect();
+        if !frames.is_empty() {
+            beliefs.push((name, frames));
+        }
+    }
+    let all_m = beliefs.iter().flat_map(|(_, frames)| frames).flat_map(|it| &it.deviations_m);
+    let Some((least, most)) = axes::range(all_m.copied()) else { return Ok(None) };
+    let (low, high) = axis.range();
+    let unit = Length::of(zone);
+    // The ends of the codes of heights and of deviations, which are along their logarithm.
+    let height_range_m = [low - (high - low), high + (high - low)];
+    let deviation_range_m = [least.max(LEAST_SHARE * most).max(f64::MIN_POSITIVE), most];
+    let heights = |heights_m: &mut dyn Iterator<Item = Option<f64>>| {
+        let [low, high] = height_range_m;
+        encode(heights_m.map(|it| (it.unwrap_or(f64::NAN) - low) / (high - low)))
+    };
+    let in_unit = |ends: [f64; 2]| ends.map(|end| end * unit.per_m);
+    let axis = |side: usize| -> Vec<f64> {
+        grid.along(side).into_iter().map(|at_m| short(at_m * unit.per_m)).collect()
+    };
+    let space = zone.z_m.map(|z_m| Space { x_m: zone.x_m, z_m, height_m: [low, high] });
+    let frame = |frame: &Frame| {
+        json!({
+            "touches": frame.touches,
+            "score": frame.score,
+            "mean": heights(&mut frame.means_m.iter().copied()),
+            "deviation": encode_log(deviation_range_m, frame.deviations_m.iter().copied()),
+        })
+    };
+    let planner = |(name, frames): &(&str, Vec<Frame>)| {
+        let touches = replay::row(run, name).map_or(&[][..], |row| &row.touches);
+        let contacts = touches.iter().map(|touch| contact(zone, touch, unit));
+        json!({
+            "name": name,
+            "colours": style::on_both(style::planner(&experiment.planners, name)),
+            "contacts": contacts.collect::<Vec<_>>(),
+            "frames": frames.iter().map(frame).collect::<Vec<_>>(),
+        })
+    };
+    Ok(Some(json!({
+        "unit": unit.symbol,
+        "x": axis(0),
+        "z": zone.z_m.map(|_| axis(1)),
+        // The ends of the heights drawn, and how much they are stretched.
+        "space": in_unit([low, high]),
+        "stretch": space.map_or(1.0, |space| space.stretch()),
+        "height_range": in_unit(height_range_m),
+        "deviation_range": in_unit(deviation_range_m),
+        "truth": heights(&mut grid.places.iter().map(|(_, height_m)| *height_m)),
+        "initial_touches": experiment.initial_touches,
+        "colours": style::touch_colours(),
+        "planners": beliefs.iter().map(planner).collect::<Vec<_>>(),
+    })))
+}
+
+/// x, height and z of a touch, in the unit of the page.
+fn contact(zone: &Zone, touch: &TouchRow, unit: Length) -> (f64, Option<f64>, Option<f64>) {
+    let met = replay::contact(zone, touch);
+    let height = met.as_ref().map(|(_, height_m)| short(height_m * unit.per_m));
+    let place = met.map_or_else(|| touch.target.numbers(), |(place, _)| place);
+    let coordinate = |side: usize| place.get(side).map(|at| short(at * unit.per_m));
+    (coordinate(0).unwrap_or(0.0), height, coordinate(1))
+}
