@@ -1,8 +1,7 @@
 //! What never changes during a trial, shared by all threads.
 
-use super::function::Function;
 use super::notice;
-use super::scene::{Body, Object, Scene, Unit};
+use super::scene::{Body, Function, Object, Scene, Unit};
 use crate::sim::finger::Fingertip;
 use nalgebra::{Point3, Vector3};
 use palpate_explore::probe::servo::ArmReach;

@@ -1,9 +1,9 @@
 //! What there is: the object, the finger, the zone, and which body carries out a touch.
 
-use super::function::Function;
 use super::solver::SolverSettings;
 use crate::sim::finger::Effects;
 use crate::sim::finger::effects::sensor;
+use clap::ValueEnum;
 use nalgebra::Isometry3;
 use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::robot::finger::Finger;
@@ -17,6 +17,7 @@ use palpate_input::config::{Checked, ConfigError, Loader, Rules, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::f64::consts::PI;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -91,6 +92,39 @@ impl Body {
     }
 }
 
+/// An analytic one-dimensional surface y = f(x), touched without a finger.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Function {
+    /// Eq. 4 of Yi et al. 2016: sin(ωx) + 1 for |x| ≤ 1, and 1 beyond, with ω = 4π.
+    Toy,
+}
+
+impl Function {
+    /// Height at `x`.
+    pub fn height_m(self, x: f64) -> f64 {
+        match self {
+            Self::Toy if x.abs() <= 1.0 => (4.0 * PI * x).sin() + 1.0,
+            Self::Toy => 1.0,
+        }
+    }
+
+    /// Smallest and largest height.
+    pub fn heights_m(self) -> [f64; 2] {
+        match self {
+            Self::Toy => [0.0, 2.0],
+        }
+    }
+
+    /// Slope at `x`; at a kink that of the side nearer to 0.
+    pub fn slope(self, x: f64) -> f64 {
+        match self {
+            Self::Toy if x.abs() <= 1.0 => 4.0 * PI * (4.0 * PI * x).cos(),
+            Self::Toy => 0.0,
+        }
+    }
+}
+
 /// A mesh and where it stands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -124,24 +158,20 @@ fn one() -> f64 {
 
 /// Unit of a mesh file's numbers.
 #[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, JsonSchema,
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum, JsonSchema,
 )]
+#[serde(rename_all = "lowercase")]
 pub enum Unit {
     /// Metres, as glTF prescribes.
     #[default]
-    #[serde(rename = "m")]
     M,
     /// Centimetres.
-    #[serde(rename = "cm")]
     Cm,
     /// Millimetres.
-    #[serde(rename = "mm")]
     Mm,
     /// Micrometres.
-    #[serde(rename = "um")]
     Um,
     /// Inches.
-    #[serde(rename = "in")]
     In,
 }
 
@@ -161,13 +191,7 @@ impl Unit {
 impl fmt::Display for Unit {
     /// As a scene file names it.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Self::M => "m",
-            Self::Cm => "cm",
-            Self::Mm => "mm",
-            Self::Um => "um",
-            Self::In => "in",
-        })
+        self.to_possible_value().map_or(Ok(()), |value| f.write_str(value.get_name()))
     }
 }
 

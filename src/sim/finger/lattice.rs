@@ -114,12 +114,13 @@ impl Lattice {
 
     /// The skin's point over each node.
     pub fn samples(&self, profile: &Profile) -> impl Iterator<Item = SkinSample> {
-        self.nodes.iter().map(|node| SkinSample {
+        self.nodes.iter().enumerate().map(|(k, node)| SkinSample {
             start: node.start,
             direction: node.direction,
             layers: profile.layers(node.start.x, &node.direction),
             normal: UnitVector3::try_new(node.area_m2, 0.0).unwrap_or(node.direction),
             area_m2: node.area_m2.norm(),
+            node: Some(k),
         })
     }
 }

@@ -25,6 +25,8 @@ pub struct SkinSample {
     pub normal: UnitVector3<f64>,
     /// Area of skin it stands for.
     pub area_m2: f64,
+    /// Its node of a shell; none outside of one.
+    pub node: Option<usize>,
 }
 
 impl SkinSample {
@@ -65,6 +67,7 @@ pub fn spread(profile: &Profile, count: usize) -> Vec<SkinSample> {
                 layers: profile.layers(start.x, &direction),
                 normal,
                 area_m2: stretched.norm() * cell_m * TAU,
+                node: None,
             }
         })
         .collect()

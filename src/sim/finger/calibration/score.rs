@@ -1,10 +1,9 @@
 //! How constants do on a sensor that they were not fitted to, beside predictions that know nothing
 //! of force.
 
-use super::bench::Bench;
 use super::constants::Model;
 use super::fit::{Fit, Free, fit};
-use super::session::Session;
+use super::session::{Bench, Session};
 use crate::sim::finger::effects::electrodes::{counts, impedance_ohm};
 use crate::sim::finger::recording::{Bin, Recording};
 use palpate_explore::robot::finger::frame::ELECTRODES;

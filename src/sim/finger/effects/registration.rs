@@ -78,8 +78,6 @@ impl RegistrationEffect {
 
 impl Effect for RegistrationEffect {
     type State = ();
-
-    fn start(&self) {}
 }
 
 /// The errors of one trial.
