@@ -3,7 +3,7 @@
 use super::notice;
 use super::scene::{Body, Function, Object, Scene, Unit};
 use crate::sim::finger::Fingertip;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::probe::servo::ArmReach;
 use palpate_explore::robot::Robot;
 use palpate_explore::robot::arm::stage::{stage, stage_with_wrist};
@@ -213,27 +213,43 @@ impl Environment {
     pub fn true_height_m(&self, place: &[f64]) -> Option<f64> {
         match &self.shape {
             Shape::Function(function) => place.first().map(|&x| function.height_m(x)),
-            Shape::Mesh { bvh, .. } => {
-                let zone = self.task.zone()?;
-                let ahead_w = zone.ahead_w();
-                let [near_m, far_m] = self.task.depth_m();
-                let start_y_m = -near_m + CLEARANCE_M;
-                let start_w = zone.x_wz() * zone.local(place, start_y_m);
-                let reach_m = start_y_m - -far_m + CLEARANCE_M;
-                let distance_m = match self.analytic() {
-                    Some((surface, object)) => {
+            Shape::Mesh { .. } => {
+                let datum_y_m = self.task.zone()?.datum_y_m();
+                let y_m = match self.analytic() {
+                    Some((surface, object)) => self.met_y_m(place, |start_w, ahead_w, reach_m| {
                         let x_wo = object.x_wo();
                         let local = x_wo.inverse_transform_point(&start_w) / object.scale;
                         let along = x_wo.inverse_transform_vector(&ahead_w);
-                        surface
-                            .ray(local, along, reach_m / object.scale)
-                            .map(|distance| distance * object.scale)
-                    }
-                    None => bvh.ray(&start_w, &ahead_w, reach_m).map(|hit| hit.distance_m),
+                        let distance = surface.ray(local, along, reach_m / object.scale)?;
+                        Some(distance * object.scale)
+                    }),
+                    None => self.mesh_y_m(place),
                 };
-                distance_m.map(|distance| start_y_m - distance - zone.datum_y_m())
+                y_m.map(|y_m| y_m - datum_y_m)
             }
         }
+    }
+
+    /// The y in the zone's frame at which the mesh is first met along the approach to `place`.
+    pub(super) fn mesh_y_m(&self, place: &[f64]) -> Option<f64> {
+        let Shape::Mesh { bvh, .. } = &self.shape else { return None };
+        self.met_y_m(place, |start_w, ahead_w, reach_m| {
+            Some(bvh.ray(&start_w, &ahead_w, reach_m)?.distance_m)
+        })
+    }
+
+    /// The same of anything, of which `ray` gives the distance from a start along a direction.
+    fn met_y_m(
+        &self,
+        place: &[f64],
+        ray: impl FnOnce(Point3<f64>, UnitVector3<f64>, f64) -> Option<f64>,
+    ) -> Option<f64> {
+        let zone = self.task.zone()?;
+        let [near_m, far_m] = self.task.depth_m();
+        let start_y_m = -near_m + CLEARANCE_M;
+        let start_w = zone.x_wz() * zone.local(place, start_y_m);
+        let reach_m = start_y_m - -far_m + CLEARANCE_M;
+        Some(start_y_m - ray(start_w, zone.ahead_w(), reach_m)?)
     }
 
     /// The point of the true surface nearest to `p_w`, if the object has an analytic one.
@@ -377,12 +393,9 @@ fn task_around(
             ball.radius_m
         )));
     }
-    if !scene.body.moves() {
-        return Task::new(ball, touch.clone(), finger).map_err(invalid);
-    }
     let around = ball.keep_out(finger, touch.standoff_m);
     let task = Task::new(ball, touch.clone(), finger).map_err(invalid)?;
-    let Some(arm) = arm else { return Ok(task) };
+    let Some(arm) = arm.filter(|_| scene.body.moves()) else { return Ok(task) };
     let robot =
         Robot { chain: arm.clone(), finger: finger.clone(), is_soft: scene.effects.skin.is_some() };
     let home_w: Point3<f64> = robot.chain.forward(&robot.chain.home).translation.vector.into();

@@ -220,51 +220,43 @@ impl Checked for Object {
 
 impl Checked for Scene {
     fn check(&self, rules: &mut Rules) {
+        let lacks = |rules: &mut Rules, key: &str, lacks: bool, allowed: &str| {
+            rules.require(key, "(none)", !lacks, || allowed.into());
+        };
+        let given = |rules: &mut Rules, key: &str, given: bool, allowed: &str| {
+            rules.require(key, "(given)", !given, || allowed.into());
+        };
         match &self.around {
             None => {
-                rules.require("zone", "(none)", self.zone.is_some(), || {
-                    "a table [zone] with x_m and z_m, or [around] for a whole object".into()
-                });
-                if let Some(zone) = &self.zone {
-                    rules.table("zone", zone);
-                }
+                let allowed = "a table [zone] with x_m and z_m, or [around] for a whole object";
+                lacks(rules, "zone", self.zone.is_none(), allowed);
+                self.zone.iter().for_each(|zone| rules.table("zone", zone));
             }
             Some(around) => {
-                rules.require("zone", "(given)", self.zone.is_none(), || {
-                    "no zone: [around] explores the object from all sides".into()
-                });
+                let allowed = "no zone: [around] explores the object from all sides";
+                given(rules, "zone", self.zone.is_some(), allowed);
                 rules.table("around", around);
             }
         }
         rules.table("finger", &self.finger);
-        match self.body {
-            Body::Function => {
-                rules.require("function", "(none)", self.function.is_some(), || {
-                    "\"toy\", because body = \"function\"".into()
-                });
-                rules.require("object", "(given)", self.object.is_none(), || {
-                    "no object: body = \"function\" touches a curve".into()
-                });
-                rules.require("around", "(given)", self.around.is_none(), || {
-                    "no around: body = \"function\" touches a curve".into()
-                });
-                let flat = self.zone.as_ref().is_none_or(|zone| zone.z_m.is_none());
-                rules.require("arm", "(given)", self.arm.is_none(), || {
-                    "no arm: body = \"function\" is touched by none".into()
-                });
-                rules.require("zone.z_m", "(given)", flat, || {
-                    "no z_m: the surface of body = \"function\" is a curve over x".into()
-                });
-            }
-            Body::Cast | Body::Kinematic | Body::Dynamic => {
-                let body = self.body.name();
-                rules.require("function", "(given)", self.function.is_none(), || {
-                    format!("no function: body = \"{body}\" touches an object")
-                });
-                rules.require("object", "(none)", self.object.is_some(), || {
-                    format!("a table with a mesh, because body = \"{body}\"")
-                });
-            }
+        let body = self.body.name();
+        if self.body == Body::Function {
+            let allowed = "\"toy\", because body = \"function\"";
+            lacks(rules, "function", self.function.is_none(), allowed);
+            let allowed = "no object: body = \"function\" touches a curve";
+            given(rules, "object", self.object.is_some(), allowed);
+            let allowed = "no around: body = \"function\" touches a curve";
+            given(rules, "around", self.around.is_some(), allowed);
+            let allowed = "no arm: body = \"function\" is touched by none";
+            given(rules, "arm", self.arm.is_some(), allowed);
+            let is_deep = self.zone.as_ref().is_some_and(|zone| zone.z_m.is_some());
+            let allowed = "no z_m: the surface of body = \"function\" is a curve over x";
+            given(rules, "zone.z_m", is_deep, allowed);
+        } else {
+            let allowed = format!("no function: body = \"{body}\" touches an object");
+            given(rules, "function", self.function.is_some(), &allowed);
+            let allowed = format!("a table with a mesh, because body = \"{body}\"");
+            lacks(rules, "object", self.object.is_none(), &allowed);
         }
         let turns = self.around.is_none() || self.arm.is_some() || self.body != Body::Dynamic;
         rules.require("body", "\"dynamic\"", turns, || {
@@ -300,16 +292,13 @@ impl Checked for Scene {
                     .into()
             });
         }
-        let feels = self.body != Body::Kinematic || self.felt_effects().skin.is_some();
-        rules.require("effects.skin", "(none)", feels, || {
-            "a table, because body = \"kinematic\" feels with a soft skin (a rigid finger is \
-             body = \"cast\"; without any [effects] it has a BioTac's)"
-                .into()
-        });
-        let bumps = self.body == Body::Dynamic || self.effects.collision.is_none();
-        rules.require("effects.collision", "(given)", bumps, || {
-            "no collision: only links of body = \"dynamic\" are kept apart by MuJoCo".into()
-        });
+        let is_rigid = self.body == Body::Kinematic && self.felt_effects().skin.is_none();
+        let allowed = "a table, because body = \"kinematic\" feels with a soft skin (a rigid finger \
+                       is body = \"cast\"; without any [effects] it has a BioTac's)";
+        lacks(rules, "effects.skin", is_rigid, allowed);
+        let bumps = self.body != Body::Dynamic && self.effects.collision.is_some();
+        let allowed = "no collision: only links of body = \"dynamic\" are kept apart by MuJoCo";
+        given(rules, "effects.collision", bumps, allowed);
         if let (Some(wrench), false) = (&self.effects.wrench, self.frames_tell_contact()) {
             let least_n = SDS_OF_CONTACT * wrench.noise_max_n();
             let told = self.touch.detection_n >= least_n;
@@ -330,9 +319,7 @@ impl Checked for Scene {
                 )
             });
         }
-        if let Some(object) = &self.object {
-            rules.table("object", object);
-        }
+        self.object.iter().for_each(|object| rules.table("object", object));
         if let Some(arm) = &self.arm {
             rules.table("arm", arm);
             let clear = arm.mount_m >= self.finger.length_m;

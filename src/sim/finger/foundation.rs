@@ -129,7 +129,7 @@ impl Foundation {
     ) -> Balance {
         let wet = touches.iter().filter(|touch| touch.wet);
         let free_m2 = self.wet_m2 - wet.map(|touch| touch.section_m2).sum::<f64>();
-        let pressure_pa = pressure_pa(touches, &self.column, free_m2, self.cavity_pa_m3);
+        let pressure_pa = self.pressure_pa(touches, free_m2);
         let free = self.column.respond(f64::NEG_INFINITY, 0.0, pressure_pa);
         for (inward_m, sample) in inward_m.iter_mut().zip(samples) {
             *inward_m = if sample.layers.wet { free.inward_m } else { 0.0 };
@@ -147,57 +147,53 @@ impl Foundation {
         }
         Balance { pressure_pa, displaced_m3, energy_j }
     }
-}
 
-/// The pressure p ≥ 0 with p = K Σ Aᵢ uᵢ(p), in Pa, and every touch's response to it.
-///
-/// The other wet columns, of `free_m2` together, are free. The volume falls with the pressure, so
-/// there is one root; a Newton step that leaves the bracket is replaced by a bisection.
-fn pressure_pa(
-    touches: &mut [SkinContact],
-    column: &Column,
-    free_m2: f64,
-    cavity_pa_m3: f64,
-) -> f64 {
-    let mut volume = |pressure_pa: f64| {
-        let mut volume_m3 = -pressure_pa / column.inflate_pa_m * free_m2;
-        let mut softness = free_m2 / column.inflate_pa_m;
-        for touch in touches.iter_mut() {
-            let felt_pa = if touch.wet { pressure_pa } else { 0.0 };
-            touch.response = column.respond(touch.indentation_m, touch.gap_m, felt_pa);
-            if !touch.wet {
-                continue;
+    /// The pressure p ≥ 0 with p = K Σ Aᵢ uᵢ(p), in Pa, and every touch's response to it.
+    ///
+    /// The other wet columns, of `free_m2` together, are free. The volume falls with the pressure, so
+    /// there is one root; a Newton step that leaves the bracket is replaced by a bisection.
+    fn pressure_pa(&self, touches: &mut [SkinContact], free_m2: f64) -> f64 {
+        let Self { column, cavity_pa_m3, .. } = *self;
+        let mut volume = |pressure_pa: f64| {
+            let mut volume_m3 = -pressure_pa / column.inflate_pa_m * free_m2;
+            let mut softness = free_m2 / column.inflate_pa_m;
+            for touch in touches.iter_mut() {
+                let felt_pa = if touch.wet { pressure_pa } else { 0.0 };
+                touch.response = column.respond(touch.indentation_m, touch.gap_m, felt_pa);
+                if !touch.wet {
+                    continue;
+                }
+                volume_m3 += touch.section_m2 * touch.response.inward_m;
+                softness += touch.section_m2 * touch.response.softness_m_pa;
             }
-            volume_m3 += touch.section_m2 * touch.response.inward_m;
-            softness += touch.section_m2 * touch.response.softness_m_pa;
-        }
-        (volume_m3, softness)
-    };
-    let (at_rest_m3, mut softness) = volume(0.0);
-    if cavity_pa_m3 <= 0.0 || at_rest_m3 <= 0.0 {
-        return 0.0;
-    }
-    let (mut low_pa, mut high_pa) = (0.0, cavity_pa_m3 * at_rest_m3);
-    let (mut pressure_pa, mut excess_m3) = (0.0, at_rest_m3);
-    for _ in 0..STEPS {
-        let newton_pa = pressure_pa + excess_m3 / (softness + 1.0 / cavity_pa_m3);
-        let last_pa = pressure_pa;
-        pressure_pa = if newton_pa > low_pa && newton_pa < high_pa {
-            newton_pa
-        } else {
-            0.5 * (low_pa + high_pa)
+            (volume_m3, softness)
         };
-        let volume_m3;
-        (volume_m3, softness) = volume(pressure_pa);
-        excess_m3 = volume_m3 - pressure_pa / cavity_pa_m3;
-        if excess_m3 > 0.0 {
-            low_pa = pressure_pa;
-        } else {
-            high_pa = pressure_pa;
+        let (at_rest_m3, mut softness) = volume(0.0);
+        if cavity_pa_m3 <= 0.0 || at_rest_m3 <= 0.0 {
+            return 0.0;
         }
-        if (pressure_pa - last_pa).abs() <= ACCURACY * pressure_pa {
-            break;
+        let (mut low_pa, mut high_pa) = (0.0, cavity_pa_m3 * at_rest_m3);
+        let (mut pressure_pa, mut excess_m3) = (0.0, at_rest_m3);
+        for _ in 0..STEPS {
+            let newton_pa = pressure_pa + excess_m3 / (softness + 1.0 / cavity_pa_m3);
+            let last_pa = pressure_pa;
+            pressure_pa = if newton_pa > low_pa && newton_pa < high_pa {
+                newton_pa
+            } else {
+                0.5 * (low_pa + high_pa)
+            };
+            let volume_m3;
+            (volume_m3, softness) = volume(pressure_pa);
+            excess_m3 = volume_m3 - pressure_pa / cavity_pa_m3;
+            if excess_m3 > 0.0 {
+                low_pa = pressure_pa;
+            } else {
+                high_pa = pressure_pa;
+            }
+            if (pressure_pa - last_pa).abs() <= ACCURACY * pressure_pa {
+                break;
+            }
         }
+        pressure_pa
     }
-    pressure_pa
 }

@@ -31,44 +31,26 @@ pub struct Lattice {
     triangles: Vec<[usize; 3]>,
 }
 
-/// Stations along the finger times angles around it; all angles meet in the apex.
-struct Grid {
-    stations_m: Vec<f64>,
-    around: usize,
-}
-
-impl Grid {
+impl Lattice {
+    /// The shell of this shape with so many cells along and around it, an even number of these; all
+    /// angles meet in the apex.
+    ///
     /// Half of the cells are before the origin of `T`, where the profile bends most, in equal steps
     /// of an arc, and an even number, so that the corner at 45° is a node.
-    fn new(profile: &Profile, [along, around]: [usize; 2]) -> Self {
+    pub fn new(profile: &Profile, [along, around]: [usize; 2]) -> Self {
         let (radius_m, length_m) = (profile.radius_m, profile.length_m);
         let arc = 2 * along.div_ceil(4);
         let straight = if length_m > 0.0 { along - arc } else { 0 };
         let behind = (0..straight).map(|i| -length_m * (1.0 - i as f64 / straight as f64));
         let before = (0..=arc).map(|i| radius_m * (FRAC_PI_2 * i as f64 / arc as f64).sin());
-        Self { stations_m: behind.chain(before).collect(), around }
-    }
-
-    fn node(&self, i: usize, j: usize) -> usize {
-        let apex = i + 1 == self.stations_m.len();
-        i * (self.around + 1) + if apex { 0 } else { j }
-    }
-
-    fn turn(&self, j: usize) -> f64 {
-        PI * (j as f64 / self.around as f64 - 0.5)
-    }
-}
-
-impl Lattice {
-    /// The shell of this shape with so many cells along and around it, an even number of these.
-    pub fn new(profile: &Profile, cells: [usize; 2]) -> Self {
-        let grid = Grid::new(profile, cells);
-        let last = grid.stations_m.len() - 1;
+        let last = straight + arc;
+        let node_at = |i: usize, j: usize| i * (around + 1) + if i == last { 0 } else { j };
         let mut nodes = Vec::new();
-        for (i, &x_m) in grid.stations_m.iter().enumerate() {
-            let angles = if i == last { 0..=0 } else { 0..=grid.around };
+        for (i, x_m) in behind.chain(before).enumerate() {
+            let angles = if i == last { 0..=0 } else { 0..=around };
             for j in angles {
-                let (start, direction) = profile.ray(x_m, grid.turn(j));
+                let turn = PI * (j as f64 / around as f64 - 0.5);
+                let (start, direction) = profile.ray(x_m, turn);
                 let layers = profile.layers(start.x, &direction);
                 nodes.push(Node {
                     point: start + direction.scale(layers.outer_m - layers.skin_m / 2.0),
@@ -76,17 +58,17 @@ impl Lattice {
                     direction,
                     gap_m: layers.gap_m,
                     area_m2: Vector3::zeros(),
-                    clamped: i == 0 || (i < last && (j == 0 || j == grid.around)),
-                    mirror: grid.node(i, grid.around - j),
+                    clamped: i == 0 || (i < last && (j == 0 || j == around)),
+                    mirror: node_at(i, around - j),
                 });
             }
         }
         let mut triangles = Vec::new();
-        for (i, j) in (0..last).flat_map(|i| (0..grid.around).map(move |j| (i, j))) {
+        for (i, j) in (0..last).flat_map(|i| (0..around).map(move |j| (i, j))) {
             let [a, b, c, d] =
-                [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| grid.node(i, j));
+                [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| node_at(i, j));
             // Diagonals mirrored at the middle keep left and right alike.
-            let split = match j < grid.around / 2 {
+            let split = match j < around / 2 {
                 true => [[a, b, c], [a, c, d]],
                 false => [[a, b, d], [b, c, d]],
             };

@@ -71,7 +71,8 @@ pub fn fit(start: &Model, recordings: &[&Recording], free: Free) -> Result<Fit, 
     };
     let mut refused = Vec::new();
     loop {
-        let problem = Calibration::new(start, constants.clone(), recordings);
+        let (free, bench) = (constants.clone(), RefCell::default());
+        let problem = Calibration { start, free, recordings, bench };
         let state = lowest(&problem)?;
         let (model, sessions) = problem.decode(&state);
         let at_bound = |constant: &&&Constant| constant.bounds.contains(&constant.value(&model));
@@ -84,7 +85,16 @@ pub fn fit(start: &Model, recordings: &[&Recording], free: Free) -> Result<Fit, 
             constants.retain(|constant| constant.key != lost.key);
             continue;
         }
-        let estimates = estimates(&problem, &state, &model);
+        let covariance = clustered_covariance(&problem, &state, |i| problem.electrode(i));
+        let estimate = |(i, constant): (usize, &&'static Constant)| {
+            let variance = covariance.as_ref().map_or(f64::INFINITY, |all| all[(i, i)]);
+            Estimate {
+                key: constant.key,
+                value: constant.value(&model),
+                factor: (constant.plausible * variance.max(0.0).sqrt()).exp(),
+            }
+        };
+        let estimates = constants.iter().enumerate().map(estimate).collect();
         return Ok(Fit { model, sessions, estimates, refused });
     }
 }
@@ -111,19 +121,6 @@ fn lowest(problem: &Calibration) -> Result<DVector<f64>, FitError> {
         }
     }
     best.map(|(_, state)| state).ok_or(failed)
-}
-
-fn estimates(problem: &Calibration, state: &DVector<f64>, model: &Model) -> Vec<Estimate> {
-    let covariance = clustered_covariance(problem, state, |i| problem.electrode(i));
-    let of = |(i, constant): (usize, &&'static Constant)| {
-        let variance = covariance.as_ref().map_or(f64::INFINITY, |all| all[(i, i)]);
-        Estimate {
-            key: constant.key,
-            value: constant.value(model),
-            factor: (constant.plausible * variance.max(0.0).sqrt()).exp(),
-        }
-    };
-    problem.free.iter().enumerate().map(of).collect()
 }
 
 /// Expected error of a mean count (chosen: two thirds of what the best fit is off on average).
@@ -169,20 +166,15 @@ struct Calibration<'a> {
     bench: RefCell<Bench>,
 }
 
-impl<'a> Calibration<'a> {
-    fn new(
-        start: &'a Model,
-        free: Vec<&'static Constant>,
-        recordings: &'a [&'a Recording],
-    ) -> Self {
-        Self { start, free, recordings, bench: RefCell::default() }
-    }
-
+impl Calibration<'_> {
     /// The model and the sessions of a state.
     fn decode(&self, state: &DVector<f64>) -> (Model, Vec<Session>) {
         let mut model = self.start.clone();
         for (constant, units) in self.free.iter().zip(state.iter()) {
-            constant.set(&mut model, self.value(constant, *units));
+            let value = constant.value(self.start) * (constant.plausible * units).exp();
+            // The ends of its bounds are exact.
+            let [least, most] = constant.bounds;
+            constant.set(&mut model, value.clamp(least, most));
         }
         let mut rest = state.as_slice().get(self.free.len()..).unwrap_or_default();
         let mut sessions = Vec::new();
@@ -197,12 +189,6 @@ impl<'a> Calibration<'a> {
             });
         }
         (model, sessions)
-    }
-
-    /// A constant's value; the ends of its bounds are exact.
-    fn value(&self, constant: &Constant, units: f64) -> f64 {
-        let [least, most] = constant.bounds;
-        (constant.value(self.start) * (constant.plausible * units).exp()).clamp(least, most)
     }
 
     /// The electrode of a session that residual `i` is an error of; none if it is of a belief.

@@ -94,12 +94,7 @@ pub fn leave_one_out(
     free: Free,
 ) -> Result<Vec<HeldOut>, FitError> {
     let held = recordings.par_iter().enumerate().map(|(i, recording)| {
-        let others: Vec<&Recording> = recordings
-            .iter()
-            .enumerate()
-            .filter(|(j, _)| *j != i)
-            .map(|(_, other)| other)
-            .collect();
+        let others: Vec<&Recording> = recordings[..i].iter().chain(&recordings[i + 1..]).collect();
         let known = match free {
             Free::Constants if !others.is_empty() => Some(fit(start, &others, free)?),
             _ => None,

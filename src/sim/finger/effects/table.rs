@@ -77,9 +77,7 @@ macro_rules! effects {
         impl Checked for Effects {
             fn check(&self, rules: &mut Rules) {
                 $(
-                    if let Some(effect) = &self.$name {
-                        rules.table(stringify!($name), effect);
-                    }
+                    self.$name.iter().for_each(|effect| rules.table(stringify!($name), effect));
                 )*
                 let filling = [$((stringify!($name), <$Effect>::FILLS_FRAMES),)*];
                 $(
