@@ -99,35 +99,26 @@ impl Environment {
         if scene.body.moves() && scene.effects.skin.is_some() && !is_biotac {
             notices.push(notice::scaled_finger(scene.finger.radius_m));
         }
-        if let (Some(around), Shape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
+        let task = if let (Some(around), Shape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
             let ball = ball_around(around, bvh.mesh())?;
-            let task = task_around(&scene, arm.as_ref(), ball, bvh.mesh())?;
-            return Self::of(scene, shape, (task, arm), notices);
-        }
-        let zone = scene.zone.as_mut().ok_or_else(|| missing("zone"))?;
-        let extent = extent(zone, &shape);
-        let depth_m = *zone.depth_m.get_or_insert([-extent[1].y, -extent[0].y]);
-        if let Shape::Mesh { bvh, .. } = &shape {
-            let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
-            let size = notice::size_mismatch(zone, unit, &extent);
-            check_overlap(zone, depth_m, &extent, size.as_deref())?;
-            check_front(zone, bvh, depth_m[0], -extent[1].y)?;
-            notices.extend(size);
-            if zone.datum_y_m.is_none() {
-                zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
+            task_around(&scene, arm.as_ref(), ball, bvh.mesh())?
+        } else {
+            let zone = scene.zone.as_mut().ok_or_else(|| missing("zone"))?;
+            let extent = extent(zone, &shape);
+            let depth_m = *zone.depth_m.get_or_insert([-extent[1].y, -extent[0].y]);
+            if let Shape::Mesh { bvh, .. } = &shape {
+                let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
+                let size = notice::size_mismatch(zone, unit, &extent);
+                check_overlap(zone, depth_m, &extent, size.as_deref())?;
+                check_front(zone, bvh, depth_m[0], -extent[1].y)?;
+                notices.extend(size);
+                if zone.datum_y_m.is_none() {
+                    zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
+                }
             }
-        }
-        zone.datum_y_m.get_or_insert(0.0);
-        let task = Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?;
-        Self::of(scene, shape, (task, arm), notices)
-    }
-
-    fn of(
-        scene: Scene,
-        shape: Shape,
-        (task, arm): (Task, Option<Chain>),
-        notices: Vec<String>,
-    ) -> Result<Self, Invalid> {
+            zone.datum_y_m.get_or_insert(0.0);
+            Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?
+        };
         let arm_mjcf = match &scene.arm {
             Some(settings) => model::mjcf(&settings.model).map_err(invalid)?,
             None => None,

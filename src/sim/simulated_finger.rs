@@ -7,7 +7,6 @@ use crate::sim::finger::effects::wrench::Gauge;
 use crate::sim::finger::{Fingertip, FingertipState, Load};
 use nalgebra::Isometry3;
 use palpate_explore::backend::{Fault, IdealContact, Reading, Sample, Wrench};
-use palpate_explore::robot::finger::Frame;
 use palpate_explore::robot::finger::TipMotion;
 use palpate_gp::math::seed;
 use std::sync::Arc;
@@ -96,7 +95,7 @@ impl SimulatedFinger {
     /// sensor tells it.
     pub fn report(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
         reading.samples.clear();
-        reading.samples.extend(std::iter::from_fn(|| self.frame()).map(Sample::BioTac));
+        reading.samples.extend(std::iter::from_fn(|| self.state.frame()).map(Sample::BioTac));
         reading.samples.extend(self.ideal().map(Sample::Ideal));
         let effect = self.environment.scene().effects.wrench.as_ref();
         reading.wrench = self.gauge.as_mut().zip(effect).map(|(gauge, effect)| {
@@ -104,13 +103,8 @@ impl SimulatedFinger {
         });
     }
 
-    /// The oldest tactile frame that has arrived and was not asked for yet.
-    pub fn frame(&mut self) -> Option<Frame> {
-        self.state.frame()
-    }
-
     /// The load where no sensor tells it.
-    pub fn ideal(&self) -> Option<IdealContact> {
+    fn ideal(&self) -> Option<IdealContact> {
         let force_n = self.load.force_n.norm();
         (!self.has_sensor && force_n > LEAST_FORCE_N).then_some(IdealContact {
             p_tc: self.load.centre_t,

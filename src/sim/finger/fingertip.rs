@@ -1,4 +1,4 @@
-//! The fingertip, put together from the effects a scene names, and the frames that its sensor sends.
+//! The fingertip, put together from the effects a scene names, and the frames its sensor sends.
 
 use super::effects::electrodes::{Common, Electrodes, Shear};
 use super::effects::fluid::Filter;

@@ -150,8 +150,8 @@ impl Foundation {
 
     /// The pressure p ≥ 0 with p = K Σ Aᵢ uᵢ(p), in Pa, and every touch's response to it.
     ///
-    /// The other wet columns, of `free_m2` together, are free. The volume falls with the pressure, so
-    /// there is one root; a Newton step that leaves the bracket is replaced by a bisection.
+    /// The other wet columns, of `free_m2` together, are free. The volume falls with the pressure,
+    /// so there is one root; a Newton step that leaves the bracket is replaced by a bisection.
     fn pressure_pa(&self, touches: &mut [SkinContact], free_m2: f64) -> f64 {
         let Self { column, cavity_pa_m3, .. } = *self;
         let mut volume = |pressure_pa: f64| {

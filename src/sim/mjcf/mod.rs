@@ -6,7 +6,7 @@ mod text;
 
 use super::environment::{CLEARANCE_M, Environment, Shape};
 use super::scene::Scene;
-use super::solver::{Collision, Integrator};
+use super::solver::{Collision, Integrator, Sdf};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use text::{CONTACT, TABLE, list, mesh_asset, pose};
@@ -98,13 +98,27 @@ pub fn scene(environment: &Environment, mode: Mode) -> Option<String> {
     ))
 }
 
-/// What collides with a finger without skin.
+/// What collides with a finger without skin: the object as a height field, as the convex hull of
+/// its mesh, which MuJoCo computes, so that every hollow is filled, or as the signed distance field
+/// of its mesh, interpolated in MuJoCo's octree, with the options of the search for contact.
 fn obstacle(environment: &Environment) -> Option<String> {
-    match environment.scene().solver.collision.unwrap_or_default() {
-        Collision::HeightField => height_field(environment),
-        Collision::Hull => hull(environment),
-        Collision::Sdf => sdf(environment),
-    }
+    let solver = &environment.scene().solver;
+    let (kind, option) = match solver.collision.unwrap_or_default() {
+        Collision::HeightField => return height_field(environment),
+        Collision::Hull => ("mesh", String::new()),
+        Collision::Sdf => {
+            let Sdf { iterations, initpoints } = solver.sdf.clone().unwrap_or_default();
+            let searched =
+                format!(r#"sdf_iterations="{iterations}" sdf_initpoints="{initpoints}""#);
+            ("sdf", format!("  <option {searched}/>\n"))
+        }
+    };
+    let asset = mesh_asset(environment.mesh()?, "object");
+    Some(format!(
+        r#"{option}  <asset>{asset}</asset>
+  <worldbody><geom name="object" type="{kind}" mesh="object" {CONTACT}/></worldbody>
+"#
+    ))
 }
 
 /// The object as a height field over the zone: a surface that is explored along one direction is
@@ -148,30 +162,6 @@ fn height_field(environment: &Environment) -> Option<String> {
         half(z_m),
         list(values),
         pose(&(x_wz * Isometry3::from_parts(middle_z, turned))),
-    ))
-}
-
-/// The object as the convex hull of its mesh, which MuJoCo computes: every hollow is filled.
-fn hull(environment: &Environment) -> Option<String> {
-    let asset = mesh_asset(environment.mesh()?, "object");
-    Some(format!(
-        r#"  <asset>{asset}</asset>
-  <worldbody><geom name="object" type="mesh" mesh="object" {CONTACT}/></worldbody>
-"#
-    ))
-}
-
-/// The object as the signed distance field of its mesh, interpolated in MuJoCo's octree, with the
-/// options of the search for contact.
-fn sdf(environment: &Environment) -> Option<String> {
-    let sdf = environment.scene().solver.sdf.clone().unwrap_or_default();
-    let asset = mesh_asset(environment.mesh()?, "object");
-    Some(format!(
-        r#"  <option sdf_iterations="{}" sdf_initpoints="{}"/>
-  <asset>{asset}</asset>
-  <worldbody><geom name="object" type="sdf" mesh="object" {CONTACT}/></worldbody>
-"#,
-        sdf.iterations, sdf.initpoints,
     ))
 }
 

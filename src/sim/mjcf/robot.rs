@@ -87,8 +87,8 @@ const AROUND: usize = 20;
 const HALVES: [(&str, &str, f64); 2] =
     [("pad", ".13 .42 .40 1", -FRAC_PI_2), ("nail", ".86 .82 .74 1", FRAC_PI_2)];
 
-/// What a BioTac looks like, as assets: the pad that senses, and the nail that holds the skin on its
-/// back.
+/// What a BioTac looks like, as assets: the pad that senses, and the nail that holds the skin on
+/// its back.
 pub(super) fn skin_assets(finger: &Finger) -> String {
     let profile = Profile::biotac(finger);
     HALVES.iter().map(|(name, _, begins)| asset(&profile, name, *begins)).collect()

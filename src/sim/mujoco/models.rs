@@ -1,5 +1,5 @@
-//! What MuJoCo compiles of an environment, once for all trials, and how finely the scene's time step
-//! is divided for the skin's force.
+//! What MuJoCo compiles of an environment, once for all trials, and how finely the scene's time
+//! step is divided for the skin's force.
 
 use super::{Plant, compile, lacking};
 use crate::sim::Environment;
@@ -30,12 +30,17 @@ impl Models {
     pub fn new(environment: &Environment) -> Result<Self, Invalid> {
         let step_s = environment.scene().solver.step_s;
         let whole = Self::at(environment, step_s)?;
-        match Substeps::needed(environment, &whole.plant)? {
-            None => Ok(whole),
-            Some(substeps) => {
-                let divided = Self::at(environment, step_s / f64::from(substeps.count))?;
-                Ok(Self { substeps: Some(substeps), ..divided })
+        let Some(limit) = StepLimit::of(environment, &whole.plant)? else { return Ok(whole) };
+        match limit.limit_s {
+            limit_s if step_s <= limit_s => Ok(whole),
+            limit_s if limit_s >= SHORTEST_S => {
+                let count = (step_s / limit_s).ceil() as u32;
+                let divided = Self::at(environment, step_s / f64::from(count))?;
+                Ok(Self { substeps: Some(Substeps { count, step_s, limit }), ..divided })
             }
+            _ => Err(Invalid::new(format!(
+                "solver.step_s = {step_s} is too long, and cannot be divided so finely: {limit}"
+            ))),
         }
     }
 
@@ -113,29 +118,6 @@ impl StepLimit {
         let stiffness_n_m = plate::largest_stiffness_n_m(skin, &towards_t, force_n);
         let limit_s = (mass_kg / stiffness_n_m).sqrt();
         Ok(Some(Self { force_n, stiffness_n_m, mass_kg, limit_s }))
-    }
-}
-
-impl Substeps {
-    /// What `model`, which has the scene's own step, needs; none if that is short enough.
-    ///
-    /// # Errors
-    /// If the longest stable step is shorter than 10 µs.
-    pub fn needed(
-        environment: &Environment,
-        model: &Arc<MjModel>,
-    ) -> Result<Option<Self>, Invalid> {
-        let step_s = environment.scene().solver.step_s;
-        let Some(limit) = StepLimit::of(environment, model)? else { return Ok(None) };
-        match limit.limit_s {
-            limit_s if step_s <= limit_s => Ok(None),
-            limit_s if limit_s >= SHORTEST_S => {
-                Ok(Some(Self { count: (step_s / limit_s).ceil() as u32, step_s, limit }))
-            }
-            _ => Err(Invalid::new(format!(
-                "solver.step_s = {step_s} is too long, and cannot be divided so finely: {limit}"
-            ))),
-        }
     }
 }
 

@@ -233,8 +233,8 @@ impl Plant {
     }
 }
 
-/// MuJoCo's own contacts as one, in `T`: centre weighted by force, sum of the forces and its direction; none
-/// without force. Those of links with whatever else are left out.
+/// MuJoCo's own contacts as one, in `T`: centre weighted by force, sum of the forces and its
+/// direction; `None` without force. Those of links with whatever else are left out.
 ///
 /// To be asked while `data` holds the forces of the last step; `finger` is the finger's body.
 fn contact(

@@ -40,8 +40,8 @@ pub trait Effect: Checked + Clone + Default + 'static {
     }
 }
 
-/// Changes the load at the end of a step, with the memory of the trial, given how the fingertip moves
-/// then and the step's duration in seconds.
+/// Changes the load at the end of a step, with the memory of the trial, given how the fingertip
+/// moves then and the step's duration in seconds.
 pub type OnLoad<E> = fn(&E, &mut <E as Effect>::State, &TipMotion, f64, &mut Load);
 
 /// What an effect means nothing without.

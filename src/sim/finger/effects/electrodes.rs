@@ -117,8 +117,8 @@ impl Electrodes {
         std::array::from_fn(|i| moved(&self.weights[i]))
     }
 
-    /// Ideal counts with that part of each gap closed when the fluid conducts `conductivity` times as
-    /// well as at rest.
+    /// Ideal counts with that part of each gap closed when the fluid conducts `conductivity` times
+    /// as well as at rest.
     pub fn counts_closed(
         &self,
         closed: &[f64; ELECTRODES],

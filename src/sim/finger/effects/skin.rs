@@ -3,10 +3,9 @@
 use super::constants::effect;
 use super::effect::{Effect, Needs};
 use crate::sim::finger::foundation::{Column, Foundation, SkinContact};
-use crate::sim::finger::lattice::Lattice;
 use crate::sim::finger::load::{Load, PressError};
 use crate::sim::finger::patches::{Patches, Vicinity, key};
-use crate::sim::finger::samples::{SkinSample, spread};
+use crate::sim::finger::samples::{Lattice, SkinSample, spread};
 use crate::sim::finger::shell::membrane::{Membrane, Settled};
 use crate::sim::finger::shell::sheet::Material;
 use nalgebra::{Isometry3, Point3, Vector3};

@@ -8,8 +8,7 @@ use super::sheet::{Material, Sheet, Strained};
 use super::softness::Softness;
 use super::springs::Springs;
 use crate::sim::finger::foundation::{Balance, Column, Response, SkinContact};
-use crate::sim::finger::lattice::{Lattice, Node};
-use crate::sim::finger::samples::SkinSample;
+use crate::sim::finger::samples::{Lattice, Node, SkinSample};
 use nalgebra::Vector3;
 use palpate_gp::math::simd::Quad;
 
