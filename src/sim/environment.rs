@@ -1,10 +1,9 @@
 //! What never changes during a trial, shared by all threads.
 
-use super::function::Function;
 use super::notice;
-use super::scene::{Body, Object, Scene, Unit};
+use super::scene::{Body, Function, Object, Scene, Unit};
 use crate::sim::finger::Fingertip;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, UnitVector3, Vector3};
 use palpate_explore::probe::servo::ArmReach;
 use palpate_explore::robot::Robot;
 use palpate_explore::robot::arm::stage::{stage, stage_with_wrist};
@@ -100,35 +99,26 @@ impl Environment {
         if scene.body.moves() && scene.effects.skin.is_some() && !is_biotac {
             notices.push(notice::scaled_finger(scene.finger.radius_m));
         }
-        if let (Some(around), Shape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
+        let task = if let (Some(around), Shape::Mesh { bvh, .. }) = (&mut scene.around, &shape) {
             let ball = ball_around(around, bvh.mesh())?;
-            let task = task_around(&scene, arm.as_ref(), ball, bvh.mesh())?;
-            return Self::of(scene, shape, (task, arm), notices);
-        }
-        let zone = scene.zone.as_mut().ok_or_else(|| missing("zone"))?;
-        let extent = extent(zone, &shape);
-        let depth_m = *zone.depth_m.get_or_insert([-extent[1].y, -extent[0].y]);
-        if let Shape::Mesh { bvh, .. } = &shape {
-            let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
-            let size = notice::size_mismatch(zone, unit, &extent);
-            check_overlap(zone, depth_m, &extent, size.as_deref())?;
-            check_front(zone, bvh, depth_m[0], -extent[1].y)?;
-            notices.extend(size);
-            if zone.datum_y_m.is_none() {
-                zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
+            task_around(&scene, arm.as_ref(), ball, bvh.mesh())?
+        } else {
+            let zone = scene.zone.as_mut().ok_or_else(|| missing("zone"))?;
+            let extent = extent(zone, &shape);
+            let depth_m = *zone.depth_m.get_or_insert([-extent[1].y, -extent[0].y]);
+            if let Shape::Mesh { bvh, .. } = &shape {
+                let unit = scene.object.as_ref().map_or(Unit::default(), |object| object.unit);
+                let size = notice::size_mismatch(zone, unit, &extent);
+                check_overlap(zone, depth_m, &extent, size.as_deref())?;
+                check_front(zone, bvh, depth_m[0], -extent[1].y)?;
+                notices.extend(size);
+                if zone.datum_y_m.is_none() {
+                    zone.datum_y_m = Some(middle_y_m(zone, bvh, depth_m));
+                }
             }
-        }
-        zone.datum_y_m.get_or_insert(0.0);
-        let task = Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?;
-        Self::of(scene, shape, (task, arm), notices)
-    }
-
-    fn of(
-        scene: Scene,
-        shape: Shape,
-        (task, arm): (Task, Option<Chain>),
-        notices: Vec<String>,
-    ) -> Result<Self, Invalid> {
+            zone.datum_y_m.get_or_insert(0.0);
+            Task::new(zone.clone(), scene.touch.clone(), &scene.finger).map_err(invalid)?
+        };
         let arm_mjcf = match &scene.arm {
             Some(settings) => model::mjcf(&settings.model).map_err(invalid)?,
             None => None,
@@ -214,27 +204,43 @@ impl Environment {
     pub fn true_height_m(&self, place: &[f64]) -> Option<f64> {
         match &self.shape {
             Shape::Function(function) => place.first().map(|&x| function.height_m(x)),
-            Shape::Mesh { bvh, .. } => {
-                let zone = self.task.zone()?;
-                let ahead_w = zone.ahead_w();
-                let [near_m, far_m] = self.task.depth_m();
-                let start_y_m = -near_m + CLEARANCE_M;
-                let start_w = zone.x_wz() * zone.local(place, start_y_m);
-                let reach_m = start_y_m - -far_m + CLEARANCE_M;
-                let distance_m = match self.analytic() {
-                    Some((surface, object)) => {
+            Shape::Mesh { .. } => {
+                let datum_y_m = self.task.zone()?.datum_y_m();
+                let y_m = match self.analytic() {
+                    Some((surface, object)) => self.met_y_m(place, |start_w, ahead_w, reach_m| {
                         let x_wo = object.x_wo();
                         let local = x_wo.inverse_transform_point(&start_w) / object.scale;
                         let along = x_wo.inverse_transform_vector(&ahead_w);
-                        surface
-                            .ray(local, along, reach_m / object.scale)
-                            .map(|distance| distance * object.scale)
-                    }
-                    None => bvh.ray(&start_w, &ahead_w, reach_m).map(|hit| hit.distance_m),
+                        let distance = surface.ray(local, along, reach_m / object.scale)?;
+                        Some(distance * object.scale)
+                    }),
+                    None => self.mesh_y_m(place),
                 };
-                distance_m.map(|distance| start_y_m - distance - zone.datum_y_m())
+                y_m.map(|y_m| y_m - datum_y_m)
             }
         }
+    }
+
+    /// The y in the zone's frame at which the mesh is first met along the approach to `place`.
+    pub(super) fn mesh_y_m(&self, place: &[f64]) -> Option<f64> {
+        let Shape::Mesh { bvh, .. } = &self.shape else { return None };
+        self.met_y_m(place, |start_w, ahead_w, reach_m| {
+            Some(bvh.ray(&start_w, &ahead_w, reach_m)?.distance_m)
+        })
+    }
+
+    /// The same of anything, of which `ray` gives the distance from a start along a direction.
+    fn met_y_m(
+        &self,
+        place: &[f64],
+        ray: impl FnOnce(Point3<f64>, UnitVector3<f64>, f64) -> Option<f64>,
+    ) -> Option<f64> {
+        let zone = self.task.zone()?;
+        let [near_m, far_m] = self.task.depth_m();
+        let start_y_m = -near_m + CLEARANCE_M;
+        let start_w = zone.x_wz() * zone.local(place, start_y_m);
+        let reach_m = start_y_m - -far_m + CLEARANCE_M;
+        Some(start_y_m - ray(start_w, zone.ahead_w(), reach_m)?)
     }
 
     /// The point of the true surface nearest to `p_w`, if the object has an analytic one.
@@ -378,12 +384,9 @@ fn task_around(
             ball.radius_m
         )));
     }
-    if !scene.body.moves() {
-        return Task::new(ball, touch.clone(), finger).map_err(invalid);
-    }
     let around = ball.keep_out(finger, touch.standoff_m);
     let task = Task::new(ball, touch.clone(), finger).map_err(invalid)?;
-    let Some(arm) = arm else { return Ok(task) };
+    let Some(arm) = arm.filter(|_| scene.body.moves()) else { return Ok(task) };
     let robot =
         Robot { chain: arm.clone(), finger: finger.clone(), is_soft: scene.effects.skin.is_some() };
     let home_w: Point3<f64> = robot.chain.forward(&robot.chain.home).translation.vector.into();

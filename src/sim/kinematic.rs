@@ -30,12 +30,8 @@ impl Kinematic {
         let q = chain.home;
         let mut body =
             Self { chain, capabilities, finger, q, tick: 0, reading: Reading::default() };
-        body.report(&Wrench::default(), &Joints::zeros());
+        body.reset(0)?;
         Ok(body)
-    }
-
-    fn time_s(&self) -> f64 {
-        self.tick as f64 * self.capabilities.period_s
     }
 
     fn report(&mut self, load: &Wrench, qdot: &Joints) {
@@ -44,7 +40,7 @@ impl Kinematic {
             to.clear();
             to.extend(from.iter().take(joints));
         };
-        self.reading.time_s = self.time_s();
+        self.reading.time_s = self.tick as f64 * self.capabilities.period_s;
         copy(&mut self.reading.q, &self.q);
         copy(&mut self.reading.qdot, qdot);
         copy(&mut self.reading.applied.qdot, qdot);

@@ -7,7 +7,7 @@ use palpate_explore::registration::{KnownBody, design};
 use palpate_explore::task::Zone;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::mesh::Mesh;
-use palpate_geometry::solids::{Triangles, ball, block};
+use palpate_geometry::solids::{ball, block};
 use palpate_gp::math::pose::parts;
 use palpate_input::error::Invalid;
 
@@ -25,7 +25,14 @@ pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Inval
     if scene.body == Body::Function {
         return Err(missing("object"));
     }
-    let ((points, triangles), half_m) = solid(body);
+    // In a frame whose +y is the plate's normal; explored so far to each side.
+    let ((points, triangles), half_m) = match *body {
+        KnownBody::Ball { radius_m, .. } => (ball(Point3::origin(), radius_m, RINGS), radius_m),
+        KnownBody::Plate { .. } => {
+            let [half_m, thick_m] = PLATE_M;
+            (block([-half_m, -thick_m, -half_m], [half_m, 0.0, half_m]), half_m)
+        }
+    };
     let x_wo = body.x_wo();
     let (mesh, report) = Mesh::new(&points, &triangles).map_err(|fault| fault.at(NAME))?;
     let (position_m, rotation_deg) = parts(&x_wo);
@@ -49,15 +56,3 @@ pub fn environment(scene: &Scene, body: &KnownBody) -> Result<Environment, Inval
 
 /// In the place of a file's name.
 const NAME: &str = "(known body)";
-
-/// Its triangles in a frame whose +y is the plate's normal, and how far it is explored to each
-/// side.
-fn solid(body: &KnownBody) -> (Triangles, f64) {
-    match *body {
-        KnownBody::Ball { radius_m, .. } => (ball(Point3::origin(), radius_m, RINGS), radius_m),
-        KnownBody::Plate { .. } => {
-            let [half_m, thick_m] = PLATE_M;
-            (block([-half_m, -thick_m, -half_m], [half_m, 0.0, half_m]), half_m)
-        }
-    }
-}

@@ -1,9 +1,7 @@
 //! What only a simulator knows: the object, the physics of the finger, the simulated bodies.
 
-pub mod collision;
 pub mod environment;
 pub mod finger;
-pub mod function;
 pub mod kinematic;
 pub mod known_body;
 pub mod mjcf;

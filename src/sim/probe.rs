@@ -13,74 +13,43 @@ use std::sync::Arc;
 
 /// Touches whatever stands in `environment`, exactly and at once.
 pub fn exact(environment: Arc<Environment>) -> Box<dyn Probe> {
-    match environment.shape() {
-        Shape::Function(_) => Box::new(FunctionProbe::new(environment)),
-        Shape::Mesh { .. } => Box::new(Cast::new(environment)),
-    }
+    Box::new(Exact { environment, swept: None, tip: None })
 }
 
-/// Touches the scene's function.
-pub struct FunctionProbe {
-    environment: Arc<Environment>,
-}
-
-impl FunctionProbe {
-    /// In `environment`.
-    pub fn new(environment: Arc<Environment>) -> Self {
-        Self { environment }
-    }
-}
-
-impl Probe for FunctionProbe {
-    fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
-        refuse_unless_finite(approach)?;
-        let (Shape::Function(function), Some(zone)) =
-            (self.environment.shape(), self.environment.task().zone())
-        else {
-            return Ok(Touch::Miss);
-        };
-        let place = zone.place(&approach.p_near_w);
-        let x_m = place[0];
-        let normal_z = Vector3::new(-function.slope(x_m), 1.0, 0.0).normalize();
-        Ok(Touch::Contact(Contact {
-            p_wc: zone.point(&place, function.height_m(x_m)),
-            normal_w: zone.x_wz().rotation * normal_z,
-        }))
-    }
-}
-
-/// Sweeps the finger's hull along the approach to first contact on the exact mesh.
-pub struct Cast {
+/// Reads the scene's function where it is asked, or sweeps the finger's hull along the approach to
+/// first contact on the exact mesh.
+struct Exact {
     environment: Arc<Environment>,
     swept: Option<Swept>,
     tip: Option<Isometry3<f64>>,
 }
 
-impl Cast {
-    /// In `environment`.
-    pub fn new(environment: Arc<Environment>) -> Self {
-        Self { environment, swept: None, tip: None }
-    }
-}
-
-impl Probe for Cast {
+impl Probe for Exact {
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         refuse_unless_finite(approach)?;
-        let found = rest(&self.environment, approach);
-        let turned_w = || {
-            approach.p_far_w + approach.direction_w().scale(beyond_m(&self.environment, approach))
-        };
+        let environment = &self.environment;
+        if let (Shape::Function(function), Some(zone)) =
+            (environment.shape(), environment.task().zone())
+        {
+            let place = zone.place(&approach.p_near_w);
+            let x_m = place[0];
+            let normal_z = Vector3::new(-function.slope(x_m), 1.0, 0.0).normalize();
+            return Ok(Touch::Contact(Contact {
+                p_wc: zone.point(&place, function.height_m(x_m)),
+                normal_w: zone.x_wz().rotation * normal_z,
+            }));
+        }
+        let found = rest(environment, approach);
+        let turned_w =
+            || approach.p_far_w + approach.direction_w().scale(beyond_m(environment, approach));
         let p_wt = found.as_ref().map_or_else(turned_w, |rest| rest.p_wt);
-        self.swept = Some(Swept { finger: self.environment.scene().finger.clone(), p_wt });
+        self.swept = Some(Swept { finger: environment.scene().finger.clone(), p_wt });
         self.tip = found
             .as_ref()
             .map(|rest| Isometry3::from_parts(rest.p_wt.coords.into(), approach.r_wt()));
-        Ok(match found {
-            Some(Rest { hit, .. }) => {
-                Touch::Contact(Contact { p_wc: hit.point, normal_w: hit.normal })
-            }
-            None => Touch::Miss,
-        })
+        Ok(found.map_or(Touch::Miss, |Rest { hit, .. }| {
+            Touch::Contact(Contact { p_wc: hit.point, normal_w: hit.normal })
+        }))
     }
 
     fn swept(&self) -> Option<Swept> {

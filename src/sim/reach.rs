@@ -4,7 +4,6 @@
 //! Fingers resting on the surface all over the zone leave below them the morphological closing of
 //! the surface by the finger's hull; the surface is reachable where it touches that envelope.
 
-use super::environment::{CLEARANCE_M, Shape};
 use super::probe::rest;
 use crate::sim::Environment;
 use crate::sim::scene::Body;
@@ -58,8 +57,9 @@ struct Fingers<'a> {
     environment: &'a Environment,
     zone: &'a Zone,
     front: Front,
-    /// Their coordinates along each side of the zone; x varies fastest.
-    sides_m: Vec<Vec<f64>>,
+    /// Their coordinates along each side of the zone, of which x varies fastest; z is 0 where the
+    /// zone has only x.
+    sides_m: [Vec<f64>; 2],
     /// The y in the zone's frame at which each tip rests; none for one that meets nothing.
     tips_y_m: Vec<OnceLock<Option<f64>>>,
     /// Height between surface and envelope up to which they touch.
@@ -80,25 +80,24 @@ impl<'a> Fingers<'a> {
         let zone = environment.task().zone()?;
         let radius_m = environment.scene().finger.radius_m;
         let steps = |side_m: f64| (side_m * PER_RADIUS / radius_m).clamp(1.0, PER_SIDE_MAX).ceil();
-        let sides_m: Vec<Vec<f64>> = (zone.sides())
-            .map(|[low, high]| {
-                let steps = steps(high - low);
-                (0..=steps as usize).map(|i| low + (high - low) * (i as f64 / steps)).collect()
-            })
-            .collect();
+        let mut sides_m = [vec![0.0], vec![0.0]];
+        for (targets_m, [low, high]) in sides_m.iter_mut().zip(zone.sides()) {
+            let steps = steps(high - low);
+            let at = |i| low + (high - low) * (i as f64 / steps);
+            *targets_m = (0..=steps as usize).map(at).collect();
+        }
         // The nearest finger may stand half a step from the one that touches; on a plane that lifts
         // the sphere off by the square of the distance over twice its radius.
         let missed_m: f64 = (zone.extents_m().into_iter())
             .map(|side_m| (side_m / steps(side_m)).powi(2) / (8.0 * radius_m))
             .sum();
-        let count = sides_m.iter().map(Vec::len).product();
-        let tips_y_m = (0..count).map(|_| OnceLock::new()).collect();
+        let count = sides_m[0].len() * sides_m[1].len();
         Some(Self {
             environment,
             zone,
             front: environment.scene().finger.front(),
             sides_m,
-            tips_y_m,
+            tips_y_m: (0..count).map(|_| OnceLock::new()).collect(),
             tolerance_m: TOLERANCE_M + missed_m,
         })
     }
@@ -122,11 +121,12 @@ impl<'a> Fingers<'a> {
     /// For each a y in the zone's frame below which its tip does not come, from the surface at
     /// every target: no hull lets it through.
     fn lowest_y_m(&self) -> Vec<f64> {
+        let surface_y_m = |finger| self.environment.mesh_y_m(&self.target(finger));
         let surface_y_m: Vec<f64> = (0..self.tips_y_m.len())
             .into_par_iter()
-            .map(|at| self.surface_y_m(at).unwrap_or(f64::NEG_INFINITY))
+            .map(|finger| surface_y_m(finger).unwrap_or(f64::NEG_INFINITY))
             .collect();
-        let across = self.sides_m.first().map_or(1, Vec::len);
+        let across = self.sides_m[0].len();
         let strips = self.strips();
         let lowest_y_m = |finger: usize| {
             let (row, column) = (finger / across, finger % across);
@@ -147,31 +147,23 @@ impl<'a> Fingers<'a> {
 
     /// The hull's front over the targets around any finger, as targets stand at equal distances.
     fn strips(&self) -> Vec<Strip> {
-        let step_m = |side: &Vec<f64>| match side[..] {
+        let step_m = self.sides_m.each_ref().map(|side| match side[..] {
             [first, .., last] => (last - first) / (side.len() - 1) as f64,
-            _ => f64::INFINITY,
-        };
+            _ => 0.0,
+        });
         let reach = |side: usize, way_m: f64| {
-            let steps = self.sides_m.get(side).map_or(0.0, |side| way_m / step_m(side));
-            let last = self.sides_m.get(side).map_or(0, |side| side.len() - 1);
-            (steps.ceil() as isize).min(last as isize)
+            let steps = (way_m / step_m[side]).ceil() as isize;
+            steps.min(self.sides_m[side].len() as isize - 1)
         };
-        let at = |side: usize, steps: isize| {
-            self.sides_m.get(side).map_or(0.0, |side| steps as f64 * step_m(side))
-        };
+        let at = |side: usize, steps: isize| steps as f64 * step_m[side];
         let radius_m = self.environment.scene().finger.radius_m;
         let [above_m, below_m] = self.front.axis_z_m();
         let (across, rows) =
             (reach(0, radius_m), -reach(1, radius_m + below_m)..=reach(1, radius_m + above_m));
         rows.filter_map(|row| {
             let front_m = |column| self.front.y_m(at(0, column), at(1, row));
-            let mut columns = (-across..=across).filter(|&column| front_m(column).is_some());
-            let first = columns.next()?;
-            Some(Strip {
-                row,
-                column: first,
-                front_m: (first..=-first).filter_map(front_m).collect(),
-            })
+            let column = (-across..=across).find(|&column| front_m(column).is_some())?;
+            Some(Strip { row, column, front_m: (column..=-column).filter_map(front_m).collect() })
         })
         .collect()
     }
@@ -179,54 +171,32 @@ impl<'a> Fingers<'a> {
     /// The fingers whose hull is over `place`, each with the y of its front there relative to its
     /// tip.
     fn over(&self, place: &[f64]) -> impl Iterator<Item = (usize, f64)> {
-        self.near(place, self.front.axis_z_m()).filter_map(move |finger| {
-            let away = place.iter().zip(self.target(finger)).map(|(at, target)| at - target);
-            Some((finger, self.front_m(away)?))
-        })
-    }
-
-    fn front_m(&self, mut away: impl Iterator<Item = f64>) -> Option<f64> {
-        self.front.y_m(away.next()?, away.next().unwrap_or(0.0))
-    }
-
-    /// The targets within a radius of `place`, along z within `more_m` than that below and above.
-    fn near(&self, place: &[f64], more_m: [f64; 2]) -> impl Iterator<Item = usize> + use<> {
         let radius_m = self.environment.scene().finger.radius_m + ROUNDING_M;
-        let within = |side: usize, [below_m, above_m]: [f64; 2]| {
-            let (&at, side) = (place.get(side)?, self.sides_m.get(side)?);
+        let [x_m, z_m] = [place[0], place.get(1).copied().unwrap_or(0.0)];
+        let within = |side: &[f64], at: f64, [below_m, above_m]: [f64; 2]| {
             let first = side.partition_point(|&x| x < at - below_m - radius_m);
-            Some(first..side.partition_point(|&x| x <= at + above_m + radius_m))
+            first..side.partition_point(|&x| x <= at + above_m + radius_m)
         };
-        let columns = within(0, [0.0; 2]).unwrap_or(0..0);
-        let rows = within(1, more_m).unwrap_or(0..1);
-        let across = self.sides_m.first().map_or(0, Vec::len);
-        rows.flat_map(move |row| columns.clone().map(move |column| row * across + column))
-    }
-
-    /// The place that `finger` is sent to.
-    fn target(&self, mut finger: usize) -> impl Iterator<Item = f64> {
-        self.sides_m.iter().map(move |side| {
-            let at = side[finger % side.len()];
-            finger /= side.len();
-            at
+        let columns = within(&self.sides_m[0], x_m, [0.0; 2]);
+        let rows = within(&self.sides_m[1], z_m, self.front.axis_z_m());
+        let across = self.sides_m[0].len();
+        let near =
+            rows.flat_map(move |row| columns.clone().map(move |column| row * across + column));
+        near.filter_map(move |finger| {
+            let target = self.target(finger);
+            Some((finger, self.front.y_m(x_m - target[0], z_m - target[1])?))
         })
     }
 
-    /// The y in the zone's frame of the surface at the target of `finger`.
-    fn surface_y_m(&self, finger: usize) -> Option<f64> {
-        let Shape::Mesh { bvh, .. } = self.environment.shape() else { return None };
-        let task = self.environment.task();
-        let zone = self.zone;
-        let [near_m, far_m] = task.depth_m();
-        let target: Vec<f64> = self.target(finger).collect();
-        let start_w = zone.x_wz() * zone.local(&target, CLEARANCE_M - near_m);
-        let hit = bvh.ray(&start_w, &zone.ahead_w(), far_m - near_m + 2.0 * CLEARANCE_M)?;
-        Some(CLEARANCE_M - near_m - hit.distance_m)
+    /// The place that `finger` is sent to, with z where the zone has only x.
+    fn target(&self, finger: usize) -> [f64; 2] {
+        let [x_m, z_m] = &self.sides_m;
+        [x_m[finger % x_m.len()], z_m[finger / x_m.len()]]
     }
 
     fn tip_y_m(&self, finger: usize) -> Option<f64> {
         *self.tips_y_m[finger].get_or_init(|| {
-            let target: Vec<f64> = self.target(finger).collect();
+            let target = self.target(finger)[..self.zone.sides().count()].to_vec();
             let approach = self.environment.task().approach(&target.into())?;
             let rest = rest(self.environment, &approach)?;
             let x_zw = self.zone.x_wz().inverse();

@@ -1,9 +1,9 @@
 //! What there is: the object, the finger, the zone, and which body carries out a touch.
 
-use super::function::Function;
 use super::solver::SolverSettings;
 use crate::sim::finger::Effects;
 use crate::sim::finger::effects::sensor;
+use clap::ValueEnum;
 use nalgebra::Isometry3;
 use palpate_explore::robot::arm::ArmSettings;
 use palpate_explore::robot::finger::Finger;
@@ -17,6 +17,7 @@ use palpate_input::config::{Checked, ConfigError, Loader, Rules, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::f64::consts::PI;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -91,6 +92,39 @@ impl Body {
     }
 }
 
+/// An analytic one-dimensional surface y = f(x), touched without a finger.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Function {
+    /// Eq. 4 of Yi et al. 2016: sin(ωx) + 1 for |x| ≤ 1, and 1 beyond, with ω = 4π.
+    Toy,
+}
+
+impl Function {
+    /// Height at `x`.
+    pub fn height_m(self, x: f64) -> f64 {
+        match self {
+            Self::Toy if x.abs() <= 1.0 => (4.0 * PI * x).sin() + 1.0,
+            Self::Toy => 1.0,
+        }
+    }
+
+    /// Smallest and largest height.
+    pub fn heights_m(self) -> [f64; 2] {
+        match self {
+            Self::Toy => [0.0, 2.0],
+        }
+    }
+
+    /// Slope at `x`; at a kink that of the side nearer to 0.
+    pub fn slope(self, x: f64) -> f64 {
+        match self {
+            Self::Toy if x.abs() <= 1.0 => 4.0 * PI * (4.0 * PI * x).cos(),
+            Self::Toy => 0.0,
+        }
+    }
+}
+
 /// A mesh and where it stands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -124,24 +158,20 @@ fn one() -> f64 {
 
 /// Unit of a mesh file's numbers.
 #[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, JsonSchema,
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum, JsonSchema,
 )]
+#[serde(rename_all = "lowercase")]
 pub enum Unit {
     /// Metres, as glTF prescribes.
     #[default]
-    #[serde(rename = "m")]
     M,
     /// Centimetres.
-    #[serde(rename = "cm")]
     Cm,
     /// Millimetres.
-    #[serde(rename = "mm")]
     Mm,
     /// Micrometres.
-    #[serde(rename = "um")]
     Um,
     /// Inches.
-    #[serde(rename = "in")]
     In,
 }
 
@@ -161,13 +191,7 @@ impl Unit {
 impl fmt::Display for Unit {
     /// As a scene file names it.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Self::M => "m",
-            Self::Cm => "cm",
-            Self::Mm => "mm",
-            Self::Um => "um",
-            Self::In => "in",
-        })
+        self.to_possible_value().map_or(Ok(()), |value| f.write_str(value.get_name()))
     }
 }
 
@@ -196,51 +220,43 @@ impl Checked for Object {
 
 impl Checked for Scene {
     fn check(&self, rules: &mut Rules) {
+        let lacks = |rules: &mut Rules, key: &str, lacks: bool, allowed: &str| {
+            rules.require(key, "(none)", !lacks, || allowed.into());
+        };
+        let given = |rules: &mut Rules, key: &str, given: bool, allowed: &str| {
+            rules.require(key, "(given)", !given, || allowed.into());
+        };
         match &self.around {
             None => {
-                rules.require("zone", "(none)", self.zone.is_some(), || {
-                    "a table [zone] with x_m and z_m, or [around] for a whole object".into()
-                });
-                if let Some(zone) = &self.zone {
-                    rules.table("zone", zone);
-                }
+                let allowed = "a table [zone] with x_m and z_m, or [around] for a whole object";
+                lacks(rules, "zone", self.zone.is_none(), allowed);
+                self.zone.iter().for_each(|zone| rules.table("zone", zone));
             }
             Some(around) => {
-                rules.require("zone", "(given)", self.zone.is_none(), || {
-                    "no zone: [around] explores the object from all sides".into()
-                });
+                let allowed = "no zone: [around] explores the object from all sides";
+                given(rules, "zone", self.zone.is_some(), allowed);
                 rules.table("around", around);
             }
         }
         rules.table("finger", &self.finger);
-        match self.body {
-            Body::Function => {
-                rules.require("function", "(none)", self.function.is_some(), || {
-                    "\"toy\", because body = \"function\"".into()
-                });
-                rules.require("object", "(given)", self.object.is_none(), || {
-                    "no object: body = \"function\" touches a curve".into()
-                });
-                rules.require("around", "(given)", self.around.is_none(), || {
-                    "no around: body = \"function\" touches a curve".into()
-                });
-                let flat = self.zone.as_ref().is_none_or(|zone| zone.z_m.is_none());
-                rules.require("arm", "(given)", self.arm.is_none(), || {
-                    "no arm: body = \"function\" is touched by none".into()
-                });
-                rules.require("zone.z_m", "(given)", flat, || {
-                    "no z_m: the surface of body = \"function\" is a curve over x".into()
-                });
-            }
-            Body::Cast | Body::Kinematic | Body::Dynamic => {
-                let body = self.body.name();
-                rules.require("function", "(given)", self.function.is_none(), || {
-                    format!("no function: body = \"{body}\" touches an object")
-                });
-                rules.require("object", "(none)", self.object.is_some(), || {
-                    format!("a table with a mesh, because body = \"{body}\"")
-                });
-            }
+        let body = self.body.name();
+        if self.body == Body::Function {
+            let allowed = "\"toy\", because body = \"function\"";
+            lacks(rules, "function", self.function.is_none(), allowed);
+            let allowed = "no object: body = \"function\" touches a curve";
+            given(rules, "object", self.object.is_some(), allowed);
+            let allowed = "no around: body = \"function\" touches a curve";
+            given(rules, "around", self.around.is_some(), allowed);
+            let allowed = "no arm: body = \"function\" is touched by none";
+            given(rules, "arm", self.arm.is_some(), allowed);
+            let is_deep = self.zone.as_ref().is_some_and(|zone| zone.z_m.is_some());
+            let allowed = "no z_m: the surface of body = \"function\" is a curve over x";
+            given(rules, "zone.z_m", is_deep, allowed);
+        } else {
+            let allowed = format!("no function: body = \"{body}\" touches an object");
+            given(rules, "function", self.function.is_some(), &allowed);
+            let allowed = format!("a table with a mesh, because body = \"{body}\"");
+            lacks(rules, "object", self.object.is_none(), &allowed);
         }
         let turns = self.around.is_none() || self.arm.is_some() || self.body != Body::Dynamic;
         rules.require("body", "\"dynamic\"", turns, || {
@@ -276,16 +292,13 @@ impl Checked for Scene {
                     .into()
             });
         }
-        let feels = self.body != Body::Kinematic || self.felt_effects().skin.is_some();
-        rules.require("effects.skin", "(none)", feels, || {
-            "a table, because body = \"kinematic\" feels with a soft skin (a rigid finger is \
-             body = \"cast\"; without any [effects] it has a BioTac's)"
-                .into()
-        });
-        let bumps = self.body == Body::Dynamic || self.effects.collision.is_none();
-        rules.require("effects.collision", "(given)", bumps, || {
-            "no collision: only links of body = \"dynamic\" are kept apart by MuJoCo".into()
-        });
+        let is_rigid = self.body == Body::Kinematic && self.felt_effects().skin.is_none();
+        let allowed = "a table, because body = \"kinematic\" feels with a soft skin (a rigid finger \
+                       is body = \"cast\"; without any [effects] it has a BioTac's)";
+        lacks(rules, "effects.skin", is_rigid, allowed);
+        let bumps = self.body != Body::Dynamic && self.effects.collision.is_some();
+        let allowed = "no collision: only links of body = \"dynamic\" are kept apart by MuJoCo";
+        given(rules, "effects.collision", bumps, allowed);
         if let (Some(wrench), false) = (&self.effects.wrench, self.frames_tell_contact()) {
             let least_n = SDS_OF_CONTACT * wrench.noise_max_n();
             let told = self.touch.detection_n >= least_n;
@@ -306,9 +319,7 @@ impl Checked for Scene {
                 )
             });
         }
-        if let Some(object) = &self.object {
-            rules.table("object", object);
-        }
+        self.object.iter().for_each(|object| rules.table("object", object));
         if let Some(arm) = &self.arm {
             rules.table("arm", arm);
             let clear = arm.mount_m >= self.finger.length_m;

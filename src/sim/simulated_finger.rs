@@ -5,9 +5,8 @@ use crate::sim::environment::Shape;
 use crate::sim::finger::effects::registration::Registration;
 use crate::sim::finger::effects::wrench::Gauge;
 use crate::sim::finger::{Fingertip, FingertipState, Load};
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::Isometry3;
 use palpate_explore::backend::{Fault, IdealContact, Reading, Sample, Wrench};
-use palpate_explore::robot::finger::Frame;
 use palpate_explore::robot::finger::TipMotion;
 use palpate_gp::math::seed;
 use std::sync::Arc;
@@ -20,28 +19,48 @@ pub struct SimulatedFinger {
     environment: Arc<Environment>,
     /// Pose of `T` in the frame of the force/torque sensor.
     x_mt: Isometry3<f64>,
-    drawn: Drawn,
-    load: Load,
-    /// Whether the fluid tells of contact and the electrodes of its place.
-    has_sensor: bool,
-}
-
-/// What is drawn for one trial by its seed.
-struct Drawn {
     /// A fingertip that differs from the environment's; none if it does not.
     own: Option<Box<Fingertip>>,
     state: FingertipState,
     gauge: Option<Gauge>,
     misplaced: Option<Registration>,
+    load: Load,
+    /// Whether the fluid tells of contact and the electrodes of its place.
+    has_sensor: bool,
 }
 
 impl SimulatedFinger {
-    /// Untouched; none in an environment without a soft finger.
+    /// Untouched, with what is drawn for a trial by its seed; none in an environment without a soft
+    /// finger.
     pub fn new(environment: Arc<Environment>, seed: u64) -> Option<Self> {
-        let effects = &environment.scene().effects;
+        let stream = |purpose| seed::stream(seed, 0, purpose);
+        let scene = environment.scene();
+        let effects = &scene.effects;
+        let sensor = effects.variation.as_ref().map(|effect| effect.sensor(stream("variation")));
+        let own: Option<Box<Fingertip>> =
+            sensor.as_ref().map(|sensor| Fingertip::varied(&scene.finger, effects, sensor).into());
+        let tip = environment.fingertip()?;
+        let mut misplaced = None;
+        if let (Some(effect), Some(object)) = (&effects.registration, &scene.object) {
+            let error = Registration::new(effect, &mut stream("registration"));
+            let x_wo = object.x_wo();
+            let correction = scene.arm.as_ref().and_then(|arm| arm.correction());
+            misplaced = Some(Registration {
+                finger: effect.fixed(correction).map_or(error.finger, |fixed| fixed * error.finger),
+                object: x_wo * error.object.inverse() * x_wo.inverse(),
+            });
+        }
+        if let Some(sensor) = &sensor {
+            let still =
+                Registration { finger: Isometry3::identity(), object: Isometry3::identity() };
+            misplaced.get_or_insert(still).finger *= sensor.attitude;
+        }
         Some(Self {
             x_mt: environment.chain()?.tool,
-            drawn: Drawn::new(&environment, environment.fingertip()?, seed),
+            state: FingertipState::new(own.as_deref().unwrap_or(tip), &stream("finger")),
+            own,
+            gauge: effects.wrench.as_ref().map(|effect| Gauge::new(effect, stream("wrench"))),
+            misplaced,
             load: Load::default(),
             has_sensor: effects.fluid.is_some() && effects.electrodes.is_some(),
             environment,
@@ -50,9 +69,8 @@ impl SimulatedFinger {
 
     /// Forgets everything.
     pub fn reset(&mut self, seed: u64) {
-        if let Some(tip) = self.environment.fingertip() {
-            self.drawn = Drawn::new(&self.environment, tip, seed);
-            self.load = Load::default();
+        if let Some(new) = Self::new(Arc::clone(&self.environment), seed) {
+            *self = new;
         }
     }
 
@@ -61,7 +79,7 @@ impl SimulatedFinger {
     /// # Errors
     /// As [`FingertipState::step`].
     pub fn step(&mut self, motion: &TipMotion, dt_s: f64) -> Result<Wrench, Fault> {
-        let Drawn { own, state, misplaced, .. } = &mut self.drawn;
+        let Self { own, state, misplaced, .. } = self;
         let tip = own.as_deref().or(self.environment.fingertip());
         let (Some(tip), Shape::Mesh { bvh, .. }) = (tip, self.environment.shape()) else {
             return Ok(Wrench::default());
@@ -77,64 +95,21 @@ impl SimulatedFinger {
     /// sensor tells it.
     pub fn report(&mut self, mount: &Wrench, period_s: f64, reading: &mut Reading) {
         reading.samples.clear();
-        reading.samples.extend(std::iter::from_fn(|| self.frame()).map(Sample::BioTac));
+        reading.samples.extend(std::iter::from_fn(|| self.state.frame()).map(Sample::BioTac));
         reading.samples.extend(self.ideal().map(Sample::Ideal));
         let effect = self.environment.scene().effects.wrench.as_ref();
-        reading.wrench = self.drawn.gauge.as_mut().zip(effect).map(|(gauge, effect)| {
-            let Wrench { force_n: f, torque_nm: t } = mount.moved(&self.x_mt);
-            let said = gauge.read(effect, &Vector6::new(f.x, f.y, f.z, t.x, t.y, t.z), period_s);
-            let said = Wrench {
-                force_n: said.fixed_rows::<3>(0).into(),
-                torque_nm: said.fixed_rows::<3>(3).into(),
-            };
-            said.moved(&self.x_mt.inverse())
+        reading.wrench = self.gauge.as_mut().zip(effect).map(|(gauge, effect)| {
+            gauge.read(effect, &mount.moved(&self.x_mt), period_s).moved(&self.x_mt.inverse())
         });
     }
 
-    /// The oldest tactile frame that has arrived and was not asked for yet.
-    pub fn frame(&mut self) -> Option<Frame> {
-        self.drawn.state.frame()
-    }
-
     /// The load where no sensor tells it.
-    pub fn ideal(&self) -> Option<IdealContact> {
+    fn ideal(&self) -> Option<IdealContact> {
         let force_n = self.load.force_n.norm();
         (!self.has_sensor && force_n > LEAST_FORCE_N).then_some(IdealContact {
             p_tc: self.load.centre_t,
             normal_t: self.load.normal_t,
             force_n,
         })
-    }
-}
-
-impl Drawn {
-    fn new(environment: &Environment, tip: &Fingertip, seed: u64) -> Self {
-        let stream = |purpose| seed::stream(seed, 0, purpose);
-        let scene = environment.scene();
-        let effects = &scene.effects;
-        let sensor = effects.variation.as_ref().map(|effect| effect.sensor(stream("variation")));
-        let own =
-            sensor.as_ref().map(|sensor| Fingertip::varied(&scene.finger, effects, sensor).into());
-        let mut drawn = Self {
-            state: FingertipState::new(own.as_deref().unwrap_or(tip), &stream("finger")),
-            own,
-            gauge: effects.wrench.as_ref().map(|effect| Gauge::new(effect, stream("wrench"))),
-            misplaced: None,
-        };
-        if let (Some(effect), Some(object)) = (&effects.registration, &scene.object) {
-            let error = Registration::new(effect, &mut stream("registration"));
-            let x_wo = object.x_wo();
-            let correction = scene.arm.as_ref().and_then(|arm| arm.correction());
-            drawn.misplaced = Some(Registration {
-                finger: effect.fixed(correction).map_or(error.finger, |fixed| fixed * error.finger),
-                object: x_wo * error.object.inverse() * x_wo.inverse(),
-            });
-        }
-        if let Some(sensor) = &sensor {
-            let still =
-                Registration { finger: Isometry3::identity(), object: Isometry3::identity() };
-            drawn.misplaced.get_or_insert(still).finger *= sensor.attitude;
-        }
-        drawn
     }
 }

@@ -140,11 +140,7 @@ impl Simulator {
                 Box::new(mujoco::Dynamic::new(&self.environment, models)?)
             }
             #[cfg(not(feature = "mujoco"))]
-            Body::Dynamic => {
-                let words =
-                    format!("{} needs a build with the feature `mujoco`", Body::Dynamic.name());
-                return Err(palpate_input::error::Invalid::new(words).into());
-            }
+            Body::Dynamic => return Err(Fault::lacks("the feature `mujoco`")),
         };
         let timing = self.environment.scene().effects.timing.as_ref();
         Ok(Some(match timing.map_or(0.0, |timing| timing.control_delay_s) {

@@ -2,10 +2,10 @@
 
 use crate::common::shipped;
 use palpate::robot::finger::profile::Profile;
-use palpate::sim::collision::Collision;
 use palpate::sim::finger::Effects;
 use palpate::sim::probe::rest;
 use palpate::sim::simulator::Simulator;
+use palpate::sim::solver::Collision;
 use palpate::sim::{Environment, Scene};
 use palpate::study::accuracy::comparison::{Comparison, Effort};
 use palpate::study::accuracy::convergence;

@@ -2,11 +2,10 @@
 
 use palpate::math::least_squares::FitError;
 use palpate::robot::finger::frame::ELECTRODES;
-use palpate::sim::finger::calibration::bench::Bench;
 use palpate::sim::finger::calibration::constants::{CONSTANTS, Model};
 use palpate::sim::finger::calibration::fit::{Free, fit};
 use palpate::sim::finger::calibration::score::{HeldOut, Score, leave_one_out};
-use palpate::sim::finger::calibration::session::Session;
+use palpate::sim::finger::calibration::session::{Bench, Session};
 use palpate::sim::finger::effects::electrodes::{counts, impedance_ohm};
 use palpate::sim::finger::recording::{Recording, Recordings};
 

@@ -5,7 +5,9 @@ use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
 use palpate::robot::finger::{Detection, Detector, Finger, Frame};
-use palpate::sim::finger::effects::electrodes::{ElectrodesEffect, counts, impedance_ohm};
+use palpate::sim::finger::effects::electrodes::{
+    Electrodes, ElectrodesEffect, counts, impedance_ohm,
+};
 use palpate::sim::finger::effects::fluid::FluidEffect;
 use palpate::sim::finger::effects::skin::SkinEffect;
 use palpate::sim::finger::effects::thermal::ThermalEffect;
@@ -65,21 +67,20 @@ fn untouched_electrodes_read_their_baselines_and_impedances_invert() {
 
 #[test]
 fn pressure_rises_saturates_near_2_n_and_electrodes_move_as_measured() {
-    let mut plate = Plate::new(
-        &SkinEffect::default(),
-        FluidEffect::default().stiffness_pa_m3,
-        &ElectrodesEffect::default(),
-    )
-    .unwrap();
+    let cavity_pa_m3 = FluidEffect::default().stiffness_pa_m3;
+    let mut plate = Plate::new(&SkinEffect::default(), cavity_pa_m3).unwrap();
     let towards_t = direction_t(0.14, 0.0);
-    let mut pressure_pa = |force_n| plate.press_to(&towards_t, force_n).unwrap().0.pressure_pa;
+    let mut pressure_pa = |force_n| plate.press_to(&towards_t, force_n).unwrap().pressure_pa;
     let steps = [0.5, 1.0, 2.0, 4.0, 8.0].map(&mut pressure_pa);
     println!("PDC at 0.5, 1, 2, 4, 8 N: {:?}", steps.map(|pa| (pa / 36.5).round()));
     assert!(steps.is_sorted() && steps[0] > 36.5 * 10.0);
     let (first, last) = (steps[1], (steps[4] - steps[3]) / 4.0);
     assert!(last < 0.2 * first, "{first} Pa/N falls to {last}");
-    let baselines = ElectrodesEffect::default().baseline_counts;
-    let (_, counts) = plate.press_to(&towards_t, 8.0).unwrap();
+    let effect = ElectrodesEffect::default();
+    let baselines = effect.baseline_counts;
+    plate.press_to(&towards_t, 8.0).unwrap();
+    let electrodes = Electrodes::new(&effect, plate.skin.samples(), 1.0);
+    let counts = electrodes.counts_closed(&electrodes.closed(plate.pressed.moved_m()), 1.0);
     for (i, (found, rest)) in counts.iter().zip(baselines).enumerate() {
         let ratio = impedance_ohm(*found) / impedance_ohm(rest);
         assert!((0.36..40.0).contains(&ratio), "E{}: Z/Z0 {ratio}", i + 1);
@@ -232,4 +233,13 @@ fn contact_is_found_after_enough_frames_and_lost_likewise() {
     assert_eq!(changes.len(), 2, "{changes:?}");
     assert!((changes[0] - 0.325).abs() < 0.01 && (changes[1] - 0.625).abs() < 0.01, "{changes:?}");
     assert_eq!(Frame::mean(&[]), Frame::default());
+}
+
+/// The power that electrodes need not compute is the same number.
+#[test]
+fn powers_of_one_are_as_computed() {
+    for k in 1..100 {
+        let base = std::hint::black_box(f64::from(k) / 33.0);
+        assert_eq!((base.powf(1.0), 1f64.powf(base)), (base, 1.0));
+    }
 }

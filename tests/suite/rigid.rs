@@ -10,12 +10,12 @@ use palpate::explore::probe::{Contact, Touch};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::geometry::mesh::Mesh;
 use palpate::sim::Environment;
-use palpate::sim::collision::Collision;
 use palpate::sim::environment::Shape;
 use palpate::sim::mjcf;
 use palpate::sim::mjcf::Mode;
 use palpate::sim::mujoco::{Models, Plant, compile};
 use palpate::sim::simulator::Simulator;
+use palpate::sim::solver::Collision;
 use palpate::sim::solver::Integrator;
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! Scene and experiment files: all that ship load, all that are saved mean the same.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use palpate::experiment::experiment::Experiment;
 use palpate::experiment::store;
 use palpate::sim::{Environment, Scene, mjcf};
@@ -93,6 +93,33 @@ fn the_generated_model_names_the_object_the_board_and_the_finger() {
     let toy = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/toy.toml");
     let toy = Environment::build(Scene::load(&toy, &[]).unwrap()).unwrap();
     assert!(mjcf::scene(&toy, mjcf::Mode::Picture).is_none());
+}
+
+/// Seen from outside every triangle of pad and nail turns counter-clockwise, and the pad is towards
+/// −z.
+#[test]
+fn faces_of_the_fingertip_look_outwards() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/container_finger.toml");
+    let environment = Environment::build(Scene::load(&path, &[]).unwrap()).unwrap();
+    let text = mjcf::scene(&environment, mjcf::Mode::Picture).unwrap();
+    for name in ["pad", "nail"] {
+        let (_, text) = text.split_once(&format!("<mesh name=\"{name}\"")).unwrap();
+        let numbers = |key: &str| -> Vec<f64> {
+            let (_, rest) = text.split_once(&format!(" {key}=\"")).unwrap();
+            let (list, _) = rest.split_once('"').unwrap();
+            list.split_whitespace().map(|number| number.parse().unwrap()).collect()
+        };
+        let points: Vec<Vector3<f64>> =
+            numbers("vertex").chunks(3).map(Vector3::from_column_slice).collect();
+        let side: f64 = points.iter().map(|p| p.z).sum();
+        assert_eq!(side < 0.0, name == "pad");
+        for face in numbers("face").chunks(3) {
+            let [a, b, c] = [0, 1, 2].map(|k| points[face[k] as usize]);
+            let middle = (a + b + c) / 3.0;
+            let outwards = middle - Vector3::new(middle.x.min(0.0), 0.0, 0.0);
+            assert!((b - a).cross(&(c - a)).dot(&outwards) > 0.0, "{name} {face:?}");
+        }
+    }
 }
 
 #[test]

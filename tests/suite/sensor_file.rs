@@ -3,6 +3,7 @@
 
 use palpate::experiment::Experiment;
 use palpate::experiment::store::resolved;
+use palpate::sim::finger::Effects;
 use palpate::sim::{Environment, Scene};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -113,4 +114,24 @@ fn resolved_experiments_hold_what_differs() {
     assert!(written.contains("[scene.effects.sensor.skin]\nflatten_pa_m = 1800000.0"), "{written}");
     assert_eq!(read(&written), other);
     assert_ne!(other, plain);
+}
+
+/// Every constant stands in the BioTac's file: one that is missing there would be 0, and would be
+/// written as a setting.
+#[test]
+fn every_constant_stands_in_the_file() {
+    let written = toml::Table::try_from(Effects::all()).unwrap();
+    assert!(!written.contains_key("sensor"), "{written}");
+    let keys = |effect: &str| -> Vec<String> {
+        let mut keys: Vec<_> = written[effect].as_table().unwrap().keys().cloned().collect();
+        keys.sort();
+        keys
+    };
+    assert_eq!(keys("skin"), ["along", "around", "model", "samples"]);
+    assert_eq!(keys("fluid"), ["vibration"]);
+    assert!(written["fluid"]["vibration"].as_table().unwrap().is_empty());
+    assert_eq!(keys("timing"), ["control_delay_s"]);
+    for effect in ["electrodes", "creep", "thermal", "friction", "wrench", "variation"] {
+        assert!(keys(effect).is_empty(), "{effect}: {:?}", keys(effect));
+    }
 }

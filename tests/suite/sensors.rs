@@ -3,6 +3,7 @@
 use crate::common::shapes::square;
 use crate::common::shipped;
 use nalgebra::{Isometry3, Vector3};
+use palpate::backend::{Reading, Sample, Wrench};
 use palpate::geometry::bvh::MeshBvh;
 use palpate::math::seed::stream;
 use palpate::robot::finger::TipMotion;
@@ -140,7 +141,10 @@ fn a_sensor_is_drawn_for_each_trial_and_nothing_varies_by_nothing() {
         let mut finger = SimulatedFinger::new(environment, seed).unwrap();
         finger.step(&TipMotion::at(away), 0.01).unwrap();
         finger.step(&TipMotion::at(away), 0.01).unwrap();
-        finger.frame().unwrap()
+        let mut reading = Reading::default();
+        finger.report(&Wrench::default(), 0.02, &mut reading);
+        let Some(Sample::BioTac(frame)) = reading.samples.first() else { panic!() };
+        frame.clone()
     };
     let varied = ["effects.variation={}"];
     assert_eq!(first(&varied, 1), first(&varied, 1));

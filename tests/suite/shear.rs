@@ -182,8 +182,7 @@ fn located(
         for roll in [-0.6, -0.3, 0.0, 0.3, 0.6] {
             for force_n in [1.0, 3.0, 6.0] {
                 let towards_t = direction_t(pitch, roll);
-                let mut plate =
-                    Plate::new(&SkinEffect::default(), 1e13, &ElectrodesEffect::default()).unwrap();
+                let mut plate = Plate::new(&SkinEffect::default(), 1e13).unwrap();
                 let height_m = plate.height_m(&towards_t, force_n).unwrap();
                 let mut feel = FingertipState::new(&tip, &stream(1, 0, "finger"));
                 let mut motion = TipMotion::at(pose(&towards_t, height_m));

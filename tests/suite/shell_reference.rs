@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use palpate::math::banded::{Banded, Factor};
 use palpate::robot::finger::Finger;
 use palpate::robot::finger::profile::Profile;
-use palpate::sim::finger::lattice::Lattice;
+use palpate::sim::finger::samples::Lattice;
 use palpate::sim::finger::shell::sheet::{Material, Sheet};
 use palpate::sim::finger::shell::springs::Springs;
 use std::collections::HashMap;

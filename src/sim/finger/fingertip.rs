@@ -1,22 +1,23 @@
-//! The fingertip, put together from the effects a scene names.
+//! The fingertip, put together from the effects a scene names, and the frames its sensor sends.
 
-use super::converter::{Converter, Parts, Signals};
-use super::counter::count;
-use super::effects::effect::Step;
-use super::effects::electrodes::Electrodes;
-use super::effects::friction::Bristle;
+use super::effects::electrodes::{Common, Electrodes, Shear};
+use super::effects::fluid::Filter;
 use super::effects::skin::{Pressed, Skin};
+use super::effects::timing::{Channel, channel};
 use super::effects::variation::Sensor;
 use super::effects::{EffectStates, Effects};
 use super::load::{Load, PressError};
-use super::shear::Shear;
+use super::noise::normal;
 use palpate_explore::backend::Fault;
 use palpate_explore::robot::finger::TipMotion;
-use palpate_explore::robot::finger::frame::Frame;
+use palpate_explore::robot::finger::frame::{
+    ELECTRODES, FRAME_S, Frame, SLOTS, SLOTS_HZ, VIBRATIONS,
+};
 use palpate_explore::robot::finger::profile::Profile;
 use palpate_explore::robot::finger::shape::Finger;
 use palpate_geometry::bvh::MeshBvh;
 use rand_chacha::ChaCha8Rng;
+use std::collections::VecDeque;
 
 /// Longest step: beyond it a frame's signals would be mostly interpolated (chosen).
 const LONGEST_STEP_S: f64 = 1.0;
@@ -67,20 +68,11 @@ impl Fingertip {
         self.skin.as_ref()
     }
 
-    /// Its electrodes.
-    pub fn electrodes(&self) -> Option<&Electrodes> {
-        self.electrodes.as_ref()
-    }
-
     /// Bytes held by skin and electrodes.
     pub fn bytes(&self) -> usize {
         self.skin.as_ref().map_or(0, Skin::bytes)
             + self.electrodes.as_ref().map_or(0, Electrodes::bytes)
-            + self.shear.as_ref().map_or(0, Shear::bytes)
-    }
-
-    fn parts(&self) -> Parts<'_> {
-        Parts { electrodes: self.electrodes.as_ref(), effects: &self.effects }
+            + self.shear.as_ref().map_or(0, size_of_val)
     }
 }
 
@@ -104,14 +96,9 @@ impl FingertipState {
         };
         if tip.effects.sends_frames() {
             let untouched = state.signals(tip, 0.0);
-            state.converter = Some(Converter::new(&tip.parts(), untouched, rng));
+            state.converter = Some(Converter::new(tip, untouched, rng));
         }
         state
-    }
-
-    /// Since the start of the trial.
-    pub fn time_s(&self) -> f64 {
-        self.time_s
     }
 
     /// The skin in its last pose.
@@ -132,14 +119,18 @@ impl FingertipState {
         dt_s: f64,
     ) -> Result<Load, Fault> {
         let time_s = self.time_s;
+        let diverged = || {
+            let parts = [motion.x_wt.translation.vector, motion.linear_w, motion.angular_w];
+            let state = parts.iter().flat_map(|part| part.iter().copied()).collect();
+            Fault::Diverged { time_s, state }
+        };
         if !motion.is_finite() || !(0.0..=LONGEST_STEP_S).contains(&dt_s) {
-            return Err(diverged(time_s, motion));
+            return Err(diverged());
         }
-        let load = match (&tip.skin, &mut self.pressed) {
+        let mut load = match (&tip.skin, &mut self.pressed) {
             (Some(skin), Some(pressed)) => {
-                count("skin");
                 skin.press(object, &motion.x_wt, pressed).map_err(|error| match error {
-                    PressError::NotFinite => diverged(time_s, motion),
+                    PressError::NotFinite => diverged(),
                     PressError::Inside => {
                         Fault::Inside { time_s, p_wt: motion.x_wt.translation.vector.into() }
                     }
@@ -147,18 +138,13 @@ impl FingertipState {
             }
             _ => Load::default(),
         };
-        Ok(self.advance(tip, load, motion, dt_s))
-    }
-
-    /// What follows from the load on the skin.
-    fn advance(&mut self, tip: &Fingertip, mut load: Load, motion: &TipMotion, dt_s: f64) -> Load {
         self.time_s += dt_s;
-        self.effects.on_load(&tip.effects, &Step { motion, dt_s }, &mut load);
+        self.effects.on_load(&tip.effects, motion, dt_s, &mut load);
         let signals = self.converter.is_some().then(|| self.signals(tip, load.pressure_pa));
         if let (Some(converter), Some(signals)) = (&mut self.converter, signals) {
-            converter.advance(&tip.parts(), self.time_s, &signals);
+            converter.advance(tip, self.time_s, &signals);
         }
-        load
+        Ok(load)
     }
 
     /// Bytes of this trial's state: what an effect that is off does not hold.
@@ -169,11 +155,13 @@ impl FingertipState {
 
     /// The oldest tactile frame that has arrived and was not asked for yet.
     pub fn frame(&mut self) -> Option<Frame> {
-        self.converter.as_mut()?.frame()
+        let converter = self.converter.as_mut()?;
+        converter.ready = converter.ready.checked_sub(1)?;
+        converter.queue.pop_front()
     }
 
     fn signals(&self, tip: &Fingertip, pressure_pa: f64) -> Signals {
-        let slip_m_s = self.effects.friction.as_ref().map_or(0.0, Bristle::slip_m_s);
+        let slip_m_s = self.effects.friction.as_ref().map_or(0.0, |bristle| bristle.slip_m_s);
         let mut signals = Signals { pressure_pa, slip_m_s, ..Signals::default() };
         let mut conductivity = 1.0;
         if let (Some(thermal), Some(heat)) = (&tip.effects.thermal, &self.effects.thermal) {
@@ -183,10 +171,9 @@ impl FingertipState {
         }
         let moved_m = self.pressed.as_ref().map_or(&[][..], Pressed::moved_m);
         if let Some(electrodes) = &tip.electrodes {
-            count("electrodes");
             let mut closed = electrodes.closed(moved_m);
             if let (Some(shear), Some(bristle)) = (&tip.shear, &self.effects.friction) {
-                shear.add(bristle.skin_t(), &mut closed);
+                shear.add(&bristle.skin_t, &mut closed);
             }
             signals.electrode_counts = electrodes.counts_closed(&closed, conductivity);
         }
@@ -194,8 +181,201 @@ impl FingertipState {
     }
 }
 
-fn diverged(time_s: f64, motion: &TipMotion) -> Fault {
-    let parts = [motion.x_wt.translation.vector, motion.linear_w, motion.angular_w];
-    let state = parts.iter().flat_map(|part| part.iter().copied()).collect();
-    Fault::Diverged { time_s, state }
+/// Frames kept for a reader that does not come, one second of them; then the oldest is lost
+/// (chosen).
+const KEPT: usize = 100;
+
+/// A slot this close to the end of a step, in seconds, belongs to it: sums of time steps round.
+const SOON_S: f64 = 1e-9;
+
+/// What the channels would read without noise, at one instant.
+#[derive(Clone, Copy, Debug, Default)]
+struct Signals {
+    /// E1 to E19.
+    electrode_counts: [f64; ELECTRODES],
+    /// Fluid pressure above rest.
+    pressure_pa: f64,
+    /// Temperature of the fluid.
+    temperature_c: f64,
+    /// Its rate of change within the sensor's band.
+    warming_c_s: f64,
+    /// Speed at which the skin slips on the object, during the whole step that ends now.
+    slip_m_s: f64,
+}
+
+/// The converter of one trial: electrodes, PDC, PAC, thermistor and slip each draw noise from a
+/// stream of their own, so that switching one leaves the others' noise as it was.
+#[derive(Clone, Debug)]
+struct Converter {
+    before: Signals,
+    time_s: f64,
+    frames: u64,
+    slot: usize,
+    frame: Frame,
+    common: Common,
+    electrodes_rng: ChaCha8Rng,
+    fluid_rng: ChaCha8Rng,
+    thermal_rng: ChaCha8Rng,
+    vibration_rng: ChaCha8Rng,
+    slip_rng: ChaCha8Rng,
+    filter: Filter,
+    queue: VecDeque<Frame>,
+    ready: usize,
+}
+
+impl Converter {
+    fn new(tip: &Fingertip, before: Signals, rng: &ChaCha8Rng) -> Self {
+        let stream = |number| {
+            let mut rng = rng.clone();
+            rng.set_stream(number);
+            rng
+        };
+        let mut electrodes_rng = stream(1);
+        let first =
+            |electrodes: &Electrodes| electrodes.next(&Common::default(), 0.0, &mut electrodes_rng);
+        Self {
+            before,
+            time_s: 0.0,
+            frames: 0,
+            slot: 0,
+            frame: Frame::default(),
+            common: tip.electrodes.as_ref().map_or_else(Common::default, first),
+            electrodes_rng,
+            fluid_rng: stream(2),
+            thermal_rng: stream(3),
+            vibration_rng: stream(4),
+            slip_rng: stream(5),
+            filter: Filter::default(),
+            queue: VecDeque::with_capacity(KEPT + batch_frames(tip)),
+            ready: 0,
+        }
+    }
+
+    /// Bytes held.
+    fn bytes(&self) -> usize {
+        size_of_val(self) + self.queue.capacity() * size_of::<Frame>()
+    }
+
+    /// Samples every slot until `time_s`; signals between the last call and now are
+    /// interpolated.
+    fn advance(&mut self, tip: &Fingertip, time_s: f64, now: &Signals) {
+        let (start_s, before) = (self.time_s, self.before);
+        // Without timing and vibration nothing is sampled before the last slot of a frame.
+        let fluid = tip.effects.fluid.as_ref();
+        let vibrates = fluid.is_some_and(|fluid| fluid.vibration.is_some());
+        let sampled_within_frames = tip.effects.timing.is_some() || vibrates;
+        self.note_slip(tip, now);
+        loop {
+            if !sampled_within_frames {
+                self.slot = SLOTS - 1;
+            }
+            let slots = self.frames * SLOTS as u64 + self.slot as u64 + 1;
+            let slot_s = slots as f64 / SLOTS_HZ;
+            if slot_s > time_s + SOON_S {
+                break;
+            }
+            let part = ((slot_s - start_s) / (time_s - start_s)).clamp(0.0, 1.0);
+            self.sample(tip, &before, now, if part.is_nan() { 1.0 } else { part });
+            self.slot += 1;
+            if self.slot == SLOTS {
+                self.finish(tip, slot_s);
+                if slot_s + SOON_S < time_s {
+                    self.note_slip(tip, now);
+                }
+            }
+        }
+        (self.time_s, self.before) = (time_s, *now);
+    }
+
+    /// Notes in the frame at hand whether the skin slips.
+    fn note_slip(&mut self, tip: &Fingertip, now: &Signals) {
+        if tip.effects.friction.is_some() {
+            *self.frame.slip.get_or_insert(false) |= now.slip_m_s > 0.0;
+        }
+    }
+
+    fn sample(&mut self, tip: &Fingertip, before: &Signals, now: &Signals, part: f64) {
+        let skewed = tip.effects.timing.is_some();
+        match channel(self.slot) {
+            Channel::Pac(i) => {
+                self.pac(tip, i, mix(before.pressure_pa, now.pressure_pa, part), now.slip_m_s);
+                if self.slot + 1 == SLOTS && !skewed {
+                    for slot in (0..SLOTS).step_by(2) {
+                        self.convert(tip, channel(slot), before, now, part);
+                    }
+                }
+            }
+            slow if skewed => self.convert(tip, slow, before, now, part),
+            _ => {}
+        }
+    }
+
+    /// PAC, to whose pressure the object's texture adds while the skin slips.
+    fn pac(&mut self, tip: &Fingertip, i: usize, mut pressure_pa: f64, slip_m_s: f64) {
+        let Some(fluid) = &tip.effects.fluid else { return };
+        let Some(vibration) = &fluid.vibration else { return };
+        if let Some(friction) = tip.effects.friction.as_ref().filter(|_| slip_m_s > 0.0) {
+            pressure_pa += friction.vibration_pa(slip_m_s) * normal(&mut self.slip_rng);
+        }
+        let (effects, rng) = ((fluid, vibration), &mut self.vibration_rng);
+        let counts = self.filter.pac_counts(effects, pressure_pa, 2.0 / SLOTS_HZ, rng);
+        self.frame.pac_counts.get_or_insert([0.0; VIBRATIONS])[i] = counts;
+    }
+
+    fn convert(
+        &mut self,
+        tip: &Fingertip,
+        channel: Channel,
+        before: &Signals,
+        now: &Signals,
+        part: f64,
+    ) {
+        let (frame, effects) = (&mut self.frame, &tip.effects);
+        match (channel, &tip.electrodes, &effects.fluid, &effects.thermal) {
+            (Channel::Electrode(i), Some(electrodes), ..) => {
+                let ideal = mix(before.electrode_counts[i], now.electrode_counts[i], part);
+                frame.electrode_counts.get_or_insert([0.0; ELECTRODES])[i] =
+                    electrodes.convert(i, ideal, &self.common, &mut self.electrodes_rng);
+            }
+            (Channel::Pdc, _, Some(fluid), _) => {
+                let pressure_pa = mix(before.pressure_pa, now.pressure_pa, part);
+                frame.pdc_counts = Some(fluid.pdc_counts(pressure_pa, &mut self.fluid_rng));
+            }
+            (Channel::Tac, _, _, Some(thermal)) => {
+                let warming_c_s = mix(before.warming_c_s, now.warming_c_s, part);
+                frame.tac_counts = Some(thermal.tac_counts(warming_c_s, &mut self.thermal_rng));
+            }
+            (Channel::Tdc, _, _, Some(thermal)) => {
+                let temperature_c = mix(before.temperature_c, now.temperature_c, part);
+                frame.tdc_counts = Some(thermal.tdc_counts(temperature_c, &mut self.thermal_rng));
+            }
+            _ => {}
+        }
+    }
+
+    fn finish(&mut self, tip: &Fingertip, time_s: f64) {
+        self.frame.time_s = time_s;
+        if let Some(electrodes) = &tip.electrodes {
+            self.common = electrodes.next(&self.common, FRAME_S, &mut self.electrodes_rng);
+        }
+        let batch = batch_frames(tip);
+        if self.queue.len() >= KEPT + batch {
+            self.queue.pop_front();
+            self.ready = self.ready.saturating_sub(1);
+        }
+        self.queue.push_back(std::mem::take(&mut self.frame));
+        (self.slot, self.frames) = (0, self.frames + 1);
+        if self.queue.len() - self.ready >= batch {
+            self.ready = self.queue.len();
+        }
+    }
+}
+
+/// Frames that arrive together.
+fn batch_frames(tip: &Fingertip) -> usize {
+    tip.effects.timing.as_ref().map_or(1, |timing| timing.batch_frames)
+}
+
+fn mix(before: f64, now: f64, part: f64) -> f64 {
+    before + part * (now - before)
 }

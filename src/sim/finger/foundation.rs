@@ -1,6 +1,16 @@
 //! The skin as columns that share the fluid's pressure and know nothing else of each other.
+//!
+//! One column of the fingertip, from the core out: fluid film, membrane, compressible skin.
+//!
+//! The object compresses the column by e; the skin yields e − u, its inner side moves inwards by
+//! u. Per area the column stores
+//!
+//! W(e, u) = ½ kₛ (e − u)₊² + ½ k(u) u² + ½ k_c (u − g)₊²
+//!
+//! with the skin's stiffness kₛ, the membrane's k (one value inwards, one outwards), the core's k_c
+//! beyond the gap g. The fluid's pressure p works against u. W is convex, so u is unique, and the
+//! stress on the object is ∂W/∂e. Everything is linear between the kinks: no iteration.
 
-use super::column::{Column, Response};
 use super::samples::SkinSample;
 use nalgebra::{Point3, Vector3};
 
@@ -10,6 +20,66 @@ const STEPS: usize = 100;
 
 /// Relative accuracy of the pressure (chosen).
 const ACCURACY: f64 = 1e-13;
+
+/// Stiffnesses of a column, in Pa per metre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Column {
+    /// The skin's: modulus over thickness.
+    pub skin_pa_m: f64,
+    /// The membrane's, where the skin is pressed in.
+    pub flatten_pa_m: f64,
+    /// The membrane's, where the fluid pushes the skin out.
+    pub inflate_pa_m: f64,
+    /// The core's, once the gap is closed.
+    pub core_pa_m: f64,
+}
+
+/// What a column does under compression and pressure.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Response {
+    /// u: how far the inner side of the skin moved towards the core, in metres.
+    pub inward_m: f64,
+    /// Stress between skin and object, in Pa.
+    pub stress_pa: f64,
+    /// −∂u/∂p, in metres per Pa.
+    pub softness_m_pa: f64,
+    /// W, in J/m².
+    pub energy_j_m2: f64,
+}
+
+impl Column {
+    /// Minimises W + p u over u.
+    #[inline]
+    pub fn respond(&self, indentation_m: f64, gap_m: f64, pressure_pa: f64) -> Response {
+        let bulged_m = -pressure_pa / self.inflate_pa_m;
+        if indentation_m <= bulged_m {
+            return Response {
+                inward_m: bulged_m,
+                stress_pa: 0.0,
+                softness_m_pa: 1.0 / self.inflate_pa_m,
+                energy_j_m2: 0.5 * self.inflate_pa_m * bulged_m * bulged_m,
+            };
+        }
+        let drive_pa = self.skin_pa_m * indentation_m - pressure_pa;
+        let membrane_pa_m = if drive_pa < 0.0 { self.inflate_pa_m } else { self.flatten_pa_m };
+        let mut stiffness_pa_m = self.skin_pa_m + membrane_pa_m;
+        let mut inward_m = drive_pa / stiffness_pa_m;
+        if inward_m > gap_m {
+            stiffness_pa_m += self.core_pa_m;
+            inward_m = (drive_pa + self.core_pa_m * gap_m) / stiffness_pa_m;
+        }
+        let (squeezed_m, core_m) = (indentation_m - inward_m, (inward_m - gap_m).max(0.0));
+        Response {
+            inward_m,
+            stress_pa: self.skin_pa_m * squeezed_m,
+            softness_m_pa: 1.0 / stiffness_pa_m,
+            energy_j_m2: 0.5
+                * (self.skin_pa_m * squeezed_m * squeezed_m
+                    + membrane_pa_m * inward_m * inward_m
+                    + self.core_pa_m * core_m * core_m),
+        }
+    }
+}
 
 /// What all touches together do, but for the energy of their own responses.
 #[derive(Clone, Copy, Debug, Default)]
@@ -59,7 +129,7 @@ impl Foundation {
     ) -> Balance {
         let wet = touches.iter().filter(|touch| touch.wet);
         let free_m2 = self.wet_m2 - wet.map(|touch| touch.section_m2).sum::<f64>();
-        let pressure_pa = pressure_pa(touches, &self.column, free_m2, self.cavity_pa_m3);
+        let pressure_pa = self.pressure_pa(touches, free_m2);
         let free = self.column.respond(f64::NEG_INFINITY, 0.0, pressure_pa);
         for (inward_m, sample) in inward_m.iter_mut().zip(samples) {
             *inward_m = if sample.layers.wet { free.inward_m } else { 0.0 };
@@ -77,57 +147,53 @@ impl Foundation {
         }
         Balance { pressure_pa, displaced_m3, energy_j }
     }
-}
 
-/// The pressure p ≥ 0 with p = K Σ Aᵢ uᵢ(p), in Pa, and every touch's response to it.
-///
-/// The other wet columns, of `free_m2` together, are free. The volume falls with the pressure, so
-/// there is one root; a Newton step that leaves the bracket is replaced by a bisection.
-fn pressure_pa(
-    touches: &mut [SkinContact],
-    column: &Column,
-    free_m2: f64,
-    cavity_pa_m3: f64,
-) -> f64 {
-    let mut volume = |pressure_pa: f64| {
-        let mut volume_m3 = -pressure_pa / column.inflate_pa_m * free_m2;
-        let mut softness = free_m2 / column.inflate_pa_m;
-        for touch in touches.iter_mut() {
-            let felt_pa = if touch.wet { pressure_pa } else { 0.0 };
-            touch.response = column.respond(touch.indentation_m, touch.gap_m, felt_pa);
-            if !touch.wet {
-                continue;
+    /// The pressure p ≥ 0 with p = K Σ Aᵢ uᵢ(p), in Pa, and every touch's response to it.
+    ///
+    /// The other wet columns, of `free_m2` together, are free. The volume falls with the pressure,
+    /// so there is one root; a Newton step that leaves the bracket is replaced by a bisection.
+    fn pressure_pa(&self, touches: &mut [SkinContact], free_m2: f64) -> f64 {
+        let Self { column, cavity_pa_m3, .. } = *self;
+        let mut volume = |pressure_pa: f64| {
+            let mut volume_m3 = -pressure_pa / column.inflate_pa_m * free_m2;
+            let mut softness = free_m2 / column.inflate_pa_m;
+            for touch in touches.iter_mut() {
+                let felt_pa = if touch.wet { pressure_pa } else { 0.0 };
+                touch.response = column.respond(touch.indentation_m, touch.gap_m, felt_pa);
+                if !touch.wet {
+                    continue;
+                }
+                volume_m3 += touch.section_m2 * touch.response.inward_m;
+                softness += touch.section_m2 * touch.response.softness_m_pa;
             }
-            volume_m3 += touch.section_m2 * touch.response.inward_m;
-            softness += touch.section_m2 * touch.response.softness_m_pa;
-        }
-        (volume_m3, softness)
-    };
-    let (at_rest_m3, mut softness) = volume(0.0);
-    if cavity_pa_m3 <= 0.0 || at_rest_m3 <= 0.0 {
-        return 0.0;
-    }
-    let (mut low_pa, mut high_pa) = (0.0, cavity_pa_m3 * at_rest_m3);
-    let (mut pressure_pa, mut excess_m3) = (0.0, at_rest_m3);
-    for _ in 0..STEPS {
-        let newton_pa = pressure_pa + excess_m3 / (softness + 1.0 / cavity_pa_m3);
-        let last_pa = pressure_pa;
-        pressure_pa = if newton_pa > low_pa && newton_pa < high_pa {
-            newton_pa
-        } else {
-            0.5 * (low_pa + high_pa)
+            (volume_m3, softness)
         };
-        let volume_m3;
-        (volume_m3, softness) = volume(pressure_pa);
-        excess_m3 = volume_m3 - pressure_pa / cavity_pa_m3;
-        if excess_m3 > 0.0 {
-            low_pa = pressure_pa;
-        } else {
-            high_pa = pressure_pa;
+        let (at_rest_m3, mut softness) = volume(0.0);
+        if cavity_pa_m3 <= 0.0 || at_rest_m3 <= 0.0 {
+            return 0.0;
         }
-        if (pressure_pa - last_pa).abs() <= ACCURACY * pressure_pa {
-            break;
+        let (mut low_pa, mut high_pa) = (0.0, cavity_pa_m3 * at_rest_m3);
+        let (mut pressure_pa, mut excess_m3) = (0.0, at_rest_m3);
+        for _ in 0..STEPS {
+            let newton_pa = pressure_pa + excess_m3 / (softness + 1.0 / cavity_pa_m3);
+            let last_pa = pressure_pa;
+            pressure_pa = if newton_pa > low_pa && newton_pa < high_pa {
+                newton_pa
+            } else {
+                0.5 * (low_pa + high_pa)
+            };
+            let volume_m3;
+            (volume_m3, softness) = volume(pressure_pa);
+            excess_m3 = volume_m3 - pressure_pa / cavity_pa_m3;
+            if excess_m3 > 0.0 {
+                low_pa = pressure_pa;
+            } else {
+                high_pa = pressure_pa;
+            }
+            if (pressure_pa - last_pa).abs() <= ACCURACY * pressure_pa {
+                break;
+            }
         }
+        pressure_pa
     }
-    pressure_pa
 }

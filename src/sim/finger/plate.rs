@@ -1,10 +1,8 @@
 //! A finger pressed on a flat plate.
 
-use super::effects::electrodes::{Electrodes, ElectrodesEffect};
 use super::effects::skin::{Pressed, Skin, SkinEffect};
 use super::load::{Load, PressError};
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
-use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_explore::robot::finger::profile::Profile;
 use palpate_explore::robot::finger::shape::Finger;
 use palpate_geometry::bvh::MeshBvh;
@@ -31,48 +29,37 @@ const DEPTH_HALVINGS: u32 = 30;
 
 /// A fingertip over a flat plate.
 pub struct Plate {
-    skin: Skin,
-    electrodes: Electrodes,
+    /// Its skin.
+    pub skin: Skin,
+    /// The skin in its last pose.
+    pub pressed: Pressed,
     bvh: MeshBvh,
-    pressed: Pressed,
 }
 
 impl Plate {
-    /// The BioTac with these constants; none if the plate cannot be built.
-    pub fn new(
-        skin: &SkinEffect,
-        cavity_pa_m3: f64,
-        electrodes: &ElectrodesEffect,
-    ) -> Option<Self> {
-        let profile = Profile::biotac(&Finger::default());
-        let skin = Skin::new(&profile, skin, cavity_pa_m3);
-        let electrodes = Electrodes::new(electrodes, skin.samples(), profile.scale());
-        let pressed = skin.relaxed();
-        Some(Self { skin, electrodes, bvh: flat()?, pressed })
+    /// The BioTac with this skin; none if the plate cannot be built.
+    pub fn new(skin: &SkinEffect, cavity_pa_m3: f64) -> Option<Self> {
+        Self::of(Skin::new(&Profile::biotac(&Finger::default()), skin, cavity_pa_m3))
     }
 
-    /// Its skin.
-    pub fn skin(&self) -> &Skin {
-        &self.skin
+    /// Over a plate in the plane z = 0.
+    fn of(skin: Skin) -> Option<Self> {
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let corners = corners.map(|(x, y)| Point3::new(PLATE_M * x, PLATE_M * y, 0.0));
+        let (mesh, _) = Mesh::new(&corners, &[[0, 1, 2], [0, 2, 3]]).ok()?;
+        Some(Self { pressed: skin.relaxed(), skin, bvh: MeshBvh::new(mesh) })
     }
 
-    /// The skin in its last pose.
-    pub fn pressed(&self) -> &Pressed {
-        &self.pressed
+    /// Load with the plate across the direction `towards_t` and the origin of `T` `height_m` above
+    /// it.
+    fn press(&mut self, towards_t: &Vector3<f64>, height_m: f64) -> Result<Load, PressError> {
+        self.skin.press(&self.bvh, &pose(towards_t, height_m), &mut self.pressed)
     }
 
-    /// Load and ideal counts with the plate across the direction `towards_t` and the origin of `T`
-    /// `height_m` above it.
-    ///
-    /// # Errors
-    /// See [`Skin::press`].
-    pub fn press(
-        &mut self,
-        towards_t: &Vector3<f64>,
-        height_m: f64,
-    ) -> Result<(Load, [f64; ELECTRODES]), PressError> {
-        let load = self.skin.press(&self.bvh, &pose(towards_t, height_m), &mut self.pressed)?;
-        Ok((load, self.electrodes.counts(&self.pressed, 1.0)))
+    /// The height at which the plate touches the skin; 0 if that lies behind the origin of `T`.
+    fn top_m(&self, towards_t: &Vector3<f64>) -> f64 {
+        let reach_m = self.skin.samples().iter().map(|s| s.point().coords.dot(towards_t));
+        reach_m.fold(0.0, f64::max)
     }
 
     /// The height at which the plate takes a normal force.
@@ -84,18 +71,16 @@ impl Plate {
         towards_t: &Vector3<f64>,
         normal_force_n: f64,
     ) -> Result<f64, PressError> {
-        let reach_m = self.skin.samples().iter().map(|s| s.point().coords.dot(towards_t));
         // Illinois: the secant of a bracket, its older end halved (Dowell & Jarratt 1971).
         let mut low = (0.0, f64::INFINITY);
-        let mut high = (reach_m.fold(0.0, f64::max), -normal_force_n);
+        let mut high = (self.top_m(towards_t), -normal_force_n);
         let (mut at_m, mut was_deep) = (high.0, None);
         for tried in 0..TRIES {
             at_m = match low.1.is_finite() && tried >= HALVINGS {
                 true => (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1),
                 false => 0.5 * (low.0 + high.0),
             };
-            let load = self.skin.press(&self.bvh, &pose(towards_t, at_m), &mut self.pressed);
-            let excess_n = match load {
+            let excess_n = match self.press(towards_t, at_m) {
                 Ok(load) => -load.force_n.dot(towards_t) - normal_force_n,
                 Err(PressError::Inside) => f64::INFINITY,
                 Err(error) => return Err(error),
@@ -113,7 +98,7 @@ impl Plate {
         Ok(at_m)
     }
 
-    /// Load and ideal counts at a given normal force.
+    /// Load at a given normal force.
     ///
     /// # Errors
     /// See [`Skin::press`].
@@ -121,7 +106,7 @@ impl Plate {
         &mut self,
         towards_t: &Vector3<f64>,
         normal_force_n: f64,
-    ) -> Result<(Load, [f64; ELECTRODES]), PressError> {
+    ) -> Result<Load, PressError> {
         let height_m = self.height_m(towards_t, normal_force_n)?;
         self.press(towards_t, height_m)
     }
@@ -131,14 +116,6 @@ impl Plate {
 pub fn direction_t(pitch_rad: f64, roll_rad: f64) -> Vector3<f64> {
     let (sin, cos) = pitch_rad.sin_cos();
     Vector3::new(sin, cos * roll_rad.sin(), -cos * roll_rad.cos())
-}
-
-/// A plate in the plane z = 0.
-fn flat() -> Option<MeshBvh> {
-    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-    let corners = corners.map(|(x, y)| Point3::new(PLATE_M * x, PLATE_M * y, 0.0));
-    let (mesh, _) = Mesh::new(&corners, &[[0, 1, 2], [0, 2, 3]]).ok()?;
-    Some(MeshBvh::new(mesh))
 }
 
 /// Pose of `T` over a plate in the plane z = 0 of `W` that `towards_t` faces.
@@ -152,15 +129,10 @@ pub fn pose(towards_t: &Vector3<f64>, height_m: f64) -> Isometry3<f64> {
 /// Largest slope of force over depth, in N/m, with a flat plate pressed on the skin across
 /// `towards_t` up to `force_n`; 0 if the skin cannot be pressed.
 pub fn largest_stiffness_n_m(skin: &Skin, towards_t: &Vector3<f64>, force_n: f64) -> f64 {
-    let Some(bvh) = flat() else { return 0.0 };
-    let mut pressed = skin.relaxed();
-    let reach_m = skin.samples().iter().map(|sample| sample.point().coords.dot(towards_t));
-    let top_m = reach_m.fold(0.0, f64::max);
-    let mut pushed_n = |depth_m: f64| {
-        let x_wt = pose(towards_t, top_m - depth_m);
-        let load = skin.press(&bvh, &x_wt, &mut pressed).ok()?;
-        Some(-load.force_n.dot(towards_t))
-    };
+    let Some(mut plate) = Plate::of(skin.clone()) else { return 0.0 };
+    let top_m = plate.top_m(towards_t);
+    let mut pushed_n =
+        |depth_m: f64| Some(-plate.press(towards_t, top_m - depth_m).ok()?.force_n.dot(towards_t));
     // A plate that encloses the fingertip's centre is deeper than any force.
     let (mut low_m, mut high_m) = (0.0, top_m);
     for _ in 0..DEPTH_HALVINGS {

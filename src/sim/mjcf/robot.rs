@@ -1,11 +1,13 @@
 //! The arm or the stage with the finger on it.
 
-use super::fingertip;
-use super::text::{CONTACT, LINK, TABLE, pose};
+use super::text::{CONTACT, LINK, TABLE, pose, surface};
 use crate::sim::Scene;
+use nalgebra::Isometry3;
 use palpate_explore::robot::arm::Chain;
 use palpate_explore::robot::arm::settings::TOOL_KG;
 use palpate_explore::robot::finger::Finger;
+use palpate_explore::robot::finger::profile::{CORE_M, Profile};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 const STAGE: &str = include_str!("../../../models/stage.xml");
 
@@ -59,7 +61,7 @@ fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, (contact, is_soft): (&str,
         false => String::new(),
     };
     let (radius, skin) = match is_soft {
-        true => (fingertip::core_m(finger), fingertip::geoms(&chain.tool)),
+        true => (CORE_M * Profile::biotac(finger).scale(), skin_geoms(&chain.tool)),
         false => (finger.radius_m, String::new()),
     };
     format!(
@@ -75,4 +77,49 @@ fn tool(finger: &Finger, tool_kg: f64, chain: &Chain, (contact, is_soft): (&str,
         middle = mount_m / 2.0,
         tip = pose(&chain.tool),
     )
+}
+
+/// Cells along the finger and around each of its halves; chosen: smooth to look at.
+const ALONG: usize = 20;
+const AROUND: usize = 20;
+
+/// Name, colour (chosen) and the angle from −z at which each half begins.
+const HALVES: [(&str, &str, f64); 2] =
+    [("pad", ".13 .42 .40 1", -FRAC_PI_2), ("nail", ".86 .82 .74 1", FRAC_PI_2)];
+
+/// What a BioTac looks like, as assets: the pad that senses, and the nail that holds the skin on
+/// its back.
+pub(super) fn skin_assets(finger: &Finger) -> String {
+    let profile = Profile::biotac(finger);
+    HALVES.iter().map(|(name, _, begins)| asset(&profile, name, *begins)).collect()
+}
+
+/// The two halves on a body in whose frame `T` is `tip`; they meet nothing.
+fn skin_geoms(tip: &Isometry3<f64>) -> String {
+    let geom = |(name, rgba, _): &(&str, &str, f64)| {
+        format!(
+            r#"<geom name="{name}" type="mesh" mesh="{name}" rgba="{rgba}" mass="0" contype="0" conaffinity="0" {}/>"#,
+            pose(tip)
+        )
+    };
+    HALVES.iter().map(geom).collect()
+}
+
+/// Half of the outer skin in `T`: rows from the back end to near the apex, and the apex.
+fn asset(profile: &Profile, name: &str, begins: f64) -> String {
+    let whole_m = profile.length_m + profile.radius_m;
+    let rows = (0..ALONG).flat_map(|i| {
+        // Steps become smaller towards the apex, where the skin turns.
+        let share = (FRAC_PI_2 * i as f64 / ALONG as f64).sin();
+        let turn = move |j: usize| begins + PI * j as f64 / AROUND as f64;
+        (0..=AROUND).map(move |j| profile.skin_t(whole_m * share - profile.length_m, turn(j)))
+    });
+    let (row, apex) = (AROUND + 1, ALONG * (AROUND + 1));
+    let cells = (0..ALONG).flat_map(|i| (0..AROUND).map(move |j| (i + 1 < ALONG, i * row + j)));
+    let faces = cells.flat_map(|(is_band, here)| match is_band {
+        true => vec![[here, here + row + 1, here + row], [here, here + 1, here + row + 1]],
+        false => vec![[here, here + 1, apex]],
+    });
+    let tip = std::iter::once(profile.skin_t(profile.radius_m, begins));
+    surface(name, rows.chain(tip), faces)
 }

@@ -48,29 +48,6 @@ impl Dynamic {
         Ok(body)
     }
 
-    /// What the servos are told: `command` within the joints' speeds.
-    fn apply(&mut self, command: &Command) {
-        let applied = &mut self.reading.applied.qdot;
-        applied.clear();
-        applied.extend(
-            command
-                .qdot
-                .iter()
-                .zip(&self.chain.joints)
-                .map(|(&qdot, joint)| qdot.clamp(-joint.qdot_limit, joint.qdot_limit)),
-        );
-    }
-
-    /// One step of plant and skin: the skin's force is that at the start of the step.
-    fn advance(&mut self) -> Result<(), Fault> {
-        let step_s = self.plant.step_s();
-        self.plant.step(&self.reading.applied.qdot, &self.wrench)?;
-        let Some(finger) = &mut self.finger else { return Ok(()) };
-        let motion = TipMotion::moving(self.plant.tip(), &self.plant.tip_twist());
-        self.wrench = finger.step(&motion, step_s)?;
-        Ok(())
-    }
-
     fn check(&self) -> Result<(), Fault> {
         let (q, qdot) = (self.plant.q(), self.plant.qdot());
         let plausible = self.chain.joints.iter().zip(q.iter().zip(qdot)).all(|(joint, (q, v))| {
@@ -121,9 +98,21 @@ impl Backend for Dynamic {
 
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
         self.capabilities.accept(command)?;
-        self.apply(command);
+        // What the servos are told: the command within the joints' speeds.
+        let within = command.qdot.iter().zip(&self.chain.joints);
+        self.reading.applied.qdot.clear();
+        self.reading
+            .applied
+            .qdot
+            .extend(within.map(|(&qdot, joint)| qdot.clamp(-joint.qdot_limit, joint.qdot_limit)));
+        let step_s = self.plant.step_s();
         for _ in 0..self.steps {
-            self.advance()?;
+            // The skin's force is that at the start of the step.
+            self.plant.step(&self.reading.applied.qdot, &self.wrench)?;
+            if let Some(finger) = &mut self.finger {
+                let motion = TipMotion::moving(self.plant.tip(), &self.plant.tip_twist());
+                self.wrench = finger.step(&motion, step_s)?;
+            }
         }
         self.check()?;
         self.tick += 1;

@@ -1,20 +1,17 @@
 //! MuJoCo as a library: compiling models, and the plant that steps one.
 
-mod contact;
 mod dynamic;
 mod joint_servo;
 mod models;
 #[cfg(feature = "render")]
 pub mod picture;
 mod plant;
-mod substeps;
 #[cfg(feature = "viewer")]
 pub mod window;
 
 pub use dynamic::Dynamic;
-pub use models::Models;
+pub use models::{Models, StepLimit, Substeps};
 pub use plant::Plant;
-pub use substeps::{StepLimit, Substeps};
 
 use mujoco_rs::wrappers::MjModel;
 use mujoco_rs::wrappers::mj_logging::{log_config, set_log_config};

@@ -1,8 +1,6 @@
 //! The arm or stage with its velocity servos, gravity and friction, one step at a time.
 
-use super::contact;
-use super::joint_servo::JointServo;
-use super::joint_servo::embedded;
+use super::joint_servo::{JointServo, embedded};
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtIntegrator, MjtObjBase};
 use nalgebra::{
@@ -144,7 +142,7 @@ impl Plant {
             true => self.data.step(),
             false => self.data.step2(),
         }
-        self.contact = contact::contact(&self.data, self.finger, &x_wt);
+        self.contact = contact(&self.data, self.finger, &x_wt);
         self.data.step1();
         self.check()
     }
@@ -233,4 +231,36 @@ impl Plant {
         let state = self.q().iter().chain(self.qdot()).copied().collect();
         Err(Fault::Diverged { time_s: self.time_s(), state })
     }
+}
+
+/// MuJoCo's own contacts as one, in `T`: centre weighted by force, sum of the forces and its
+/// direction; `None` without force. Those of links with whatever else are left out.
+///
+/// To be asked while `data` holds the forces of the last step; `finger` is the finger's body.
+fn contact(
+    data: &MjData<Arc<MjModel>>,
+    finger: usize,
+    x_wt: &Isometry3<f64>,
+) -> Option<IdealContact> {
+    let (mut moment, mut weight_n, mut sum_n) = (Vector3::zeros(), 0.0, Vector3::zeros());
+    for (i, contact) in data.contact().iter().enumerate() {
+        let force_n = data.try_contact_force(i).map_or(0.0, |[normal, ..]| normal);
+        // From the first geom to the second, which come in the order of their kinds.
+        let [x, y, z, ..] = contact.frame;
+        let of = |geom: i32| data.model().geom_bodyid().get(geom as usize);
+        let outward = match contact.geom.map(|geom| of(geom) == Some(&(finger as i32))) {
+            [_, true] => 1.0,
+            [true, false] => -1.0,
+            [false, false] => continue,
+        };
+        moment += Vector3::from(contact.pos) * force_n;
+        weight_n += force_n;
+        sum_n += outward * force_n * Vector3::new(x, y, z);
+    }
+    let force_n = sum_n.norm();
+    (weight_n > 0.0 && force_n > 0.0).then(|| IdealContact {
+        p_tc: x_wt.inverse_transform_point(&Point3::from(moment / weight_n)),
+        normal_t: x_wt.inverse_transform_vector(&(sum_n / force_n)),
+        force_n,
+    })
 }

@@ -1,9 +1,9 @@
 //! Fidelity levels: named changes to a scene, from a swept hull to a fine skin at a fine time step.
 
 use crate::sim::Scene;
-use crate::sim::collision::Collision;
 use crate::sim::finger::effects::skin::SkinModel;
 use crate::sim::scene::Body;
+use crate::sim::solver::Collision;
 use crate::sim::solver::Integrator;
 use serde::Serialize;
 

@@ -2,7 +2,7 @@
 
 use crate::sim::Scene;
 use crate::sim::finger::Effects;
-use crate::sim::finger::effects::switch::Switch;
+use crate::sim::finger::effects::effect::Switch;
 use crate::sim::scene::Body;
 use palpate_input::config::Rules;
 

@@ -76,43 +76,33 @@ impl Constant {
     }
 }
 
-const CORE: Constant = Constant {
-    key: "skin.core_pa_m",
-    bounds: [1e6, 1e11],
-    plausible: 2.3,
-    of: |model| &mut model.skin.core_pa_m,
-};
+const fn constant(
+    key: &'static str,
+    bounds: [f64; 2],
+    plausible: f64,
+    of: fn(&mut Model) -> &mut f64,
+) -> Constant {
+    Constant { key, bounds, plausible, of }
+}
 
-const SPREAD: Constant = Constant {
-    key: "electrodes.spread_m",
-    bounds: [5e-4, 6e-3],
-    plausible: 0.7,
-    of: |model| &mut model.electrodes.spread_m,
-};
+const CORE: Constant =
+    constant("skin.core_pa_m", [1e6, 1e11], 2.3, |model| &mut model.skin.core_pa_m);
+const SPREAD: Constant =
+    constant("electrodes.spread_m", [5e-4, 6e-3], 0.7, |model| &mut model.electrodes.spread_m);
 
 /// Those of columns. Bounds and what is plausible are chosen: a factor of ten for a stiffness, two
 /// for the spread. The skin's modulus and the stiffness against inflation are sourced: counts alone
 /// would have the pressure ten times too low as well; and the exponent is a gain that all share.
 pub const CONSTANTS: [Constant; 3] = [
-    Constant {
-        key: "skin.flatten_pa_m",
-        bounds: [1e4, 1e9],
-        plausible: 2.3,
-        of: |model| &mut model.skin.flatten_pa_m,
-    },
+    constant("skin.flatten_pa_m", [1e4, 1e9], 2.3, |model| &mut model.skin.flatten_pa_m),
     CORE,
     SPREAD,
 ];
 
 /// Those of a shell, whose modulus is what resists being flattened. Two for it is what the hardness
 /// of the skin (Shore A 26, BioTac SP manual) and NVlabs/biotac_sim differ by.
-pub const SHELL_CONSTANTS: [Constant; 3] = [
-    Constant {
-        key: "skin.modulus_pa",
-        bounds: [1e5, 1e7],
-        plausible: 0.7,
-        of: |model| &mut model.skin.modulus_pa,
-    },
+const SHELL_CONSTANTS: [Constant; 3] = [
+    constant("skin.modulus_pa", [1e5, 1e7], 0.7, |model| &mut model.skin.modulus_pa),
     CORE,
     SPREAD,
 ];

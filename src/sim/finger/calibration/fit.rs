@@ -1,11 +1,13 @@
-//! The fit itself, with how sure it is.
+//! Constants and sessions as one problem of least squares, and its fit with how sure it is.
 
 use super::constants::{Constant, Model};
-use super::problem::Calibration;
-use super::session::Session;
+use super::session::{Bench, Session};
+use crate::sim::finger::effects::skin::SkinModel;
 use crate::sim::finger::recording::Recording;
 use nalgebra::DVector;
+use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_gp::math::least_squares::{FitError, Problem, clustered_covariance, robust};
+use std::cell::RefCell;
 
 /// Besides from where it starts, a fit is tried from skins this many times softer: a stiff skin
 /// and a soft one are two valleys (chosen).
@@ -69,7 +71,8 @@ pub fn fit(start: &Model, recordings: &[&Recording], free: Free) -> Result<Fit, 
     };
     let mut refused = Vec::new();
     loop {
-        let problem = Calibration::new(start, constants.clone(), recordings);
+        let (free, bench) = (constants.clone(), RefCell::default());
+        let problem = Calibration { start, free, recordings, bench };
         let state = lowest(&problem)?;
         let (model, sessions) = problem.decode(&state);
         let at_bound = |constant: &&&Constant| constant.bounds.contains(&constant.value(&model));
@@ -82,7 +85,16 @@ pub fn fit(start: &Model, recordings: &[&Recording], free: Free) -> Result<Fit, 
             constants.retain(|constant| constant.key != lost.key);
             continue;
         }
-        let estimates = estimates(&problem, &state, &model);
+        let covariance = clustered_covariance(&problem, &state, |i| problem.electrode(i));
+        let estimate = |(i, constant): (usize, &&'static Constant)| {
+            let variance = covariance.as_ref().map_or(f64::INFINITY, |all| all[(i, i)]);
+            Estimate {
+                key: constant.key,
+                value: constant.value(&model),
+                factor: (constant.plausible * variance.max(0.0).sqrt()).exp(),
+            }
+        };
+        let estimates = constants.iter().enumerate().map(estimate).collect();
         return Ok(Fit { model, sessions, estimates, refused });
     }
 }
@@ -111,15 +123,175 @@ fn lowest(problem: &Calibration) -> Result<DVector<f64>, FitError> {
     best.map(|(_, state)| state).ok_or(failed)
 }
 
-fn estimates(problem: &Calibration, state: &DVector<f64>, model: &Model) -> Vec<Estimate> {
-    let covariance = clustered_covariance(problem, state, |i| problem.electrode(i));
-    let of = |(i, constant): (usize, &&'static Constant)| {
-        let variance = covariance.as_ref().map_or(f64::INFINITY, |all| all[(i, i)]);
-        Estimate {
-            key: constant.key,
-            value: constant.value(model),
-            factor: (constant.plausible * variance.max(0.0).sqrt()).exp(),
+/// Expected error of a mean count (chosen: two thirds of what the best fit is off on average).
+const EXPECTED_COUNTS: f64 = 40.0;
+
+/// From 4 to 8 N the pressure may rise, per newton, by this part of its rise over the first
+/// newton: the sensor's manual says it saturates at about 2 N (chosen).
+const SATURATED: f64 = 0.15;
+
+/// Expected error of that part, for each session (chosen: the manual speaks of another model of
+/// the sensor and gives no curve).
+const SATURATION_SD: f64 = 0.015;
+
+/// What is plausible of a session, as standard deviations (chosen): offset about that of untouched
+/// sensors between sessions; gain as the spread of the resistors; a hand that aims at the pulp.
+const OFFSET_LN: f64 = 0.15;
+const GAIN_LN: f64 = 0.15;
+const PITCH_RAD: f64 = 0.3;
+const ROLL_RAD: f64 = 0.3;
+/// How far the mean roll at a load lies from the session's.
+const LOAD_ROLL_RAD: f64 = 0.1;
+
+/// Parameters of a session that are not rolls: offset, gain, pitch.
+const SHARED: usize = 3;
+
+/// In place of residuals where a pose has no answer; no step goes there.
+const IMPOSSIBLE: f64 = 1e6;
+
+/// Part of a unit over which slopes are taken: columns are found to rounding, a shell to a
+/// thousandth of its force (chosen).
+const COLUMNS_DIFFERENCE: f64 = 1e-4;
+const SHELL_DIFFERENCE: f64 = 2e-2;
+
+/// A step that gains no more than this part of the cost is the last (chosen).
+const GAINED: f64 = 1e-4;
+
+/// What is fitted: the constants that are free, then each session's offset, gain, pitch and rolls,
+/// all in units of what is plausible, 0 at the start.
+struct Calibration<'a> {
+    start: &'a Model,
+    free: Vec<&'static Constant>,
+    recordings: &'a [&'a Recording],
+    bench: RefCell<Bench>,
+}
+
+impl Calibration<'_> {
+    /// The model and the sessions of a state.
+    fn decode(&self, state: &DVector<f64>) -> (Model, Vec<Session>) {
+        let mut model = self.start.clone();
+        for (constant, units) in self.free.iter().zip(state.iter()) {
+            let value = constant.value(self.start) * (constant.plausible * units).exp();
+            // The ends of its bounds are exact.
+            let [least, most] = constant.bounds;
+            constant.set(&mut model, value.clamp(least, most));
         }
-    };
-    problem.free.iter().enumerate().map(of).collect()
+        let mut rest = state.as_slice().get(self.free.len()..).unwrap_or_default();
+        let mut sessions = Vec::new();
+        for recording in self.recordings {
+            let (own, others) = rest.split_at(SHARED + recording.near_normal_loads.len());
+            rest = others;
+            sessions.push(Session {
+                offset: (OFFSET_LN * own[0]).exp(),
+                gain: (GAIN_LN * own[1]).exp(),
+                pitch_rad: PITCH_RAD * own[2],
+                roll_rad: own[SHARED..].iter().map(|units| LOAD_ROLL_RAD * units).collect(),
+            });
+        }
+        (model, sessions)
+    }
+
+    /// The electrode of a session that residual `i` is an error of; none if it is of a belief.
+    fn electrode(&self, i: usize) -> Option<usize> {
+        let mut first = 0;
+        for (number, recording) in self.recordings.iter().enumerate() {
+            let count = ELECTRODES * recording.near_normal_loads.len();
+            if i < first + count {
+                return Some(number * ELECTRODES + (i - first) % ELECTRODES);
+            }
+            first += count;
+        }
+        None
+    }
+
+    /// Errors of the counts, in units of what is expected.
+    fn errors(&self, model: &Model, sessions: &[Session]) -> Option<Vec<f64>> {
+        let bench = &mut *self.bench.borrow_mut();
+        let mut errors = Vec::new();
+        for (session, recording) in sessions.iter().zip(self.recordings) {
+            let predicted = session.predict(model, recording, bench)?;
+            for (bin, predicted) in recording.near_normal_loads.iter().zip(predicted) {
+                let entries = predicted.iter().zip(bin.mean_counts);
+                errors.extend(entries.map(|(predicted, counts)| predicted - counts));
+            }
+        }
+        errors.iter_mut().for_each(|error| *error /= EXPECTED_COUNTS);
+        Some(errors)
+    }
+
+    /// By how much each session's pressure fails to saturate.
+    fn unsaturated(&self, model: &Model, sessions: &[Session]) -> Option<Vec<f64>> {
+        if self.free.is_empty() {
+            return Some(Vec::new());
+        }
+        let bench = &mut *self.bench.borrow_mut();
+        let of = |session: &Session| {
+            let excess = session.saturation(model, bench)? - SATURATED;
+            Some(excess.max(0.0) / SATURATION_SD)
+        };
+        sessions.iter().map(of).collect()
+    }
+
+    /// How far a state lies from what was plausible.
+    fn doubts(&self, state: &DVector<f64>, sessions: &[Session]) -> Vec<f64> {
+        let mut doubts = state.as_slice()[..self.free.len()].to_vec();
+        for session in sessions {
+            let mean_rad = session.mean_roll_rad();
+            doubts.extend([
+                session.offset.ln() / OFFSET_LN,
+                session.gain.ln() / GAIN_LN,
+                session.pitch_rad / PITCH_RAD,
+                mean_rad / ROLL_RAD,
+            ]);
+            doubts.extend(session.roll_rad.iter().map(|roll| (roll - mean_rad) / LOAD_ROLL_RAD));
+        }
+        doubts
+    }
+}
+
+impl Problem for Calibration<'_> {
+    type State = DVector<f64>;
+
+    fn parameters(&self) -> usize {
+        let loads = self.recordings.iter().map(|recording| recording.near_normal_loads.len());
+        self.free.len() + loads.map(|loads| SHARED + loads).sum::<usize>()
+    }
+
+    fn moved(&self, state: &DVector<f64>, step: &DVector<f64>) -> DVector<f64> {
+        let mut moved = state + step;
+        for (constant, units) in self.free.iter().zip(moved.iter_mut()) {
+            let start = constant.value(self.start);
+            let [least, most] =
+                constant.bounds.map(|bound| (bound / start).ln() / constant.plausible);
+            *units = units.clamp(least.min(0.0), most.max(0.0));
+        }
+        moved
+    }
+
+    fn residuals(&self, state: &DVector<f64>) -> DVector<f64> {
+        let (model, sessions) = self.decode(state);
+        let doubts = self.doubts(state, &sessions);
+        let found = self.errors(&model, &sessions).zip(self.unsaturated(&model, &sessions));
+        let residuals = match found {
+            Some((errors, unsaturated)) => [errors, unsaturated, doubts].concat(),
+            None => {
+                let loads = self.recordings.iter().map(|all| all.near_normal_loads.len());
+                let extra = if self.free.is_empty() { 0 } else { self.recordings.len() };
+                let count = ELECTRODES * loads.sum::<usize>() + extra;
+                [vec![IMPOSSIBLE; count], doubts].concat()
+            }
+        };
+        DVector::from_vec(residuals)
+    }
+
+    fn gained(&self) -> f64 {
+        GAINED
+    }
+
+    fn difference(&self) -> f64 {
+        match self.start.skin.model {
+            SkinModel::Columns => COLUMNS_DIFFERENCE,
+            SkinModel::Shell => SHELL_DIFFERENCE,
+        }
+    }
 }

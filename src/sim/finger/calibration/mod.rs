@@ -4,15 +4,13 @@
 //! session without contact, by one factor of conductivity (an untouched sensor shows that alone:
 //! 1.08 and 1.2 in MiaoLi/syntouchcontact's recordings), the sensor answers stronger or weaker
 //! than another, and a hand held the finger at an attitude that nobody wrote down. `session` has
-//! these apart from the `constants`, which all sensors share; `problem` fits both to every load
-//! there is, `fit` says how sure it is, and `score` tries constants on a sensor that they were not
+//! these apart from the `constants`, which all sensors share; `fit` fits both to every load there
+//! is and says how sure it is, and `score` tries constants on a sensor that they were not
 //! fitted to, beside what knows nothing of force. `shear` holds the model against how electrodes
 //! answer tangential force.
 
-pub mod bench;
 pub mod constants;
 pub mod fit;
-mod problem;
 pub mod score;
 pub mod session;
 pub mod shear;

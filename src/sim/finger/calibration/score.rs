@@ -1,10 +1,9 @@
 //! How constants do on a sensor that they were not fitted to, beside predictions that know nothing
 //! of force.
 
-use super::bench::Bench;
 use super::constants::Model;
 use super::fit::{Fit, Free, fit};
-use super::session::Session;
+use super::session::{Bench, Session};
 use crate::sim::finger::effects::electrodes::{counts, impedance_ohm};
 use crate::sim::finger::recording::{Bin, Recording};
 use palpate_explore::robot::finger::frame::ELECTRODES;
@@ -95,12 +94,7 @@ pub fn leave_one_out(
     free: Free,
 ) -> Result<Vec<HeldOut>, FitError> {
     let held = recordings.par_iter().enumerate().map(|(i, recording)| {
-        let others: Vec<&Recording> = recordings
-            .iter()
-            .enumerate()
-            .filter(|(j, _)| *j != i)
-            .map(|(_, other)| other)
-            .collect();
+        let others: Vec<&Recording> = recordings[..i].iter().chain(&recordings[i + 1..]).collect();
         let known = match free {
             Free::Constants if !others.is_empty() => Some(fit(start, &others, free)?),
             _ => None,

@@ -1,16 +1,18 @@
-//! What belongs to one session of one sensor.
+//! What belongs to one session of one sensor, and the plate on which its presses are repeated.
 
-use super::bench::Bench;
 use super::constants::Model;
 use crate::sim::finger::effects::electrodes::{Electrodes, ElectrodesEffect};
-use crate::sim::finger::plate::direction_t;
+use crate::sim::finger::plate::{Plate, direction_t};
 use crate::sim::finger::recording::Recording;
+use crate::sim::finger::samples::SkinSample;
 use nalgebra::Vector3;
 use palpate_explore::robot::finger::frame::ELECTRODES;
+use std::collections::HashMap;
+use std::rc::Rc;
 
 /// Standard deviation of the roll from press to press of a hand at one load (chosen, as fits that
 /// leave it free find 0.01 to 0.27).
-pub const PRESS_SD_RAD: f64 = 0.1;
+const PRESS_SD_RAD: f64 = 0.1;
 
 /// Abscissae and weights of three-point Gauss–Hermite quadrature over a normal distribution.
 const QUADRATURE: [(f64, f64); 3] =
@@ -42,8 +44,8 @@ impl Session {
         recording: &Recording,
         bench: &mut Bench,
     ) -> Option<Vec<[f64; ELECTRODES]>> {
-        bench.wear(model)?;
-        let electrodes = bench.electrodes(&self.electrodes(model, recording));
+        let effect = self.electrodes(model, recording);
+        let electrodes = Electrodes::new(&effect, bench.wear(model)?, 1.0);
         let loads = recording.near_normal_loads.iter().zip(&self.roll_rad);
         loads
             .map(|(bin, &roll_rad)| {
@@ -92,5 +94,60 @@ impl Session {
         let mut pressure_pa = |force_n| Some(bench.press(angles_rad, force_n)?.pressure_pa);
         let (one, four, eight) = (pressure_pa(1.0)?, pressure_pa(4.0)?, pressure_pa(8.0)?);
         Some((eight - four) / 4.0 / one)
+    }
+}
+
+/// Presses remembered, of 4 kB each (chosen: several times the slopes of one step).
+const REMEMBERED: usize = 4000;
+
+/// What a press does.
+#[derive(Debug)]
+pub struct Press {
+    /// How far the skin moved inwards at each sample.
+    pub inward_m: Vec<f64>,
+    /// Pressure of the fluid above rest.
+    pub pressure_pa: f64,
+}
+
+/// A finger over a plate, with one skin at a time, that remembers its presses: most of a fit's
+/// parameters leave them alone.
+#[derive(Default)]
+pub struct Bench {
+    worn: Option<(Model, Plate)>,
+    presses: HashMap<Vec<u64>, Rc<Press>>,
+}
+
+impl Bench {
+    /// Puts on the skin of `model`, unless it is worn, and returns its points; none if it cannot be
+    /// built.
+    pub fn wear(&mut self, model: &Model) -> Option<&[SkinSample]> {
+        let is_worn = |(worn, _): &(Model, Plate)| {
+            worn.skin == model.skin && worn.cavity_pa_m3 == model.cavity_pa_m3
+        };
+        if !self.worn.as_ref().is_some_and(is_worn) {
+            self.worn = Some((model.clone(), Plate::new(&model.skin, model.cavity_pa_m3)?));
+        }
+        Some(self.worn.as_ref()?.1.skin.samples())
+    }
+
+    /// Presses with a normal force at pitch and roll; none if that has no answer.
+    pub fn press(&mut self, angles_rad: [f64; 2], force_n: f64) -> Option<Rc<Press>> {
+        let (model, plate) = self.worn.as_mut()?;
+        let skin = &model.skin;
+        let stiffness = [skin.modulus_pa, skin.flatten_pa_m, skin.inflate_pa_m, skin.core_pa_m];
+        let others = [angles_rad[0], angles_rad[1], force_n, model.cavity_pa_m3];
+        let key: Vec<u64> = stiffness.iter().chain(&others).map(|value| value.to_bits()).collect();
+        if let Some(press) = self.presses.get(&key) {
+            return Some(Rc::clone(press));
+        }
+        let towards_t = direction_t(angles_rad[0], angles_rad[1]);
+        let load = plate.press_to(&towards_t, force_n).ok()?;
+        let inward_m = plate.pressed.moved_m().to_vec();
+        let press = Rc::new(Press { inward_m, pressure_pa: load.pressure_pa });
+        if self.presses.len() >= REMEMBERED {
+            self.presses.clear();
+        }
+        self.presses.insert(key, Rc::clone(&press));
+        Some(press)
     }
 }

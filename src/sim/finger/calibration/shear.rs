@@ -1,9 +1,9 @@
 //! How the electrodes answer tangential force: what was measured, and what the model says.
 
-use super::bench::Bench;
 use super::constants::Model;
 use super::fit::{Free, fit};
-use super::session::Session;
+use super::session::{Bench, Session};
+use crate::sim::finger::effects::electrodes::{Electrodes, Shear};
 use crate::sim::finger::effects::friction::FrictionEffect;
 use crate::sim::finger::recording::{Recording, filled, force};
 use nalgebra::Vector3;
@@ -138,9 +138,9 @@ fn slopes(
     axis_t: &Vector3<f64>,
 ) -> Option<[f64; ELECTRODES]> {
     let mut bench = Bench::default();
-    bench.wear(model)?;
-    let electrodes = bench.electrodes(&session.electrodes(model, recording));
-    let shear = bench.shear(&electrodes);
+    let samples = bench.wear(model)?;
+    let electrodes = Electrodes::new(&session.electrodes(model, recording), samples, 1.0);
+    let shear = Shear::new(&electrodes, samples);
     let mut counts = |aside_n: f64| {
         let carry = |towards_t: &Vector3<f64>, closed: &mut [f64; ELECTRODES]| {
             let along_t = (axis_t - towards_t * towards_t.dot(axis_t)).normalize();

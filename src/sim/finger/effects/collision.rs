@@ -32,6 +32,4 @@ impl Effect for CollisionEffect {
     type State = ();
 
     const NEEDS: Needs = Needs::Nothing;
-
-    fn start(&self) {}
 }

@@ -4,7 +4,7 @@
 
 use palpate_input::config::Rules;
 use serde::de::DeserializeOwned;
-use std::ops::{RangeFull, RangeInclusive};
+use std::ops::RangeInclusive;
 use std::sync::LazyLock;
 use toml::{Table, Value};
 
@@ -22,45 +22,22 @@ pub(super) fn constant<T: DeserializeOwned + Default>(table: &str, key: &str) ->
     value.and_then(|value| value.try_into().ok()).unwrap_or_default()
 }
 
-/// A type of constants with what limits one.
+/// A number, or several, that a range limits.
 pub(super) trait Constant {
-    /// The values that are allowed.
-    type Allowed;
-
     /// Checks the constant under `key`.
-    fn check(&self, key: &str, allowed: Self::Allowed, rules: &mut Rules);
+    fn check(&self, key: &str, allowed: RangeInclusive<f64>, rules: &mut Rules);
 }
 
 impl Constant for f64 {
-    type Allowed = RangeInclusive<f64>;
-
-    fn check(&self, key: &str, allowed: Self::Allowed, rules: &mut Rules) {
+    fn check(&self, key: &str, allowed: RangeInclusive<f64>, rules: &mut Rules) {
         rules.number(key, *self, allowed);
     }
 }
 
 impl<const N: usize> Constant for [f64; N] {
-    type Allowed = RangeInclusive<f64>;
-
-    fn check(&self, key: &str, allowed: Self::Allowed, rules: &mut Rules) {
+    fn check(&self, key: &str, allowed: RangeInclusive<f64>, rules: &mut Rules) {
         rules.numbers(key, self, allowed);
     }
-}
-
-impl Constant for usize {
-    type Allowed = RangeInclusive<usize>;
-
-    fn check(&self, key: &str, allowed: Self::Allowed, rules: &mut Rules) {
-        rules.require(key, self, allowed.contains(self), || {
-            format!("{} to {}", allowed.start(), allowed.end())
-        });
-    }
-}
-
-impl Constant for bool {
-    type Allowed = RangeFull;
-
-    fn check(&self, _: &str, _: RangeFull, _: &mut Rules) {}
 }
 
 /// Makes the type of an effect from its settings, which a scene gives, and its constants, which the
@@ -73,7 +50,7 @@ macro_rules! effect {
             $($(#[$setting_doc:meta])* $setting:ident: $Setting:ty = $default:expr,)*
         })?
         constants {
-            $($(#[$constant_doc:meta])* $constant:ident: $Constant:ty, $allowed:expr;)*
+            $($(#[$constant_doc:meta])* $constant:ident: $Constant:ty $(, $allowed:expr)?;)*
         }
     ) => {
         $(#[$doc])*
@@ -97,9 +74,13 @@ macro_rules! effect {
 
         impl palpate_input::config::Checked for $Effect {
             fn check(&self, rules: &mut palpate_input::config::Rules) {
-                use crate::sim::finger::effects::constants::Constant;
                 $($check(self, rules);)?
-                $(Constant::check(&self.$constant, stringify!($constant), $allowed, rules);)*
+                $($(
+                    let key = stringify!($constant);
+                    $crate::sim::finger::effects::constants::Constant::check(
+                        &self.$constant, key, $allowed, rules,
+                    );
+                )?)*
             }
         }
     };
@@ -128,52 +109,4 @@ fn split_by(effects: Table, biotac: &Table) -> (Table, Table) {
         }
     }
     (settings, constants)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sim::finger::Effects;
-
-    /// Keys of effects that are no constants.
-    const SETTINGS: [&str; 5] =
-        ["skin.model", "skin.samples", "skin.along", "skin.around", "timing.control_delay_s"];
-
-    fn unknown(effects: &Table, biotac: &Table, prefix: &str, found: &mut Vec<String>) {
-        for (key, value) in effects {
-            let path = format!("{prefix}{key}");
-            match (biotac.get(key), value) {
-                (Some(Value::Table(biotac)), Value::Table(inner)) => {
-                    unknown(inner, biotac, &format!("{path}."), found);
-                }
-                (Some(_), _) => {}
-                (None, _) if SETTINGS.contains(&path.as_str()) => {}
-                (None, _) => found.push(path),
-            }
-        }
-    }
-
-    /// A constant that is missing in the file would be 0.
-    #[test]
-    fn every_constant_stands_in_the_file() {
-        let settings = Effects::all();
-        let mut whole = Table::new();
-        for (name, value) in [
-            ("skin", Table::try_from(&settings.skin)),
-            ("fluid", Table::try_from(&settings.fluid)),
-            ("electrodes", Table::try_from(&settings.electrodes)),
-            ("creep", Table::try_from(&settings.creep)),
-            ("thermal", Table::try_from(&settings.thermal)),
-            ("friction", Table::try_from(&settings.friction)),
-            ("wrench", Table::try_from(&settings.wrench)),
-            ("variation", Table::try_from(&settings.variation)),
-            ("timing", Table::try_from(&settings.timing)),
-        ] {
-            whole.insert(name.into(), Value::Table(value.unwrap()));
-        }
-        let mut found = Vec::new();
-        unknown(&whole, &BIOTAC, "", &mut found);
-        assert!(found.is_empty(), "{found:?}");
-        assert_eq!(split(whole).1, Table::new());
-    }
 }

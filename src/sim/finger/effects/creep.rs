@@ -21,11 +21,7 @@ impl Effect for CreepEffect {
     type State = Lag;
 
     const ON_LOAD: Option<OnLoad<Self>> =
-        Some(|effect, lag, step, load| lag.step(effect, step.dt_s, load));
-
-    fn start(&self) -> Lag {
-        Lag::default()
-    }
+        Some(|effect, lag, _, dt_s, load| lag.step(effect, dt_s, load));
 }
 
 /// What lags behind the load: one trial's state.

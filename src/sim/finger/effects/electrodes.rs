@@ -2,9 +2,9 @@
 
 use super::constants::effect;
 use super::effect::Effect;
-use super::skin::Pressed;
 use crate::sim::finger::noise::normal;
 use crate::sim::finger::samples::SkinSample;
+use nalgebra::Vector3;
 use palpate_explore::robot::finger::electrode_table;
 use palpate_explore::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use rand::Rng;
@@ -36,9 +36,9 @@ effect! {
         /// Random walk shared by all electrodes, in counts per root second; 0 is none.
         drift_counts: f64, 0.0..=1e3;
         /// Whether counts are whole numbers.
-        quantise: bool, ..;
+        quantise: bool;
         /// Whether counts stay within the converter's 0 to 4095.
-        clip: bool, ..;
+        clip: bool;
     }
 }
 
@@ -46,8 +46,6 @@ impl Effect for ElectrodesEffect {
     type State = ();
 
     const FILLS_FRAMES: bool = true;
-
-    fn start(&self) {}
 }
 
 /// The electrodes over a skin; never change.
@@ -105,17 +103,6 @@ impl Electrodes {
             + self.weights.iter().map(|near| size_of_val(near.as_slice())).sum::<usize>()
     }
 
-    /// Ideal counts over a pressed skin when the fluid conducts `conductivity` times as well as at
-    /// rest.
-    pub fn counts(&self, pressed: &Pressed, conductivity: f64) -> [f64; ELECTRODES] {
-        self.counts_over(pressed.moved_m(), conductivity)
-    }
-
-    /// The same over samples whose skin moved inwards by `inward_m`, one each, or none at rest.
-    pub fn counts_over(&self, inward_m: &[f64], conductivity: f64) -> [f64; ELECTRODES] {
-        self.counts_closed(&self.closed(inward_m), conductivity)
-    }
-
     /// The part of each gap that is closed by skin that moved inwards by `inward_m`, one each, or
     /// none at rest; negative where it lifted.
     pub fn closed(&self, inward_m: &[f64]) -> [f64; ELECTRODES] {
@@ -130,7 +117,8 @@ impl Electrodes {
         std::array::from_fn(|i| moved(&self.weights[i]))
     }
 
-    /// Ideal counts with that part of each gap closed.
+    /// Ideal counts with that part of each gap closed when the fluid conducts `conductivity` times
+    /// as well as at rest.
     pub fn counts_closed(
         &self,
         closed: &[f64; ELECTRODES],
@@ -170,6 +158,52 @@ impl Electrodes {
     }
 }
 
+/// How skin that is carried sideways over the core changes the electrodes' gaps; never changes.
+///
+/// The skin is a sleeve around the core that the fluid lets slide. Carried by `s`, it comes down
+/// where it faces against `s` and lifts off where it faces along it: over a point with outward
+/// normal n along a ray d, by −(n·s) / (n·d). The fluid's volume stays, so the whole skin over it
+/// lifts by the rest. The nail holds the dry skin; at the apex skin and core touch (FEM mesh of
+/// NVlabs/biotac_sim) and hold each other, and in between the skin follows with 1 − d_x² (chosen).
+/// On a plane the skin slides along itself: where the object is met, its shape decides the gap.
+#[derive(Clone, Debug)]
+pub struct Shear {
+    /// Part of each electrode's gap that a metre along x, y and z of `T` closes.
+    closes_per_m: [[f64; ELECTRODES]; 3],
+}
+
+impl Shear {
+    /// Of the skin at `samples`, over `electrodes`.
+    pub fn new(electrodes: &Electrodes, samples: &[SkinSample]) -> Self {
+        let is_wet = |sample: &&SkinSample| sample.layers.wet;
+        let follows = |sample: &SkinSample| 1.0 - sample.direction.x.max(0.0).powi(2);
+        let lifted_m2: Vector3<f64> = (samples.iter().filter(is_wet))
+            .map(|sample| sample.normal.scale(follows(sample) * sample.area_m2))
+            .sum();
+        let wet_m2: f64 = samples.iter().filter(is_wet).map(SkinSample::section_m2).sum();
+        let closes_per_m = [0, 1, 2].map(|axis| {
+            let inward = |sample: &SkinSample| match sample.layers.wet {
+                true => {
+                    let facing = sample.normal[axis] / sample.normal.dot(&sample.direction);
+                    lifted_m2[axis] / wet_m2 - follows(sample) * facing
+                }
+                false => 0.0,
+            };
+            electrodes.closed(&samples.iter().map(inward).collect::<Vec<f64>>())
+        });
+        Self { closes_per_m }
+    }
+
+    /// Adds to the `closed` part of each gap what skin carried by `skin_t` closes.
+    pub fn add(&self, skin_t: &Vector3<f64>, closed: &mut [f64; ELECTRODES]) {
+        for (per_m, &carried_m) in self.closes_per_m.iter().zip(skin_t.iter()) {
+            for (closed, per_m) in closed.iter_mut().zip(per_m) {
+                *closed += per_m * carried_m;
+            }
+        }
+    }
+}
+
 /// What all electrodes of a frame have in common.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Common {
@@ -199,19 +233,4 @@ pub fn counts(impedance_ohm: f64) -> f64 {
 /// Impedance over counts: the inverse of [`counts`].
 pub fn impedance_ohm(counts: f64) -> f64 {
     (FULL_SCALE_COUNTS / counts - 1.0) * LOAD_OHM
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        /// What is no work is the same number.
-        #[test]
-        fn powers_of_one_are_as_computed(base in FILM..3.0f64, exponent in 0.1..10.0f64) {
-            prop_assert_eq!(power(base, 1.0), raised(base, 1.0));
-            prop_assert_eq!(power(1.0, exponent), raised(1.0, exponent));
-        }
-    }
 }

@@ -1,9 +1,8 @@
 //! What the pressure sensor makes of the fluid: PDC (static) and PAC (vibration).
 
 use super::constants::effect;
-use super::effect::Effect;
-use super::switch::Switch;
-use crate::sim::finger::noise::normal;
+use super::effect::{Effect, Switch};
+use crate::sim::finger::noise::converted;
 use palpate_explore::robot::finger::frame::FULL_SCALE_COUNTS;
 use palpate_input::config::Rules;
 use rand::Rng;
@@ -31,7 +30,7 @@ effect! {
         /// White noise of PDC; 0 is none.
         noise_counts: f64, 0.0..=1e3;
         /// Whether counts are whole numbers from 0 to 4095.
-        quantise: bool, ..;
+        quantise: bool;
     }
 }
 
@@ -45,8 +44,6 @@ impl Effect for FluidEffect {
     type State = ();
 
     const FILLS_FRAMES: bool = true;
-
-    fn start(&self) {}
 
     fn complete() -> Self {
         Self { vibration: Some(VibrationEffect::default()), ..Self::default() }
@@ -82,14 +79,8 @@ effect! {
 impl FluidEffect {
     /// PDC at a pressure above rest.
     pub fn pdc_counts(&self, pressure_pa: f64, rng: &mut impl Rng) -> f64 {
-        self.convert(self.baseline_counts + pressure_pa / PDC_PA, self.noise_counts, rng)
-    }
-
-    fn convert(&self, mut counts: f64, noise_counts: f64, rng: &mut impl Rng) -> f64 {
-        if noise_counts > 0.0 {
-            counts += noise_counts * normal(rng);
-        }
-        if self.quantise { counts.round().clamp(0.0, FULL_SCALE_COUNTS) } else { counts }
+        let counts = self.baseline_counts + pressure_pa / PDC_PA;
+        converted(counts, self.noise_counts, self.quantise, rng)
     }
 }
 
@@ -113,6 +104,6 @@ impl Filter {
         self.smooth_pa += part(vibration.low_pass_hz) * (pressure_pa - self.smooth_pa);
         self.slow_pa += part(vibration.high_pass_hz) * (self.smooth_pa - self.slow_pa);
         let counts = vibration.baseline_counts + (self.smooth_pa - self.slow_pa) / PAC_PA;
-        fluid.convert(counts, vibration.noise_counts, rng)
+        converted(counts, vibration.noise_counts, fluid.quantise, rng)
     }
 }

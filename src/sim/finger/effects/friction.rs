@@ -1,13 +1,14 @@
 //! Stick and slip: one elastic bristle between finger and object, dragged along at Coulomb's limit.
 //!
 //! What yields is the skin: the bristle's stretch is how far the object carries it over the core,
-//! which the electrodes feel ([`Shear`](crate::sim::finger::shear::Shear)). While it slips, the
+//! which the electrodes feel ([`Shear`](super::electrodes::Shear)). While it slips, the
 //! object's texture makes the fluid vibrate.
 
 use super::constants::effect;
 use super::effect::{Effect, OnLoad};
 use crate::sim::finger::load::Load;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Vector3;
+use palpate_explore::robot::finger::TipMotion;
 
 /// Slower than this the skin creeps and does not slip (chosen): far below any speed of a touch,
 /// far above what rounding at Coulomb's limit makes of a finger at rest.
@@ -29,14 +30,8 @@ effect! {
 impl Effect for FrictionEffect {
     type State = Bristle;
 
-    const ON_LOAD: Option<OnLoad<Self>> = Some(|effect, bristle, step, load| {
-        let velocity = [&step.motion.linear_w, &step.motion.angular_w];
-        bristle.step(effect, &step.motion.x_wt, velocity, step.dt_s, load);
-    });
-
-    fn start(&self) -> Bristle {
-        Bristle::default()
-    }
+    const ON_LOAD: Option<OnLoad<Self>> =
+        Some(|effect, bristle, motion, dt_s, load| bristle.step(effect, motion, dt_s, load));
 }
 
 impl FrictionEffect {
@@ -53,21 +48,13 @@ impl FrictionEffect {
 #[derive(Clone, Debug, Default)]
 pub struct Bristle {
     stretch_w: Vector3<f64>,
-    skin_t: Vector3<f64>,
-    slip_m_s: f64,
+    /// How far the object carries the skin over the core, in `T`.
+    pub skin_t: Vector3<f64>,
+    /// Speed at which the skin slipped on the object in the last step; 0 while it sticks.
+    pub slip_m_s: f64,
 }
 
 impl Bristle {
-    /// How far the object carries the skin over the core, in `T`.
-    pub fn skin_t(&self) -> &Vector3<f64> {
-        &self.skin_t
-    }
-
-    /// Speed at which the skin slipped on the object in the last step; 0 while it sticks.
-    pub fn slip_m_s(&self) -> f64 {
-        self.slip_m_s
-    }
-
     /// Moves the skin with the velocity of T for `dt_s` and adds the friction to `load`, at the
     /// centre of pressure.
     ///
@@ -77,11 +64,11 @@ impl Bristle {
     pub fn step(
         &mut self,
         effect: &FrictionEffect,
-        x_wt: &Isometry3<f64>,
-        [linear_w, angular_w]: [&Vector3<f64>; 2],
+        motion: &TipMotion,
         dt_s: f64,
         load: &mut Load,
     ) {
+        let TipMotion { x_wt, linear_w, angular_w } = motion;
         let normal_n = load.force_n.norm();
         if normal_n == 0.0 {
             *self = Self::default();

@@ -14,18 +14,16 @@ pub mod friction;
 pub mod registration;
 pub mod sensor;
 pub mod skin;
-pub mod switch;
 mod table;
 pub mod thermal;
 pub mod timing;
 pub mod variation;
 pub mod wrench;
 
-use super::counter::count;
 use super::load::Load;
-use effect::{Effect, Needs, Step};
+use effect::{Effect, Needs, Switch};
+use palpate_explore::robot::finger::TipMotion;
 use palpate_input::config::{Checked, Rules};
-use switch::Switch;
 
 // What an effect needs stands above it.
 table::effects! {

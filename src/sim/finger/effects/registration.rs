@@ -48,12 +48,10 @@ impl Default for RegistrationEffect {
 
 impl Checked for RegistrationEffect {
     fn check(&self, rules: &mut Rules) {
-        if let Some(position_m) = &self.finger_position_m {
-            rules.numbers("finger_position_m", position_m, -0.1..=0.1);
-        }
-        if let Some(rotation_deg) = &self.finger_rotation_deg {
-            rules.numbers("finger_rotation_deg", rotation_deg, -45.0..=45.0);
-        }
+        (self.finger_position_m.iter())
+            .for_each(|values| rules.numbers("finger_position_m", values, -0.1..=0.1));
+        (self.finger_rotation_deg.iter())
+            .for_each(|values| rules.numbers("finger_rotation_deg", values, -45.0..=45.0));
         rules.number("finger_m", self.finger_m, 0.0..=0.1);
         rules.number("finger_deg", self.finger_deg, 0.0..=45.0);
         rules.number("object_m", self.object_m, 0.0..=0.1);
@@ -78,8 +76,6 @@ impl RegistrationEffect {
 
 impl Effect for RegistrationEffect {
     type State = ();
-
-    fn start(&self) {}
 }
 
 /// The errors of one trial.

@@ -30,8 +30,12 @@ pub fn load(loader: &mut Loader, effects: &str) -> Result<Vec<String>, ConfigErr
     };
     let Some(table) = loader.table_mut(effects) else { return Ok(Vec::new()) };
     table.remove("sensor");
-    let mut moved = Vec::new();
-    constants_in(table, &BIOTAC, &sensor, "effects", &mut moved);
+    let is_moved = |(name, is): &(String, &Value)| {
+        let known = value(&BIOTAC, name);
+        known.is_some_and(|known| value(&sensor, name).unwrap_or(known) != *is)
+    };
+    let moved = values(table, "").into_iter().filter(is_moved);
+    let moved = moved.map(|(name, _)| format!("effects.{name}")).collect();
     overlay(table, &sensor);
     Ok(moved)
 }
@@ -57,47 +61,29 @@ fn read(loader: &Loader, key: &str, name: &str) -> Result<Table, ConfigError> {
     BIOTAC.keys().for_each(|name| {
         table.entry(name).or_insert_with(|| Value::Table(Table::new()));
     });
-    let refused = setting_in(&sensor, &BIOTAC, "").map(|(key, value)| {
+    let setting = values(&sensor, "").into_iter().find(|(name, _)| value(&BIOTAC, name).is_none());
+    let refused = setting.map(|(key, value)| {
         let allowed = "a constant of the sensor; settings of effects stand in the scene";
-        file.not_allowed(&key, &value, allowed)
+        file.not_allowed(&key, &value.to_string(), allowed)
     });
     file.finish::<Effects>()?;
     refused.map_or(Ok(sensor), Err)
 }
 
-/// The first key of a sensor's file that is not a constant, with its value.
-fn setting_in(sensor: &Table, known: &Table, prefix: &str) -> Option<(String, String)> {
-    sensor.iter().find_map(|(key, value)| {
-        let path = format!("{prefix}{key}");
-        match (known.get(key), value) {
-            (Some(Value::Table(known)), Value::Table(inner)) => {
-                setting_in(inner, known, &format!("{path}."))
-            }
-            (Some(_), _) => None,
-            (None, value) => Some((path, value.to_string())),
-        }
-    })
+/// The values in the tables of `effects`, by their dotted names.
+fn values<'a>(effects: &'a Table, prefix: &str) -> Vec<(String, &'a Value)> {
+    let of = |(key, value): (&String, &'a Value)| match value {
+        Value::Table(inner) => values(inner, &format!("{prefix}{key}.")),
+        value => vec![(format!("{prefix}{key}"), value)],
+    };
+    effects.iter().flat_map(of).collect()
 }
 
-/// Adds the keys of constants in `effects` whose values are not those of the sensor.
-fn constants_in(
-    effects: &Table,
-    biotac: &Table,
-    sensor: &Table,
-    prefix: &str,
-    found: &mut Vec<String>,
-) {
-    let nothing = Table::new();
-    for (key, value) in effects {
-        let path = format!("{prefix}.{key}");
-        match (biotac.get(key), value) {
-            (Some(Value::Table(biotac)), Value::Table(inner)) => {
-                let sensor = sensor.get(key).and_then(Value::as_table).unwrap_or(&nothing);
-                constants_in(inner, biotac, sensor, &path, found);
-            }
-            (Some(known), value) if sensor.get(key).unwrap_or(known) != value => found.push(path),
-            _ => {}
-        }
+/// The value of `effects` with this dotted name.
+fn value<'a>(effects: &'a Table, name: &str) -> Option<&'a Value> {
+    match name.split_once('.') {
+        Some((table, rest)) => value(effects.get(table)?.as_table()?, rest),
+        None => effects.get(name),
     }
 }
 

@@ -2,15 +2,12 @@
 
 use super::constants::effect;
 use super::effect::{Effect, Needs};
-use crate::sim::finger::column::Column;
-use crate::sim::finger::foundation::Foundation;
-use crate::sim::finger::foundation::SkinContact;
-use crate::sim::finger::lattice::Lattice;
+use crate::sim::finger::foundation::{Column, Foundation, SkinContact};
 use crate::sim::finger::load::{Load, PressError};
 use crate::sim::finger::patches::{Patches, Vicinity, key};
-use crate::sim::finger::samples::{SkinSample, spread};
+use crate::sim::finger::samples::{Lattice, SkinSample, spread};
+use crate::sim::finger::shell::membrane::{Membrane, Settled};
 use crate::sim::finger::shell::sheet::Material;
-use crate::sim::finger::shell::{Shell, ShellState};
 use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_explore::robot::finger::profile::Profile;
 use palpate_geometry::bvh::MeshBvh;
@@ -74,24 +71,10 @@ fn check_resolution(skin: &SkinEffect, rules: &mut Rules) {
     rules.require("around", skin.around, even, || "an even number, 4 to 32".into());
 }
 
-impl SkinEffect {
-    /// The same of silicone `factor` times as stiff; the core stays.
-    pub fn stiffened(&self, factor: f64) -> Self {
-        Self {
-            modulus_pa: factor * self.modulus_pa,
-            flatten_pa_m: factor * self.flatten_pa_m,
-            inflate_pa_m: factor * self.inflate_pa_m,
-            ..self.clone()
-        }
-    }
-}
-
 impl Effect for SkinEffect {
     type State = ();
 
     const NEEDS: Needs = Needs::Nothing;
-
-    fn start(&self) {}
 }
 
 /// A fingertip's skin; never changes.
@@ -101,7 +84,7 @@ pub struct Skin {
     sections_m2: Vec<f64>,
     patches: Patches,
     foundation: Foundation,
-    shell: Option<Shell>,
+    shell: Option<Membrane>,
     bulge_m: f64,
 }
 
@@ -110,7 +93,7 @@ pub struct Skin {
 pub struct Pressed {
     touches: Vec<SkinContact>,
     vicinity: Vicinity,
-    shell: Option<ShellState>,
+    shell: Option<Settled>,
     /// How far the inner side of the skin moved in at each sample, in metres.
     pub inward_m: Vec<f64>,
     /// How far the object compresses each sample's column, in metres; 0 where it is not met.
@@ -121,20 +104,15 @@ impl Pressed {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let numbers = self.inward_m.capacity() + self.indentation_m.capacity();
-        self.shell.as_ref().map_or(0, ShellState::bytes)
+        self.shell.as_ref().map_or(0, Settled::bytes)
             + self.vicinity.bytes()
             + self.touches.capacity() * size_of::<SkinContact>()
             + numbers * size_of::<f64>()
     }
 
-    /// Whether no ray met anything: the skin is untouched and the fluid at rest.
-    pub fn is_resting(&self) -> bool {
-        self.touches.is_empty()
-    }
-
     /// `inward_m`, or nothing while the skin rests.
     pub fn moved_m(&self) -> &[f64] {
-        if self.is_resting() { &[] } else { &self.inward_m }
+        if self.touches.is_empty() { &[] } else { &self.inward_m }
     }
 }
 
@@ -148,20 +126,16 @@ impl Skin {
             samples.retain(|sample| !sample.layers.wet);
             samples.splice(0..0, lattice.samples(profile));
         }
-        let nodes = lattice.as_ref().map_or(0, |lattice| lattice.nodes().len());
-        let mut order: Vec<usize> = (0..samples.len()).collect();
-        order.sort_by_key(|&i| key(profile, &samples[i]));
-        let samples: Vec<SkinSample> = order.iter().map(|&i| samples[i].clone()).collect();
+        samples.sort_by_cached_key(|sample| key(profile, sample));
         let bulges = cavity_pa_m3 > 0.0 || lattice.is_some();
         let bulge_m = if bulges { BULGE * profile.radius_m } else { 0.0 };
         let skin_m = samples.first().map_or(1.0, |sample| sample.layers.skin_m);
         let wet = samples.iter().filter(|sample| sample.layers.wet);
         Self {
             shell: lattice.map(|lattice| {
-                let node = order.iter().map(|&i| (i < nodes).then_some(i)).collect();
                 let (young_pa, poisson) = (effect.modulus_pa, effect.poisson);
                 let material = Material { young_pa, poisson, thickness_m: skin_m };
-                Shell::new(&lattice, node, &material, [effect.core_pa_m, cavity_pa_m3])
+                Membrane::new(&lattice, &material, effect.core_pa_m, cavity_pa_m3)
             }),
             sections_m2: samples.iter().map(SkinSample::section_m2).collect(),
             patches: Patches::new(profile, &samples, bulge_m),
@@ -187,7 +161,7 @@ impl Skin {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.shell.as_ref().map_or(0, Shell::bytes)
+        self.shell.as_ref().map_or(0, Membrane::bytes)
             + self.samples.len() * (size_of::<SkinSample>() + size_of::<f64>())
             + self.patches.bytes()
     }
@@ -202,7 +176,7 @@ impl Skin {
         Pressed {
             touches: Vec::with_capacity(self.samples.len()),
             vicinity: self.patches.vicinity(),
-            shell: self.shell.as_ref().map(Shell::relaxed),
+            shell: self.shell.as_ref().map(Membrane::relaxed),
             inward_m: vec![0.0; self.samples.len()],
             indentation_m: vec![0.0; self.samples.len()],
         }
@@ -227,10 +201,10 @@ impl Skin {
         if bvh.surrounds(&x_wt.translation.vector.into()) {
             return Err(PressError::Inside);
         }
-        let resting = pressed.is_resting();
+        let resting = pressed.touches.is_empty();
         pressed.touches.clear();
         self.meet(bvh, x_wt, pressed);
-        if pressed.is_resting() {
+        if pressed.touches.is_empty() {
             if !resting {
                 pressed.inward_m.fill(0.0);
                 pressed.indentation_m.fill(0.0);
@@ -280,7 +254,9 @@ impl Skin {
     fn balance(&self, pressed: &mut Pressed) -> Load {
         let Pressed { touches, shell, inward_m, indentation_m, .. } = pressed;
         let balance = match (&self.shell, shell) {
-            (Some(shell), Some(state)) => shell.balance(touches, self.column(), state, inward_m),
+            (Some(shell), Some(state)) => {
+                shell.balance(touches, &self.samples, self.column(), state, inward_m)
+            }
             _ => self.foundation.balance(touches, &self.samples, inward_m),
         };
         indentation_m.fill(0.0);

@@ -77,9 +77,7 @@ macro_rules! effects {
         impl Checked for Effects {
             fn check(&self, rules: &mut Rules) {
                 $(
-                    if let Some(effect) = &self.$name {
-                        rules.table(stringify!($name), effect);
-                    }
+                    self.$name.iter().for_each(|effect| rules.table(stringify!($name), effect));
                 )*
                 let filling = [$((stringify!($name), <$Effect>::FILLS_FRAMES),)*];
                 $(
@@ -109,13 +107,18 @@ macro_rules! effects {
             /// Lets every effect that has something to do with it change the load, in the table's
             /// order.
             #[inline]
-            pub fn on_load(&mut self, effects: &Effects, step: &Step, load: &mut Load) {
+            pub fn on_load(
+                &mut self,
+                effects: &Effects,
+                motion: &TipMotion,
+                dt_s: f64,
+                load: &mut Load,
+            ) {
                 $(
                     if let Some(act) = <$Effect>::ON_LOAD
                         && let (Some(effect), Some(state)) = (&effects.$name, &mut self.$name)
                     {
-                        count(stringify!($name));
-                        act(effect, state, step, load);
+                        act(effect, state, motion, dt_s, load);
                     }
                 )*
             }

@@ -2,7 +2,7 @@
 
 use super::constants::effect;
 use super::effect::{Effect, OnLoad};
-use crate::sim::finger::noise::normal;
+use crate::sim::finger::noise::converted;
 use palpate_explore::robot::finger::frame::FULL_SCALE_COUNTS;
 use rand::Rng;
 use std::f64::consts::TAU;
@@ -36,7 +36,7 @@ effect! {
         /// White noise of TAC; 0 is none.
         tac_noise_counts: f64, 0.0..=1e3;
         /// Whether counts are whole numbers from 0 to 4095.
-        quantise: bool, ..;
+        quantise: bool;
     }
 }
 
@@ -47,10 +47,11 @@ impl Effect for ThermalEffect {
 
     /// The load stays; its area cools the fluid.
     const ON_LOAD: Option<OnLoad<Self>> =
-        Some(|effect, heat, step, load| heat.step(effect, load.area_m2, step.dt_s));
+        Some(|effect, heat, _, dt_s, load| heat.step(effect, load.area_m2, dt_s));
 
     fn start(&self) -> Heat {
-        Heat::new(self)
+        let start_c = self.start_c;
+        Heat { start_c, temperature_c: start_c, slow_c: start_c }
     }
 }
 
@@ -59,25 +60,18 @@ impl ThermalEffect {
     /// T = 4025 / ln((155183 − 46555 r) / r) − 273.15, r = TDC / 4095.
     pub fn tdc_counts(&self, temperature_c: f64, rng: &mut impl Rng) -> f64 {
         let ratio = 155_183.0 / ((4025.0 / (temperature_c + 273.15)).exp() + 46_555.0);
-        self.convert(FULL_SCALE_COUNTS * ratio, self.tdc_noise_counts, rng)
+        converted(FULL_SCALE_COUNTS * ratio, self.tdc_noise_counts, self.quantise, rng)
     }
 
     /// TAC at a rate of warming: cooling raises it.
     pub fn tac_counts(&self, warming_c_s: f64, rng: &mut impl Rng) -> f64 {
         let counts = self.tac_baseline_counts - warming_c_s / TAC_C_S;
-        self.convert(counts, self.tac_noise_counts, rng)
-    }
-
-    fn convert(&self, mut counts: f64, noise_counts: f64, rng: &mut impl Rng) -> f64 {
-        if noise_counts > 0.0 {
-            counts += noise_counts * normal(rng);
-        }
-        if self.quantise { counts.round().clamp(0.0, FULL_SCALE_COUNTS) } else { counts }
+        converted(counts, self.tac_noise_counts, self.quantise, rng)
     }
 }
 
 /// The fluid's heat: one trial's state.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Heat {
     start_c: f64,
     /// The fluid's temperature.
@@ -86,12 +80,6 @@ pub struct Heat {
 }
 
 impl Heat {
-    /// At the start of a trial.
-    pub fn new(effect: &ThermalEffect) -> Self {
-        let start_c = effect.start_c;
-        Self { start_c, temperature_c: start_c, slow_c: start_c }
-    }
-
     /// Another `dt_s` with this contact area: exact for a constant area.
     pub fn step(&mut self, effect: &ThermalEffect, area_m2: f64, dt_s: f64) {
         let cooled = area_m2 / (area_m2 + effect.half_area_m2);

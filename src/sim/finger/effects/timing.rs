@@ -1,8 +1,7 @@
 //! When a BioTac samples which channel, and when its frames arrive.
 
 use super::constants::effect;
-use super::effect::{Effect, Needs};
-use super::switch::Switch;
+use super::effect::{Effect, Needs, Switch};
 use palpate_explore::backend::delay::DELAY_MAX_S;
 use palpate_explore::robot::finger::frame::ELECTRODES;
 use palpate_input::config::Rules;
@@ -15,26 +14,25 @@ effect! {
     /// commands late. Without it a frame is sampled at once, every 10 ms, and arrives then, and a
     /// command holds from the tick on in which it is given.
     TimingEffect in "timing"
-    settings checked by check_delay {
+    settings checked by check_timing {
         /// From a command to its effect, rounded to whole control periods.
         control_delay_s: f64 = 0.002,
     }
     constants {
         /// Frames that arrive together, when the last of them is complete.
-        batch_frames: usize, 1..=100;
+        batch_frames: usize;
     }
 }
 
-fn check_delay(timing: &TimingEffect, rules: &mut Rules) {
+fn check_timing(timing: &TimingEffect, rules: &mut Rules) {
     rules.number("control_delay_s", timing.control_delay_s, 0.0..=DELAY_MAX_S);
+    rules.number("batch_frames", timing.batch_frames as f64, 1.0..=100.0);
 }
 
 impl Effect for TimingEffect {
     type State = ();
 
     const NEEDS: Needs = Needs::Frames;
-
-    fn start(&self) {}
 
     /// All of it, and a delay of commands alone: with frames as near to those without timing as a
     /// table can say it, each by itself.

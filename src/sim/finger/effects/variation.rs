@@ -41,8 +41,6 @@ effect! {
 
 impl Effect for VariationEffect {
     type State = ();
-
-    fn start(&self) {}
 }
 
 impl VariationEffect {
@@ -93,9 +91,14 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// Its skin where the scene has `nominal`.
+    /// Its skin where the scene has `nominal`: the core is as stiff as there.
     pub fn skin(&self, nominal: &SkinEffect) -> SkinEffect {
-        nominal.stiffened(self.stiffness)
+        SkinEffect {
+            modulus_pa: self.stiffness * nominal.modulus_pa,
+            flatten_pa_m: self.stiffness * nominal.flatten_pa_m,
+            inflate_pa_m: self.stiffness * nominal.inflate_pa_m,
+            ..nominal.clone()
+        }
     }
 
     /// The same of its electrodes.

@@ -2,9 +2,9 @@
 
 use super::constants::effect;
 use super::effect::Effect;
-use crate::sim::finger::counter::count;
 use crate::sim::finger::noise::normal;
 use nalgebra::Vector6;
+use palpate_explore::backend::Wrench;
 use rand_chacha::ChaCha8Rng;
 
 effect! {
@@ -38,8 +38,6 @@ impl WrenchEffect {
 
 impl Effect for WrenchEffect {
     type State = ();
-
-    fn start(&self) {}
 }
 
 /// The sensor during one trial.
@@ -58,19 +56,21 @@ impl Gauge {
         Self { rng, bias }
     }
 
-    /// What it says `dt_s` after the last reading of a load: forces, then torques.
-    pub fn read(&mut self, effect: &WrenchEffect, load: &Vector6<f64>, dt_s: f64) -> Vector6<f64> {
-        count("wrench");
+    /// What it says `dt_s` after the last reading of a load.
+    pub fn read(&mut self, effect: &WrenchEffect, load: &Wrench, dt_s: f64) -> Wrench {
         let noise = effect.noise_n.iter().chain(&effect.noise_nm);
         let steps = effect.resolution_n.iter().chain(&effect.resolution_nm);
         let walk = dt_s.max(0.0).sqrt();
         let mut said = *load;
-        for (i, (noise, &step)) in noise.zip(steps).enumerate() {
+        let values = said.force_n.iter_mut().chain(said.torque_nm.iter_mut());
+        for (i, ((value, noise), &step)) in values.zip(noise).zip(steps).enumerate() {
             if let Some(drift) = effect.drift_n_sqrt_s.get(i) {
                 self.bias[i] += drift * walk * normal(&mut self.rng);
             }
-            let value = load[i] + self.bias[i] + noise * normal(&mut self.rng);
-            said[i] = if step > 0.0 { (value / step).round() * step } else { value };
+            *value = *value + self.bias[i] + noise * normal(&mut self.rng);
+            if step > 0.0 {
+                *value = (*value / step).round() * step;
+            }
         }
         said
     }

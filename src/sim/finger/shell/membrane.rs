@@ -1,15 +1,19 @@
 //! The shell of the skin in balance with the fluid under it, the core and an object.
 //!
 //! Sought is where the energy of sheet, fluid (½ K V²), core and skin under the object is least.
-//! This is that energy; `settle` finds its least.
+//! This is that energy; `settle` finds its least. [`Membrane::balance`] is that under the rays by
+//! which the skin meets an object.
 
-use super::course::Course;
 use super::sheet::{Material, Sheet, Strained};
 use super::softness::Softness;
 use super::springs::Springs;
-use crate::sim::finger::lattice::{Lattice, Node};
+use crate::sim::finger::foundation::{Balance, Column, Response, SkinContact};
+use crate::sim::finger::samples::{Lattice, Node, SkinSample};
 use nalgebra::Vector3;
 use palpate_gp::math::simd::Quad;
+
+/// The shell goes on as it went by no more than so many times its last way (chosen).
+const FARTHEST: f64 = 2.0;
 
 /// An object before a node of the shell: a plane, for all that the node knows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +39,8 @@ pub struct Membrane {
     pub(super) skin_n_m: Vec<f64>,
     pub(super) core_n_m: Vec<f64>,
     pub(super) cavity_pa_m3: f64,
+    /// Half of the skin's thickness.
+    half_m: f64,
 }
 
 /// A way to lie.
@@ -52,6 +58,7 @@ pub struct Settled {
     pub(super) there: Pose,
     pub(super) at_rest: bool,
     pub(super) course: Course,
+    pushes: Vec<Push>,
     pub(super) links: Vec<Link>,
     pub(super) springs: Springs,
     pub(super) residual_n: Vec<f64>,
@@ -97,12 +104,8 @@ impl Membrane {
             free,
             place,
             cavity_pa_m3,
+            half_m: material.thickness_m / 2.0,
         }
-    }
-
-    /// Its nodes.
-    pub fn nodes(&self) -> &[Node] {
-        &self.nodes
     }
 
     /// Bytes held.
@@ -125,6 +128,7 @@ impl Membrane {
             there: pose(),
             at_rest: true,
             course: Course::new(count),
+            pushes: Vec::new(),
             links: Vec::new(),
             springs: Springs::default(),
             residual_n: vec![0.0; size],
@@ -159,17 +163,8 @@ impl Membrane {
     }
 
     /// How far a node moved towards the core.
-    pub fn inward_m(&self, node: usize, state: &Settled) -> f64 {
-        self.sunk_m(node, &state.here)
-    }
-
     pub(super) fn sunk_m(&self, node: usize, pose: &Pose) -> f64 {
         -self.nodes[node].direction.dot(&pose.moved_m[node])
-    }
-
-    /// Pressure of the fluid above rest.
-    pub fn pressure_pa(&self, state: &Settled) -> f64 {
-        self.cavity_pa_m3 * state.displaced_m3()
     }
 
     /// Energy of sheet, fluid, core, and skin under the pushes.
@@ -190,17 +185,69 @@ impl Membrane {
         });
         smooth_j + pushed.sum::<f64>() + on_core.sum::<f64>()
     }
+
+    /// Finds every touch's response, and how far the skin moved in at each sample. Where there is
+    /// no shell, on the back, `column` stands on its own.
+    ///
+    /// A node is met as a ball as thick as the skin, by the plane in which its ray met the object:
+    /// pressed flat, the skin turns until its outside faces the object.
+    pub(in crate::sim::finger) fn balance(
+        &self,
+        touches: &mut [SkinContact],
+        samples: &[SkinSample],
+        column: &Column,
+        state: &mut Settled,
+        inward_m: &mut [f64],
+    ) -> Balance {
+        let mut pushes = std::mem::take(&mut state.pushes);
+        pushes.clear();
+        pushes.extend(touches.iter().filter_map(|touch| {
+            let (along_m, turned_m) =
+                (touch.indentation_m * touch.cosine, self.half_m * (1.0 - touch.cosine));
+            Some(Push {
+                node: samples[touch.sample].node?,
+                normal_t: touch.normal_t,
+                overlap_m: along_m + turned_m,
+            })
+        }));
+        self.settle(&pushes, state);
+        let here = &state.here;
+        for (inward_m, sample) in inward_m.iter_mut().zip(samples) {
+            *inward_m = sample.node.map_or(0.0, |node| self.sunk_m(node, here));
+        }
+        let mut met = pushes.iter();
+        for touch in touches.iter_mut() {
+            let Some(push) = samples[touch.sample].node.and_then(|_| met.next()) else {
+                touch.response = column.respond(touch.indentation_m, touch.gap_m, 0.0);
+                continue;
+            };
+            let force_n = self.pushed_n(push, here);
+            touch.response = Response {
+                inward_m: self.sunk_m(push.node, here),
+                stress_pa: force_n * touch.cosine / touch.section_m2,
+                ..Response::default()
+            };
+            // Where the ball is nearest to the plane.
+            let moved_m = &here.moved_m[push.node];
+            let centre_t = self.nodes[push.node].point + moved_m;
+            let above_m = self.half_m - push.overlap_m + push.normal_t.dot(moved_m);
+            touch.point_t = centre_t - push.normal_t * above_m;
+        }
+        let displaced_m3 = here.strained.displaced_m3;
+        let balance = Balance {
+            pressure_pa: self.cavity_pa_m3 * displaced_m3,
+            displaced_m3,
+            energy_j: self.held_j(&pushes, here),
+        };
+        state.pushes = pushes;
+        balance
+    }
 }
 
 impl Settled {
     /// How far each node moved, in `T`.
     pub fn moved_m(&self) -> &[Vector3<f64>] {
         &self.here.moved_m
-    }
-
-    /// Volume by which the cavity is smaller than at rest.
-    pub fn displaced_m3(&self) -> f64 {
-        self.here.strained.displaced_m3
     }
 
     /// Bytes held.
@@ -212,9 +259,68 @@ impl Settled {
             + self.here.strained.bytes()
             + self.there.strained.bytes()
             + self.course.bytes()
+            + self.pushes.capacity() * size_of::<Push>()
             + self.links.capacity() * size_of::<Link>()
             + self.springs.bytes()
             + self.residual_n.capacity() * size_of::<f64>()
             + singles.map(|values| values.capacity() * size_of::<f32>()).iter().sum::<usize>()
+    }
+}
+
+/// The last ways of shell and object, to guess where the shell goes next.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Course {
+    /// How far each node went in the last press.
+    pub went_m: Vec<Vector3<f64>>,
+    /// Of each node: overlap with the object, NaN without one, the one before, and by how much it
+    /// grew.
+    overlap_m: Vec<f64>,
+    before_m: Vec<f64>,
+    grew_m: Vec<f64>,
+}
+
+impl Course {
+    /// Of so many nodes, at rest.
+    pub fn new(nodes: usize) -> Self {
+        let unknown = || vec![f64::NAN; nodes];
+        Self {
+            went_m: vec![Vector3::zeros(); nodes],
+            overlap_m: unknown(),
+            before_m: unknown(),
+            grew_m: unknown(),
+        }
+    }
+
+    /// Forgets them.
+    pub fn forget(&mut self) {
+        self.overlap_m.fill(f64::NAN);
+        self.grew_m.fill(f64::NAN);
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let numbers =
+            [&self.overlap_m, &self.before_m, &self.grew_m].map(|numbers| numbers.capacity());
+        self.went_m.capacity() * size_of::<Vector3<f64>>()
+            + numbers.iter().sum::<usize>() * size_of::<f64>()
+    }
+
+    /// How many times its last way the object went now, given each node's overlap with it; takes
+    /// note of them.
+    pub fn times(&mut self, overlaps: impl Iterator<Item = (usize, f64)>) -> f64 {
+        let (mut along_m2, mut last_m2) = (0.0, 0.0);
+        std::mem::swap(&mut self.overlap_m, &mut self.before_m);
+        self.overlap_m.fill(f64::NAN);
+        for (node, overlap_m) in overlaps {
+            let grew_m = &mut self.grew_m[node];
+            let grows_m = overlap_m - self.before_m[node];
+            if (grows_m * *grew_m).is_finite() {
+                along_m2 += grows_m * *grew_m;
+                last_m2 += *grew_m * *grew_m;
+            }
+            (*grew_m, self.overlap_m[node]) = (grows_m, overlap_m);
+        }
+        let times = along_m2 / last_m2;
+        if times.is_finite() { times.clamp(-FARTHEST, FARTHEST) } else { 0.0 }
     }
 }

@@ -1,16 +1,11 @@
 //! The skin as a thin shell over the fluid: it carries load to its neighbours.
 //!
 //! `sheet` is the silicone and `softness` how it gives way at rest, `membrane` is its energy with
-//! fluid, core and object, `settle` finds the least of it, with `springs` for the places that may
-//! touch and `course` for a first guess; `touching` is that under the rays by which the skin meets
-//! an object.
+//! fluid, core and object, under the rays by which the skin meets an object; `settle` finds the
+//! least of it, with `springs` for the places that may touch.
 
-mod course;
 pub mod membrane;
 mod settle;
 pub mod sheet;
 mod softness;
 pub mod springs;
-mod touching;
-
-pub use touching::{Shell, ShellState};

@@ -159,7 +159,57 @@ impl Sheet {
 
     /// Its state with each node moved by `moved_m`.
     pub fn strain(&self, moved_m: &[Vector3<f64>], state: &mut Strained) {
-        widest(Straining { sheet: self, moved_m, state });
+        widest(
+            #[inline(always)]
+            || self.strain_plainly(moved_m, state),
+        );
+    }
+
+    #[inline(always)]
+    fn strain_plainly(&self, moved_m: &[Vector3<f64>], state: &mut Strained) {
+        let Self { rest, edges, volume_m3 } = self;
+        let Strained { points, grown, gradient_n, volume_m2, .. } = state;
+        points.resize(rest.len(), Quad::default());
+        for ((point, at), moved_m) in points.iter_mut().zip(rest).zip(moved_m) {
+            *point = sum(at, &quad(moved_m));
+        }
+        grown.resize(edges.len(), [0.0; 2]);
+        for (edge, grown) in edges.iter().zip(grown.iter_mut()) {
+            let axis = edge.axis(points);
+            *grown = [dot_quad(&axis, &axis) - edge.rest_m2, edge.slope(points) - edge.rest_slope];
+        }
+        for gradient in [&mut *gradient_n, &mut *volume_m2] {
+            gradient.clear();
+            gradient.resize(points.len(), Quad::default());
+        }
+        let mut doubled_j = [0.0; 2];
+        for (edge, own) in edges.iter().zip(&*grown) {
+            // Tension and moment: derivatives of the energy by what grew.
+            let mut pull = [edge.laws[0][0] * own[0], edge.laws[0][1] * own[1]];
+            for k in 0..4 {
+                let (law, other) = (edge.laws[k + 1], grown[edge.near[k]]);
+                pull = [pull[0] + law[0] * other[0], pull[1] + law[1] * other[1]];
+            }
+            doubled_j = [doubled_j[0] + pull[0] * own[0], doubled_j[1] + pull[1] * own[1]];
+            let [a, b, c, d] = edge.corners;
+            let pull_n = scaled(&edge.axis(points), 2.0 * pull[0]);
+            let bend_nm = scaled(&edge.normal, pull[1]);
+            let [wa, wb, wc, wd] = edge.slopes_m;
+            let back_n = scaled(&pull_n, -1.0);
+            gradient_n[a] = sum(&gradient_n[a], &sum(&scaled(&bend_nm, wa), &back_n));
+            gradient_n[b] = sum(&gradient_n[b], &sum(&scaled(&bend_nm, wb), &pull_n));
+            gradient_n[c] = sum(&gradient_n[c], &scaled(&bend_nm, wc));
+            gradient_n[d] = sum(&gradient_n[d], &scaled(&bend_nm, wd));
+            let swept_m2 = cross(&points[a], &points[b]);
+            volume_m2[c] = sum(&volume_m2[c], &scaled(&swept_m2, -edge.turns[0]));
+            volume_m2[d] = sum(&volume_m2[d], &scaled(&swept_m2, -edge.turns[1]));
+        }
+        let mut tripled_m3 = 0.0;
+        for (point, volume_m2) in points.iter().zip(volume_m2.iter()) {
+            tripled_m3 += dot_quad(point, volume_m2);
+        }
+        state.energy_j = 0.5 * (doubled_j[0] + doubled_j[1]);
+        state.displaced_m3 = tripled_m3 / 3.0 + volume_m3;
     }
 
     /// Hands out the blocks of the elastic energy's second derivative at rest, in N/m, by pairs of
@@ -216,63 +266,6 @@ impl Edge {
         let ends = sum(&scaled(&points[a], wa), &scaled(&points[b], wb));
         let across = sum(&scaled(&points[c], wc), &scaled(&points[d], wd));
         dot_quad(&self.normal, &sum(&ends, &across))
-    }
-}
-
-struct Straining<'a> {
-    sheet: &'a Sheet,
-    moved_m: &'a [Vector3<f64>],
-    state: &'a mut Strained,
-}
-
-impl pulp::NullaryFnOnce for Straining<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Sheet { rest, edges, volume_m3 } = self.sheet;
-        let Strained { points, grown, gradient_n, volume_m2, .. } = self.state;
-        points.resize(rest.len(), Quad::default());
-        for ((point, at), moved_m) in points.iter_mut().zip(rest).zip(self.moved_m) {
-            *point = sum(at, &quad(moved_m));
-        }
-        grown.resize(edges.len(), [0.0; 2]);
-        for (edge, grown) in edges.iter().zip(grown.iter_mut()) {
-            let axis = edge.axis(points);
-            *grown = [dot_quad(&axis, &axis) - edge.rest_m2, edge.slope(points) - edge.rest_slope];
-        }
-        for gradient in [&mut *gradient_n, &mut *volume_m2] {
-            gradient.clear();
-            gradient.resize(points.len(), Quad::default());
-        }
-        let mut doubled_j = [0.0; 2];
-        for (edge, own) in edges.iter().zip(&*grown) {
-            // Tension and moment: derivatives of the energy by what grew.
-            let mut pull = [edge.laws[0][0] * own[0], edge.laws[0][1] * own[1]];
-            for k in 0..4 {
-                let (law, other) = (edge.laws[k + 1], grown[edge.near[k]]);
-                pull = [pull[0] + law[0] * other[0], pull[1] + law[1] * other[1]];
-            }
-            doubled_j = [doubled_j[0] + pull[0] * own[0], doubled_j[1] + pull[1] * own[1]];
-            let [a, b, c, d] = edge.corners;
-            let pull_n = scaled(&edge.axis(points), 2.0 * pull[0]);
-            let bend_nm = scaled(&edge.normal, pull[1]);
-            let [wa, wb, wc, wd] = edge.slopes_m;
-            let back_n = scaled(&pull_n, -1.0);
-            gradient_n[a] = sum(&gradient_n[a], &sum(&scaled(&bend_nm, wa), &back_n));
-            gradient_n[b] = sum(&gradient_n[b], &sum(&scaled(&bend_nm, wb), &pull_n));
-            gradient_n[c] = sum(&gradient_n[c], &scaled(&bend_nm, wc));
-            gradient_n[d] = sum(&gradient_n[d], &scaled(&bend_nm, wd));
-            let swept_m2 = cross(&points[a], &points[b]);
-            volume_m2[c] = sum(&volume_m2[c], &scaled(&swept_m2, -edge.turns[0]));
-            volume_m2[d] = sum(&volume_m2[d], &scaled(&swept_m2, -edge.turns[1]));
-        }
-        let mut tripled_m3 = 0.0;
-        for (point, volume_m2) in points.iter().zip(volume_m2.iter()) {
-            tripled_m3 += dot_quad(point, volume_m2);
-        }
-        self.state.energy_j = 0.5 * (doubled_j[0] + doubled_j[1]);
-        self.state.displaced_m3 = tripled_m3 / 3.0 + volume_m3;
     }
 }
 
