@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release --example own_measure`
 
-use palpate::experiment::measure::{Aggregate, Direction, METRES, Measure, Scale};
+use palpate::experiment::measure::{Aggregate, Direction, METRES, Measure, Scale, Source};
 use palpate::experiment::statistics::summary::typical;
 use palpate::experiment::trial::row::TrialRow;
 use palpate::experiment::{Experiment, Simulation};
@@ -18,13 +18,12 @@ pub const MEAN_RMSE: Measure = Measure {
     scale: Scale::Log,
     is_tabled: true,
     is_error: true,
-    is_of_shapes: false,
-    of: |row, touches| {
+    source: Source::Trial(|row, touches| {
         let so_far = row.touches.get(..touches as usize)?;
         let errors: Vec<f64> =
             so_far.iter().filter_map(|touch| Some(touch.metrics?.rmse_m)).collect();
         (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
-    },
+    }),
 };
 
 /// Trials of two planners on the toy.

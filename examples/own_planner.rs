@@ -42,7 +42,7 @@ pub fn error(planner: &Entry, experiment: &str) -> Result<f64, Box<dyn std::erro
     let row = simulation.trial(planner, 0);
     let touches = row.touches.len() as u32;
     let error = simulation.experiment().error();
-    (error.of)(&row, touches).ok_or_else(|| row.failure.unwrap_or_default().into())
+    error.of(&row, touches).ok_or_else(|| row.failure.unwrap_or_default().into())
 }
 
 #[allow(dead_code)]

@@ -77,7 +77,7 @@ pub(crate) fn touches<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, Py
     numbers(&told, "signal_sd_m", fit(|found| found.signal_sd))?;
     numbers(&told, "noise_sd_m", fit(|found| found.noise_sd))?;
     for measure in in_files(&run.rows) {
-        let values = all.iter().map(|(row, count, _)| (measure.of)(row, *count as u32));
+        let values = all.iter().map(|(row, count, _)| measure.of(row, *count as u32));
         numbers(&told, measure.id, values)?;
     }
     Ok(told)

@@ -45,7 +45,7 @@ impl True {
     pub(crate) fn of(environment: &Environment, per_side: usize) -> Self {
         match environment.task().ball() {
             Some(_) => Self::Around(TrueShape::of(environment)),
-            None => Self::Zone(Truth::sample(environment, per_side)),
+            None => Self::Zone(Truth::sample(environment, per_side, &|_| ())),
         }
     }
 

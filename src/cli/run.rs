@@ -196,11 +196,12 @@ impl Made {
 
     /// How it ended; says on standard error how many trials failed and why the first did.
     fn ending(&self, talk: Talk) -> Ending {
-        let Tally { trials, failed, first } = &self.tally;
-        let all_failed = *trials > 0 && failed == trials;
-        if let Some((TrialId { trial, planner }, reason)) = first {
+        let Tally { trials, failed } = &self.tally;
+        let all_failed = *trials > 0 && failed.len() == *trials;
+        if let Some((TrialId { trial, planner }, reason)) = failed.first() {
             let words = format!(
-                "{failed} of {trials} trials failed, the first ({planner}, trial {trial}): {reason}"
+                "{} of {trials} trials failed, the first ({planner}, trial {trial}): {reason}",
+                failed.len()
             );
             match all_failed {
                 true => error(words),

@@ -186,7 +186,7 @@ fn scene(path: &Path, args: &Args, talk: Talk) -> anyhow::Result<String> {
 fn one_side(environment: &Environment, talk: Talk) -> String {
     let truth = with_patience(talk, |tell| {
         tell("looking where the finger can touch the surface");
-        Truth::sample(environment, GRID)
+        Truth::sample(environment, GRID, &|_| ())
     });
     notice::of_truth(environment.task().zone(), &truth).iter().for_each(|notice| talk.note(notice));
     let (count, places) = (truth.count(), truth.places.len());

@@ -138,7 +138,7 @@ impl Probe for Told {
 }
 
 fn ending(row: &TrialRow) -> String {
-    let of = |measure: Measure| Some((measure.title, (measure.of)(row, row.touches.len() as u32)?));
+    let of = |measure: Measure| Some((measure.title, measure.of(row, row.touches.len() as u32)?));
     let error = of(RMSE).or_else(|| of(CHAMFER));
     let error = error.map_or(String::new(), |(name, m)| format!(", {name} {:.2} mm", 1e3 * m));
     match &row.failure {

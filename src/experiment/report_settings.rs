@@ -65,9 +65,7 @@ impl Checked for ReportSettings {
                 rules.one_of(&format!("{key}[{i}]"), name, &entrant::allowed(name));
             }
         }
-        if let Some(goal) = self.goal_touches {
-            rules.number("goal_touches", goal.into(), 1.0..=TOUCHES_MAX);
-        }
+        rules.given("goal_touches", self.goal_touches.map(f64::from), 1.0..=TOUCHES_MAX);
         let measures: Vec<&str> = MEASURES.iter().map(|measure| measure.id).collect();
         for (i, claim) in self.claims.iter().enumerate() {
             let key = |field: &str| format!("claims[{i}].{field}");

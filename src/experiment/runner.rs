@@ -3,11 +3,11 @@
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{Entry, JOURNAL, Journal, RunError, RunFolder};
 use crate::experiment::trial::Touched;
-use crate::experiment::trial::entrant::Entrant;
 use crate::experiment::trial::recorded_trial::{self, next_part, recording_path};
 use crate::experiment::trial::row::{TrialId, TrialRow};
 use palpate_explore::backend::Fault;
 use palpate_explore::backend::pace;
+use palpate_explore::planner::PlannerFactory;
 use palpate_input::error::Invalid;
 use rayon::iter::{
     IndexedParallelIterator, IntoParallelIterator, ParallelBridge, ParallelIterator,
@@ -27,14 +27,14 @@ pub enum Progress<'a> {
     Trial(&'a TrialRow),
 }
 
+/// A trial to be run, and its planner.
+pub type Job<'a> = (u32, &'a dyn PlannerFactory);
+
 /// Every trial of every planner that `done` lacks, trial by trial.
 ///
 /// # Errors
 /// If the experiment lists a planner that is not there.
-pub fn jobs<'a>(
-    simulation: &'a Simulation,
-    done: &[TrialId],
-) -> Result<Vec<(u32, Entrant<'a>)>, Invalid> {
+pub fn jobs<'a>(simulation: &'a Simulation, done: &[TrialId]) -> Result<Vec<Job<'a>>, Invalid> {
     let known = |(trial, name): (u32, &str)| {
         let planner = simulation.planner(name);
         let problem = format!("planner `{name}` is not built into this program");
@@ -77,7 +77,7 @@ impl Shard {
     }
 
     /// Leaves its own of all jobs.
-    pub fn keep(self, jobs: &mut Vec<(u32, Entrant)>) {
+    pub fn keep(self, jobs: &mut Vec<Job>) {
         jobs.retain(|(trial, _)| self.has(*trial));
     }
 }
@@ -91,7 +91,7 @@ impl Shard {
 /// If a row cannot be stored, or threads cannot be started.
 pub fn run(
     simulation: &Simulation,
-    (folder, jobs): (&mut RunFolder, Vec<(u32, Entrant)>),
+    (folder, jobs): (&mut RunFolder, Vec<Job>),
     threads: usize,
     stop: &AtomicBool,
     recorded: Option<&Path>,
@@ -106,7 +106,7 @@ pub fn run(
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let row = run_caught(simulation, (planner, trial), recorded, progress);
+            let row = run_caught(simulation, (trial, planner), recorded, progress);
             if row.failure.is_some() && stop.load(Ordering::Relaxed) {
                 // What stopped the run may have failed it: it is run again.
                 return Ok(());
@@ -129,14 +129,14 @@ pub fn run(
 /// If threads cannot be started.
 pub fn rows(
     simulation: &Simulation,
-    jobs: Vec<(u32, Entrant)>,
+    jobs: Vec<Job>,
     threads: usize,
     stop: &AtomicBool,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Vec<TrialRow>, Invalid> {
-    let run = |(trial, planner): (u32, Entrant)| {
+    let run = |(trial, planner): Job| {
         let row = (!stop.load(Ordering::Relaxed))
-            .then(|| run_caught(simulation, (planner, trial), None, progress))?;
+            .then(|| run_caught(simulation, (trial, planner), None, progress))?;
         progress(Progress::Trial(&row));
         Some(row)
     };
@@ -160,7 +160,7 @@ pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, Invalid> {
 /// in somebody's code does not lose the others' work.
 fn run_caught(
     simulation: &Simulation,
-    (planner, trial): (Entrant, u32),
+    (trial, planner): Job,
     recorded: Option<&Path>,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> TrialRow {
@@ -170,7 +170,7 @@ fn run_caught(
         Ok(())
     };
     let run =
-        || recorded_trial::run(simulation, (planner, trial), path.as_deref(), &[], &mut count);
+        || recorded_trial::run(simulation, (trial, planner), path.as_deref(), &[], &mut count);
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
         let words = panic.downcast_ref::<String>().map(String::as_str);
         let words = words.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
@@ -228,7 +228,7 @@ pub fn run_real(
             if is_asked { Err(Fault::Stopped { time_s }) } else { Ok(()) }
         };
         let path = recorded.map(|run| next_part(&recording_path(run, planner, trial)));
-        let job = (planner, trial);
+        let job = (trial, planner);
         let row = recorded_trial::run(simulation, job, path.as_deref(), &made, &mut keep);
         if let Some(error) = unstored {
             return Err(error);

@@ -4,9 +4,8 @@ use crate::experiment::experiment::Experiment;
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::notice;
 use crate::experiment::real_robot;
-use crate::experiment::trial::entrant::{Entrant, ORACLE};
 use crate::experiment::trial::row::TrialRow;
-use crate::experiment::trial::{self, GroundTruth, TrialObserver};
+use crate::experiment::trial::{self, GroundTruth, OracleFactory, TrialObserver};
 use crate::experiment::truth::Truth;
 use crate::sim::Environment;
 use crate::sim::simulator::Simulator;
@@ -27,12 +26,12 @@ use std::sync::Arc;
 pub struct Simulation {
     experiment: Experiment,
     simulator: Simulator,
-    truth: GroundTruth,
+    truth: Arc<GroundTruth>,
     /// The arm that touches in place of the simulated body, once it is connected.
     lab: Option<Arc<Lab>>,
     /// The notice about a truth that was scanned.
     scanned: Option<String>,
-    /// Planners that are not built in.
+    /// Planners that are not built in: the oracle, and those that were added.
     own_planners: Vec<Box<dyn PlannerFactory>>,
 }
 
@@ -84,7 +83,7 @@ impl Simulation {
                 let (truth, contacts, rmse_m) = scan.sample(zone, per_side)?;
                 (truth, Some(notice::of_scan(contacts, rmse_m)))
             }
-            _ => (Truth::sample_telling(&environment, per_side, tell), None),
+            _ => (Truth::sample(&environment, per_side, tell), None),
         };
         if environment.task().zone().is_some() && !truth.is_known() {
             return Err(Invalid::new(
@@ -93,9 +92,8 @@ impl Simulation {
         }
         let shape = TrueShape::of(&environment);
         tell("compiling the model");
-        let mut simulation = Self::against(experiment, environment, truth)?;
-        simulation.truth.shape = shape;
-        Ok(Self { scanned, ..simulation })
+        let truth = GroundTruth { environment, truth, shape };
+        Ok(Self { scanned, ..Self::made(experiment, truth)? })
     }
 
     /// As [`within`](Self::within), held against a `truth` that was sampled before; an unknown one
@@ -104,20 +102,21 @@ impl Simulation {
     /// # Errors
     /// If it cannot be simulated.
     pub fn against(
-        mut experiment: Experiment,
+        experiment: Experiment,
         environment: Arc<Environment>,
         truth: Truth,
     ) -> Result<Self, Invalid> {
-        experiment.scene = environment.scene().clone();
-        let simulator = Simulator::new(Arc::clone(&environment));
-        Ok(Self {
-            experiment,
-            simulator: simulator.map_err(|error| Invalid::new(error.to_string()))?,
-            truth: GroundTruth { environment, truth, shape: None },
-            lab: None,
-            scanned: None,
-            own_planners: Vec::new(),
-        })
+        Self::made(experiment, GroundTruth { environment, truth, shape: None })
+    }
+
+    fn made(mut experiment: Experiment, truth: GroundTruth) -> Result<Self, Invalid> {
+        experiment.scene = truth.environment.scene().clone();
+        let simulator = Simulator::new(Arc::clone(&truth.environment));
+        let simulator = simulator.map_err(|error| Invalid::new(error.to_string()))?;
+        let truth = Arc::new(truth);
+        let own_planners: Vec<Box<dyn PlannerFactory>> =
+            vec![Box::new(OracleFactory(truth.clone()))];
+        Ok(Self { experiment, simulator, truth, lab: None, scanned: None, own_planners })
     }
 
     /// With planners that are not built in, under the names that the experiment lists them by.
@@ -126,16 +125,11 @@ impl Simulation {
         self
     }
 
-    /// The entrant of a name: a planner that is built in or [own](Self::with_planners), or the
-    /// oracle.
-    pub fn planner(&self, name: &str) -> Option<Entrant<'_>> {
-        if name == ORACLE {
-            return Some(Entrant::Oracle);
-        }
-        let own = self.own_planners.iter().map(|planner| &**planner);
-        let built_in = planner::by_name(name).map(Entrant::from);
-        let is_it = |planner: &&dyn PlannerFactory| planner.name() == name;
-        built_in.or_else(|| own.into_iter().find(is_it).map(Entrant::from))
+    /// The planner of a name: one that is built in or [own](Self::with_planners), or the oracle.
+    pub fn planner(&self, name: &str) -> Option<&dyn PlannerFactory> {
+        let built_in = planner::by_name(name).map(|entry| entry as &dyn PlannerFactory);
+        let mut own = self.own_planners.iter().map(|planner| &**planner);
+        built_in.or_else(|| own.find(|planner| planner.name() == name))
     }
 
     /// What is run, with everything that it left to its object written out.
@@ -234,8 +228,7 @@ impl Simulation {
     }
 
     /// Runs one trial of `planner` from start to end; what goes wrong stands in its row.
-    pub fn trial<'a>(&self, planner: impl Into<Entrant<'a>>, trial: u32) -> TrialRow {
-        let planner = planner.into();
+    pub fn trial(&self, planner: &dyn PlannerFactory, trial: u32) -> TrialRow {
         match self.probe(trial) {
             Ok(mut probe) => self.trial_with(&mut *probe, planner, trial, &mut |_| Ok(())),
             Err(fault) => TrialRow::unstarted(trial, planner.name(), &fault),
@@ -244,13 +237,13 @@ impl Simulation {
 
     /// Runs a trial like [`trial`](Self::trial) with the touches of any `probe`, and calls
     /// `observer` after each.
-    pub fn trial_with<'a>(
+    pub fn trial_with(
         &self,
         probe: &mut dyn Probe,
-        planner: impl Into<Entrant<'a>>,
+        planner: &dyn PlannerFactory,
         trial: u32,
         observer: &mut TrialObserver,
     ) -> TrialRow {
-        trial::run(&self.experiment, &self.truth, probe, (planner.into(), trial), observer)
+        trial::run(&self.experiment, &self.truth, probe, (planner, trial), observer)
     }
 }

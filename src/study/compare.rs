@@ -8,11 +8,13 @@
 use super::check::judged::JUDGED;
 use crate::experiment::measure::outline::TENTHS;
 use crate::experiment::statistics::equal_error::Estimate;
-use crate::experiment::statistics::{mean, percentiles_95, resampled_within};
+use crate::experiment::statistics::{RESAMPLES, mean, percentiles_95};
 use crate::experiment::store::Run;
 use crate::experiment::trial::entrant::ORACLE;
 use crate::experiment::trial::row::{TouchRow, TrialRow, of_planner};
+use palpate_gp::math::seed;
 use palpate_input::error::Invalid;
+use rand::RngExt;
 use std::collections::HashMap;
 
 /// The planner that gains nothing; the [`ORACLE`] gains all that can be.
@@ -182,19 +184,12 @@ pub fn interquartile(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
         return None;
     }
     let sizes: Vec<usize> = strata.iter().map(|stratum| stratum.len()).collect();
-    let mut sample = Vec::new();
-    let found = resampled_within(&sizes, (seed, "compare"), |picks| {
-        sample.clear();
-        for (stratum, picks) in strata.iter().zip(picks) {
-            sample.extend(picks.iter().map(|pick| stratum[*pick]));
-        }
-        interquartile_mean(&sample)
-    });
-    let found = found.into_iter().flatten().collect();
-    Some(Estimate {
-        value: interquartile_mean(&strata.concat())?,
-        interval: Some(percentiles_95(found)),
-    })
+    let of = |picks: &[Vec<usize>]| {
+        let picked = strata.iter().zip(picks);
+        let sample = picked.flat_map(|(scores, picks)| picks.iter().map(|pick| scores[*pick]));
+        interquartile_mean(&sample.collect::<Vec<_>>()).unwrap_or(f64::NAN)
+    };
+    Some(estimate(&sizes, (seed, "compare"), of))
 }
 
 /// The probability that a trial of `one` is better than one of `other`, averaged over the objects
@@ -229,7 +224,7 @@ pub fn geometric(strata: &[&[f64]], seed: u64) -> Option<Estimate> {
     }
     let logs: Vec<Vec<f64>> = strata.iter().map(|scores| log_scores(scores)).collect();
     let of = |picks: &[Vec<usize>]| mean_of_means(&logs, picks).exp();
-    Some(estimate(&counts(&logs), seed, of))
+    Some(estimate(&counts(&logs), (seed, "suite"), of))
 }
 
 /// Share of the way from [`FLOOR`] to the [`ORACLE`] that a contender comes, in log error averaged
@@ -255,7 +250,7 @@ pub fn gap_closed(
         let [floor, own, ceiling] = [&floor, &own, &ceiling].map(|it| mean_of_means(it, picks));
         (floor - own) / (floor - ceiling)
     };
-    let found = estimate(&sizes, seed, share);
+    let found = estimate(&sizes, (seed, "suite"), share);
     let ends = found.interval.iter().flatten();
     ends.chain([&found.value]).all(|number| number.is_finite()).then_some(found)
 }
@@ -276,9 +271,21 @@ fn mean_of_means(strata: &[Vec<f64>], picks: &[Vec<usize>]) -> f64 {
     mean(&means.collect::<Vec<_>>())
 }
 
-/// A statistic of all trials of strata of these sizes, with its 95 % bootstrap interval.
-fn estimate(sizes: &[usize], seed: u64, of: impl Fn(&[Vec<usize>]) -> f64) -> Estimate {
-    let all: Vec<Vec<usize>> = sizes.iter().map(|size| (0..*size).collect()).collect();
-    let found = resampled_within(sizes, (seed, "suite"), &of);
-    Estimate { value: of(&all), interval: Some(percentiles_95(found)) }
+/// A statistic of all trials of strata of these sizes, with the 95 % interval of a bootstrap that
+/// draws within each stratum, the same for the same `seed` and `purpose`.
+fn estimate(
+    sizes: &[usize],
+    (seed, purpose): (u64, &str),
+    of: impl Fn(&[Vec<usize>]) -> f64,
+) -> Estimate {
+    let mut rng = seed::stream(seed, 0, purpose);
+    let mut picks: Vec<Vec<usize>> = sizes.iter().map(|size| (0..*size).collect()).collect();
+    let value = of(&picks);
+    let found = (0..RESAMPLES).map(|_| {
+        for (picks, size) in picks.iter_mut().zip(sizes) {
+            picks.fill_with(|| rng.random_range(0..*size));
+        }
+        of(&picks)
+    });
+    Estimate { value, interval: Some(percentiles_95(found.collect())) }
 }

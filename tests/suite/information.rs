@@ -40,7 +40,7 @@ fn the_surface_is_below_what_the_finger_has_swept() {
     for name in ["container.toml", "bird.toml"] {
         let experiment = load(name, &[]).unwrap();
         let environment = Arc::new(Environment::build(experiment.scene.clone()).unwrap());
-        let truth = Truth::sample(&environment, 21);
+        let truth = Truth::sample(&environment, 21, &|_| ());
         let zone = environment.task().zone().unwrap();
         let mut probe = Simulator::new(Arc::clone(&environment)).unwrap().probe(1).unwrap();
         assert_eq!(probe.swept(), None);

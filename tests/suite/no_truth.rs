@@ -50,9 +50,9 @@ fn verification_touches_follow_a_trial_and_change_nothing_of_it() {
     for id in
         ["verification_rmse_m", "verification_nlpd", "verification_coverage", "repeatability_m"]
     {
-        let of = measure::by_id(id).unwrap().of;
-        assert!(of(&verified, 10).is_some(), "{id}");
-        assert_eq!((of(&verified, 9), of(&plain, 10)), (None, None), "{id}");
+        let measure = measure::by_id(id).unwrap();
+        assert!(measure.of(&verified, 10).is_some(), "{id}");
+        assert_eq!((measure.of(&verified, 9), measure.of(&plain, 10)), (None, None), "{id}");
     }
 }
 
@@ -61,7 +61,7 @@ fn verification_touches_follow_a_trial_and_change_nothing_of_it() {
 #[test]
 fn an_exact_probe_repeats_and_verifies() {
     let verified = row(container(&["verification_touches=200", "repeat_touches=6"]), "active", 0);
-    let of = |id: &str| (measure::by_id(id).unwrap().of)(&verified, 10).unwrap();
+    let of = |id: &str| measure::by_id(id).unwrap().of(&verified, 10).unwrap();
     assert_eq!(of("repeatability_m"), 0.0);
     assert_eq!(of("verification_missed"), 0.0);
     let ratio = of("verification_rmse_m") / of("rmse_m");

@@ -11,10 +11,10 @@ use palpate::backend::{
 };
 use palpate::experiment::trial::Touched;
 use palpate::experiment::trial::recorded_trial::{self, next_part, parts, recording_path};
-use palpate::experiment::trial::replay::{self, Difference, ReplayError};
+use palpate::experiment::trial::replay::{self, Difference};
 use palpate::experiment::trial::row::TouchRow;
-use palpate::experiment::{Entrant, Experiment, Simulation};
-use palpate::explore::planner;
+use palpate::experiment::{Experiment, Simulation};
+use palpate::explore::planner::{self, PlannerFactory};
 use palpate::robot::finger::Frame;
 use palpate::ros::message::{BioTacHand, JointState, JointTrajectory, WrenchStamped};
 use palpate::ros::recording::{
@@ -502,10 +502,10 @@ fn experiment(sets: &[&str]) -> Experiment {
 /// Records a trial of `active` and returns the file.
 fn record(folder: &Path, sets: &[&str]) -> (Simulation, PathBuf) {
     let simulation = Simulation::new(experiment(sets)).unwrap();
-    let active = Entrant::from(planner::by_name("active").unwrap());
+    let active = planner::by_name("active").unwrap();
     let path = recording_path(folder, active, 0);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    let row = recorded_trial::run(&simulation, (active, 0), Some(&path), &[], &mut |_| Ok(()));
+    let row = recorded_trial::run(&simulation, (0, active), Some(&path), &[], &mut |_| Ok(()));
     let bare = simulation.trial(active, 0);
     assert_eq!(row.failure, None);
     assert_eq!(serde_json::to_string(&row).unwrap(), serde_json::to_string(&bare).unwrap());
@@ -513,7 +513,7 @@ fn record(folder: &Path, sets: &[&str]) -> (Simulation, PathBuf) {
 }
 
 #[track_caller]
-fn replayed(path: &Path, sets: &[&str]) -> Result<replay::Replay, ReplayError> {
+fn replayed(path: &Path, sets: &[&str]) -> Result<replay::Replay, Fault> {
     let recorded = Recorded::read(path).unwrap();
     let sets: Vec<String> = sets.iter().map(|set| (*set).into()).collect();
     let experiment = replay::experiment(&recorded, path, &sets).unwrap();
@@ -566,7 +566,7 @@ fn what_acts_otherwise_is_found_where_it_first_does() {
         "{more:?}"
     );
     let other = replayed(&path, &["seed=1"]).unwrap_err();
-    assert!(matches!(other, ReplayError::Start(Fault::NeverReset { .. })), "{other}");
+    assert!(matches!(other, Fault::NeverReset { .. }), "{other}");
     // As far as it goes, one that was cut is the same.
     let bytes = fs::read(&path).unwrap();
     for share in [0.3, 0.6, 0.9] {
@@ -620,7 +620,7 @@ fn the_program_records_and_replays() {
 fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
     let folder = TempDir::new().unwrap();
     let simulation = Simulation::new(experiment(&[])).unwrap();
-    let active = Entrant::from(planner::by_name("active").unwrap());
+    let active = planner::by_name("active").unwrap();
     let path = recording_path(folder.path(), active, 0);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     let mut kept: Vec<TouchRow> = Vec::new();
@@ -636,7 +636,7 @@ fn a_trial_that_was_interrupted_and_continued_is_played_to_the_same_rows() {
                 false => Ok(()),
             }
         };
-        let job = (active, 0);
+        let job: (u32, &dyn PlannerFactory) = (0, active);
         let row = recorded_trial::run(&simulation, job, Some(&part), &made, &mut interrupt);
         assert_eq!(row.touches, kept);
         assert_eq!(row.touches.len(), after as usize);

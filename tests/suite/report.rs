@@ -229,7 +229,7 @@ fn a_zone_has_no_measures_of_whole_objects() {
     for name in ["summary.csv", "comparison.csv", "equal_error.csv"] {
         told += &fs::read_to_string(folder.path().join(name)).unwrap();
     }
-    for measure in MEASURES.iter().filter(|measure| measure.is_of_shapes) {
+    for measure in MEASURES.iter().filter(|measure| measure.is_of_shapes()) {
         assert!(!told.contains(measure.title), "{measure:?}");
         for name in measure.columns().into_iter().chain([measure.id.into()]) {
             assert!(!told.contains(&format!(",{name},")), "{name}");
@@ -270,7 +270,7 @@ fn a_measure_is_told_wherever_measures_are() {
         assert_eq!(ends.map(has), [aggregate.has_median(); 3], "{measure:?}");
         assert_eq!(has("minus_random_low"), measure.is_error, "{measure:?}");
         // Nothing is told of what no row holds.
-        let is_told = run.rows.iter().any(|row| (measure.of)(row, 20).is_some());
+        let is_told = run.rows.iter().any(|row| measure.of(row, 20).is_some());
         let is_compared = is_told && measure.direction != Direction::Neither;
         assert_eq!(comparison.contains(&format!(",{},", measure.id)), is_compared, "{measure:?}");
         let is_drawn = !matches!(measure.scale, Scale::Undrawn);

@@ -377,8 +377,8 @@ fn verification_touches_hold_a_belief_around_an_object_to_what_it_expects() {
             assert!(touch.difference_m.unwrap().abs() < 1e-9, "{name}: {touch:?}");
         }
         let covered = palpate::experiment::measure::by_id("verification_coverage").unwrap();
-        assert!((covered.of)(&row, 40).unwrap() >= 0.85, "{name}");
+        assert!(covered.of(&row, 40).unwrap() >= 0.85, "{name}");
         let rmse = palpate::experiment::measure::VERIFICATION_RMSE;
-        assert!((rmse.of)(&row, 40).unwrap() < 1e-3, "{name}");
+        assert!(rmse.of(&row, 40).unwrap() < 1e-3, "{name}");
     }
 }

@@ -140,9 +140,7 @@ impl Checked for GpSettings {
                 names.join(", ")
             )
         });
-        if let Some(noise_sd_m) = self.noise_sd_m {
-            rules.number("noise_sd_m", noise_sd_m, 1e-9..=1e3);
-        }
+        rules.given("noise_sd_m", self.noise_sd_m, 1e-9..=1e3);
         if let Some(least_m) = self.noise_sd_min_m {
             rules.number("noise_sd_min_m", least_m, 1e-9..=1e3);
             rules.require("noise_sd_min_m", least_m, self.noise_sd_m.is_none(), || {

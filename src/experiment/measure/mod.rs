@@ -21,191 +21,148 @@ pub static MEASURES: &[Measure] = &[
     CENTRED_R,
     RMSE,
     EDGE_RMSE,
-    measure(Less, "reachable_rmse_m", "RMSE where the finger reaches", MM, |row, n| {
-        metrics(row, n)?.reachable_rmse_m
-    })
-    .aggregated(Aggregate::Median)
-    .drawn(Scale::LogBeside(&UNREACHABLE_RMSE))
-    .untabled()
-    .error(),
+    measure(Less, "reachable_rmse_m", "RMSE where the finger reaches", MM)
+        .from(Source::Metrics(|it| it.reachable_rmse_m))
+        .aggregated(Aggregate::Median)
+        .drawn(Scale::LogBeside(&UNREACHABLE_RMSE))
+        .untabled()
+        .error(),
     UNREACHABLE_RMSE,
-    measure(Less, "max_error_m", "largest error", MM, |row, n| Some(metrics(row, n)?.max_error_m))
+    measure(Less, "max_error_m", "largest error", MM)
+        .from(Source::Metrics(|it| Some(it.max_error_m)))
         .aggregated(Aggregate::Median),
     COVERAGE,
-    measure(Less, "coverage_off", "share in the 95 % band, away from 0.95", PLAIN, |row, n| {
-        Some((metrics(row, n)?.coverage? - HONEST).abs())
-    })
-    .untabled(),
-    measure(Less, "nlpd", "NLPD", PLAIN, |row, n| metrics(row, n)?.nlpd),
-    measure(Less, "presence_brier", "Brier score of where there is a surface", PLAIN, |row, n| {
-        Some(outline(row, n)?.brier)
-    }),
-    measure(More, "silhouette_iou", "silhouette, intersection over union", PLAIN, |row, n| {
-        Some(outline(row, n)?.iou)
-    })
-    .drawn(Scale::UpToOne),
+    measure(Less, "coverage_off", "share in the 95 % band, away from 0.95", SHARE)
+        .from(Source::Metrics(|it| Some((it.coverage? - HONEST).abs())))
+        .untabled(),
+    measure(Less, "nlpd", "NLPD", PLAIN).from(Source::Metrics(|it| it.nlpd)),
+    measure(Less, "presence_brier", "Brier score of where there is a surface", SHARE)
+        .from(Source::Outline(|it| Some(it.brier))),
+    measure(More, "silhouette_iou", "silhouette, intersection over union", SHARE)
+        .from(Source::Outline(|it| Some(it.iou)))
+        .drawn(Scale::UpToOne),
     measure(
         Less,
         "silhouette_wrong",
         "share of the zone on the wrong side of the silhouette",
-        PLAIN,
-        |row, n| Some(outline(row, n)?.wrong_share),
+        SHARE,
     )
+    .from(Source::Outline(|it| Some(it.wrong_share)))
     .untabled(),
     CHAMFER,
-    measure(Less, "chamfer_share", "Chamfer distance, of the diagonal", PERCENT, |row, n| {
-        shape(row, n)?.chamfer_share
-    })
-    .of_shapes(),
-    measure(Less, "reachable_chamfer_m", "distance of what the finger reaches", MM, |row, n| {
-        shape(row, n)?.reachable_chamfer_m
-    })
-    .aggregated(Aggregate::Median)
-    .untabled()
-    .of_shapes(),
-    measure(More, "f_1", "F-score at 1 % of the diagonal", PLAIN, |row, n| {
-        Some(shape(row, n)?.f_1)
-    })
-    .drawn(Scale::UpToOne)
-    .of_shapes(),
-    measure(More, "f_3", "F-score at 3 % of the diagonal", PLAIN, |row, n| {
-        Some(shape(row, n)?.f_3)
-    })
-    .of_shapes(),
-    measure(Neither, "volume_error", "believed volume, too much", PERCENT, |row, n| {
-        shape(row, n)?.volume_error
-    })
-    .of_shapes(),
-    measure(Neither, "area_error", "believed area, too much", PERCENT, |row, n| {
-        Some(shape(row, n)?.area_error)
-    })
-    .of_shapes(),
-    measure(More, "iou", "insides, intersection over union", PLAIN, |row, n| shape(row, n)?.iou)
-        .drawn(Scale::UpToOne)
-        .of_shapes(),
+    measure(Less, "chamfer_share", "Chamfer distance, of the diagonal", PERCENT)
+        .from(Source::Shape(|it| it.chamfer_share)),
+    measure(Less, "reachable_chamfer_m", "distance of what the finger reaches", MM)
+        .from(Source::Shape(|it| it.reachable_chamfer_m))
+        .aggregated(Aggregate::Median)
+        .untabled(),
+    measure(More, "f_1", "F-score at 1 % of the diagonal", SHARE)
+        .from(Source::Shape(|it| Some(it.f_1)))
+        .drawn(Scale::UpToOne),
+    measure(More, "f_3", "F-score at 3 % of the diagonal", SHARE)
+        .from(Source::Shape(|it| Some(it.f_3))),
+    measure(Neither, "volume_error", "believed volume, too much", PERCENT)
+        .from(Source::Shape(|it| it.volume_error)),
+    measure(Neither, "area_error", "believed area, too much", PERCENT)
+        .from(Source::Shape(|it| Some(it.area_error))),
+    measure(More, "iou", "insides, intersection over union", SHARE)
+        .from(Source::Shape(|it| it.iou))
+        .drawn(Scale::UpToOne),
     measure(
         Neither,
         "shape_coverage",
         "share of the surface within two standard deviations",
-        PLAIN,
-        |row, n| shape(row, n)?.coverage,
+        SHARE,
     )
-    .drawn(Scale::UpToOne)
-    .of_shapes(),
-    measure(Less, "path_m", "lateral travel", METRES, TrialRow::path_m).drawn(Scale::Linear),
-    measure(Less, "time_s", "time of the body", SECONDS, |row, n| touch(row, n)?.time_s),
+    .from(Source::Shape(|it| it.coverage))
+    .drawn(Scale::UpToOne),
+    measure(Less, "path_m", "lateral travel", METRES)
+        .from(Source::Trial(TrialRow::path_m))
+        .drawn(Scale::Linear),
+    measure(Less, "time_s", "time of the body", SECONDS).from(Source::Touch(|it| it.time_s)),
     VERIFICATION_RMSE,
-    measure(Less, "verification_nlpd", "NLPD at verification touches", PLAIN, |row, n| {
-        predicted(row, n)?.1
-    }),
+    measure(Less, "verification_nlpd", "NLPD at verification touches", PLAIN)
+        .from(Source::Trial(|row, n| predicted(row, n)?.1)),
     VERIFICATION_COVERAGE,
-    measure(Less, "verification_missed", "verification touches without contact", PLAIN, missed),
+    measure(Less, "verification_missed", "verification touches without contact", SHARE)
+        .from(Source::Trial(missed)),
     REPEATABILITY,
-    measure(Neither, "length_scale_x_m", "length scale along x", MM, |row, n| {
-        length_scale(row, n, 0)
-    })
-    .aggregated(Aggregate::Median)
-    .untabled(),
-    measure(Neither, "length_scale_z_m", "length scale along z", MM, |row, n| {
-        length_scale(row, n, 1)
-    })
-    .aggregated(Aggregate::Median)
-    .untabled(),
+    measure(Neither, "length_scale_x_m", "length scale along x", MM)
+        .from(Source::Touch(|it| length_scale(it, 0)))
+        .aggregated(Aggregate::Median)
+        .untabled(),
+    measure(Neither, "length_scale_z_m", "length scale along z", MM)
+        .from(Source::Touch(|it| length_scale(it, 1)))
+        .aggregated(Aggregate::Median)
+        .untabled(),
 ];
 
 /// The share of the truth that an honest 95 % band holds.
 const HONEST: f64 = 0.95;
 
 /// Eq. 5 of Yi et al. 2016.
-pub const R: Measure =
-    measure(More, "r", "R (Eq. 5)", CORRELATION, |row, n| Some(metrics(row, n)?.r))
-        .drawn(Scale::UpToOne);
+pub const R: Measure = measure(More, "r", "R (Eq. 5)", CORRELATION)
+    .from(Source::Metrics(|it| Some(it.r)))
+    .drawn(Scale::UpToOne);
 
 /// The same after subtracting each one's mean.
-pub const CENTRED_R: Measure =
-    measure(More, "centred_r", "centred R", CORRELATION, |row, n| Some(metrics(row, n)?.centred_r))
-        .drawn(Scale::UpToOne);
+pub const CENTRED_R: Measure = measure(More, "centred_r", "centred R", CORRELATION)
+    .from(Source::Metrics(|it| Some(it.centred_r)))
+    .drawn(Scale::UpToOne);
 
 /// Root mean square error.
-pub const RMSE: Measure =
-    measure(Less, "rmse_m", "RMSE", MM, |row, n| Some(metrics(row, n)?.rmse_m))
-        .aggregated(Aggregate::Both)
-        .drawn(Scale::Log)
-        .error();
+pub const RMSE: Measure = measure(Less, "rmse_m", "RMSE", MM)
+    .from(Source::Metrics(|it| Some(it.rmse_m)))
+    .aggregated(Aggregate::Both)
+    .drawn(Scale::Log)
+    .error();
 
 /// Root mean square error in the outer tenth of the zone.
-pub const EDGE_RMSE: Measure =
-    measure(Less, "edge_rmse_m", "RMSE in the outer tenth", MM, |row, n| {
-        metrics(row, n)?.edge_rmse_m
-    })
+pub const EDGE_RMSE: Measure = measure(Less, "edge_rmse_m", "RMSE in the outer tenth", MM)
+    .from(Source::Metrics(|it| it.edge_rmse_m))
     .aggregated(Aggregate::Median)
     .drawn(Scale::Log)
     .error();
 
 const UNREACHABLE_RMSE: Measure =
-    measure(Less, "unreachable_rmse_m", "RMSE where it does not reach", MM, |row, n| {
-        metrics(row, n)?.unreachable_rmse_m
-    })
-    .aggregated(Aggregate::Median)
-    .untabled();
+    measure(Less, "unreachable_rmse_m", "RMSE where it does not reach", MM)
+        .from(Source::Metrics(|it| it.unreachable_rmse_m))
+        .aggregated(Aggregate::Median)
+        .untabled();
 
 /// Share of the truth inside the 95 % band.
-pub const COVERAGE: Measure =
-    measure(Neither, "coverage", "share in the 95 % band", PLAIN, |row, n| {
-        metrics(row, n)?.coverage
-    })
+pub const COVERAGE: Measure = measure(Neither, "coverage", "share in the 95 % band", SHARE)
+    .from(Source::Metrics(|it| it.coverage))
     .drawn(Scale::UpToOne);
 
 /// Chamfer distance between the believed and the true surface of a whole object.
-pub const CHAMFER: Measure =
-    measure(Less, "chamfer_m", "Chamfer distance", MM, |row, n| shape(row, n)?.chamfer_m)
-        .aggregated(Aggregate::Both)
-        .drawn(Scale::Log)
-        .error()
-        .of_shapes();
+pub const CHAMFER: Measure = measure(Less, "chamfer_m", "Chamfer distance", MM)
+    .from(Source::Shape(|it| it.chamfer_m))
+    .aggregated(Aggregate::Both)
+    .drawn(Scale::Log)
+    .error();
 
 /// Root mean square error at touches that the last belief predicted and did not learn from.
 pub const VERIFICATION_RMSE: Measure =
-    measure(Less, "verification_rmse_m", "RMSE at verification touches", MM, |row, n| {
-        rmse(verified(row, n)?.filter_map(|touch| touch.error_m))
-    })
-    .aggregated(Aggregate::Both);
+    measure(Less, "verification_rmse_m", "RMSE at verification touches", MM)
+        .from(Source::Trial(|row, n| rmse(verified(row, n)?.filter_map(|touch| touch.error_m))))
+        .aggregated(Aggregate::Both);
 
 /// Share of verification touches inside the 95 % band.
-pub const VERIFICATION_COVERAGE: Measure = measure(
-    Neither,
-    "verification_coverage",
-    "verification touches in the 95 % band",
-    PLAIN,
-    |row, n| predicted(row, n)?.0,
-);
+pub const VERIFICATION_COVERAGE: Measure =
+    measure(Neither, "verification_coverage", "verification touches in the 95 % band", SHARE)
+        .from(Source::Trial(|row, n| predicted(row, n)?.0));
 
 /// Root mean square difference of a touch from the one it repeats.
 pub const REPEATABILITY: Measure =
-    measure(Less, "repeatability_m", "difference of repeated touches", MM, |row, n| {
-        rmse(verification(row, n)?.iter().filter_map(|touch| touch.difference_m))
-    })
-    .aggregated(Aggregate::Both);
+    measure(Less, "repeatability_m", "difference of repeated touches", MM)
+        .from(Source::Trial(|row, n| {
+            rmse(verification(row, n)?.iter().filter_map(|touch| touch.difference_m))
+        }))
+        .aggregated(Aggregate::Both);
 
-fn touch(row: &TrialRow, count: u32) -> Option<&TouchRow> {
-    row.touches.get((count as usize).checked_sub(1)?)
-}
-
-fn metrics(row: &TrialRow, count: u32) -> Option<&Metrics> {
-    touch(row, count)?.metrics.as_ref()
-}
-
-fn outline(row: &TrialRow, count: u32) -> Option<&Outline> {
-    touch(row, count)?.outline.as_ref()
-}
-
-fn shape(row: &TrialRow, count: u32) -> Option<&ShapeMetrics> {
-    touch(row, count)?.shape.as_ref()
-}
-
-fn length_scale(row: &TrialRow, count: u32, axis: usize) -> Option<f64> {
-    let fit = touch(row, count)?.fit.as_ref()?;
-    fit.hyperparameters.length_scales.get(axis).copied()
+fn length_scale(touch: &TouchRow, axis: usize) -> Option<f64> {
+    touch.fit.as_ref()?.hyperparameters.length_scales.get(axis).copied()
 }
 
 /// The touches after the last of a trial; `None` unless that is number `touches`.
@@ -237,7 +194,7 @@ fn missed(row: &TrialRow, touches: u32) -> Option<f64> {
 /// The measures that have columns in files about `rows`.
 pub fn in_files(rows: &[TrialRow]) -> impl Iterator<Item = &'static Measure> {
     let has_shape = rows.iter().flat_map(|row| &row.touches).any(|touch| touch.shape.is_some());
-    MEASURES.iter().filter(move |measure| has_shape || !measure.is_of_shapes)
+    MEASURES.iter().filter(move |measure| has_shape || !measure.is_of_shapes())
 }
 
 /// The measure of a name in files.
@@ -265,10 +222,24 @@ pub struct Measure {
     /// Whether it is an error, so that planners are compared in it after every touch, and in the
     /// touches that they need to bring it down.
     pub is_error: bool,
-    /// Whether it is of whole objects: it has no columns in files of runs that explore a zone.
-    pub is_of_shapes: bool,
-    /// Its value after some touches; none where the trial has none.
-    pub of: fn(&TrialRow, u32) -> Option<f64>,
+    /// What it is computed from.
+    pub source: Source,
+}
+
+/// The part of a row that a measure is computed from; a measure has no value where that is missing.
+#[derive(Clone, Copy)]
+pub enum Source {
+    /// The agreement of heights with the truth after a touch.
+    Metrics(fn(&Metrics) -> Option<f64>),
+    /// The agreement of silhouettes after a touch.
+    Outline(fn(&Outline) -> Option<f64>),
+    /// The agreement of closed surfaces after a touch: such a measure has no columns in files of
+    /// runs that explore a zone.
+    Shape(fn(&ShapeMetrics) -> Option<f64>),
+    /// A touch.
+    Touch(fn(&TouchRow) -> Option<f64>),
+    /// A trial and a count of touches.
+    Trial(fn(&TrialRow, u32) -> Option<f64>),
 }
 
 /// A unit in files and for readers.
@@ -282,6 +253,8 @@ pub struct Unit {
     pub per_si: f64,
     /// Decimals shown.
     pub decimals: usize,
+    /// The smallest and the largest value that a row may have, in the SI unit.
+    pub range: [f64; 2],
 }
 
 /// Whether less or more of a measure is better.
@@ -333,13 +306,25 @@ pub enum Scale {
     LogBeside(&'static Measure),
 }
 
-const CORRELATION: Unit = Unit { suffix: "", symbol: "", per_si: 1.0, decimals: 4 };
-const PLAIN: Unit = Unit { decimals: 3, ..CORRELATION };
-const PERCENT: Unit = Unit { symbol: "%", per_si: 100.0, ..PLAIN };
-const MM: Unit = Unit { suffix: "_m", symbol: "mm", per_si: 1e3, decimals: 3 };
+/// Farthest that a place or an error can be, m.
+// heuristic: no robot reaches a thousandth of it.
+pub(super) const FAR_M: f64 = 1e6;
+
+/// Largest number without a unit that a measure can come to, apart from shares and correlations.
+// heuristic: the negative log density of a belief that is far too sure of itself; no larger one has
+// been computed from finite numbers.
+const LARGE: f64 = 1e300;
+
+const PLAIN: Unit =
+    Unit { suffix: "", symbol: "", per_si: 1.0, decimals: 3, range: [-LARGE, LARGE] };
+const CORRELATION: Unit = Unit { decimals: 4, range: [-1.000_001, 1.000_001], ..PLAIN };
+const SHARE: Unit = Unit { range: [0.0, 1.000_001], ..PLAIN };
+const PERCENT: Unit = Unit { symbol: "%", per_si: 100.0, range: [-FAR_M, FAR_M], ..PLAIN };
 /// Metres.
-pub const METRES: Unit = Unit { suffix: "_m", symbol: "m", per_si: 1.0, decimals: 3 };
-const SECONDS: Unit = Unit { suffix: "_s", symbol: "s", per_si: 1.0, decimals: 1 };
+pub const METRES: Unit = Unit { suffix: "_m", symbol: "m", range: [0.0, FAR_M], ..PLAIN };
+const MM: Unit = Unit { symbol: "mm", per_si: 1e3, ..METRES };
+const SECONDS: Unit =
+    Unit { suffix: "_s", symbol: "s", decimals: 1, range: [-LARGE, LARGE], ..PLAIN };
 
 impl Measure {
     /// The columns of its statistics over many trials: its mean with the standard error, its
@@ -365,6 +350,35 @@ impl Measure {
         self.id.strip_suffix(self.unit.suffix).unwrap_or(self.id)
     }
 
+    /// Its value after some touches; `None` where the trial has none.
+    pub fn of(&self, row: &TrialRow, touches: u32) -> Option<f64> {
+        match self.source {
+            Source::Trial(of) => of(row, touches),
+            _ => self.of_touch(row.touches.get((touches as usize).checked_sub(1)?)?),
+        }
+    }
+
+    /// Its value after a touch; `None` of a measure of a trial.
+    pub fn of_touch(&self, touch: &TouchRow) -> Option<f64> {
+        match self.source {
+            Source::Metrics(of) => of(touch.metrics.as_ref()?),
+            Source::Outline(of) => of(touch.outline.as_ref()?),
+            Source::Shape(of) => of(touch.shape.as_ref()?),
+            Source::Touch(of) => of(touch),
+            Source::Trial(_) => None,
+        }
+    }
+
+    /// Whether it is of whole objects.
+    pub fn is_of_shapes(&self) -> bool {
+        matches!(self.source, Source::Shape(_))
+    }
+
+    /// Computed from this.
+    const fn from(self, source: Source) -> Self {
+        Self { source, ..self }
+    }
+
     /// With these statistics over many trials.
     const fn aggregated(self, aggregate: Aggregate) -> Self {
         Self { aggregate, ..self }
@@ -380,11 +394,6 @@ impl Measure {
         Self { is_tabled: false, ..self }
     }
 
-    /// Marks a measure of whole objects.
-    const fn of_shapes(self) -> Self {
-        Self { is_of_shapes: true, ..self }
-    }
-
     /// Marks an error, in which planners are compared after every touch.
     const fn error(self) -> Self {
         Self { is_error: true, ..self }
@@ -397,13 +406,12 @@ impl fmt::Debug for Measure {
     }
 }
 
-/// A measure whose mean is reported and tabled, and which is not drawn.
+/// A measure whose mean is reported and tabled, and which is not drawn; `None` of every trial.
 const fn measure(
     direction: Direction,
     id: &'static str,
     title: &'static str,
     unit: Unit,
-    of: fn(&TrialRow, u32) -> Option<f64>,
 ) -> Measure {
     Measure {
         id,
@@ -414,8 +422,7 @@ const fn measure(
         scale: Scale::Undrawn,
         is_tabled: true,
         is_error: false,
-        is_of_shapes: false,
-        of,
+        source: Source::Trial(|_, _| None),
     }
 }
 

@@ -48,7 +48,7 @@ pub fn paired(
     measure: &Measure,
 ) -> Option<Paired> {
     let values = |planner| {
-        of_planner(rows, planner).filter_map(|row| Some((row.trial, (measure.of)(row, touches)?)))
+        of_planner(rows, planner).filter_map(|row| Some((row.trial, measure.of(row, touches)?)))
     };
     let theirs: HashMap<u32, f64> = values(baseline).collect();
     let pairs: Vec<(f64, f64)> =

@@ -87,7 +87,7 @@ fn interval(
 ) -> Option<[f64; 2]> {
     let all: Vec<f64> = summary::fitted(rows, &point.planner, point.touches)
         .into_iter()
-        .filter_map(|row| (measure.of)(row, point.touches))
+        .filter_map(|row| measure.of(row, point.touches))
         .collect();
     match all.len() == samples.count {
         true => samples.median_interval(&all),

@@ -143,8 +143,7 @@ fn curves(
 ) -> BTreeMap<u32, Curve<f64>> {
     let counts = compared(experiment);
     let curve = |row: &TrialRow| -> Option<Curve<f64>> {
-        let errors: Option<Vec<f64>> =
-            counts.iter().map(|&count| (measure.of)(row, count)).collect();
+        let errors: Option<Vec<f64>> = counts.iter().map(|&count| measure.of(row, count)).collect();
         let start_m = row.path_m(experiment.initial_touches)?;
         let paths_m: Option<Vec<f64>> =
             counts.iter().map(|&count| Some(row.path_m(count)? - start_m)).collect();

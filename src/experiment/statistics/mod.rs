@@ -124,25 +124,6 @@ impl Samples {
     }
 }
 
-/// A statistic of every bootstrap sample of several strata of `sizes`: indices of each, drawn
-/// within it. What is drawn is the same for the same `seed` and `purpose`.
-pub fn resampled_within<T>(
-    sizes: &[usize],
-    (seed, purpose): (u64, &str),
-    mut statistic: impl FnMut(&[Vec<usize>]) -> T,
-) -> Vec<T> {
-    let mut rng = seed::stream(seed, 0, purpose);
-    let mut picks: Vec<Vec<usize>> = sizes.iter().map(|size| vec![0; *size]).collect();
-    (0..RESAMPLES)
-        .map(|_| {
-            for (picks, size) in picks.iter_mut().zip(sizes) {
-                picks.fill_with(|| rng.random_range(0..*size));
-            }
-            statistic(&picks)
-        })
-        .collect()
-}
-
 /// The ends of the middle 95 % of `found`, which is not empty.
 pub fn percentiles_95(mut found: Vec<f64>) -> [f64; 2] {
     found.sort_by(f64::total_cmp);

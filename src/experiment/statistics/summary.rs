@@ -72,7 +72,7 @@ pub fn curve(experiment: &Experiment, rows: &[TrialRow], planner: &str) -> Vec<C
         .filter_map(|touches| {
             let fitted = fitted(rows, planner, touches);
             let of = |measure: &Measure| -> Vec<f64> {
-                fitted.iter().filter_map(|row| (measure.of)(row, touches)).collect()
+                fitted.iter().filter_map(|row| measure.of(row, touches)).collect()
             };
             (!fitted.is_empty()).then(|| CurvePoint {
                 planner: planner.into(),
@@ -100,7 +100,7 @@ pub(in crate::experiment) fn fitted<'a>(
 /// told, else the mean; none if no trial has it.
 pub fn typical(rows: &[TrialRow], planner: &str, touches: u32, measure: &Measure) -> Option<f64> {
     let values: Vec<f64> =
-        of_planner(rows, planner).filter_map(|row| (measure.of)(row, touches)).collect();
+        of_planner(rows, planner).filter_map(|row| measure.of(row, touches)).collect();
     match measure.aggregate.has_median() {
         true => median(&values),
         false => (!values.is_empty()).then(|| mean(&values)),

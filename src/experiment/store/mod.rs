@@ -160,10 +160,12 @@ impl RunFolder {
         rows::scan(&file, experiment, |row, bytes| {
             let id = row.id();
             if experiment.lists(&id) {
-                tally.add(row, experiment);
+                tally.trials += 1;
+                tally.failed.extend(row.failure.map(|reason| (id.clone(), reason)));
             }
             places.push((id, bytes));
         })?;
+        tally.failed.sort_by(|(a, _), (b, _)| rows::order(a, b, experiment));
         if !rows::is_sorted(&places, experiment) {
             places.sort_by(|(a, _), (b, _)| rows::order(a, b, experiment));
             let mut from = File::open(&file).map_err(io_error(&file))?;
@@ -176,29 +178,13 @@ impl RunFolder {
     }
 }
 
-/// What rows came to.
+/// The rows of a run that its experiment lists.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tally {
-    /// How many there are.
+    /// Their number.
     pub trials: usize,
-    /// How many of them failed.
-    pub failed: usize,
-    /// The first that did, and why.
-    pub first: Option<(TrialId, String)>,
-}
-
-impl Tally {
-    fn add(&mut self, row: TrialRow, experiment: &Experiment) {
-        self.trials += 1;
-        let id = row.id();
-        if let Some(reason) = row.failure {
-            self.failed += 1;
-            let is_before = |first: &TrialId| rows::order(&id, first, experiment).is_lt();
-            if self.first.as_ref().is_none_or(|(first, _)| is_before(first)) {
-                self.first = Some((id, reason));
-            }
-        }
-    }
+    /// The trials that failed, in order, and why.
+    pub failed: Vec<(TrialId, String)>,
 }
 
 impl Run {

@@ -3,7 +3,6 @@
 
 use super::files::{RunError, io_error, write_changed, write_whole};
 use crate::experiment::simulation::Simulation;
-use crate::experiment::trial::entrant::Entrant;
 use crate::sim::environment::Shape;
 use palpate_input::files;
 use palpate_input::words::hex;
@@ -58,9 +57,7 @@ impl Content {
             content.add("scene.arm.model", sha256(&bytes), Some(path));
         }
         for name in &experiment.planners {
-            if let Some(Entrant::Planner(factory)) = simulation.planner(name)
-                && let Some(source) = factory.source()
-            {
+            if let Some(source) = simulation.planner(name).and_then(|planner| planner.source()) {
                 content.add(&format!("{PLANNER}{name}"), sha256(source.as_bytes()), None);
             }
         }

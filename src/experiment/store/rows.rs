@@ -2,6 +2,7 @@
 
 use super::files::{RunError, io_error};
 use crate::experiment::experiment::Experiment;
+use crate::experiment::measure::{FAR_M, MEASURES};
 use crate::experiment::trial::row::{TouchRow, TrialId, TrialRow};
 use crate::{files, words};
 use std::cmp::Ordering;
@@ -103,60 +104,15 @@ fn fits(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), St
     Ok(())
 }
 
-/// Farthest that a place or an error can be, m.
-// heuristic: no robot reaches a thousandth of it.
-const FAR_M: f64 = 1e6;
-
-/// Largest number without a unit that a measure can come to, apart from shares and correlations.
-// heuristic: the negative log density of a belief that is far too sure of itself; no larger one has
-// been computed from finite numbers.
-const LARGE: f64 = 1e300;
-
 /// The first number of a touch that no trial can come to, with its name and what is allowed.
 fn impossible(touch: &TouchRow) -> Option<(&'static str, f64, [f64; 2])> {
-    const CORRELATION: [f64; 2] = [-1.000_001, 1.000_001];
-    const SHARE: [f64; 2] = [0.0, 1.000_001];
-    const LENGTH: [f64; 2] = [0.0, FAR_M];
-    let coordinate = |value: f64| ("a coordinate", Some(value), [-FAR_M, FAR_M]);
+    let coordinate = |value: f64| ("a coordinate", value, [-FAR_M, FAR_M]);
     let places = [touch.contact, touch.normal, touch.tip].into_iter().flatten().flatten();
-    let numbers = touch.target.numbers();
-    let places = numbers.into_iter().chain(places).map(coordinate);
-    let metrics = touch.metrics.iter().flat_map(|metrics| {
-        [
-            ("r", Some(metrics.r), CORRELATION),
-            ("centred_r", Some(metrics.centred_r), CORRELATION),
-            ("rmse_m", Some(metrics.rmse_m), LENGTH),
-            ("max_error_m", Some(metrics.max_error_m), LENGTH),
-            ("edge_rmse_m", metrics.edge_rmse_m, LENGTH),
-            ("reachable_rmse_m", metrics.reachable_rmse_m, LENGTH),
-            ("unreachable_rmse_m", metrics.unreachable_rmse_m, LENGTH),
-            ("coverage", metrics.coverage, SHARE),
-            ("nlpd", metrics.nlpd, [-LARGE, LARGE]),
-        ]
-    });
-    let outline = touch.outline.iter().flat_map(|outline| {
-        [
-            ("brier", Some(outline.brier), SHARE),
-            ("iou", Some(outline.iou), SHARE),
-            ("wrong_share", Some(outline.wrong_share), SHARE),
-        ]
-    });
-    let shape = touch.shape.iter().flat_map(|shape| {
-        [
-            ("chamfer_m", shape.chamfer_m, LENGTH),
-            ("chamfer_share", shape.chamfer_share, LENGTH),
-            ("reachable_chamfer_m", shape.reachable_chamfer_m, LENGTH),
-            ("f_1", Some(shape.f_1), SHARE),
-            ("f_3", Some(shape.f_3), SHARE),
-            ("volume_error", shape.volume_error, [-FAR_M, FAR_M]),
-            ("area_error", Some(shape.area_error), [-FAR_M, FAR_M]),
-            ("iou", shape.iou, SHARE),
-            ("coverage", shape.coverage, SHARE),
-        ]
-    });
-    let all = places.chain(metrics).chain(outline).chain(shape);
-    let mut wrong = all.filter_map(|(name, value, allowed)| Some((name, value?, allowed)));
-    wrong.find(|(_, value, [low, high])| !(low..=high).contains(&value))
+    let coordinates = touch.target.numbers().into_iter().chain(places).map(coordinate);
+    let measured = MEASURES
+        .iter()
+        .filter_map(|measure| Some((measure.id, measure.of_touch(touch)?, measure.unit.range)));
+    coordinates.chain(measured).find(|(_, value, [low, high])| !(low..=high).contains(&value))
 }
 
 /// The order of rows: by trial, and the experiment's planners, those not listed last.

@@ -8,9 +8,8 @@ pub mod replay;
 pub mod row;
 mod verification;
 
-pub(super) use oracle::GroundTruth;
+pub(super) use oracle::{GroundTruth, OracleFactory};
 
-use self::entrant::Entrant;
 use self::row::{TouchRow, TrialRow};
 use self::verification::verify;
 use crate::experiment::experiment::Experiment;
@@ -38,19 +37,19 @@ pub struct Touched<'a> {
 /// fault that it returns ends the trial.
 pub type TrialObserver<'a> = dyn FnMut(&Touched) -> Result<(), Fault> + 'a;
 
-/// Runs one trial of an entrant from start to end with the touches of `probe`; calls `observer`
+/// Runs one trial of a planner from start to end with the touches of `probe`; calls `observer`
 /// after each.
 ///
-/// Its row depends on the experiment, the trial's number, the entrant and the probe only.
+/// Its row depends on the experiment, the trial's number, the planner and the probe only.
 pub(in crate::experiment) fn run(
     experiment: &Experiment,
     truth: &GroundTruth,
     probe: &mut dyn Probe,
-    (entrant, trial): (Entrant, u32),
+    (factory, trial): (&dyn PlannerFactory, u32),
     observer: &mut TrialObserver,
 ) -> TrialRow {
-    let mut row = TrialRow::ended(trial, entrant.name(), None);
-    row.failure = explore(experiment, truth, probe, (entrant, &mut row), observer).err();
+    let mut row = TrialRow::ended(trial, factory.name(), None);
+    row.failure = explore(experiment, truth, probe, (factory, &mut row), observer).err();
     row
 }
 
@@ -62,14 +61,14 @@ fn explore(
     experiment: &Experiment,
     truth: &GroundTruth,
     probe: &mut dyn Probe,
-    (entrant, row): (Entrant, &mut TrialRow),
+    (factory, row): (&dyn PlannerFactory, &mut TrialRow),
     observer: &mut TrialObserver,
 ) -> Result<(), String> {
     let (scene, task) = (truth.environment.scene(), truth.environment.task());
     let finger = (&scene.finger, scene.effects.skin.is_some());
     let mut belief = Belief::new(task, finger, &experiment.gp, &experiment.space);
-    let (is_around, name) = (belief.implicit_surface().is_some(), entrant.name());
-    if let Some(why) = entrant.zone_only().filter(|_| is_around) {
+    let (is_around, name) = (belief.implicit_surface().is_some(), factory.name());
+    if let Some(why) = factory.zone_only().filter(|_| is_around) {
         return Err(format!("planner `{name}` does not go around an object: {why}"));
     }
     // The initial touches: random places of a zone, evenly spread directions at an object.
@@ -77,7 +76,7 @@ fn explore(
     let start = start.ok_or("no planner for the initial touches")?;
     let stream = |purpose| seed::stream(experiment.seed, row.trial.into(), purpose);
     let mut start = start.make(&experiment.planning, stream("initial touches"));
-    let mut planner = entrant.make(&experiment.planning, stream(name), truth);
+    let mut planner = factory.make(&experiment.planning, stream(name));
     // Contact normals and tips stand in the rows where the belief observes them.
     let writes_normals = experiment.gp.normals || is_around;
     let writes_tips = experiment.gp.free_space || is_around;

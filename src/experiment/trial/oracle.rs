@@ -1,9 +1,10 @@
 //! The oracle, which chooses touches by the ground truth: it shows how much any planner could gain.
 //!
-//! Only trials make one. A planner is given the belief alone.
+//! Only the ground truth of a simulation makes one. A planner is given the belief alone.
 
 use crate::experiment::measure::shape::TrueShape;
 use crate::experiment::statistics::mean;
+use crate::experiment::trial::entrant::ORACLE;
 use crate::experiment::truth::Truth;
 use crate::sim::Environment;
 use crate::sim::probe::exact;
@@ -13,14 +14,14 @@ use palpate_explore::belief::Belief;
 use palpate_explore::planner::candidates::{Candidates, free_aim};
 use palpate_explore::planner::sample::any_side;
 use palpate_explore::planner::search::Search;
-use palpate_explore::planner::{Plan, PlanError, Planner, PlanningSettings};
+use palpate_explore::planner::{Plan, PlanError, Planner, PlannerFactory, PlanningSettings};
 use palpate_explore::task::{Aim, Target};
 use palpate_geometry::spread::Spot;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
-/// The ground truth that the beliefs of a trial are compared with.
+/// The ground truth that the beliefs of a trial are compared with, and that the oracle sees.
 pub(in crate::experiment) struct GroundTruth {
     /// The scene, with the object's mesh.
     pub(in crate::experiment) environment: Arc<Environment>,
@@ -63,13 +64,26 @@ impl GroundTruth {
     }
 }
 
-/// Tries touches on the ground truth and asks for the one after which the belief is nearest to it.
-pub(super) struct Oracle<'a> {
-    search: Search,
-    truth: &'a GroundTruth,
+/// Makes the oracles of trials with one ground truth.
+pub(in crate::experiment) struct OracleFactory(pub(in crate::experiment) Arc<GroundTruth>);
+
+impl PlannerFactory for OracleFactory {
+    fn name(&self) -> &str {
+        ORACLE
+    }
+
+    fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner> {
+        Box::new(Oracle { search: Search::new(settings, random), truth: Arc::clone(&self.0) })
+    }
 }
 
-impl Planner for Oracle<'_> {
+/// Tries touches on the ground truth and asks for the one after which the belief is nearest to it.
+struct Oracle {
+    search: Search,
+    truth: Arc<GroundTruth>,
+}
+
+impl Planner for Oracle {
     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError> {
         Ok(match belief {
             Belief::HeightField(field) => {
@@ -92,16 +106,7 @@ impl Planner for Oracle<'_> {
     }
 }
 
-impl<'a> Oracle<'a> {
-    /// Makes the oracle of one trial; `rng` is its only randomness.
-    pub(super) fn new(
-        settings: &PlanningSettings,
-        rng: ChaCha8Rng,
-        truth: &'a GroundTruth,
-    ) -> Self {
-        Self { search: Search::new(settings, rng), truth }
-    }
-
+impl Oracle {
     /// The target after which `belief` is nearest to the truth.
     fn best(&self, belief: &Belief, targets: Vec<Target>) -> Option<Target> {
         let is_refitted = self.search.settings.oracle.refit && belief.height_field().is_some();

@@ -3,11 +3,11 @@
 use crate::experiment::simulation::Simulation;
 use crate::experiment::store::{RECORDINGS, resolved_beside};
 use crate::experiment::trial::belief_shape::shapes;
-use crate::experiment::trial::entrant::Entrant;
 use crate::experiment::trial::row::{TouchRow, TrialRow};
 use crate::experiment::trial::{Touched, TrialObserver};
 use nalgebra::{Point3, Vector3};
 use palpate_explore::backend::Fault;
+use palpate_explore::planner::PlannerFactory;
 use palpate_explore::probe::{Contact, Probe, Swept, Touch};
 use palpate_explore::robot::Finger;
 use palpate_explore::task::Approach;
@@ -16,7 +16,7 @@ use std::iter;
 use std::path::{Path, PathBuf};
 
 /// The file of a trial's recording in a run's folder.
-pub fn recording_path(run: &Path, planner: Entrant, trial: u32) -> PathBuf {
+pub fn recording_path(run: &Path, planner: &dyn PlannerFactory, trial: u32) -> PathBuf {
     run.join(RECORDINGS).join(format!("{}-{trial:04}.mcap", planner.name()))
 }
 
@@ -46,12 +46,12 @@ fn part(path: &Path, number: usize) -> PathBuf {
 /// the trial.
 pub fn run(
     simulation: &Simulation,
-    (planner, trial): (Entrant, u32),
+    (trial, planner): (u32, &dyn PlannerFactory),
     path: Option<&Path>,
     made: &[TouchRow],
     observer: &mut TrialObserver,
 ) -> TrialRow {
-    let job = (planner, trial);
+    let job = (trial, planner);
     let row = match path {
         Some(path) => record(simulation, job, path, made, observer),
         None => simulation.probe(trial).map(|mut probe| {
@@ -66,7 +66,7 @@ pub fn run(
 /// A fault before the first touch.
 fn record(
     simulation: &Simulation,
-    (planner, trial): (Entrant, u32),
+    (trial, planner): (u32, &dyn PlannerFactory),
     path: &Path,
     made: &[TouchRow],
     observer: &mut TrialObserver,

@@ -11,7 +11,6 @@ use palpate_input::error::Invalid;
 use palpate_ros::recording::{self, Player, Recorded};
 use serde::Serialize;
 use std::path::Path;
-use thiserror::Error;
 
 /// What came of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -65,17 +64,6 @@ pub enum Difference {
     },
 }
 
-/// Why a recording cannot be replayed.
-#[derive(Debug, Error)]
-pub enum ReplayError {
-    /// Its planner is unknown, or a touch in it cannot be read.
-    #[error(transparent)]
-    Invalid(#[from] Invalid),
-    /// The robot cannot be brought to the recording's start.
-    #[error(transparent)]
-    Start(#[from] Fault),
-}
-
 /// The experiment of a recording that lies at `path`, after `--set` assignments.
 ///
 /// # Errors
@@ -92,8 +80,9 @@ pub fn experiment(
 /// [`experiment`](experiment()).
 ///
 /// # Errors
-/// If it cannot be begun.
-pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, ReplayError> {
+/// If its planner is unknown, a touch in it cannot be read, or the robot cannot be brought to the
+/// recording's start.
+pub fn replay(simulation: &Simulation, recorded: &Recorded) -> Result<Replay, Fault> {
     let about = &recorded.about;
     let planner = simulation.planner(&about.planner).ok_or_else(|| {
         let name = &about.planner;

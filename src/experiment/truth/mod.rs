@@ -78,14 +78,9 @@ const TRIANGLES: usize = 20_000;
 const CALIBRATED: usize = 4;
 
 impl Truth {
-    /// Reads the environment's surface on a grid of `per_side` places along each side of the zone.
-    pub fn sample(environment: &Environment, per_side: usize) -> Self {
-        Self::sample_telling(environment, per_side, &|_| ())
-    }
-
-    /// Samples like [`sample`](Self::sample); `tell` is called with the name of each step, as it
-    /// begins.
-    pub fn sample_telling(environment: &Environment, per_side: usize, tell: &dyn Fn(&str)) -> Self {
+    /// Reads the environment's surface on a grid of `per_side` places along each side of the zone;
+    /// `tell` is called with the name of each step, as it begins.
+    pub fn sample(environment: &Environment, per_side: usize, tell: &dyn Fn(&str)) -> Self {
         let Some(zone) = environment.task().zone() else {
             return Self::around(environment.mesh());
         };

@@ -41,9 +41,7 @@ impl Checked for ScanTruth {
         rules.require("scan", "\"\"", named, || "the name of a cloud.csv or cloud.ply".into());
         let enough = (3..=1000).contains(&self.neighbours);
         rules.require("neighbours", self.neighbours, enough, || "3 to 1000".into());
-        if let Some(within_m) = self.within_m {
-            rules.number("within_m", within_m, 1e-6..=1.0);
-        }
+        rules.given("within_m", self.within_m, 1e-6..=1.0);
     }
 }
 

@@ -50,7 +50,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
 
 /// Standard deviation that a touch asked for at `place` could still remove.
 fn deviation_m(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> f64 {
-    belief.explorable_variance(place, &mut [], scratch).sqrt()
+    belief.explorable().map_or(f64::NAN, |known| known.variance(place, scratch).sqrt())
 }
 
 /// Where the deviation is largest: what the planner found, or else the largest of `read`.

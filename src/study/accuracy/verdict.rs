@@ -63,7 +63,7 @@ pub fn advantages_m(
         return Ok(Vec::new());
     };
     let environment = Arc::new(Environment::build(scene.clone())?);
-    let truth = Truth::sample(&environment, GRID);
+    let truth = Truth::sample(&environment, GRID, &|_| ());
     let experiment = Experiment::on(scene, &names, trials.end, touches);
     let is_known = truth.is_known();
     let Some(simulation) =

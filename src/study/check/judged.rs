@@ -30,7 +30,7 @@ fn log(value: f64) -> f64 {
 /// The error that trials are judged by, in metres: over a zone the RMSE, around a whole object the
 /// Chamfer distance; none where it was not taken.
 fn error_m(row: &TrialRow, touches: u32) -> Option<f64> {
-    (RMSE.of)(row, touches).or_else(|| (CHAMFER.of)(row, touches))
+    RMSE.of(row, touches).or_else(|| CHAMFER.of(row, touches))
 }
 
 fn share(row: &TrialRow, of: &Experiment, is_it: fn(&TouchRow) -> bool) -> Option<f64> {
@@ -53,7 +53,7 @@ pub static JUDGED: &[Judged] = &[
         error_m(row, of.touches).map(log)
     }),
     Judged::log("log_1_minus_centred_r", "1 − centred R after the last touch", |row, of| {
-        (CENTRED_R.of)(row, of.touches).map(|r| log(1.0 - r))
+        CENTRED_R.of(row, of.touches).map(|r| log(1.0 - r))
     }),
     Judged::log("log_path", "lateral travel", |row, of| row.path_m(of.touches).map(log)),
     Judged::share("missed", "share of touches that met nothing", |row, of| {

@@ -80,9 +80,7 @@ impl Checked for SpaceSettings {
         rules.interval("slope_noise", self.slope_noise, 1e-6..=100.0);
         rules.number("free_places", self.free_places.into(), 0.0..=16.0);
         rules.number("widening", self.widening, 0.1..=10.0);
-        if let Some(offset_m) = self.offset_m {
-            rules.number("offset_m", offset_m, 0.0..=0.1);
-        }
+        rules.given("offset_m", self.offset_m, 0.0..=0.1);
         rules.number("compared_every", self.compared_every.into(), 1.0..=1e6);
         rules.number("cells", self.cells.into(), 8.0..=256.0);
     }

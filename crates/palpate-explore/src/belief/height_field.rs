@@ -11,7 +11,7 @@ use palpate_gp::fit::Choice;
 use palpate_gp::fit::Fit;
 use palpate_gp::inducing::Induced;
 use palpate_gp::math::normal::BAND_95;
-use palpate_gp::posterior::{Posterior, Scratch};
+use palpate_gp::posterior::Posterior;
 use palpate_gp::{Hyperparameters, Observation, Observations, Range, SearchBox, Slope, TouchNoise};
 
 /// A contact farther than this from its target, in units of the zone's sides, leaves the target
@@ -255,7 +255,8 @@ impl HeightField {
     }
 
     /// What a further touch would start from: the posterior, given also that targets missed, or
-    /// contacted elsewhere, are no news. Its variance counts; its mean means nothing.
+    /// contacted elsewhere, are no news. Its variance is what a touch could still remove; its mean
+    /// means nothing.
     pub fn explorable(&self) -> Option<&Posterior> {
         self.explored.as_ref().or(self.surface.as_ref())
     }
@@ -268,33 +269,6 @@ impl HeightField {
     /// Every target asked for so far.
     pub fn targets(&self) -> &[Vec<f64>] {
         &self.targets
-    }
-
-    /// Variance of [`explorable`](Self::explorable) at `place`, what a touch asked for there could
-    /// still remove, with its gradient unless that is empty; NaN before the first fit.
-    pub fn explorable_variance(
-        &self,
-        place: &[f64],
-        gradient: &mut [f64],
-        scratch: &mut Scratch,
-    ) -> f64 {
-        match self.explorable() {
-            Some(posterior) if gradient.is_empty() => posterior.variance(place, scratch),
-            Some(posterior) => posterior.variance_gradient(place, gradient, scratch),
-            None => f64::NAN,
-        }
-    }
-
-    /// The same at each of `places`, with the gradients if there is room for them.
-    pub fn explorable_variances(
-        &self,
-        places: &[Vec<f64>],
-        gradients: &mut [Vec<f64>],
-    ) -> Vec<f64> {
-        match self.explorable() {
-            Some(posterior) => posterior.variances(places, gradients),
-            None => vec![f64::NAN; places.len()],
-        }
     }
 }
 

@@ -19,10 +19,12 @@ pub(super) const ENTRY: Entry = Entry {
 /// The variance has its maximum where its root has, and its gradient is finite everywhere.
 fn plan(search: &mut Search, belief: &Belief) -> Plan {
     match belief {
-        Belief::HeightField(field) if field.surface().is_none() => search.anywhere(field.zone()),
-        Belief::HeightField(field) => {
-            search.plan(field, |places, gradients| field.explorable_variances(places, gradients))
-        }
+        Belief::HeightField(field) => match field.explorable() {
+            None => search.anywhere(field.zone()),
+            Some(known) => {
+                search.plan(field, |places, gradients| known.variances(places, gradients))
+            }
+        },
         Belief::ImplicitSurface(surface) => {
             Candidates::choose(surface, &mut search.rng, |candidates| {
                 candidates.all.iter().map(|candidate| candidate.offset_m).collect()

@@ -43,13 +43,13 @@ pub fn any_side(scope: &Scope, rng: &mut ChaCha8Rng) -> Aim {
 /// A uniformly random point of a ball.
 pub(super) fn in_ball(ball: &Ball, rng: &mut ChaCha8Rng) -> Point3<f64> {
     let [u, v, w]: [f64; 3] = rng.random();
-    let outward_w = side(&[u, v]);
+    let outward_w = outward(&[u, v]);
     ball.centre_w + outward_w * (ball.radius_m * w.cbrt())
 }
 
-/// From the first side, as [`from_side`] takes one, that can be reached.
+/// From the first of the sides at the ball's centre that can be reached.
 fn reached(scope: &Scope, mut side: impl FnMut() -> Vec<f64>) -> Aim {
-    let mut next = || from_side(&scope.ball, &side());
+    let mut next = || Aim::against(scope.ball.centre_w, &outward(&side()));
     let first = next();
     std::iter::once(first)
         .chain(std::iter::repeat_with(next).take(TRIED))
@@ -57,14 +57,9 @@ fn reached(scope: &Scope, mut side: impl FnMut() -> Vec<f64>) -> Aim {
         .unwrap_or(first)
 }
 
-/// From the side of the sphere that a place of the unit square stands for, at the ball's centre;
-/// equal areas are equal areas: z = 1 − 2u at the longitude 2πv.
-fn from_side(ball: &Ball, at: &[f64]) -> Aim {
-    Aim::against(ball.centre_w, &side(at))
-}
-
-/// The unit vector of a side.
-fn side(at: &[f64]) -> Vector3<f64> {
+/// The unit vector of the side of a sphere at a place of the unit square. The map keeps areas:
+/// z = 1 − 2u at the longitude 2πv.
+fn outward(at: &[f64]) -> Vector3<f64> {
     let [u, v] = [0, 1].map(|i| at.get(i).copied().unwrap_or(0.5));
     let up = 1.0 - 2.0 * u;
     let beside = (1.0 - up * up).max(0.0).sqrt();

@@ -227,5 +227,6 @@ fn stalled(belief: &HeightField, place: &[f64]) -> Option<Stall> {
 }
 
 fn variance(belief: &HeightField, place: &[f64]) -> f64 {
-    belief.explorable_variance(place, &mut [], &mut Scratch::default())
+    let known = belief.explorable();
+    known.map_or(f64::NAN, |known| known.variance(place, &mut Scratch::default()))
 }

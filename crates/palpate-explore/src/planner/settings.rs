@@ -150,9 +150,7 @@ impl Checked for PlanningSettings {
         rules.number("integrated_variance.places", places.into(), 1.0..=65536.0);
         rules.number("silhouette.places", self.silhouette.places.into(), 1.0..=65536.0);
         rules.number("silhouette.candidates", self.silhouette.candidates.into(), 1.0..=65536.0);
-        if let Some(touch_way_m) = self.silhouette.touch_way_m {
-            rules.number("silhouette.touch_way_m", touch_way_m, 1e-6..=1e6);
-        }
+        rules.given("silhouette.touch_way_m", self.silhouette.touch_way_m, 1e-6..=1e6);
         rules.number("oracle.candidates", self.oracle.candidates.into(), 1.0..=65536.0);
         rules.number("slope.weight", self.slope.weight, 0.0..=1e3);
         rules.number("travel.tour", self.travel.tour.into(), 1.0..=100.0);

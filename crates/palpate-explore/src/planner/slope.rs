@@ -23,7 +23,9 @@ pub(super) const ENTRY: Entry = Entry {
 const MEAN_PLACES: u32 = 256;
 
 fn plan(search: &mut Search, belief: &HeightField) -> Plan {
-    let Some(surface) = belief.surface() else { return search.anywhere(belief.zone()) };
+    let (Some(surface), Some(known)) = (belief.surface(), belief.explorable()) else {
+        return search.anywhere(belief.zone());
+    };
     let mut scratch = Scratch::default();
     let places = sobol::places(belief.zone(), MEAN_PLACES, 0);
     let slopes = places.iter().map(|place| slope(surface, place, &mut scratch));
@@ -32,7 +34,7 @@ fn plan(search: &mut Search, belief: &HeightField) -> Plan {
     // A flat belief is steep nowhere.
     let per_slope = if mean > 0.0 { weight / mean } else { 0.0 };
     let score = search.differentiated(belief.zone(), |places| {
-        let variances = belief.explorable_variances(places, &mut []);
+        let variances = known.variances(places, &mut []);
         let steep = places.iter().map(|place| slope(surface, place, &mut scratch));
         let each = variances.iter().zip(steep);
         each.map(|(variance, slope)| variance.sqrt() * (1.0 + per_slope * slope)).collect()

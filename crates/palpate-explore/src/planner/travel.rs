@@ -66,18 +66,15 @@ impl Travel {
 
     /// The places of a tour, at least one: each where σ is largest given touches at those before.
     fn largest(&self, field: &HeightField) -> Vec<Vec<f64>> {
-        let (_, first) = self.search.maximum(field.zone(), |places, gradients| {
-            field.explorable_variances(places, gradients)
-        });
-        let mut places = vec![first];
+        let mut places: Vec<Vec<f64>> = Vec::new();
         let mut known = field.explorable().cloned();
-        for _ in 1..self.search.settings.travel.tour {
-            let last = places.last().map(Vec::as_slice);
-            known = known.and_then(|known| known.fantasize(last.into_iter()).ok());
-            let Some(posterior) = &known else { break };
+        while let Some(posterior) = &known {
             let (_, place) = self
                 .search
                 .maximum(field.zone(), |places, gradients| posterior.variances(places, gradients));
+            let is_last = places.len() + 1 >= self.search.settings.travel.tour as usize;
+            let after = || posterior.fantasize([place.as_slice()].into_iter()).ok();
+            known = if is_last { None } else { after() };
             places.push(place);
         }
         places

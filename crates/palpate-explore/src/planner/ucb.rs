@@ -10,11 +10,13 @@ pub(super) const ENTRY: Entry = Entry {
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
         over_zone(move |belief| {
-            let Some(surface) = belief.surface() else { return search.anywhere(belief.zone()) };
+            let (Some(surface), Some(known)) = (belief.surface(), belief.explorable()) else {
+                return search.anywhere(belief.zone());
+            };
             let sds = search.settings.ucb.sds;
             let score = search.differentiated(belief.zone(), |places| {
                 let means = surface.means(places.iter().map(Vec::as_slice));
-                let variances = belief.explorable_variances(places, &mut []);
+                let variances = known.variances(places, &mut []);
                 let each = means.iter().zip(variances);
                 each.map(|(mean, variance)| mean + sds * variance.sqrt()).collect()
             });

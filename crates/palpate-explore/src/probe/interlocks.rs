@@ -20,11 +20,6 @@ pub fn interlocked(
     object: Option<OrientedBox>,
     settings: &InterlockSettings,
 ) -> Result<Interlocked, Fault> {
-    Interlocked::new(body, &site(robot, task, object), settings)
-}
-
-/// What the interlocks are told.
-fn site(robot: &Robot, task: &Task, object: Option<OrientedBox>) -> Site {
     let touch = task.touch();
     let home: Point3<f64> = robot.chain.forward(&robot.chain.home).translation.vector.into();
     let (mut low, mut high) = (home, home);
@@ -51,12 +46,13 @@ fn site(robot: &Robot, task: &Task, object: Option<OrientedBox>) -> Site {
             }
         }
     }
-    Site {
+    let site = Site {
         robot: robot.clone(),
         tip_w: Some([low, high]),
         farthest,
         object,
         touch_force_n: touch.force_limit_n,
         travel_m_s: touch.travel_m_s.max(touch.approach_m_s),
-    }
+    };
+    Interlocked::new(body, &site, settings)
 }

@@ -12,19 +12,6 @@ use std::ops::RangeInclusive;
 /// Distance that the finger's hull goes beyond the farthest depth before it turns back; chosen.
 pub const BEYOND_M: f64 = 0.01;
 
-/// Where the line over a point along a direction enters a sphere of this centre and radius and
-/// where it leaves it, counted from the point; twice where it is nearest, if it passes beside.
-fn chord_m(
-    (centre_w, radius_m): (&Point3<f64>, f64),
-    (p_w, ahead_w): (&Point3<f64>, &UnitVector3<f64>),
-) -> [f64; 2] {
-    let to_centre_w = centre_w - p_w;
-    let along_m = to_centre_w.dot(ahead_w);
-    let beside2 = to_centre_w.norm_squared() - along_m * along_m;
-    let half_m = (radius_m * radius_m - beside2).max(0.0).sqrt();
-    [along_m - half_m, along_m + half_m]
-}
-
 /// What a probe is told of a touch: the centre of the fingertip's hemisphere comes over `p_near_w`
 /// and goes straight on over `p_far_w`, wherever the surface between them is.
 ///
@@ -101,12 +88,8 @@ impl Checked for Around {
         if let Some(centre_m) = self.centre_m {
             rules.numbers("centre_m", &centre_m, -REACH_M..=REACH_M);
         }
-        if let Some(radius_m) = self.radius_m {
-            rules.number("radius_m", radius_m, RADIUS_M);
-        }
-        if let Some(lowest_m) = self.lowest_m {
-            rules.number("lowest_m", lowest_m, -REACH_M..=REACH_M);
-        }
+        rules.given("radius_m", self.radius_m, RADIUS_M);
+        rules.given("lowest_m", self.lowest_m, -REACH_M..=REACH_M);
     }
 }
 
@@ -151,9 +134,13 @@ impl Ball {
     }
 
     /// Where the line of an aim enters the ball and leaves it, counted from the point that is aimed
-    /// at along its direction.
+    /// at along its direction; twice where it is nearest, if it passes beside.
     pub fn chord_m(&self, aim: &Aim) -> [f64; 2] {
-        chord_m((&self.centre_w, self.radius_m), (&aim.p_w, &aim.ahead_w))
+        let to_centre_w = self.centre_w - aim.p_w;
+        let along_m = to_centre_w.dot(&aim.ahead_w);
+        let beside2 = to_centre_w.norm_squared() - along_m * along_m;
+        let half_m = (self.radius_m * self.radius_m - beside2).max(0.0).sqrt();
+        [along_m - half_m, along_m + half_m]
     }
 
     /// The way of `finger` straight over the point, from where the line enters the ball to where it
@@ -185,7 +172,7 @@ impl Ball {
     /// Where the straight line that comes to `p_w` along `ahead_w` enters the ball; the point
     /// nearest to the centre, if it passes beside it.
     pub fn entrance_w(&self, p_w: &Point3<f64>, ahead_w: &UnitVector3<f64>) -> Point3<f64> {
-        p_w + ahead_w.scale(chord_m((&self.centre_w, self.radius_m), (p_w, ahead_w))[0])
+        p_w + ahead_w.scale(self.chord_m(&Aim { p_w: *p_w, ahead_w: *ahead_w })[0])
     }
 
     /// How deep `p_w` is in the ball; negative outside.

@@ -105,7 +105,7 @@ impl Task {
     ) -> Result<Self, Invalid> {
         let region = region.into();
         let depth_m = match &region {
-            Region::Zone(zone) => zone.depth_m.ok_or_else(no_depth)?,
+            Region::Zone(zone) => zone.depth_m.ok_or_else(|| Invalid::new(NO_DEPTH))?,
             Region::Ball(_) => [0.0; 2],
         };
         let (finger, cells) = (finger.clone(), cells());
@@ -226,12 +226,9 @@ impl PartialEq for Task {
     }
 }
 
-fn no_depth() -> Invalid {
-    Invalid::new(
-        "zone.depth_m is missing: nearest and farthest depth along the approach, in metres, at \
-         which there may be something to touch",
-    )
-}
+/// A zone that does not say its depth.
+const NO_DEPTH: &str = "zone.depth_m is missing: nearest and farthest depth along the approach, \
+                        in metres, at which there may be something to touch";
 
 /// Directions from which an object's middle is tried, to say what is out of reach; chosen.
 pub const DIRECTIONS: usize = 64;

@@ -87,9 +87,7 @@ impl TouchSettings {
 
 impl Checked for TouchSettings {
     fn check(&self, rules: &mut Rules) {
-        if let Some(period_s) = self.period_s {
-            rules.number("period_s", period_s, 1e-4..=0.1);
-        }
+        rules.given("period_s", self.period_s, 1e-4..=0.1);
         rules.number("travel_m_s", self.travel_m_s, 1e-4..=1.0);
         rules.number("approach_m_s", self.approach_m_s, 1e-4..=1.0);
         rules.number("standoff_m", self.standoff_m, 1e-4..=1.0);

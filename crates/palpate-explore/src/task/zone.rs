@@ -57,9 +57,7 @@ impl Checked for Zone {
                 format!("at least {SIDE_MIN_M} m wide")
             });
         }
-        if let Some(datum_y_m) = self.datum_y_m {
-            rules.number("datum_y_m", datum_y_m, -REACH_M..=REACH_M);
-        }
+        rules.given("datum_y_m", self.datum_y_m, -REACH_M..=REACH_M);
         if let Some(depth_m) = self.depth_m {
             rules.interval("depth_m", depth_m, -REACH_M..=REACH_M);
         }

@@ -66,7 +66,7 @@ fn active_finds_the_largest_explorable_variance() {
             let mut scratch = Scratch::default();
             let grid = zone.grid(per_side).into_iter();
             let best = grid
-                .map(|place| belief.explorable_variance(&place, &mut [], &mut scratch).sqrt())
+                .map(|place| belief.explorable().unwrap().variance(&place, &mut scratch).sqrt())
                 .fold(0.0, f64::max);
             let share = plan.sd_m.unwrap() / best;
             plans += 1;
@@ -211,7 +211,7 @@ fn finds(name: &str, formula: impl for<'a> Fn(&'a HeightField, &[Vec<f64>]) -> F
 
 fn mean_sd(belief: &HeightField, place: &[f64], scratch: &mut Scratch) -> (f64, f64) {
     let mean = belief.surface().unwrap().mean(place, scratch);
-    (mean, belief.explorable_variance(place, &mut [], scratch).sqrt())
+    (mean, belief.explorable().unwrap().variance(place, scratch).sqrt())
 }
 
 #[test]

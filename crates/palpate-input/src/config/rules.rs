@@ -43,6 +43,13 @@ impl Rules {
         self.require(key, value, allowed.contains(&value), described);
     }
 
+    /// As [`number`](Self::number), of a key that may be left out.
+    pub fn given(&mut self, key: &str, value: Option<f64>, allowed: RangeInclusive<f64>) {
+        if let Some(value) = value {
+            self.number(key, value, allowed);
+        }
+    }
+
     /// Each entry of `key` must be a number in `allowed`.
     pub fn numbers(&mut self, key: &str, values: &[f64], allowed: RangeInclusive<f64>) {
         for (i, &value) in values.iter().enumerate() {

@@ -143,7 +143,7 @@ impl Servo {
         mut path: Path,
         alert: bool,
     ) -> Result<Option<ApproachEnd>, Fault> {
-        let to = path.to();
+        let to = path.to;
         // From the first reading on: the clock of a real arm goes on while the next touch is
         // thought about.
         let mut deadline_s = None;
@@ -152,13 +152,13 @@ impl Servo {
             let goal = path.advance(period_s);
             self.tick(&goal)?;
             let time_s = self.time_s;
-            let deadline_s = *deadline_s.get_or_insert(time_s + path.patience_s());
+            let deadline_s = *deadline_s.get_or_insert(time_s + path.pace.patience_s());
             if let Some(end) = self.monitor.approach_end().filter(|_| alert) {
                 return Ok(Some(end));
             }
             let here = self.x_wt();
             let away = here.translation.vector - to.translation.vector;
-            if path.is_done() && away.norm() < ARRIVED_M && path.has_turned(&here) {
+            if path.pace.is_done() && away.norm() < ARRIVED_M && path.has_turned(&here) {
                 return Ok(None);
             }
             if time_s > deadline_s {
@@ -234,10 +234,10 @@ impl Servo {
             let qdot = qdot.map_err(|cause| Fault::no_command(self.time_s, cause))?;
             self.carry_out(&qdot)?;
             let (time_s, q) = (self.time_s, &self.q);
-            let deadline_s = *deadline_s.get_or_insert(time_s + line.patience_s());
+            let deadline_s = *deadline_s.get_or_insert(time_s + line.pace.patience_s());
             let home = self.robot.chain.start();
             let is_home = q.iter().zip(home).all(|(q, home)| (q - home).abs() < HOME_RAD);
-            if line.is_done() && is_home {
+            if line.pace.is_done() && is_home {
                 return Ok(());
             }
             if time_s > deadline_s {

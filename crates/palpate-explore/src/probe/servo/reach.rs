@@ -314,14 +314,11 @@ impl ArmReach {
     /// Where the joints are after `paths` from `q`; none if it does not come along one of them.
     fn follow(
         &self,
-        mut q: Joints,
+        q: Joints,
         paths: impl IntoIterator<Item = Path>,
         clear: &Clear,
     ) -> Option<Joints> {
-        for path in paths {
-            q = self.follow_one(q, path, clear)?;
-        }
-        Some(q)
+        paths.into_iter().try_fold(q, |q, path| self.follow_one(q, path, clear))
     }
 
     fn follow_one(&self, mut q: Joints, mut path: Path, clear: &Clear) -> Option<Joints> {
@@ -340,7 +337,7 @@ impl ArmReach {
             if is_stuck || !self.is_clear(&q, clear, is_approach) || !self.is_apart(&stops, clear) {
                 return None;
             }
-            if path.is_done() {
+            if path.pace.is_done() {
                 if away_m < NEAR_M && away_rad < NEAR_RAD {
                     return Some(q);
                 }

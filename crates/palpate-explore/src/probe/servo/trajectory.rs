@@ -17,10 +17,11 @@ const TURNED_RAD: f64 = 2e-3;
 /// A movement of the fingertip with an end, straight or around a sphere.
 pub(super) struct Path {
     from: Vector3<f64>,
-    to: Isometry3<f64>,
+    /// Where it ends.
+    pub(super) to: Isometry3<f64>,
     /// `None` of a straight movement.
     round: Option<Round>,
-    pace: Pace,
+    pub(super) pace: Pace,
 }
 
 impl Path {
@@ -35,21 +36,6 @@ impl Path {
         let (from, to) = (round.from.translation.vector, round.to);
         let pace = Pace::new(round.length_m(), speed_m_s);
         Self { from, to, round: Some(round), pace }
-    }
-
-    /// Where it ends.
-    pub(super) fn to(&self) -> Isometry3<f64> {
-        self.to
-    }
-
-    /// Longest time it may take before something is wrong.
-    pub(super) fn patience_s(&self) -> f64 {
-        self.pace.patience_s()
-    }
-
-    /// Whether the point has arrived.
-    pub(super) fn is_done(&self) -> bool {
-        self.pace.is_done()
     }
 
     /// Whether it is straight.
@@ -86,7 +72,7 @@ impl Path {
 const ACCELERATION_M_S2: f64 = 0.5;
 
 /// How far a point has run that speeds up and slows down evenly.
-struct Pace {
+pub(super) struct Pace {
     length_m: f64,
     speed_m_s: f64,
     travelled_m: f64,
@@ -100,7 +86,7 @@ impl Pace {
     }
 
     /// Whether it has arrived.
-    fn is_done(&self) -> bool {
+    pub(super) fn is_done(&self) -> bool {
         self.travelled_m >= self.length_m
     }
 
@@ -122,7 +108,7 @@ impl Pace {
     }
 
     /// Longest time it may take before something is wrong; chosen: four times what it should.
-    fn patience_s(&self) -> f64 {
+    pub(super) fn patience_s(&self) -> f64 {
         let least_s = self.length_m / self.speed_m_s + self.speed_m_s / ACCELERATION_M_S2;
         4.0 * least_s + 2.0
     }
@@ -289,7 +275,7 @@ const STEPS: usize = 64;
 pub(super) struct Line {
     from: Joints,
     by: Joints,
-    pace: Pace,
+    pub(super) pace: Pace,
 }
 
 impl Line {
@@ -317,16 +303,6 @@ impl Line {
         };
         let length_m = self.pace.length_m;
         [self.from + self.by * (travelled_m / length_m), self.by * (now_m_s / length_m)]
-    }
-
-    /// Whether it has been run to its end.
-    pub(super) fn is_done(&self) -> bool {
-        self.pace.is_done()
-    }
-
-    /// Longest time it may take before something is wrong.
-    pub(super) fn patience_s(&self) -> f64 {
-        self.pace.patience_s()
     }
 }
 
@@ -374,10 +350,10 @@ mod tests {
             // Of steps whose length is measured along their chords.
             prop_assert!(postures.windows(2).all(|two| moved_m(&two[0], &two[1]) < 0.01 * 1.02));
             let (mut q, dt_s) = (from, 0.01);
-            while !line.is_done() {
+            while !line.pace.is_done() {
                 let [next, qdot] = line.advance(dt_s);
                 prop_assert!(moved_m(&q, &next) < 0.1 * dt_s * 1.02);
-                prop_assert!(line.is_done() || (qdot * dt_s - (next - q)).amax() < 1e-9);
+                prop_assert!(line.pace.is_done() || (qdot * dt_s - (next - q)).amax() < 1e-9);
                 q = next;
             }
             prop_assert!((q - to).amax() < 1e-12);
