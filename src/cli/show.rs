@@ -42,8 +42,8 @@ Examples:
 In the window stand arm, finger and object, and a small ball at every contact found. Drag with the mouse to turn and move, \
 F1 lists the keys, Control+Q or closing the window ends the trial. It needs X11 or Wayland with OpenGL.")]
 pub(super) struct Args {
-    /// A mesh (.obj, .gltf, .glb, .stl, .ply), a scene or an experiment (.toml), the name of a scene
-    /// in scenes/, or a run's folder.
+    /// A mesh (.obj, .gltf, .glb, .stl, .ply), a scene or an experiment (.toml), the name of a
+    /// scene in scenes/, or a run's folder.
     path: PathBuf,
     /// Unit of a mesh file's numbers [default: m].
     #[arg(long, value_name = "UNIT")]

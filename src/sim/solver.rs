@@ -9,8 +9,8 @@ const LONGEST_STEP_S: f64 = 0.002;
 
 /// Longest step of an [explicit](Integrator::is_explicit) integrator with an arm. The largest rate
 /// of the PA-10's servos, the largest eigenvalue of M⁻¹ diag(kv), is 1740 /s (link set A: 1890 /s)
-/// over 3000 random postures (`tests/suite/rigid.rs`); Euler's steps are stable below 2 over that, Runge
-/// and Kutta's below 2.79.
+/// over 3000 random postures (`tests/suite/rigid.rs`); Euler's steps are stable below 2 over that,
+/// Runge and Kutta's below 2.79.
 const LONGEST_EXPLICIT_STEP_S: f64 = 0.001;
 
 /// How far a control period may be off a whole number of steps, in steps (chosen: rounding).

@@ -127,7 +127,11 @@ fn a_damaged_row_is_faulted_at_its_line() {
             "\"length_scales\":[".into(),
             "a fit of 1 length scales",
         ),
-        (format!("\"length_scales\":[{length}"), "\"length_scales\":[-0.1".into(), "not positive"),
+        (
+            format!("\"length_scales\":[{length}"),
+            "\"length_scales\":[-0.1".into(),
+            "is -0.1; allowed is 0 to 1000000",
+        ),
         ("\"trial\":1".into(), "\"trial\":\"x\"".into(), "column 12: allowed is a whole number"),
         ("\"contact\":[".into(), "\"contact\":[1,".into(), "column "),
         ("\"planner\"".into(), "\"planer\"".into(), "missing field `planner`"),

@@ -89,7 +89,7 @@ fn fits(touch: &TouchRow, [coordinates, dimension]: [usize; 2]) -> Result<(), St
         return Err(format!("a target of {target} coordinates where {coordinates} are needed"));
     }
     if let Some((name, value, [low, high])) = impossible(touch) {
-        return Err(format!("{name} is {value:e}; allowed is {low:e} to {high:e}"));
+        return Err(format!("{name} is {value}; allowed is {low} to {high}"));
     }
     let Some(fit) = &touch.fit else { return Ok(()) };
     let found = &fit.hyperparameters;

@@ -40,7 +40,14 @@ pub fn compile(mjcf: &str) -> Result<MjModel, Invalid> {
         // SAFETY: no thread can use MuJoCo yet, because every model is compiled here.
         unsafe { set_log_config(quiet) };
     });
+    // MuJoCo takes an errno that an allocation left behind for the error of a number that it read;
+    // seen with a mesh among many threads. A second attempt shows whether it was one.
+    let spurious = "unknown error in attribute";
     let mut model = MjModel::from_xml_string(mjcf)
+        .or_else(|cause| match cause.to_string().contains(spurious) {
+            true => MjModel::from_xml_string(mjcf),
+            false => Err(cause),
+        })
         .map_err(|cause| Invalid::new(format!("MuJoCo refuses the scene: {cause}")))?;
     joint_servo::embed(&mut model);
     Ok(model)

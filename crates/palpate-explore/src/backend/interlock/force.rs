@@ -23,6 +23,14 @@ pub const FORCE: Entry = Entry {
 // heuristic: 0.1 m/s, the speed of travel, against 20 N/mm.
 pub const RISE_N_S: f64 = 2000.0;
 
+/// Speed at which the finger goes back after too much force, m/s.
+// heuristic: four times the slowest contact, far below the reduced speed.
+pub const RETRACT_M_S: f64 = 0.02;
+
+/// Rise of the force at which the finger stops going back, N.
+// heuristic: well above the sensor's noise, far below a fault.
+pub const RETRACT_RISE_N: f64 = 2.0;
+
 /// Length that is added to the finger's own when its lever is taken.
 // heuristic: what adapter and skin may add.
 const SPARE_M: f64 = 0.01;

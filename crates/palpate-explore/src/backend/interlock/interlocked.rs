@@ -1,9 +1,10 @@
 //! The last line before a body moves.
 
+use super::INTERLOCKS;
+use super::force::{FORCE, RETRACT_M_S, RETRACT_RISE_N};
 use super::interlock::{Entry, Interlock, Now, Site, stopping_s};
 use super::limits::limited;
 use super::settings::InterlockSettings;
-use super::{INTERLOCKS, force::FORCE};
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading, Trip, Wrench};
 use crate::robot::arm::{Jacobian, Joints};
 use nalgebra::Isometry3;
@@ -229,14 +230,6 @@ impl Interlocked {
 /// stale one for a stop.
 // heuristic: 30 ms at 250 Hz.
 const HELD_TICKS: f64 = 8.0;
-
-/// Speed at which the finger goes back after too much force, m/s.
-// heuristic: four times the slowest contact, far below the reduced speed.
-pub const RETRACT_M_S: f64 = 0.02;
-
-/// Rise of the force at which the finger stops going back, N.
-// heuristic: well above the sensor's noise, far below a fault.
-pub const RETRACT_RISE_N: f64 = 2.0;
 
 /// Ticks beyond twice those of a way back at full speed: to start and to stop.
 const PATIENCE_TICKS: usize = 100;

@@ -42,8 +42,8 @@ pub const FORMER_KEYS: [(&str, f64); 7] = [
     ("interlocks.force_rate_n_s", force::RISE_N_S),
     ("interlocks.tracking_error_s", tracking::VELOCITY_S),
     ("interlocks.follow_s", tracking::VELOCITY_S),
-    ("interlocks.retract_m_s", interlocked::RETRACT_M_S),
-    ("interlocks.retract_rise_n", interlocked::RETRACT_RISE_N),
+    ("interlocks.retract_m_s", force::RETRACT_M_S),
+    ("interlocks.retract_rise_n", force::RETRACT_RISE_N),
     ("gates.hold_s", gates::HOLD_S),
     ("gates.still", gates::STILL),
 ];
