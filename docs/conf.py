@@ -43,30 +43,35 @@ CONTENTS = """
 
 ```{toctree}
 :hidden:
-:caption: Guide
-tutorial
-how-to
+:caption: Tasks
+install
+first-experiment
+your-object
+whole-objects
+your-planner
+your-robot
+results
+many-runs
+physics
 python
-python-reference
-reference
+faq
 ```
 
 ```{toctree}
 :hidden:
 :caption: Background
-paper
-cost
-hard-cases
-real-arm
-checks
-clusters
-interlocks
-registration
+belief
 finger
-dynamic
-recordings
-gaussian-process
-around
+paper
+validation
+hard-cases
+```
+
+```{toctree}
+:hidden:
+:caption: Look up
+reference
+python-reference
 ```
 
 ```{toctree}
