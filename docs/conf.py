@@ -43,17 +43,19 @@ CONTENTS = """
 
 ```{toctree}
 :hidden:
-:caption: Tasks
+:caption: Guide
 install
 first-experiment
 your-object
-whole-objects
 your-planner
 your-robot
 results
 many-runs
 physics
+whole-objects
 python
+python-reference
+reference
 faq
 ```
 
@@ -65,13 +67,6 @@ finger
 paper
 validation
 hard-cases
-```
-
-```{toctree}
-:hidden:
-:caption: Look up
-reference
-python-reference
 ```
 
 ```{toctree}
