@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/python.md", "python/README.md"])
+@pytest.mark.parametrize("page", ["docs/your-planner.md", "docs/python.md", "python/README.md"])
 def test_the_first_example_prints_a_table(page, tmp_path):
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL)
     code = next(block for block in blocks if block.startswith("import palpate"))
