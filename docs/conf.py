@@ -46,6 +46,9 @@ CONTENTS = """
 :caption: Guide
 tutorial
 how-to
+your-robot
+safety
+physics
 python
 python-reference
 reference
@@ -55,16 +58,10 @@ reference
 :hidden:
 :caption: Background
 paper
-cost
 hard-cases
-real-arm
 checks
 clusters
-interlocks
-registration
 finger
-dynamic
-recordings
 gaussian-process
 around
 ```
