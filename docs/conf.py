@@ -44,26 +44,30 @@ CONTENTS = """
 ```{toctree}
 :hidden:
 :caption: Guide
-tutorial
-how-to
+install
+first-experiment
+your-object
+your-planner
 your-robot
 safety
+results
+many-runs
 physics
+whole-objects
 python
 python-reference
 reference
+faq
 ```
 
 ```{toctree}
 :hidden:
 :caption: Background
-paper
-hard-cases
-checks
-clusters
+belief
 finger
-gaussian-process
-around
+paper
+validation
+hard-cases
 ```
 
 ```{toctree}
