@@ -51,7 +51,7 @@ test: setup
 	$(MAKE) test-faults
 	$(MAKE) test-ros2 TOUCHES=6 OVER_TOPICS='lab::a_peer lab::an_arm lab::only_the_named lab::the_container lab::the_loop'
 
-# How far the tip still moves after each failure between explorer and arm: the table of docs/real-arm.md.
+# How far the tip still moves after each failure between explorer and arm: the table of docs/safety.md.
 # In real time, so with the machine for itself.
 test-faults: setup
 	cargo test --locked -p palpate --features ros2 --test suite -- --ignored --test-threads 1 --nocapture twin_faults

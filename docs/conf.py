@@ -49,6 +49,7 @@ first-experiment
 your-object
 your-planner
 your-robot
+safety
 results
 many-runs
 physics

@@ -109,7 +109,7 @@ impl Checked for SolverSettings {
 }
 
 /// As what the object is met by a finger without skin, which MuJoCo lets collide;
-/// `docs/dynamic.md` says how exact each is.
+/// `docs/physics.md` says how exact each is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Collision {

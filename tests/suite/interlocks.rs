@@ -311,7 +311,7 @@ fn the_table_has_every_interlock_once() {
     names.sort_unstable();
     names.dedup();
     assert_eq!(names.len(), INTERLOCKS.len());
-    let docs = include_str!("../../docs/interlocks.md");
+    let docs = include_str!("../../docs/safety.md");
     for name in names {
         assert!(docs.contains(&format!("| {name} |")), "{name}");
     }

@@ -1,5 +1,5 @@
 //! What goes wrong between an explorer and its arm, one after another: who sees it, and how soon the
-//! arm stands still. Prints the table of `docs/real-arm.md`.
+//! arm stands still. Prints the table of `docs/safety.md`.
 
 use crate::common::lab::{EXPERIMENT, Network, TwinProcess, journal, signal};
 use palpate::backend::pace;

@@ -214,7 +214,7 @@ fn a_stage_is_refused_before_it_touches() {
 }
 
 /// 2 mm and 2° of error in the mount of a soft finger on a PA-10, in the kinematic body: found to
-/// what docs/registration.md says, with a ball that stands 4 mm from where it is said to be.
+/// what docs/your-robot.md says, with a ball that stands 4 mm from where it is said to be.
 #[test]
 fn a_soft_finger_on_an_arm_finds_where_it_stands() {
     let mut scene = Scene::load(

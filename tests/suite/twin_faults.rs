@@ -1,7 +1,7 @@
 //! Failures on either side of the topics: the explorer's message, and how far the tip still moves.
 //!
 //! The tests of times and paths need the machine for themselves and are ignored without:
-//! `make test-faults` runs them and prints the table of `docs/real-arm.md`.
+//! `make test-faults` runs them and prints the table of `docs/safety.md`.
 
 #[cfg(feature = "mujoco")]
 use crate::common::rig::{ARM, Rest};

@@ -43,7 +43,7 @@ pub struct Level {
 }
 
 /// Fastest approach of a rigid finger with masses: stopped at once, it ends in an overload from
-/// about 5 mm/s on (`docs/dynamic.md`).
+/// about 5 mm/s on (`docs/physics.md`).
 const RIGID_M_S: f64 = 0.005;
 
 const fn kinematic(senses: Senses, samples: usize, period_s: f64) -> Level {

@@ -13,8 +13,8 @@ pub fn path() -> PathBuf {
 const HEAD: &str = "# Hard cases
 
 Written by `make hard-cases`, which runs every case of `tests/suite/hard` at every severity and, where time matters, at
-every control period or time step. [cost.md](cost.md#hard-cases) discusses what was found. `make test` runs each case at
-the hardest severity that must hold.
+every control period or time step. [physics.md](physics.md#where-the-simulation-breaks) says what helps. `make test` runs
+each case at the hardest severity that must hold.
 
 The column *outcomes* lists the severities from the easiest to the hardest. Behind each stands one letter for each period or step:
 

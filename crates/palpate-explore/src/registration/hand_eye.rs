@@ -57,7 +57,7 @@ const ASIDE_EXACT_M: f64 = 1e-6;
 const START_M: f64 = 3e-4;
 
 /// Expected scatter of a touch's depth, and of the side on which it is felt; chosen from
-/// simulated touches, `docs/registration.md`.
+/// simulated touches, `docs/your-robot.md`.
 const DEPTH_SD_M: f64 = 5e-5;
 const FELT_SD_M: f64 = 3e-4;
 
