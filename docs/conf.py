@@ -44,29 +44,29 @@ CONTENTS = """
 ```{toctree}
 :hidden:
 :caption: Guide
-tutorial
-how-to
+install
+first-experiment
+your-object
+your-planner
+your-robot
+results
+many-runs
+physics
+whole-objects
 python
 python-reference
 reference
+faq
 ```
 
 ```{toctree}
 :hidden:
 :caption: Background
-paper
-cost
-hard-cases
-real-arm
-checks
-clusters
-interlocks
-registration
+belief
 finger
-dynamic
-recordings
-gaussian-process
-around
+paper
+validation
+hard-cases
 ```
 
 ```{toctree}
