@@ -125,7 +125,7 @@ const ARM: &str = "\n[arm]                       # a Mitsubishi PA-10; its base 
 const SLOWER: &str = "approach_m_s = 0.015        # slower than a stage: the servos need 0.04 s to stop the finger\n";
 
 /// A rigid finger's contacts say how steep the surface is; those of electrodes are too often tilted
-/// the same way (docs/gaussian-process.md).
+/// the same way (docs/belief.md).
 const EXACT: &str = "normals = true              # a contact says how steep the surface is, too\n";
 
 /// What contacts that electrodes locate are off the surface, RMS (docs/finger.md).

@@ -54,7 +54,7 @@ pub enum PriorShape {
 pub const KERNELS: [&str; 2] = ["matern_52", "matern_32"];
 
 impl Default for SpaceSettings {
-    /// Chosen on the half of the suite that is for choosing; see docs/around.md.
+    /// Chosen on the half of the suite that is for choosing; see docs/whole-objects.md.
     fn default() -> Self {
         Self {
             kernel: KERNELS[0].into(),
