@@ -43,13 +43,12 @@ pub(in crate::probe) fn turning_point(robot: &Robot, approach: &Approach) -> Iso
 /// Number of places checked along each side of the zone; a heuristic.
 const TRIED_PER_SIDE: usize = 5;
 
-/// Checks that `robot` reaches the whole zone of the task: in front of each place of a grid, and at
-/// the turning point behind the farthest depth. For a whole object, checks that it reaches the
+/// Checks that `robot` reaches the whole zone of the task: in front of each place of a grid, and
+/// at the turning point behind the farthest depth. For a whole object, checks that it reaches the
 /// centre from at least one direction.
-/// to its middle from some side.
 ///
+/// # Errors
 /// If it does not; the error names the place with the largest deviation.
-/// If it has not, with the place that is missed by most.
 pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), Invalid> {
     let Some(zone) = task.zone() else {
         let of = DIRECTIONS;

@@ -124,7 +124,6 @@ const LOOKS: usize = 48;
 ///
 /// At the fraction t of the path, with rotation vectors a, b, c of those three turns in `W`:
 /// `R(t) = exp(t a) exp(t b) exp(t c) R(0)` and `p(t) = centre + ρ(t) exp(t a) u`.
-/// `R(t) = exp(t a) exp(t b) exp(t c) R(0)` and `p(t) = centre + ρ(t) exp(t a) u`.
 #[derive(Clone)]
 pub(super) struct Round {
     centre_w: Vector3<f64>,
@@ -132,7 +131,7 @@ pub(super) struct Round {
     to: Isometry3<f64>,
     /// Distances from the centre at the start and the end.
     distance_m: [f64; 2],
-    /// From the centre to the start.
+    /// Direction from the centre to the start.
     outward_w: Vector3<f64>,
     carried: Vector3<f64>,
     tilted: Vector3<f64>,
