@@ -16,9 +16,8 @@ pub const BIOTAC_RADIUS_M: f64 = 7.0e-3;
 pub struct Finger {
     /// Radius of cylinder and hemisphere, m; skin, fluid and electrodes of a soft finger scale with
     /// it.
-    ///
-    /// Contacts are less accurate at other radii than a BioTac's 7 mm: RMSE on the container 0.30
-    /// mm at 7 mm, 0.46 at 8, 0.79 at 10.
+    // Contacts are less accurate at other radii than a BioTac's 7 mm: RMSE on the container 0.30 mm
+    // at 7 mm, 0.46 at 8, 0.79 at 10.
     pub radius_m: f64,
     /// Length of the cylinder behind the hemisphere's centre, m.
     pub length_m: f64,
