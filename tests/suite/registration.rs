@@ -288,7 +288,10 @@ fn too_few_contacts_are_refused() {
     let touch = TouchSettings::default();
     let refused = register(&mut Nothing, &robot, &touch, (&BALL, &design), &mut |_| ());
     let refused = refused.unwrap_err().to_string();
-    assert!(refused.starts_with("0 of 0 touches made contact with the body; at least 12 are needed"), "{refused}");
+    assert!(
+        refused.starts_with("0 of 0 touches made contact with the body; at least 12 are needed"),
+        "{refused}"
+    );
 }
 
 fn mesh((points, triangles): (Vec<Point3<f64>>, Vec<[u32; 3]>)) -> MeshBvh {

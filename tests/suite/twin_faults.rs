@@ -108,7 +108,7 @@ fn a_hold_or_stop_of_an_instant_ends_the_run() {
                 let lab = rig.lab().unwrap();
                 let touches = rig.touch(&lab, &[[0.1, 0.1], [0.9, 0.9]]);
                 let Some(Err(fault)) = touches.last() else { panic!("{name}: {touches:?}") };
-                assert!(fault.to_string().contains("the arm does not move"), "{name}: {fault}");
+                assert!(fault.to_string().contains("the arm refuses to move"), "{name}: {fault}");
                 sleep(Duration::from_millis(300));
                 let still_m = rig.path_m(Duration::from_millis(200));
                 assert!(still_m < 1e-4, "{name}: the tip moved {still_m} m after the release");

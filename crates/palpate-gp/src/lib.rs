@@ -46,15 +46,15 @@
 //! # Ok::<(), palpate_gp::covariance::CovarianceError>(())
 //! ```
 //!
-//! | module | what it does |
+//! | module | content |
 //! |---|---|
-//! | [`kernel`] | how alike the heights of two places are, and the hyperparameters |
+//! | [`kernel`] | correlation of the heights of two places, and the hyperparameters |
 //! | [`observations`] | places, heights, and slopes if they are observed too |
-//! | [`posterior`], [`batch`], [`means`] | mean, variance, gradients at one, many, most places |
-//! | [`inducing`] | the posterior of very many touches through a few of them |
-//! | [`likelihood`] | how well hyperparameters explain the observations |
-//! | [`fit`], [`search_box`] | the most likely hyperparameters and kernel, and where to seek them |
-//! | [`reduction`] | how much one more observation would tell |
+//! | [`posterior`], [`batch`], [`means`] | mean, variance and gradients at one, several, or very many places |
+//! | [`inducing`] | approximate posterior from inducing points |
+//! | [`likelihood`] | log marginal likelihood of hyperparameters |
+//! | [`fit`], [`search_box`] | maximum-likelihood hyperparameters and kernel, and their bounds |
+//! | [`reduction`] | variance reduction by one more observation |
 //! | [`covariance`], [`dense`], [`cholesky`] | the covariance, factored whole or row by row |
 
 pub mod batch;

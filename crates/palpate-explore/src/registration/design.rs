@@ -206,8 +206,8 @@ fn unreachable(reached: usize, tried: usize, wanted: usize) -> Invalid {
         "the robot reaches {reached} of {tried} touches of the body; required are {wanted}"
     ))
     .mend(
-        "a finger must be turned to find where it stands, which a stage cannot do; bring the body \
-         nearer (--at)",
+        "a finger must be turned to find its pose, which a stage cannot do; move the body closer \
+         (--at)",
     )
 }
 
