@@ -197,7 +197,7 @@ fn broken_and_hostile_files_are_refused_at_their_place() {
         ("list.ply", ply.replace("vertex_indices", "corners").into(), "must have vertex_indices"),
         ("word.ply", ply.replace("255 2 0 0", "255 two 0 0").into(), "line 17"),
         ("negative.ply", ply.replace("3 0 1 4", "3 -1 1 4").into(), "line 23"),
-        ("index.ply", ply.replace("3 0 1 4", "3 0 1 5").into(), "names vertex 5"),
+        ("index.ply", ply.replace("3 0 1 4", "3 0 1 5").into(), "refers to vertex 5"),
         ("points.ply", points.into(), "holds 5 points and no faces"),
         ("longer.ply", longer(&ply_binary(false)), "5 bytes more"),
         (

@@ -1,11 +1,10 @@
-//! Triangle meshes, analytic surfaces, and where things meet them.
+//! Triangle meshes, analytic surfaces, and geometric queries.
 //!
-//! A mesh file is read by [`import`](import::import), or a mesh is given as vertices and
-//! triangles; both are repaired, with a report of what had to be done, and become a
-//! [`Mesh`](mesh::Mesh) that can be trusted everywhere above. A [`MeshBvh`](bvh::MeshBvh), a
-//! bounding volume hierarchy, answers where a ray, a point or a moving capsule meets it, exactly
-//! and without a gap. An [`Implicit`](implicit::Implicit) surface is given by a formula instead.
-//! All lengths are metres.
+//! A mesh file is read by [`import`](import::import), or a mesh is given as vertices and triangles.
+//! Both are repaired, with a report of the repairs, and become a valid [`Mesh`](mesh::Mesh). A
+//! [`MeshBvh`](bvh::MeshBvh), a bounding volume hierarchy, computes exact, watertight intersections
+//! of a ray, a point or a moving capsule with it. An [`Implicit`](implicit::Implicit) surface is
+//! given by a formula instead. All lengths are in metres.
 //!
 //! ```
 //! use nalgebra::{Point3, Vector3};

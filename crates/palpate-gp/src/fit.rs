@@ -36,8 +36,8 @@ pub struct Fit {
     pub stop: Stop,
 }
 
-/// Up to this many observations each fit scans the whole box: few touches change their mind, and
-/// the factors of the scan grow with the observations. Chosen: they need 8 MB.
+/// Up to this many observations each fit scans the whole box: with few touches the optimum changes
+/// often, and the factors of the scan grow with the observations. A heuristic: they need 8 MB.
 const SCAN_ALWAYS: usize = 128;
 /// Growth of the observations since the last scan at which a larger fit scans again; in between it
 /// climbs from the last optimum; a heuristic.
@@ -316,8 +316,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Climbs from the least and the largest noise beside the best lengths, if the data are nearly
-    /// as likely there: noise and lengths may trade, and leave two tops that differ little.
+    /// Climbs from the smallest and the largest noise with the best lengths, if the data are nearly
+    /// as likely there: noise and lengths may trade off, and give two optima that differ little.
     fn cross_noise(&mut self) {
         let Some(best) = &self.best else { return };
         let (value, top) = (best.score, best.x.clone());

@@ -47,7 +47,7 @@ pub trait Problem {
     }
 }
 
-/// A fit.
+/// Result of a least-squares fit.
 #[derive(Clone, Debug)]
 pub struct Solution<S> {
     /// Best parameters.
@@ -59,9 +59,9 @@ pub struct Solution<S> {
     pub undetermined: Vec<DVector<f64>>,
     /// Largest singular value over the smallest determined one.
     pub condition: f64,
-    /// Residuals at the end, all of them.
+    /// Final residuals, including outliers.
     pub residuals: DVector<f64>,
-    /// Whether each residual was used; an outlier was not.
+    /// Whether each residual was used; outliers were not.
     pub used: Vec<bool>,
 }
 
