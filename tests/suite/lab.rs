@@ -43,7 +43,7 @@ fn run_to_its_end(network: &Network, planner: &str, out: &Path) {
             println!("{planner}: {halts} halts because this machine was late");
             return;
         }
-        let is_late = said.contains("commands ceased") || said.contains("nothing new on");
+        let is_late = said.contains("commands ceased") || said.contains("no new message on");
         assert!(is_late, "{planner}: {said}");
         sleep(Duration::from_millis(500));
     }

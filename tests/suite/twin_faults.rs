@@ -18,13 +18,13 @@ use std::time::Duration;
 /// Names of failures with what the explorer must say of them.
 const ENDED: &[(&[&str], &str)] = &[
     (&["nan"], "is NaN"),
-    (&["swapped_names"], "farther than it can"),
+    (&["swapped_names"], "beyond its speed limit"),
     (&["future"], "in the future"),
     (&["unstamped"], "its stamp is zero, so its age is unknown; stamp it, or set backend.accept"),
     (&["backward"], BACKWARD),
-    (&["no_joints"], "nothing new on /joint_states"),
-    (&["no_wrench"], "nothing new on /ft_sensor/wrench"),
-    (&["no_tactile"], "nothing new on /biotac_pub"),
+    (&["no_joints"], "no new message on /joint_states"),
+    (&["no_wrench"], "no new message on /ft_sensor/wrench"),
+    (&["no_tactile"], "no new message on /biotac_pub"),
     (&["frozen"], "standstill of E"),
     (&["frozen_joints"], STANDSTILL),
     (&["frozen_wrench"], "wrench age"),
