@@ -25,7 +25,7 @@
 //! let hit = mesh.ray(&start, &-Vector3::y_axis(), 1.0).expect("it meets the square");
 //! assert!((hit.distance_m - 0.3).abs() < 1e-12);
 //!
-//! // A capsule the same way touches as much earlier as its radius says.
+//! // A capsule in the same direction makes contact earlier by its radius.
 //! let capsule = Capsule { p0_w: start, p1_w: start + Vector3::z() * 0.02, radius_m: 0.007 };
 //! let hit = mesh.sweep(&capsule, &-Vector3::y_axis(), 1.0).expect("it meets the square");
 //! assert!((hit.travel_m - 0.293).abs() < 1e-12);

@@ -47,7 +47,7 @@ pub struct MeshReport {
     pub vertices: usize,
     /// Triangles of the mesh.
     pub triangles: usize,
-    /// Least and greatest corner of the bounding box, in metres.
+    /// Lowest and highest corner of the bounding box, in metres.
     pub bounds_m: (Point3<f64>, Point3<f64>),
     /// Surface area, in m².
     pub area_m2: f64,

@@ -27,7 +27,7 @@ pub struct Hyperparameters {
     pub length_scales: Vec<f64>,
     /// Standard deviation of one touch's error, in the unit of the heights.
     pub noise_sd: f64,
-    /// Standard deviation of an observed slope's error; 0 where no slopes are observed.
+    /// Standard deviation of an observed slope's error; 0 without observed slopes.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub slope_noise_sd: f64,
     /// Prior mean, to which the belief returns far from all observations.

@@ -6,7 +6,7 @@
 //! scale, one per coordinate; it, the signal's standard deviation and the noise's are the
 //! [`Hyperparameters`], and a fit finds the most likely ones.
 //!
-//! Places and heights may be in any units: lengths and noise come out in the same.
+//! Places and heights may be in any units: lengths and noise have the same.
 //!
 //! ```
 //! use palpate_gp::kernel::SquaredExponential;

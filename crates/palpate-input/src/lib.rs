@@ -1,4 +1,4 @@
-//! Input from users: files, settings with overrides, and errors that say how to fix the input.
+//! Input from users: files, settings with overrides, and errors that describe how to fix the input.
 //!
 //! | module | content |
 //! |---|---|

@@ -365,7 +365,7 @@ messages! {
 
 const NANO: f64 = 1e9;
 
-/// Conversions from and to seconds.
+/// Implements conversions from and to seconds.
 macro_rules! seconds {
     ($($name:ident),*) => {$(
         impl $name {

@@ -205,7 +205,7 @@ impl HeightField {
         let squares: f64 = heights.iter().map(|y| y * y).sum();
         let rms = (squares / heights.len().max(1) as f64).sqrt();
         let extents_m = self.zone.extents_m();
-        // Heights that are all zero have no scale of their own.
+        // Heights that are all zero have no scale.
         let scale = if rms > 0.0 { rms } else { extents_m[0] };
         let [shortest, longest] = self.settings.length_scale;
         let [quietest, loudest] = self.settings.noise;

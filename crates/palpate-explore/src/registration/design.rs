@@ -189,7 +189,7 @@ impl Design {
             return Err(Invalid::new(format!(
                 "these {touches} touches would not determine {lost}"
             ))
-            .mend("make more (--touches)"));
+            .mend("increase --touches"));
         }
         match self.condition <= CONDITION_MAX {
             true => Ok(()),

@@ -148,7 +148,7 @@ impl Problem for HandEyeFit<'_> {
 }
 
 /// Names of the sensing parameters.
-pub const FELT: [&str; 3] = ["give", "gain", "felt aside"];
+pub const FELT: [&str; 3] = ["give", "gain", "lateral offset"];
 
 /// Returns the name of each parameter and the unit of its step in m, rad or 1.
 pub fn parameters(body: &KnownBody) -> [(&'static str, f64); PARAMETERS] {

@@ -237,8 +237,8 @@ fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, Invalid> {
     let folder = folder(source.path).map_err(unreadable)?;
     if !source.outside_buffers && !real.starts_with(folder) {
         return Err(Invalid::new(format!(
-            "{} lies outside the mesh's folder; if that is meant, allow it by \
-             object.outside_buffers = true in a scene, or by --outside-buffers",
+            "{} lies outside the mesh's folder; to allow it, set \
+             object.outside_buffers = true in the scene, or use --outside-buffers",
             real.display()
         )));
     }

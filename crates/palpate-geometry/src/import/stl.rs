@@ -61,8 +61,8 @@ fn is_binary(bytes: &[u8]) -> Result<bool, Invalid> {
         true => Ok(true),
         false if is_text => Ok(false),
         false => Err(Invalid::new(format!(
-            "STL: {actual} bytes, which is no text that begins with \"solid\", and binary with \
-             {count} triangles takes {needed}"
+            "STL: not a text that begins with \"solid\", and a binary file of {count} triangles has \
+             {needed} bytes, not {actual}"
         ))),
     }
 }
@@ -87,7 +87,7 @@ fn solids(text: &str) -> impl Iterator<Item = &str> {
     text.split_inclusive("endsolid\n").filter(|solid| !solid.trim().is_empty())
 }
 
-/// A text that is read a line at a time, so that it is known where a reader stopped.
+/// A text that is read line by line, so that the position of an error is known.
 struct Lines<'a> {
     text: &'a str,
     at: usize,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub enum Stop {
     /// Converged.
     Converged,
-    /// The budget of evaluations was spent.
+    /// The budget of evaluations is exhausted.
     Budget,
     /// Rounding errors prevented progress; the result is the best place found.
     Roundoff,
@@ -138,7 +138,7 @@ mod tests {
             prop_assert_eq!(found.value, best);
         }
 
-        /// An error ends it.
+        /// An error ends the search.
         #[test]
         fn an_error_ends_it(at in 1u32..6) {
             let mut asked = 0;

@@ -147,8 +147,8 @@ impl Interlocked {
         let home: Vec<_> = joints.map(|(joint, q)| format!("{} {q:.3}", joint.name)).collect();
         let p_wt = self.now.x_wt.translation.vector;
         Invalid::new(format!(
-            "the arm is not moved from where it stands, its tip at [{:.3}, {:.3}, {:.3}] m: {trip}; bring \
-             it near its home posture by hand: {}",
+            "the arm cannot start with its tip at [{:.3}, {:.3}, {:.3}] m: {trip}; jog it close to its \
+             home posture: {}",
             p_wt.x, p_wt.y, p_wt.z, home.join(", ")
         ))
         .into()

@@ -176,7 +176,7 @@ impl Servo {
             return Ok(());
         }
         let back = Isometry3::from_parts(back_w.into(), here.rotation);
-        self.go("the way back", back, self.settings.approach_m_s, false).map(|_| ())
+        self.go("the retract position", back, self.settings.approach_m_s, false).map(|_| ())
     }
 
     /// Travels around the object to the stand-off `above`; an arm follows a path that was checked
@@ -263,7 +263,7 @@ impl Servo {
                 return Err(self.no_way());
             }
         }
-        self.go("the way back", out, speed_m_s, false).map(|_| ())
+        self.go("the retract position", out, speed_m_s, false).map(|_| ())
     }
 
     fn no_way(&self) -> Fault {
@@ -361,7 +361,7 @@ impl Probe for Servo {
         let here_w = self.x_wt().translation.vector;
         let back_w = approach.level_with(&here_w, &above.translation.vector);
         let back = Isometry3::from_parts(back_w.into(), above.rotation);
-        self.go("the way back", back, travel_m_s, false)?;
+        self.go("the retract position", back, travel_m_s, false)?;
         Ok(touch)
     }
 

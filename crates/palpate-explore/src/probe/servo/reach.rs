@@ -59,8 +59,8 @@ pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), Invalid> {
                 "the finger cannot reach the object from any of {of} directions"
             ))
             .mend(
-                "bring it nearer (object.position_m), move arm.base_position_m, or make \
-                 around.radius_m or around.lowest_m smaller",
+                "move it closer (object.position_m), move arm.base_position_m, or decrease \
+                 around.radius_m or around.lowest_m",
             )),
         };
     };
@@ -88,11 +88,11 @@ pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), Invalid> {
         Some((place, phase, distance_m, angle_rad)) => {
             let away = format!("{:.0} mm and {:.0} deg", 1e3 * distance_m, angle_rad.to_degrees());
             Err(Invalid::new(format!(
-                "the arm does not reach {count} of {of} places of the zone: over {place:?} the tip \
-                 stays {away} away from {phase}"
+                "the arm does not reach {count} of {of} places of the zone: at {place:?} the tip \
+                 misses {phase} by {away}"
             ))
             .mend(
-                "bring the object and the zone nearer (object.position_m, zone), move \
+                "move the object and the zone closer (object.position_m, zone), move \
                  arm.base_position_m, or make the zone smaller",
             ))
         }

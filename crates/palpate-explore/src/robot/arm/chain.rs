@@ -145,7 +145,7 @@ impl Chain {
         fits.then(|| Joints::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0)))
     }
 
-    /// The home posture, one number per joint.
+    /// Returns the home posture, one number per joint.
     pub fn start(&self) -> &[f64] {
         self.home.as_slice().get(..self.joints.len()).unwrap_or_default()
     }
@@ -164,7 +164,7 @@ impl Chain {
         self.joints.iter().any(|joint| joint.kind == Kind::Revolute)
     }
 
-    /// Forward kinematics, the pose of `T` in `W`:
+    /// Returns the pose of `T` in `W` by forward kinematics:
     /// `X_WT = X_WB · Π X_i(q_i) · X_flange · X_tool`.
     pub fn forward(&self, q: &Joints) -> Isometry3<f64> {
         let moved = self.joints.iter().zip(q.iter());
