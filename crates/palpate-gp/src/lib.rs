@@ -2,11 +2,11 @@
 //!
 //! A Gaussian process is a belief about a surface: at every place it has a mean height and a
 //! standard deviation. Heights observed at some places, each with an error, pull the mean towards
-//! them and make the standard deviation small near them. How far that reaches is the length
+//! them and make the standard deviation small near them. The range of this effect is the length
 //! scale, one per coordinate; it, the signal's standard deviation and the noise's are the
 //! [`Hyperparameters`], and a fit finds the most likely ones.
 //!
-//! Places and heights may be in any units: lengths and noise have the same.
+//! Places and heights may be in any units; length scales and noise are in the same units.
 //!
 //! ```
 //! use palpate_gp::kernel::SquaredExponential;

@@ -63,7 +63,7 @@ impl Approach {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Around {
-    /// Centre of the ball in `W`; default in a simulation: the centre of the object's box. Required
+    /// Centre of the ball in `W`; default in simulation: centre of the object's box. Required
     /// for a real robot.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centre_m: Option<[f64; 3]>,

@@ -20,8 +20,9 @@ pub struct Zone {
     /// Smallest and largest z, m; if omitted, the zone is an interval of x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z_m: Option<[f64; 2]>,
-    /// Height datum (y), m: value of a zero-mean belief far from touches; used in Eq. 5. Default:
-    /// middle of a simulated surface, else 0.
+    /// Height datum (y), m; default: middle of a simulated object's surface, 0 for functions and
+    /// real robots.
+    // A zero-mean belief returns to it far from all touches, and Eq. 5 depends on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub datum_y_m: Option<f64>,
     /// Nearest and farthest depth (−y) of the surface, m; default in a simulation: the object's.
