@@ -35,6 +35,7 @@ pub struct GpSettings {
     pub free_space: bool,
     /// Largest number of inducing touches; with more touches, the fit is an approximation whose
     /// error is recorded.
+    // The hyperparameters are then fitted to between this number and twice as many touches.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inducing_touches: Option<u32>,
     /// Calibration of the standard deviations.

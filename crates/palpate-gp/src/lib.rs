@@ -50,7 +50,7 @@
 //! |---|---|
 //! | [`kernel`] | correlation of the heights of two places, and the hyperparameters |
 //! | [`observations`] | places, heights, and slopes if they are observed too |
-//! | [`posterior`], [`batch`], [`means`] | mean, variance and gradients at one, several, or very many places |
+//! | [`posterior`], [`batch`], [`means`] | mean, variance, gradients; batch evaluation |
 //! | [`inducing`] | approximate posterior from inducing points |
 //! | [`likelihood`] | log marginal likelihood of hyperparameters |
 //! | [`fit`], [`search_box`] | maximum-likelihood hyperparameters and kernel, and their bounds |
