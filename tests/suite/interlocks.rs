@@ -165,7 +165,7 @@ fn an_arm_away_from_home_is_told_where_to_go_and_not_moved() {
     let (mut body, fake) = interlocks(&site, &InterlockSettings::default(), World::real());
     let fault = body.step(&command(7, 100)).unwrap_err();
     let said = fault.to_string();
-    for word in ["its tip at [", "workspace of the tip", "bring it near its home", "S1 -1.571"] {
+    for word in ["its tip at [", "workspace of the tip", "jog it close to its home", "S1 -1.571"] {
         assert!(said.contains(word), "{said}");
     }
     assert!(fake.commands().is_empty());
