@@ -88,7 +88,7 @@ impl Factor {
 }
 
 widest_fn! {
-    /// See [`Factor::solve_lower`].
+    /// Implements [`Factor::solve_lower`].
     fn solve_lower<'a>(rows: &'a [f64], b: &'a mut [f64]) -> f64 {
         for i in 0..b.len() {
             let row = row(rows, i);
@@ -99,7 +99,7 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// See [`Factor::solve_upper`].
+    /// Implements [`Factor::solve_upper`].
     fn solve_upper<'a>(rows: &'a [f64], b: &'a mut [f64]) -> () {
         for i in (0..b.len()).rev() {
             let row = row(rows, i);

@@ -18,7 +18,7 @@ pub enum Fault {
     /// A reading that is not finite.
     #[error("bad reading at {time_s:.3} s: {quantity} is {values:?}")]
     BadReading {
-        /// Time.
+        /// Time since reset, s.
         time_s: f64,
         /// Quantity, e.g. `joint positions`.
         quantity: &'static str,
@@ -33,25 +33,25 @@ pub enum Fault {
     OutOfReach {
         /// Target of the movement.
         phase: &'static str,
-        /// Time.
+        /// Time since reset, s.
         time_s: f64,
-        /// Smallest distance found.
+        /// Smallest distance found, m.
         distance_m: f64,
-        /// Angle at that distance.
+        /// Angle at that distance, rad.
         angle_rad: f64,
     },
     /// The state is not finite or outside its limits.
     #[error("diverged at {time_s:.3} s: {state:.3?}")]
     Diverged {
-        /// Time.
+        /// Time since reset, s.
         time_s: f64,
-        /// The state.
+        /// State of the simulation.
         state: Vec<f64>,
     },
     /// The fingertip's centre is inside the object: the skin no longer separates them.
     #[error("at {time_s:.3} s the finger is inside the object, its tip at {p_wt:.4?}")]
     Inside {
-        /// Time.
+        /// Time since reset, s.
         time_s: f64,
         /// Position of the tip in `W`.
         p_wt: [f64; 3],
@@ -62,9 +62,9 @@ pub enum Fault {
     Late {
         /// Target of the movement.
         phase: &'static str,
-        /// Time.
+        /// Time since reset, s.
         time_s: f64,
-        /// Joint positions.
+        /// Joint positions, rad or m.
         q: Vec<f64>,
     },
     /// No checked path to an approach around an object exists.
@@ -73,15 +73,15 @@ pub enum Fault {
          jog the arm to arm.home_deg, or skip this approach"
     )]
     NoWay {
-        /// Time.
+        /// Time since reset, s.
         time_s: f64,
-        /// Joint positions.
+        /// Joint positions, rad or m.
         q: Vec<f64>,
     },
     /// A recording cannot be written; motion stops, since it would not be recorded.
     #[error("cannot write the recording at {time_s:.3} s: {message}")]
     Unrecorded {
-        /// Time.
+        /// Time since reset, s.
         time_s: f64,
         /// Message of the operating system.
         message: String,
@@ -118,13 +118,13 @@ pub enum Fault {
     /// Stopped by the user in the viewer.
     #[error("stopped at {time_s:.3} s")]
     Stopped {
-        /// Time.
+        /// Time since reset, s.
         time_s: f64,
     },
     /// An interlock stopped the robot; it does not move until the fault is cleared.
     #[error("stopped at {time_s:.3} s: {trip}")]
     Interlock {
-        /// Time.
+        /// Time since reset, s.
         time_s: f64,
         /// The interlock that tripped, and the reason.
         trip: Trip,
@@ -138,7 +138,7 @@ pub enum Fault {
     /// A failure of the connection to an arm behind topics.
     #[error("at {time_s:.3} s {cause}")]
     Link {
-        /// Time.
+        /// Time since reset, s.
         time_s: f64,
         /// Cause.
         cause: LinkFault,

@@ -42,7 +42,7 @@ impl KnownBody {
         }
     }
 
-    /// Returns it moved by a step in plausible units: a ball along x, y, z; a plate along its
+    /// Returns the body moved by a step in plausible units: a ball along x, y, z; a plate along its
     /// normal, then rotated about two axes in it.
     pub fn moved(&self, step: [f64; Self::PARAMETERS]) -> Self {
         match *self {
@@ -242,7 +242,7 @@ impl Outline {
         (p_t, level_m + missing_m)
     }
 
-    /// Returns the point nearest to `body` for the fingertip pose `x_wt`, and its signed distance;
+    /// Returns the outline's point nearest to `body` for the fingertip pose `x_wt`, and its signed distance;
     /// negative inside.
     pub fn nearest(&self, body: &KnownBody, x_wt: &Isometry3<f64>) -> (Point3<f64>, f64) {
         let far = |p_t: &Point3<f64>| body.distance_m(&(x_wt * p_t));

@@ -130,7 +130,7 @@ pub fn cross(a: &Quad, b: &Quad) -> Quad {
 /// remainder is below 5e-18.
 #[inline(always)]
 pub fn exp_of_negative(x: f64) -> f64 {
-    /// Adding it leaves the nearest integer in the low bits of the sum.
+    /// Constant whose addition leaves the nearest integer in the low bits of the sum.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     /// ln 2 in two parts; the first has trailing zeros, so that its multiples are exact.
     const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;

@@ -11,11 +11,11 @@ pub trait Vector: Copy {
     fn load(from: &[f64]) -> Self;
     /// Writes all lanes to the beginning of a slice, which must be long enough.
     fn store(self, to: &mut [f64]);
-    /// self·b + c.
+    /// Returns self·b + c.
     fn mul_add(self, b: Self, c: Self) -> Self;
-    /// self·b.
+    /// Returns self·b.
     fn mul(self, b: Self) -> Self;
-    /// self − b.
+    /// Returns self − b.
     fn sub(self, b: Self) -> Self;
 }
 

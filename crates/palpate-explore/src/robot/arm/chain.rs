@@ -241,9 +241,9 @@ pub enum ArmError {
     /// No posture within the joint limits reaches the pose of the tip.
     #[error("out of reach: the closest pose of the tip is {distance_m} m and {angle_rad} rad away")]
     OutOfReach {
-        /// Smallest distance found.
+        /// Smallest distance found, m.
         distance_m: f64,
-        /// Angle at that distance.
+        /// Angle at that distance, rad.
         angle_rad: f64,
     },
 }

@@ -16,7 +16,7 @@ pub enum Alarm {
     Pressure,
     /// The electrodes, by changes that differ from their common drift.
     Electrodes,
-    /// Either of them.
+    /// Pressure or electrodes.
     Both,
 }
 
