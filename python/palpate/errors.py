@@ -63,4 +63,4 @@ class RunFolderError(PalpateError, OSError):
 
 
 class PlannerError(PalpateError):
-    """A planner that cannot be found or made, or that named no target."""
+    """A planner that cannot be found or made, or that returned no target."""

@@ -215,7 +215,7 @@ fn nonsense_is_an_error() {
     assert!(posture(&chain, &nan.x_wt).is_ok());
     nan.x_wt.translation.vector.x = f64::NAN;
     let error = posture(&chain, &nan.x_wt).unwrap_err().to_string();
-    assert!(error.ends_with("is not a number"), "{error}");
+    assert!(error.ends_with("is not finite"), "{error}");
 }
 
 #[test]

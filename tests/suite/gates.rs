@@ -31,16 +31,16 @@ fn a_body_in_order_passes() {
 fn what_is_not_in_order_is_said_with_its_numbers() {
     type Case = (fn(u64, &mut Reading), &'static str);
     let cases: [Case; 7] = [
-        (|_, reading| reading.q[1] = 1.7, "joint S2 stands at 1.7000, outside its limits "),
+        (|_, reading| reading.q[1] = 1.7, "the position 1.7000 of joint S2 is outside its limits "),
         (
             |tick, reading| reading.q[0] += 1e-5 * tick as f64,
-            "joint S1 moved by 0.01000 while told to stand still; allowed are 0.002",
+            "joint S1 moved by 0.01000 while commanded to rest; allowed is 0.002",
         ),
         (
             |tick, reading| reading.wrench.as_mut().unwrap().force_n.z = 1e-3 * tick as f64,
             "the force at rest drifts by 0.75",
         ),
-        (|_, reading| reading.samples.clear(), "no tactile frame in 2 s"),
+        (|_, reading| reading.samples.clear(), "no tactile frame received in 2 s"),
         (
             |_, reading| counts(reading, |counts| counts[4] = 2000.0),
             "electrode E5 at rest is 2000.0 counts with a standard deviation of 0.00",

@@ -42,10 +42,10 @@ const CAUSES: [(&str, Breaks); 13] = [
     ("force", |tick, reading| force(reading, (0.5 * (tick - 100) as f64).min(40.0))),
     ("force rate", |_, reading| force(reading, 24.0)),
     ("torque", |_, reading| reading.wrench.as_mut().unwrap().torque_nm.x += 2.0),
-    ("silence of the joints", |_, reading| reading.time_s = 0.2),
-    ("silence of the force", |_, reading| reading.wrench = None),
-    ("silence of the force", |_, reading| reading.wrench = Some(Wrench::default())),
-    ("silence of the skin", |_, reading| reading.samples.clear()),
+    ("joint state age", |_, reading| reading.time_s = 0.2),
+    ("wrench age", |_, reading| reading.wrench = None),
+    ("wrench age", |_, reading| reading.wrench = Some(Wrench::default())),
+    ("tactile frame age", |_, reading| reading.samples.clear()),
     ("value of E3", |_, reading| electrode(reading, 2, 4095.0)),
     ("value of E4", |_, reading| electrode(reading, 3, 0.0)),
     ("standstill of E19", |_, reading| electrode(reading, 18, 2000.0)),
@@ -165,7 +165,7 @@ fn an_arm_away_from_home_is_told_where_to_go_and_not_moved() {
     let (mut body, fake) = interlocks(&site, &InterlockSettings::default(), World::real());
     let fault = body.step(&command(7, 100)).unwrap_err();
     let said = fault.to_string();
-    for word in ["its tip at [", "workspace of the tip", "bring it near its home", "S1 -1.571"] {
+    for word in ["its tip at [", "workspace of the tip", "jog it close to its home", "S1 -1.571"] {
         assert!(said.contains(word), "{said}");
     }
     assert!(fake.commands().is_empty());

@@ -43,7 +43,7 @@ fn run_to_its_end(network: &Network, planner: &str, out: &Path) {
             println!("{planner}: {halts} halts because this machine was late");
             return;
         }
-        let is_late = said.contains("commands ceased") || said.contains("nothing new on");
+        let is_late = said.contains("commands ceased") || said.contains("no new message on");
         assert!(is_late, "{planner}: {said}");
         sleep(Duration::from_millis(500));
     }
@@ -268,7 +268,10 @@ fn an_arm_of_another_implementation_is_heard_and_answers() {
         BackendSettings { service_mapping: MappingKind::Enhanced, patience_s: 2.0, ..on_change };
     let lab = Lab::join(&other, &chain).unwrap();
     let fault = lab.call(&Service::Hold).unwrap_err().to_string();
-    assert!(fault.contains("no answer in 2 s") && fault.contains("service_mapping"), "{fault}");
+    assert!(
+        fault.contains("did not answer within 2 s") && fault.contains("service_mapping"),
+        "{fault}"
+    );
     drop(lab);
     let told = String::from_utf8(arm.wait_with_output().unwrap().stdout).unwrap();
     let called: Value = serde_json::from_str(&told).unwrap();

@@ -76,11 +76,11 @@ fn what_fails_on_the_arms_side_stops_the_exploration() {
     for (i, (name, words)) in [
         ("nan", "is NaN"),
         ("six_names", "no joint"),
-        ("swapped_names", "farther than it can"),
+        ("swapped_names", "beyond its speed limit"),
         ("future", "in the future"),
-        ("no_joints", "nothing new on /joint_states"),
-        ("no_wrench", "nothing new on /ft_sensor/wrench"),
-        ("no_tactile", "nothing new on /biotac_pub"),
+        ("no_joints", "no new message on /joint_states"),
+        ("no_wrench", "no new message on /ft_sensor/wrench"),
+        ("no_tactile", "no new message on /biotac_pub"),
         ("frozen", "standstill"),
         ("force_spike", "force"),
         ("estop", "emergency stop"),
@@ -135,7 +135,7 @@ fn the_death_of_either_side_stops_the_other() {
             let count = scene.twin.events.lock().unwrap().len();
             signal(&scene.explorer, "CONT");
             let (said, _) = scene.halted();
-            let is_told = said.contains("commands ceased") || said.contains("nothing new on");
+            let is_told = said.contains("commands ceased") || said.contains("no new message on");
             assert!(is_told, "{said}");
             let events = scene.twin.events.lock().unwrap();
             assert!(events[count..].iter().all(|line| line["event"] != "moving"), "{events:?}");
@@ -150,7 +150,7 @@ fn the_death_of_either_side_stops_the_other() {
         let at_s = pace::now_s();
         let (said, halted_s) = scene.halted();
         told(&format!("SIG{name} of the arm's side"), Some(halted_s - at_s), None, &said);
-        assert!(said.contains("nothing new on"), "{said}");
+        assert!(said.contains("no new message on"), "{said}");
         if name == "STOP" {
             // It wakes with a command that is old by now.
             signal(&scene.twin.child, "CONT");

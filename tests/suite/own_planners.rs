@@ -95,7 +95,7 @@ fn an_own_planner_is_one_of_the_experiments() {
 fn a_planner_that_names_no_target_fails_its_trial() {
     let simulation = simulation(5);
     let row = simulation.trial(simulation.planner("mine:Random").unwrap(), 0);
-    assert_eq!(row.failure.unwrap(), "touch 6: the planner named no target: enough");
+    assert_eq!(row.failure.unwrap(), "touch 6: the planner returned no target: enough");
     assert_eq!(row.touches.len(), 5);
 }
 

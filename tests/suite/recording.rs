@@ -435,10 +435,10 @@ fn a_file_that_was_cut_is_read_up_to_the_cut() {
     assert!(partly > 0, "no cut in the midst of a touch was read up to the cut");
     for at in [0, 3, 8, head - 1] {
         let error = Recorded::of(bytes[..at].to_vec()).unwrap_err();
-        assert!(error.to_string().contains("it has no metadata `palpate`"), "{at}: {error}");
+        assert!(error.to_string().contains("the metadata `palpate` is missing"), "{at}: {error}");
     }
     let error = Recorded::of(b"a text that is something else".to_vec()).unwrap_err();
-    assert!(error.to_string().contains("does not begin as an MCAP file does"), "{error}");
+    assert!(error.to_string().contains("does not begin like an MCAP file does"), "{error}");
 }
 
 #[test]

@@ -210,7 +210,7 @@ fn a_stage_is_refused_before_it_touches() {
     let touch = TouchSettings::default();
     let refused = Design::new(&robot, &touch, &BALL, 20, &mut random).unwrap_err().to_string();
     assert!(refused.starts_with("the robot reaches 0 of 0 touches of the body"), "{refused}");
-    assert!(refused.contains("20 are wanted; a finger must be turned"), "{refused}");
+    assert!(refused.contains("required are 20; a finger must be turned"), "{refused}");
 }
 
 /// 2 mm and 2° of error in the mount of a soft finger on a PA-10, in the kinematic body: found to
@@ -288,7 +288,10 @@ fn too_few_contacts_are_refused() {
     let touch = TouchSettings::default();
     let refused = register(&mut Nothing, &robot, &touch, (&BALL, &design), &mut |_| ());
     let refused = refused.unwrap_err().to_string();
-    assert!(refused.starts_with("0 of 0 touches met the body, and 12 are needed"), "{refused}");
+    assert!(
+        refused.starts_with("0 of 0 touches made contact with the body; at least 12 are needed"),
+        "{refused}"
+    );
 }
 
 fn mesh((points, triangles): (Vec<Point3<f64>>, Vec<[u32; 3]>)) -> MeshBvh {

@@ -73,7 +73,7 @@ fn joints_of_other_names_are_named() {
     let chain = rig.simulator.environment().chain().unwrap();
     let error = Lab::connect(&settings, &chain, connect).map(|_| ()).unwrap_err();
     let error = error.to_string();
-    let says = "Skipped a message: joints [\"X\", \"Y\", \"Z\"] are none of the arm's [\"A\", \"B\", \"C\"]";
+    let says = "Skipped a message: joints [\"X\", \"Y\", \"Z\"] are not joints of the arm, [\"A\", \"B\", \"C\"]";
     assert!(error.contains(says), "{error}");
 }
 

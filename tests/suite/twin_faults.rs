@@ -18,23 +18,23 @@ use std::time::Duration;
 /// Names of failures with what the explorer must say of them.
 const ENDED: &[(&[&str], &str)] = &[
     (&["nan"], "is NaN"),
-    (&["swapped_names"], "farther than it can"),
+    (&["swapped_names"], "beyond its speed limit"),
     (&["future"], "in the future"),
     (&["unstamped"], "its stamp is zero, so its age is unknown; stamp it, or set backend.accept"),
     (&["backward"], BACKWARD),
-    (&["no_joints"], "nothing new on /joint_states"),
-    (&["no_wrench"], "nothing new on /ft_sensor/wrench"),
-    (&["no_tactile"], "nothing new on /biotac_pub"),
+    (&["no_joints"], "no new message on /joint_states"),
+    (&["no_wrench"], "no new message on /ft_sensor/wrench"),
+    (&["no_tactile"], "no new message on /biotac_pub"),
     (&["frozen"], "standstill of E"),
     (&["frozen_joints"], STANDSTILL),
-    (&["frozen_wrench"], "silence of the force"),
-    (&["estop"], "the arm does not move: emergency stop"),
-    (&["python_flags", "estop"], "the arm does not move: emergency stop"),
-    (&["number_flags", "estop"], "the arm does not move: emergency stop"),
-    (&["deadman"], "the arm does not move: dead-man switch released"),
-    (&["python_flags", "deadman"], "the arm does not move: dead-man switch released"),
-    (&["hold"], "the arm does not move: hold"),
-    (&["brake"], "the arm does not move: brakes closed"),
+    (&["frozen_wrench"], "wrench age"),
+    (&["estop"], "the arm refuses to move: emergency stop"),
+    (&["python_flags", "estop"], "the arm refuses to move: emergency stop"),
+    (&["number_flags", "estop"], "the arm refuses to move: emergency stop"),
+    (&["deadman"], "the arm refuses to move: dead-man switch released"),
+    (&["python_flags", "deadman"], "the arm refuses to move: dead-man switch released"),
+    (&["hold"], "the arm refuses to move: hold"),
+    (&["brake"], "the arm refuses to move: brakes closed"),
     (&["no_flags"], "message on /pa10/status refused: servo_on is missing; allowed are true/false"),
     (&["unknown_flag"], "message on /pa10/status refused: estop is \"unknown\"; allowed are"),
 ];
@@ -108,7 +108,7 @@ fn a_hold_or_stop_of_an_instant_ends_the_run() {
                 let lab = rig.lab().unwrap();
                 let touches = rig.touch(&lab, &[[0.1, 0.1], [0.9, 0.9]]);
                 let Some(Err(fault)) = touches.last() else { panic!("{name}: {touches:?}") };
-                assert!(fault.to_string().contains("the arm does not move"), "{name}: {fault}");
+                assert!(fault.to_string().contains("the arm refuses to move"), "{name}: {fault}");
                 sleep(Duration::from_millis(300));
                 let still_m = rig.path_m(Duration::from_millis(200));
                 assert!(still_m < 1e-4, "{name}: the tip moved {still_m} m after the release");

@@ -1,7 +1,7 @@
-//! A body of one's own under the same explorer: a stage of three slides before a wall.
+//! A custom backend: a stage of three prismatic joints in front of a wall.
 //!
-//! Nothing here knows a simulator: this is what an arm's driver looks like. `cargo run --example
-//! own_backend` explores the wall and says how well the belief knows it.
+//! It uses no simulator, like the driver of a real arm. `cargo run --example own_backend` explores
+//! the wall and prints the accuracy of the belief.
 
 use nalgebra::{Point3, Vector3};
 use palpate_explore::backend::{
@@ -20,15 +20,15 @@ use palpate_explore::task::touch::TouchSettings;
 use palpate_explore::task::{Task, Zone};
 use palpate_gp::math::seed;
 
-/// A wall that leans: y = 0.1·x + 0.2·z.
+/// Height of an inclined wall: y = 0.1·x + 0.2·z.
 fn wall_y_m(x_m: f64, z_m: f64) -> f64 {
     0.1 * x_m + 0.2 * z_m
 }
 
-/// Spring of the wall against the fingertip.
+/// Contact stiffness of the wall against the fingertip.
 const STIFFNESS_N_M: f64 = 2000.0;
 
-/// Slides that move as they are told, carrying a ball that feels the wall.
+/// A stage that follows its commands exactly and carries a ball that senses the wall.
 pub struct Slides {
     chain: Chain,
     radius_m: f64,
@@ -37,7 +37,7 @@ pub struct Slides {
 }
 
 impl Slides {
-    /// At the start of `robot`, whose chain is a stage.
+    /// Creates the stage at the home of `robot`, whose chain is a stage.
     pub fn new(robot: &Robot) -> Self {
         let chain = robot.chain.clone();
         let capabilities = Capabilities::of(&chain, 0.01);
@@ -45,10 +45,10 @@ impl Slides {
         Self { chain, radius_m, capabilities, reading }
     }
 
-    /// What the ball feels with its centre at the stage's position.
+    /// Returns the contact of the ball centred at the stage's position.
     fn feel(&self) -> Option<IdealContact> {
         let &[x, y, z] = self.reading.q.as_slice() else { return None };
-        // The wall's unit normal, towards the finger.
+        // Unit normal of the wall, towards the finger.
         let normal_w = Vector3::new(-0.1, 1.0, -0.2).normalize();
         let gap_m = (y - wall_y_m(x, z)) * normal_w.y - self.radius_m;
         let x_wt = self.chain.forward(&self.chain.joints_from(&self.reading.q)?);
@@ -85,18 +85,18 @@ impl Backend for Slides {
     }
 }
 
-/// What is explored, and with what.
+/// Returns the task and the robot.
 pub fn task_and_robot() -> Result<(Task, Robot), palpate_input::error::Invalid> {
     let finger = Finger { length_m: 0.0, ..Finger::default() };
     let mut zone = Zone::new([-0.05, 0.05], Some([-0.05, 0.05]));
-    // Depths run along the approach: the wall is somewhere between y = 0.03 and y = −0.03.
+    // Depths run along the approach: the wall lies between y = 0.03 and y = −0.03.
     zone.depth_m = Some([-0.03, 0.03]);
     let task = Task::new(zone, TouchSettings::default(), &finger)?;
     let chain = stage(Point3::new(0.0, 0.08, 0.0), finger.r_at());
     Ok((task, Robot { chain, finger, is_soft: false }))
 }
 
-/// Explores with as many touches; the belief, and the largest error of a contact.
+/// Explores with `touches` touches; returns the belief and the largest error of a contact.
 pub fn explore(touches: usize) -> Result<(HeightField, f64), Box<dyn std::error::Error>> {
     let (task, robot) = task_and_robot()?;
     let body = Slides::new(&robot);
@@ -129,7 +129,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (belief, worst_m) = explore(15)?;
     let surface = belief.surface().ok_or("no belief")?;
     let mut scratch = Default::default();
-    println!("15 touches, contacts off the wall by {:.4} mm at most", 1e3 * worst_m);
+    println!("15 touches, largest distance of a contact from the wall {:.4} mm", 1e3 * worst_m);
     for place in [[-0.04, -0.04], [0.0, 0.0], [0.04, 0.02]] {
         let (mean_m, variance) =
             (surface.mean(&place, &mut scratch), surface.variance(&place, &mut scratch));

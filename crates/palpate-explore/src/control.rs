@@ -1,18 +1,18 @@
-//! From where the fingertip should be to how the joints should move.
+//! Resolved-rate control: from the desired motion of the fingertip to joint velocities.
 
 use crate::robot::arm::{ArmError, Chain, Jacobian, Joints};
 use nalgebra::{Isometry3, Matrix6, SymmetricEigen, Vector6};
 use palpate_input::error::Invalid;
 
-/// Share of the pose's error taken back per second; chosen, a tenth of the servos' integral
-/// rate, so that the two loops do not fight.
+/// Gain of the pose error, 1/s; a heuristic: a tenth of the servos' integral rate, so that the two
+/// loops do not interact.
 const GAIN_PER_S: f64 = 5.0;
 
-/// Fastest correction of an error: linear (m/s) and angular (rad/s); chosen, the reduced speed
-/// of EN ISO 10218-1 and as much per 0.25 m of lever.
+/// Largest correction of an error: linear (m/s) and angular (rad/s); a heuristic: the reduced speed
+/// of EN ISO 10218-1, and the same speed per 0.25 m of lever.
 const CORRECTION: [f64; 2] = [0.25, 1.0];
 
-/// Where the fingertip should be now and how it should move, in `W`.
+/// Desired pose and velocity of the fingertip, in `W`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal {
     /// Pose of `T`.
@@ -22,41 +22,41 @@ pub struct Goal {
 }
 
 impl Goal {
-    /// To stand still at `x_wt`.
+    /// A goal at rest at `x_wt`.
     pub fn still(x_wt: Isometry3<f64>) -> Self {
         Self { x_wt, twist: Vector6::zeros() }
     }
 }
 
-/// A joint velocity command and how it came about.
+/// A joint velocity command with diagnostics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMotion {
-    /// rad/s or m/s; within every speed and acceleration limit.
+    /// Joint velocities, rad/s or m/s, within all speed and acceleration limits.
     pub qdot: Joints,
-    /// 0 away from singularities; 1 if some direction of the tip is lost.
+    /// Damping: 0 away from singularities, 1 if a direction of the tip is lost.
     pub damping: f64,
-    /// Share of the wanted tip velocity that `qdot` gives, 1 if all of it: less near
-    /// singularities and at limits.
+    /// Fraction of the desired tip velocity that `qdot` achieves: below 1 near singularities and at
+    /// limits.
     pub followed: f64,
 }
 
-/// Resolved-rate control (Whitney 1969) with feed-forward:
-/// `qdot = J⁺ · (twist + GAIN_PER_S · error) + N · posture`, J⁺ damped near singularities and
-/// the null space N pulling towards the chain's home and away from joint limits; then limited.
+/// Resolved-rate control (Whitney 1969) with feed-forward: `qdot = J⁺ · (twist + GAIN_PER_S ·
+/// error) + N · posture`, with J⁺ damped near singularities and the null space N pulling towards
+/// the chain's home and away from joint limits; then limited.
 ///
-/// What moves in the plane of a limit or singularity slows down there; nothing ever jumps.
+/// Motion towards a limit or singularity slows down there; commands never jump.
 #[derive(Clone, Debug)]
 pub struct Controller {
     chain: Chain,
     period_s: f64,
-    /// The last command.
+    /// Last command.
     qdot: Joints,
-    /// The joint positions last asked about, the tip's pose there and how it moves.
+    /// Last joint positions, with the tip's pose and Jacobian there.
     at: Option<(Joints, Isometry3<f64>, Jacobian)>,
 }
 
 impl Controller {
-    /// A controller at rest that is asked every `period_s`.
+    /// Creates a controller at rest with the period `period_s`.
     ///
     /// # Errors
     /// If the period is not a positive number.
@@ -66,26 +66,26 @@ impl Controller {
         if usable { Ok(controller) } else { Err(not_finite()) }
     }
 
-    /// What it drives.
+    /// The chain that it controls.
     pub fn chain(&self) -> &Chain {
         &self.chain
     }
 
-    /// Starts from rest again.
+    /// Restarts from rest.
     pub fn reset(&mut self) {
         self.qdot = Joints::zeros();
     }
 
-    /// Pose of `T` in `W` at measured joint positions, by forward kinematics.
+    /// Returns the pose of `T` in `W` at measured joint positions, by forward kinematics.
     ///
     /// # Errors
-    /// If there are not as many as joints.
+    /// If the number of positions differs from that of the joints.
     pub fn x_wt(&mut self, q: &[f64]) -> Result<Isometry3<f64>, ArmError> {
         let q = positions(&self.chain, q)?;
         Ok(self.kinematics(&q).0)
     }
 
-    /// Pose and Jacobian; of one reading, of which both are asked, found once.
+    /// Returns pose and Jacobian, cached for the last reading.
     fn kinematics(&mut self, q: &Joints) -> (Isometry3<f64>, Jacobian) {
         match &self.at {
             Some((known, x_wt, jacobian)) if known == q => (*x_wt, *jacobian),
@@ -97,10 +97,10 @@ impl Controller {
         }
     }
 
-    /// The command for the next period from measured joint positions, rad or m.
+    /// Returns the command for the next period from measured joint positions, rad or m.
     ///
     /// # Errors
-    /// If a number is not finite or missing; what was commanded last still holds.
+    /// If a number is not finite or missing; the last command remains in force.
     pub fn step(&mut self, q: &[f64], goal: &Goal) -> Result<JointMotion, ArmError> {
         let q = positions(&self.chain, q)?;
         let (x_wt, jacobian) = self.kinematics(&q);
@@ -111,10 +111,11 @@ impl Controller {
         Ok(JointMotion { qdot: self.qdot, damping, followed: task.followed(&self.qdot) })
     }
 
-    /// The command for the next period, after which the joints shall be and move as `posture` says.
+    /// Returns the command for the next period towards the joint positions and velocities of
+    /// `posture`.
     ///
     /// # Errors
-    /// If a number is not finite or missing; what was commanded last still holds.
+    /// If a number is not finite or missing; the last command remains in force.
     pub fn along(&mut self, q: &[f64], posture: &[Joints; 2]) -> Result<Joints, ArmError> {
         let q = positions(&self.chain, q)?;
         let [to, qdot] = posture;
@@ -128,7 +129,7 @@ impl Controller {
 }
 
 fn not_finite() -> ArmError {
-    Invalid::new("the arm's position, goal or period is not a number").into()
+    Invalid::new("the arm's position, goal or period is not finite").into()
 }
 
 fn positions(chain: &Chain, q: &[f64]) -> Result<Joints, ArmError> {
@@ -140,19 +141,19 @@ fn positions(chain: &Chain, q: &[f64]) -> Result<Joints, ArmError> {
     if finite { Ok(joints) } else { Err(not_finite()) }
 }
 
-/// From `at` to `to` as a displacement in `W`: m, then rad.
+/// Displacement from `at` to `to` in `W`: m, then rad.
 fn error(at: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
     let linear = to.translation.vector - at.translation.vector;
     let angular = (to.rotation * at.rotation.inverse()).scaled_axis();
     Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
 }
 
-/// The twist that takes back the error, no faster than [`CORRECTION`].
+/// Returns the twist that corrects the error, no faster than [`CORRECTION`].
 fn correction(at: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6<f64> {
     shortened(error(at, to) * GAIN_PER_S, CORRECTION)
 }
 
-/// `v` with its linear and its angular part no longer than `longest`.
+/// Returns `v` with its linear and its angular part limited to `longest`.
 fn shortened(mut v: Vector6<f64>, longest: [f64; 2]) -> Vector6<f64> {
     for (part, longest) in [0, 3].into_iter().zip(longest) {
         let mut part = v.fixed_rows_mut::<3>(part);
@@ -164,11 +165,11 @@ fn shortened(mut v: Vector6<f64>, longest: [f64; 2]) -> Vector6<f64> {
     v
 }
 
-/// `wanted` within the limits, `before` having been commanded in the period before.
+/// Limits `wanted`, given the command `before` of the previous period.
 ///
-/// The whole command is shortened to the speed limits, then the whole change to the acceleration
-/// limits, so that directions are kept. A joint that would run into its limit brakes alone. The
-/// acceleration limit holds always; the two others do if they held before.
+/// The whole command is scaled to the speed limits, then the whole change to the acceleration
+/// limits, so that directions are preserved. A joint close to its position limit brakes alone. The
+/// acceleration limit always holds; the two others do if they held before.
 fn limited(chain: &Chain, q: &Joints, before: &Joints, wanted: &Joints, period_s: f64) -> Joints {
     let joints = || chain.joints.iter().enumerate().take(q.len());
     let mut scale: f64 = 1.0;
@@ -195,29 +196,29 @@ fn limited(chain: &Chain, q: &Joints, before: &Joints, wanted: &Joints, period_s
     qdot
 }
 
-/// Length by which angular velocities are multiplied to be compared with linear ones; chosen,
+/// Length that scales angular velocities for comparison with linear ones; a heuristic: the distance
 /// from the wrist's centre to the fingertip.
 const LEVER_M: f64 = 0.2;
 
-/// Singular value, m/s of the tip per rad/s of the joints, below which damping sets in; chosen.
+/// Singular value, m/s of the tip per rad/s of the joints, below which damping begins; a heuristic.
 const SINGULAR: f64 = 0.05;
 
-/// How fast the null space goes home: rad/s per rad, and at most rad/s; chosen, slow beside the
-/// motion of the tip.
+/// Speed of the null-space motion towards home: rad/s per rad, and its maximum, rad/s; a heuristic:
+/// slow relative to the motion of the tip.
 const HOME_PER_S: f64 = 0.5;
 const HOME_MAX: f64 = 0.2;
 
-/// Distance from a joint's limit below which motion towards it is held back; chosen.
+/// Distance from a joint's limit below which motion towards it is reduced; a heuristic.
 const MARGIN_RAD: f64 = 0.2;
 
-/// A tip velocity asked of a chain at one posture.
+/// A resolved-rate problem: a tip velocity for a chain at one posture.
 struct ResolvedRate {
-    /// With angular rows in units of the lever.
+    /// Jacobian with angular rows in units of the lever.
     jacobian: Jacobian,
     twist: Vector6<f64>,
-    /// The wanted motion of the null space.
+    /// Desired motion of the null space.
     home: Joints,
-    /// 1 far from a limit, 0 at it; below zero is the side of the limit.
+    /// Distance to each limit, scaled: 1 far from it, 0 at it, negative beyond it.
     room: [Joints; 2],
     turns: bool,
 }
@@ -242,12 +243,12 @@ impl ResolvedRate {
         Self { jacobian, twist, home, room, turns }
     }
 
-    /// Joint velocities and how much the inverse is damped, 0 to 1; none if a number is not
+    /// Returns joint velocities and the damping of the inverse, 0 to 1; `None` if a number is not
     /// finite.
     ///
-    /// A joint that the first solution moves towards a near limit is held back in a second one
-    /// by weighting its column (Chan and Dubey 1995), so that redundant joints take over before
-    /// it stops.
+    /// A joint that the first solution moves towards a near limit is reduced in a second one by
+    /// weighting its column (Chan and Dubey 1995), so that redundant joints take over before it
+    /// stops.
     fn solve(&self) -> Option<(Joints, f64)> {
         let free = Joints::repeat(1.0);
         let first = self.weighted(&free)?;
@@ -258,7 +259,7 @@ impl ResolvedRate {
         if weights == free { Some(first) } else { self.weighted(&weights) }
     }
 
-    /// `qdot = D Jᴰ⁺ v + D (I − Jᴰ⁺ Jᴰ) z` with `Jᴰ = J D`.
+    /// Computes `qdot = D Jᴰ⁺ v + D (I − Jᴰ⁺ Jᴰ) z` with `Jᴰ = J D`.
     fn weighted(&self, weights: &Joints) -> Option<(Joints, f64)> {
         let mut jacobian = self.jacobian;
         for (mut column, weight) in jacobian.column_iter_mut().zip(weights.iter()) {
@@ -266,7 +267,7 @@ impl ResolvedRate {
         }
         let mut square: Matrix6<f64> = jacobian * jacobian.transpose();
         if !self.turns {
-            // No joint turns the tip, and no damping is due for that.
+            // No joint rotates the tip, and this needs no damping.
             square.fixed_view_mut::<3, 3>(3, 3).fill_with_identity();
         }
         let finite = square.iter().chain(self.twist.iter()).all(|value| value.is_finite());
@@ -282,23 +283,24 @@ impl ResolvedRate {
         Some((qdot.component_mul(weights), damping))
     }
 
-    /// Share of the wanted twist that `qdot` gives: their product over the wanted one's square.
+    /// Fraction of the desired twist that `qdot` achieves: their product over the square of the
+    /// desired one.
     fn followed(&self, qdot: &Joints) -> f64 {
         let wanted = self.twist.norm_squared();
         if wanted > 0.0 { (self.jacobian * qdot).dot(&self.twist) / wanted } else { 1.0 }
     }
 }
 
-/// `(Jᴰ Jᴰᵀ)⁻¹ r`, if no singular value is below SINGULAR: then `Jᴰ Jᴰᵀ − SINGULAR² I` has a
-/// Cholesky factor. A tenth of the work of the eigenvectors, and the usual case.
+/// Computes `(Jᴰ Jᴰᵀ)⁻¹ r`, if no singular value is below SINGULAR: then `Jᴰ Jᴰᵀ − SINGULAR² I` has
+/// a Cholesky factor. This is the usual case, at a tenth of the cost of the eigenvectors.
 fn regular(square: &Matrix6<f64>, rest: &Vector6<f64>) -> Option<Vector6<f64>> {
     (square - Matrix6::identity() * (SINGULAR * SINGULAR)).cholesky()?;
     Some(square.cholesky()?.solve(rest))
 }
 
-/// In the eigenvectors u of `Jᴰ Jᴰᵀ`, a direction of singular value σ is multiplied by
-/// `σ / (σ² + λ²)` with `λ² = SINGULAR² − σ²` below SINGULAR and 0 above (after Nakamura and
-/// Hanafusa 1986); and how much that damps, 0 to 1.
+/// Computes the damped inverse: in the eigenvectors u of `Jᴰ Jᴰᵀ`, a direction of singular value σ
+/// is multiplied by `σ / (σ² + λ²)` with `λ² = SINGULAR² − σ²` below SINGULAR and 0 above (after
+/// Nakamura and Hanafusa 1986). Also returns the damping, 0 to 1.
 fn damped(
     square: Matrix6<f64>,
     twist: &Vector6<f64>,
@@ -312,7 +314,7 @@ fn damped(
         let damped = value.max(SINGULAR * SINGULAR);
         damping = damping.max(1.0 - value.max(0.0) / damped);
         along += u * (u.dot(twist) / damped);
-        // Below rounding, J has no such direction and the null space owns it.
+        // Below rounding, J lacks this direction and it belongs to the null space.
         if value > 1e-10 {
             along -= u * (u.dot(wish) / value);
         }
@@ -320,24 +322,23 @@ fn damped(
     Some((along, damping))
 }
 
-/// Steps after which a search from one start is given up; chosen, ten times what is usual.
+/// Largest number of steps of a search from one start; a heuristic: ten times the usual number.
 const STEPS: usize = 300;
 
-/// How near a posture must come: m, and rad times 1 m.
+/// Tolerance of a posture: m, and rad times 1 m.
 const NEAR: f64 = 1e-9;
 
-/// Farthest that one step of the search goes, m and rad; within it the Jacobian is nearly
-/// constant.
+/// Largest step of the search, m and rad, within which the Jacobian is nearly constant.
 const STRIDE: [f64; 2] = [0.1, 0.3];
 
-/// Starts of the search: turns of the first joint away from home.
+/// Starts of the search: rotations of the first joint away from home.
 const TURNS_DEG: [f64; 8] = [0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0];
 
-/// A posture with the tip at `x_wt`, reached from the chain's home by the controller's own law
-/// in large steps, and near home where the arm is redundant.
+/// Returns a posture with the tip at `x_wt` (inverse kinematics), found from the chain's home by
+/// the control law in large steps, and close to home if the arm is redundant.
 ///
 /// # Errors
-/// [`ArmError::OutOfReach`] if no start leads there within the joint limits.
+/// [`ArmError::OutOfReach`] if no start converges within the joint limits.
 pub fn posture(chain: &Chain, x_wt: &Isometry3<f64>) -> Result<Joints, ArmError> {
     let mut nearest = (f64::INFINITY, f64::INFINITY);
     let starts = if chain.turns() { &TURNS_DEG[..] } else { &TURNS_DEG[..1] };
@@ -373,7 +374,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Eigenvectors are the slow twin of the factor.
+        /// Compares the Cholesky solution with one by eigenvectors.
         #[test]
         fn without_a_singularity_both_ways_agree(
             entries in prop::collection::vec(-1.0..1.0f64, 36),

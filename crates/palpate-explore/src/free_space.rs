@@ -1,23 +1,23 @@
-//! Space found free as an upper bound of the surface.
+//! Swept free space as an upper bound of the surface.
 //!
-//! Where the belief's mean rises above what the finger has swept, the bound is taken in by assumed
-//! density filtering, expectation propagation's first pass (Minka 2001): at that place the normal
-//! belief N(μ, σ²) is cut off at the bound b, softened by n, which leaves
-//! (Rasmussen & Williams 2006, Eq. 3.58, with z = (b − μ) / √(σ² + n²) and h = φ(z) / Φ(z))
+//! Where the belief's mean exceeds the space swept by the finger, the bound is applied by assumed
+//! density filtering, the first pass of expectation propagation (Minka 2001): the normal belief
+//! N(μ, σ²) at that place is truncated at the bound b, softened by n, which gives (Rasmussen &
+//! Williams 2006, Eq. 3.58, with z = (b − μ) / √(σ² + n²) and h = φ(z) / Φ(z))
 //!
 //! * mean μ − σ²·h / √(σ² + n²)
 //! * variance σ² − σ⁴·h·(z + h) / (σ² + n²)
 //!
-//! and the height with the noise that would have brought N(μ, σ²) there is observed. Mean and
-//! variance are then those of the cut distribution at that place, and follow from it elsewhere;
-//! unless that noise were below n, which it then is: a belief that contradicts the bound by many
-//! standard deviations is wrong, and a sharp correction of it would swing elsewhere. Bounds that
-//! the mean keeps are left out, though they too would lower it a little; the fit of the
-//! hyperparameters does not see the bounds.
+//! A pseudo-observation of a height with noise is added that moves N(μ, σ²) to these moments. Mean
+//! and variance then match the truncated distribution at that place, and follow from it elsewhere.
+//! The noise of the pseudo-observation is at least n: a belief that contradicts the bound by many
+//! standard deviations is wrong, and a sharp correction of it would oscillate elsewhere. Bounds
+//! that the mean satisfies are omitted, though they too would lower it a little; the fit of the
+//! hyperparameters ignores the bounds.
 //!
-//! A bound holds where there is a surface. With the probability p that there is one, and Φ(z) that
-//! it then lies below the bound, there is none with the odds (1 − p) : p·Φ(z): beside an edge that
-//! the finger came to rest on there is nothing, rather than a surface far below.
+//! A bound holds only where a surface is present. With the probability p of a surface, and Φ(z)
+//! that it then lies below the bound, the odds of no surface are (1 − p) : p·Φ(z): beside an edge
+//! on which the finger came to rest there is no surface, rather than one far below.
 
 use super::presence::Silhouette;
 use super::probe::Swept;
@@ -27,24 +27,24 @@ use palpate_gp::means::Means;
 use palpate_gp::posterior::Scratch;
 use palpate_gp::{Hyperparameters, Observation, Posterior};
 
-/// Places along each side at which the bound is kept; chosen, finer than a fingertip in any zone
-/// that takes more than a few touches.
+/// Grid points per side at which the bound is stored; a heuristic: finer than a fingertip in any
+/// zone that takes more than a few touches.
 const PER_SIDE: usize = 41;
 
-/// Places at which a belief is cut at most; chosen, a few for every touch that can still violate
-/// one.
+/// Largest number of places at which a belief is truncated; a heuristic: a few for every touch
+/// whose bound can still be violated.
 const CUTS_MAX: usize = 16;
 
-/// Least softness of a bound, as a fraction of the signal's standard deviation; chosen, the largest
-/// touch noise that is fitted by default.
+/// Smallest softness of a bound, as a fraction of the signal's standard deviation; a heuristic: the
+/// largest touch noise that is fitted by default.
 const SOFTNESS_MIN: f64 = 1e-2;
 
-/// The probability of a surface at most: beliefs are surer of it than edges allow. Chosen on the
-/// suite's objects for choosing: with 1 the error on the worst, a star, grows by 9 %, with 0.75
-/// next to no bound is taken in.
+/// Upper limit of the probability of a surface, since beliefs are overconfident at edges.
+/// Heuristic, tuned on the suite's tuning objects: with 1 the error on the worst, a star, grows by
+/// 9 %; with 0.75 almost no bound is applied.
 const SURE: f64 = 0.92;
 
-/// The lowest bound so far, on a grid over the zone.
+/// The lowest upper bound so far, on a grid over the zone.
 #[derive(Clone)]
 pub(super) struct Ceiling {
     places: Vec<Vec<f64>>,
@@ -52,13 +52,13 @@ pub(super) struct Ceiling {
 }
 
 impl Ceiling {
-    /// Nothing is known to be free.
+    /// Creates a bound without any free space.
     pub(super) fn new(zone: &Zone) -> Self {
         let places = zone.grid(PER_SIDE);
         Self { heights_m: vec![f64::INFINITY; places.len()], places }
     }
 
-    /// Takes in what one touch swept.
+    /// Lowers the bound to the volume swept by one touch.
     pub(super) fn lower(&mut self, zone: &Zone, swept: &Swept) {
         let ceilings_m = swept.ceilings_m(zone, self.places.iter().map(Vec::as_slice));
         for (height_m, ceiling_m) in self.heights_m.iter_mut().zip(ceilings_m) {
@@ -66,9 +66,9 @@ impl Ceiling {
         }
     }
 
-    /// Cuts the belief where its mean is above the bound by more than its softness, where most
-    /// first, at each place once; not where that there is no surface at all is likelier than that
-    /// there is one below the bound.
+    /// Truncates the belief where its mean exceeds the bound by more than its softness, largest
+    /// violation first, once per place; not where the absence of a surface is more likely than a
+    /// surface below the bound.
     pub(super) fn cut(&self, belief: &mut Posterior, silhouette: &Silhouette) {
         let &Hyperparameters { noise_sd, signal_sd, .. } = belief.hyperparameters();
         let soft_sd = noise_sd.max(SOFTNESS_MIN * signal_sd);
@@ -85,7 +85,8 @@ impl Ceiling {
             let mut there = |(i, excess): (usize, f64)| {
                 let bound = &mut bounds[i];
                 let chance = SURE * *bound.chance.get_or_insert_with(|| silhouette.at(bound.place));
-                // The mean is above the bound, so the surface is no likelier below it than not.
+                // The mean is above the bound, so the probability of a surface below it is at most
+                // one half.
                 if 0.5 * chance < 1.0 - chance {
                     bound.is_done = true;
                     return None;
@@ -117,18 +118,18 @@ impl Ceiling {
     }
 }
 
-/// What is known of one place.
+/// State of the bound at one place.
 struct Bound<'a> {
     place: &'a [f64],
     height_m: f64,
-    /// The probability that there is a surface, once it was asked for.
+    /// Probability of a surface, after the first evaluation.
     chance: Option<f64>,
-    /// Whether the belief was cut there, or never will be.
+    /// Whether the belief was truncated there, or never will be.
     is_done: bool,
 }
 
-/// The observation (height, standard deviation) that takes N(μ, σ²) to its part below a bound;
-/// none where the belief is too sure to be moved.
+/// Returns the pseudo-observation (height, standard deviation) that moves N(μ, σ²) to its moments
+/// below a bound; `None` where the variance is too small to change.
 fn site(mean: f64, variance: f64, bound: f64, soft_sd: f64) -> Option<(f64, f64)> {
     let spread = (variance + soft_sd * soft_sd).sqrt();
     let z = (bound - mean) / spread;
@@ -146,7 +147,7 @@ fn site(mean: f64, variance: f64, bound: f64, soft_sd: f64) -> Option<(f64, f64)
 mod tests {
     use super::*;
 
-    /// The slow twin sums over the cut density.
+    /// Compares with a reference that integrates the truncated density.
     #[test]
     fn the_site_takes_a_normal_to_the_moments_of_its_cut() {
         for (mean, variance, bound, noise) in

@@ -1,4 +1,4 @@
-//! What decides how a belief is fitted.
+//! Settings of the Gaussian process of a belief.
 
 use palpate_gp::kernel;
 use palpate_gp::{LogNormal, Mean};
@@ -6,57 +6,57 @@ use palpate_input::config::{Checked, Rules, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the Gaussian process is fitted.
+/// Settings of the Gaussian process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GpSettings {
-    /// Name of the kernel, or of several, of which each fit takes the likeliest.
+    /// Kernel name, or several names, of which each fit selects the most likely.
     pub kernel: Kernels,
-    /// How the prior mean is chosen.
+    /// Prior mean: how it is determined.
     pub mean: Mean,
-    /// Range of each length scale, as a fraction of the zone's side.
+    /// Bounds of each length scale, as fractions of the zone's side.
     pub length_scale: [f64; 2],
-    /// Range of the touch noise's standard deviation, as a fraction of the signal's.
+    /// Bounds of the touch noise's standard deviation, as fractions of the signal's.
     pub noise: [f64; 2],
-    /// The touch noise's standard deviation, if it is known: then it is not fitted.
+    /// Known standard deviation of the touch noise, m; if given, it is not fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_sd_m: Option<f64>,
-    /// What it is at least: the sensor's own. What the kernel cannot follow is fitted on top.
+    /// Lower bound on the noise (sensor noise), m; extra noise is fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_sd_min_m: Option<f64>,
-    /// Range of the signal's standard deviation, as a fraction of the heights' root mean square.
+    /// Bounds of the signal's standard deviation, as fractions of the heights' root mean square.
     pub signal: [f64; 2],
     /// Whether contact normals are observed too, as slopes of the surface.
     pub normals: bool,
-    /// Range of the slopes' noise, as a fraction of the signal's standard deviation over the zone's
+    /// Bounds of the slopes' noise, in units of the signal's standard deviation over the zone's
     /// shortest side.
     pub slope_noise: [f64; 2],
-    /// Whether the surface is held below the space that the finger has swept, where it met one.
+    /// Whether swept free space bounds the surface from above, where a touch made contact.
     pub free_space: bool,
-    /// With more touches than this the belief is conditioned on all of them through at most so
-    /// many, and fitted to between as many and twice that: an approximation, whose rows say what
-    /// it loses.
+    /// Largest number of inducing touches; with more touches, the fit is an approximation whose
+    /// error is recorded.
+    // The hyperparameters are then fitted to between this number and twice as many touches.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inducing_touches: Option<u32>,
-    /// What the standard deviations are scaled by.
+    /// Calibration of the standard deviations.
     #[serde(skip_serializing_if = "is_default")]
     pub band: Band,
-    /// What the hyperparameters probably are.
+    /// Log-normal priors of the hyperparameters.
     pub prior: Priors,
 }
 
-/// What the kernel may be.
+/// Kernel of a fit.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Kernels {
-    /// This one.
+    /// A single kernel.
     One(String),
-    /// The likeliest of these.
+    /// The most likely of several kernels.
     Likeliest(Vec<String>),
 }
 
 impl Kernels {
-    /// The names.
+    /// Returns the names of the kernels.
     pub fn names(&self) -> &[String] {
         match self {
             Self::One(name) => std::slice::from_ref(name),
@@ -65,38 +65,38 @@ impl Kernels {
     }
 }
 
-/// What says how wide the belief's standard deviations are.
+/// Calibration of the belief's standard deviations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Band {
-    /// The likelihood, as it fits all hyperparameters.
+    /// Maximum likelihood, as for all hyperparameters.
     #[default]
     Likelihood,
-    /// The contacts: that 95 of 100 lie within 1.96 of what all others say of them.
+    /// Leave-one-out: scaled so that 95 % of contacts lie within 1.96 standard deviations.
     LeaveOneOut,
 }
 
-/// Log-normal priors, in the units of the ranges; left out, every value is as probable.
+/// Log-normal priors, in the units of the bounds; flat if omitted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Priors {
-    /// Of each length scale.
+    /// Prior of each length scale.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length_scale: Option<LogNormal>,
-    /// Of the noise.
+    /// Prior of the noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<LogNormal>,
-    /// Of the signal.
+    /// Prior of the signal.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub signal: Option<LogNormal>,
 }
 
 impl Default for GpSettings {
-    /// Chosen: no length scale beyond the zone, where the data cannot tell it from a constant;
-    /// no noise so small that the covariance of a few hundred touches nears singularity, and
-    /// none above a hundredth of the relief, or a curve not yet resolved passes for noise; a
-    /// signal range that never binds on heights that vary; slopes from what a mesh's facets leave
-    /// of them to what says nothing.
+    /// Heuristics: length scales up to the zone's side, beyond which data cannot distinguish them
+    /// from a constant; noise large enough that the covariance of a few hundred touches stays
+    /// regular, and at most a hundredth of the relief, above which an unresolved curve is explained
+    /// as noise; a signal range that never binds on heights that vary; slope noise from that of a
+    /// mesh's facets to one that carries no information.
     fn default() -> Self {
         Self {
             kernel: Kernels::One("squared_exponential".into()),
@@ -124,7 +124,9 @@ impl Checked for GpSettings {
         for (i, name) in chosen.iter().enumerate() {
             rules.one_of("kernel", name, &names);
             let is_first = !chosen[..i].contains(name);
-            rules.require("kernel", format!("\"{name}\""), is_first, || "each name once".into());
+            rules.require("kernel", format!("\"{name}\""), is_first, || {
+                "each name at most once".into()
+            });
         }
         rules.interval("length_scale", self.length_scale, 1e-4..=1e3);
         rules.interval("noise", self.noise, 1e-7..=1e3);
@@ -135,26 +137,23 @@ impl Checked for GpSettings {
         rules.require("normals", self.normals, !self.normals || has_slopes, || {
             let smooth = kernel::KERNELS.iter().filter(|(_, kernel)| kernel.has_slopes());
             let names: Vec<&str> = smooth.map(|(name, _)| *name).collect();
-            format!(
-                "a kernel whose surfaces have slopes that vary continuously: {}",
-                names.join(", ")
-            )
+            format!("a kernel with continuously varying slopes: {}", names.join(", "))
         });
         rules.given("noise_sd_m", self.noise_sd_m, 1e-9..=1e3);
         if let Some(least_m) = self.noise_sd_min_m {
             rules.number("noise_sd_min_m", least_m, 1e-9..=1e3);
             rules.require("noise_sd_min_m", least_m, self.noise_sd_m.is_none(), || {
-                "this or noise_sd_m, which says that it is known".into()
+                "either this or noise_sd_m (known noise), not both".into()
             });
         }
         if let Some(most) = self.inducing_touches {
             rules.number("inducing_touches", most.into(), 10.0..=2000.0);
             rules.require("normals", self.normals, !self.normals, || {
-                "false with inducing_touches, through which heights alone are taken in".into()
+                "false with inducing_touches, which supports heights only".into()
             });
             let by_likelihood = self.band == Band::Likelihood;
             rules.require("band", "\"leave_one_out\"", by_likelihood, || {
-                "\"likelihood\" with inducing_touches, whose errors depend on each other".into()
+                "\"likelihood\" with inducing_touches, whose errors are correlated".into()
             });
         }
         let priors = [

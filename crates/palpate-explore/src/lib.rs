@@ -1,10 +1,10 @@
-//! Active touch for a robot, real or simulated: a belief, planners, and a servo that touches.
+//! Active touch for a robot, real or simulated: belief, planners, and a servo that makes touches.
 //!
 //! A [`Belief`](belief::Belief) observes touches; a [`Planner`](planner::Planner) selects the next
-//! target from it; a [`Probe`](probe::Probe) follows the approach to it. A
+//! target from it; a [`Probe`](probe::Probe) follows the approach to the target. A
 //! [`Servo`](probe::servo::Servo) is the probe of a robot: it commands any
-//! [`Backend`](backend::Backend), the trait of a body, through its interlocks. No simulator is
-//! among the dependencies, so that nothing here can see the object.
+//! [`Backend`](backend::Backend), a real or simulated robot, through its interlocks. This crate
+//! does not depend on a simulator, so no code in it has access to the object.
 //!
 //! | module | content |
 //! |---|---|

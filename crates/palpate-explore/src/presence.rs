@@ -1,19 +1,19 @@
-//! What touches say of where there is a surface: evidence, and a [`Silhouette`] that weighs it.
+//! Probability that a surface is present: evidence from touches, and its [`Silhouette`].
 //!
-//! A miss says that the finger's whole hull, a stadium of its width and slant, came to the zone's
-//! far depth and met nothing: where it passed there is no surface. A contact says that there is one
-//! at its place. And it says what lies beyond: a hull that rests on something in its middle has
-//! found a face, one that rests on its rim an edge, and beside the edge there is nothing.
+//! After a miss, the finger's whole hull, a stadium of its width and slant, reached the zone's far
+//! depth without contact: there is no surface where it passed. A contact shows a surface at its
+//! place. It also indicates what lies beyond: a hull that rests on its middle has found a face, one
+//! that rests on its rim an edge, and beside the edge there is no surface.
 //!
-//! Evidence of presence, 1 for a surface and 0 for none, is regressed on by a Gaussian process of
-//! its own (least-squares classification, Rasmussen & Williams 2006, §6.5): with its mean m and
-//! variance v at a place, in units of its signal, a surface is there with the probability
+//! The evidence of presence, 1 for a surface and 0 for none, is regressed by a separate Gaussian
+//! process (least-squares classification, Rasmussen & Williams 2006, §6.5). With its mean m and
+//! variance v at a place, in units of its signal, a surface is present with the probability
 //!
 //! p = Φ((m − c) / √(v + n²)),
 //!
-//! n² being the noise of the evidence and c what divides yes from no; and with none where a hull
-//! has passed and met nothing. How far evidence speaks for its surroundings is the likeliest of a
-//! few lengths. Who looks for surfaces hopes for them, with c = 0.
+//! with the noise n² of the evidence and the decision threshold c; the probability is zero where a
+//! hull passed without contact. The length scale is the most likely one of a few. The optimistic
+//! probability has c = 0.
 
 use super::probe::Swept;
 use crate::robot::Finger;
@@ -25,41 +25,41 @@ use palpate_gp::math::normal;
 use palpate_gp::{Hyperparameters, Mean, NoiseRatio, Observations, Posterior, Range, Scale};
 use std::cell::OnceCell;
 
-/// Probability that there is a surface a radius beyond a contact, on the side of the hull's middle:
-/// that of a hull that rests on its middle, less this times (distance of the contact from the
-/// middle / radius)². Read from the touches of a Sobol sequence on the suite's objects for
-/// choosing, where it is 0.93 of contacts in the innermost tenth and 0.19 of those on the rim.
+/// Probability of a surface one radius beyond a contact, on the side of the hull's middle: that for
+/// a hull resting on its middle, minus `LESS_AT_THE_RIM` times (distance of the contact from the
+/// middle / radius)². Estimated from the touches of a Sobol sequence on the suite's tuning objects,
+/// where it is 0.93 of contacts in the innermost tenth and 0.19 of those on the rim.
 const BEYOND_A_FACE: f64 = 0.95;
 const LESS_AT_THE_RIM: f64 = 0.9;
 
-/// Places along a missed hull that are taken for evidence; two and five are worth the same.
+/// Number of evidence points along a missed hull; two and five perform the same.
 const MISS_PLACES: usize = 3;
 
-/// What touches say of where there is a surface.
+/// Evidence from touches for the presence of a surface.
 #[derive(Clone, Debug)]
 pub struct Presence {
-    /// Of each contact, where the hull was sent and where it met the surface.
+    /// For each contact, the target of the hull and the place of contact.
     contacts: Vec<[Vector2<f64>; 2]>,
     misses: Vec<Stadium>,
-    /// The hull of the last touch; about another target its next one.
+    /// Hull of the last touch; for another target it is translated.
     hull: Option<Stadium>,
     zone: Zone,
 }
 
 impl Presence {
-    /// Of no touch.
+    /// Creates an empty set of evidence.
     pub(super) fn new(zone: &Zone) -> Self {
         Self { contacts: Vec::new(), misses: Vec::new(), hull: None, zone: zone.clone() }
     }
 
-    /// Takes in a contact at `p_w` of a touch asked for at `target`.
+    /// Adds a contact at `p_w` of a touch at `target`.
     pub(super) fn met(&mut self, target: &[f64], p_w: &Point3<f64>) {
         let target = flat(&self.zone.local(target, 0.0));
         let contact = flat(&self.zone.x_wz().inverse_transform_point(p_w));
         self.contacts.push([target, contact]);
     }
 
-    /// Takes in where the hull of a touch ended, and whether it had met nothing by then.
+    /// Adds the final place of a touch's hull, and whether the touch was a miss.
     pub(super) fn passed(&mut self, swept: &Swept, has_missed: bool) {
         let tip = flat(&self.zone.x_wz().inverse_transform_point(&swept.p_wt));
         let hull = Stadium::new(&swept.finger, tip);
@@ -69,12 +69,12 @@ impl Presence {
         self.hull = Some(hull);
     }
 
-    /// Where there probably is a surface, as far as the touches tell.
+    /// Returns the estimated silhouette.
     pub fn silhouette(&self) -> Silhouette {
         Silhouette::new(&self.zone, self.hull.as_ref(), &self.misses, &self.labels())
     }
 
-    /// Places with the probability that there is a surface, in the terms of one touch.
+    /// Returns places with the probability of a surface, as given by single touches.
     fn labels(&self) -> Vec<(Vector2<f64>, f64)> {
         let mut labels = Vec::new();
         let Some(hull) = &self.hull else { return labels };
@@ -96,33 +96,33 @@ impl Presence {
     }
 }
 
-/// What evidence is returned to far from all of it, on the scale where none is −1 and a surface
-/// is 1: a little less than nobody knows. This, the noise and the divide are chosen on the suite's
-/// objects for choosing, by the mean squared error of p after 10, 30 and 60 touches.
+/// Prior mean of the evidence, on the scale from −1 for no surface to 1 for a surface: slightly
+/// below undecided. This, the noise and the threshold are heuristics, tuned on the suite's tuning
+/// objects by the mean squared error of p after 10, 30 and 60 touches.
 const PRIOR: f64 = -0.2;
 
 /// Variance n² of the evidence, in units of the signal's.
 const NOISE_VARIANCE: f64 = 0.1;
 
-/// The divide c: what lies between two contacts is not always surface.
+/// Threshold c: the space between two contacts is not always surface.
 const DIVIDE: f64 = 0.3;
 
-/// Lengths over which evidence speaks for its surroundings, in radii of the finger; chosen.
+/// Length scales of the evidence, in radii of the finger; heuristics.
 const LENGTHS: [f64; 3] = [1.5, 3.0, 6.0];
 
-/// The table's places lie half a radius apart, or as far as this many along a side allow; chosen:
-/// p hardly changes within half a radius.
+/// Largest number of table cells per side; the cells are half a radius wide if this allows. A
+/// heuristic: p hardly changes within half a radius.
 const PER_SIDE_MAX: usize = 64;
 
-/// Places of a hull along and across its axis at which it is asked whether it meets something;
-/// chosen, no two farther apart than a radius of a BioTac.
+/// Sample points of a hull along and across its axis for the probability of contact; a heuristic:
+/// no two are farther apart than the radius of a BioTac.
 const ALONG: usize = 4;
 const ACROSS: [f64; 3] = [-0.8, 0.0, 0.8];
 
-/// The probability that there is a surface, at any place of the zone's plane.
+/// Probability that a surface is present, at any place of the zone's plane.
 pub struct Silhouette {
     zone: Zone,
-    /// None while no finger was seen to pass: then there is a surface everywhere.
+    /// `None` before the first swept volume: the probability is then 1 everywhere.
     seen: Option<Seen>,
 }
 
@@ -130,12 +130,14 @@ struct Seen {
     hull: Stadium,
     misses: Vec<Stadium>,
     belief: Posterior,
-    /// What the belief says all over the zone: made when a planner first asks, for it asks often.
+    /// The evidence on a grid over the zone, computed on first use, since planners evaluate it
+    /// often.
     table: OnceCell<Table>,
 }
 
 impl Silhouette {
-    /// Of `labels`, probabilities at places of the plane, with the `hull` that found them.
+    /// Creates a silhouette from `labels`, probabilities at places of the plane, and the `hull` of
+    /// the touches.
     fn new(
         zone: &Zone,
         hull: Option<&Stadium>,
@@ -150,17 +152,17 @@ impl Silhouette {
         Self { zone: zone.clone(), seen }
     }
 
-    /// Whether a finger was seen to pass.
+    /// Whether a swept volume was observed.
     pub fn is_seen(&self) -> bool {
         self.seen.is_some()
     }
 
-    /// The probability that there is a surface at `place`.
+    /// Returns the probability of a surface at `place`.
     pub fn at(&self, place: &[f64]) -> f64 {
         self.over([place])[0]
     }
 
-    /// The same at each of `places`.
+    /// Returns the probability of a surface at each of `places`.
     pub fn over<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
         let flat = |place| flat(&self.zone.local(place, 0.0));
         let places: Vec<Vector2<f64>> = places.into_iter().map(flat).collect();
@@ -170,8 +172,8 @@ impl Silhouette {
         }
     }
 
-    /// Whether a surface is likelier than not at each of `places`; it is everywhere as long as no
-    /// touch has met nothing.
+    /// Whether a surface is more likely than not at each of `places`; true everywhere before the
+    /// first miss.
     pub fn is_likely<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<bool> {
         match self.seen.as_ref().is_some_and(|seen| !seen.misses.is_empty()) {
             true => self.over(places).into_iter().map(|probability| probability > 0.5).collect(),
@@ -179,15 +181,15 @@ impl Silhouette {
         }
     }
 
-    /// The probability at `place` as who looks for surfaces sees it, a little too likely; between
-    /// places half a radius apart.
+    /// Returns the optimistic probability of a surface at `place`, with threshold 0; interpolated
+    /// between grid points half a radius apart.
     pub fn hoped(&self, place: &[f64]) -> f64 {
         let place = flat(&self.zone.local(place, 0.0));
         self.seen.as_ref().map_or(1.0, |seen| seen.hoped(&self.zone, &place))
     }
 
-    /// The chance that a touch asked for at `target` meets something, as hoped: 1 − (1 − p)² with
-    /// the likeliest place under the hull, as if two places under it knew nothing of each other.
+    /// Returns the optimistic probability that a touch at `target` ends in contact: 1 − (1 − p)²
+    /// with the most likely place under the hull, as if two places under it were independent.
     pub fn of_contact(&self, target: &[f64]) -> f64 {
         let Some(seen) = &self.seen else { return 1.0 };
         let hull = seen.hull.about(flat(&self.zone.local(target, 0.0)));
@@ -210,7 +212,7 @@ impl Seen {
         self.above(0.0, place, mean, variance)
     }
 
-    /// The probability that evidence of this mean and variance at `place` is above `divide`.
+    /// Returns the probability that evidence of this mean and variance at `place` exceeds `divide`.
     fn above(&self, divide: f64, place: &Vector2<f64>, mean: f64, variance: f64) -> f64 {
         match self.misses.iter().any(|miss| miss.holds(place)) {
             true => 0.0,
@@ -219,7 +221,7 @@ impl Seen {
     }
 }
 
-/// Places under a hull, about all of them.
+/// Returns sample points under a hull.
 fn places(hull: &Stadium) -> impl Iterator<Item = Vector2<f64>> {
     let Stadium { start, along, radius_m } = *hull;
     let length_m = along.norm();
@@ -233,7 +235,8 @@ fn places(hull: &Stadium) -> impl Iterator<Item = Vector2<f64>> {
     ends.into_iter().chain(middle)
 }
 
-/// The belief of the evidence, on the scale from −1 to 1 above the prior; none without evidence.
+/// Returns the posterior of the evidence on the scale from −1 to 1, relative to the prior; `None`
+/// without evidence.
 fn belief(radius_m: f64, labels: &[(Vector2<f64>, f64)]) -> Option<Posterior> {
     let mut evidence = Observations::new(2);
     for (place, probability) in labels {
@@ -255,8 +258,8 @@ fn belief(radius_m: f64, labels: &[(Vector2<f64>, f64)]) -> Option<Posterior> {
     Posterior::new(&SquaredExponential, hyperparameters, evidence).ok()
 }
 
-/// Mean and variance of the evidence on an even grid over all that a hull sent into the zone can
-/// pass.
+/// Mean and variance of the evidence on a regular grid over all places that a hull sent into the
+/// zone can pass.
 struct Table {
     low: Vector2<f64>,
     step_m: Vector2<f64>,
@@ -286,7 +289,7 @@ impl Table {
         Self { low, step_m, counts, values }
     }
 
-    /// Between its places, bilinear; beyond them as at the nearest.
+    /// Interpolates bilinearly; outside the grid returns the value of the nearest grid point.
     fn at(&self, place: &Vector2<f64>) -> [f64; 2] {
         let steps = (place - self.low).component_div(&self.step_m);
         let [(i, across), (j, along)] = [0, 1].map(|axis| {
@@ -304,42 +307,42 @@ impl Table {
     }
 }
 
-/// The places near a segment of the zone's plane.
+/// The places within a radius of a segment in the zone's plane.
 #[derive(Clone, Debug)]
 struct Stadium {
     /// The tip.
     start: Vector2<f64>,
-    /// From there to the shaft's end.
+    /// Vector from the tip to the shaft's end.
     along: Vector2<f64>,
     radius_m: f64,
 }
 
 impl Stadium {
-    /// Of a finger whose tip is at `tip`.
+    /// The hull of a finger whose tip is at `tip`.
     fn new(finger: &Finger, tip: Vector2<f64>) -> Self {
         let axis = finger.axis_a();
         Self { start: tip, along: Vector2::new(axis.x, axis.z), radius_m: finger.radius_m }
     }
 
-    /// The same hull, sent to `start`.
+    /// Returns this hull with its tip at `start`.
     fn about(&self, start: Vector2<f64>) -> Self {
         Self { start, ..self.clone() }
     }
 
-    /// The place on its axis that is nearest to `place`.
+    /// Returns the place on its axis nearest to `place`.
     fn nearest(&self, place: &Vector2<f64>) -> Vector2<f64> {
         let off = place - self.start;
         let share = off.dot(&self.along) / self.along.norm_squared().max(f64::MIN_POSITIVE);
         self.start + self.along * share.clamp(0.0, 1.0)
     }
 
-    /// Whether it passes `place`.
+    /// Whether it contains `place`.
     fn holds(&self, place: &Vector2<f64>) -> bool {
         (place - self.nearest(place)).norm() <= self.radius_m
     }
 }
 
-/// (x, z) of a point in the zone's frame.
+/// The coordinates (x, z) of a point in the zone's frame.
 fn flat(p_z: &Point3<f64>) -> Vector2<f64> {
     Vector2::new(p_z.x, p_z.z)
 }

@@ -1,10 +1,10 @@
-//! Lower bounds on distance and travel to a box: what lets a query skip most of a mesh.
+//! Lower bounds on distance and travel to a box, which let a query skip most of a mesh.
 //!
-//! A node of the hierarchy need not be opened if what is asked about cannot reach its box before
-//! the best hit so far. A point or segment has its distance to the box; a ray must pass the
-//! [`Slab`]s of the box; of a moving capsule, p0 must enter the grown box, the [`Tube`]
-//! about its axis must meet the box's ball, and the [`Wall`] ahead of it must meet the box. Each
-//! is a lower bound, so the largest of them is one too.
+//! A node of the hierarchy need not be opened if the query cannot reach its box before the best hit
+//! so far. For a point or segment, the bound is its distance to the box; a ray must pass the
+//! [`Slab`]s of the box. For a moving capsule, p0 must enter the grown box, the [`Tube`] around its
+//! axis must meet the box's ball, and the [`Wall`] ahead of it must meet the box. Each of these is
+//! a lower bound, and so is the largest of them.
 
 use glam::Vec3A;
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -12,8 +12,8 @@ use obvhs::aabb::Aabb;
 
 use super::sweep::Capsule;
 
-/// A bound that would divide by a speed below this part of the capsule's is not worth its
-/// rounding.
+/// Smallest speed, relative to the capsule's, by which a bound is divided; below it the bound would
+/// be dominated by rounding.
 const MIN_SPEED: f64 = 1e-3;
 
 /// An axis-aligned box, in metres from the centre of the mesh.
@@ -36,8 +36,9 @@ impl Box3 {
         Self { low: a.inf(b).inf(c).coords - centre, high: a.sup(b).sup(c).coords - centre }
     }
 
-    /// What a box grows by, so that a moving capsule meets the box no earlier than a ray from its
-    /// end p0 meets the grown box: the Minkowski sum with the bounding box of the capsule.
+    /// Returns the margins by which a box grows so that a moving capsule meets the box no earlier
+    /// than a ray from its end p0 meets the grown box: the Minkowski sum with the bounding box of
+    /// the capsule.
     pub fn swept(capsule: &Capsule) -> Self {
         let draw = capsule.p0_w - capsule.p1_w;
         let zero = Vector3::zeros();
@@ -52,7 +53,7 @@ impl Box3 {
         Self { low: self.low + by.low, high: self.high + by.high }
     }
 
-    /// Squared distance to the box from `low` to `high`, in m².
+    /// Returns the squared distance to the box from `low` to `high`, m².
     #[inline]
     pub fn distance_squared(&self, low: &Point3<f64>, high: &Point3<f64>) -> f64 {
         let gap = (self.low - high.coords).sup(&(low.coords - self.high));
@@ -60,13 +61,13 @@ impl Box3 {
     }
 }
 
-/// The capsule drawn out along its axis without end, against the balls around boxes.
+/// The capsule extended along its axis to infinity, tested against the balls around boxes.
 pub(super) struct Tube {
     start: Vector3<f64>,
     axis: Vector3<f64>,
     radius_m: f64,
-    /// The part of the direction across the axis, and one over its square; 0 if it is slow,
-    /// which makes every bound 0.
+    /// Component of the direction orthogonal to the axis, and the reciprocal of its square; 0 if it
+    /// is small, which makes every bound 0.
     velocity: Vector3<f64>,
     inverse_squared: f64,
 }
@@ -88,7 +89,7 @@ impl Tube {
         }
     }
 
-    /// Travel until the tube touches the ball around a box, infinite if it never does.
+    /// Returns the travel until the tube touches the ball around a box; infinite if it never does.
     #[inline]
     pub fn enter_m(&self, node: &Box3) -> f64 {
         let arm = self.start - (node.low + node.high) / 2.0;
@@ -104,12 +105,12 @@ impl Tube {
     }
 }
 
-/// A moving plane ahead of the capsule, square to the normal of the best contact so far. What
-/// the plane does not reach, the capsule does not touch: behind a contact on a bulge this rules
-/// out at once all that the boxes, which are wider than the capsule, would let through.
+/// A moving plane ahead of the capsule, orthogonal to the normal of the best contact so far. The
+/// capsule does not touch anything that the plane does not reach: behind a contact on a bulge this
+/// excludes everything that the boxes, which are wider than the capsule, would admit.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Wall {
-    /// Against the capsule's motion, divided by the speed at which the plane advances.
+    /// Normal against the capsule's motion, divided by the speed at which the plane advances.
     normal: Vector3<f64>,
     start_m: f64,
 }
@@ -130,14 +131,15 @@ impl Wall {
         Self { normal: normal / speed, start_m: start_m / speed }
     }
 
-    /// Travel until the plane reaches the first of these points, from the centre of the mesh.
+    /// Returns the travel until the plane reaches the first of these points, relative to the centre
+    /// of the mesh.
     #[inline]
     pub fn travel_to_m(&self, points: &[Point3<f64>; 3]) -> f64 {
         let height = points.map(|point| self.normal.dot(&point.coords));
         self.start_m - height[0].max(height[1]).max(height[2])
     }
 
-    /// Travel until the plane reaches a box.
+    /// Returns the travel until the plane reaches a box.
     #[inline]
     pub fn travel_m(&self, node: &Box3) -> f64 {
         let (low, high) =
@@ -146,8 +148,8 @@ impl Wall {
     }
 }
 
-/// A ray prepared for boxes: a box is where three slabs, each between two parallel planes, overlap
-/// (Kay & Kajiya 1986).
+/// A ray prepared for box tests: a box is the intersection of three slabs, each between two
+/// parallel planes (Kay & Kajiya 1986).
 pub(super) struct Slab {
     origin: Vector3<f64>,
     inverse: Vector3<f64>,
@@ -160,7 +162,7 @@ impl Slab {
         Self { origin: origin.coords, inverse }
     }
 
-    /// Distance at which the ray enters a box, 0 from inside, infinite if it misses.
+    /// Returns the distance at which the ray enters a box; 0 from inside, infinite if it misses.
     #[inline]
     pub fn enter_m(&self, node: &Box3) -> f64 {
         let low = (node.low - self.origin).component_mul(&self.inverse);
@@ -171,14 +173,14 @@ impl Slab {
     }
 }
 
-// In single precision, all three coordinates at once, for queries that ask dozens of boxes and few
-// triangles. What is asked about grows, and its bound shrinks, by more than rounding moves them: no
-// bound is above the exact one.
+// The following tests use single precision and all three coordinates at once, for queries that test
+// dozens of boxes and few triangles. The query is enlarged, and its bound reduced, by more than
+// rounding changes them, so that no bound exceeds the exact one.
 
-/// Twice what the operations of a bound, each of which rounds by half an ε, can be off by together.
+/// Twice the accumulated rounding error of a bound's operations, each of which rounds by half an ε.
 const ROUNDING: f32 = 5.0 * f32::EPSILON;
 
-/// A ray prepared for boxes in single precision, as [`Slab`].
+/// A ray prepared for box tests in single precision; see [`Slab`].
 pub(super) struct SingleSlab {
     origin: SingleBall,
     inverse: Vec3A,
@@ -191,8 +193,8 @@ impl SingleSlab {
         Self { origin: SingleBall::new(origin), inverse: single(&inverse) }
     }
 
-    /// At most the distance at which the ray enters a box, 0 from inside; infinite only if it
-    /// misses.
+    /// Returns a lower bound of the distance at which the ray enters a box; 0 from inside; infinite
+    /// only if it misses.
     #[inline]
     pub fn enter_m(&self, node: &Aabb) -> f64 {
         let low = (node.min - self.origin.high) * self.inverse;
@@ -203,8 +205,8 @@ impl SingleSlab {
     }
 }
 
-/// A point prepared for boxes in single precision: somewhere between two corners, which rounding
-/// makes of it.
+/// A point prepared for box tests in single precision: it lies between two corners, due to
+/// rounding.
 pub(super) struct SingleBall {
     low: Vec3A,
     high: Vec3A,
@@ -217,7 +219,7 @@ impl SingleBall {
         Self { low: nearest - slack, high: nearest + slack }
     }
 
-    /// At most the squared distance to a box, in m².
+    /// Returns a lower bound of the squared distance to a box, m².
     #[inline]
     pub fn distance_squared(&self, node: &Aabb) -> f64 {
         let gap = (node.min - self.high).max(self.low - node.max).max(Vec3A::ZERO);
@@ -240,7 +242,7 @@ mod tests {
     }
 
     proptest! {
-        /// Double precision is the slow twin.
+        /// Compares with double precision.
         #[test]
         fn no_bound_is_above_the_exact_one(
             corner in coordinates(0.2),

@@ -1,4 +1,4 @@
-//! Where a ray, a point or a moving capsule meets a mesh.
+//! Bounding volume hierarchy of a mesh: ray, nearest-point and capsule-sweep queries.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -15,36 +15,36 @@ use super::mesh::Mesh;
 use super::primitives::{Line, nearest_on_triangle, normal};
 use super::sweep::{Capsule, Sweep};
 
-/// Boxes grow by this part of the mesh's diagonal: more than rounding to f32, and the rounding of
-/// a query kilometres away, can take off them.
+/// Padding of boxes as a fraction of the mesh's diagonal: more than the rounding to f32, and the
+/// rounding of a query kilometres away.
 const PADDING: f64 = 1e-6;
 
-/// Below this distance, in metres, the direction between two points says nothing.
+/// Distance below which the direction between two points is undefined, m.
 const NO_DIRECTION_M: f64 = 1e-12;
 
 /// A triangle mesh with a bounding volume hierarchy over it.
 ///
-/// Boxes are f32, relative to the centre of the mesh and padded, and only decide which triangles
-/// to ask; every triangle is asked in f64. Queries do not allocate.
+/// Boxes are f32, relative to the centre of the mesh and padded, and only select the triangles to
+/// test; every triangle is tested in f64. Queries do not allocate.
 #[derive(Clone)]
 pub struct MeshBvh {
     mesh: Arc<Mesh>,
     centre: Vector3<f64>,
     bvh: Bvh2,
-    /// Nodes that wait on the stack at most.
+    /// Largest number of nodes on the stack.
     stack_size: usize,
 }
 
-/// Where a ray meets the mesh.
+/// Intersection of a ray with the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
     /// Distance from the origin of the ray, in metres.
     pub distance_m: f64,
-    /// The triangle.
+    /// Index of the triangle.
     pub triangle: u32,
     /// The point, in metres.
     pub point: Point3<f64>,
-    /// Unit normal of the triangle, towards the side its corners run counter-clockwise on.
+    /// Unit normal of the triangle, towards the side from which its corners run counter-clockwise.
     pub normal: Vector3<f64>,
 }
 
@@ -55,22 +55,21 @@ pub struct ClosestHit {
     pub distance_m: f64,
     /// The point, in metres.
     pub point: Point3<f64>,
-    /// A triangle it lies on.
+    /// Index of a triangle that contains it.
     pub triangle: u32,
 }
 
-/// Where a moving capsule first touches the mesh.
+/// First contact of a moving capsule with the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SweepHit {
-    /// Travel of the capsule until it touches, in metres; 0 if it overlaps from the start.
+    /// Travel of the capsule until contact, in metres; 0 if it overlaps from the start.
     pub travel_m: f64,
-    /// The point of the mesh that is touched, in metres. Where a line or an area is touched at
-    /// once, one point of it.
+    /// Contact point of the mesh, in metres; one point of it if the contact is a line or an area.
     pub point: Point3<f64>,
-    /// Unit vector from `point` to the axis of the capsule. If the axis itself touches: the
-    /// triangle's normal, on the side the capsule comes from.
+    /// Unit vector from `point` to the axis of the capsule. If the axis itself touches, the
+    /// triangle's normal on the side from which the capsule comes.
     pub normal: Vector3<f64>,
-    /// A triangle that is touched.
+    /// Index of a triangle in contact.
     pub triangle: u32,
 }
 
@@ -97,13 +96,13 @@ impl MeshBvh {
         Self { mesh, centre, bvh, stack_size }
     }
 
-    /// The mesh asked about.
+    /// The mesh of the hierarchy.
     pub fn mesh(&self) -> &Arc<Mesh> {
         &self.mesh
     }
 
-    /// First point where the ray o + s d, 0 ≤ s ≤ `max_distance_m`, meets the mesh, from either
-    /// side. A ray through an edge or a vertex does not slip between triangles.
+    /// Returns the first intersection of the ray o + s d, 0 ≤ s ≤ `max_distance_m`, with the mesh,
+    /// from either side. A ray through an edge or a vertex does not slip between triangles.
     pub fn ray(
         &self,
         origin: &Point3<f64>,
@@ -113,7 +112,7 @@ impl MeshBvh {
         self.ray_near(&Nearby::WHOLE, origin, direction, max_distance_m)
     }
 
-    /// The same of a ray that stays in the ball of `near`.
+    /// Returns the first intersection of a ray that stays in the ball of `near`.
     pub fn ray_near(
         &self,
         near: &Nearby,
@@ -147,7 +146,7 @@ impl MeshBvh {
         })
     }
 
-    /// The point of the mesh nearest to `p`.
+    /// Returns the point of the mesh nearest to `p`.
     pub fn closest_point(&self, p: &Point3<f64>) -> ClosestHit {
         let from = p - self.centre;
         let reach = |triangle| {
@@ -176,12 +175,12 @@ impl MeshBvh {
         self.touches_near(&Nearby::WHOLE, centre, radius_m)
     }
 
-    /// What of the mesh lies within `radius_m` of `centre`, for queries that stay there.
+    /// Returns the part of the mesh within `radius_m` of `centre`, for queries that stay there.
     pub fn nearby(&self, centre: &Point3<f64>, radius_m: f64) -> Nearby {
         Nearby::new(&self.bvh, &(centre - self.centre), radius_m)
     }
 
-    /// Whether what is `near` comes within `radius_m` of `centre`.
+    /// Whether the part `near` comes within `radius_m` of `centre`.
     pub fn touches_near(&self, near: &Nearby, centre: &Point3<f64>, radius_m: f64) -> bool {
         let ball = SingleBall::new(&(centre - self.centre));
         let mut touched = false;
@@ -200,13 +199,13 @@ impl MeshBvh {
         touched
     }
 
-    /// Whether the mesh reaches into `capsule`.
+    /// Whether the mesh intersects `capsule`.
     pub fn enters(&self, capsule: &Capsule) -> bool {
         self.overlap(capsule).is_some()
     }
 
-    /// Whether `p` sees only back faces along the six axes: it is inside a closed mesh, or deep
-    /// in one with few holes.
+    /// Whether all six axis-parallel rays from `p` meet back faces: it is inside a closed mesh, or
+    /// deep in one with few holes.
     pub fn surrounds(&self, p: &Point3<f64>) -> bool {
         let from = p - self.centre;
         if Box3::of(self.bvh.nodes[0].aabb()).distance_squared(&from, &from) > 0.0 {
@@ -218,9 +217,10 @@ impl MeshBvh {
             .all(|axis| self.ray(p, &axis, f64::MAX).is_some_and(|hit| hit.normal.dot(&axis) > 0.0))
     }
 
-    /// First contact of a capsule that travels along `direction` by at most `max_travel_m`: the
-    /// least travel at which the distance from axis to mesh is no more than the radius. If that
-    /// is so from the start, the contact is the point of the mesh nearest to the axis.
+    /// Returns the first contact of a capsule that travels along `direction` by at most
+    /// `max_travel_m`: the smallest travel at which the distance from axis to mesh is at most the
+    /// radius. If the capsule overlaps from the start, the contact is the point of the mesh nearest
+    /// to the axis.
     pub fn sweep(
         &self,
         capsule: &Capsule,
@@ -263,7 +263,7 @@ impl MeshBvh {
         hit
     }
 
-    /// The triangle nearest to the axis, if it is no farther than the radius.
+    /// Returns the triangle nearest to the axis, if it is no farther than the radius.
     fn overlap(&self, capsule: &Capsule) -> Option<u32> {
         let ends = (capsule.p0_w - self.centre, capsule.p1_w - self.centre);
         let (low, high) = (ends.0.coords.inf(&ends.1.coords), ends.0.coords.sup(&ends.1.coords));
@@ -309,7 +309,7 @@ impl MeshBvh {
         SweepHit { travel_m, point, normal, triangle }
     }
 
-    /// `p` from the middle of the boxes.
+    /// Returns `p` relative to the centre of the boxes.
     pub(super) fn local(&self, p: &Point3<f64>) -> Point3<f64> {
         p - self.centre
     }
@@ -319,8 +319,8 @@ impl MeshBvh {
         self.mesh.corners(triangle as usize)
     }
 
-    /// Shows `ask` the triangles of some parts whose boxes have a lower bound under the limit, in
-    /// each part near ones first. `ask` returns the new limit.
+    /// Passes to `ask` the triangles of some parts whose boxes have a lower bound below the limit,
+    /// near ones first within each part. `ask` returns the new limit.
     #[inline]
     pub(super) fn visit(
         &self,
@@ -361,7 +361,7 @@ impl MeshBvh {
     }
 }
 
-/// Levels of the tree below its root.
+/// Returns the number of levels of the tree below its root.
 fn depth(bvh: &Bvh2) -> usize {
     let mut deepest = 0;
     let mut waiting = vec![(0, 0)];
@@ -375,10 +375,10 @@ fn depth(bvh: &Bvh2) -> usize {
     deepest
 }
 
-/// Parts kept at most; chosen: more are asked one by one in vain.
+/// Largest number of parts; a heuristic: more are tested one by one without benefit.
 const MOST: usize = 8;
 
-/// Parts of a mesh that hold every triangle within some ball, and perhaps others.
+/// Parts of a mesh that contain every triangle within some ball, and perhaps others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Nearby {
     nodes: [u32; MOST],
@@ -391,8 +391,8 @@ impl Nearby {
 
     const NOTHING: Self = Self { nodes: [0; MOST], count: 0 };
 
-    /// Within `radius_m` of `centre`, which is relative to that of the boxes: one level of the
-    /// hierarchy after the other, as deep as there is room for all of a level that the ball meets.
+    /// Selects the parts within `radius_m` of `centre`, which is relative to that of the boxes:
+    /// descends level by level as long as all nodes of a level that the ball meets fit.
     fn new(bvh: &Bvh2, centre: &Point3<f64>, radius_m: f64) -> Self {
         let ball = SingleBall::new(centre);
         let reach = (radius_m * radius_m).next_up();
@@ -418,12 +418,12 @@ impl Nearby {
         }
     }
 
-    /// The nodes at the parts' roots.
+    /// Returns the root nodes of the parts.
     fn nodes(&self) -> &[u32] {
         &self.nodes[..self.count]
     }
 
-    /// Whether there was room for one more.
+    /// Adds a node if there is space; returns whether there was.
     fn has_taken(&mut self, node: u32) -> bool {
         let room = self.nodes.get_mut(self.count);
         self.count += usize::from(room.is_some());
@@ -437,7 +437,7 @@ mod tests {
     use crate::mesh::Mesh;
     use proptest::prelude::*;
 
-    /// A wavy sheet, 1 m by 1 m.
+    /// Returns a wavy sheet, 1 m by 1 m.
     fn sheet() -> MeshBvh {
         const SIDE: u32 = 30;
         let vertex = |i: u32| {
@@ -451,7 +451,7 @@ mod tests {
     }
 
     proptest! {
-        /// Queries that begin at the root are the slow twins.
+        /// Compares with queries that start at the root.
         #[test]
         fn in_the_ball_nothing_is_missed(
             centre in prop::array::uniform3(-0.2..1.2f64),

@@ -1,30 +1,30 @@
-//! A mesh of fewer triangles, to be looked at.
+//! Mesh decimation by vertex clustering, for display.
 
 use super::mesh::Mesh;
 use super::solids::{Triangles, normals};
 use nalgebra::{Point3, Vector3};
 use std::collections::HashMap;
 
-/// From one size of cells to the next that is tried; chosen.
+/// Ratio between consecutive cell sizes; a heuristic.
 const FINER: f64 = 0.9;
 
-/// The mesh with at most `most` triangles, or as it is if it has no more: the vertices of a cubic
-/// cell become their mean, and triangles without three corners vanish (Rossignac and Borrel,
-/// *Multi-resolution 3D approximations for rendering complex scenes*, 1993). Cells are as small as
-/// that allows; where a surface of area A is folded so that even cells of √(12 A / `most`) have
-/// more triangles, it has more.
+/// Returns the mesh reduced to at most `most` triangles, or unchanged if it has no more: the
+/// vertices of a cubic cell are merged into their mean, and triangles without three distinct
+/// corners are removed (Rossignac and Borrel, *Multi-resolution 3D approximations for rendering
+/// complex scenes*, 1993). Cells are as small as possible. If a surface of area A is folded so that
+/// even cells of √(12 A / `most`) give more triangles, the result has more.
 ///
 /// No vertex moves by more than a cell's diagonal, 6 √(A / `most`). The two sides of a thin wall
-/// stay apart: a vertex that looks the other way than the first of its cell is of another. What was
-/// closed stays closed; nothing keeps triangles from meeting.
+/// remain separate: vertices with opposite normals are not merged. A closed mesh remains closed;
+/// triangles may intersect.
 pub fn coarse(mesh: &Mesh, most: usize) -> Triangles {
     let (vertices, triangles) = (mesh.vertices(), mesh.triangles());
     if triangles.len() <= most {
         return (vertices.to_vec(), triangles.to_vec());
     }
     let normals = normals(vertices, triangles);
-    // A surface meets one to two cells for each square of their side that it has, and has two
-    // triangles for each: this begins with too few.
+    // A surface meets one to two cells per square of their side, and has two triangles for each:
+    // this starts with too few.
     let mut cell_m = (12.0 * mesh.area_m2() / most.max(1) as f64).sqrt();
     let mut found = clustered(mesh, &normals, cell_m);
     loop {

@@ -1,45 +1,45 @@
 //! Analytic surfaces: solids given by a formula instead of by triangles.
 //!
-//! A solid is a field of one number per point, in metres: negative inside, positive outside, zero
-//! on the surface. Every field here is 1-Lipschitz, |f(p) - f(q)| <= |p - q|, so the surface is
-//! never nearer than |f(p)|; that is what makes [`Implicit::ray`] safe. Shapes and blends follow
-//! Quilez, "Distance functions" (iquilezles.org/articles/distfunctions), with exact gradients.
+//! A solid is a scalar field, in metres: negative inside, positive outside, zero on the surface.
+//! Every field here is 1-Lipschitz, |f(p) - f(q)| <= |p - q|, so the distance to the surface is at
+//! least |f(p)|; this makes [`Implicit::ray`] safe. Shapes and blends follow Quilez, "Distance
+//! functions" (iquilezles.org/articles/distfunctions), with exact gradients.
 //!
-//! Only + - * / and square roots are used, so that values are the same bits on every machine. A
-//! point that is not finite gives NaN or `None`; nothing panics.
+//! Only + - * / and square roots are used, so that values have the same bits on every machine. A
+//! point that is not finite gives NaN or `None`, never a panic.
 
 use nalgebra::{Point3, Vector3};
 
-/// Shortest step of a ray, metres. Chosen: a ray can miss no more than a graze with a chord
-/// shorter than this, a ten-thousandth of the 1 mm that touch resolves.
+/// Shortest step of a ray, m. A heuristic: a ray can miss at most a graze with a chord shorter than
+/// this, a ten-thousandth of the 1 mm that touch resolves.
 const SHORTEST_STEP_M: f64 = 1e-7;
-/// Length of the interval in which a ray's crossing is known, metres. Chosen.
+/// Length of the interval in which a ray's crossing is known, m; a heuristic.
 const RAY_TOLERANCE_M: f64 = 1e-12;
-/// Field value that counts as zero, metres. Chosen: some ten roundings at 0.1 m.
+/// Field value that counts as zero, m. A heuristic: some ten roundings at 0.1 m.
 const ZERO_M: f64 = 1e-15;
-/// Newton steps before giving up. Chosen: far more than a point near the surface needs.
+/// Largest number of Newton steps. A heuristic: far more than a point near the surface needs.
 const NEWTON_STEPS: usize = 50;
 
 /// A solid given by a 1-Lipschitz field, in its own frame, metres.
 pub trait Implicit: Send + Sync {
-    /// The field and its gradient at `p`.
+    /// Returns the field and its gradient at `p`.
     fn field(&self, p: Point3<f64>) -> Field;
 
-    /// Lowest and highest corner of a box that encloses the solid.
+    /// Returns the lowest and highest corner of a box that encloses the solid.
     fn bounds(&self) -> [Point3<f64>; 2];
 
-    /// The field at `p`, metres: negative inside, positive outside.
+    /// Returns the field at `p`, m: negative inside, positive outside.
     fn value(&self, p: Point3<f64>) -> f64 {
         self.field(p).value
     }
 
-    /// The field's gradient at `p`: points outwards, and is no longer than one.
+    /// Returns the field's gradient at `p`: it points outwards, and is no longer than one.
     fn gradient(&self, p: Point3<f64>) -> Vector3<f64> {
         self.field(p).gradient
     }
 
-    /// The point of the surface that Newton's steps p - f ∇f / |∇f|² lead to from `p`; close to
-    /// the surface that is the nearest point to second order. `None` where they do not converge.
+    /// Projects `p` onto the surface by Newton's steps p - f ∇f / |∇f|²; close to the surface this
+    /// is the nearest point to second order. Returns `None` if they do not converge.
     fn project(&self, mut p: Point3<f64>) -> Option<Point3<f64>> {
         for _ in 0..NEWTON_STEPS {
             let Field { value, gradient } = self.field(p);
@@ -51,11 +51,11 @@ pub trait Implicit: Send + Sync {
         None
     }
 
-    /// Distance from `origin` along `direction` (of any length) to where the ray first crosses
-    /// the surface, from outside or from inside, if that is within `max_m` metres.
+    /// Returns the distance from `origin` along `direction` (of any length) to the first crossing
+    /// of the surface, from outside or from inside, if it is within `max_m` metres.
     ///
-    /// Steps of |f| cannot pass the surface; once one of the shortest length has, the crossing is
-    /// bisected.
+    /// Steps of |f| cannot pass the surface; once one of the shortest length has passed it, the
+    /// crossing is found by bisection.
     fn ray(&self, origin: Point3<f64>, direction: Vector3<f64>, max_m: f64) -> Option<f64> {
         let unit = direction.try_normalize(0.0)?;
         let value_at = |distance_m: f64| self.value(origin + unit * distance_m);
@@ -69,7 +69,7 @@ pub trait Implicit: Send + Sync {
             before = reached;
             reached = max_m.min(before + value.abs().max(SHORTEST_STEP_M));
             value = value_at(reached);
-            // The end of the ray, steps below rounding, or numbers that are not finite.
+            // The end of the ray, steps below rounding, or values that are not finite.
             if !(reached > before && reached <= max_m && value.is_finite()) {
                 return None;
             }
@@ -95,18 +95,18 @@ pub trait Implicit: Send + Sync {
 pub struct Field {
     /// Negative inside, positive outside, metres.
     pub value: f64,
-    /// Derivative of the value by the point.
+    /// Derivative of the value with respect to the point.
     pub gradient: Vector3<f64>,
 }
 
 impl Field {
-    /// The half space below the plane through `on` with the unit normal `normal`.
+    /// Half-space below the plane through `on` with the unit normal `normal`.
     pub fn plane(p: Point3<f64>, on: Point3<f64>, normal: Vector3<f64>) -> Self {
         Self { value: normal.dot(&(p - on)), gradient: normal }
     }
 
-    /// An ellipsoid, (|v / r| - 1) min r for the offset v from its centre. An infinite radius
-    /// makes it an elliptic cylinder.
+    /// Ellipsoid, (|v / r| - 1) min r for the offset v from its centre. An infinite radius makes it
+    /// an elliptic cylinder.
     pub fn ellipsoid(offset: Vector3<f64>, radii_m: Vector3<f64>) -> Self {
         let scale_m = radii_m.min();
         let scaled = offset.component_div(&radii_m);
@@ -116,12 +116,11 @@ impl Field {
         }
     }
 
-    /// The hull of two balls, each a centre and a radius, neither within the other: its exact
-    /// distance.
+    /// Hull of two balls, each a centre and a radius, neither within the other: its exact distance.
     ///
-    /// It is the union of balls of radius `r_a - s t` at `a + t u`, where u is the unit axis and
-    /// s the sine of the half angle; the distance is least over t at `t = h - q s / c`, for a
-    /// point h along the axis and q beside it.
+    /// It is the union of balls of radius `r_a - s t` at `a + t u`, where u is the unit axis and s
+    /// the sine of the half angle; the distance is minimal over t at `t = h - q s / c`, for a point
+    /// h along the axis and q beside it.
     pub fn round_cone(p: Point3<f64>, a: (Point3<f64>, f64), b: (Point3<f64>, f64)) -> Self {
         let axis = b.0 - a.0;
         let length_m = axis.norm();
@@ -137,22 +136,21 @@ impl Field {
         }
     }
 
-    /// The solid with a skin of `thickness_m` added (negative: taken off).
+    /// Returns the solid with a layer of `thickness_m` added (negative: removed).
     pub fn grown(self, thickness_m: f64) -> Self {
         Self { value: self.value - thickness_m, ..self }
     }
 
-    /// A tube about the curve in which two surfaces that meet at right angles cross:
-    /// √(f² + g²) - r.
+    /// Tube around the curve in which two surfaces cross at right angles: √(f² + g²) - r.
     pub fn tube(self, other: Self, radius_m: f64) -> Self {
         let norm = (self.value * self.value + other.value * other.value).sqrt();
         let gradient = self.gradient * self.value + other.gradient * other.value;
-        // On the curve itself the direction is free: zero, as at a ball's centre.
+        // The gradient is undefined on the curve itself: zero, as at a ball's centre.
         let gradient = if norm == 0.0 { gradient } else { gradient / norm };
         Self { value: norm - radius_m, gradient }
     }
 
-    /// Both solids, the edge between them filled: Quilez's cubic smooth minimum,
+    /// Union of both solids with the edge between them filled: Quilez's cubic smooth minimum,
     /// min(f, g) - k h³ / 6 with h = max(1 - |f - g| / k, 0). Twice continuously differentiable;
     /// the gradient is a weighted mean of the two, which keeps the field 1-Lipschitz.
     pub fn union(self, other: Self, blend_m: f64) -> Self {
@@ -165,8 +163,8 @@ impl Field {
         }
     }
 
-    /// What is in both solids, the edge rounded off as [`Field::union`] fills it. Where they meet
-    /// at right angles the edge's least radius is 0.35 `blend_m`.
+    /// Intersection of both solids, with the edge rounded off as [`Field::union`] fills it. Where
+    /// they meet at right angles the smallest radius of the edge is 0.35 `blend_m`.
     pub fn intersection(self, other: Self, blend_m: f64) -> Self {
         self.complement().union(other.complement(), blend_m).complement()
     }
@@ -176,7 +174,7 @@ impl Field {
     }
 }
 
-/// v / |v|; zero for the zero vector, where a ball's distance has no gradient.
+/// Returns v / |v|; zero for the zero vector, where a ball's distance has no gradient.
 fn unit_or_zero(v: Vector3<f64>) -> Vector3<f64> {
     let norm = v.norm();
     if norm == 0.0 { v } else { v / norm }

@@ -1,27 +1,27 @@
-//! What lies inside a closed mesh: what goes in must come out.
+//! Point-in-mesh test by counting signed surface crossings along lines.
 //!
-//! Along a line the surface is entered and left; where it was entered more often than left, the
-//! line is inside. Counting with signs is exact for a closed mesh of any number of pieces, nested,
-//! touching or overlapping, where counting without them is not, and it costs one walk through the
-//! hierarchy where the solid angles of all triangles, the generalised winding number, cost one for
-//! each triangle. What that number would still tell, a surface with a face missing, is made up for:
-//! a line is looked along from both of its ends.
+//! A line enters and leaves the surface; where it has entered more often than left, it is inside.
+//! Signed counting is exact for a closed mesh of any number of components, nested, touching or
+//! overlapping, unlike unsigned counting. It costs one traversal of the hierarchy, whereas the
+//! generalised winding number, the solid angles of all triangles, costs one term per triangle. That
+//! number would also handle a surface with a missing face; this is compensated by evaluating a line
+//! from both of its ends.
 
 use super::bounds::SingleSlab;
 use super::bvh::{MeshBvh, Nearby};
 use super::primitives::Line;
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-/// Lines through a point that are asked. Chosen skew, so that sides along the axes are met by none
-/// in an edge or in their plane.
+/// Directions of the lines through a point. A heuristic: skew, so that they meet no axis-parallel
+/// side in an edge or in its plane.
 const SKEW: [[f64; 3]; 3] = [[0.83, 0.44, 0.34], [-0.37, 0.85, 0.38], [-0.29, -0.47, 0.83]];
 
-/// Where a line goes through a mesh.
+/// Crossing of a line with a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
-    /// Way along the line, in metres.
+    /// Distance along the line, m.
     pub at_m: f64,
-    /// Whether the surface is entered there, against its normal.
+    /// Whether the line enters the surface there, against its normal.
     pub enters: bool,
 }
 
@@ -32,8 +32,8 @@ impl Crossing {
 }
 
 impl MeshBvh {
-    /// Tells every place where the ray from `origin` without end goes through the mesh, in no
-    /// order. A ray through an edge is told of both triangles there.
+    /// Reports every crossing of the infinite ray from `origin` with the mesh, in no particular
+    /// order. A crossing through an edge is reported for both triangles.
     pub fn cross(
         &self,
         origin: &Point3<f64>,
@@ -57,8 +57,8 @@ impl MeshBvh {
         );
     }
 
-    /// Whether `p` is inside the mesh, which is closed: most of three lines through it say so. A
-    /// point of the surface may be either.
+    /// Whether `p` is inside the closed mesh, by a majority of three lines through it. For a point
+    /// on the surface either result is possible.
     pub fn contains(&self, p: &Point3<f64>) -> bool {
         let (low, high) = self.mesh().bounds();
         if p.sup(&low).inf(&high) != *p {
@@ -80,12 +80,12 @@ impl MeshBvh {
     }
 }
 
-/// The parts of a line that are inside, as [from, to] in order, from all its `crossings`, which are
-/// sorted; `spans` is emptied before.
+/// Returns the intervals of a line inside, as [from, to] in order, from all its `crossings`, which
+/// get sorted; `spans` is cleared before.
 pub fn spans_inside(crossings: &mut [Crossing], spans: &mut Vec<[f64; 2]>) {
     crossings.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m));
     spans.clear();
-    // Seen from the far end, as many bodies lie ahead as were entered, but for those never left.
+    // From the far end, as many bodies lie ahead as were entered, except those never left.
     let outside = crossings.iter().map(Crossing::sign).sum::<i32>().min(0);
     let mut depth = 0;
     for pair in crossings.windows(2) {
@@ -116,7 +116,7 @@ mod tests {
         MeshBvh::new(Mesh::new(&vertices, &triangles).unwrap().0)
     }
 
-    /// A ring about z, of a circle of `tube_m` led around one of `ring_m`.
+    /// Returns a torus around z: a circle of radius `tube_m` moved around one of `ring_m`.
     fn torus(ring_m: f64, tube_m: f64) -> MeshBvh {
         use std::f64::consts::TAU;
         let (turns, around) = (48, 24);
@@ -140,8 +140,8 @@ mod tests {
     }
 
     proptest! {
-        /// Off the surface by more than the chords of its 48 and 24 corners, 1 - cos(π/24) of the
-        /// tube and 1 - cos(π/48) of the ring.
+        /// Points off the surface by more than the chords of its 48 and 24 corners, 1 - cos(π/24)
+        /// of the tube and 1 - cos(π/48) of the ring.
         #[test]
         fn a_torus_is_hollow_in_the_middle(at in prop::array::uniform3(-1.5f64..1.5)) {
             let [x, y, z] = at;
@@ -150,8 +150,8 @@ mod tests {
             prop_assert_eq!(torus(1.0, 0.4).contains(&Point3::from(at)), from_tube < 0.0);
         }
 
-        /// Two boxes that touch in a part of a face, a third that overlaps, a fourth within the
-        /// first, a ball apart: at any place, on lattice planes as well.
+        /// Two boxes that share a part of a face, a third that overlaps, a fourth within the first,
+        /// and a separate ball: at any place, including lattice planes.
         #[test]
         fn pieces_may_touch_overlap_and_nest(
             at in prop::array::uniform3(prop_oneof![-0.5f64..4.5, (0..9).prop_map(|i| f64::from(i) * 0.5 + 0.25)]),
@@ -194,7 +194,7 @@ mod tests {
         }
     }
 
-    /// Along a line through the centres of a box in a box and of one apart.
+    /// A line through the centres of a box in a box and of a separate one.
     #[test]
     fn a_line_is_inside_from_where_it_enters_to_where_it_leaves() {
         let boxes = all_of(&[
@@ -209,7 +209,8 @@ mod tests {
         let mut spans = vec![[7.0; 2]];
         spans_inside(&mut crossings, &mut spans);
         assert_eq!(spans, [[1.0, 4.0], [5.0, 6.0]]);
-        // The way back, where the first surface is missing: none is where there is nothing.
+        // The reverse direction, with the first surface missing: no interval is reported in empty
+        // space.
         let half = &mut crossings[1..];
         spans_inside(half, &mut spans);
         assert_eq!(spans, [[2.0, 4.0], [5.0, 6.0]]);

@@ -1,11 +1,10 @@
-//! Triangle meshes, analytic surfaces, and where things meet them.
+//! Triangle meshes, analytic surfaces, and geometric queries.
 //!
-//! A mesh file is read by [`import`](import::import), or a mesh is given as vertices and
-//! triangles; both are repaired, with a report of what had to be done, and become a
-//! [`Mesh`](mesh::Mesh) that can be trusted everywhere above. A [`MeshBvh`](bvh::MeshBvh), a
-//! bounding volume hierarchy, answers where a ray, a point or a moving capsule meets it, exactly
-//! and without a gap. An [`Implicit`](implicit::Implicit) surface is given by a formula instead.
-//! All lengths are metres.
+//! A mesh file is read by [`import`](import::import), or a mesh is given as vertices and triangles.
+//! Both are repaired, with a report of the repairs, and become a valid [`Mesh`](mesh::Mesh). A
+//! [`MeshBvh`](bvh::MeshBvh), a bounding volume hierarchy, computes exact, watertight intersections
+//! of a ray, a point or a moving capsule with it. An [`Implicit`](implicit::Implicit) surface is
+//! given by a formula instead. All lengths are in metres.
 //!
 //! ```
 //! use nalgebra::{Point3, Vector3};
@@ -26,7 +25,7 @@
 //! let hit = mesh.ray(&start, &-Vector3::y_axis(), 1.0).expect("it meets the square");
 //! assert!((hit.distance_m - 0.3).abs() < 1e-12);
 //!
-//! // A capsule the same way touches as much earlier as its radius says.
+//! // A capsule in the same direction makes contact earlier by its radius.
 //! let capsule = Capsule { p0_w: start, p1_w: start + Vector3::z() * 0.02, radius_m: 0.007 };
 //! let hit = mesh.sweep(&capsule, &-Vector3::y_axis(), 1.0).expect("it meets the square");
 //! assert!((hit.travel_m - 0.293).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! The triangle mesh that can be trusted.
+//! Validated triangle mesh.
 
 use super::primitives::extent;
 use nalgebra::{Isometry3, Point3};
@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 /// A triangle mesh, in metres.
 ///
-/// Only [`repair`](super::repair::repair) makes one, so it always has at least one triangle,
+/// It is created only by [`repair`](super::repair::repair), so it always has at least one triangle,
 /// finite vertices that are all used, indices in range, and no degenerate or duplicate triangles.
 /// Winding is consistent over each edge-connected component: seen from outside, corners run
 /// counter-clockwise.
@@ -19,7 +19,7 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// The caller promises what the type promises.
+    /// Creates a mesh from parts that must satisfy the invariants of the type.
     pub(super) fn from_sound_parts(vertices: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Self {
         let bounds = extent(&vertices).map_or_else(Default::default, |[low, high]| (low, high));
         Self { vertices, triangles, bounds }
@@ -35,28 +35,28 @@ impl Mesh {
         &self.triangles
     }
 
-    /// The corners of triangle `triangle`, in winding order, in metres.
+    /// Returns the corners of triangle `triangle`, in winding order, in metres.
     ///
     /// # Panics
-    /// If there is no such triangle, like any index.
+    /// If there is no such triangle.
     #[inline]
     pub fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
         self.triangles[triangle].map(|vertex| self.vertices[vertex as usize])
     }
 
-    /// Corners of all triangles, in order.
+    /// Returns the corners of all triangles, in order.
     pub fn iter_corners(&self) -> impl ExactSizeIterator<Item = [Point3<f64>; 3]> + '_ {
         (0..self.triangles.len()).map(|triangle| self.corners(triangle))
     }
 
-    /// The smallest axis-aligned box around the mesh: least and greatest corner, in metres. Known
-    /// beforehand, however many vertices there are.
+    /// Returns the smallest axis-aligned box around the mesh: lowest and highest corner, in metres.
+    /// The box is precomputed.
     pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
         self.bounds
     }
 
-    /// SHA-256 of the vertices, then of the triangles, as [`MeshReport`](super::report::MeshReport)
-    /// has it.
+    /// Returns the SHA-256 of the vertices, then of the triangles, as in
+    /// [`MeshReport`](super::report::MeshReport).
     pub fn sha256(&self) -> String {
         let mut hash = Sha256::new();
         for vertex in &self.vertices {
@@ -75,9 +75,9 @@ impl Mesh {
 
     /// Enclosed volume, in m³, by the divergence theorem: a sixth of the sum of a · (b × c).
     ///
-    /// Meaningful when the mesh is closed. An inner wall counts as a body of its own.
+    /// Meaningful if the mesh is closed. An inner wall counts as a separate body.
     pub fn volume_m3(&self) -> f64 {
-        // Measured from a vertex, so that a mesh far from the origin loses no digits.
+        // Relative to a vertex, so that a mesh far from the origin loses no digits.
         let origin = self.vertices[0];
         self.iter_corners()
             .map(|[a, b, c]| (a - origin).dot(&(b - origin).cross(&(c - origin))))
@@ -85,13 +85,13 @@ impl Mesh {
             / 6.0
     }
 
-    /// The mesh enlarged by a positive, finite `factor` about its origin.
+    /// Returns the mesh scaled by a positive, finite `factor` about its origin.
     pub fn scaled(&self, factor: f64) -> Self {
         let vertices = self.vertices.iter().map(|vertex| vertex * factor).collect();
         Self::from_sound_parts(vertices, self.triangles.clone())
     }
 
-    /// The mesh moved by the finite pose `x_wm`: a vertex p in M becomes `x_wm` p in W.
+    /// Returns the mesh moved by the finite pose `x_wm`: a vertex p in M becomes `x_wm` p in W.
     pub fn transformed(&self, x_wm: &Isometry3<f64>) -> Self {
         let vertices = self.vertices.iter().map(|vertex| x_wm * vertex).collect();
         Self::from_sound_parts(vertices, self.triangles.clone())

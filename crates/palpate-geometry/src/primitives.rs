@@ -1,16 +1,16 @@
-//! Exact answers in f64 about points and one triangle: the box around them, a line through it, the
-//! nearest point of it.
+//! Exact queries in f64 for points and single triangles: bounding box, line intersection, nearest
+//! point.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
-/// Returns the least and greatest corner of the smallest axis-aligned box around `points`; `None`
-/// if there are none.
+/// Returns the lowest and highest corner of the smallest axis-aligned box around `points`; `None`
+/// for no points.
 pub fn extent<'a>(points: impl IntoIterator<Item = &'a Point3<f64>>) -> Option<[Point3<f64>; 2]> {
     let grown = |[low, high]: [Point3<f64>; 2], p: &Point3<f64>| [low.inf(p), high.sup(p)];
     points.into_iter().fold(None, |ends, p| Some(grown(ends.unwrap_or([*p; 2]), p)))
 }
 
-/// A line prepared for triangle tests that leave no gaps.
+/// A line prepared for watertight triangle tests.
 ///
 /// The triangle is sheared so that the line becomes the z axis, then tested in the plane
 /// (Woop, Benthin, Wald: *Watertight Ray/Triangle Intersection*, JCGT 2013). Two triangles that
@@ -23,7 +23,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// A line along `direction`.
+    /// Creates a line along `direction`.
     pub fn along(direction: &UnitVector3<f64>) -> Self {
         let z = direction.iamax();
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
@@ -31,8 +31,8 @@ impl Line {
         Self { axes: [x, y, z], shear }
     }
 
-    /// Signed distance from `origin` along the line to the triangle, in metres; `None` if the
-    /// line misses it or lies in its plane.
+    /// Returns the signed distance from `origin` along the line to the triangle, in metres; `None`
+    /// if the line misses it or lies in its plane.
     #[inline]
     pub fn distance_m(&self, origin: &Point3<f64>, triangle: &[Point3<f64>; 3]) -> Option<f64> {
         let [x, y, z] = self.axes;
@@ -52,20 +52,21 @@ impl Line {
     }
 }
 
-/// Unit normal of a triangle, towards the side from which its corners run counter-clockwise.
+/// Returns the unit normal of a triangle, towards the side from which its corners run
+/// counter-clockwise.
 pub fn normal(triangle: &[Point3<f64>; 3]) -> Vector3<f64> {
     let [a, b, c] = triangle;
     (b - a).cross(&(c - a)).normalize()
 }
 
-/// The point of segment `a`–`b` nearest to `p`.
+/// Returns the point of segment `a`–`b` nearest to `p`.
 #[inline]
 pub fn nearest_on_segment(p: &Point3<f64>, a: &Point3<f64>, b: &Point3<f64>) -> Point3<f64> {
     let along = b - a;
     a + along * fraction((p - a).dot(&along), along.norm_squared())
 }
 
-/// The point of a triangle nearest to `p`.
+/// Returns the point of a triangle nearest to `p`.
 #[inline]
 pub fn nearest_on_triangle(p: &Point3<f64>, triangle: &[Point3<f64>; 3]) -> Point3<f64> {
     let [a, b, c] = triangle;
@@ -80,7 +81,7 @@ pub fn nearest_on_triangle(p: &Point3<f64>, triangle: &[Point3<f64>; 3]) -> Poin
     nearest_of(candidates, |q| (q - p).norm_squared())
 }
 
-/// Where the perpendicular from `p` meets the triangle, if it does.
+/// Returns the foot of the perpendicular from `p` onto the triangle, if it lies inside.
 #[inline]
 fn perpendicular_foot(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> Option<Point3<f64>> {
     let (ab, ac, ap) = (b - a, c - a, p - a);
@@ -90,7 +91,7 @@ fn perpendicular_foot(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> Option<P
     (beta >= 0.0 && gamma >= 0.0 && beta + gamma <= 1.0).then(|| a + ab * beta + ac * gamma)
 }
 
-/// The nearest points of segment `p`–`q` and segment `a`–`b`, in this order.
+/// Returns the nearest points of segment `p`–`q` and segment `a`–`b`, in this order.
 pub fn nearest_of_segments(
     [p, q]: [&Point3<f64>; 2],
     [a, b]: [&Point3<f64>; 2],
@@ -104,8 +105,8 @@ pub fn nearest_of_segments(
     (nearest_on_segment(&on_across, p, q), on_across)
 }
 
-/// The nearest points of segment `p`–`q` and a triangle, in this order. If they intersect, both
-/// are the point where they do.
+/// Returns the nearest points of segment `p`–`q` and a triangle, in this order. If they intersect,
+/// both are the intersection.
 pub fn nearest_of_segment_and_triangle(
     [p, q]: [&Point3<f64>; 2],
     triangle: &[Point3<f64>; 3],
@@ -141,7 +142,7 @@ fn nearest_of<T: Copy, const N: usize>(candidates: [T; N], distance: impl Fn(&T)
     best.1
 }
 
-/// `part / whole` within 0..=1, and 0 where the whole is nothing.
+/// Returns `part / whole` clamped to 0..=1, and 0 if the whole is zero.
 fn fraction(part: f64, whole: f64) -> f64 {
     if whole > 0.0 { (part / whole).clamp(0.0, 1.0) } else { 0.0 }
 }

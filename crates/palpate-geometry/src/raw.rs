@@ -1,16 +1,16 @@
-//! What importers hand over: vertices and triangles nobody has checked yet.
+//! Output of the importers: unchecked vertices and triangles.
 
 use nalgebra::Point3;
 use palpate_input::error::Invalid;
 use std::fmt;
 
-/// More triangles than this are refused, so that a corrupt count cannot exhaust memory.
+/// Largest number of triangles, so that a corrupt count cannot exhaust memory.
 pub const MAX_TRIANGLES: usize = 5_000_000;
 
-/// More vertices than this are refused: three for each triangle.
+/// Largest number of vertices: three per triangle.
 pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 
-/// A vertex or triangle as its source knows it: number `index` (from 0) of `part`.
+/// A vertex or triangle as named by its source: number `index` (from 0) of `part`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Element {
     /// The part of the source, such as an object's name.
@@ -25,12 +25,12 @@ impl fmt::Display for Element {
     }
 }
 
-/// Vertices (metres) and triangles in parts, each part named after where it came from.
+/// Vertices (metres) and triangles in parts, each part named after its source.
 #[derive(Clone, Debug, Default)]
 pub struct RawMesh {
     pub(super) vertices: Vec<Point3<f64>>,
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Primitives that hold no triangles (points, lines) and were left out.
+    /// Number of primitives without triangles (points, lines) that were skipped.
     pub skipped_primitives: usize,
     parts: Vec<Part>,
 }
@@ -67,7 +67,7 @@ impl RawMesh {
             if let Some(&index) = triangle.iter().find(|&&index| index as usize >= count) {
                 let triangle = Element { part: part.name, index: number };
                 return Err(Invalid::new(format!(
-                    "triangle {triangle} names vertex {index}, but there are {count}"
+                    "triangle {triangle} refers to vertex {index}, but there are {count}"
                 )));
             }
             if self.triangles.len() == MAX_TRIANGLES {

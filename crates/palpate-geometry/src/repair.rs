@@ -1,4 +1,4 @@
-//! From whatever an importer read to a [`Mesh`] that can be trusted.
+//! Repair of imported data into a valid [`Mesh`].
 
 use foldhash::{HashMap, HashMapExt, HashSet, HashSetExt};
 use nalgebra::Point3;
@@ -9,23 +9,23 @@ use super::report::{Finding, MeshReport};
 use super::topology::orient;
 use palpate_input::error::Invalid;
 
-/// A coordinate beyond this, in metres, is a file read in the wrong unit.
+/// Largest coordinate, in metres; a larger one indicates a wrong unit.
 pub const MAX_COORDINATE_M: f64 = 1e4;
 
-/// A triangle is degenerate if its height is at most this part of its longest side.
+/// Largest ratio of height to longest side at which a triangle is degenerate.
 const MIN_ASPECT: f64 = 1e-12;
 
-/// Makes a sound mesh of `raw` and says what had to be done.
+/// Repairs `raw` into a valid mesh and reports the repairs.
 ///
-/// In this order: vertices at equal positions become one (renders split them at seams of normals
-/// and textures; −0 equals 0); degenerate triangles go (a repeated vertex, or a height that is
-/// nothing beside the longest side or the rounding of the coordinates); of triangles with the
-/// same three vertices the first stays; winding is made consistent over each edge-connected
-/// component, outward where it is closed, as most of its triangles were where it is open;
-/// vertices no triangle uses go.
+/// In this order: vertices at equal positions are merged (renderers split them at seams of normals
+/// and textures; −0 equals 0); degenerate triangles are removed (a repeated vertex, or a height
+/// that is negligible relative to the longest side or the rounding of the coordinates); of
+/// triangles with the same three vertices the first is kept; winding is made consistent over each
+/// edge-connected component, outward if it is closed, by majority of its triangles if it is open;
+/// unused vertices are removed.
 ///
 /// # Errors
-/// If there is no triangle with an area, or a vertex is not finite or too far away.
+/// If no triangle has an area, or a vertex is not finite or too far away.
 pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), Invalid> {
     if raw.triangles.is_empty() {
         return Err(Invalid::new(format!(
@@ -48,7 +48,7 @@ pub fn repair(raw: RawMesh) -> Result<(Mesh, MeshReport), Invalid> {
         return Err(Invalid::new(format!("all {count} triangles are degenerate")));
     }
     let topology = orient(&triangles, |triangle| {
-        // Measured from a vertex, so that a mesh far from the origin loses no digits.
+        // Relative to a vertex, so that a mesh far from the origin loses no digits.
         let [a, b, c] = triangles[triangle as usize].map(|v| vertices[v as usize] - vertices[0]);
         a.dot(&b.cross(&c))
     });
@@ -71,7 +71,7 @@ impl Mesh {
     /// Repairs vertices (metres) and triangles (indices into them) into a mesh.
     ///
     /// # Errors
-    /// Whatever [`repair`] refuses; elements are named as parts of "the mesh".
+    /// The errors of [`repair`]; elements are named as parts of "the mesh".
     pub fn new(
         vertices: &[Point3<f64>],
         triangles: &[[u32; 3]],
@@ -98,7 +98,7 @@ fn check_positions(raw: &RawMesh) -> Result<(), Invalid> {
             let mut units = [("mm", 1e-3), ("um", 1e-6)].into_iter();
             return Err(match units.find(|(_, metres)| farthest_m * metres <= MAX_COORDINATE_M) {
                 Some((unit, _)) => {
-                    too_far.mend(format!("for a file in {unit} say unit = \"{unit}\""))
+                    too_far.mend(format!("for a file in {unit}, set unit = \"{unit}\""))
                 }
                 None => too_far,
             });
@@ -107,7 +107,8 @@ fn check_positions(raw: &RawMesh) -> Result<(), Invalid> {
     Ok(())
 }
 
-/// Distinct positions in order of first appearance, and for each vertex its position's number.
+/// Returns distinct positions in order of first appearance, and the index of each vertex's
+/// position.
 fn weld(vertices: &[Point3<f64>]) -> (Vec<Point3<f64>>, Vec<u32>) {
     let mut distinct = Vec::new();
     let mut numbers: HashMap<[u64; 3], u32> = HashMap::with_capacity(vertices.len());
@@ -126,8 +127,8 @@ fn weld(vertices: &[Point3<f64>]) -> (Vec<Point3<f64>>, Vec<u32>) {
     (distinct, canonical)
 }
 
-/// Drops degenerate and duplicate triangles. Returns the rest over welded vertices, and the raw
-/// number of each.
+/// Removes degenerate and duplicate triangles. Returns the rest over merged vertices, and the raw
+/// index of each.
 fn sift(
     raw: &RawMesh,
     vertices: &[Point3<f64>],
@@ -165,7 +166,7 @@ fn is_degenerate(triangle: [u32; 3], vertices: &[Point3<f64>], rounding_m: f64) 
     twice_area_m2 <= longest_m * rounding_m.max(MIN_ASPECT * longest_m)
 }
 
-/// Drops unused vertices, keeping the order of the others.
+/// Removes unused vertices, keeping the order of the others.
 fn compact(vertices: Vec<Point3<f64>>, mut triangles: Vec<[u32; 3]>) -> Mesh {
     let mut used = vec![false; vertices.len()];
     for &vertex in triangles.iter().flatten() {

@@ -1,4 +1,4 @@
-//! What was found in a mesh and what was done to it.
+//! Report of the defects and repairs of a mesh.
 
 use std::fmt;
 
@@ -7,18 +7,18 @@ use nalgebra::{Point3, Vector3};
 use super::mesh::Mesh;
 use super::raw::Element;
 
-/// An object smaller than this, in metres, is too small to be touched.
+/// Smallest size of an object for exploration by touch, m.
 pub const MIN_TOUCHABLE_M: f64 = 1e-3;
 
-/// An object larger than this, in metres, is too large to be explored by touch.
+/// Largest size of an object for exploration by touch, m.
 pub const MAX_TOUCHABLE_M: f64 = 5.0;
 
-/// How often something was found, and the first triangle it was found on.
+/// Number of occurrences of a defect, and the first triangle with it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Finding {
-    /// How often.
+    /// Number of occurrences.
     pub count: usize,
-    /// The first triangle, as its source names it.
+    /// First triangle, as named by its source.
     pub first: Option<Element>,
 }
 
@@ -32,8 +32,8 @@ impl fmt::Display for Finding {
     }
 }
 
-/// What [`repair`](super::repair::repair) found in a mesh and did to it. Its `Display` is the
-/// summary for a person.
+/// Report of [`repair`](super::repair::repair): defects and repairs of a mesh. Its `Display` is a
+/// readable summary.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshReport {
     /// SHA-256 of the mesh: of its vertices, 24 bytes each, then of its triangles, 12 bytes each,
@@ -47,15 +47,15 @@ pub struct MeshReport {
     pub vertices: usize,
     /// Triangles of the mesh.
     pub triangles: usize,
-    /// Least and greatest corner of the bounding box, in metres.
+    /// Lowest and highest corner of the bounding box, in metres.
     pub bounds_m: (Point3<f64>, Point3<f64>),
     /// Surface area, in m².
     pub area_m2: f64,
     /// Enclosed volume, in m³, if the mesh is closed.
     pub volume_m3: Option<f64>,
-    /// Primitives of points or lines that were left out.
+    /// Number of primitives of points or lines that were skipped.
     pub skipped_primitives: usize,
-    /// Vertices that shared the position of an earlier one.
+    /// Number of vertices merged into an earlier one at the same position.
     pub welded: usize,
     /// Triangles without area, removed.
     pub degenerate_removed: Finding,
@@ -84,13 +84,13 @@ impl MeshReport {
         (self.bounds_m.1 - self.bounds_m.0) * 1e3
     }
 
-    /// What to change if the object's size says that its file was read in the wrong unit.
+    /// Returns the setting to change if the object's size indicates a wrong unit of its file.
     pub fn unit_hint(&self) -> Option<&'static str> {
         let size_m = (self.bounds_m.1 - self.bounds_m.0).max();
         if size_m > MAX_TOUCHABLE_M {
-            Some("larger than 5 m: for a file in millimetres say unit = \"mm\"")
+            Some("larger than 5 m: for a file in millimetres, set unit = \"mm\"")
         } else if size_m < MIN_TOUCHABLE_M {
-            Some("smaller than 1 mm: for a file in metres say unit = \"m\"")
+            Some("smaller than 1 mm: for a file in metres, set unit = \"m\"")
         } else {
             None
         }

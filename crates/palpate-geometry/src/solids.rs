@@ -1,8 +1,8 @@
-//! Solids as triangles.
+//! Triangulated solids.
 
 use nalgebra::{Point3, Vector3};
 
-/// Vertices in metres, and triangles of them; seen from outside, corners run counter-clockwise.
+/// Vertices in metres, and triangles over them; seen from outside, corners run counter-clockwise.
 pub type Triangles = (Vec<Point3<f64>>, Vec<[u32; 3]>);
 
 const BOX: [[u32; 3]; 12] = [
@@ -20,8 +20,8 @@ const BOX: [[u32; 3]; 12] = [
     [3, 7, 5],
 ];
 
-/// Normals of vertices: the mean of the triangles around each, by their areas, of length 1; zero
-/// where they cancel. Every triangle must name vertices that there are.
+/// Returns vertex normals: the area-weighted mean of the triangles around each, of length 1; zero
+/// if they cancel. Every vertex index must be in range.
 pub fn normals(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<Vector3<f64>> {
     let mut sums = vec![Vector3::zeros(); vertices.len()];
     for corners in triangles {
@@ -34,7 +34,7 @@ pub fn normals(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<Vector3<
     sums.iter().map(|sum| sum.try_normalize(0.0).unwrap_or_default()).collect()
 }
 
-/// A box between two corners.
+/// Returns a box between two corners.
 pub fn block(low: [f64; 3], high: [f64; 3]) -> Triangles {
     let corner = |i: usize| {
         Point3::from(std::array::from_fn(
@@ -44,7 +44,7 @@ pub fn block(low: [f64; 3], high: [f64; 3]) -> Triangles {
     ((0..8).map(corner).collect(), BOX.to_vec())
 }
 
-/// A sphere of `rings` rings from pole to pole along y, with twice as many corners around.
+/// Returns a sphere of `rings` rings from pole to pole along y, with twice as many corners around.
 pub fn ball(centre: Point3<f64>, radius_m: f64, rings: u32) -> Triangles {
     use std::f64::consts::{PI, TAU};
     let turns = 2 * rings;

@@ -1,8 +1,8 @@
-//! Points spread evenly: over a square, over directions, over the surface of a mesh.
+//! Low-discrepancy points: over a square, over directions, over the surface of a mesh.
 //!
-//! All of them are the additive sequence of Roberts ("The unreasonable effectiveness of quasirandom
+//! All of them use the additive sequence of Roberts ("The unreasonable effectiveness of quasirandom
 //! sequences", 2018): the fractional parts of multiples of an irrational number in each dimension.
-//! It has no state and no seed: a point depends on its number and nothing else.
+//! It has no state and no seed: a point depends on its number only.
 
 use super::mesh::Mesh;
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -16,24 +16,24 @@ const GOLDEN: f64 = 0.618_033_988_749_894_8;
 /// A point of a mesh's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spot {
-    /// Where it is, in metres.
+    /// Position, in metres.
     pub point: Point3<f64>,
-    /// The triangle that it lies on.
+    /// Index of the triangle that contains it.
     pub triangle: u32,
 }
 
-/// Point `number` of a sequence that fills the unit square evenly.
+/// Returns point `number` of a sequence that fills the unit square evenly.
 pub fn in_square(number: usize) -> [f64; 2] {
     PLASTIC.map(|step| (0.5 + number as f64 * step).fract())
 }
 
-/// `count` directions, each for an equal part of the sphere: at equal steps along z, turned on by
-/// the golden section (González 2010, Math. Geosci. 42, 49).
+/// Returns `count` directions, each for an equal part of the sphere: at equal steps along z,
+/// rotated by the golden section (González 2010, Math. Geosci. 42, 49).
 pub fn directions(count: usize) -> impl ExactSizeIterator<Item = UnitVector3<f64>> {
     (0..count).map(move |number| direction(number, count))
 }
 
-/// One of [`directions`].
+/// Returns one of [`directions`].
 pub fn direction(number: usize, count: usize) -> UnitVector3<f64> {
     let z = 1.0 - (2 * number + 1) as f64 / count as f64;
     let turn = std::f64::consts::TAU * (number as f64 * (1.0 - GOLDEN)).fract();
@@ -41,9 +41,9 @@ pub fn direction(number: usize, count: usize) -> UnitVector3<f64> {
     UnitVector3::new_normalize(Vector3::new(across * turn.cos(), across * turn.sin(), z))
 }
 
-/// `count` points of the surface, each for an equal part of its area: one in the middle of each
-/// stratum of the area summed over triangles in their order, within its triangle where the
-/// sequence of the square puts it, folded over along the diagonal.
+/// Returns `count` points of the surface, each for an equal part of its area: one at the centre of
+/// each stratum of the area accumulated over triangles in their order; the position within a
+/// triangle follows from the sequence of the square, folded along the diagonal.
 pub fn over_surface(mesh: &Mesh, count: usize) -> Vec<Spot> {
     let doubled_m2 = |[a, b, c]: [Point3<f64>; 3]| (b - a).cross(&(c - a)).norm();
     let stratum_m2 = mesh.iter_corners().map(doubled_m2).sum::<f64>() / count as f64;
@@ -75,7 +75,7 @@ mod tests {
         assert!((GOLDEN.recip() - GOLDEN - 1.0).abs() < 1e-15);
     }
 
-    /// Chance would leave the mean of n directions at √(1/n) from nothing.
+    /// The mean of n random directions would have a length of √(1/n).
     #[test]
     fn directions_have_unit_length_and_no_mean() {
         for count in [1, 2, 64, 200] {
@@ -86,8 +86,8 @@ mod tests {
         }
     }
 
-    /// Every face of a box gets its share of points to within one for each of its two triangles,
-    /// and every octant of a ball its eighth.
+    /// Every face of a box gets its proportion of points to within one for each of its two
+    /// triangles, and every octant of a ball its eighth.
     #[test]
     fn points_lie_on_the_surface_in_proportion_to_its_area() {
         let (vertices, triangles) = block([0.0; 3], [0.1, 0.2, 0.3]);
@@ -116,9 +116,9 @@ mod tests {
         assert!(octants.iter().all(|&on| on.abs_diff(500) < 30), "{octants:?}");
     }
 
-    /// The mean of x·y over a square, whose variance is 7/144: chance is off by √(variance / n).
-    /// These points are off by a tenth of that; a fold that tears the square along its diagonal
-    /// would be by a quarter.
+    /// The mean of x·y over a square, whose variance is 7/144: random points have an error of
+    /// √(variance / n). These points have a tenth of that; a fold that tears the square along its
+    /// diagonal would have a quarter.
     #[test]
     fn means_over_a_surface_are_better_than_by_chance() {
         let corner = |x: f64, y: f64| Point3::new(x, y, 0.0);

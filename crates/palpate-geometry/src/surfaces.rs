@@ -1,29 +1,29 @@
-//! The analytic objects, by name. Their formulas are the ground truth of the meshes in `models/`.
+//! Analytic objects by name; their formulas are the ground truth of the meshes in `models/`.
 //!
-//! Each lies in its own frame: origin in its middle, front towards +y, z up, and so x to its own
-//! right. Metres. All lengths are chosen: the shapes of the objects of Yi et al. (IROS
-//! 2016, Fig. 2), which these stand in for, are not published.
+//! Each has its own frame, in metres: origin at its centre, front towards +y, z up, and x to its
+//! own right. All lengths are heuristics: the shapes of the objects of Yi et al. 2016, Fig. 2, are
+//! not published; these objects replace them.
 
 use nalgebra::{Point3, Vector3, matrix, point, vector};
 
 use super::implicit::{Field, Implicit};
 
-/// Every analytic object; one line adds one.
+/// All analytic objects; add one line per object.
 static SURFACES: &[(&str, &dyn Implicit)] = &[("container", &Container), ("bird", &Bird)];
 
-/// The analytic object called `name`.
+/// Returns the analytic object called `name`.
 pub fn by_name(name: &str) -> Option<&'static dyn Implicit> {
     SURFACES.iter().find(|(known, _)| *known == name).map(|(_, surface)| *surface)
 }
 
-/// The names [`by_name`] knows.
+/// Returns the names that [`by_name`] accepts.
 pub fn names() -> impl Iterator<Item = &'static str> {
     SURFACES.iter().map(|(name, _)| *name)
 }
 
-/// A steel container, 120 mm wide and 200 mm high: an elliptic cylinder, straight along z, with
-/// rounded edges and a round bead about its top. The bead stands 2 mm out of the front and 3 mm
-/// out of the sides; where |z| < 84 mm the front is y = 40 mm √(1 - (x / 60 mm)²).
+/// A steel container, 120 mm wide and 200 mm high: an elliptic cylinder along z, with rounded edges
+/// and a round bead around its top. The bead protrudes 2 mm from the front and 3 mm from the sides;
+/// where |z| < 84 mm the front is y = 40 mm √(1 - (x / 60 mm)²).
 pub struct Container;
 
 impl Implicit for Container {
@@ -44,9 +44,9 @@ impl Implicit for Container {
     }
 }
 
-/// A porcelain bird, 110 mm wide, 140 mm high and 80 mm deep, that sits on a round foot and looks
-/// along +y: a breast and a back, two wings, a head with eyes and a tuft, and a nose thinner than a
-/// fingertip. Its left and right are mirror images.
+/// A porcelain bird, 110 mm wide, 140 mm high and 80 mm deep, on a round foot, facing +y: a breast
+/// and a back, two wings, a head with eyes and a tuft, and a nose thinner than a fingertip. It is
+/// mirror-symmetric.
 pub struct Bird;
 
 impl Implicit for Bird {
@@ -63,8 +63,8 @@ impl Implicit for Bird {
     }
 }
 
-/// The bird's field for x >= 0. The wing and the eye have no part in it near x = 0, so that it
-/// meets its mirror image smoothly.
+/// Returns the bird's field for x >= 0. Wing and eye do not reach x = 0, so that the field meets
+/// its mirror image smoothly.
 fn right_half(p: Point3<f64>) -> Field {
     let ellipsoid =
         |centre: Point3<f64>, radii_m: Vector3<f64>| Field::ellipsoid(p - centre, radii_m);
@@ -74,8 +74,8 @@ fn right_half(p: Point3<f64>) -> Field {
     let head = ellipsoid(point![0.0, 0.003, 0.035], vector![0.029, 0.028, 0.028]);
     let eye = ellipsoid(point![0.012, 0.026, 0.043], vector![0.0045, 0.0045, 0.0045]);
 
-    // Its upper end leans in by 4.4 degrees, whose sine and cosine are these fractions:
-    // 52² + 675² = 677².
+    // Its upper end leans inwards by 4.4 degrees, whose sine and cosine are these fractions: 52² +
+    // 675² = 677².
     let (sine, cosine) = (52.0 / 677.0, 675.0 / 677.0);
     let tilt = matrix![cosine, 0.0, sine; 0.0, 1.0, 0.0; -sine, 0.0, cosine];
     let upright =

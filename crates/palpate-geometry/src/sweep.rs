@@ -1,18 +1,18 @@
-//! A capsule in straight motion against one triangle.
+//! Straight sweep of a capsule against one triangle.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
 use super::primitives::{Line, nearest_of_segment_and_triangle};
 
-/// A start this close to touching, in metres, touches: rounding must not let a shape that rests
-/// on a surface fall through it.
+/// Distance, in metres, below which a start counts as touching, so that rounding does not let a
+/// shape that rests on a surface fall through it.
 const TOUCH_M: f64 = 1e-11;
 
-/// Squared sine below which a motion runs along an edge and meets only the corners at its ends.
+/// Squared sine below which a motion is parallel to an edge and meets only the corners at its ends.
 const PARALLEL: f64 = 1e-24;
 
-/// All points within `radius_m` of a segment. Equal ends make a sphere, a zero radius a segment
-/// or a point.
+/// All points within `radius_m` of a segment. Equal ends give a sphere, a zero radius a segment or
+/// a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
     /// One end of the axis, in W, in metres.
@@ -24,17 +24,17 @@ pub struct Capsule {
 }
 
 impl Capsule {
-    /// A sphere.
+    /// Creates a sphere.
     pub fn sphere(centre_w: Point3<f64>, radius_m: f64) -> Self {
         Self { p0_w: centre_w, p1_w: centre_w, radius_m }
     }
 
-    /// The nearest points of the axis and a triangle, in this order.
+    /// Returns the nearest points of the axis and a triangle, in this order.
     pub fn nearest(&self, triangle: &[Point3<f64>; 3]) -> (Point3<f64>, Point3<f64>) {
         nearest_of_segment_and_triangle([&self.p0_w, &self.p1_w], triangle)
     }
 
-    /// This capsule, moved by `by`.
+    /// Returns this capsule, moved by `by`.
     pub fn translated(&self, by: &Vector3<f64>) -> Self {
         Self { p0_w: self.p0_w + by, p1_w: self.p1_w + by, ..*self }
     }
@@ -42,11 +42,11 @@ impl Capsule {
 
 /// A capsule moving along a direction, prepared for many triangles.
 ///
-/// Sliding the capsule against a triangle T is sliding the point p0 against T drawn out along
-/// p0 − p1 and rounded by the radius r. That body is convex, so p0 enters it where it first
-/// meets one of the pieces that cover its surface: the prism's faces moved outwards by r, the
-/// cylinders of radius r about its edges, the spheres of radius r about its corners. Parts of a
-/// piece that lie inside the body are met later and change nothing.
+/// Sliding the capsule against a triangle T is equivalent to sliding the point p0 against T
+/// extruded along p0 − p1 and rounded by the radius r. That body is convex, so p0 enters it at the
+/// first intersection with one of the pieces that cover its surface: the prism's faces moved
+/// outwards by r, the cylinders of radius r around its edges, the spheres of radius r around its
+/// corners. Parts of a piece inside the body are met later and do not matter.
 #[derive(Clone, Copy, Debug)]
 pub struct Sweep {
     start: Point3<f64>,
@@ -57,7 +57,7 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// `capsule` moving along `direction`.
+    /// Prepares `capsule` moving along `direction`.
     pub fn new(capsule: &Capsule, direction: UnitVector3<f64>) -> Self {
         Self {
             start: capsule.p0_w,
@@ -68,14 +68,14 @@ impl Sweep {
         }
     }
 
-    /// The travel, in metres, at which the capsule first touches the triangle, if it ever does.
+    /// Returns the travel, in metres, at which the capsule first touches the triangle, if it does.
     ///
     /// The capsule must not overlap the triangle at the start.
     pub fn travel_m(&self, triangle: &[Point3<f64>; 3]) -> Option<f64> {
         let far = triangle.map(|corner| corner + self.draw);
         let is_sphere = self.draw == Vector3::zeros();
         let mut first = f64::INFINITY;
-        // The least travel that does not lie behind the start.
+        // The smallest travel that is not behind the start.
         let mut offer = |travel_m: Option<f64>| {
             if let Some(travel_m) = travel_m
                 && travel_m >= -TOUCH_M
@@ -106,13 +106,13 @@ impl Sweep {
         self.face((b - a).cross(&(c - a)), &[*triangle], offer);
     }
 
-    /// The parallelogram an edge is drawn out to.
+    /// The parallelogram of an extruded edge.
     fn side(&self, [a, b, c, d]: [&Point3<f64>; 4], offer: &mut impl FnMut(Option<f64>)) {
         let normal = (b - a).cross(&(d - a));
         self.face(normal, &[[*a, *b, *c], [*a, *c, *d]], offer);
     }
 
-    /// A flat face moved by the radius towards where the capsule comes from.
+    /// A flat face, offset by the radius against the motion.
     fn face(
         &self,
         normal: Vector3<f64>,
@@ -127,7 +127,7 @@ impl Sweep {
         }
     }
 
-    /// The cylinder about an edge, without its ends.
+    /// The cylinder around an edge, without its ends.
     fn onto_edge(&self, a: &Point3<f64>, b: &Point3<f64>) -> Option<f64> {
         let (axis, length_m) = UnitVector3::try_new_and_get(b - a, 0.0)?;
         let arm = self.start - a;
@@ -145,7 +145,7 @@ impl Sweep {
         (0.0..=length_m).contains(&(arm_along + speed_along * travel_m)).then_some(travel_m)
     }
 
-    /// The sphere about a corner.
+    /// The sphere around a corner.
     fn onto_corner(&self, corner: &Point3<f64>) -> Option<f64> {
         let arm = self.start - corner;
         let nearest_m = -arm.dot(&self.direction);

@@ -1,9 +1,9 @@
-//! How triangles hang together: edges, components, winding.
+//! Topology of a triangle mesh: edges, components, winding.
 
-/// Marks a side without a neighbour.
+/// Marker of a side without a neighbour.
 const NONE: u32 = u32::MAX;
 
-/// What [`orient`] found and decided. Lists hold triangles in ascending order.
+/// Result of [`orient`]. Lists contain triangles in ascending order.
 #[derive(Debug, Default)]
 pub(super) struct Topology {
     /// One entry per edge that has a single triangle.
@@ -29,12 +29,12 @@ struct Side {
     ascending: bool,
 }
 
-/// Per triangle and side: the neighbour over a two-triangle edge, and whether both run along
-/// the edge the same way, which means that one of them is wound the wrong way.
+/// Per triangle and side: the neighbour over a two-triangle edge, and whether both traverse the
+/// edge in the same direction, which means that one of them has the wrong winding.
 type Neighbours = Vec<[(u32, bool); 3]>;
 
-/// Finds the components of a mesh and a winding that is consistent over each: outward where the
-/// component is closed, as most of its triangles already are where it is open.
+/// Finds the components of a mesh and a winding that is consistent over each: outward if the
+/// component is closed, by majority of its triangles if it is open.
 ///
 /// `signed_volume` is six times the volume under one triangle, in its input winding.
 pub(super) fn orient(triangles: &[[u32; 3]], signed_volume: impl Fn(u32) -> f64) -> Topology {
@@ -64,8 +64,8 @@ pub(super) fn orient(triangles: &[[u32; 3]], signed_volume: impl Fn(u32) -> f64)
     found
 }
 
-/// The sides of all triangles by edge, of one edge by triangle. Sorted into the lower vertices
-/// first, which leaves a handful for each to compare.
+/// Returns the sides of all triangles sorted by edge, then by triangle. Bucketed by the lower
+/// vertex first, which leaves few comparisons per bucket.
 fn sorted_sides(triangles: &[[u32; 3]]) -> Vec<Side> {
     let sides = |triangle: usize| {
         let corners = triangles[triangle];

@@ -1,7 +1,8 @@
-//! The Gaussian process without a robot: it learns a curve by observing it where it is least sure.
+//! The Gaussian process without a robot: learns a curve from observations at the most uncertain
+//! place.
 //!
-//! The curve is the toy of Yi et al. (IROS 2016), a wave on [-1, 1] and flat outside; places and
-//! heights are metres. Run it with `cargo run --example gp_alone`.
+//! The curve is the toy of Yi et al. 2016, a wave on [-1, 1] and flat outside; places and heights
+//! are in metres. Run it with `cargo run --example gp_alone`.
 
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::kernel::SquaredExponential;

@@ -1,9 +1,9 @@
-//! Mean, variance and its gradient at many places: the factor is read once for sixteen of them.
+//! Batch evaluation of mean, variance and its gradient: the factor is read once per sixteen places.
 
 use super::posterior::{Posterior, Scratch};
 use crate::math::simd::widest_fn;
 
-/// Belief at one place.
+/// Prediction at one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// Mean height.
@@ -12,12 +12,13 @@ pub struct Prediction {
     pub variance: f64,
 }
 
-/// Places solved side by side: with four rows of the factor eight vectors of the widest kind.
+/// Number of places solved together: with four rows of the factor, eight vectors of the widest
+/// kind.
 const MANY: usize = 16;
-/// As many for the last few.
+/// Number of places solved together for the remainder.
 const FEW: usize = 8;
 
-/// What is asked of the places of one block.
+/// Quantities computed at the places of one block.
 enum Asked<'a> {
     Means,
     Variances,
@@ -25,7 +26,7 @@ enum Asked<'a> {
     Gradients(&'a mut [Vec<f64>]),
 }
 
-/// Of as many places as fit side by side.
+/// Buffers for as many places as are solved together.
 #[derive(Default)]
 struct Lanes<const N: usize> {
     correlations: Vec<[f64; N]>,
@@ -35,7 +36,7 @@ struct Lanes<const N: usize> {
 }
 
 impl Posterior {
-    /// [`mean`](Self::mean) and [`variance`](Self::variance) at each of `places`.
+    /// Returns [`mean`](Self::mean) and [`variance`](Self::variance) at each of `places`.
     pub fn predict<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<Prediction> {
         let places: Vec<&[f64]> = places.into_iter().collect();
         let mut predictions = Vec::with_capacity(places.len());
@@ -43,7 +44,7 @@ impl Posterior {
         predictions
     }
 
-    /// [`mean`](Self::mean) at each of `places`.
+    /// Returns [`mean`](Self::mean) at each of `places`.
     pub fn means<'a>(&self, places: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
         let places: Vec<&[f64]> = places.into_iter().collect();
         let mut means = Vec::with_capacity(places.len());
@@ -51,8 +52,8 @@ impl Posterior {
         means
     }
 
-    /// [`variance`](Self::variance) at each of `places`, with the gradients if there is room for
-    /// them.
+    /// Returns [`variance`](Self::variance) at each of `places`, and writes the gradients unless
+    /// `gradients` is empty.
     pub fn variances(&self, places: &[Vec<f64>], gradients: &mut [Vec<f64>]) -> Vec<f64> {
         let places: Vec<&[f64]> = places.iter().map(Vec::as_slice).collect();
         let mut variances = Vec::with_capacity(places.len());
@@ -115,8 +116,8 @@ impl<const N: usize> Lanes<N> {
         predictions[..places.len()].iter().for_each(|prediction| tell(*prediction));
     }
 
-    /// Correlations of the places with what was observed, and their slopes if asked; lanes without
-    /// a place repeat the first.
+    /// Computes the correlations of the places with the observations, and their slopes if
+    /// requested; lanes without a place repeat the first.
     fn correlate(&mut self, posterior: &Posterior, places: &[&[f64]], is_sloped: bool) {
         let observations = posterior.observations();
         let lengths = &posterior.hyperparameters().length_scales;
@@ -144,7 +145,7 @@ impl<const N: usize> Lanes<N> {
         }
     }
 
-    /// The gradients of the variances, after A⁻¹·k* was solved.
+    /// Computes the gradients of the variances, after A⁻¹·k* was solved.
     fn differentiate(
         &mut self,
         posterior: &Posterior,
@@ -176,7 +177,7 @@ impl<const N: usize> Lanes<N> {
 }
 
 widest_fn! {
-    /// Adds ((at − x) / length)² of one axis.
+    /// Adds ((at − x) / length)² along one axis.
     fn add_squares<'a, const N: usize>(
         r2: &'a mut [[f64; N]],
         at: [f64; N],
@@ -193,7 +194,7 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// Σ_i w_i·c_i of each lane.
+    /// Returns Σ_i w_i·c_i for each lane.
     fn weighted<'a, const N: usize>(correlations: &'a [[f64; N]], weights: &'a [f64]) -> [f64; N] {
         let mut sums = [0.0; N];
         for (correlations, weight) in correlations.iter().zip(weights) {
@@ -206,7 +207,7 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// Σ_i u_i·c′_i·(at − x_i) of one axis.
+    /// Returns Σ_i u_i·c′_i·(at − x_i) along one axis.
     fn steps<'a, const N: usize>(
         solved: &'a [[f64; N]],
         slopes: &'a [[f64; N]],

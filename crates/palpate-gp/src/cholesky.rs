@@ -16,13 +16,13 @@ pub struct Factor {
     order: usize,
 }
 
-/// Start of row `i` in packed storage.
+/// Index of the start of row `i` in packed storage.
 #[inline(always)]
 fn start(i: usize) -> usize {
     i * (i + 1) / 2
 }
 
-/// Row `i` of L: its first i + 1 entries.
+/// Returns row `i` of L: its first i + 1 entries.
 #[inline(always)]
 fn row(rows: &[f64], i: usize) -> &[f64] {
     &rows[start(i)..start(i + 1)]
@@ -43,13 +43,13 @@ impl From<&Dense> for Factor {
 }
 
 impl Factor {
-    /// Row `i` of L: its first i + 1 entries.
+    /// Returns row `i` of L: its first i + 1 entries.
     #[inline(always)]
     pub(super) fn row(&self, i: usize) -> &[f64] {
         row(&self.rows, i)
     }
 
-    /// Adds one row and column to A: `row` holds the entries n, 0 to n. Costs n² operations.
+    /// Appends one row and column to A: `row` holds the entries n, 0 to n. Costs n² operations.
     ///
     /// # Errors
     /// If the enlarged matrix is not positive definite to within rounding; the factor is then
@@ -70,7 +70,7 @@ impl Factor {
         Ok(())
     }
 
-    /// Takes the last rows and columns of A away, down to `order`.
+    /// Removes the last rows and columns of A, down to `order`.
     pub fn truncate(&mut self, order: usize) {
         self.order = self.order.min(order);
         self.rows.truncate(start(self.order));
@@ -88,7 +88,7 @@ impl Factor {
 }
 
 widest_fn! {
-    /// See [`Factor::solve_lower`].
+    /// Implements [`Factor::solve_lower`].
     fn solve_lower<'a>(rows: &'a [f64], b: &'a mut [f64]) -> f64 {
         for i in 0..b.len() {
             let row = row(rows, i);
@@ -99,7 +99,7 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// See [`Factor::solve_upper`].
+    /// Implements [`Factor::solve_upper`].
     fn solve_upper<'a>(rows: &'a [f64], b: &'a mut [f64]) -> () {
         for i in (0..b.len()).rev() {
             let row = row(rows, i);
@@ -125,13 +125,13 @@ impl Factor {
 }
 
 vectorised_fn! {
-    /// Eight sums in registers hide the latency of each other.
+    /// Eight sums in registers hide each other's latency.
     fn solve_lower_lanes<'a, V: Vector, const N: usize>(
         factor: &'a Factor,
         lanes: &'a mut [[f64; N]],
     ) -> [f64; N] {
         let mut squares = [0.0; N];
-        // Lanes that a register does not hold are gone through one after the other.
+        // Lanes beyond the register width are processed one after the other.
         let mut lane = 0;
         while lane < N {
             if V::LANES == 8 && N - lane >= 16 {
@@ -146,7 +146,7 @@ vectorised_fn! {
     }
 }
 
-/// For `WIDE` vectors of lanes from `lane` on, `ROWS` rows at a time.
+/// Solves `WIDE` vectors of lanes from `lane` on, `ROWS` rows at a time.
 #[inline(always)]
 fn lower<V: Vector, const N: usize, const WIDE: usize, const ROWS: usize>(
     factor: &Factor,
@@ -201,7 +201,7 @@ vectorised_fn! {
     }
 }
 
-/// For a vector of lanes from `lane` on, `ROWS` rows at a time from the last.
+/// Solves a vector of lanes from `lane` on, `ROWS` rows at a time from the last.
 #[inline(always)]
 fn upper<V: Vector, const N: usize, const ROWS: usize>(
     factor: &Factor,
@@ -214,7 +214,7 @@ fn upper<V: Vector, const N: usize, const ROWS: usize>(
         let begin = end - count;
         let (above, block) = lanes[..end].split_at_mut(begin);
         let rows: [&[f64]; ROWS] = std::array::from_fn(|r| factor.row(begin + r.min(count - 1)));
-        // Rows that there are not pull nothing.
+        // Missing rows contribute zero.
         let mut solved = [V::splat(0.0); ROWS];
         for r in (0..count).rev() {
             let mut sum = V::load(&block[r][lane..]);
@@ -241,7 +241,7 @@ mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
-    /// A well-conditioned symmetric matrix of order n.
+    /// Returns a well-conditioned symmetric matrix of order n.
     fn matrix(n: usize) -> DMatrix<f64> {
         let wave = DMatrix::from_fn(n, n, |i, j| ((i * 7 + j * 13) as f64).sin());
         &wave * wave.transpose() + DMatrix::identity(n, n) * n as f64

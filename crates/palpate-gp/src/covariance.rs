@@ -1,4 +1,4 @@
-//! The covariance of what was observed, factored with as little jitter as it needs.
+//! Covariance of the observations, factored with the smallest sufficient jitter.
 //!
 //! A Gaussian process and its derivatives are one Gaussian process (Rasmussen & Williams 2006,
 //! section 9.4; Solak et al. 2003). With the correlation c(r²), u_d = (a_d − b_d) / l_d and slopes
@@ -17,33 +17,35 @@ use thiserror::Error;
 /// Largest jitter tried, relative to the diagonal; beyond it the data contradict the kernel.
 const JITTER_MAX: f64 = 1e-4;
 
-/// Observations that no posterior can be made of.
+/// Error of observations that do not define a posterior.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum CovarianceError {
     /// A place or height that is not a finite number.
     #[error("touch {index} is not finite")]
     NotFinite {
-        /// Which observation.
+        /// Index of the observation.
         index: usize,
     },
-    /// No jitter, however large, made the covariance positive definite.
-    #[error("covariance of {count} touches stays indefinite with jitter {jitter:e}: {cause}")]
+    /// The covariance is not positive definite with any allowed jitter.
+    #[error(
+        "the covariance of {count} touches is not positive definite, even with jitter {jitter:e}: {cause}"
+    )]
     Indefinite {
         /// Number of observations.
         count: usize,
         /// Largest jitter tried, relative to the diagonal.
         jitter: f64,
-        /// What the factorisation met.
+        /// Cause of the failed factorisation.
         cause: NotPositiveDefinite,
     },
 }
 
-/// Factors C + N + jitter·diag(C), where C are the correlations and N the noise, a diagonal, into
-/// `dense` with the smallest jitter of 0, 1e-15, 1e-14, … that works, and returns that jitter.
-/// `correlations` are the buffer, and skip what they hold already.
+/// Factors C + N + jitter·diag(C), with the correlations C and the diagonal noise N, into `dense`,
+/// with the smallest sufficient jitter of 0, 1e-15, 1e-14, …, and returns that jitter.
+/// `correlations` is the buffer, and entries that it already holds are not computed again.
 ///
 /// # Errors
-/// If an observation is not finite, or even the largest jitter does not help.
+/// If an observation is not finite, or even the largest jitter is insufficient.
 pub(super) fn factor(
     dense: &mut Dense,
     kernel: &dyn Kernel,
@@ -89,7 +91,7 @@ pub(super) fn factor(
 }
 
 /// Writes the covariance of heights and slopes, and returns the largest diagonal entry without the
-/// noise: a number of much noise must not make another's pivot look lost.
+/// noise: the large noise of one number must not make another's pivot appear lost.
 fn with_slopes(
     dense: &mut Dense,
     kernel: &dyn Kernel,
@@ -119,11 +121,12 @@ fn with_slopes(
     largest
 }
 
-/// Columns of a triangle are correlated together until they hold this many entries: vector loops
-/// over single short columns would run half empty. Chosen to stay in the first-level cache.
+/// Number of entries up to which columns of a triangle are processed together: vector loops over
+/// single short columns would be half empty. A heuristic: they stay in the first-level cache.
 const BATCH: usize = 2048;
 
-/// Consecutive ranges of the columns 0..count of a lower triangle with about [`BATCH`] entries.
+/// Returns consecutive ranges of the columns 0..count of a lower triangle with about [`BATCH`]
+/// entries.
 pub(super) fn batches(count: usize) -> impl Iterator<Item = Range<usize>> {
     let mut begin = 0;
     std::iter::from_fn(move || {
@@ -136,7 +139,7 @@ pub(super) fn batches(count: usize) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// The correlations of one batch, remembered until another is asked for.
+/// Correlations of one batch, cached until another is requested.
 #[derive(Default)]
 pub(super) struct Correlations {
     columns: Range<usize>,
@@ -149,8 +152,8 @@ pub(super) struct Correlations {
 }
 
 impl Correlations {
-    /// Correlations in `columns` of the lower triangle, column after column, each from below its
-    /// diagonal down. The observations and the kernel must be the same in every call.
+    /// Returns the correlations in `columns` of the lower triangle, column after column, each from
+    /// below its diagonal down. The observations and the kernel must be the same in every call.
     pub(super) fn of(
         &mut self,
         kernel: &dyn Kernel,
@@ -165,8 +168,8 @@ impl Correlations {
         &self.entries
     }
 
-    /// The derivatives of [`of`](Self::of) with respect to the squared distances; the caller may
-    /// overwrite them.
+    /// Returns the derivatives of [`of`](Self::of) with respect to the squared distances; the
+    /// caller may overwrite them.
     pub(super) fn slopes_of(
         &mut self,
         kernel: &dyn Kernel,
@@ -194,20 +197,20 @@ impl Correlations {
 }
 
 /// The correlations c of one place with the places of some observations, and their first three
-/// derivatives c′, c″, c‴ with respect to the squared distance: all that the covariances of heights
-/// and slopes are made of.
+/// derivatives c′, c″, c‴ with respect to the squared distance, from which the covariances of
+/// heights and slopes follow.
 #[derive(Clone, Debug, Default)]
 pub(super) struct DerivativeCovariance {
-    /// The one place.
+    /// The place.
     place: Vec<f64>,
-    /// The observations are those from this one on.
+    /// Index of the first observation.
     first: usize,
     correlations: Vec<f64>,
     derivatives: [Vec<f64>; 3],
 }
 
 impl DerivativeCovariance {
-    /// Correlates `place` with the observations from `first` on.
+    /// Computes the correlations of `place` with the observations from `first` on.
     pub(super) fn correlate(
         &mut self,
         kernel: &dyn Kernel,
@@ -228,7 +231,7 @@ impl DerivativeCovariance {
         kernel.correlate_derivatives(&mut self.correlations, derivatives);
     }
 
-    /// u_d of the place and observation `i`.
+    /// Returns u_d of the place and observation `i`.
     #[inline(always)]
     fn step(&self, observations: &Observations, lengths: &[f64], i: usize, axis: usize) -> f64 {
         (self.place[axis] - observations.column(axis)[i]) / lengths[axis]

@@ -1,5 +1,5 @@
-//! Cholesky factorisation and inversion of a whole covariance matrix: in tiles where it fits into
-//! the cache, and by faer's blocked algorithms where it does not.
+//! Cholesky factorisation and inversion of a whole covariance matrix: in tiles if it fits into the
+//! cache, otherwise by faer's blocked algorithms.
 
 use super::tiles;
 pub use super::tiles::NotPositiveDefinite;
@@ -15,7 +15,7 @@ const TILED_MAX: usize = 320;
 
 /// A symmetric matrix that is factored in place; only its lower triangle is read and written.
 ///
-/// In tiles the order is rounded up, with the identity in what is added.
+/// In tiles the order is rounded up, and the padding is the identity.
 pub struct Dense {
     order: usize,
     matrix: Mat<f64>,
@@ -25,7 +25,7 @@ pub struct Dense {
 }
 
 impl Dense {
-    /// All zeros, of order `n`.
+    /// Creates a zero matrix of order `n`.
     pub fn new(n: usize) -> Self {
         let padded = if n <= TILED_MAX { n.next_multiple_of(tiles::WIDE) } else { n };
         let mut matrix = Mat::zeros(padded, padded);
@@ -40,18 +40,18 @@ impl Dense {
         }
     }
 
-    /// Order of the matrix.
+    /// Returns the order of the matrix.
     pub fn order(&self) -> usize {
         self.order
     }
 
-    /// Column `j` from its diagonal down.
+    /// Returns column `j` from its diagonal down.
     #[inline(always)]
     pub fn column(&self, j: usize) -> &[f64] {
         &self.matrix.col_as_slice(j)[j..self.order]
     }
 
-    /// Column `j` from its diagonal down.
+    /// Returns column `j` from its diagonal down.
     pub fn column_mut(&mut self, j: usize) -> &mut [f64] {
         &mut self.matrix.col_as_slice_mut(j)[j..self.order]
     }
@@ -59,8 +59,8 @@ impl Dense {
     /// Replaces A by L with A = L·Lᵀ: n³/3 operations.
     ///
     /// # Errors
-    /// If A is not positive definite to within rounding: a pivot lost to cancellation is as good
-    /// as none, its sign is noise. `largest` is A's largest diagonal entry.
+    /// If A is not positive definite to within rounding: a pivot that is lost to cancellation
+    /// counts as not positive, since its sign is noise. `largest` is A's largest diagonal entry.
     pub fn factor(&mut self, largest: f64) -> Result<(), NotPositiveDefinite> {
         match self.order <= TILED_MAX {
             true => tiles::factor(self.matrix.as_mut())?,
@@ -89,7 +89,7 @@ impl Dense {
             })
     }
 
-    /// ln |A| of the matrix factored last.
+    /// Returns ln |A| of the last factored matrix.
     pub fn log_determinant(&self) -> f64 {
         self.log_determinant
     }
@@ -117,8 +117,8 @@ impl Dense {
         }
     }
 
-    /// Computes A⁻¹ = XᵀX with X = L⁻¹ of the factored matrix: 2n³/3 operations. The factor is
-    /// used up: what needs it comes before.
+    /// Computes A⁻¹ = XᵀX with X = L⁻¹ of the factored matrix: 2n³/3 operations. It overwrites the
+    /// factor.
     pub fn invert(&mut self) {
         let n = self.matrix.nrows();
         if self.inverse.nrows() != n {
@@ -144,7 +144,7 @@ impl Dense {
         std::mem::swap(&mut self.matrix, &mut self.inverse);
     }
 
-    /// Column `j` of A⁻¹ from its diagonal down, after [`invert`](Self::invert).
+    /// Returns column `j` of A⁻¹ from its diagonal down, after [`invert`](Self::invert).
     pub fn inverse_column(&self, j: usize) -> &[f64] {
         &self.inverse.col_as_slice(j)[j..self.order]
     }

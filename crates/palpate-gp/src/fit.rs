@@ -1,5 +1,5 @@
 //! Hyperparameters by maximum likelihood (Rasmussen & Williams 2006, section 5.4.1): a coarse scan
-//! finds the hills of the profiled likelihood, climbs go up those that may be the highest.
+//! finds the hills of the profiled likelihood, and BFGS climbs those that may be the highest.
 
 use super::kernel::{Hyperparameters, KERNELS, Kernel};
 use super::likelihood::{Likelihood, ProfiledLikelihood};
@@ -12,62 +12,64 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// What a fit found.
+/// Result of a fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fit {
-    /// Name of the kernel that made the data likeliest, where there was a choice.
+    /// Name of the most likely kernel, if there were several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kernel: Option<String>,
-    /// The most probable hyperparameters.
+    /// Most probable hyperparameters.
     #[serde(flatten)]
     pub hyperparameters: Hyperparameters,
-    /// Their log marginal likelihood.
+    /// Log marginal likelihood of the hyperparameters.
     pub log_likelihood: f64,
-    /// Where the touches are taken in through a few of them, the largest standard deviation that
-    /// these leave of a touch's height, in the heights' unit.
+    /// Largest residual standard deviation of a touch's height given the inducing touches, in the
+    /// heights' unit, if the posterior is approximate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub left_sd: Option<f64>,
-    /// How many covariance matrices were factored; those of the scan that grew by a row are not.
+    /// Number of factored covariance matrices, not counting those of the scan that grew by a row.
     pub factorisations: u32,
-    /// With how many observations the whole box was last scanned, in this fit or one it began
-    /// from.
+    /// Number of observations at the last scan of the whole box, in this fit or an earlier one that
+    /// it continued.
     pub scanned_at: usize,
-    /// Why the climb that won stopped.
+    /// Reason why the winning climb stopped.
     pub stop: Stop,
 }
 
-/// Up to this many observations each fit scans the whole box: few touches change their mind, and
-/// the factors of the scan grow with the observations. Chosen: they need 8 MB.
+/// Up to this many observations each fit scans the whole box: with few touches the optimum changes
+/// often, and the factors of the scan grow with the observations. A heuristic: they need 8 MB.
 const SCAN_ALWAYS: usize = 128;
-/// Beyond, a fit scans once the observations have grown by this factor since the last scan, and
-/// in between climbs from where it stood; chosen.
+/// Growth of the observations since the last scan at which a larger fit scans again; in between it
+/// climbs from the last optimum; a heuristic.
 const SCAN_AGAIN: f64 = 1.2;
-/// With more observations than this the box is scanned with every second of them, and so on: where
-/// the hills are shows with hundreds, how high they are does not matter. Chosen: with 150 of 300,
-/// surfaces of two scales and with edges were taken for others.
+/// With more observations than this, the scan uses every second one, with twice as many every
+/// fourth, and so on: hundreds determine the positions of the hills, and their heights are not
+/// needed. A heuristic: with 150 of 300, surfaces of two scales and surfaces with edges were
+/// confused.
 const HALVED: usize = 1024;
 
-/// Fits of observations that grow, with one kernel: each begins where the last one ended.
+/// Sequence of fits of growing observations with one kernel; each starts from the last one's
+/// optimum.
 #[derive(Clone)]
 pub struct Refits {
     kernel: &'static dyn Kernel,
-    /// Of the box as it is, and with the sensor's noise.
+    /// State of the search of the whole box, and of that with the sensor's noise.
     free: Memory,
     bound: Memory,
 }
 
-/// What one fit leaves to the next.
+/// State that one fit passes to the next.
 #[derive(Clone, Default)]
 struct Memory {
     last: Option<Fit>,
-    /// Minus the second derivatives at its top.
+    /// Negative second derivatives at its optimum.
     curvature: Vec<f64>,
     /// Shared, since beliefs are cloned more often than fitted.
     scan: Arc<Scan>,
 }
 
 impl Refits {
-    /// None yet.
+    /// Creates an empty sequence.
     pub fn of(kernel: &'static dyn Kernel) -> Self {
         Self { kernel, free: Memory::default(), bound: Memory::default() }
     }
@@ -77,10 +79,10 @@ impl Refits {
         self.kernel
     }
 
-    /// As [`SearchBox::fit`], of at least the observations of the last time.
+    /// Runs [`SearchBox::fit`] on at least the observations of the last call.
     ///
-    /// The last top is one more start, or, while the box need not be scanned again, the only one
-    /// beside shorter lengths.
+    /// The last optimum is an additional start, or, unless the box must be scanned again, the only
+    /// one besides shorter lengths.
     pub fn fit(&mut self, sought: &SearchBox, observations: &Observations) -> Fit {
         let TouchNoise::AtLeast(least) = sought.touch_noise else {
             return self.free.fit(sought, self.kernel, observations);
@@ -122,7 +124,7 @@ impl Memory {
                     sought.shorten(&mut start, &lower, &upper);
                     search.climb(&start, None);
                 }
-                // What is fitted once is not fitted again; then nothing need be kept.
+                // A single fit has no successor, and no state needs to be stored.
                 None if is_kept => {
                     search.scan(Some(Arc::make_mut(&mut self.scan)));
                 }
@@ -165,21 +167,21 @@ impl Memory {
 }
 
 impl SearchBox {
-    /// Maximises the marginal likelihood, times what priors there are, globally and
+    /// Maximises the marginal likelihood, times the priors if given, globally and
     /// deterministically.
     ///
-    /// The likelihood is profiled over signal_sd, which has a closed form, so the search runs
-    /// over (ln lengths, ln noise ratio, ln slope noise ratio if there is one) only. With no
-    /// observations, or if no covariance can be factored, the middle of the box is returned with
+    /// The likelihood is profiled over signal_sd, which has a closed form, so the search runs over
+    /// (ln lengths, ln noise ratio, ln slope noise ratio if there is one) only. Without
+    /// observations, or if no covariance can be factored, returns the middle of the box with
     /// [`Stop::Failed`].
     ///
-    /// Noise that is known to be at least that of the sensor is fitted, and is the sensor's where
-    /// less would be likelier.
+    /// A noise with a lower bound (the sensor's) is fitted, and is set to the bound if less would
+    /// be more likely.
     pub fn fit(&self, kernel: &'static dyn Kernel, observations: &Observations) -> Fit {
         Refits::of(kernel).fit(self, observations)
     }
 
-    /// What is believed before any touch: the geometric middle of the box.
+    /// Returns the hyperparameters before any touch: the geometric middle of the box.
     fn middle(&self, lower: &[f64], upper: &[f64]) -> Hyperparameters {
         let middle: Vec<f64> = lower.iter().zip(upper).map(|(l, u)| 0.5 * (l + u)).collect();
         let (length_scales, noise) = self.parameters(&middle);
@@ -193,32 +195,33 @@ impl SearchBox {
     }
 }
 
-/// A climb ends where less than a ten-thousandth of a nat is to be won, which no data could tell;
-/// most need a tenth of the budget. The first step is a third of the way between two places of
-/// the scan; all chosen.
+/// A climb ends where its predicted gain is below 1e-4 nat, which no data can resolve; most need a
+/// tenth of the budget. The first step is a third of the distance between two places of the scan;
+/// heuristics.
 const MANNER: Manner = Manner { first_step: 0.05, gain: 1e-4, relative_gain: 0.0, budget: 100 };
-/// A climb is given up that would stay below the highest top if it won so many times what its
-/// parabola says; chosen, see [`SearchBox::fit`] for what that misses.
+/// A climb is stopped if it would stay below the highest optimum even with this many times its
+/// predicted gain; a heuristic. See [`SearchBox::fit`] for the optima that this misses.
 const HOPE: f64 = 4.0;
-/// Nor does it go on this near to the highest top, in units of the box's sides, and below it.
+/// A climb also stops this close to the highest optimum, in units of the box's sides, if it is
+/// below it.
 const SAME_TOP: f64 = 0.02;
-/// Hills of the scan that are climbed at most; chosen: enough for the fits of the toy that were
-/// held against a dense grid.
+/// Largest number of hills of the scan that are climbed; a heuristic: sufficient for the fits of
+/// the toy that were compared with a dense grid.
 const CLIMBS: usize = 2;
-/// Tops that differ by less nats are the same one; chosen above the likelihood's rounding.
+/// Optima that differ by less, in nats, are the same; a heuristic: above the likelihood's rounding.
 const GAIN_MIN: f64 = 1e-6;
-/// Where another noise makes the data less likely by up to this many nats, its own top may be the
-/// higher one; chosen.
+/// Largest drop of the log likelihood, in nats, at another noise for which a climb from there is
+/// worth trying; a heuristic.
 const NEARLY_AS_LIKELY: f64 = 0.3;
 
-/// The highest top so far.
+/// Highest optimum so far.
 struct Top {
     x: Vec<f64>,
     score: f64,
     profile: ProfiledLikelihood,
-    /// Why the climb to it stopped.
+    /// Reason why the climb to it stopped.
     stop: Stop,
-    /// Minus the second derivatives there, for the next climb in the same box.
+    /// Negative second derivatives there, for the next climb in the same box.
     curvature: Vec<f64>,
 }
 
@@ -230,12 +233,12 @@ struct Search<'a> {
     likelihood: Likelihood<'a>,
     scale: Scale,
     bounds: Bounds<'a>,
-    /// The highest top; none while no covariance could be factored.
+    /// Highest optimum; `None` while no covariance could be factored.
     best: Option<Top>,
 }
 
 impl<'a> Search<'a> {
-    /// Nothing found yet; `lower` and `upper` are the box's corners.
+    /// Creates a search without results; `lower` and `upper` are the box's corners.
     fn new(
         sought: &'a SearchBox,
         kernel: &'static dyn Kernel,
@@ -256,8 +259,8 @@ impl<'a> Search<'a> {
         self.best.as_ref().map_or(f64::NEG_INFINITY, |best| best.score)
     }
 
-    /// Climbs from `start`, if possible with the curvature of an earlier top, and keeps the top if
-    /// it is the highest so far.
+    /// Climbs from `start`, if possible with the curvature of an earlier optimum, and keeps the
+    /// result if it is the highest so far.
     fn climb(&mut self, start: &[f64], curvature: Option<&[f64]>) {
         let Self { sought, likelihood, scale, bounds, best, .. } = self;
         let mut profile = None;
@@ -287,8 +290,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Scores a grid over the box and climbs its highest hills, but for those that cannot reach
-    /// what was found already. With a `scan` it is asked what it knows of the grid.
+    /// Evaluates a grid over the box and climbs its highest hills, except those that cannot exceed
+    /// the best optimum. With a `scan`, reuses its cached factors.
     fn scan(&mut self, scan: Option<&mut Scan>) {
         let grid = Grid::new(self.bounds, self.sought.length_scales.len());
         let known = scan.map(|scan| {
@@ -313,8 +316,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Climbs from the least and the largest noise beside the best lengths, if the data are nearly
-    /// as likely there: noise and lengths may trade, and leave two tops that differ little.
+    /// Climbs from the smallest and the largest noise with the best lengths, if the data are nearly
+    /// as likely there: noise and lengths may trade off, and give two optima that differ little.
     fn cross_noise(&mut self) {
         let Some(best) = &self.best else { return };
         let (value, top) = (best.score, best.x.clone());
@@ -337,8 +340,8 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Log likelihood plus log priors at `x`, with the gradient if asked; NaN where the covariance
-/// cannot be factored.
+/// Returns log likelihood plus log priors at `x`, with the gradient if requested; NaN if the
+/// covariance cannot be factored.
 fn score(
     sought: &SearchBox,
     likelihood: &mut Likelihood,
@@ -360,7 +363,7 @@ fn score(
     with_priors(sought, scale, x, &profile)
 }
 
-/// Log likelihood plus log priors at `x`.
+/// Returns log likelihood plus log priors at `x`.
 fn with_priors(sought: &SearchBox, scale: &Scale, x: &[f64], at: &ProfiledLikelihood) -> f64 {
     let priors = sought.ranges().zip(x).filter_map(|(range, &log)| {
         let prior = range.prior?;
@@ -369,17 +372,17 @@ fn with_priors(sought: &SearchBox, scale: &Scale, x: &[f64], at: &ProfiledLikeli
     priors.fold(at.log_likelihood + scale.log_prior(at.signal_sd), |sum, prior| sum + prior)
 }
 
-/// One or several kernels, of which each fit chooses the likeliest.
+/// One or several kernels, of which each fit selects the most likely.
 #[derive(Clone)]
 pub struct Choice {
-    /// By their names.
+    /// Fits by kernel name.
     candidates: Vec<(&'static str, Refits)>,
     chosen: usize,
 }
 
 impl Choice {
-    /// Between the kernels of these names, the first until there is a fit. Unknown names are passed
-    /// over; with none left it is the squared exponential.
+    /// Creates a selection between the kernels of these names, the first one until there is a fit.
+    /// Unknown names are skipped; if none is left, the kernel is the squared exponential.
     pub fn between(names: &[String]) -> Self {
         let candidate =
             |(name, kernel): &(&'static str, &'static dyn Kernel)| (*name, Refits::of(*kernel));
@@ -391,23 +394,23 @@ impl Choice {
         Self { candidates, chosen: 0 }
     }
 
-    /// The chosen one.
+    /// Returns the selected kernel.
     pub fn kernel(&self) -> &'static dyn Kernel {
         self.candidates[self.chosen].1.kernel()
     }
 
-    /// Whether all of them can observe slopes.
+    /// Whether all kernels support slopes.
     pub fn has_slopes(&self) -> bool {
         self.candidates.iter().all(|(_, fits)| fits.kernel().has_slopes())
     }
 
-    /// Fits all and chooses the likeliest. Names it if there was a choice; the factorisations are
-    /// those of all.
+    /// Fits all kernels and selects the most likely. The result names it if there are several; its
+    /// factorisations are the sum over all.
     pub fn fit(&mut self, search_box: &SearchBox, observations: &Observations) -> Fit {
         let all = self.candidates.iter_mut();
         let fits: Vec<Fit> = all.map(|(_, fits)| fits.fit(search_box, observations)).collect();
         let likelihood = |i: &usize| fits[*i].log_likelihood;
-        // Of equals the first.
+        // The first of equally likely kernels.
         let likeliest =
             (0..fits.len()).rev().max_by(|a, b| likelihood(a).total_cmp(&likelihood(b)));
         self.chosen = likeliest.unwrap_or(0);
@@ -419,7 +422,7 @@ impl Choice {
         fit
     }
 
-    /// Chooses what `fit` chose.
+    /// Selects the kernel of `fit`.
     pub fn follow(&mut self, fit: &Fit) {
         let named =
             self.candidates.iter().position(|(name, _)| Some(*name) == fit.kernel.as_deref());

@@ -1,13 +1,12 @@
-//! Very many touches taken in through a few of them: inducing points (Snelson & Ghahramani 2006).
+//! Inducing points: the approximate posterior of many touches (Snelson & Ghahramani 2006).
 //!
-//! What the touches say of the surface at a few kept places is, given that other touches tell of
-//! each other through these alone, again a normal distribution. So the posterior is that of as many
-//! touches as are kept, whose heights and whose errors, which depend on each other, are found in
-//! one pass over all. For n touches of which m are kept that takes n·m² + 4m³/3 operations and
-//! memory for m² numbers.
+//! Given the surface at a few inducing touches, all other touches are assumed to be independent.
+//! The posterior is then that of the inducing touches alone, with heights and correlated errors
+//! that are found in one pass over all touches. For n touches and m inducing ones it takes n·m² +
+//! 4m³/3 operations and memory for m² numbers.
 //!
-//! A touch that is not kept counts as one of what the kept ones say of its place: what they leave
-//! of its variance is added to its noise. The largest that is left is what the approximation loses.
+//! The residual variance of a touch, given the inducing ones, is added to its noise. The largest
+//! residual is the error of the approximation.
 
 use super::covariance::CovarianceError;
 use super::dense::{Dense, NotPositiveDefinite};
@@ -19,29 +18,30 @@ use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place as solve_lower;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-/// No more touches are kept once all others vary, given those that are, by less than this share of
-/// the noise's variance. Chosen: their errors are then those of their own noise.
+/// No inducing touches are added once the residual variance of all others is below this fraction of
+/// the noise variance; a heuristic: their errors are then those of their own noise.
 const NEGLIGIBLE: f64 = 1e-4;
-/// Nor below this share of the signal's variance, which is rounding.
+/// Nor below this fraction of the signal variance, which is rounding.
 const ROUNDING: f64 = 1e-12;
-/// Those that are kept are chosen from so many times as many, evenly spread ones; chosen.
+/// Number of evenly spread candidates per inducing touch; a heuristic.
 const CANDIDATES: usize = 2;
-/// Touches gone through at once; chosen so that a block of them stays in the cache.
+/// Number of touches processed together; a heuristic: a block of them stays in the cache.
 const BLOCK: usize = 256;
-/// The precision of what is kept is raised by this share of its trace, so that it can be factored.
+/// Jitter of the precision of the inducing heights, as a fraction of its trace, so that it can be
+/// factored.
 const JITTER: f64 = 1e-15;
 
-/// A posterior through some of its touches.
+/// Approximate posterior from inducing touches.
 pub struct Induced {
-    /// It, of the kept touches.
+    /// Posterior given the inducing touches.
     pub posterior: Posterior,
-    /// The largest standard deviation that the kept touches leave of another one's height, in the
-    /// heights' unit.
+    /// Largest residual standard deviation of another touch's height given the inducing ones, in
+    /// the heights' unit.
     pub left_sd: f64,
 }
 
 impl Posterior {
-    /// Conditions the prior on the heights of `observations` through at most `most` of them.
+    /// Conditions the prior on the heights of `observations` through at most `most` inducing ones.
     ///
     /// # Errors
     /// [`CovarianceError`] if an observation is not finite, or the covariance cannot be factored.
@@ -70,7 +70,7 @@ impl Posterior {
     }
 }
 
-/// Of the lower triangle.
+/// Copies the lower triangle into a dense matrix.
 fn dense(matrix: MatRef<f64>) -> Dense {
     let mut dense = Dense::new(matrix.nrows());
     for (j, column) in matrix.col_iter().enumerate() {
@@ -90,9 +90,9 @@ fn indefinite(count: usize, cause: NotPositiveDefinite) -> CovarianceError {
     CovarianceError::Indefinite { count, jitter: 0.0, cause }
 }
 
-/// The most uncertain of evenly spread candidates, one after the other (a pivoted Cholesky
-/// factorisation), until no other is uncertain: which touches are kept, and the factor of the
-/// correlations of their heights.
+/// Selects the inducing touches from evenly spread candidates: repeatedly the most uncertain one (a
+/// pivoted Cholesky factorisation), until none is uncertain. Returns their indices, and the factor
+/// of the correlations of their heights.
 fn choose(
     most: usize,
     kernel: &dyn Kernel,
@@ -105,7 +105,7 @@ fn choose(
     let noise2 = hyperparameters.noise_ratio().height.powi(2);
     let enough = (NEGLIGIBLE * noise2).max(ROUNDING);
     let mut left = vec![1.0f64; candidates.len()];
-    // Row after row of L⁻¹·K, of all candidates.
+    // Rows of L⁻¹·K for all candidates.
     let mut rows: Vec<Vec<f64>> = Vec::new();
     let mut chosen: Vec<usize> = Vec::new();
     while chosen.len() < most {
@@ -134,7 +134,8 @@ fn choose(
     (chosen.iter().map(|&i| candidates[i]).collect(), factor)
 }
 
-/// Up to `most` touches, each the farthest from all before it in units of the length scales.
+/// Returns up to `most` touches, each the farthest from all before it in units of the length
+/// scales.
 fn spread(most: usize, length_scales: &[f64], observations: &Observations) -> Vec<usize> {
     let mut distances2 = vec![f64::INFINITY; observations.len()];
     let mut from = vec![0.0; observations.len()];
@@ -149,13 +150,13 @@ fn spread(most: usize, length_scales: &[f64], observations: &Observations) -> Ve
     chosen
 }
 
-/// The covariance of the heights of the kept touches with their errors, in units of the signal's
-/// variance, their heights above the mean, and the most that is left of any touch's variance.
+/// Returns the covariance of the inducing heights with their errors, in units of the signal's
+/// variance, their heights above the mean, and the largest residual variance of any touch.
 ///
-/// With `factor` the L of the correlations K = L·Lᵀ of the kept touches, V = L⁻¹·K(kept, all)
-/// and D the noise of all touches, what they tell of L⁻¹ times the kept heights has the
-/// precision B = V·D⁻¹·Vᵀ = R·Rᵀ; so the errors of the kept heights have the covariance W·Wᵀ
-/// with W = L·R⁻ᵀ, and the heights are W·R⁻¹·V·D⁻¹·y.
+/// With `factor` the L of the correlations K = L·Lᵀ of the inducing touches, V = L⁻¹·K(inducing,
+/// all) and D the noise of all touches, the information of all touches about L⁻¹ times the inducing
+/// heights has the precision B = V·D⁻¹·Vᵀ = R·Rᵀ. Thus the errors of the inducing heights have the
+/// covariance W·Wᵀ with W = L·R⁻ᵀ, and the heights are W·R⁻¹·V·D⁻¹·y.
 fn condition(
     kernel: &dyn Kernel,
     hyperparameters: &Hyperparameters,
@@ -204,7 +205,8 @@ fn condition(
     Ok((covariance, residuals.col_as_slice(0).to_vec(), left_variance))
 }
 
-/// Writes the correlations of the kept touches with those from `begin` on, one of these a column.
+/// Writes the correlations of the inducing touches with those from `begin` on, one column per
+/// touch.
 fn correlate(
     kernel: &dyn Kernel,
     hyperparameters: &Hyperparameters,

@@ -1,42 +1,42 @@
 //! Stationary kernels with one length scale per input (automatic relevance determination): the
-//! formula of one correlation, and loops over many.
+//! formula of one correlation, and vectorised loops over many.
 
 use super::observations::NoiseRatio;
 use crate::math::simd::{exp_of_negative, widest_fn};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Every kernel by name; one line adds one.
+/// All kernels by name; add one line per kernel.
 pub const KERNELS: &[(&str, &dyn Kernel)] = &[
     ("squared_exponential", &SquaredExponential),
     ("matern_52", &Matern52),
     ("matern_32", &Matern32),
 ];
 
-/// The kernel called `name`.
+/// Returns the kernel called `name`.
 pub fn by_name(name: &str) -> Option<&'static dyn Kernel> {
     KERNELS.iter().find(|(known, _)| *known == name).map(|(_, kernel)| *kernel)
 }
 
-/// What a fit chooses: k(a, b) = signal_sd² · c(r²(a, b)) + noise_sd² · [a is b].
+/// Hyperparameters: k(a, b) = signal_sd² · c(r²(a, b)) + noise_sd² · [a is b].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Hyperparameters {
     /// Standard deviation of the surface around its mean, in the unit of the heights.
     pub signal_sd: f64,
-    /// Distance over which heights stay alike, one per input, in the unit of the inputs.
+    /// Correlation lengths of the heights, one per input, in the unit of the inputs.
     pub length_scales: Vec<f64>,
     /// Standard deviation of one touch's error, in the unit of the heights.
     pub noise_sd: f64,
-    /// Standard deviation of an observed slope's error; 0 where no slopes are observed.
+    /// Standard deviation of an observed slope's error; 0 without observed slopes.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub slope_noise_sd: f64,
-    /// Height that the belief returns to away from all observations.
+    /// Prior mean, to which the belief returns far from all observations.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub mean: f64,
 }
 
 impl Hyperparameters {
-    /// From the noise in units of the signal.
+    /// Creates hyperparameters from a noise in units of the signal.
     pub fn new(signal_sd: f64, length_scales: Vec<f64>, noise: NoiseRatio, mean: f64) -> Self {
         Self {
             signal_sd,
@@ -47,7 +47,7 @@ impl Hyperparameters {
         }
     }
 
-    /// The noise in units of the signal.
+    /// Returns the noise in units of the signal.
     pub fn noise_ratio(&self) -> NoiseRatio {
         let [height, slope] =
             [self.noise_sd, self.slope_noise_sd].map(|noise_sd| noise_sd / self.signal_sd);
@@ -59,7 +59,7 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-/// exp(−r²/2), Eq. 2 of Yi et al. 2016: infinitely smooth surfaces.
+/// Squared exponential exp(−r²/2), Eq. 2 of Yi et al. 2016: infinitely smooth surfaces.
 #[derive(Clone, Copy, Debug)]
 pub struct SquaredExponential;
 
@@ -79,7 +79,7 @@ impl Radial for SquaredExponential {
     }
 }
 
-/// The Matérn kernel (1 + √3·r)·exp(−√3·r) (Rasmussen & Williams 2006, Eq. 4.17): surfaces with one
+/// Matérn kernel (1 + √3·r)·exp(−√3·r) (Rasmussen & Williams 2006, Eq. 4.17): surfaces with one
 /// derivative.
 #[derive(Clone, Copy, Debug)]
 pub struct Matern32;
@@ -93,7 +93,7 @@ impl Radial for Matern32 {
     }
 }
 
-/// The Matérn kernel (1 + √5·r + 5r²/3)·exp(−√5·r): surfaces with two derivatives.
+/// Matérn kernel (1 + √5·r + 5r²/3)·exp(−√5·r): surfaces with two derivatives.
 #[derive(Clone, Copy, Debug)]
 pub struct Matern52;
 
@@ -116,7 +116,7 @@ impl Radial for Matern52 {
     }
 }
 
-/// 0 where ∞·0 gave NaN: at distances whose square overflows.
+/// Replaces NaN from ∞·0 by 0, at distances whose square overflows.
 #[inline(always)]
 fn bounded(value: f64) -> f64 {
     if value.is_nan() { 0.0 } else { value }
@@ -130,19 +130,19 @@ pub trait Radial: Send + Sync {
     /// `#[inline(always)]`, so that loops over it are vectorised.
     fn correlation_slope(r2: f64) -> (f64, f64);
 
-    /// Whether its surfaces have slopes that vary continuously, so that one slope tells of others
-    /// near by. Then it has [`curvatures`](Self::curvatures).
+    /// Whether its surfaces have continuously varying slopes, so that one slope is informative
+    /// about others nearby. If so, it must define [`curvatures`](Self::curvatures).
     const HAS_SLOPES: bool = false;
 
-    /// The second and third derivative of c with respect to r². The third may stand at 0 for any
-    /// number: it is multiplied by r⁴.
+    /// Returns the second and third derivative of c with respect to r². The third may be any number
+    /// at 0, since it is multiplied by r⁴.
     #[inline(always)]
     fn curvatures(_r2: f64) -> (f64, f64) {
         (0.0, 0.0)
     }
 }
 
-/// A kernel, many distances at a time.
+/// A kernel, evaluated for many distances at a time.
 pub trait Kernel: Send + Sync {
     /// Replaces each r² by c(r²).
     fn correlate(&self, r2: &mut [f64]);
@@ -150,7 +150,7 @@ pub trait Kernel: Send + Sync {
     /// Replaces each r² by c(r²) and writes dc/d(r²) into `slopes`.
     fn correlate_slope(&self, r2: &mut [f64], slopes: &mut [f64]);
 
-    /// Whether slopes can be observed with it, see [`Radial::HAS_SLOPES`].
+    /// Whether it supports observed slopes; see [`Radial::HAS_SLOPES`].
     fn has_slopes(&self) -> bool;
 
     /// Replaces each r² by c(r²) and writes its first three derivatives with respect to r².
@@ -172,7 +172,7 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// The second and third derivatives.
+    /// Writes the second and third derivatives.
     fn curve<'a, R: Radial>(r2: &'a [f64], second: &'a mut [f64], third: &'a mut [f64]) -> () {
         for (r2, (second, third)) in r2.iter().zip(second.iter_mut().zip(third)) {
             (*second, *third) = R::curvatures(*r2);

@@ -2,11 +2,11 @@
 //!
 //! A Gaussian process is a belief about a surface: at every place it has a mean height and a
 //! standard deviation. Heights observed at some places, each with an error, pull the mean towards
-//! them and make the standard deviation small near them. How far that reaches is the length
+//! them and make the standard deviation small near them. The range of this effect is the length
 //! scale, one per coordinate; it, the signal's standard deviation and the noise's are the
 //! [`Hyperparameters`], and a fit finds the most likely ones.
 //!
-//! Places and heights may be in any units: lengths and noise come out in the same.
+//! Places and heights may be in any units; length scales and noise are in the same units.
 //!
 //! ```
 //! use palpate_gp::kernel::SquaredExponential;
@@ -46,15 +46,15 @@
 //! # Ok::<(), palpate_gp::covariance::CovarianceError>(())
 //! ```
 //!
-//! | module | what it does |
+//! | module | content |
 //! |---|---|
-//! | [`kernel`] | how alike the heights of two places are, and the hyperparameters |
+//! | [`kernel`] | correlation of the heights of two places, and the hyperparameters |
 //! | [`observations`] | places, heights, and slopes if they are observed too |
-//! | [`posterior`], [`batch`], [`means`] | mean, variance, gradients at one, many, most places |
-//! | [`inducing`] | the posterior of very many touches through a few of them |
-//! | [`likelihood`] | how well hyperparameters explain the observations |
-//! | [`fit`], [`search_box`] | the most likely hyperparameters and kernel, and where to seek them |
-//! | [`reduction`] | how much one more observation would tell |
+//! | [`posterior`], [`batch`], [`means`] | mean, variance, gradients; batch evaluation |
+//! | [`inducing`] | approximate posterior from inducing points |
+//! | [`likelihood`] | log marginal likelihood of hyperparameters |
+//! | [`fit`], [`search_box`] | maximum-likelihood hyperparameters and kernel, and their bounds |
+//! | [`reduction`] | variance reduction by one more observation |
 //! | [`covariance`], [`dense`], [`cholesky`] | the covariance, factored whole or row by row |
 
 pub mod batch;

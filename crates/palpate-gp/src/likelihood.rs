@@ -10,39 +10,40 @@ use super::search_box::Mean;
 use super::search_box::Scale;
 use crate::math::simd::{widest, widest_dot};
 
-/// Scores hyperparameters against fixed observations; keeps its buffers between calls.
+/// Log marginal likelihood of hyperparameters given fixed observations, with buffers kept between
+/// calls.
 ///
-/// With K = s²·A, A = C + g²·I (s the signal's standard deviation, C the correlations, g the
-/// noise as a fraction of s) the log marginal likelihood is
-/// −½·yᵀA⁻¹y / s² − n·ln s − ½·ln|A| − (n/2)·ln 2π, where y are the heights above the mean
-/// (Rasmussen & Williams 2006, Eq. 2.30). A slope counts as a further height, slope · length, with
-/// its own noise, and adds ln length: the density is that of the slope.
+/// With K = s²·A, A = C + g²·I (s the signal's standard deviation, C the correlations, g the noise
+/// as a fraction of s) the log marginal likelihood is −½·yᵀA⁻¹y / s² − n·ln s − ½·ln|A| − (n/2)·ln
+/// 2π, where y are the heights above the mean (Rasmussen & Williams 2006, Eq. 2.30). A slope counts
+/// as an additional height, slope · length, with its own noise, and adds ln length, so that the
+/// density is that of the slope.
 pub struct Likelihood<'a> {
     kernel: &'static dyn Kernel,
     mean: Mean,
     observations: &'a Observations,
     dense: Dense,
-    /// L⁻¹·y, then A⁻¹·y where a gradient is asked for.
+    /// L⁻¹·y, then A⁻¹·y if a gradient is requested.
     weights: Vec<f64>,
     scratch: Vec<f64>,
-    /// Weights of a pair of places, see [`DerivativeCovariance::add_length_gradient`].
+    /// Weights of a pair of places; see [`DerivativeCovariance::add_length_gradient`].
     pair: [Vec<f64>; 2],
     correlations: Correlations,
     factorisations: u32,
 }
 
-/// A profiled score: the signal's standard deviation follows from the other parameters.
+/// Profiled likelihood: the signal's standard deviation follows from the other parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct ProfiledLikelihood {
     /// Log marginal likelihood.
     pub log_likelihood: f64,
     /// Signal standard deviation.
     pub signal_sd: f64,
-    /// The mean that the model chooses.
+    /// Prior mean according to the mean model.
     pub mean: f64,
 }
 
-/// The log marginal likelihood of `order` heights, given yᵀA⁻¹y and ln |A|.
+/// Returns the log marginal likelihood of `order` heights, given yᵀA⁻¹y and ln |A|.
 pub(super) fn of_height(fit: f64, signal_sd: f64, order: usize, log_determinant: f64) -> f64 {
     let n = order as f64;
     -0.5 * fit / (signal_sd * signal_sd)
@@ -52,7 +53,7 @@ pub(super) fn of_height(fit: f64, signal_sd: f64, order: usize, log_determinant:
 }
 
 impl<'a> Likelihood<'a> {
-    /// Prepares to score hyperparameters against `observations`.
+    /// Prepares the likelihood of hyperparameters given `observations`.
     pub fn new(kernel: &'static dyn Kernel, mean: Mean, observations: &'a Observations) -> Self {
         let count = observations.order();
         Self {
@@ -68,14 +69,14 @@ impl<'a> Likelihood<'a> {
         }
     }
 
-    /// How many matrices were factored so far.
+    /// Returns the number of matrices factored so far.
     pub fn factorisations(&self) -> u32 {
         self.factorisations
     }
 
-    /// Log marginal likelihood; writes its gradient with respect to
-    /// (ln signal_sd, ln length_1, …, ln length_d, ln noise_sd), and ln slope_noise_sd if there is
-    /// room, unless `gradient` is empty.
+    /// Returns the log marginal likelihood and writes its gradient with respect to (ln signal_sd,
+    /// ln length_1, …, ln length_d, ln noise_sd), and ln slope_noise_sd if there is space, unless
+    /// `gradient` is empty.
     ///
     /// # Errors
     /// [`CovarianceError`] if the covariance cannot be factored.
@@ -97,9 +98,9 @@ impl<'a> Likelihood<'a> {
         Ok(value)
     }
 
-    /// Log marginal likelihood with the signal_sd that `scale` says. A `gradient` is written with
-    /// respect to (ln length_1, …, ln length_d, ln noise_ratio), and the logarithm of the slope
-    /// noise ratio if there is room; it includes the prior of signal_sd.
+    /// Returns the log marginal likelihood with signal_sd according to `scale`. A `gradient` is
+    /// written with respect to (ln length_1, …, ln length_d, ln noise_ratio), and the logarithm of
+    /// the slope noise ratio if there is space; it includes the prior of signal_sd.
     ///
     /// # Errors
     /// [`CovarianceError`] if the covariance cannot be factored.
@@ -120,8 +121,8 @@ impl<'a> Likelihood<'a> {
         if let Some(gradient) = gradient {
             let signal2 = signal_sd * signal_sd;
             self.gradient(signal2, length_scales, noise, gradient);
-            // The best signal_sd does not change the value to first order; a known noise makes
-            // it fall as the ratio rises.
+            // At the optimal signal_sd the value is stationary in it; with a known noise, signal_sd
+            // decreases as the ratio increases.
             if let (Scale::KnownNoise(_), Some(by_noise)) =
                 (scale, gradient.get_mut(length_scales.len()))
             {
@@ -147,17 +148,17 @@ impl<'a> Likelihood<'a> {
         covariance::factor(dense, kernel, observations, length_scales, noise, buffer).map(|_| ())
     }
 
-    /// Makes L⁻¹·y of the heights above `mean` the weights, and returns its square yᵀA⁻¹y.
+    /// Sets the weights to L⁻¹·y for the heights above `mean`, and returns the squared norm yᵀA⁻¹y.
     fn whiten(&mut self, mean: f64, length_scales: &[f64]) -> f64 {
         self.observations.residuals(mean, length_scales, &mut self.weights);
         self.dense.solve_lower(&mut self.weights);
         widest_dot(&self.weights, &self.weights)
     }
 
-    /// With respect to the logarithms of the length scales and of the noise ratio, by
-    /// ½·tr((w·wᵀ/s² − A⁻¹)·∂A) (Rasmussen & Williams 2006, Eq. 5.9), after
-    /// [`whiten`](Self::whiten) at the same parameters. The mean is the best one or does not
-    /// depend on them, so it has no part in this.
+    /// Writes the gradient with respect to the logarithms of the length scales and of the noise
+    /// ratio: ½·tr((w·wᵀ/s² − A⁻¹)·∂A) (Rasmussen & Williams 2006, Eq. 5.9), after
+    /// [`whiten`](Self::whiten) at the same parameters. The mean is optimal or independent of them,
+    /// so it does not contribute.
     fn gradient(&mut self, signal2: f64, lengths: &[f64], noise: NoiseRatio, gradient: &mut [f64]) {
         self.dense.solve_upper(&mut self.weights);
         self.dense.invert();
@@ -205,8 +206,8 @@ impl<'a> Likelihood<'a> {
         by_noise.iter_mut().take(1).for_each(|by_noise| *by_noise = by_height);
     }
 
-    /// The same where slopes were observed, pair of places by pair; and the slopes, counted per
-    /// length scale, change with it.
+    /// Writes the gradient with observed slopes, by pairs of places; the slopes per length scale
+    /// change with it too.
     fn gradient_with_slopes(
         &mut self,
         signal2: f64,

@@ -1,26 +1,26 @@
-//! Means at very many places: the same ones while observations are added, or those that a search
-//! for zeros asks for.
+//! Posterior means at very many places: at fixed places while observations are added, or at
+//! arbitrary ones for a search of zeros.
 
 use super::kernel::{Hyperparameters, Kernel};
 use super::observations::Observations;
 use super::posterior::{Posterior, Scratch};
 use crate::math::simd::{widest, widest_dot, widest_fn};
 
-/// Places, and their correlations with what was observed so far.
+/// Fixed places with their correlations with the observations so far.
 pub struct Means {
     places: Observations,
-    /// Of each place with all numbers that were observed at first, one place after the other.
+    /// Correlations of each place with all initially observed numbers, place by place.
     first: Vec<f64>,
-    /// How many numbers, and at how many places, that was.
+    /// Number of initially observed numbers, and of their places.
     order: usize,
     count: usize,
-    /// Of all places with each height since, one height after the other.
+    /// Correlations of all places with each later height, height by height.
     since: Vec<f64>,
     means: Vec<f64>,
 }
 
 impl Means {
-    /// Prepares for `places`, by what `belief` was conditioned on so far.
+    /// Prepares for `places`, with the current observations of `belief`.
     pub fn at<'a>(belief: &Posterior, places: impl Iterator<Item = &'a [f64]>) -> Self {
         let observations = belief.observations();
         let mut all = Observations::new(observations.dimension());
@@ -35,9 +35,9 @@ impl Means {
         Self { places: all, first, order, count, since: Vec::new(), means }
     }
 
-    /// The means of `belief`, which since [`at`](Self::at) may have taken in heights, and nothing
-    /// else: for m places and n observations m·n operations, and a correlation for each place and
-    /// new height.
+    /// Returns the means of `belief`, to which only heights may have been added since
+    /// [`at`](Self::at): for m places and n observations, m·n operations, and one correlation per
+    /// place and new height.
     pub fn of(&mut self, belief: &Posterior) -> &[f64] {
         let Hyperparameters { mean, length_scales, .. } = belief.hyperparameters();
         let observations = belief.observations();
@@ -66,11 +66,11 @@ impl Means {
     }
 }
 
-/// A posterior's mean as weighted sums over what was observed, with buffers of its own.
+/// Evaluator of a posterior's mean as weighted sums over the observations, with its own buffers.
 ///
-/// With u = (x − x_i) / l for each observation, the weight w of its height and the weights v of
-/// its slopes per length scale, the mean is m + Σ w·c − 2c′·(u·v), and its gradient per length
-/// scale Σ 2u·(w·c′ − 2c″·(u·v)) − 2c′·v.
+/// With u = (x − x_i) / l for each observation, the weight w of its height and the weights v of its
+/// slopes per length scale, the mean is m + Σ w·c − 2c′·(u·v), and its gradient per length scale Σ
+/// 2u·(w·c′ − 2c″·(u·v)) − 2c′·v.
 #[derive(Clone)]
 pub struct MeanField {
     kernel: &'static dyn Kernel,
@@ -120,14 +120,14 @@ impl From<&Posterior> for MeanField {
 }
 
 impl MeanField {
-    /// The mean at `place`.
+    /// Returns the mean at `place`.
     pub fn value(&mut self, place: &[f64]) -> f64 {
         self.walk(place);
         self.kernel.correlate_slope(&mut self.correlations, &mut self.derivatives[0]);
         self.mean + self.sum()
     }
 
-    /// The same, and writes its gradient with respect to the place.
+    /// Returns the mean and writes its gradient with respect to the place.
     pub fn gradient(&mut self, place: &[f64], gradient: &mut [f64]) -> f64 {
         self.walk(place);
         let derivatives = self.derivatives.each_mut().map(Vec::as_mut_slice);
@@ -141,7 +141,7 @@ impl MeanField {
         self.mean + self.sum()
     }
 
-    /// Writes the steps from every observation to `place`, their squared lengths, and u·v.
+    /// Writes the differences of `place` from every observation, their squared lengths, and u·v.
     fn walk(&mut self, place: &[f64]) {
         let Self { lengths, columns, slopes, steps, correlations, along, .. } = self;
         correlations.fill(0.0);
@@ -157,11 +157,12 @@ impl MeanField {
     }
 }
 
-/// As many sums are kept side by side.
+/// Number of parallel sums.
 const LANES: usize = 8;
 
 widest_fn! {
-    /// See [`MeanField::walk`]; observed are a column and the weights of its slopes.
+    /// Implements [`MeanField::walk`] for one axis; `observed` is a column and the weights of its
+    /// slopes.
     fn walk<'a>(
         at: f64,
         observed: (&'a [f64], &'a [f64]),
@@ -181,7 +182,7 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// Σ w·c − 2c′·(u·v).
+    /// Returns Σ w·c − 2c′·(u·v).
     fn height_sum<'a>(
         heights: &'a [f64],
         along: &'a [f64],
@@ -193,7 +194,7 @@ widest_fn! {
 }
 
 widest_fn! {
-    /// Σ 2u·(w·c′ − 2c″·(u·v)) − 2c′·v along one axis.
+    /// Returns Σ 2u·(w·c′ − 2c″·(u·v)) − 2c′·v along one axis.
     fn slope_sum<'a>(
         heights: &'a [f64],
         slopes: &'a [f64],
@@ -211,7 +212,7 @@ widest_fn! {
     }
 }
 
-/// Σ of `term` over 0..count, in sums side by side.
+/// Returns Σ of `term` over 0..count, in parallel sums.
 #[inline(always)]
 fn lanes(count: usize, term: impl Fn(usize) -> f64) -> f64 {
     let mut sums = [0.0; LANES];
@@ -232,7 +233,7 @@ mod tests {
     use crate::{NoiseRatio, Observation, Slope};
     use rand::RngExt;
 
-    /// The slow twin asks for one mean at a time.
+    /// Compares with a reference that computes one mean at a time.
     #[test]
     fn they_are_those_of_one_place_at_a_time_before_and_after_an_addition() {
         for is_sloped in [false, true] {
@@ -260,7 +261,7 @@ mod tests {
         }
     }
 
-    /// The slow twin is the posterior itself, place by place, some with slopes.
+    /// Compares with the posterior itself, place by place, some with slopes.
     #[test]
     fn it_is_the_posteriors_mean() {
         let mut rng = stream(3, 0, "field");

@@ -1,18 +1,18 @@
-//! Places with the heights, and perhaps the slopes, observed there.
+//! Observations: places with heights and, optionally, slopes.
 
 use crate::math::simd::widest;
 use std::ops::Range;
 
-/// What was observed at one place.
+/// An observation at one place.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
-    /// Where.
+    /// Place.
     pub place: &'a [f64],
-    /// The height there.
+    /// Height at the place.
     pub height: f64,
     /// Standard deviation of the height's error, in units of the belief's noise.
     pub noise: f64,
-    /// The slope there, if it was observed too.
+    /// Slope at the place, if observed.
     pub slope: Option<Slope<'a>>,
 }
 
@@ -26,12 +26,12 @@ pub struct Slope<'a> {
 }
 
 impl<'a> Observation<'a> {
-    /// A height alone, with the belief's noise.
+    /// Creates an observation of a height alone, with the belief's noise.
     pub fn height(place: &'a [f64], height: f64) -> Self {
         Self { place, height, noise: 1.0, slope: None }
     }
 
-    /// How many numbers it is.
+    /// Returns the count of its numbers: height and slope components.
     pub(super) fn order(&self) -> usize {
         1 + self.slope.map_or(0, |_| self.place.len())
     }
@@ -51,9 +51,9 @@ impl<'a> Observation<'a> {
 /// Standard deviations of the errors, in units of the signal's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseRatio {
-    /// Of a height.
+    /// Noise of a height.
     pub height: f64,
-    /// Of a slope, per unit of the inputs.
+    /// Noise of a slope, per unit of the inputs.
     pub slope: f64,
 }
 
@@ -63,11 +63,11 @@ impl From<f64> for NoiseRatio {
     }
 }
 
-/// Places and what was observed there, stored coordinate by coordinate.
+/// Places and their observations, stored coordinate by coordinate.
 ///
-/// The numbers observed stand in the order in which they were taken in, at each place the height
-/// and then the slope along each axis, if any. A slope is counted per length scale, so that it has
-/// the unit of a height and one scale with it.
+/// The observed numbers are stored in the order of addition: for each place the height and then the
+/// slope along each axis, if any. A slope is counted per length scale, so that it has the unit and
+/// scale of a height.
 #[derive(Clone, Debug, Default)]
 pub struct Observations {
     columns: Vec<Vec<f64>>,
@@ -75,12 +75,12 @@ pub struct Observations {
     height_noise2: Vec<f64>,
     slopes: Vec<f64>,
     slope_noise2: Vec<f64>,
-    /// Where the numbers of each place begin.
+    /// Index of the first number of each place.
     starts: Vec<usize>,
 }
 
 impl Observations {
-    /// None yet, with `dimension` coordinates each.
+    /// Creates an empty set with `dimension` coordinates per place.
     pub fn new(dimension: usize) -> Self {
         Self { columns: vec![Vec::new(); dimension], ..Self::default() }
     }
@@ -104,7 +104,7 @@ impl Observations {
         self.slope_noise2.push(observation.slope.map_or(0.0, |slope| slope.noise * slope.noise));
     }
 
-    /// Whether the first ones are `others`.
+    /// Whether it starts with `others`.
     pub(super) fn begin_with(&self, others: &Self) -> bool {
         let count = others.len();
         let same = |mine: &[f64], theirs: &[f64]| mine.get(..theirs.len()) == Some(theirs);
@@ -118,7 +118,7 @@ impl Observations {
             && same(&self.slope_noise2, &others.slope_noise2)
     }
 
-    /// Every `step`th of them.
+    /// Returns every `step`th observation.
     pub fn every(&self, step: usize) -> Self {
         let mut some = Self::new(self.dimension());
         for i in (0..self.len()).step_by(step.max(1)) {
@@ -135,14 +135,14 @@ impl Observations {
         some
     }
 
-    /// Heights, all 0, at the places of those of `indices`.
+    /// Returns heights of 0 at the places of the observations `indices`.
     pub(super) fn places(&self, indices: &[usize]) -> Self {
         let mut places = Self::new(self.dimension());
         indices.iter().for_each(|&i| places.push(&self.place(i).collect::<Vec<f64>>(), 0.0));
         places
     }
 
-    /// The same with other heights.
+    /// Returns the observations with their heights replaced.
     pub(super) fn with_heights(self, heights: Vec<f64>) -> Self {
         Self { heights, ..self }
     }
@@ -152,17 +152,17 @@ impl Observations {
         self.columns.len()
     }
 
-    /// How many places there are.
+    /// Returns the number of places.
     pub fn len(&self) -> usize {
         self.heights.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no observations.
     pub fn is_empty(&self) -> bool {
         self.heights.is_empty()
     }
 
-    /// How many numbers were observed: heights and slopes.
+    /// Returns the count of observed numbers: heights and slopes.
     pub fn order(&self) -> usize {
         self.heights.len() + self.slopes.len()
     }
@@ -172,22 +172,23 @@ impl Observations {
         !self.slopes.is_empty()
     }
 
-    /// At how many places a slope was observed.
+    /// Returns the number of places with a slope.
     pub fn sloped(&self) -> usize {
         self.slopes.len() / self.dimension().max(1)
     }
 
-    /// Coordinate `axis` of every place.
+    /// Returns coordinate `axis` of every place.
     pub fn column(&self, axis: usize) -> &[f64] {
         &self.columns[axis]
     }
 
-    /// Where observation `i` was made.
+    /// Returns the place of observation `i`.
     pub fn place(&self, i: usize) -> impl Iterator<Item = f64> {
         self.columns.iter().map(move |column| column[i])
     }
 
-    /// The first one with a coordinate, height or slope that is not finite.
+    /// Returns the index of the first observation with a coordinate, height or slope that is not
+    /// finite.
     pub fn first_not_finite(&self) -> Option<usize> {
         let columns = self.columns.iter().chain([&self.heights]);
         let place = columns.filter_map(|column| column.iter().position(|x| !x.is_finite())).min();
@@ -195,18 +196,19 @@ impl Observations {
         place.into_iter().chain(slope).min()
     }
 
-    /// All heights in order.
+    /// Returns all heights in order.
     pub fn heights(&self) -> &[f64] {
         &self.heights
     }
 
-    /// The gradient observed at place `i`; empty if none was.
+    /// Returns the gradient observed at place `i`; empty if there is none.
     pub fn slope(&self, i: usize) -> &[f64] {
         let before = |i: usize| self.start(i) - i;
         &self.slopes[before(i)..before(i + 1)]
     }
 
-    /// Where the numbers of place `i` begin; of one beyond the last, the [`order`](Self::order).
+    /// Returns the index of the first number of place `i`; for one beyond the last, the
+    /// [`order`](Self::order).
     pub(super) fn start(&self, i: usize) -> usize {
         self.starts.get(i).copied().unwrap_or(self.order())
     }

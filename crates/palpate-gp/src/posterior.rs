@@ -11,7 +11,7 @@ use super::kernel::{Hyperparameters, Kernel};
 use super::observations::{Observation, Observations};
 use crate::math::simd::widest_dot;
 
-/// Buffers of a query, so that asking allocates nothing.
+/// Buffers of a query, so that queries do not allocate.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     pub(super) slopes: Vec<f64>,
@@ -20,7 +20,7 @@ pub struct Scratch {
     row: Vec<f64>,
 }
 
-/// The belief after the observations: mean and variance of the height at any place.
+/// Posterior of a Gaussian process: mean and variance of the height at any place.
 #[derive(Clone)]
 pub struct Posterior {
     kernel: &'static dyn Kernel,
@@ -52,7 +52,8 @@ impl Posterior {
         Ok(Self { jitter, ..Self::factored(kernel, hyperparameters, observations, &dense) })
     }
 
-    /// Of observations whose covariance, with that of their errors, was factored already.
+    /// Creates the posterior from observations whose covariance, including that of their errors, is
+    /// already factored.
     pub(super) fn factored(
         kernel: &'static dyn Kernel,
         hyperparameters: Hyperparameters,
@@ -67,19 +68,19 @@ impl Posterior {
         new
     }
 
-    /// Takes in one more height without factoring again: n² operations. The hyperparameters stay.
+    /// Adds one height without factoring again: n² operations. The hyperparameters are unchanged.
     ///
     /// # Errors
-    /// If the enlarged covariance is not positive definite; nothing is taken in then, and
-    /// [`new`](Self::new) would find the jitter it needs.
+    /// If the enlarged covariance is not positive definite; the posterior is then unchanged, and
+    /// [`new`](Self::new) would find the necessary jitter.
     pub fn add(&mut self, place: &[f64], height: f64) -> Result<(), NotPositiveDefinite> {
         self.take_in(&Observation::height(place, height))
     }
 
-    /// As [`add`](Self::add), of any observation.
+    /// Adds any observation, like [`add`](Self::add).
     ///
     /// # Errors
-    /// As [`add`](Self::add).
+    /// The same as [`add`](Self::add).
     pub fn take_in(&mut self, observation: &Observation) -> Result<(), NotPositiveDefinite> {
         self.append(observation)?;
         self.weigh();
@@ -94,7 +95,7 @@ impl Posterior {
             let axis = number.checked_sub(1);
             self.covariances(observation.place, axis, &mut scratch);
             let row = &mut scratch.solved;
-            // Height and slopes of one place do not tell of each other.
+            // Errors of height and slope at one place are independent.
             row.resize(order + number, 0.0);
             row.push(match axis {
                 None => 1.0 + observation.height_noise2(noise) + self.jitter,
@@ -113,7 +114,8 @@ impl Posterior {
         Ok(())
     }
 
-    /// Conditioned on the same, with length scales that are `scale` times its own: n³/3 operations.
+    /// Returns the posterior with the same observations and its length scales multiplied by
+    /// `scale`: n³/3 operations.
     ///
     /// # Errors
     /// [`CovarianceError`] if the covariance cannot be factored.
@@ -123,9 +125,9 @@ impl Posterior {
         Self::new(self.kernel, hyperparameters, self.observations.clone())
     }
 
-    /// Conditions on imagined touches at `places` as well, whose heights are not known: the
-    /// variance, which does not depend on them, is what it would be after these touches, and the
-    /// mean means nothing. n² operations for each.
+    /// Returns the posterior conditioned also on fantasy touches at `places` with unknown heights:
+    /// the variance, which does not depend on them, is that after these touches, and the mean is
+    /// meaningless. n² operations per place.
     ///
     /// # Errors
     /// [`CovarianceError`] if the enlarged covariance cannot be factored.
@@ -143,7 +145,7 @@ impl Posterior {
         Self::new(self.kernel, self.hyperparameters.clone(), observations)
     }
 
-    /// Finds the weights: of what was weighed before only L⁻ᵀ is solved again.
+    /// Computes the weights; for earlier observations only L⁻ᵀ is solved again.
     fn weigh(&mut self) {
         let Hyperparameters { mean, length_scales, .. } = &self.hyperparameters;
         self.observations.residuals(*mean, length_scales, &mut self.weights);
@@ -157,7 +159,7 @@ impl Posterior {
     }
 
     /// Writes into `scratch.solved` the covariances of the height at `place`, or of its slope along
-    /// `axis` per length scale, with all that was observed; a slope's only if slopes were.
+    /// `axis` per length scale, with all observations; a slope's only if slopes were observed.
     fn covariances(&self, place: &[f64], axis: Option<usize>, scratch: &mut Scratch) {
         let lengths = &self.hyperparameters.length_scales;
         let Scratch { solved, derivatives, .. } = scratch;
@@ -173,7 +175,7 @@ impl Posterior {
     }
 
     /// Writes the gradient of Σ_i w_i·k(place, i), in units of the signal's variance, with respect
-    /// to the place that [`covariances`](Self::covariances) was called with last.
+    /// to the place of the last call of [`covariances`](Self::covariances).
     fn gradient_with_slopes(
         &self,
         weights: &[f64],
@@ -201,9 +203,9 @@ impl Posterior {
         self.gradient_with_slopes(weights, (derivatives, row), gradient);
     }
 
-    /// How far each height lies from what all other observations say of it, in standard deviations
-    /// of that: z = (A⁻¹y)ᵢ / (s·√(A⁻¹)ᵢᵢ) with the covariance s²·A (Rasmussen & Williams 2006,
-    /// Eqs. 5.10 to 5.12). n³/2 operations.
+    /// Returns the leave-one-out z-scores of the heights: the deviation of each from its prediction
+    /// by all others, in standard deviations, z = (A⁻¹y)ᵢ / (s·√(A⁻¹)ᵢᵢ) with the covariance s²·A
+    /// (Rasmussen & Williams 2006, Eqs. 5.10 to 5.12). n³/2 operations.
     pub fn left_out(&self) -> Vec<f64> {
         let mut unit = Vec::new();
         let z = |i: usize| {
@@ -217,34 +219,34 @@ impl Posterior {
         (0..self.observations.len()).map(z).collect()
     }
 
-    /// Takes every standard deviation, of the surface and of the noise, `factor` times: the means
-    /// stay.
+    /// Multiplies every standard deviation, of surface and noise, by `factor`; the means are
+    /// unchanged.
     pub fn widen(&mut self, factor: f64) {
         let Hyperparameters { signal_sd, noise_sd, slope_noise_sd, .. } = &mut self.hyperparameters;
         [signal_sd, noise_sd, slope_noise_sd].into_iter().for_each(|sd| *sd *= factor);
     }
 
-    /// The hyperparameters it was made with.
+    /// The hyperparameters of the posterior.
     pub fn hyperparameters(&self) -> &Hyperparameters {
         &self.hyperparameters
     }
 
-    /// What it was conditioned on.
+    /// The observations of the posterior.
     pub fn observations(&self) -> &Observations {
         &self.observations
     }
 
-    /// Jitter the factorisation needed, relative to the diagonal signal_sd²; 0 if none.
+    /// Jitter of the factorisation, relative to the diagonal signal_sd²; 0 if none.
     pub fn jitter(&self) -> f64 {
         self.jitter
     }
 
-    /// Mean height m + k*ᵀ·K⁻¹·(y − m) at `place`.
+    /// Returns the mean height m + k*ᵀ·K⁻¹·(y − m) at `place`.
     pub fn mean(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
         self.mean_with_correlations(place, scratch).0
     }
 
-    /// The mean, and the correlations of `place` with the observations.
+    /// Returns the mean, and the correlations of `place` with the observations.
     pub(super) fn mean_with_correlations<'a>(
         &self,
         place: &[f64],
@@ -256,7 +258,7 @@ impl Posterior {
         (mean, correlations)
     }
 
-    /// As [`mean`](Self::mean), and writes its gradient with respect to the place.
+    /// Returns [`mean`](Self::mean) and writes its gradient with respect to the place.
     pub fn mean_gradient(&self, place: &[f64], gradient: &mut [f64], scratch: &mut Scratch) -> f64 {
         let lengths = &self.hyperparameters.length_scales;
         if self.observations.has_slopes() {
@@ -279,12 +281,13 @@ impl Posterior {
         self.hyperparameters.mean + widest_dot(solved, &self.weights)
     }
 
-    /// Variance of the surface (without touch noise) k** − k*ᵀ·K⁻¹·k* at `place`, in [0, k**].
+    /// Returns the variance of the surface (without touch noise) k** − k*ᵀ·K⁻¹·k* at `place`, in
+    /// [0, k**].
     pub fn variance(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
         self.remaining(self.whiten(place, scratch))
     }
 
-    /// As [`variance`](Self::variance), and writes its gradient with respect to the place.
+    /// Returns [`variance`](Self::variance) and writes its gradient with respect to the place.
     pub fn variance_gradient(
         &self,
         place: &[f64],
@@ -318,14 +321,14 @@ impl Posterior {
         self.remaining(explained)
     }
 
-    /// Writes L⁻¹·k* into `scratch.solved`, and returns its square: the share of the variance at
-    /// `place` that the observations explain.
+    /// Writes L⁻¹·k* into `scratch.solved`, and returns its squared norm: the fraction of the
+    /// variance at `place` that the observations explain.
     pub(super) fn whiten(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
         self.covariances(place, None, scratch);
         self.factor.solve_lower(&mut scratch.solved)
     }
 
-    /// A⁻¹·(y − m).
+    /// The weights A⁻¹·(y − m).
     pub(super) fn weights(&self) -> &[f64] {
         &self.weights
     }
@@ -338,7 +341,7 @@ impl Posterior {
         &self.factor
     }
 
-    /// The variance left when the share `explained` of the prior's is known.
+    /// Returns the variance that remains if the fraction `explained` of the prior's is known.
     pub(super) fn remaining(&self, explained: f64) -> f64 {
         self.hyperparameters.signal_sd.powi(2) * (1.0 - explained).max(0.0)
     }

@@ -1,22 +1,21 @@
-//! How much one more observation would lower the variance elsewhere (Cohn, Ghahramani & Jordan
-//! 1996).
+//! Integrated variance reduction by one more observation (Cohn, Ghahramani & Jordan 1996).
 
 use super::observations::Observations;
 use super::posterior::{Posterior, Scratch};
 use crate::math::simd::widest_dot;
 
-/// A posterior and the places at which its variance counts.
+/// A posterior with the reference places at which its variance is summed.
 pub struct Reduction<'a> {
     posterior: &'a Posterior,
     references: Observations,
-    /// How much each of them counts.
+    /// Weight of each reference place.
     weights: Vec<f64>,
     /// L⁻¹·k(X, r) of each reference place r, one after the other.
     whitened: Vec<f64>,
 }
 
 impl<'a> Reduction<'a> {
-    /// Prepares for `references`: n² operations for each.
+    /// Prepares for `references`: n² operations per reference.
     pub fn new<'b>(posterior: &'a Posterior, references: impl Iterator<Item = &'b [f64]>) -> Self {
         let mut places = Observations::new(posterior.observations().dimension());
         let mut whitened = Vec::new();
@@ -29,14 +28,14 @@ impl<'a> Reduction<'a> {
         Self { posterior, weights: vec![1.0; places.len()], references: places, whitened }
     }
 
-    /// With a weight for each reference; those that are not given count nothing.
+    /// Sets a weight for each reference; missing weights are 0.
     pub fn weighted(mut self, mut weights: Vec<f64>) -> Self {
         weights.resize(self.references.len(), 0.0);
         self.weights = weights;
         self
     }
 
-    /// Mean fall of the variance at the references if `place` were observed,
+    /// Returns the mean reduction of the variance at the references by an observation at `place`,
     /// (1/m)·Σ_r w_r·k(r, x)² / (σ²(x) + noise²) with the posterior covariance k and variance σ²:
     /// n² + n·m operations.
     pub fn at(&self, place: &[f64], scratch: &mut Scratch) -> f64 {
@@ -57,7 +56,8 @@ impl<'a> Reduction<'a> {
         signal2 * squares / (variance * self.references.len().max(1) as f64)
     }
 
-    /// What the observations say of the covariance of reference `r` with the place of `solved`.
+    /// Returns the part of the covariance of reference `r` with the place of `solved` that the
+    /// observations explain.
     fn explained(&self, r: usize, solved: &[f64]) -> f64 {
         let start = r * solved.len();
         widest_dot(&self.whitened[start..start + solved.len()], solved)

@@ -1,7 +1,8 @@
-//! Scores of a grid over the box of hyperparameters, kept while observations are added.
+//! Profiled likelihoods on a grid over the box of hyperparameters, cached while observations are
+//! added.
 //!
-//! The grid stays where it is, so that each of its covariances is factored once and grows by a row
-//! with each observation: n² operations where factoring again would take n³/3.
+//! The grid is fixed, so that each of its covariances is factored once and extended by a row per
+//! observation: n² operations instead of n³/3 for a new factorisation.
 
 use super::cholesky::Factor;
 use super::kernel::Kernel;
@@ -14,13 +15,13 @@ use super::search_box::SearchBox;
 use crate::math::optimize::Bounds;
 use crate::math::simd::widest_dot;
 
-/// Widest step between two noise levels, as the logarithm of their ratio; climbs find what lies
-/// between. Chosen: a noise that is fitted has a range of two decades, one that is known leaves six
-/// of its ratio, whose ends alone say nothing of the middle.
+/// Largest step between two noise levels, as the logarithm of their ratio; climbs find optima in
+/// between. A heuristic: a fitted noise has a range of two decades; a known one leaves six for its
+/// ratio, whose ends alone carry no information about the middle.
 const NOISE_STEP: f64 = 4.61;
 
-/// Most length scales that are gone through in every combination; the combinations of more are
-/// spread evenly, this many of them. Chosen: as many as of three.
+/// Largest number of length scales that are combined fully; the combinations of more are spread
+/// evenly, as many as of this number; a heuristic: as many as of three.
 const COMBINED_MAX: usize = 3;
 const SPREAD: usize = 125;
 
@@ -29,21 +30,21 @@ const SPREAD: usize = 125;
 pub(super) struct Grid {
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// Places per parameter, the noises last; those of lengths that are spread are one entry.
+    /// Number of places per parameter, the noises last; spread lengths are one entry.
     levels: Vec<usize>,
-    /// Places of the lengths that are spread, in a unit cube, and which of them lie next to each.
+    /// Places of the spread lengths, in a unit cube, and their neighbours.
     spread: Vec<Vec<f64>>,
     beside: Vec<Vec<[usize; 2]>>,
 }
 
-/// The first places of Sobol's sequence in a unit cube.
+/// Returns the first places of Sobol's sequence in a unit cube.
 fn spread(dimension: usize) -> Vec<Vec<f64>> {
     let at = |index: usize, axis| f64::from(sobol_burley::sample(index as u32, axis, 0));
     let place = |index| (0..dimension as u32).map(|axis| at(index, axis)).collect();
     (0..SPREAD).map(place).collect()
 }
 
-/// The nearest of `places` beside each: as many as it would have on a grid.
+/// Returns the nearest `places` of each: as many as it would have on a grid.
 fn beside(places: &[Vec<f64>]) -> Vec<Vec<[usize; 2]>> {
     let nearest = |place: &Vec<f64>| {
         let squares = |other: &Vec<f64>| -> f64 {
@@ -52,14 +53,14 @@ fn beside(places: &[Vec<f64>]) -> Vec<Vec<[usize; 2]>> {
         let distances: Vec<f64> = places.iter().map(squares).collect();
         let mut order: Vec<usize> = (0..places.len()).collect();
         order.sort_by(|a, b| distances[*a].total_cmp(&distances[*b]));
-        // The nearest is itself.
+        // The nearest place is the place itself.
         order[1..].as_chunks::<2>().0.iter().copied().take(place.len()).collect()
     };
     places.iter().map(nearest).collect()
 }
 
 impl Grid {
-    /// Over `bounds`, of which the first `lengths` are length scales.
+    /// Creates a grid over `bounds`, of which the first `lengths` are length scales.
     pub(super) fn new(bounds: Bounds, lengths: usize) -> Self {
         let per_length = match lengths {
             1 => 18,
@@ -77,18 +78,18 @@ impl Grid {
         Self { lower, upper, levels, spread, beside }
     }
 
-    /// How many places have the same lengths.
+    /// Returns the number of places with the same lengths.
     fn noises(&self, lengths: usize) -> usize {
         let entries = if self.spread.is_empty() { lengths } else { 1 };
         self.levels[entries..].iter().product()
     }
 
-    /// How many places it has.
+    /// Returns the number of places.
     pub(super) fn len(&self) -> usize {
         self.levels.iter().product()
     }
 
-    /// Place `index`; the last parameter varies fastest.
+    /// Returns place `index`; the last parameter varies fastest.
     pub(super) fn place(&self, index: usize) -> Vec<f64> {
         let mut shares = Vec::with_capacity(self.lower.len());
         for (entry, (digit, &levels)) in digits(index, &self.levels).zip(&self.levels).enumerate() {
@@ -105,11 +106,11 @@ impl Grid {
             .collect()
     }
 
-    /// The places that no neighbour along any parameter exceeds, the highest first, and what each
-    /// may rise above its value.
+    /// Returns the places that no neighbour along any parameter exceeds, the highest first, with an
+    /// upper bound of the rise above their values.
     ///
-    /// Along each parameter that is a quarter of its fall to the lower neighbour, where a
-    /// parabola's top is at most an eighth of it higher.
+    /// Along each parameter the bound is a quarter of the fall to the lower neighbour; a parabola's
+    /// maximum is at most an eighth of it higher.
     pub(super) fn hills(&self, values: &[f64]) -> Vec<(usize, f64)> {
         let is_hill = |index: &usize| {
             let mut beside = self.neighbours(*index, values).flatten().flatten();
@@ -127,7 +128,7 @@ impl Grid {
         hills.into_iter().map(|index| (index, rise(index))).collect()
     }
 
-    /// The values of the neighbours of place `index`, parameter by parameter.
+    /// Returns the values of the neighbours of place `index`, parameter by parameter.
     fn neighbours(&self, index: usize, values: &[f64]) -> impl Iterator<Item = [Option<f64>; 2]> {
         let mut stride = values.len();
         let along = digits(index, &self.levels).zip(&self.levels).map(move |(digit, levels)| {
@@ -146,7 +147,7 @@ impl Grid {
     }
 }
 
-/// The digits of `index` as a number whose last one varies fastest.
+/// Returns the digits of `index` as a number whose last digit varies fastest.
 fn digits(index: usize, levels: &[usize]) -> impl Iterator<Item = usize> {
     let mut stride: usize = levels.iter().product();
     let mut rest = index;
@@ -158,7 +159,7 @@ fn digits(index: usize, levels: &[usize]) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The factors at the places of a grid, and what they have taken in.
+/// Cached factors at the places of a grid.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scan {
     grid: Grid,
@@ -170,18 +171,18 @@ pub(super) struct Scan {
 #[derive(Clone, Debug, Default)]
 struct Point {
     factor: Factor,
-    /// L⁻¹·y of the heights y, and of a one for each of them.
+    /// L⁻¹·y of the heights y, and of a vector of ones.
     heights: Vec<f64>,
     ones: Vec<f64>,
     log_determinant: f64,
-    /// Its covariance cannot be factored as it is.
+    /// Whether its covariance cannot be factored without jitter.
     is_lost: bool,
 }
 
 impl Scan {
-    /// The profile of each place of `grid`, none where the covariance cannot be factored as it is.
-    /// What was taken in before is kept, if it is of the same grid and the first of these
-    /// observations, which have heights only.
+    /// Returns the profile of each place of `grid`, `None` if the covariance cannot be factored
+    /// without jitter. Cached factors are reused if they belong to the same grid and the first of
+    /// these observations, which have heights only.
     pub(super) fn profiles(
         &mut self,
         sought: &SearchBox,
@@ -198,7 +199,7 @@ impl Scan {
         let mut profiles = Vec::with_capacity(grid.len());
         let noises = grid.noises(sought.length_scales.len());
         for (group, points) in self.points.chunks_mut(noises.max(1)).enumerate() {
-            // The same lengths, and so the same correlations.
+            // The same lengths have the same correlations.
             let (lengths, _) = sought.parameters(&grid.place(group * noises));
             let places = (0..points.len()).map(|at| grid.place(group * noises + at));
             ratios.clear();
@@ -223,7 +224,7 @@ impl Scan {
 }
 
 impl Point {
-    /// Back to no observations; its memory is kept for the next.
+    /// Removes all observations; keeps its memory for the next ones.
     fn forget(&mut self) {
         self.factor.truncate(0);
         self.heights.clear();

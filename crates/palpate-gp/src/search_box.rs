@@ -1,4 +1,4 @@
-//! Where hyperparameters are sought, what each probably is, and how the mean and the signal follow.
+//! Search box of the hyperparameters, their priors, and the models of mean and signal.
 //!
 //! A search runs over their logarithms: of each length scale, of the noise ratio, and of the slope
 //! noise ratio if there is one. The signal's standard deviation follows from these.
@@ -9,41 +9,41 @@ use super::observations::{NoiseRatio, Observations};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The box in which hyperparameters are sought, and how the mean is chosen.
+/// Bounds of the hyperparameters, and the model of the mean.
 #[derive(Clone, Debug)]
 pub struct SearchBox {
-    /// How the mean is chosen.
+    /// Model of the prior mean.
     pub mean: Mean,
-    /// Each length scale, in the unit of the inputs.
+    /// Bounds of each length scale, in the unit of the inputs.
     pub length_scales: Vec<Range>,
-    /// The noise, as a fraction of the signal's standard deviation. If the noise is known, what
-    /// this range leaves of `signal_sd`.
+    /// Bounds of the noise, as a fraction of the signal's standard deviation. If the noise is
+    /// known, intersected with the range implied by `signal_sd`.
     pub noise_ratio: Range,
-    /// The slopes' noise, as a fraction of the signal's standard deviation, per unit of the inputs;
-    /// none where no slopes are observed.
+    /// Bounds of the slopes' noise, as a fraction of the signal's standard deviation, per unit of
+    /// the inputs; `None` without slopes.
     pub slope_noise_ratio: Option<Range>,
-    /// The signal's standard deviation, in the unit of the heights.
+    /// Bounds of the signal's standard deviation, in the unit of the heights.
     pub signal_sd: Range,
-    /// What is known of the touch noise.
+    /// Model of the touch noise.
     pub touch_noise: TouchNoise,
 }
 
-/// What is known of the touch noise's standard deviation, in the unit of the heights.
+/// Model of the touch noise's standard deviation, in the unit of the heights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TouchNoise {
-    /// Nothing: it is fitted within the range of its ratio.
+    /// Fitted within the range of its ratio.
     Fitted,
-    /// It is this.
+    /// Known value.
     Known(f64),
-    /// It is the sensor's, this, and what the kernel cannot follow comes on top: fitted where that
-    /// gives more.
+    /// Lower bound (sensor noise); extra noise from the kernel's misfit is fitted where that gives
+    /// more.
     AtLeast(f64),
 }
 
 impl SearchBox {
-    /// The ranges searched over: lengths, then noise ratio, then slope noise ratio.
+    /// Returns the searched ranges: lengths, then noise ratio, then slope noise ratio.
     pub(super) fn ranges(&self) -> impl Iterator<Item = Range> {
-        // A known noise and a range of the signal leave a range of their ratio.
+        // A known noise and a range of the signal determine a range of their ratio.
         let noise_ratio = match self.touch_noise {
             TouchNoise::Known(noise_sd) => {
                 (noise_sd / self.signal_sd.high, noise_sd / self.signal_sd.low).into()
@@ -53,12 +53,12 @@ impl SearchBox {
         self.length_scales.iter().copied().chain([noise_ratio]).chain(self.slope_noise_ratio)
     }
 
-    /// Logarithms of the smallest and of the largest parameters.
+    /// Returns the logarithms of the lower and upper bounds.
     pub(super) fn log_bounds(&self) -> (Vec<f64>, Vec<f64>) {
         self.ranges().map(|range| (range.low.ln(), range.high.ln())).unzip()
     }
 
-    /// Lengths and noise ratios from their logarithms.
+    /// Returns lengths and noise ratios from their logarithms.
     pub(super) fn parameters(&self, logs: &[f64]) -> (Vec<f64>, NoiseRatio) {
         let mut lengths: Vec<f64> = logs.iter().map(|log| log.exp()).collect();
         let noises = lengths.split_off(self.length_scales.len().min(logs.len()));
@@ -66,7 +66,7 @@ impl SearchBox {
         (lengths, NoiseRatio { height: noise(0), slope: noise(1) })
     }
 
-    /// Logarithms of the parameters, the inverse of [`parameters`](Self::parameters).
+    /// Returns the logarithms of the parameters, the inverse of [`parameters`](Self::parameters).
     pub(super) fn log_parameters(&self, at: &Hyperparameters) -> Vec<f64> {
         let noise = at.noise_ratio();
         let slope = self.slope_noise_ratio.map(|range| noise.slope.clamp(range.low, range.high));
@@ -74,8 +74,8 @@ impl SearchBox {
         parameters.map(f64::ln).collect()
     }
 
-    /// Moves to a third of the lengths and the middle noises: a start from which a fit that sits
-    /// in a corner of its box finds out that new touches have shown a rougher surface.
+    /// Moves to a third of the lengths and the middle noises: a start from which a fit in a corner
+    /// of its box detects that new touches show a rougher surface.
     pub(super) fn shorten(&self, logs: &mut [f64], lower: &[f64], upper: &[f64]) {
         let lengths = self.length_scales.len();
         logs.iter_mut().take(lengths).for_each(|log| *log -= 3f64.ln());
@@ -85,14 +85,14 @@ impl SearchBox {
     }
 }
 
-/// Bounds of a positive hyperparameter and, if something is known of it, its prior.
+/// Bounds of a positive hyperparameter and, optionally, its prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// Smallest value.
     pub low: f64,
     /// Largest value.
     pub high: f64,
-    /// What it probably is.
+    /// Prior, if given.
     pub prior: Option<LogNormal>,
 }
 
@@ -102,53 +102,53 @@ impl From<(f64, f64)> for Range {
     }
 }
 
-/// A log-normal prior: ln x is normal about ln `median`, and two thirds of x lie within a factor
+/// Log-normal prior: ln x is normal about ln `median`, and two thirds of x lie within a factor
 /// `spread` of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LogNormal {
-    /// Half of the values are smaller.
+    /// Median of the log-normal prior.
     pub median: f64,
     /// Factor of one standard deviation, above 1.
     pub spread: f64,
 }
 
 impl LogNormal {
-    /// The same with its median in another unit.
+    /// Returns the prior with its median multiplied by `unit`.
     pub fn scaled(self, unit: f64) -> Self {
         Self { median: self.median * unit, ..self }
     }
 
-    /// Standard deviations of ln x from the middle.
+    /// Returns the standard deviations of ln x from the median.
     fn deviations(&self, log: f64) -> f64 {
         (log - self.median.ln()) / self.spread.ln()
     }
 
-    /// Log density of ln x at `log`, but for a constant: −½·z².
+    /// Returns the log density of ln x at `log`, up to a constant: −½·z².
     pub fn log_density(&self, log: f64) -> f64 {
         -0.5 * self.deviations(log).powi(2)
     }
 
-    /// Its derivative with respect to ln x.
+    /// Returns the derivative of the log density with respect to ln x.
     pub fn slope(&self, log: f64) -> f64 {
         -self.deviations(log) / self.spread.ln()
     }
 }
 
-/// How the signal's standard deviation s follows from the other hyperparameters.
+/// Model of the signal's standard deviation s, given the other hyperparameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scale {
-    /// The most probable s in a range, given the noise as a fraction of it.
+    /// Most probable s in a range, with the noise as a fraction of it.
     Best(Range),
-    /// The touch noise is known, so its fraction of s says what s is.
+    /// s follows from a known touch noise and its ratio.
     KnownNoise(f64),
 }
 
 impl Scale {
-    /// s, given the fit F = yᵀA⁻¹y of `count` heights and the noise ratio.
+    /// Returns s, given the fit F = yᵀA⁻¹y of `count` heights and the noise ratio.
     ///
-    /// Maximises −½F/s² − n·ln s plus the log prior of s. Without a prior that is sqrt(F/n); with
-    /// one the slope falls in ln s, so its zero is bisected.
+    /// Maximises −½F/s² − n·ln s plus the log prior of s. Without a prior, s is sqrt(F/n); with
+    /// one, the derivative decreases in ln s, and its zero is found by bisection.
     pub fn signal_sd(&self, fit: f64, count: usize, noise_ratio: f64) -> f64 {
         let range = match self {
             Self::KnownNoise(noise_sd) => return noise_sd / noise_ratio,
@@ -167,7 +167,7 @@ impl Scale {
         (0.5 * (low + high)).exp()
     }
 
-    /// Log prior density of s.
+    /// Returns the log prior density of s.
     pub fn log_prior(&self, signal_sd: f64) -> f64 {
         match self {
             Self::Best(Range { prior: Some(prior), .. }) => prior.log_density(signal_sd.ln()),
@@ -176,21 +176,21 @@ impl Scale {
     }
 }
 
-/// How the prior mean is chosen in a fit.
+/// Model of the prior mean in a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Mean {
-    /// 0, as in Yi et al. 2016.
+    /// Zero, as in Yi et al. 2016.
     #[default]
     Zero,
-    /// The average of the observed heights.
+    /// Average of the observed heights.
     Data,
-    /// The most likely constant, m = 1ᵀA⁻¹y / 1ᵀA⁻¹1 (generalised least squares).
+    /// Most likely constant, m = 1ᵀA⁻¹y / 1ᵀA⁻¹1 (generalised least squares).
     Constant,
 }
 
 impl Mean {
-    /// The mean of `observations` whose covariance is proportional to the factored matrix;
+    /// Returns the mean of `observations` whose covariance is proportional to the factored matrix;
     /// the buffers are overwritten.
     pub(super) fn of(
         self,

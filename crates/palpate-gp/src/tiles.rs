@@ -1,8 +1,8 @@
 //! Cholesky factorisation and inversion of matrices that fit into the cache, tile by tile.
 //!
-//! All arithmetic that counts is one loop: products of rows of two matrices, for a tile of the
-//! result that stays in the processor's registers (Goto & van de Geijn 2008). A search factors such
-//! matrices by the thousand, and a blocked algorithm's book-keeping would cost more than that.
+//! The work is dominated by one loop: products of rows of two matrices, for a tile of the result
+//! that stays in the processor's registers (Goto & van de Geijn 2008). A search factors thousands
+//! of such matrices, and the overhead of a blocked algorithm would exceed that.
 
 use crate::math::vector::{Vector, vectorised_fn};
 use faer::reborrow::{Reborrow, ReborrowMut};
@@ -10,15 +10,15 @@ use faer::{MatMut, MatRef};
 use std::ops::Range;
 use thiserror::Error;
 
-/// The matrix is not positive definite in floating point.
+/// Error of a matrix that is not positive definite in floating point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("pivot {index} is not positive")]
 pub struct NotPositiveDefinite {
-    /// Row at which it was seen.
+    /// Row of the pivot.
     pub index: usize,
 }
 
-/// Columns that are worked on together; orders are multiples of it.
+/// Number of columns processed together; orders are multiples of it.
 pub(super) const WIDE: usize = 8;
 
 vectorised_fn! {
@@ -40,10 +40,11 @@ vectorised_fn! {
 }
 
 vectorised_fn! {
-    /// Replaces the lower triangle of L by that of A⁻¹ = Y·Yᵀ with Y = L⁻ᵀ, for which there is room
-    /// in `upper`.
+    /// Replaces the lower triangle of L by that of A⁻¹ = Y·Yᵀ with Y = L⁻ᵀ, which is stored in
+    /// `upper`.
     ///
-    /// Y stands below A as the identity does: what makes L of A makes Y of it.
+    /// Y is initialised with the identity below A: the operations that turn A into L turn it into
+    /// Y.
     pub(super) fn invert<'a, V: Vector>(factor: MatMut<'a, f64>, upper: MatMut<'a, f64>) -> () {
         let (mut factor, mut upper) = (factor, upper);
         let order = factor.ncols();
@@ -51,7 +52,7 @@ vectorised_fn! {
             let (done, mut block) = upper.rb_mut().split_at_col_mut(j);
             for c in 0..WIDE {
                 let column = slice_mut(block.rb_mut(), c);
-                // Tiles read zeros as far as one of them reaches below the diagonal.
+                // Tiles read zeros as far as one of them extends below the diagonal.
                 column[..order.min(j + 2 * WIDE)].fill(0.0);
                 column[j + c] = 1.0;
             }
@@ -80,14 +81,14 @@ vectorised_fn! {
     }
 }
 
-/// Rows two vectors at a time, or one where no more are left.
+/// Returns ranges of rows, two vectors at a time, or one if no more are left.
 #[inline(always)]
 fn tiles<V: Vector>(rows: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     let high = 2 * V::LANES;
     rows.clone().step_by(high).map(move |i| i..rows.end.min(i + high))
 }
 
-/// Takes Σ_k P[i, k]·Q[j + c, k] away from entry i of each of the first columns c of `block`.
+/// Subtracts Σ_k P[i, k]·Q[j + c, k] from entry i of each of the first columns c of `block`.
 #[inline(always)]
 fn subtract<V: Vector>(
     mut block: MatMut<'_, f64>,
@@ -101,7 +102,7 @@ fn subtract<V: Vector>(
     if V::LANES == 8 {
         return subtract_tile::<V, 2, 8>(block, factors, (rows, j), sum);
     }
-    // Where there are fewer registers, half of the columns at a time.
+    // With fewer registers, half of the columns at a time.
     for half in [0, 4] {
         let block = block.rb_mut().split_at_col_mut(half).1;
         subtract_tile::<V, 2, 4>(block, factors, (rows.clone(), j + half), sum.clone());
@@ -136,10 +137,10 @@ fn subtract_tile<V: Vector, const HIGH: usize, const COLUMNS: usize>(
     }
 }
 
-/// The rows of a triangle of [`WIDE`] columns, each with 1 over its pivot instead of that.
+/// Rows of a triangle of [`WIDE`] columns, each with the reciprocal of its pivot on the diagonal.
 type Corner = [[f64; WIDE]; WIDE];
 
-/// Factors what stands on the diagonal of a block's first columns, at row `j`.
+/// Factors the diagonal block of the first columns, at row `j`.
 #[inline(always)]
 fn corner(mut block: MatMut<'_, f64>, j: usize) -> Result<Corner, NotPositiveDefinite> {
     let columns: [&[f64]; WIDE] = std::array::from_fn(|c| &slice(block.rb(), c)[j..]);
@@ -168,7 +169,7 @@ fn corner(mut block: MatMut<'_, f64>, j: usize) -> Result<Corner, NotPositiveDef
     Ok(rows)
 }
 
-/// The same of what is factored already.
+/// Returns the triangle of an already factored matrix.
 #[inline(always)]
 fn triangle(factor: MatRef<'_, f64>, j: usize) -> Corner {
     let mut rows = [[0.0; WIDE]; WIDE];
@@ -197,13 +198,13 @@ fn solve<V: Vector>(mut block: MatMut<'_, f64>, rows: Range<usize>, corner: &Cor
     }
 }
 
-/// Column `j` of a matrix whose columns are contiguous.
+/// Returns column `j` of a matrix whose columns are contiguous.
 #[inline(always)]
 fn slice(matrix: MatRef<'_, f64>, j: usize) -> &[f64] {
     matrix.col(j).try_as_col_major().map_or(&[], |column| column.as_slice())
 }
 
-/// Column `j` of a matrix whose columns are contiguous.
+/// Returns column `j` of a matrix whose columns are contiguous.
 #[inline(always)]
 fn slice_mut(matrix: MatMut<'_, f64>, j: usize) -> &mut [f64] {
     matrix.col_mut(j).try_as_col_major_mut().map_or(&mut [], |column| column.as_slice_mut())

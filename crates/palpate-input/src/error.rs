@@ -1,14 +1,13 @@
-//! The error of input or state that cannot be used: place, problem, value, what is allowed, what
-//! mends it.
+//! Error of invalid input or state: place, problem, value, allowed values, and remedy.
 
 use crate::words::brief;
 use std::fmt;
 use std::path::Path;
 
-/// An error with its place, the value found there, what is allowed instead, and how to mend it.
+/// An error with its place, the value found, the allowed values, and a remedy.
 ///
-/// It is shown as `place: problem = value: allowed is …; mend`, without the parts that are absent.
-/// An enum of its own is for errors that a caller distinguishes.
+/// It is shown as `place: problem = value: allowed is …; mend`, without absent parts. A separate
+/// enum is for errors that a caller distinguishes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Invalid(Box<Parts>);
 
@@ -22,36 +21,36 @@ struct Parts {
 }
 
 impl Invalid {
-    /// An error that says what is wrong.
+    /// Creates an error from its problem.
     pub fn new(problem: impl Into<String>) -> Self {
         let problem = problem.into();
         Self(Box::new(Parts { place: None, problem, value: None, allowed: None, mend: None }))
     }
 
-    /// A file or folder that cannot be read or written.
+    /// Creates the error of a file or folder that cannot be read or written.
     pub fn io(path: &Path, cause: std::io::Error) -> Self {
         Self::new(cause.to_string()).at(path.display())
     }
 
-    /// With the file, line, key or argument where it stands.
+    /// Sets the place: file, line, key or argument.
     pub fn at(mut self, place: impl fmt::Display) -> Self {
         self.0.place = Some(place.to_string());
         self
     }
 
-    /// With the value found, cut if it is long.
+    /// Sets the value found, shortened if it is long.
     pub fn value(mut self, value: impl fmt::Display) -> Self {
         self.0.value = Some(brief(&value.to_string()));
         self
     }
 
-    /// With what is allowed there.
+    /// Sets the allowed values.
     pub fn allowed(mut self, allowed: impl Into<String>) -> Self {
         self.0.allowed = Some(allowed.into());
         self
     }
 
-    /// With what to do about it, in the imperative.
+    /// Sets the remedy, in the imperative.
     pub fn mend(mut self, mend: impl Into<String>) -> Self {
         self.0.mend = Some(mend.into());
         self

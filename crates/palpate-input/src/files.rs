@@ -1,23 +1,23 @@
-//! Reading and writing files whose names come from users.
+//! Reading and writing of files named by users.
 //!
-//! Only regular files of a bounded size are read: a pipe or a device may never answer or never end.
-//! Nothing is written through a symbolic link, so that a run's folder cannot change a file outside.
+//! Only regular files of a bounded size are read, since a pipe or a device may block or never end.
+//! Writes do not follow symbolic links, so that a run's folder cannot change a file outside.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Most bytes of a text that people write, as settings and recordings are.
-// heuristic: far more than anyone writes by hand, and little memory.
+/// Largest size of a text written by hand, such as settings and recordings, in bytes.
+// heuristic: far more than is written by hand, and little memory.
 pub const TEXT_MAX: u64 = 64 << 20;
 
-/// What some programs put before UTF-8, to say that it is UTF-8.
+/// Byte order mark that some programs write before UTF-8 text.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Opens a file to be read.
+/// Opens a file for reading.
 ///
 /// # Errors
-/// If it is missing, forbidden, a folder, a pipe or a device.
+/// If it is missing, not permitted, a folder, a pipe or a device.
 pub fn open(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?;
     if kind.is_dir() {
@@ -29,15 +29,15 @@ pub fn open(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// The bytes of a file of at most `most` bytes.
+/// Reads the bytes of a file of at most `most` bytes.
 ///
 /// # Errors
-/// As [`open`], and if it is larger.
+/// The errors of [`open`], and if it is larger.
 pub fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let mut bytes = Vec::new();
     bytes.try_reserve_exact(file.metadata()?.len().min(most) as usize)?;
-    // A file may grow while it is read, and some say that they are empty and never end.
+    // A file may grow while it is read, and some report a size of zero and never end.
     file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
     match bytes.len() as u64 > most {
         true => Err(io::Error::new(
@@ -48,10 +48,10 @@ pub fn bytes(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     }
 }
 
-/// The text of a file of at most `most` bytes, without a byte order mark.
+/// Reads the text of a file of at most `most` bytes, without a byte order mark.
 ///
 /// # Errors
-/// As [`bytes`], and if it is not UTF-8.
+/// The errors of [`bytes`], and if it is not UTF-8.
 pub fn text(path: &Path, most: u64) -> io::Result<String> {
     let bytes = bytes(path, most)?;
     let text = str::from_utf8(unmarked(&bytes));
@@ -59,24 +59,24 @@ pub fn text(path: &Path, most: u64) -> io::Result<String> {
     text.map(str::to_owned).map_err(no_text)
 }
 
-/// `bytes` without the byte order mark they may begin with.
+/// Returns `bytes` without a leading byte order mark.
 pub fn unmarked(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes)
 }
 
-/// Replaces the file `path` by `bytes`, so that a reader sees all of them or the file of before. A
-/// symbolic link is replaced, not followed.
+/// Replaces the file `path` by `bytes` atomically: a reader sees either the new or the old
+/// contents. A symbolic link is replaced, not followed.
 ///
 /// # Errors
-/// If it cannot be written; then the file of before is still there.
+/// If it cannot be written; the old file then remains.
 pub fn replace(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
     replace_by(path, |file| file.write_all(bytes.as_ref()))
 }
 
-/// Replaces a file like [`replace`], by what `write` writes.
+/// Replaces a file like [`replace`], with the output of `write`.
 ///
 /// # Errors
-/// If it cannot be written; then the file of before is still there.
+/// If it cannot be written; the old file then remains.
 pub fn replace_by(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
@@ -89,20 +89,20 @@ pub fn replace_by(
         fs::rename(&partial, path)
     });
     if written.is_err() {
-        // What a full disk has taken of it is in the way there.
+        // Frees the space of a partial file on a full disk.
         let _ = fs::remove_file(&partial);
     }
     written
 }
 
-/// Where a file is written until it is whole.
+/// Returns the path of a file during writing.
 pub fn partial(path: &Path) -> PathBuf {
     let mut partial = path.as_os_str().to_owned();
     partial.push(".part");
     partial.into()
 }
 
-/// Creates an empty file in place of the file or symbolic link that `path` names.
+/// Creates an empty file, replacing the file or symbolic link at `path`.
 ///
 /// # Errors
 /// If it cannot be written.
@@ -111,7 +111,7 @@ pub fn create(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-/// Opens a file to append to it and to read it, created if it is missing.
+/// Opens a file for appending and reading, and creates it if missing.
 ///
 /// # Errors
 /// If it cannot be written, or is a symbolic link.
@@ -120,19 +120,19 @@ pub fn append(path: &Path) -> io::Result<File> {
     OpenOptions::new().create(true).read(true).append(true).open(path)
 }
 
-/// Makes a folder inside one that is there, unless it is there already.
+/// Creates a folder in an existing one, unless it exists.
 ///
 /// # Errors
-/// If it cannot be made, or is a symbolic link.
+/// If it cannot be created, or is a symbolic link.
 pub fn make_folder(path: &Path) -> io::Result<()> {
     refuse_link(path)?;
     fs::create_dir_all(path)
 }
 
-/// Removes a file if it is there.
+/// Removes a file if it exists.
 ///
 /// # Errors
-/// If it is there and cannot be removed.
+/// If it exists and cannot be removed.
 pub fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
@@ -144,7 +144,7 @@ fn refuse_link(path: &Path) -> io::Result<()> {
     match fs::symlink_metadata(path) {
         Ok(found) if found.is_symlink() => Err(io::Error::new(
             io::ErrorKind::InvalidInput,
-            "a symbolic link, and nothing is written through one; remove it",
+            "a symbolic link; links are not followed for writing; remove it",
         )),
         _ => Ok(()),
     }

@@ -1,11 +1,11 @@
-//! Input from users: files, settings with overrides, and errors that say how to fix the input.
+//! Input from users: files, settings with overrides, and errors that describe how to fix the input.
 //!
 //! | module | content |
 //! |---|---|
-//! | [`files`] | reads and replaces files that a user named |
+//! | [`files`] | reads and replaces files named by users |
 //! | [`config`] | settings from a TOML file and `key=value` overrides |
-//! | [`error`] | the error of bad input: place, value, what is allowed |
-//! | [`words`] | values and parser messages as users read them |
+//! | [`error`] | error of invalid input: place, value, allowed values |
+//! | [`words`] | formatting of values and parser messages for users |
 //!
 //! ```
 //! use palpate_input::config::{Checked, Loader, Rules};

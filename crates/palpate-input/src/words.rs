@@ -1,9 +1,9 @@
-//! How messages put values and what parsers say, in the words of those who write settings.
+//! Formatting of values and parser messages for the authors of settings.
 
-/// Most characters of a value that a message repeats; chosen.
+/// Largest number of characters of a value in a message; a heuristic.
 const SHOWN_MAX: usize = 60;
 
-/// A value as a message shows it: long numbers in powers of ten, other long ones cut.
+/// Formats a value for a message: long numbers in powers of ten, other long values shortened.
 pub fn brief(text: &str) -> String {
     if text.chars().count() <= SHOWN_MAX {
         return text.into();
@@ -14,8 +14,8 @@ pub fn brief(text: &str) -> String {
     }
 }
 
-/// What a parser that complains with `message` would have taken, if that can be told: it names the
-/// types of the language it is written in.
+/// Returns the values that a parser with this error `message` accepts, if known: the message
+/// contains the types of the programming language.
 pub fn allowed(message: &str) -> Option<String> {
     let (_, expected) = message.rsplit_once("expected ")?;
     let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
@@ -44,14 +44,14 @@ pub fn allowed(message: &str) -> Option<String> {
     })
 }
 
-/// The name most like `word`, if it takes few enough slips of the hand to turn one into the other.
+/// Returns the name most similar to `word`, if few typing errors lead from one to the other.
 pub fn nearest(word: &str, names: &[String]) -> Option<String> {
     let slips = |name: &String| strsim::damerau_levenshtein(word, name);
     let most = (word.chars().count() / 2).min(2);
     names.iter().min_by_key(|name| slips(name)).filter(|name| slips(name) <= most).cloned()
 }
 
-/// What is wrong with a JSON text, without its place.
+/// Describes the problem of a JSON text, without its place.
 pub fn json(error: &serde_json::Error) -> String {
     let text = error.to_string();
     let what = text.split(" at line ").next().unwrap_or_default();
@@ -64,7 +64,7 @@ pub fn json(error: &serde_json::Error) -> String {
     }
 }
 
-/// Bytes in hexadecimal, as hashes are written.
+/// Returns bytes in hexadecimal, as for hashes.
 pub fn hex(bytes: impl AsRef<[u8]>) -> String {
     bytes.as_ref().iter().map(|byte| format!("{byte:02x}")).collect()
 }

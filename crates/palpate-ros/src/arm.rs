@@ -1,5 +1,5 @@
-//! An arm behind topics, as a [`Backend`]: commands out at a fixed rate, the newest of what is
-//! heard in.
+//! Arm behind topics, as a [`Backend`]: sends commands at a fixed rate, and returns the newest
+//! received messages as readings.
 
 use super::link::Link;
 use super::mailbox::{Heard, Mailbox, TopicState, refused};
@@ -17,41 +17,42 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// An arm that is connected; several bodies may use it, one after another.
+/// Connection to an arm; several backends may use it, one after another.
 pub struct Lab {
     chain: Chain,
     link: Link,
     mailbox: Arc<Mailbox>,
-    /// The first fault; it stays until the operator clears it.
+    /// First fault; it is latched until the operator clears it.
     latched: Mutex<Option<LinkFault>>,
-    /// Fills in forces, while it exists.
+    /// Receiver of forces over UDP, while it exists.
     _net_ft: Option<NetFt>,
 }
 
-/// How often is looked whether something has come; chosen, well below a control tick.
+/// Polling interval for received messages; a heuristic: well below a control tick.
 const LOOK: Duration = Duration::from_millis(1);
 
-/// After how long a call without an answer is repeated, where repeating it is harmless.
-// heuristic: ten times what discovery and an answer take on a local network.
+/// Time without an answer after which an idempotent service call is repeated.
+// heuristic: ten times the duration of discovery and an answer on a local network.
 const REPEAT_S: f64 = 0.5;
 
-/// Topics that an arm must be heard on.
+/// Topics that must be received from an arm.
 const HEARD: [Topic; 4] = [Topic::Joints, Topic::Wrench, Topic::Tactile, Topic::Status];
 
 impl Lab {
-    /// Joins the arm of `chain` over the transport that `settings` name.
+    /// Connects to the arm of `chain` over the transport of `settings`.
     ///
     /// # Errors
-    /// As [`connect`](Self::connect), and if this build lacks the transport.
+    /// The errors of [`connect`](Self::connect), and an error if this build lacks the transport.
     pub fn join(settings: &BackendSettings, chain: &Chain) -> Result<Arc<Self>, LinkFault> {
         let open = super::connect(settings, Side::Explorer, Service::COMMON.into())?;
         Self::connect(settings, chain, open)
     }
 
-    /// Connects to the arm of `chain` and waits until every topic is heard.
+    /// Connects to the arm of `chain` and waits for a message on every topic.
     ///
     /// # Errors
-    /// If the transport cannot be opened, a topic stays silent, or somebody else commands the arm.
+    /// If the transport cannot be opened, a topic has no messages, or there is another publisher of
+    /// commands.
     pub fn connect(
         settings: &BackendSettings,
         chain: &Chain,
@@ -72,7 +73,7 @@ impl Lab {
         Ok(lab)
     }
 
-    /// A body on this arm; there should be one at a time.
+    /// Returns a backend on this arm; use one at a time.
     pub fn body(self: &Arc<Self>) -> LabArm {
         let period_s = 1.0 / self.settings().rate_hz;
         let capabilities = Capabilities::of(&self.chain, period_s);
@@ -86,10 +87,10 @@ impl Lab {
         }
     }
 
-    /// Holds the arm still, and looks whether joints and sensors are as they must be.
+    /// Commands the arm to rest, and checks joints and sensors.
     ///
     /// # Errors
-    /// The first thing that is not.
+    /// The first check that fails.
     pub fn check_start(self: &Arc<Self>) -> Result<(), Fault> {
         check_start(&mut self.body(), &self.chain, &self.settings().gates, 0)
     }
@@ -99,10 +100,10 @@ impl Lab {
     }
 
     /// Calls a service as soon as its server is found, and waits for the answer for at most the
-    /// connection timeout; what is idempotent is repeated meanwhile.
+    /// connection timeout; an idempotent call is repeated meanwhile.
     ///
     /// # Errors
-    /// If there is no server or no answer in time, or the answer is a refusal.
+    /// If there is no server or no answer within the timeout, or the answer is a refusal.
     pub fn call(&self, service: &Service) -> Result<(), LinkFault> {
         self.call_within(service, self.settings().patience_s)
     }
@@ -127,8 +128,8 @@ impl Lab {
                 break match is_sent {
                     false => format!("no server (std_srvs/srv/Trigger) found in {timeout_s} s"),
                     true => format!(
-                        "a server was found, but gave no answer in {timeout_s} s; does \
-                         backend.service_mapping fit its DDS implementation?"
+                        "a server was found, but did not answer within {timeout_s} s; check that \
+                         backend.service_mapping fits its DDS implementation"
                     ),
                 };
             }
@@ -142,10 +143,10 @@ impl Lab {
         Err(Invalid::new(format!("service {name}: {words}")).into())
     }
 
-    /// Forgets faults, here and on the arm's side: the operator's to ask for.
+    /// Clears faults, here and on the arm; only an operator may request it.
     ///
     /// # Errors
-    /// If the arm's side does not.
+    /// If the arm refuses.
     pub fn clear_fault(&self) -> Result<(), LinkFault> {
         self.call(&Service::ClearFault)?;
         let mut heard = self.mailbox.heard();
@@ -182,8 +183,8 @@ impl Lab {
                 let skipped: String =
                     skipped.map(|why| format!(" Skipped a message: {why}.")).collect();
                 return Err(Invalid::new(format!(
-                    "nothing heard for {patience_s} s on {}; is the arm's side running, with the same \
-                     domain, and are names and types those of [backend.topics]?{skipped}",
+                    "no message within {patience_s} s on {}; check that the arm's driver runs in the same \
+                     domain and that [backend.topics] has its names and types.{skipped}",
                     names.join(", ")
                 ))
                 .into());
@@ -199,17 +200,17 @@ impl Lab {
             return Ok(());
         }
         let topic = self.settings().topics.name(Topic::Command);
-        let words = format!("{count} publishers on {topic}, allowed is one: this program");
+        let words = format!("{count} publishers on {topic}; allowed is one (this program)");
         Err(Invalid::new(words).into())
     }
 
-    /// Sends velocities.
+    /// Sends joint velocities.
     fn command(&self, qdot: &[f64]) {
         self.mailbox.heard().commanded = Some(Instant::now());
         self.link.send(self.mailbox.command(qdot));
     }
 
-    /// Whether everything that was heard is of an age and kind that may be acted on.
+    /// Checks that all received messages are recent enough and permit motion.
     fn check(&self, heard: &Heard) -> Result<(), LinkFault> {
         if let Some(refused) = &heard.refused {
             return Err(refused.clone());
@@ -222,7 +223,7 @@ impl Lab {
             let state = &heard.topics[topic as usize];
             if self.settings().is_on_change(topic) {
                 if self.link.publisher_count(topic) == 0 {
-                    let words = format!("no publisher on {} any more", topics.name(topic));
+                    let words = format!("the publisher on {} has gone", topics.name(topic));
                     return Err(Invalid::new(words).into());
                 }
                 continue;
@@ -239,7 +240,7 @@ impl Lab {
     }
 }
 
-/// Puts what the sensor sends into the mailbox; a record with an error is a refusal.
+/// Writes the sensor's records into the mailbox; a record with an error status is refused.
 fn listen(settings: &NetFtSettings, mailbox: &Arc<Mailbox>) -> Result<NetFt, LinkFault> {
     let (mailbox, address) = (Arc::clone(mailbox), settings.address.clone());
     let take = move |record: Record| {
@@ -254,12 +255,12 @@ fn listen(settings: &NetFtSettings, mailbox: &Arc<Mailbox>) -> Result<NetFt, Lin
     Ok(NetFt::open(settings, take).map_err(cannot_open(&settings.address))?)
 }
 
-/// The error of a topic on which nothing new has come for `age_s`.
+/// Returns the error of a topic without a new message for `age_s`.
 fn silent(topic: &str, age_s: f64, state: &TopicState) -> Invalid {
-    let mut words = format!("nothing new on {topic} for {:.0} ms", 1e3 * age_s);
+    let mut words = format!("no new message on {topic} for {:.0} ms", 1e3 * age_s);
     if let Some(late_s) = state.late_s {
         words += &format!(
-            "; messages come, but their stamps are {:.0} ms old: are the clocks synchronised?",
+            "; messages arrive, but their stamps are {:.0} ms old; check that the clocks are synchronised",
             1e3 * late_s
         );
     }
@@ -271,7 +272,7 @@ fn silent(topic: &str, age_s: f64, state: &TopicState) -> Invalid {
 }
 
 impl Drop for Lab {
-    /// Nobody commands any more, and the arm's side is told, so that it is no alarm.
+    /// Ends commanding with a hold on the arm, so that it raises no alarm.
     fn drop(&mut self) {
         let was_engaged = {
             let mut heard = self.mailbox.heard();
@@ -284,7 +285,7 @@ impl Drop for Lab {
     }
 }
 
-/// The body.
+/// Backend of an arm behind topics.
 pub struct LabArm {
     lab: Arc<Lab>,
     capabilities: Capabilities,
@@ -301,10 +302,10 @@ impl LabArm {
 
     /// Latches a fault.
     fn fault(&self, cause: LinkFault) -> Fault {
-        // The last command would otherwise hold until it expires.
+        // Otherwise the last command would remain valid until it expires.
         self.lab.command(&self.still.qdot);
-        // No command goes to an arm that was stopped by hand: one to stand still could open its
-        // brakes again.
+        // No command goes to an arm that was stopped by hand: even a zero velocity could release
+        // its brakes again.
         if matches!(cause, LinkFault::Arm(_)) {
             let mut heard = self.lab.mailbox.heard();
             (heard.is_engaged, heard.is_ready) = (false, false);
@@ -313,7 +314,7 @@ impl LabArm {
         Fault::Link { time_s: self.time_s(), cause }
     }
 
-    /// The fault that is latched, if one is.
+    /// Returns the latched fault as an error, if there is one.
     fn latched(&self) -> Result<(), Fault> {
         match self.lab.latch().clone() {
             Some(cause) => Err(Fault::Link { time_s: self.time_s(), cause }),
@@ -342,7 +343,7 @@ impl LabArm {
                 if (to - from).abs() > JUMP_RAD + joint.qdot_limit * dt_s {
                     let (joint, dt_ms) = (&joint.name, 1e3 * dt_s);
                     let words = format!(
-                        "joint \"{joint}\" went from {from:.4} to {to:.4} in {dt_ms:.0} ms, farther than it can"
+                        "joint \"{joint}\" jumped from {from:.4} to {to:.4} in {dt_ms:.0} ms, beyond its speed limit"
                     );
                     return Err(Invalid::new(words).into());
                 }
@@ -359,11 +360,11 @@ impl LabArm {
     }
 }
 
-/// A joint's position may be off by this much for other reasons than motion; chosen: a tick at half
-/// of the fastest joint's speed.
+/// Tolerance of a joint's position besides motion, for the detection of jumps; a heuristic: a tick
+/// at half the fastest joint's speed.
 const JUMP_RAD: f64 = 0.02;
 
-/// How long the arm is told to stand still before it is moved; chosen.
+/// Duration of zero velocity commands before the arm moves; a heuristic.
 const HANDSHAKE_S: f64 = 0.1;
 
 impl Backend for LabArm {
@@ -371,7 +372,7 @@ impl Backend for LabArm {
         &self.capabilities
     }
 
-    /// Brings nothing anywhere: the arm stays where it stands, and is told to listen.
+    /// Does not move the arm; starts sending zero velocities.
     fn reset(&mut self, _seed: u64) -> Result<&Reading, Fault> {
         self.latched()?;
         let lab = Arc::clone(&self.lab);
@@ -385,7 +386,7 @@ impl Backend for LabArm {
         if let Err(fault) = lab.call(&Service::Unhold) {
             return Err(self.fault(fault));
         }
-        // Brakes open after the first commands to stand still.
+        // Brakes are released after the first zero velocity commands.
         let begun = Instant::now();
         loop {
             sleep(LOOK);
@@ -414,7 +415,7 @@ impl Backend for LabArm {
         self.read()
     }
 
-    /// Calls the stop of the arm's side, without waiting for its answer.
+    /// Calls the arm's stop service, without waiting for its answer.
     fn brake(&mut self) {
         self.lab.link.call(Service::Stop);
     }

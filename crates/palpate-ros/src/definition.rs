@@ -1,27 +1,27 @@
-//! Definitions of message types: their texts, and the macro that makes a struct and a definition of
-//! one declaration.
+//! Definitions of message types: their texts, and the macro that generates a struct and a
+//! definition from one declaration.
 
 /// A message type: its name and the text of its definition.
 pub struct Definition {
-    /// As in `sensor_msgs/msg/JointState`.
+    /// Full name, e.g. `sensor_msgs/msg/JointState`.
     pub name: &'static str,
-    /// Its fields, one line each, in the language of `.msg` files.
+    /// Fields, one line each, in the syntax of `.msg` files.
     pub fields: &'static str,
-    /// The definitions of the types that it names.
+    /// Definitions of the types that it uses.
     pub parts: &'static [&'static Definition],
 }
 
-/// A type that is sent over topics.
+/// A message type that is sent over topics.
 pub trait Described {
-    /// Its name and its fields.
+    /// Name and fields.
     const DEFINITION: Definition;
 }
 
-/// Replacements that make a definition of ROS 2 of what a macro writes.
+/// Replacements that turn the macro's text into a ROS 2 definition.
 const ROS2: &[(&str, &str)] = &[("r#", "")];
 
-/// Replacements that make a definition of ROS 1 of one of ROS 2: times are primitive there, and a
-/// header counts.
+/// Replacements that turn a ROS 2 definition into one of ROS 1, in which times are primitive and a
+/// header has a sequence number.
 #[cfg(feature = "ros1")]
 const ROS1: &[(&str, &str)] = &[
     ("builtin_interfaces/Time stamp", "uint32 seq\ntime stamp"),
@@ -29,34 +29,34 @@ const ROS1: &[(&str, &str)] = &[
     ("builtin_interfaces/Duration", "duration"),
 ];
 
-/// Separates the definitions of parts.
+/// Separator of the definitions of parts.
 const RULE: &str =
     "================================================================================\nMSG: ";
 
 impl Definition {
-    /// The package, as in `sensor_msgs`.
+    /// Returns the package, e.g. `sensor_msgs`.
     pub fn package(&self) -> &'static str {
         self.name.split('/').next().unwrap_or_default()
     }
 
-    /// The name in its package, as in `JointState`.
+    /// Returns the name in its package, e.g. `JointState`.
     pub fn short_name(&self) -> &'static str {
         self.name.rsplit('/').next().unwrap_or_default()
     }
 
-    /// The whole definition with those of all parts: a schema of encoding `ros2msg`.
+    /// Returns the full definition with those of all parts: a schema of encoding `ros2msg`.
     pub fn text(&self) -> String {
         Text::of(self, ROS2).as_str().into()
     }
 
-    /// The same in ROS 1.
+    /// Returns the full definition for ROS 1.
     #[cfg(feature = "ros1")]
     pub(super) const fn ros1(&self) -> Text {
         Text::of(self, ROS1)
     }
 }
 
-/// A definition that is put together when the program is compiled.
+/// A definition text that is assembled at compile time.
 pub(super) struct Text {
     bytes: [u8; 4096],
     length: usize,
@@ -70,7 +70,7 @@ impl Text {
         text
     }
 
-    /// Adds the definitions of `parts` and of what they name, each once.
+    /// Appends the definitions of `parts` and of the types that they use, each once.
     const fn push_parts(&mut self, parts: &[&Definition], replaced: &[(&str, &str)]) {
         let mut i = 0;
         while i < parts.len() {
@@ -90,7 +90,7 @@ impl Text {
         }
     }
 
-    /// Whether what stands from `start` on stands before it too.
+    /// Whether the text from `start` on also occurs before it.
     const fn has_before(&self, start: usize) -> bool {
         let (before, found) = self.bytes.split_at(start);
         let (found, _) = found.split_at(self.length - start);
@@ -104,7 +104,7 @@ impl Text {
         false
     }
 
-    /// Adds `text` with what is `replaced`.
+    /// Appends `text` with the replacements `replaced`.
     const fn push(&mut self, text: &str, replaced: &[(&str, &str)]) {
         let text = text.as_bytes();
         let mut at = 0;
@@ -125,16 +125,16 @@ impl Text {
         }
     }
 
-    /// The text.
+    /// Returns the text.
     pub(super) const fn as_str(&self) -> &str {
         match std::str::from_utf8(self.bytes.split_at(self.length).0) {
             Ok(text) => text,
-            Err(_) => panic!("a definition is no text"),
+            Err(_) => panic!("the definition is not valid UTF-8"),
         }
     }
 }
 
-/// Whether `text` has `what` at the byte `at`.
+/// Whether `text` contains `what` at the byte `at`.
 const fn begins(text: &[u8], at: usize, what: &[u8]) -> bool {
     let mut i = 0;
     while i < what.len() {
@@ -146,10 +146,10 @@ const fn begins(text: &[u8], at: usize, what: &[u8]) -> bool {
     true
 }
 
-/// Makes a struct with its [`Definition`] of each declaration in the language of `.msg` files: a
-/// package with a name and, in braces, constants as a text and fields with their types and
-/// defaults. `serde` writes the fields in this order, so that a CDR serializer writes what every
-/// other implementation reads.
+/// Generates a struct with its [`Definition`] from each declaration in the syntax of `.msg` files:
+/// a package with a name and, in braces, constants as a text and fields with their types and
+/// defaults. `serde` writes the fields in this order, so that a CDR serializer is compatible with
+/// other implementations.
 macro_rules! messages {
     ($(
         $(#[$meta:meta])*

@@ -1,4 +1,4 @@
-//! Joints by name: which number of a message is which joint's.
+//! Joints by name: mapping between messages and the arm's order.
 
 use super::message::{
     Duration, Float64MultiArray, Header, JointState, JointTrajectory, JointTrajectoryPoint,
@@ -7,17 +7,17 @@ use super::topics::{CommandMessage, CommandTopic};
 use super::transport::Packet;
 use palpate_input::error::Invalid;
 
-/// The names of an arm's joints, in the order in which the arm counts them.
+/// Names of an arm's joints, in the arm's order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JointNames(Vec<String>);
 
 impl JointNames {
-    /// In the arm's order.
+    /// Creates the mapping from names in the arm's order.
     pub fn new(names: Vec<String>) -> Self {
         Self(names)
     }
 
-    /// In the arm's order.
+    /// Returns the names in the arm's order.
     pub fn names(&self) -> &[String] {
         &self.0
     }
@@ -27,10 +27,10 @@ impl JointNames {
         self.0.iter().any(|name| names.contains(name))
     }
 
-    /// Puts `values`, one for each of `names`, into `into`, in the arm's order.
+    /// Writes `values`, one for each of `names`, to `into`, in the arm's order.
     ///
     /// # Errors
-    /// If one is missing, twice there or not finite, or their lengths differ.
+    /// If one is missing, repeated or not finite, or the lengths differ.
     fn pick(
         &self,
         what: &'static str,
@@ -61,7 +61,7 @@ impl JointNames {
     /// Reads positions and velocities of a message, which may name other joints too.
     ///
     /// # Errors
-    /// If it does not say them of every joint of the arm.
+    /// If a joint of the arm is missing.
     pub fn read(
         &self,
         message: &JointState,
@@ -72,7 +72,7 @@ impl JointNames {
         self.pick("velocities", &message.name, &message.velocity, qdot)
     }
 
-    /// What an arm says of itself.
+    /// Returns a joint state message.
     pub fn state(&self, stamp_s: f64, q: &[f64], qdot: &[f64]) -> JointState {
         JointState {
             header: Header::new(stamp_s, ""),
@@ -83,7 +83,7 @@ impl JointNames {
         }
     }
 
-    /// A velocity command over `topic` at `stamp_s`.
+    /// Returns a velocity command over `topic` with the stamp `stamp_s`.
     pub fn command(&self, stamp_s: f64, qdot: &[f64], topic: &CommandTopic) -> Packet {
         if topic.message == CommandMessage::Velocities {
             let data = qdot.into();
@@ -100,18 +100,18 @@ impl JointNames {
         })
     }
 
-    /// Reads a velocity command: its stamp and for how long it is valid, in seconds. A bare one has
+    /// Reads a velocity command: returns its stamp and its validity, s. A command without names has
     /// neither.
     ///
     /// # Errors
-    /// If it is not of this arm's joints, one finite velocity each.
+    /// If it does not contain one finite velocity for each joint of this arm.
     pub fn read_command(
         &self,
         packet: &Packet,
         qdot: &mut Vec<f64>,
     ) -> Result<Option<[f64; 2]>, Invalid> {
         let points = |found: usize| {
-            Err(Invalid::new(format!("{found} points in a velocity command, allowed is one")))
+            Err(Invalid::new(format!("{found} points in a velocity command; allowed is one")))
         };
         match packet {
             Packet::Command(message) => {
@@ -121,7 +121,8 @@ impl JointNames {
                 let names = &message.joint_names;
                 if let Some(name) = names.iter().find(|name| !self.0.contains(name)) {
                     let known = &self.0;
-                    let words = format!("\"{name}\" is no joint of this arm, which has {known:?}");
+                    let words =
+                        format!("\"{name}\" is not a joint of this arm; its joints are {known:?}");
                     return Err(Invalid::new(words));
                 }
                 self.pick("velocities", names, &point.velocities, qdot)?;

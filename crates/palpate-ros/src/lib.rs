@@ -1,14 +1,14 @@
-//! A robot arm behind ROS 1 or ROS 2 topics, its simulated twin, and recordings of touches.
+//! Robot arm behind ROS 1 or ROS 2 topics, its simulated twin, and recordings of touches.
 //!
 //! | module | content |
 //! |---|---|
 //! | [`arm`] | the arm: a [`Backend`](palpate_explore::backend::Backend) over topics |
 //! | [`topics`], [`message`] | the topics and services of an arm, and their messages |
-//! | [`transport`] | sends and receives; [`connect`] makes one from settings |
-//! | [`twin`] | a simulated body behind the same topics, in real time |
-//! | [`recording`] | every tick of a trial as an MCAP file, and a backend that plays it |
+//! | [`transport`] | sends and receives packets; [`connect`] creates one from settings |
+//! | [`twin`] | a simulated robot behind the same topics, in real time |
+//! | [`recording`] | every tick of a trial as an MCAP file, and a backend that replays it |
 //!
-//! Joints are matched by name, so that messages of a driver may order them as it likes:
+//! Joints are matched by name, so that a driver's messages may have them in any order:
 //!
 //! ```
 //! use palpate_ros::joints::JointNames;
@@ -49,10 +49,11 @@ use settings::{BackendKind, BackendSettings};
 use topics::{Service, Side};
 use transport::Connect;
 
-/// Returns what opens the transport that `settings` name, in the thread that is going to own it.
+/// Returns a function that opens the transport of `settings`, to be called in the thread that will
+/// own it.
 ///
 /// # Errors
-/// If this build lacks it.
+/// If this build lacks the transport.
 pub fn connect(
     settings: &BackendSettings,
     side: Side,

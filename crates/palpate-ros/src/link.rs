@@ -1,5 +1,5 @@
-//! A thread of its own for one side's topics: what arrives is handed on at once, what is to be sent
-//! never makes a control loop wait.
+//! Thread for one side's topics: passes on received messages immediately, and sends without
+//! blocking the control loop.
 
 use super::message::TriggerResponse;
 use super::topics::{Service, Topic};
@@ -12,27 +12,27 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// How often publishers are counted; chosen, discovery takes longer.
+/// Interval for counting publishers; a heuristic: discovery takes longer.
 const COUNTED_S: f64 = 0.1;
 
-/// Sends something; done by the thread.
+/// A send operation, run by the thread.
 type Job = Box<dyn FnOnce(&mut dyn Transport) -> Result<(), Invalid> + Send>;
 
-/// Most jobs that wait; older ones are of no use.
+/// Largest number of pending jobs; older ones are obsolete.
 const JOBS_MAX: usize = 256;
 
 #[derive(Default)]
 struct Shared {
     jobs: Mutex<VecDeque<Job>>,
     is_closed: AtomicBool,
-    /// Known publishers by topic.
+    /// Number of known publishers by topic.
     publishers: [AtomicUsize; Topic::ALL.len()],
     broken: Mutex<Option<Invalid>>,
     /// Calls whose server has not been found yet.
     waiting: Mutex<Vec<Service>>,
 }
 
-/// One side's end with its thread.
+/// One side of a transport, run by its own thread.
 pub struct Link {
     shared: Arc<Shared>,
     waker: Waker,
@@ -40,8 +40,8 @@ pub struct Link {
 }
 
 impl Link {
-    /// Opens a transport in a thread of its own, which passes what arrives to `take`, and about
-    /// every `period` sends what `idle` returns.
+    /// Opens a transport in its own thread, which passes received messages to `take`, and about
+    /// every `period` sends the packet returned by `idle`.
     ///
     /// # Errors
     /// If it cannot be opened.
@@ -63,18 +63,17 @@ impl Link {
                 let _ = opened.send(Err(error));
             }
         });
-        let gone = |_| Invalid::new("cannot open the transport: it ended");
+        let gone = |_| Invalid::new("cannot open the transport: its thread ended");
         let waker = is_open.recv().map_err(gone)??;
         Ok(Self { shared, waker, thread: Some(thread) })
     }
 
-    /// Sends a packet soon.
+    /// Queues a packet for sending.
     pub fn send(&self, packet: Packet) {
         self.add(Box::new(move |transport| transport.send(&packet)));
     }
 
-    /// Calls a service of the other side as soon as its server is found; the answer is a
-    /// delivery.
+    /// Calls a service of the other side as soon as its server is found; the answer is a delivery.
     pub fn call(&self, service: Service) {
         let mut waiting = lock(&self.shared.waiting);
         if !waiting.contains(&service) {
@@ -84,7 +83,7 @@ impl Link {
         (self.waker)();
     }
 
-    /// Whether a call of `service` still waits for its server.
+    /// Whether a call of `service` is still waiting for its server.
     pub fn awaits_server(&self, service: &Service) -> bool {
         lock(&self.shared.waiting).contains(service)
     }
@@ -94,12 +93,12 @@ impl Link {
         self.add(Box::new(move |transport| transport.answer(&service, call, answer)));
     }
 
-    /// How many publishers of a topic are known, this side's own among them.
+    /// Returns the number of known publishers of a topic, including this side's own.
     pub fn publisher_count(&self, topic: Topic) -> usize {
         self.shared.publishers[topic as usize].load(Ordering::Relaxed)
     }
 
-    /// Why nothing is sent any more, if that is so.
+    /// Returns the error that ended sending, if there is one.
     pub fn broken(&self) -> Option<Invalid> {
         lock(&self.shared.broken).clone()
     }
@@ -129,7 +128,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The thread.
+/// Runs the thread.
 fn serve(
     mut transport: Box<dyn Transport>,
     shared: &Shared,
@@ -171,7 +170,7 @@ fn serve(
         }
         *lock(&shared.broken) = result.err();
     }
-    // What a side says last is still sent.
+    // Pending messages are still sent at the end.
     for job in lock(&shared.jobs).drain(..) {
         let _ = job(&mut *transport);
     }

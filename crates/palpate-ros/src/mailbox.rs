@@ -1,5 +1,5 @@
-//! The newest message of each topic, stamped on receipt by the monotonic clock; and the commands
-//! that hold the arm still while the explorer computes.
+//! Newest message of each topic, stamped on receipt by the monotonic clock; and zero velocity
+//! commands while the explorer is computing.
 
 use super::joints::JointNames;
 use super::message::{Time, TriggerResponse};
@@ -15,11 +15,11 @@ use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Tactile frames kept until they are read.
-// heuristic: two and a half batches of five each tenth of a second.
+/// Largest number of unread tactile frames.
+// heuristic: two and a half batches of five per tenth of a second.
 const FRAMES_MAX: usize = 64;
 
-/// After as many silent periods the arm is commanded to stand still.
+/// Number of periods without a command after which zero velocity is commanded.
 const SILENT_PERIODS: f64 = 1.5;
 
 /// The last message of each topic.
@@ -31,50 +31,50 @@ pub struct Heard {
     pub qdot: Vec<f64>,
     /// Reading of the force/torque sensor, in its own frame.
     pub wrench: Option<Wrench>,
-    /// Tactile frames not read yet, oldest first; their time is that of receipt, since `since`.
+    /// Unread tactile frames, oldest first; their time is that of receipt, since `since`.
     pub frames: VecDeque<Frame>,
     /// State of the arm.
     pub status: Option<ArmStatus>,
     /// Reception state of each topic.
     pub topics: [TopicState; Topic::ALL.len()],
-    /// The first message that ends the run.
+    /// First message that ends the run.
     pub refused: Option<LinkFault>,
     /// Answers of services.
     pub answers: Vec<(Service, TriggerResponse)>,
-    /// When a command was last given, if any was.
+    /// Time of the last command, if any.
     pub commanded: Option<Instant>,
-    /// Whether the arm is commanded to stand still while no other command is given.
+    /// Whether the arm is commanded to zero velocity in the absence of other commands.
     pub is_engaged: bool,
     /// Whether the arm has been ready to move since it was engaged: from then on a status that
-    /// refuses movement is a fault, however short it lasts.
+    /// refuses motion is a fault, however short it is.
     pub is_ready: bool,
-    /// From when on times count.
+    /// Time origin.
     pub since: Option<Instant>,
 }
 
 /// Reception state of a topic.
 #[derive(Clone, Debug, Default)]
 pub struct TopicState {
-    /// When the last message was received.
+    /// Time of receipt of the last message.
     pub at: Option<Instant>,
-    /// Age by its stamp of a last message that was too old.
+    /// Age by its stamp of the last message, if it was too old.
     pub late_s: Option<f64>,
     /// Largest stamp so far.
     pub stamp_s: f64,
-    /// Messages dropped because their stamp was smaller than one before.
+    /// Number of messages dropped because their stamp was smaller than an earlier one.
     pub backward: u64,
-    /// Why the last message of another device was skipped.
+    /// Reason why the last message of another device was skipped.
     pub skipped: Option<String>,
 }
 
-/// The fault of a message on `topic` that cannot be used.
+/// Returns the fault of an unusable message on `topic`.
 pub(super) fn refused(topic: &str, words: impl std::fmt::Display) -> LinkFault {
     Invalid::new(format!("message on {topic} refused: {words}")).into()
 }
 
 /// The newest messages of an arm, shared between the link's thread and the control loop.
 pub struct Mailbox {
-    /// The arm's joints as its messages name them.
+    /// Names of the arm's joints in its messages.
     pub names: JointNames,
     /// Table `[backend]` of the experiment.
     pub settings: BackendSettings,
@@ -93,7 +93,7 @@ impl Mailbox {
         self.heard.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes what has arrived.
+    /// Stores a received delivery.
     pub fn take(&self, delivery: Delivery) {
         match delivery {
             Delivery::Packet { packet, received, .. } => self.take_packet(packet, received),
@@ -106,8 +106,8 @@ impl Mailbox {
         }
     }
 
-    /// Returns a command to stand still if the arm is engaged and no other command was given
-    /// lately.
+    /// Returns a zero velocity command if the arm is engaged and there was no other command
+    /// recently.
     pub fn idle_command(&self) -> Option<Packet> {
         let heard = self.heard();
         let silent_s = SILENT_PERIODS / self.settings.rate_hz;
@@ -116,7 +116,7 @@ impl Mailbox {
         (heard.is_engaged && is_silent).then(still)
     }
 
-    /// The packet that commands velocities from now on.
+    /// Returns the packet that commands velocities, and records the time.
     pub fn command(&self, qdot: &[f64]) -> Packet {
         self.names.command(pace::now_s(), qdot, &self.settings.topics.command)
     }
@@ -137,7 +137,7 @@ impl Mailbox {
         }
     }
 
-    /// Reads a message into `heard`, if it is the arm's and in time.
+    /// Reads a message into `heard`, if it belongs to the arm and is recent.
     fn read(
         &self,
         heard: &mut Heard,
@@ -148,12 +148,12 @@ impl Mailbox {
         let topic = packet.topic();
         let refuse = |words: String| refused(&self.settings.topics.name(topic), words);
         let state = &mut heard.topics[topic as usize];
-        // Another driver, such as a hand's, may publish on the same topic.
+        // Other drivers, e.g. of a hand, may publish on the same topic.
         if let Packet::Joints(message) = packet
             && !self.names.are_among(&message.name)
         {
             let names = self.names.names();
-            let words = format!("joints {:?} are none of the arm's {names:?}", message.name);
+            let words = format!("joints {:?} are not joints of the arm, {names:?}", message.name);
             state.skipped = Some(words);
             return Ok(());
         }
@@ -170,7 +170,7 @@ impl Mailbox {
         }
         let is_timely = self.is_timely(state, topic, stamp);
         if let Some(status) = &status {
-            // What only an operator can clear counts whatever its stamp says.
+            // A fault that only an operator can clear counts regardless of its stamp.
             let is_read = status.needs_operator() || is_timely.clone()?;
             if let Some(words) = status.refusal().filter(|_| heard.is_ready && is_read) {
                 return Err(LinkFault::Arm(words));
@@ -213,7 +213,7 @@ impl Mailbox {
         Ok(())
     }
 
-    /// Whether a message of `topic` with this stamp may be used, by its age and order.
+    /// Whether a message of `topic` with this stamp is recent enough and in order.
     ///
     /// # Errors
     /// If it has no stamp, or one from the future.
@@ -239,7 +239,7 @@ impl Mailbox {
         if age_s < -CLOCK_AHEAD_S {
             let ahead_ms = -1e3 * age_s;
             let words = format!(
-                "its stamp is {ahead_ms:.0} ms in the future; are the clocks synchronised?"
+                "its stamp is {ahead_ms:.0} ms in the future; check that the clocks are synchronised"
             );
             return Err(refused(&topics.name(topic), words));
         }

@@ -1,42 +1,42 @@
-//! Messages of the lab's topics and of recordings, in the layout of ROS 2.
+//! Messages of the arm's topics and of recordings, in the layout of ROS 2.
 //!
 //! `biotac_sensors` (kth-ros-pkg/biotac_driver, BSD) and `sr_robot_msgs` (shadow-robot/sr_common,
-//! BSD-3) are packages of ROS 1; in ROS 2 they keep their fields, with that system's header.
+//! BSD-3) are packages of ROS 1; for ROS 2 they keep their fields, with the ROS 2 header.
 
 use super::definition::{Definition, Described, messages};
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 messages! {
-    /// A moment since 1970, or since a simulation's start.
+    /// A time since 1970, or since the start of a simulation.
     #[derive(Copy, Eq)]
     builtin_interfaces/Time {
         /// Whole seconds.
         int32 sec,
-        /// The rest, in nanoseconds.
+        /// Remainder, ns.
         uint32 nanosec,
     }
 
-    /// A span of time; both parts count.
+    /// A duration, the sum of both parts.
     #[derive(Copy, Eq)]
     builtin_interfaces/Duration {
         /// Whole seconds.
         int32 sec,
-        /// The rest, in nanoseconds.
+        /// Remainder, ns.
         uint32 nanosec,
     }
 
-    /// When and in which frame: the beginning of most messages.
+    /// Time and frame: the first field of most messages.
     std_msgs/Header {
-        /// When it was measured, by the sender's clock.
+        /// Time of measurement, by the sender's clock.
         builtin_interfaces/Time stamp,
-        /// The frame of what follows.
+        /// Frame of the following data.
         string frame_id,
     }
 
-    /// Joints by name.
+    /// State of named joints.
     sensor_msgs/JointState {
-        /// When the joints stood so.
+        /// Time of the state.
         std_msgs/Header header,
         /// Names.
         string[] name,
@@ -52,19 +52,19 @@ messages! {
     trajectory_msgs/JointTrajectoryPoint {
         /// Empty in a velocity command.
         float64[] positions,
-        /// rad/s or m/s, in the order of the names.
+        /// Velocities, rad/s or m/s, in the order of the names.
         float64[] velocities,
         /// Empty in a velocity command.
         float64[] accelerations,
         /// Empty in a velocity command.
         float64[] effort,
-        /// In a velocity command: how long it is valid from its stamp on.
+        /// Validity of a velocity command from its stamp on.
         builtin_interfaces/Duration time_from_start,
     }
 
     /// A trajectory; one point with velocities is a velocity command.
     trajectory_msgs/JointTrajectory {
-        /// When it was given.
+        /// Time of the command.
         std_msgs/Header header,
         /// Names.
         string[] joint_names,
@@ -72,57 +72,57 @@ messages! {
         trajectory_msgs/JointTrajectoryPoint[] points,
     }
 
-    /// A dimension of a list of numbers.
+    /// A dimension of an array.
     std_msgs/MultiArrayDimension {
-        /// Its name.
+        /// Name.
         string label,
-        /// Its size.
+        /// Size.
         uint32 size,
-        /// Entries from one to the next.
+        /// Stride between entries.
         uint32 stride,
     }
 
-    /// The layout of a list of numbers.
+    /// Layout of an array.
     std_msgs/MultiArrayLayout {
-        /// Its dimensions; may be empty.
+        /// Dimensions; may be empty.
         std_msgs/MultiArrayDimension[] dim,
-        /// Entries before the first.
+        /// Offset of the first entry.
         uint32 data_offset,
     }
 
     /// A velocity command of `ros_control`, without stamp or names.
     std_msgs/Float64MultiArray {
-        /// How the numbers are laid out; a list without dimensions.
+        /// Layout; an array without dimensions.
         std_msgs/MultiArrayLayout layout,
-        /// Velocities in the controller's own order of joints.
+        /// Velocities in the controller's order of joints.
         float64[] data,
     }
 
-    /// One finger, in counts.
+    /// Data of one finger, in counts.
     biotac_sensors/BioTacData {
         /// Serial number.
         string bt_serial,
-        /// Which finger of the hand.
+        /// Number of the finger.
         uint16 bt_position,
-        /// TDC, temperature.
+        /// Temperature (TDC).
         uint16 tdc_data,
-        /// TAC, change of temperature.
+        /// Change of temperature (TAC).
         uint16 tac_data,
-        /// PDC, static pressure.
+        /// Static pressure (PDC).
         uint16 pdc_data,
-        /// PAC, vibration, oldest first.
+        /// Vibration (PAC), oldest first.
         uint16[22] pac_data,
-        /// E1 to E19.
+        /// Electrodes E1 to E19.
         uint16[19] electrode_data,
     }
 
-    /// When the frame was taken, and its channels after that.
+    /// Time of a frame and of its channels.
     biotac_sensors/BioTacTime {
-        /// First channel.
+        /// Time of the first channel.
         builtin_interfaces/Time frame_start_time,
-        /// Last channel.
+        /// Time of the last channel.
         builtin_interfaces/Time frame_end_time,
-        /// Offset of TDC; the driver's own arithmetic of offsets is wrong, and they are not used.
+        /// Offset of TDC; unused, like all offsets, since the driver computes them incorrectly.
         uint32 tdc_ns_offset,
         /// Offset of TAC.
         uint32 tac_ns_offset,
@@ -138,22 +138,22 @@ messages! {
     biotac_sensors/BioTacHand {
         /// Host's time at the frame's end.
         std_msgs/Header header,
-        /// Which hand.
+        /// Identifier of the hand.
         string hand_id,
         /// One entry per finger.
         biotac_sensors/BioTacData[] bt_data,
-        /// When.
+        /// Times of the channels.
         biotac_sensors/BioTacTime bt_time,
     }
 
-    /// One finger of a Shadow hand. Its channels come one after another over EtherCAT, so that
-    /// those of one message are of different ages.
+    /// Data of one finger of a Shadow hand. Its channels are transmitted one after another over
+    /// EtherCAT, so that those of one message have different ages.
     sr_robot_msgs/Biotac {
-        /// Vibration, the newest two.
+        /// Vibration, newest two samples.
         int16 pac0,
         /// Vibration.
         int16 pac1,
-        /// Vibration, as many as came.
+        /// Vibration, all received samples.
         int16[] pac,
         /// Static pressure.
         int16 pdc,
@@ -161,7 +161,7 @@ messages! {
         int16 tac,
         /// Temperature.
         int16 tdc,
-        /// Electrodes, 19 or 24 by model.
+        /// Electrodes, 19 or 24 depending on the model.
         int16[] electrodes,
     }
 
@@ -177,7 +177,7 @@ messages! {
     diagnostic_msgs/KeyValue {
         /// Its name.
         string key,
-        /// As text.
+        /// Value as text.
         string value,
     }
 
@@ -188,17 +188,17 @@ messages! {
         byte level,
         /// Name of the device.
         string name,
-        /// In words.
+        /// Description.
         string message,
-        /// Number of the device.
+        /// Identifier of the device.
         string hardware_id,
-        /// In detail.
+        /// Detailed values.
         diagnostic_msgs/KeyValue[] values,
     }
 
     /// The state of an arm.
     diagnostic_msgs/DiagnosticArray {
-        /// When.
+        /// Time.
         std_msgs/Header header,
         /// One entry per device.
         diagnostic_msgs/DiagnosticStatus[] status,
@@ -218,21 +218,21 @@ messages! {
     /// Force and torque.
     #[derive(Copy)]
     geometry_msgs/Wrench {
-        /// N.
+        /// Force, N.
         geometry_msgs/Vector3 force,
-        /// N·m.
+        /// Torque, N·m.
         geometry_msgs/Vector3 torque,
     }
 
-    /// The reading of a force/torque sensor, in its own frame, its bias not taken off.
+    /// Reading of a force/torque sensor, in its own frame, without bias compensation.
     geometry_msgs/WrenchStamped {
-        /// When it was measured, in which frame.
+        /// Time and frame of the measurement.
         std_msgs/Header header,
         /// Force and torque.
         geometry_msgs/Wrench wrench,
     }
 
-    /// A place, m.
+    /// A position, m.
     #[derive(Copy)]
     geometry_msgs/Point {
         /// Along x.
@@ -256,16 +256,16 @@ messages! {
         float64 w 1,
     }
 
-    /// A place and a rotation.
+    /// A position and a rotation.
     #[derive(Copy)]
     geometry_msgs/Pose {
-        /// Where.
+        /// Position.
         geometry_msgs/Point position,
-        /// How it is turned.
+        /// Rotation.
         geometry_msgs/Quaternion orientation,
     }
 
-    /// A colour, each part 0 to 1.
+    /// A colour, with components from 0 to 1.
     #[derive(Copy)]
     std_msgs/ColorRGBA {
         /// Red.
@@ -278,9 +278,9 @@ messages! {
         float32 a,
     }
 
-    /// A texture; a marker without one has an empty one.
+    /// A texture; empty in a marker without one.
     sensor_msgs/CompressedImage {
-        /// When.
+        /// Time.
         std_msgs/Header header,
         /// Empty.
         string format,
@@ -288,16 +288,16 @@ messages! {
         uint8[] data,
     }
 
-    /// A place in a texture.
+    /// A position in a texture.
     #[derive(Copy)]
     visualization_msgs/UVCoordinate {
-        /// Across.
+        /// Horizontal coordinate.
         float32 u,
-        /// Down.
+        /// Vertical coordinate.
         float32 v,
     }
 
-    /// A mesh; a marker of points has an empty one.
+    /// A mesh; empty in a marker of points.
     visualization_msgs/MeshFile {
         /// Empty.
         string filename,
@@ -305,31 +305,31 @@ messages! {
         uint8[] data,
     }
 
-    /// A shape that viewers draw, as of ROS 2 Humble.
+    /// A shape for visualisation, as of ROS 2 Humble.
     visualization_msgs/Marker {
-        /// When, and in which frame.
+        /// Time and frame.
         std_msgs/Header header,
-        /// Its name; with `id`, one that is sent again takes the place of the last.
+        /// Namespace; a marker with the same `ns` and `id` replaces the earlier one.
         string ns,
-        /// Tells it from others of its `ns`.
+        /// Identifier within its `ns`.
         int32 id,
-        /// The number of a [`Shape`].
+        /// Number of a [`Shape`].
         int32 r#type,
-        /// 0: it is shown.
+        /// Action; 0: shown.
         int32 action,
-        /// Of the points' frame in that of the header.
+        /// Pose of the points' frame in the header's frame.
         geometry_msgs/Pose pose,
-        /// Size of what stands at each point, m.
+        /// Size of the element at each point, m.
         geometry_msgs/Vector3 scale,
-        /// Of all points, unless they have their own.
+        /// Colour of all points without their own.
         std_msgs/ColorRGBA color,
-        /// Zero: for ever.
+        /// Lifetime; zero: forever.
         builtin_interfaces/Duration lifetime,
         /// Whether it moves with its frame.
         bool frame_locked,
-        /// Its points.
+        /// Points.
         geometry_msgs/Point[] points,
-        /// One for each point, or none.
+        /// Colours, one per point, or empty.
         std_msgs/ColorRGBA[] colors,
         /// Empty.
         string texture_resource,
@@ -343,34 +343,33 @@ messages! {
         string mesh_resource,
         /// Empty.
         visualization_msgs/MeshFile mesh_file,
-        /// Whether a mesh brings its own colours.
+        /// Whether a mesh contains its own colours.
         bool mesh_use_embedded_materials,
     }
 
-    /// The request of a service without arguments. ROS 2 has no empty message: one byte stands in
-    /// it.
+    /// Request of a service without arguments. ROS 2 has no empty message, so it contains one byte.
     std_srvs/TriggerRequest {
         /// Unused.
         uint8 structure_needs_at_least_one_member,
     }
 
-    /// The answer of a service without arguments.
+    /// Response of a service without arguments.
     #[derive(Eq)]
     std_srvs/TriggerResponse {
-        /// Whether it was done.
+        /// Whether the request succeeded.
         bool success,
-        /// What was, or why not.
+        /// Description of the result or the error.
         string message,
     }
 }
 
 const NANO: f64 = 1e9;
 
-/// Conversions from and to seconds.
+/// Implements conversions from and to seconds.
 macro_rules! seconds {
     ($($name:ident),*) => {$(
         impl $name {
-            /// Of seconds, rounded to nanoseconds.
+            /// Creates a time from seconds, rounded to nanoseconds.
             pub fn from_s(time_s: f64) -> Self {
                 let whole_s = time_s.floor();
                 let nanosec = ((time_s - whole_s) * NANO).round();
@@ -380,7 +379,7 @@ macro_rules! seconds {
                 }
             }
 
-            /// In seconds.
+            /// Returns the time in seconds.
             pub fn s(self) -> f64 {
                 f64::from(self.sec) + f64::from(self.nanosec) / NANO
             }
@@ -391,7 +390,7 @@ macro_rules! seconds {
 seconds!(Time, Duration);
 
 impl Header {
-    /// Of a moment, in seconds, in a frame.
+    /// Creates a header with a time in seconds and a frame.
     pub fn new(stamp_s: f64, frame_id: &str) -> Self {
         Self { stamp: Time::from_s(stamp_s), frame_id: frame_id.into() }
     }
@@ -415,19 +414,20 @@ impl From<Point3<f64>> for Point {
     }
 }
 
-/// What a marker's points are.
+/// Shape of a marker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// Joined by a line.
+    /// Points joined by a line.
     LineStrip = 4,
-    /// The centre of a ball each.
+    /// One ball per point.
     SphereList = 7,
-    /// Three each are the corners of a triangle.
+    /// One triangle per three points.
     TriangleList = 11,
 }
 
 impl Marker {
-    /// Named `ns`, of no points yet, to be drawn as `shape` of size `scale_m` in the frame `W`.
+    /// Creates a marker named `ns` without points, to be drawn as `shape` of size `scale_m` in the
+    /// frame `W`.
     pub fn new(ns: &str, shape: Shape, scale_m: f64, color: ColorRGBA) -> Self {
         Self {
             header: Header::new(0.0, "W"),

@@ -1,5 +1,5 @@
-//! A force/torque sensor straight over UDP, without ROS: the raw data transfer of ATI's Net F/T
-//! (manual 9620-05-Net FT).
+//! Force/torque sensor over UDP, without ROS: raw data transfer of ATI's Net F/T (manual
+//! 9620-05-Net FT).
 
 use nalgebra::Vector3;
 use palpate_explore::backend::Wrench;
@@ -13,15 +13,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Table `[backend.net_ft]`.
+/// Table `[backend.net_ft]`: a force/torque sensor over UDP.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NetFtSettings {
-    /// Host and port of the sensor, as in `"192.168.1.1:49152"`.
+    /// Host and port of the sensor, e.g. `"192.168.1.1:49152"`.
     pub address: String,
-    /// Counts per newton, as the sensor's own page says (`cfgcpf`).
+    /// Counts per newton, from the sensor's web page (`cfgcpf`).
     pub counts_per_n: f64,
-    /// Counts per newton metre (`cfgcpt`).
+    /// Counts per newton metre, from the sensor's web page (`cfgcpt`).
     pub counts_per_nm: f64,
 }
 
@@ -31,7 +31,7 @@ impl Checked for NetFtSettings {
             !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0)
         });
         rules.require("address", format!("\"{}\"", self.address), has_port, || {
-            "a host and a port, as in \"192.168.1.1:49152\"".into()
+            "a host and a port, e.g. \"192.168.1.1:49152\"".into()
         });
         rules.number("counts_per_n", self.counts_per_n, 1e-3..=1e12);
         rules.number("counts_per_nm", self.counts_per_nm, 1e-3..=1e12);
@@ -41,25 +41,25 @@ impl Checked for NetFtSettings {
 /// Length of a record: three counters, three forces, three torques.
 const RECORD: usize = 36;
 
-/// Requests: a header, a command, and how many samples (0: without end).
+/// Requests: a header, a command, and the number of samples (0: unlimited).
 const START: [u8; 8] = [0x12, 0x34, 0x00, 0x02, 0, 0, 0, 0];
 const STOP: [u8; 8] = [0x12, 0x34, 0x00, 0x00, 0, 0, 0, 0];
 
-/// How long a record is waited for before the stream is asked for again; chosen.
+/// Timeout after which the stream is requested again; a heuristic.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// What a record says.
+/// Contents of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Record {
-    /// Number of the record in the stream.
+    /// Sequence number in the stream.
     pub sequence: u32,
-    /// The sensor's own state; 0 is well.
+    /// Status of the sensor; 0 is OK.
     pub status: u32,
-    /// In the sensor's frame.
+    /// Wrench in the sensor's frame.
     pub wrench: Wrench,
 }
 
-/// Reads a record; none of another length.
+/// Reads a record; returns `None` for another length.
 pub fn record(bytes: &[u8], settings: &NetFtSettings) -> Option<Record> {
     let bytes: &[u8; RECORD] = bytes.try_into().ok()?;
     let word = |i: usize| {
@@ -78,14 +78,14 @@ pub fn record(bytes: &[u8], settings: &NetFtSettings) -> Option<Record> {
     })
 }
 
-/// A stream of records in a thread of its own.
+/// A stream of records, received in its own thread.
 pub struct NetFt {
     is_closed: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl NetFt {
-    /// Asks the sensor for its stream; `take` gets every record that is newer than the last.
+    /// Requests the sensor's stream; calls `take` with every record newer than the last.
     ///
     /// # Errors
     /// If the address cannot be reached.
@@ -101,7 +101,7 @@ impl NetFt {
         let thread = std::thread::spawn(move || {
             let mut bytes = [0; 2 * RECORD];
             let mut last = None;
-            // Who does not answer is asked again: the sensor may be switched on later.
+            // The request is repeated without an answer, since the sensor may be switched on later.
             let mut ask = true;
             while !closed.load(Ordering::Relaxed) {
                 if ask {

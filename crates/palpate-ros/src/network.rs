@@ -1,16 +1,16 @@
-//! Domain and network interfaces of ROS 2: from settings, else from the environment of ROS.
+//! Domain and network interfaces of ROS 2, from settings or from the ROS environment.
 
 use super::settings::{BackendSettings, DOMAIN_MAX};
 use std::net::{IpAddr, Ipv4Addr};
 
-/// The domain of DDS and the addresses of the interfaces that are multicast to and announced
-/// (`None` for all), by `settings`, the variables that `variable` returns and the `interfaces` of
-/// this machine, each with its IPv4 addresses. Settings come before variables: `ROS_DOMAIN_ID`,
-/// `ROS_LOCALHOST_ONLY` and `ROS_AUTOMATIC_DISCOVERY_RANGE`, as REP 2003 and the documentation of
-/// ROS 2 have them.
+/// Returns the DDS domain and the addresses of the interfaces for multicast and announcements
+/// (`None` for all), from `settings`, the environment variables returned by `variable`, and the
+/// `interfaces` of this machine with their IPv4 addresses. Settings have priority over variables:
+/// `ROS_DOMAIN_ID`, `ROS_LOCALHOST_ONLY` and `ROS_AUTOMATIC_DISCOVERY_RANGE`, as in REP 2003 and
+/// the documentation of ROS 2.
 ///
 /// # Errors
-/// If a variable has another value than is allowed, or an interface is not there; in words.
+/// If a variable has an invalid value, or an interface does not exist, as a message.
 pub fn network(
     settings: &BackendSettings,
     variable: impl Fn(&str) -> Option<String>,
@@ -55,7 +55,7 @@ pub fn network(
     Ok((domain, is_local.then(|| vec![Ipv4Addr::LOCALHOST.into()])))
 }
 
-/// Addresses of the interface with this name or address.
+/// Returns the addresses of the interface with this name or address.
 fn find(wanted: &str, interfaces: &[(String, Vec<IpAddr>)]) -> Result<Vec<IpAddr>, String> {
     let address: Option<IpAddr> = wanted.parse().ok();
     let connected = interfaces.iter().filter(|(_, addresses)| !addresses.is_empty());
@@ -68,7 +68,7 @@ fn find(wanted: &str, interfaces: &[(String, Vec<IpAddr>)]) -> Result<Vec<IpAddr
         (None, _) => {
             let known: Vec<&str> = connected.map(|(name, _)| name.as_str()).collect();
             Err(format!(
-                "backend.interfaces names {wanted:?}, which has no IPv4 address here; allowed are {}",
+                "backend.interfaces: {wanted:?} is not an interface with an IPv4 address on this machine; allowed are {}",
                 known.join(", ")
             ))
         }

@@ -1,4 +1,4 @@
-//! ROS 2, by RustDDS: no installation of ROS, no master.
+//! ROS 2 transport by RustDDS, without an installation of ROS.
 
 use super::definition::Described;
 use super::message::{
@@ -30,20 +30,20 @@ use std::time::{Duration, Instant};
 impl ros2_client::Message for TriggerRequest {}
 impl ros2_client::Message for TriggerResponse {}
 
-/// Messages that wait in a reader or writer; chosen, more than come while a thread is held up.
+/// Queue length of a reader or writer; a heuristic: more than arrive while a thread is delayed.
 const DEPTH: usize = 64;
 
-/// Token of the waker; every other one is looked at whatever woke the thread.
+/// Token of the waker; all other sources are read after every wake-up.
 const WAKE: Token = Token(0);
 
-/// Hands over what has arrived on a topic.
+/// Passes on the messages received on a topic.
 type Reader = Box<dyn Fn(&mut dyn FnMut(Delivery))>;
-/// Publishes a packet if it is of its topic and type.
+/// Publishes a packet if its topic and type match.
 type Writer = Box<dyn Fn(&Packet) -> Option<Result<(), String>>>;
-/// A client with the time at which it was made.
+/// A client with its time of creation.
 type MadeClient = (Client<TriggerRequest, TriggerResponse>, Instant);
 
-/// One side's end in a ROS 2 network.
+/// One side in a ROS 2 network.
 pub struct Ros2 {
     context: Context,
     node: Node,
@@ -55,27 +55,27 @@ pub struct Ros2 {
     readers: Vec<Reader>,
     writers: Vec<Writer>,
     mapping: MappingKind,
-    /// Services with their clients, once servers are found, and when those were made.
+    /// Services with their clients and creation times, once servers are found.
     clients: Vec<(Service, Option<MadeClient>)>,
-    /// When servers were looked for last.
+    /// Time of the last search for servers.
     looked: Instant,
     servers: Vec<(Service, Server<TriggerRequest, TriggerResponse>)>,
     calls: HashMap<u64, RmwRequestId>,
     call_count: u64,
 }
 
-/// How often servers are looked for.
+/// Interval of the search for servers.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// From when a client is made until its server knows of it, so that a request is not lost.
+/// Delay from the creation of a client until its server knows it, so that a request is not lost.
 // heuristic: several exchanges of endpoint discovery on a local network.
 const SETTLE: Duration = Duration::from_millis(200);
 
-/// Vendor of Eclipse Cyclone DDS in the first two bytes of a GUID (RTPS 2.5, section 9.3.1.3; list
-/// of vendors of the DDS Foundation).
+/// Vendor id of Eclipse Cyclone DDS in the first two bytes of a GUID (RTPS 2.5, section 9.3.1.3;
+/// list of vendors of the DDS Foundation).
 const CYCLONE: [u8; 2] = [0x01, 0x10];
 
-/// What a writer promises: nobody has to ask for less, and it never waits.
+/// QoS of a writer: compatible with all readers, and never blocking.
 fn reliable() -> QosProfile {
     QosProfile::publisher_default()
         .reliability_reliable(WhenFull::Fail)
@@ -83,17 +83,17 @@ fn reliable() -> QosProfile {
         .history(History::KeepLast { depth: DEPTH })
 }
 
-/// What a reader asks for: what sensors' drivers promise.
+/// QoS of a reader: compatible with sensor drivers.
 fn best_effort() -> QosProfile {
     QosProfile::subscription_default().history(History::KeepLast { depth: DEPTH })
 }
 
-/// QoS of a reader that is also sent the last message published before it came.
+/// QoS of a reader that also receives the last message published before its creation.
 fn latched() -> QosProfile {
     reliable().durability(Durability::TransientLocal)
 }
 
-/// The network interfaces of this machine with their IPv4 addresses.
+/// Returns the network interfaces of this machine with their IPv4 addresses.
 fn interfaces() -> Vec<(String, Vec<IpAddr>)> {
     let addresses =
         |one: &netdev::Interface| one.ipv4.iter().map(|net| net.addr().into()).collect();
@@ -101,7 +101,7 @@ fn interfaces() -> Vec<(String, Vec<IpAddr>)> {
 }
 
 impl Ros2 {
-    /// An end on one side of the arm of `settings`; `services` are those that are called or served.
+    /// Opens one side of the arm of `settings`; `services` are those that are called or served.
     ///
     /// # Errors
     /// If the network cannot be joined.
@@ -160,7 +160,8 @@ impl Ros2 {
         self.topic::<WrenchStamped>(Topic::Wrench)?;
         self.topic::<DiagnosticArray>(Topic::Status)?;
         if self.side == Side::Explorer {
-            // One that is published on change was so before this side came.
+            // A status that is published on change may have been published before this side
+            // started.
             self.subscribe::<DiagnosticArray>(Topic::Status, latched())?;
         }
         match self.topics.tactile.message {
@@ -173,8 +174,8 @@ impl Ros2 {
         }
     }
 
-    /// A topic with messages of type `M`: a writer on the side that publishes it, a reader on the
-    /// other.
+    /// Creates a topic with messages of type `M`: a writer on the side that publishes it, a reader
+    /// on the other.
     fn topic<M>(&mut self, topic: Topic) -> Result<(), Invalid>
     where
         M: Packed + Described + Serialize + DeserializeOwned + Clone + 'static,
@@ -195,7 +196,7 @@ impl Ros2 {
         Ok(())
     }
 
-    /// The name of a topic, and what DDS has for it.
+    /// Returns the name of a topic, and its DDS topic.
     fn dds_topic<M: Described>(
         &mut self,
         topic: Topic,
@@ -208,7 +209,7 @@ impl Ros2 {
         Ok((name, dds))
     }
 
-    /// A reader of messages of type `M`.
+    /// Creates a reader of messages of type `M`.
     fn subscribe<M>(&mut self, topic: Topic, qos: QosProfile) -> Result<(), Invalid>
     where
         M: Packed + Described + DeserializeOwned + 'static,
@@ -240,7 +241,7 @@ impl Ros2 {
     fn serve(&mut self, service: Service) -> Result<(), Invalid> {
         let name = service.name(self.topics.namespace());
         let path = Name::parse(&name).map_err(cannot_open(&name))?;
-        // Who calls cannot be known before: the usual one, unless it is said.
+        // The client's vendor is not known in advance: the default mapping, unless set.
         let mapping = mapping(self.mapping, [0, 0]);
         let mut server = self
             .node
@@ -251,12 +252,12 @@ impl Ros2 {
         Ok(())
     }
 
-    /// The client of a service whose server was found.
+    /// Returns the client of a service whose server was found.
     fn client(&self, service: &Service) -> Option<&MadeClient> {
         self.clients.iter().find(|(other, _)| other == service)?.1.as_ref()
     }
 
-    /// Makes clients for the servers that were found since.
+    /// Creates clients for newly found servers.
     fn look_for_servers(&mut self) {
         let is_open = self.clients.iter().all(|(_, client)| client.is_some());
         if is_open || self.looked.elapsed() < LOOK {
@@ -267,7 +268,7 @@ impl Ros2 {
         for i in 0..self.clients.len() {
             let (service, None) = &self.clients[i] else { continue };
             let name = service.name(self.topics.namespace());
-            // As rmw names the topic of a service's requests.
+            // Name of the topic of a service's requests, as in rmw.
             let requests = format!("rq{name}Request");
             let is_server = |topic: &str| topic == requests;
             let server =
@@ -277,7 +278,7 @@ impl Ros2 {
             let mapping = mapping(self.mapping, [guid[0], guid[1]]);
             let Ok(path) = Name::parse(&name) else { continue };
             let made = self.node.create_client(mapping, &path, &trigger(), reliable(), reliable());
-            // One that cannot be made stays unfound, and the caller's timeout says so.
+            // If it fails, the server stays unfound, and the caller's timeout reports it.
             let Ok(mut client) = made else { continue };
             if self.watch(&mut client, &name).is_ok() {
                 self.clients[i].1 = Some((client, Instant::now()));
@@ -285,7 +286,7 @@ impl Ros2 {
         }
     }
 
-    /// Has the poll woken by what arrives at `source`.
+    /// Registers `source` with the poll.
     fn watch(&self, source: &mut impl mio1::event::Source, name: &str) -> Result<(), Invalid> {
         let token = Token(WAKE.0 + 1);
         self.poll.registry().register(source, token, Interest::READABLE).map_err(cannot_open(name))
@@ -296,7 +297,7 @@ fn trigger() -> ServiceTypeName {
     ServiceTypeName::new("std_srvs", "Trigger")
 }
 
-/// How a service is carried whose server is of this vendor.
+/// Returns the mapping of a service for a server of this vendor.
 fn mapping(kind: MappingKind, vendor: [u8; 2]) -> ServiceMapping {
     match kind {
         MappingKind::Cyclone => ServiceMapping::Cyclone,
@@ -321,7 +322,7 @@ impl Transport for Ros2 {
     }
 
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery)) {
-        // What interrupts a wait is nothing to act on.
+        // Interruptions of a wait are ignored.
         let _ = self.poll.poll(&mut self.events, Some(timeout));
         self.readers.iter().for_each(|reader| reader(take));
         for (service, server) in &self.servers {

@@ -1,4 +1,4 @@
-//! Which body carries out the touches of an experiment: table `[backend]`.
+//! Settings of the backend: table `[backend]`.
 
 use super::joints::JointNames;
 use super::net_ft::NetFtSettings;
@@ -10,21 +10,21 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Value;
 
-/// Which body carries out the touches.
+/// Kind of backend that makes the touches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BackendKind {
-    /// The scene's own, simulated.
+    /// The simulator of the scene.
     #[default]
     Simulated,
-    /// An arm, or its twin, behind topics of ROS 2.
+    /// An arm, or its simulated twin, behind ROS 2 topics.
     Ros2,
-    /// An arm, or its twin, behind topics of ROS 1.
+    /// An arm, or its simulated twin, behind ROS 1 topics.
     Ros1,
 }
 
 impl BackendKind {
-    /// As a file names it.
+    /// Returns its name in a file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Simulated => "simulated",
@@ -34,73 +34,73 @@ impl BackendKind {
     }
 }
 
-/// How services of ROS 2 are carried over DDS.
+/// Mapping of ROS 2 services to DDS.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MappingKind {
-    /// The default of the server's vendor.
+    /// Default of the server's vendor.
     #[default]
     Auto,
-    /// The request's identity in the inline QoS: Fast DDS, RTI Connext, RustDDS.
+    /// Request identity in the inline QoS: Fast DDS, RTI Connext, RustDDS.
     Enhanced,
-    /// The request's identity in a header of the payload: Eclipse Cyclone DDS.
+    /// Request identity in a header of the payload: Eclipse Cyclone DDS.
     Cyclone,
-    /// The header of "basic" RPC over DDS: RTI Connext, where set so.
+    /// Header of "basic" RPC over DDS: RTI Connext, if configured so.
     Basic,
 }
 
-/// Table `[backend]` of an experiment; all but `kind` matters for an arm behind topics only.
+/// Table `[backend]` of an experiment; except for `kind` it applies to an arm behind topics only.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct BackendSettings {
-    /// Which body carries out the touches.
+    /// Kind of backend: simulated, or an arm behind ROS topics.
     pub kind: BackendKind,
-    /// Domain of ROS 2. Left out, `ROS_DOMAIN_ID` of the environment, or 0.
+    /// ROS 2 domain; default: the environment's `ROS_DOMAIN_ID`, or 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub domain: Option<u16>,
-    /// Network interfaces for ROS 2, by name or address, as in `["eth1"]`. Left out, those that
-    /// `ROS_LOCALHOST_ONLY` and `ROS_AUTOMATIC_DISCOVERY_RANGE` of the environment allow, or all.
+    /// Network interfaces for ROS 2, e.g. `["eth1"]`; default: from `ROS_LOCALHOST_ONLY` and
+    /// `ROS_AUTOMATIC_DISCOVERY_RANGE`, or all.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub interfaces: Vec<String>,
-    /// How services of ROS 2 are carried over DDS; `auto` follows the vendor of the server.
+    /// Mapping of ROS 2 services to DDS; `auto` follows the server's vendor.
     pub service_mapping: MappingKind,
-    /// Where the master of ROS 1 is.
+    /// Address of the ROS 1 master.
     pub master: String,
-    /// Names of the joints in the lab's messages, from the base on; left out, the manufacturer's.
+    /// Joint names in messages, from the base on; default: the manufacturer's.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub joints: Vec<String>,
-    /// Which finger of the hand explores, as its driver counts.
+    /// Index of the finger in the driver's messages.
     pub finger: u16,
-    /// Control ticks in a second.
+    /// Control ticks per second, Hz.
     pub rate_hz: f64,
-    /// How long the arm's side is waited for.
+    /// Connection timeout, s.
     pub patience_s: f64,
-    /// Whether messages without a stamp are accepted; their age then counts from receipt.
+    /// Whether messages without a stamp are accepted; their age counts from receipt.
     pub accept_unstamped: bool,
-    /// Whether the status is published on change only, latched (transient local): its age then says
-    /// nothing, and the arm counts as lost when the publisher is gone.
+    /// Whether the status is published on change only (latched); the arm then counts as lost
+    /// without a publisher.
     pub status_on_change: bool,
-    /// A force/torque sensor that is read over UDP in place of its topic.
+    /// Force/torque sensor read over UDP instead of its topic.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub net_ft: Option<NetFtSettings>,
-    /// Where the body is stopped, whatever it is told; of a simulated one too.
+    /// Interlock limits, for real and simulated robots.
     #[serde(skip_serializing_if = "is_default")]
     pub interlocks: InterlockSettings,
-    /// What an arm and its sensors must be like before it is moved.
+    /// Start checks of arm and sensors.
     #[serde(skip_serializing_if = "is_default")]
     pub gates: GateSettings,
-    /// The table of topics.
+    /// Topics of the arm.
     pub topics: Topics,
 }
 
-/// Largest domain of DDS: ports of a larger one would exceed 65535 (RTPS 2.5, section 9.6.2).
+/// Largest DDS domain: ports of a larger one would exceed 65535 (RTPS 2.5, section 9.6.2).
 pub const DOMAIN_MAX: u16 = 232;
 
-/// Most ticks in a second: the cycle of the PA-10's servo driver, 2 ms (`hydro`, Orca robotics).
+/// Largest rate: the cycle of the PA-10's servo driver, 2 ms (`hydro`, Orca robotics).
 const RATE_MAX_HZ: f64 = 500.0;
 
 impl Default for BackendSettings {
-    /// Chosen, but for the rate: that at which labs send joint states.
+    /// Heuristics, except the rate, which is the usual rate of joint states.
     fn default() -> Self {
         Self {
             kind: BackendKind::Simulated,
@@ -122,11 +122,11 @@ impl Default for BackendSettings {
     }
 }
 
-/// How far stamps may be ahead of this machine's clock, s.
-// heuristic: several times what NTP leaves between the clocks of a local network.
+/// Largest lead of a stamp over this machine's clock, s.
+// heuristic: several times the NTP offset between clocks of a local network.
 pub const CLOCK_AHEAD_S: f64 = 0.005;
 
-/// Keys of version 0.1 that had no effect on a run.
+/// Keys of version 0.1 without an effect on a run.
 const UNUSED_KEYS: [&str; 6] = [
     "gates.near",
     "topics.joints.rate_hz",
@@ -136,12 +136,12 @@ const UNUSED_KEYS: [&str; 6] = [
     "topics.command.rate_hz",
 ];
 
-/// Takes the keys that version 0.1 read in `[backend]`, and wrote with their defaults, out of the
-/// experiment in `loader`.
+/// Removes from the experiment in `loader` the keys that version 0.1 read in `[backend]`, and wrote
+/// with their defaults.
 ///
 /// # Errors
-/// If one has another value than the constant that holds now: a limit of an arm does not change
-/// without notice.
+/// If one has a value other than the present constant: a limit of an arm does not change without
+/// notice.
 pub fn take_former_keys(loader: &mut Loader) -> Result<(), ConfigError> {
     UNUSED_KEYS.iter().for_each(|key| drop(loader.take(&format!("backend.{key}"))));
     let numbers = FORMER_KEYS.into_iter().chain([("clock_ahead_s", CLOCK_AHEAD_S)]);
@@ -158,7 +158,7 @@ pub fn take_former_keys(loader: &mut Loader) -> Result<(), ConfigError> {
             None => value == constant,
         };
         if !is_same {
-            let allowed = format!("{constant}, which is a constant now: remove the key");
+            let allowed = format!("{constant}, which is now a constant; remove the key");
             return Err(loader.not_allowed(&key, &value.to_string(), &allowed));
         }
     }
@@ -166,8 +166,8 @@ pub fn take_former_keys(loader: &mut Loader) -> Result<(), ConfigError> {
 }
 
 impl BackendSettings {
-    /// Takes what the file leaves to the model of `arm` from it, or from the default arm's for a
-    /// stage; a model that cannot be read is an error of the scene, where it is built.
+    /// Sets omitted values from the model of `arm`, or from that of the default arm for a stage; an
+    /// unreadable model is reported with the scene, where it is built.
     pub fn complete(&mut self, arm: Option<&ArmSettings>) {
         if self.topics.namespace.is_none() {
             let arm = arm.cloned().unwrap_or_default();
@@ -176,12 +176,12 @@ impl BackendSettings {
         }
     }
 
-    /// Whether messages of `topic` come on change only.
+    /// Whether messages of `topic` are sent on change only.
     pub fn is_on_change(&self, topic: Topic) -> bool {
         topic == Topic::Status && self.status_on_change
     }
 
-    /// The joints of `chain` as the lab names them.
+    /// Returns the joints of `chain` with their names in messages.
     pub fn joint_names(&self, chain: &Chain) -> JointNames {
         JointNames::new(match self.joints.as_slice() {
             [] => chain.joints.iter().map(|joint| joint.name.to_string()).collect(),
@@ -197,14 +197,14 @@ impl Checked for BackendSettings {
         }
         let is_address = self.master.starts_with("http://") && self.master.len() > 7;
         rules.require("master", format!("\"{}\"", self.master), is_address, || {
-            "an address, as in \"http://127.0.0.1:11311\"".into()
+            "an address, e.g. \"http://127.0.0.1:11311\"".into()
         });
         rules.number("rate_hz", self.rate_hz, 50.0..=RATE_MAX_HZ);
         rules.number("patience_s", self.patience_s, 0.1..=600.0);
         for (i, name) in self.joints.iter().enumerate() {
             let is_new = !name.is_empty() && !self.joints[..i].contains(name);
             rules.require(&format!("joints[{i}]"), format!("\"{name}\""), is_new, || {
-                "a name of its own".into()
+                "a unique name".into()
             });
         }
         if let Some(net_ft) = &self.net_ft {

@@ -1,10 +1,10 @@
-//! The state of an arm, as its own computer reports it.
+//! State of an arm, as reported by its computer.
 
 use super::message::{DiagnosticArray, DiagnosticStatus, Header, KeyValue};
 use palpate_input::error::Invalid;
 use serde::Serialize;
 
-/// The arm's state.
+/// State of an arm.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ArmStatus {
     /// Whether the servos are on.
@@ -17,9 +17,9 @@ pub struct ArmStatus {
     pub deadman: bool,
     /// Whether the arm holds its position and ignores commands.
     pub hold: bool,
-    /// What is wrong, until it is cleared; empty if nothing is.
+    /// Description of a fault until it is cleared; empty if there is none.
     pub alarm: String,
-    /// How many of its own control periods the arm's computer has missed.
+    /// Number of control periods missed by the arm's computer.
     pub overruns: u64,
 }
 
@@ -30,11 +30,11 @@ const ERROR: u8 = 2;
 /// Keys of the flags, in the order of the fields.
 const FLAGS: [&str; 5] = ["servo_on", "brake", "estop", "deadman", "hold"];
 
-/// Spellings of false and true, in any case: those that drivers write as text.
+/// Spellings of false and true, in any case, used by drivers.
 const WORDS: [[&str; 2]; 3] = [["false", "true"], ["0", "1"], ["off", "on"]];
 
 impl ArmStatus {
-    /// Returns why the arm must not be commanded, or `None` if it may move.
+    /// Returns the reason why the arm must not be commanded, or `None` if it may move.
     pub fn refusal(&self) -> Option<String> {
         if self.estop {
             Some("emergency stop".into())
@@ -53,12 +53,12 @@ impl ArmStatus {
         }
     }
 
-    /// Whether nothing but an operator can make the arm move again.
+    /// Whether only an operator can make the arm move again.
     pub fn needs_operator(&self) -> bool {
         self.estop || !self.deadman || !self.alarm.is_empty()
     }
 
-    /// Returns the message that reports this state as that of `device`.
+    /// Returns a message that reports this state for `device`.
     pub fn message(&self, stamp_s: f64, device: &str) -> DiagnosticArray {
         let flags = [self.servo_on, self.brake, self.estop, self.deadman, self.hold];
         let flags = FLAGS.into_iter().zip(flags.map(|is| is.to_string()));
@@ -75,11 +75,12 @@ impl ArmStatus {
         DiagnosticArray { header: Header::new(stamp_s, ""), status: vec![status] }
     }
 
-    /// Reads the entries of `device` in a message; `None` if it has none, as a message of another
-    /// device. A level of error or worse counts as an alarm, unless flags explain it.
+    /// Reads the entries of `device` in a message; returns `None` if there are none, as in a
+    /// message of another device. A level of error or worse counts as an alarm, unless flags
+    /// explain it.
     ///
     /// # Errors
-    /// If a flag is missing or unreadable, which does not say that the arm may move.
+    /// If a flag is missing or unreadable, so that motion may not be permitted.
     pub fn read(message: &DiagnosticArray, device: &str) -> Result<Option<Self>, Invalid> {
         let of_arm = |status: &&DiagnosticStatus| status.name == device;
         let entries: Vec<_> = message.status.iter().filter(of_arm).collect();
@@ -116,7 +117,7 @@ impl ArmStatus {
     }
 }
 
-/// The boolean of `key`; otherwise what stands in its place.
+/// Returns the boolean of `key`; otherwise its text as the error.
 fn flag(entries: &[&DiagnosticStatus], key: &str) -> Result<bool, String> {
     let all = entries.iter().flat_map(|status| &status.values);
     let mut values = all.filter(|entry| entry.key == key);

@@ -1,4 +1,4 @@
-//! A tactile frame as the two drivers send it.
+//! Conversion of tactile frames from and to the messages of the two drivers.
 
 use super::message::{BioTacData, BioTacHand, BioTacTime, Biotac, BiotacAll, Header, Time};
 use super::topics::TactileMessage;
@@ -6,13 +6,13 @@ use super::transport::Packet;
 use palpate_explore::robot::finger::Frame;
 use palpate_explore::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS, VIBRATIONS};
 
-/// Reads the frame of a finger out of a packet of the tactile topic; it gets the time `time_s`.
-/// None if the hand has no such finger, or one of another model.
+/// Reads the frame of a finger from a packet of the tactile topic, with the time `time_s`. Returns
+/// `None` if the hand lacks this finger, or its model differs.
 pub fn frame(packet: &Packet, finger: usize, time_s: f64) -> Option<Frame> {
     let (electrodes, pac, [pdc, tdc, tac]) = match packet {
         Packet::Hand(hand) => {
             let is_it = |data: &&BioTacData| usize::from(data.bt_position) == finger;
-            // The driver counts positions from 1; with one finger its number does not matter.
+            // The driver numbers positions from 1; with one finger the number is ignored.
             let data = match hand.bt_data.as_slice() {
                 [only] => only,
                 many => many.iter().find(is_it)?,
@@ -40,8 +40,8 @@ pub fn frame(packet: &Packet, finger: usize, time_s: f64) -> Option<Frame> {
     })
 }
 
-/// Puts a frame into `data` as the BioTac's own driver sends it: whole counts, 0 where there are
-/// none.
+/// Writes a frame to `data` in the format of the BioTac's own driver: whole counts, 0 for missing
+/// channels.
 pub fn fill(data: &mut BioTacData, frame: &Frame) {
     let whole =
         |counts: Option<f64>| counts.unwrap_or(0.0).clamp(0.0, FULL_SCALE_COUNTS).round() as u16;
@@ -52,7 +52,7 @@ pub fn fill(data: &mut BioTacData, frame: &Frame) {
     data.electrode_data = std::array::from_fn(|i| whole(frame.electrode_counts.map(|all| all[i])));
 }
 
-/// The packet of a frame; what the frame lacks is 0 counts.
+/// Returns the packet of a frame; missing channels are 0 counts.
 pub fn packet(frame: &Frame, stamp_s: f64, finger: usize, message: TactileMessage) -> Packet {
     let mut data = BioTacData { bt_position: finger as u16, ..BioTacData::default() };
     fill(&mut data, frame);

@@ -1,4 +1,4 @@
-//! The topics of an arm, their names, message types and ages; and its services.
+//! Topics of an arm: names, message types and age limits; and its services.
 
 use super::definition::Described;
 use super::message::{
@@ -9,49 +9,49 @@ use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is sent between an arm and who explores with it.
+/// Topic between an arm and the explorer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Topic {
-    /// The arm's joints.
+    /// Joint states of the arm.
     Joints,
-    /// The force/torque sensor.
+    /// Force/torque sensor.
     Wrench,
-    /// The fingertip.
+    /// Tactile frames of the fingertip.
     Tactile,
-    /// The arm's own state.
+    /// State of the arm.
     Status,
-    /// Joint velocities, to the arm.
+    /// Joint velocity commands to the arm.
     Command,
 }
 
-/// Which end of the topics.
+/// Side of the topics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// Who commands and reads.
+    /// The explorer, which sends commands and receives readings.
     Explorer,
-    /// Who is commanded and read: an arm's computer, or its twin.
+    /// The arm's computer or its simulated twin.
     Arm,
 }
 
 impl Topic {
-    /// All of them, in the order of the table.
+    /// All topics, in the order of the table.
     pub const ALL: [Self; 5] =
         [Self::Joints, Self::Wrench, Self::Tactile, Self::Status, Self::Command];
 
-    /// Who publishes it.
+    /// Returns the side that publishes it.
     pub fn publisher(self) -> Side {
         if self == Self::Command { Side::Explorer } else { Side::Arm }
     }
 
-    /// Its key in `[backend.topics]`.
+    /// Returns its key in `[backend.topics]`.
     pub fn key(self) -> &'static str {
         ["joints", "wrench", "tactile", "status", "command"][self as usize]
     }
 }
 
-/// Default name and age in s of each topic, as drivers send them (`pa10_hardware_interface`,
+/// Default name and age limit, s, of each topic, as used by drivers (`pa10_hardware_interface`,
 /// `kth-ros-pkg/biotac_driver`, `netft_rdt_driver`).
-// heuristic: the ages; some frames of each topic may be lost.
+// heuristic: the age limits; some frames of each topic may be lost.
 const USUAL: [(&str, f64); 5] = [
     ("/joint_states", 0.05),
     ("/ft_sensor/wrench", 0.06),
@@ -63,11 +63,11 @@ const USUAL: [(&str, f64); 5] = [
 /// Message type of tactile frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum TactileMessage {
-    /// That of the BioTac's own driver.
+    /// Message of the BioTac's own driver.
     #[default]
     #[serde(rename = "biotac_sensors/msg/BioTacHand")]
     Hand,
-    /// That of a Shadow hand.
+    /// Message of a Shadow hand.
     #[serde(rename = "sr_robot_msgs/msg/BiotacAll")]
     Fingers,
 }
@@ -75,31 +75,30 @@ pub enum TactileMessage {
 /// Message type of velocity commands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum CommandMessage {
-    /// With names, stamp and validity.
+    /// Trajectory point with names, stamp and validity.
     #[default]
     #[serde(rename = "trajectory_msgs/msg/JointTrajectory")]
     Trajectory,
-    /// As `ros_control` takes them, without names and stamp.
+    /// Velocities for `ros_control`, without names and stamp.
     #[serde(rename = "std_msgs/msg/Float64MultiArray")]
     Velocities,
 }
 
-/// The settings of a topic, with its own defaults.
+/// Defines the settings of a topic, with its own defaults.
 macro_rules! topic_settings {
     ($name:ident, $topic:expr $(, $message:ident)?) => {
         /// Name and age limit of a topic.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct $name {
-            /// Its name; without a slash at the beginning, in the namespace.
+            /// Name; in the namespace unless it begins with a slash.
             pub name: String,
             $(
-                /// Its message type.
+                /// Message type.
                 #[serde(rename = "type")]
                 pub message: $message,
             )?
-            /// Age beyond which what was last received counts as lost; of a command: how long it is
-            /// valid.
+            /// Age limit of the last message, s; for a command, its validity.
             pub age_s: f64,
         }
 
@@ -118,28 +117,28 @@ topic_settings!(TactileTopic, Topic::Tactile, TactileMessage);
 topic_settings!(StatusTopic, Topic::Status);
 topic_settings!(CommandTopic, Topic::Command, CommandMessage);
 
-/// Table `[backend.topics]`.
+/// Table `[backend.topics]`: topics of the arm.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Topics {
-    /// Namespace of the arm's services, and of topics without a slash at the beginning. Left out,
-    /// that of the arm's model.
+    /// Namespace of services and of topics without a leading slash; default: that of the arm's
+    /// model.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub namespace: Option<String>,
-    /// The arm's joints, from it.
+    /// Joint states, from the arm.
     pub joints: JointsTopic,
-    /// The force/torque sensor, in its own frame, its bias not taken off.
+    /// Force/torque sensor in its own frame, without bias compensation.
     pub wrench: WrenchTopic,
-    /// The fingertip.
+    /// Tactile frames of the fingertip.
     pub tactile: TactileTopic,
-    /// The arm's own state: servos, brakes, emergency stop, dead-man switch, alarm.
+    /// State of the arm: servos, brakes, emergency stop, dead-man switch, alarm.
     pub status: StatusTopic,
-    /// Joint velocities, to the arm.
+    /// Joint velocity commands, to the arm.
     pub command: CommandTopic,
 }
 
 impl Topics {
-    /// Name, without its namespace, and age of a topic.
+    /// Returns the name, without its namespace, and the age limit of a topic.
     fn entry(&self, topic: Topic) -> (&str, f64) {
         match topic {
             Topic::Joints => (&self.joints.name, self.joints.age_s),
@@ -150,7 +149,7 @@ impl Topics {
         }
     }
 
-    /// Name of a topic, in its namespace.
+    /// Returns the name of a topic, with its namespace.
     pub fn name(&self, topic: Topic) -> String {
         match self.entry(topic).0 {
             name if name.starts_with('/') => name.into(),
@@ -158,12 +157,12 @@ impl Topics {
         }
     }
 
-    /// Age beyond which what was last received on a topic counts as lost.
+    /// Returns the age limit of the last message of a topic.
     pub fn age_s(&self, topic: Topic) -> f64 {
         self.entry(topic).1
     }
 
-    /// Message type of a topic.
+    /// Returns the message type of a topic.
     pub fn type_name(&self, topic: Topic) -> &'static str {
         match topic {
             Topic::Joints => JointState::DEFINITION.name,
@@ -180,47 +179,47 @@ impl Topics {
         }
     }
 
-    /// Namespace of the arm's services.
+    /// Returns the namespace of the arm's services.
     pub fn namespace(&self) -> &str {
         self.namespace.as_deref().unwrap_or_default()
     }
 
-    /// Name of the entry of the arm in its status: its namespace without slashes.
+    /// Returns the name of the arm's entry in its status: its namespace without slashes.
     pub fn device(&self) -> &str {
         self.namespace().trim_matches('/')
     }
 }
 
-/// A service of the arm's side, without arguments (`std_srvs/Trigger`).
+/// A service of the arm, without arguments (`std_srvs/Trigger`).
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Service {
-    /// Stops and stays, whatever is commanded.
+    /// Stops the arm and ignores commands.
     Hold,
-    /// Listens to commands again.
+    /// Accepts commands again.
     Unhold,
-    /// Stops at once and brakes: as the emergency stop.
+    /// Stops immediately by the brakes, like the emergency stop.
     Stop,
-    /// Forgets faults; the operator's.
+    /// Clears faults; for the operator.
     ClearFault,
-    /// Takes what the force/torque sensor says now as its zero.
+    /// Sets the zero of the force/torque sensor to its current value.
     Bias,
-    /// Of a twin only: begins or ends a failure, by its name.
+    /// Starts or ends a failure by its name; supported by a twin only.
     Twin(&'static str),
 }
 
 impl Service {
-    /// Those that every arm has.
+    /// Services of every arm.
     pub const COMMON: [Self; 5] =
         [Self::Hold, Self::Unhold, Self::Stop, Self::ClearFault, Self::Bias];
 
-    /// Whether calling it twice does the same as once: not so for a bias, which may be taken
-    /// under load the second time, nor for a twin's failure, which it would end.
+    /// Whether a second call has no further effect: false for a bias, which may be taken under load
+    /// the second time, and for a twin's failure, which it would end.
     pub fn is_idempotent(&self) -> bool {
         matches!(self, Self::Hold | Self::Unhold | Self::Stop | Self::ClearFault)
     }
 
-    /// Its name at an arm with this namespace.
+    /// Returns its name for an arm with this namespace.
     pub fn name(&self, namespace: &str) -> String {
         match self {
             Self::Hold => format!("{namespace}/hold"),
@@ -240,7 +239,7 @@ impl Checked for Topics {
             "namespace",
             format!("{namespace:?}"),
             namespace.is_none_or(|name| name.starts_with('/') && !name.ends_with('/')),
-            || "a slash and a name".into(),
+            || "a name that begins with a slash".into(),
         );
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "_/".contains(c);
         let names = Topic::ALL.map(|topic| self.name(topic));
@@ -255,7 +254,7 @@ impl Checked for Topics {
                 &key,
                 format!("\"{}\"", names[i]),
                 !names[..i].contains(&names[i]),
-                || "a name of its own".into(),
+                || "a unique name".into(),
             );
             rules.number(&format!("{}.age_s", topic.key()), age_s, 1e-3..=10.0);
         }

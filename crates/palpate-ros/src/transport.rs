@@ -1,4 +1,4 @@
-//! Packets and what carries them between the two sides: ROS 2, ROS 1, or a channel of a test.
+//! Packets, and the transports that carry them: ROS 2, ROS 1, or a channel for tests.
 
 use super::message::{
     BioTacHand, BiotacAll, DiagnosticArray, Float64MultiArray, JointState, JointTrajectory, Time,
@@ -8,9 +8,9 @@ use super::topics::{Service, Topic};
 use palpate_input::error::Invalid;
 use std::time::{Duration, Instant};
 
-/// A message that is sent in a [`Packet`].
+/// A message type of a [`Packet`].
 pub trait Packed: Into<Packet> {
-    /// The message in `packet`, if it is of this type.
+    /// Returns the message in `packet`, if it is of this type.
     fn in_packet(packet: &Packet) -> Option<&Self>;
 }
 
@@ -23,7 +23,7 @@ macro_rules! packets {
         }
 
         impl Packet {
-            /// Over which topic it goes.
+            /// Returns its topic.
             pub fn topic(&self) -> Topic {
                 match self {
                     $(Self::$kind(_) => Topic::$topic,)*
@@ -49,24 +49,24 @@ macro_rules! packets {
 }
 
 packets! {
-    /// The arm's joints.
+    /// Joint states of the arm.
     Joints(JointState): JointState on Joints,
     /// Force and torque.
     Wrench(WrenchStamped): WrenchStamped on Wrench,
     /// A tactile frame of the BioTac's own driver.
     Hand(Box<BioTacHand>): BioTacHand on Tactile,
-    /// The same of a Shadow hand.
+    /// Tactile frame of a Shadow hand.
     Fingers(Box<BiotacAll>): BiotacAll on Tactile,
-    /// The arm's state.
+    /// State of the arm.
     Status(DiagnosticArray): DiagnosticArray on Status,
     /// Joint velocities with names and validity.
     Command(JointTrajectory): JointTrajectory on Command,
-    /// Joint velocities as `ros_control` takes them.
+    /// Joint velocities for `ros_control`.
     Velocities(Float64MultiArray): Float64MultiArray on Command,
 }
 
 impl Packet {
-    /// The stamp of its header, where the message type has one.
+    /// Returns the stamp of its header, if the message type has one.
     pub fn stamp_mut(&mut self) -> Option<&mut Time> {
         let header = match self {
             Self::Joints(message) => &mut message.header,
@@ -81,70 +81,70 @@ impl Packet {
     }
 }
 
-/// Something that arrived.
+/// A received item.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Delivery {
     /// A packet.
     Packet {
-        /// It.
+        /// Packet.
         packet: Packet,
-        /// The same number for the same publisher.
+        /// Identifier of the publisher.
         sender: u64,
-        /// When, by this machine's monotonic clock.
+        /// Time of receipt, by this machine's monotonic clock.
         received: Instant,
     },
-    /// Something that cannot be read as its topic's type.
+    /// Data that cannot be read as its topic's type.
     Garbled {
-        /// Where it came.
+        /// Topic.
         topic: Topic,
-        /// What is wrong with it.
+        /// Description of the error.
         words: String,
     },
-    /// A call of a service, to be answered through [`Transport::answer`].
+    /// Call of a service, to be answered through [`Transport::answer`].
     Call {
-        /// Which.
+        /// Service.
         service: Service,
-        /// Whose.
+        /// Identifier of the call.
         call: u64,
     },
-    /// The answer to a call of this side's own.
+    /// Answer to a call made by this side.
     Answered {
-        /// Of which service.
+        /// Service.
         service: Service,
-        /// What it says.
+        /// Answer.
         answer: TriggerResponse,
     },
 }
 
-/// The error of a part of a transport that cannot be opened.
+/// Returns the error of a part of a transport that cannot be opened.
 pub(super) fn cannot_open<E: std::fmt::Display>(what: &str) -> impl Fn(E) -> Invalid {
     move |error| Invalid::new(format!("cannot open {what}: {error}"))
 }
 
-/// The error of a message that cannot be sent to `what`.
+/// Returns the error of a message that cannot be sent to `what`.
 #[cfg(any(feature = "ros1", feature = "ros2"))]
 pub(super) fn cannot_send(what: &str, error: impl std::fmt::Display) -> Invalid {
     Invalid::new(format!("cannot send to {what}: {error}"))
 }
 
-/// Wakes a transport that waits, from another thread.
+/// Wakes a waiting transport from another thread.
 pub type Waker = std::sync::Arc<dyn Fn() + Send + Sync>;
 
-/// One side's end. It belongs to one thread, which waits in [`receive`](Self::receive).
+/// One side of a transport. It belongs to one thread, which waits in [`receive`](Self::receive).
 pub trait Transport {
-    /// Returns what ends a wait early.
+    /// Returns a function that ends a wait early.
     fn waker(&self) -> Waker;
 
     /// Sends a packet to all subscribers, if there are any.
     ///
     /// # Errors
-    /// If the transport does not send any more.
+    /// If the transport can no longer send.
     fn send(&mut self, packet: &Packet) -> Result<(), Invalid>;
 
-    /// Waits for at most `timeout` and hands over all that has arrived.
+    /// Waits for at most `timeout` and passes all received items to `take`.
     fn receive(&mut self, timeout: Duration, take: &mut dyn FnMut(Delivery));
 
-    /// How many publishers of a topic are known, this side's own among them.
+    /// Returns the number of known publishers of a topic, including this side's own.
     fn publisher_count(&self, topic: Topic) -> usize;
 
     /// Whether a server of `service` has been found, so that a call reaches it.
@@ -168,5 +168,5 @@ pub trait Transport {
     ) -> Result<(), Invalid>;
 }
 
-/// Makes a transport in the thread that is going to own it.
+/// Creates a transport in the thread that will own it.
 pub type Connect = Box<dyn FnOnce() -> Result<Box<dyn Transport>, Invalid> + Send>;

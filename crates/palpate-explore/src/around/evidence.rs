@@ -1,5 +1,5 @@
-//! Observations of the field by touches: where it is zero and which way it grows, and where it is
-//! free. And the prior: a body about what was met.
+//! Observations from touches of a whole object: the field is zero at contacts, with the normal as
+//! gradient, and positive in swept free space. Also the prior mean: a body around the contacts.
 
 use super::settings::PriorShape;
 use crate::probe::{Contact, Swept, Touch};
@@ -10,35 +10,35 @@ use palpate_geometry::primitives::extent;
 use palpate_geometry::primitives::nearest_on_segment;
 use palpate_gp::{Observation, Observations, Slope};
 
-/// All that was met and swept.
+/// All contacts and swept volumes.
 #[derive(Clone, Debug, Default)]
 pub struct Evidence {
     contacts: Vec<Contact>,
     ways: Vec<Way>,
 }
 
-/// The way of a fingertip that met nothing before its end.
+/// Path of a fingertip that was free up to its end.
 #[derive(Clone, Debug)]
 struct Way {
-    /// Its end, and which way it went.
+    /// End point and direction.
     end: Aim,
     length_m: f64,
     radius_m: f64,
-    /// Balls along it that are observed.
+    /// Number of balls along it that are observed.
     places: u32,
-    /// Whether something was met at its end.
+    /// Whether there is a contact at its end.
     is_met: bool,
 }
 
 impl Way {
-    /// How far `p_w` is from its hull.
+    /// Distance of `p_w` from its hull.
     fn away_m(&self, p_w: &Point3<f64>) -> f64 {
         let start_w = self.end.p_w - self.end.ahead_w.scale(self.length_m);
         (nearest_on_segment(p_w, &start_w, &self.end.p_w) - p_w).norm() - self.radius_m
     }
 
-    /// Middles of its balls, from its end backwards: where it runs through `ball`, and at least the
-    /// one that something was met with.
+    /// Returns the centres of its balls, from its end backwards: those inside `ball`, and at least
+    /// the one at a contact.
     fn places_w(&self, ball: &Ball) -> impl Iterator<Item = Point3<f64>> {
         let [near_m, far_m] = ball.chord_m(&self.end);
         let first_m = if self.is_met { 0.0 } else { (-far_m).max(0.0) };
@@ -54,12 +54,12 @@ impl Way {
     }
 }
 
-/// Least deviation of a free place's field, as a share of its distance from what was met: the field
-/// is near a distance, not one. Chosen.
+/// Smallest standard deviation of a free point's field, as a fraction of its distance from the
+/// contacts: the field is close to a distance, but not exact; a heuristic.
 const SURE: f64 = 0.1;
 
 impl Evidence {
-    /// Takes in a touch, with what it swept if that is known, as `places` balls along the way.
+    /// Adds a touch and, if known, its swept volume, as `places` balls along the path.
     pub fn observe(
         &mut self,
         approach: &Approach,
@@ -73,7 +73,7 @@ impl Evidence {
                 places
             }
             Touch::Miss => 2 * places,
-            // Where a touch broken off met something is not known.
+            // The point of contact of an interrupted touch is unknown.
             Touch::Overload => 0,
         };
         let Some(Swept { finger, p_wt }) = swept else { return };
@@ -92,22 +92,22 @@ impl Evidence {
         self.contacts.iter().map(|contact| &contact.p_wc)
     }
 
-    /// How far `p_w` is from all contacts and from the hull of the fingertip on all its ways.
+    /// Distance of `p_w` from all contacts and all swept paths.
     pub fn hole_m(&self, p_w: &Point3<f64>) -> f64 {
         let met = self.contacts().map(|contact| (contact - p_w).norm());
         met.chain(self.ways.iter().map(|way| way.away_m(p_w))).fold(f64::INFINITY, f64::min)
     }
 
-    /// Middles and radii of the balls that were swept inside `ball`.
+    /// Returns centres and radii of the swept balls inside `ball`.
     fn free<'a>(&'a self, ball: &'a Ball) -> impl Iterator<Item = (Point3<f64>, f64)> {
         self.ways.iter().flat_map(|way| way.places_w(ball).map(|p_w| (p_w, way.radius_m)))
     }
 
-    /// What the field is above `prior`: 0 at each contact, with the normal as its gradient if
-    /// `normals`; and at the middle of each ball swept inside `ball` the distance to the nearest
-    /// contact. That is the most that a distance can be there as the swept radius is the least: the
-    /// deviation is that of a uniform distribution between them. `noise_m` is the deviation that
-    /// counts as one.
+    /// Returns the observations of the field relative to `prior`: 0 at each contact, with the
+    /// normal as its gradient if `normals` is set; and, at the centre of each swept ball inside
+    /// `ball`, the distance to the nearest contact. That is the upper bound of a distance there,
+    /// and the swept radius the lower bound: the standard deviation is that of a uniform
+    /// distribution between them. `noise_m` is the unit of the noise.
     pub fn observations(
         &self,
         (prior, ball): (&Prior, &Ball),
@@ -138,22 +138,22 @@ impl Evidence {
     }
 }
 
-/// The mean of the field over space.
+/// Prior mean of the field over space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
-    /// Centre in `W` and half axes along those of `W`; none for a field of zeros.
+    /// Centre in `W` and half axes along those of `W`; `None` for a field of zeros.
     body: Option<(Point3<f64>, Vector3<f64>)>,
 }
 
-/// Shortest half axis as a share of the ball's radius, so that touches on one plane leave a body;
-/// chosen.
+/// Shortest half axis as a fraction of the ball's radius, so that contacts in one plane still span
+/// a body; a heuristic.
 const THINNEST: f64 = 0.1;
 
-/// Half axis of the sphere before two contacts, as a share of the ball's radius; chosen.
+/// Radius of the sphere before two contacts exist, as a fraction of the ball's radius; a heuristic.
 const UNKNOWN: f64 = 0.5;
 
 impl Prior {
-    /// About `contacts`, in the `ball` about them.
+    /// Creates the prior around `contacts`, in the `ball` around them.
     pub fn about<'a>(
         shape: PriorShape,
         ball: &Ball,
@@ -175,9 +175,9 @@ impl Prior {
         Self { body }
     }
 
-    /// The field at `p_w`, negative inside, with its gradient: s·(|v / r|² − 1) / 2 for the offset
-    /// v from the centre, the half axes r and the least of them s. It is as smooth as any, so that
-    /// what a Gaussian process must add to it is no rougher than the object.
+    /// Returns the field at `p_w`, negative inside, with its gradient: s·(|v / r|² − 1) / 2 for the
+    /// offset v from the centre, the half axes r and the smallest of them s. It is infinitely
+    /// smooth, so that the residual of the Gaussian process is no rougher than the object.
     pub fn field(&self, p_w: &Point3<f64>) -> Field {
         let Some((centre_w, radii_m)) = &self.body else {
             return Field { value: 0.0, gradient: Vector3::zeros() };

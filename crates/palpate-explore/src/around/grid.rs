@@ -1,36 +1,36 @@
-//! The zero set of a field as triangles: surface nets (Gibson 1998) on a grid that is fine only
-//! near the surface; and the pieces of it that were touched.
+//! Triangulation of a field's zero set: surface nets (Gibson 1998) on an adaptive grid that is fine
+//! only near the surface; and selection of the components that were touched.
 
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
 use foldhash::{HashSet, HashSetExt};
 use nalgebra::{Point3, Vector3};
 use ndshape::{RuntimeShape, Shape};
 
-/// Cells along a block of the coarsest grid.
+/// Number of cells per side of a block of the coarsest grid.
 const COARSEST: usize = 4;
 
-/// A block is looked into while a corner's value may reach zero within it: of a field whose
-/// gradient is no longer than this times a distance's. Chosen.
+/// Upper bound of the gradient's length relative to that of a distance; blocks whose corner values
+/// exclude a zero under this bound are skipped; a heuristic.
 const STEEPEST: f64 = 1.2;
 
-/// Values at the corners of cells; NaN where nobody asked.
+/// Values at the corners of cells; NaN where not evaluated.
 struct Grid<F> {
     value: F,
     low: Point3<f64>,
     cell_m: f64,
-    /// Corners along each axis.
+    /// Number of corners along each axis.
     count: [usize; 3],
     values: Vec<f32>,
 }
 
-/// Vertices and triangles of the zeros of `value`, metres, in a box with cells of `cell_m`; closed,
-/// because what reaches the box is cut off there.
+/// Returns vertices and triangles of the zero set of `value`, m, in a box with cells of `cell_m`.
+/// It is closed, since the surface is capped at the box.
 pub fn zero_set(
     [low, high]: [Point3<f64>; 2],
     cell_m: f64,
     value: impl FnMut(&Point3<f64>) -> f64,
 ) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
-    // A cell of air on every side, and whole blocks.
+    // One empty cell on every side, and whole blocks.
     let low = low.map(|x| x - cell_m);
     let blocks = (high - low).map(|x| (x / cell_m).ceil() as usize + 1);
     let count = <[usize; 3]>::from(blocks).map(|cells| cells.div_ceil(COARSEST) * COARSEST + 1);
@@ -54,7 +54,8 @@ pub fn zero_set(
     (buffer.positions.iter().map(at).collect(), buffer.indices.as_chunks().0.to_vec())
 }
 
-/// The eight corners of a block of `side` cells, or the blocks of that side in one of twice that.
+/// Returns the eight corners of a block of `side` cells, or the sub-blocks of that side in one of
+/// twice the side.
 fn corners([i, j, k]: [usize; 3], side: usize) -> impl Iterator<Item = [usize; 3]> {
     (0..8).map(move |c| [i + side * (c & 1), j + side * (c >> 1 & 1), k + side * (c >> 2)])
 }
@@ -70,7 +71,7 @@ impl<F: FnMut(&Point3<f64>) -> f64> Grid<F> {
         (k * self.count[1] + j) * self.count[0] + i
     }
 
-    /// The value at a corner; on the rim of the box never inside.
+    /// Returns the value at a corner; never inside on the border of the box.
     fn ask(&mut self, corner: [usize; 3]) -> f32 {
         let index = self.index(corner);
         if self.values[index].is_nan() {
@@ -83,7 +84,7 @@ impl<F: FnMut(&Point3<f64>) -> f64> Grid<F> {
         self.values[index]
     }
 
-    /// Least and greatest value at the corners of a block.
+    /// Returns the smallest and largest value at the corners of a block.
     fn corner_values(&mut self, block: [usize; 3], side: usize) -> [f32; 2] {
         corners(block, side).fold(
             [f32::INFINITY, f32::NEG_INFINITY],
@@ -94,7 +95,7 @@ impl<F: FnMut(&Point3<f64>) -> f64> Grid<F> {
         )
     }
 
-    /// Whether the surface may cross a block; if not, its corners' sign is written all over it.
+    /// Whether the surface may cross a block; if not, fills it with its corners' sign.
     fn may_cross(&mut self, block @ [i, j, k]: [usize; 3], side: usize) -> bool {
         let [least, greatest] = self.corner_values(block, side);
         let reach = (STEEPEST * side as f64 * self.cell_m) as f32;
@@ -116,8 +117,8 @@ impl<F: FnMut(&Point3<f64>) -> f64> Grid<F> {
     }
 }
 
-/// Those of `triangles` that hang together with the vertex nearest to some of `contacts`: a field
-/// may have zeros where nothing was met.
+/// Returns those of `triangles` that are connected to the vertex nearest to one of `contacts`: a
+/// field may have zeros far from all contacts.
 pub fn touched(
     vertices: &[Point3<f64>],
     triangles: Vec<[u32; 3]>,
@@ -140,7 +141,7 @@ pub fn touched(
     triangles.into_iter().filter(|[a, ..]| kept.contains(&root(&mut parents, *a))).collect()
 }
 
-/// The vertex that stands for all that hang together with `vertex`.
+/// Returns the representative vertex of the component of `vertex`.
 fn root(parents: &mut [u32], mut vertex: u32) -> u32 {
     while parents[vertex as usize] != vertex {
         let above = parents[parents[vertex as usize] as usize];
@@ -156,8 +157,8 @@ mod tests {
     use nalgebra::Point3;
     use std::collections::HashMap;
 
-    /// Every edge has a triangle on either side, also where the box cuts the surface off, on
-    /// whichever side; and what is not cut off is where it should be.
+    /// Every edge has two triangles, also where the box caps the surface, on any side; and the rest
+    /// is at its correct position.
     #[test]
     fn surfaces_are_closed() {
         for centre in [[0.0; 3], [0.05, 0.0, 0.0], [-0.05, 0.02, 0.05], [0.0, 0.05, -0.05]] {

@@ -1,5 +1,5 @@
-//! What is known of a whole object after some touches: a Gaussian process over space whose zero set
-//! is the surface, negative inside (Williams & Fitzgibbon 2007).
+//! Belief of a whole object: a Gaussian process over space whose zero set is the surface, negative
+//! inside (Williams & Fitzgibbon 2007).
 
 use super::evidence::{Evidence, Prior};
 use super::scope::Scope;
@@ -16,7 +16,7 @@ use palpate_gp::likelihood::Likelihood;
 use palpate_gp::math::optimize::compass;
 use palpate_gp::{Hyperparameters, Mean, NoiseRatio, Observations, Posterior, Range, Scale};
 
-/// The belief of one trial around an object.
+/// Belief of one trial around a whole object.
 #[derive(Clone)]
 pub struct ImplicitSurface {
     scope: Scope,
@@ -28,34 +28,34 @@ pub struct ImplicitSurface {
     surface: Option<Surface>,
 }
 
-/// Signal's deviation before the first fit, as a share of the radius of the ball about the
-/// contacts, and the range in which it is sought; chosen, the field is a distance and the object
-/// fills a part of the ball.
+/// Signal's standard deviation before the first fit, as a fraction of the radius of the ball around
+/// the contacts, and its bounds; heuristics: the field is a distance, and the object fills a part
+/// of the ball.
 const SIGNAL: f64 = 0.5;
 const SIGNAL_RANGE: [f64; 2] = [1e-2, 1e2];
 
-/// Numbers of the covariance matrices' cubes that a fit may spend, with at least [`TRIED_MIN`]
-/// factorisations; chosen, some ten milliseconds.
+/// Computational budget of a fit in cubed matrix sizes, with at least [`TRIED_MIN`] factorisations;
+/// a heuristic: some ten milliseconds.
 const CUBES: f64 = 2e8;
 const TRIED_MIN: f64 = 3.0;
 const TRIED_MAX: f64 = 60.0;
 
-/// First step of the first fit, first one of those that follow, and last of all, in logarithms;
-/// chosen.
+/// First step of the first fit, first step of later fits, and smallest step, in logarithms;
+/// heuristics.
 const STEP_FIRST: f64 = 0.7;
 const STEP_NEXT: f64 = 0.35;
 const STEP_LAST: f64 = 0.1;
 
 impl ImplicitSurface {
-    /// Knows nothing yet.
+    /// Creates a belief without data.
     pub fn new(scope: Scope, settings: SpaceSettings) -> Self {
         let kernel = kernel::by_name(&settings.kernel).unwrap_or(&Matern52);
         let (evidence, asked) = (Evidence::default(), Vec::new());
         Self { scope, settings, kernel, evidence, asked, fit: None, surface: None }
     }
 
-    /// Takes in one touch that went the way of `approach` because of `aim`, and what it swept; the
-    /// belief changes with the next [`refit`](Self::refit).
+    /// Adds a touch at `aim` that followed `approach`, and the volume it swept; the belief changes
+    /// at the next [`refit`](Self::refit).
     pub fn observe(
         &mut self,
         aim: &Aim,
@@ -66,11 +66,11 @@ impl ImplicitSurface {
         self.evidence.observe(approach, touch, swept, self.settings.free_places);
     }
 
-    /// Finds the most likely length and noises and conditions on all touches.
+    /// Fits length scale and noises by maximum likelihood and conditions on all touches.
     ///
-    /// A step along each parameter in turn from where the last fit ended, halved where none is
-    /// uphill: touch by touch the fit follows its hill, and a large covariance is factored three
-    /// times only.
+    /// Coordinate search from the last optimum: a step along each parameter in turn, halved if none
+    /// improves. The fit follows its optimum from touch to touch, and a large covariance is
+    /// factored only three times.
     ///
     /// # Errors
     /// If the covariance of the touches cannot be factored.
@@ -81,8 +81,8 @@ impl ImplicitSurface {
         self.conclude(prior, observations, fit)
     }
 
-    /// Conditions on all touches with what a fit found that began from `last`, as when a recorded
-    /// belief is drawn again.
+    /// Conditions on all touches with the given fit, which started from `last`, e.g. to draw a
+    /// recorded belief.
     ///
     /// # Errors
     /// If the covariance of the touches cannot be factored.
@@ -106,7 +106,7 @@ impl ImplicitSurface {
         Ok((self.fit.insert(fit), self.surface.insert(surface)))
     }
 
-    /// What the touches say, in units of the noise of `last`.
+    /// Returns the observations, in units of the noise of `last`.
     fn observations(&self, last: Option<&Hyperparameters>) -> (Prior, Observations) {
         let ball = self.scope.met(self.contacts());
         let prior = Prior::about(self.settings.prior, &ball, self.contacts());
@@ -116,7 +116,7 @@ impl ImplicitSurface {
         (prior, observations)
     }
 
-    /// Whether normals are observed: a kernel without slopes cannot.
+    /// Whether normals are observed; false for a kernel without gradients.
     fn normals(&self) -> bool {
         self.settings.normals && self.kernel.has_slopes()
     }
@@ -141,13 +141,13 @@ impl ImplicitSurface {
             None => ranges.iter().copied().map(middle).collect(),
         };
         begin.truncate(ranges.len());
-        // The object may have grown since.
+        // The object's extent may have grown since the last fit.
         begin.iter_mut().zip(&ranges).for_each(|(at, [low, high])| *at = at.clamp(*low, *high));
         let signal_sd =
             Scale::Best(Range::from((SIGNAL_RANGE[0] * radius_m, SIGNAL_RANGE[1] * radius_m)));
         let mut likelihood = Likelihood::new(self.kernel, Mean::Zero, observations);
         let cube = (observations.order() as f64).powi(3);
-        // Each fit begins with another parameter, so that short ones see to all.
+        // Each fit starts with a different parameter, so that short fits cover all of them.
         let axis = observations.len() % begin.len();
         let steps = [if start.is_some() { STEP_NEXT } else { STEP_FIRST }, STEP_LAST];
         let budget = (CUBES / cube).clamp(TRIED_MIN, TRIED_MAX) as u32;
@@ -168,7 +168,7 @@ impl ImplicitSurface {
         })
     }
 
-    /// What is explored, and with what.
+    /// The region and the finger.
     pub fn scope(&self) -> &Scope {
         &self.scope
     }
@@ -178,28 +178,28 @@ impl ImplicitSurface {
         self.evidence.contacts()
     }
 
-    /// How far `p_w` is from all that was met and swept.
+    /// Distance of `p_w` from all contacts and swept paths.
     pub fn hole_m(&self, p_w: &Point3<f64>) -> f64 {
         self.evidence.hole_m(p_w)
     }
 
-    /// Every aim asked for so far.
+    /// All aims so far.
     pub fn asked(&self) -> &[Aim] {
         &self.asked
     }
 
-    /// What the last [`refit`](Self::refit) found.
+    /// Returns the result of the last [`refit`](Self::refit).
     pub fn fit(&self) -> Option<&Fit> {
         self.fit.as_ref()
     }
 
-    /// The surface that is believed, once fitted.
+    /// The estimated surface, after the first fit.
     pub fn surface(&self) -> Option<&Surface> {
         self.surface.as_ref()
     }
 }
 
-/// Length in metres and noise ratios from their logarithms; the slopes' is that of slopes per
+/// Returns the length scale, m, and noise ratios from their logarithms; the slopes' noise is per
 /// length scale.
 fn parameters(logs: &[f64]) -> (f64, NoiseRatio) {
     let at = |i: usize| logs.get(i).map_or(0.0, |log| log.exp());

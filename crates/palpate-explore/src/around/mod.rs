@@ -1,4 +1,4 @@
-//! A whole object, touched from any side: a belief over space.
+//! Belief of a whole object over space, touched from any side.
 
 mod evidence;
 mod grid;

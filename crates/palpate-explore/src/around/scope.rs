@@ -1,4 +1,4 @@
-//! What is explored, and with what: all that a belief over space and its planners are told.
+//! Scope of an exploration around a whole object: the ball and the finger.
 
 use crate::robot::Finger;
 use crate::task::{Aim, Ball, Task};
@@ -6,31 +6,31 @@ use nalgebra::Point3;
 use palpate_geometry::primitives::extent;
 use std::sync::Arc;
 
-/// How far the surface that a soft finger finds is off as a whole: of the twelve objects for
-/// choosing, 36 trials of 60 touches, by 0.1 to 0.8 mm outwards, 0.3 mm in the median.
+/// Common offset of the surface found by a soft finger: on the twelve tuning objects, in 36 trials
+/// of 60 touches, 0.1 to 0.8 mm outwards, median 0.3 mm.
 const SOFT_OFFSET_M: f64 = 3e-4;
 
-/// A ball in which there is an object, and the finger that touches it.
+/// A ball that contains the object, and the finger that touches it.
 #[derive(Clone, Debug)]
 pub struct Scope {
-    /// Where the object is.
+    /// The ball that contains the object.
     pub ball: Ball,
     /// Radius of the fingertip.
     pub radius_m: f64,
-    /// Standard deviation of an error that all its contacts have in common.
+    /// Standard deviation of the error common to all contacts.
     pub offset_m: f64,
     task: Arc<Task>,
 }
 
 impl Scope {
-    /// The `ball` of a task around a whole object, touched by `finger`, which may be soft.
+    /// Creates the scope of the `ball` of a task, with `finger`; a soft finger is marked so.
     pub fn new(ball: Ball, task: &Task, (finger, is_soft): (&Finger, bool)) -> Self {
         let offset_m = if is_soft { SOFT_OFFSET_M } else { 0.0 };
         Self { ball, radius_m: finger.radius_m, offset_m, task: Arc::new(task.clone()) }
     }
 
-    /// The ball about `contacts`, which says how large the object is when the one it is sought in
-    /// does not; that one before there are two.
+    /// Returns the ball around `contacts`, which estimates the object's size; the ball of the scope
+    /// before there are two contacts.
     pub fn met<'a>(&self, contacts: impl Iterator<Item = &'a Point3<f64>>) -> Ball {
         let spanned = extent(contacts).filter(|[low, high]| low != high);
         let Some(spanned) = spanned else { return self.ball };
@@ -39,7 +39,7 @@ impl Scope {
         Ball { radius_m, ..about }
     }
 
-    /// Whether the finger can be brought to what is aimed at.
+    /// Whether the finger can reach the aim.
     pub fn reaches(&self, aim: &Aim) -> bool {
         self.task.may_reach(aim) && self.task.reaches(aim)
     }

@@ -1,60 +1,60 @@
-//! What decides how a belief over space is fitted.
+//! Settings of the Gaussian process over space.
 
 use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Table `[gp]` around a whole object: how the Gaussian process over space is fitted.
+/// Table `[gp]` for a whole object: settings of the Gaussian process over space.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SpaceSettings {
-    /// Name of the kernel.
+    /// Kernel name.
     pub kernel: String,
-    /// What is believed where nothing is known.
+    /// Prior mean of the field.
     pub prior: PriorShape,
-    /// Range of the length scale, as a share of the radius of the ball about the contacts.
+    /// Bounds of the length scale, as fractions of the radius of the ball around the contacts.
     pub length_scale: [f64; 2],
-    /// Range of the contacts' error, as a share of the field's standard deviation.
+    /// Bounds of the contacts' noise, as fractions of the field's standard deviation.
     pub noise: [f64; 2],
-    /// Range of the normals' error, as a share of the field's standard deviation over the length
+    /// Bounds of the normals' noise, in units of the field's standard deviation over the length
     /// scale.
     pub slope_noise: [f64; 2],
-    /// Whether contact normals are observed too, as gradients of the field, with a kernel that has
-    /// them: `matern_52`.
+    /// Whether contact normals are observed, as gradients of the field; requires the kernel
+    /// `matern_52`.
     pub normals: bool,
-    /// Places along each swept way that are observed to be free; twice as many of a miss.
+    /// Free-space samples per swept path; twice as many for a miss.
     pub free_places: u32,
-    /// What the standard deviations are multiplied by.
+    /// Factor applied to the standard deviations.
     pub widening: f64,
-    /// Standard deviation, in metres, of an error that all contacts have in common, by which the
-    /// whole surface may be larger or smaller. Left out, 0 of a rigid finger and 0.0003 of a soft
-    /// one.
+    /// Standard deviation of a common offset of all contacts, m; default 0.0003 for a soft finger,
+    /// else 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset_m: Option<f64>,
-    /// Cells along the longest side of the box in which the surface is sought.
+    /// Grid cells along the longest side of the surface's box.
     pub cells: u32,
-    /// Beliefs are compared with the truth after every so many touches, and after the last.
+    /// Interval, in touches, between evaluations against the ground truth; the last touch is always
+    /// evaluated.
     pub compared_every: u32,
 }
 
-/// The mean of the field before any touch, about the contacts.
+/// Prior mean of the field, relative to the contacts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PriorShape {
-    /// The ellipsoid in the box that the contacts span.
+    /// The ellipsoid inscribed in the contacts' box.
     #[default]
     Ellipsoid,
-    /// A sphere about the middle of that box, as large as the ellipsoid.
+    /// A sphere about the centre of that box, as large as the ellipsoid.
     Sphere,
-    /// Zero: what is far from all touches is neither inside nor outside.
+    /// Zero: far from all touches, points are neither inside nor outside.
     None,
 }
 
-/// The kernels that may be; a squared exponential folds.
+/// Supported kernels; a squared exponential makes the surface fold.
 pub const KERNELS: [&str; 2] = ["matern_52", "matern_32"];
 
 impl Default for SpaceSettings {
-    /// Chosen on the half of the suite that is for choosing; see docs/whole-objects.md.
+    /// Heuristics, tuned on the tuning half of the suite; see docs/whole-objects.md.
     fn default() -> Self {
         Self {
             kernel: KERNELS[0].into(),

@@ -1,4 +1,4 @@
-//! The surface that is believed: the zero set of a Gaussian process over space.
+//! Estimated surface: the zero set of a Gaussian process over space.
 
 use super::evidence::Prior;
 use super::grid::{touched, zero_set};
@@ -11,33 +11,34 @@ use palpate_geometry::primitives::extent;
 use palpate_gp::Posterior;
 use palpate_gp::means::MeanField;
 
-/// A field over space with its uncertainty: negative inside the object, and near its surface about
-/// the distance from it.
+/// A field over space with its uncertainty: negative inside the object, and approximately the
+/// distance near its surface.
 #[derive(Clone)]
 pub struct Surface {
     prior: Prior,
     posterior: Posterior,
     contacts: Vec<Point3<f64>>,
-    /// Standard deviation of what all contacts are off by.
+    /// Standard deviation of the error common to all contacts.
     offset_m: f64,
-    /// Corners of the box in which the surface is sought.
+    /// Corners of the box that contains the surface.
     bounds: [Point3<f64>; 2],
 }
 
-/// How far the box of a surface goes beyond its contacts, as a share of the radius of the ball
-/// about them; chosen.
+/// Margin of a surface's box around its contacts, as a fraction of the radius of the ball around
+/// them; a heuristic.
 const BEYOND: f64 = 0.15;
 
-/// A gradient below this is not a distance's; chosen.
+/// Smallest gradient that is used as that of a distance; a heuristic.
 const FLAT: f64 = 0.3;
 
-/// By how much a field of this gradient grows on the way out of its surface; so that a deviation of
-/// the field becomes one of the surface.
+/// Returns the slope of a field with this gradient along the outward normal, which converts a
+/// deviation of the field into one of the surface.
 pub fn steepness(gradient: &Vector3<f64>) -> f64 {
     gradient.norm().max(FLAT)
 }
 
-/// Steps by which a vertex is put onto the surface, none longer than a cell and a half; chosen.
+/// Number of Newton steps that move a vertex onto the surface, each at most one and a half cells; a
+/// heuristic.
 const STEPS: usize = 2;
 
 impl Surface {
@@ -63,12 +64,12 @@ impl Surface {
         Self { prior, posterior, contacts, offset_m, bounds }
     }
 
-    /// To ask for its mean at many points.
+    /// Returns an evaluator of its mean at many points.
     pub fn field(&self) -> SurfaceField<'_> {
         SurfaceField { prior: &self.prior, mean: MeanField::from(&self.posterior) }
     }
 
-    /// Standard deviation of the field at each of `points_w`, metres.
+    /// Standard deviation of the field at each of `points_w`, m.
     pub fn sds_m(&self, points_w: &[Point3<f64>]) -> Vec<f64> {
         let places: Vec<Vec<f64>> =
             points_w.iter().map(|p_w| p_w.coords.as_slice().into()).collect();
@@ -77,20 +78,21 @@ impl Surface {
         variances.into_iter().map(|variance| (variance.max(0.0) + offset2).sqrt()).collect()
     }
 
-    /// How far the surface may lie from where it is believed at each of `points_w` of it: σ / |∇f|.
+    /// Standard deviation of the surface along its normal at each of `points_w` on it: σ / |∇f|.
     pub fn offsets_m(&self, points_w: &[Point3<f64>]) -> Vec<f64> {
         let mut field = self.field();
         let sds_m = self.sds_m(points_w).into_iter().zip(points_w);
         sds_m.map(|(sd_m, p_w)| sd_m / steepness(&field.at(p_w).gradient)).collect()
     }
 
-    /// What it was conditioned on.
+    /// The posterior of the field.
     pub fn posterior(&self) -> &Posterior {
         &self.posterior
     }
 
-    /// The surface as closed triangles, from a grid of `cells` along the longest side of the box
-    /// about the contacts: the pieces that were touched. None if the field has no zeros there.
+    /// Returns the surface as closed triangles, from a grid of `cells` along the longest side of
+    /// the box around the contacts: the components that were touched. Returns `None` if the field
+    /// has no zeros there.
     pub fn mesh(&self, cells: u32) -> Option<Mesh> {
         let [low, high] = &self.bounds;
         let cell_m = (high - low).max() / f64::from(cells.max(1));
@@ -108,19 +110,19 @@ impl Surface {
     }
 }
 
-/// A surface's field at many points, with buffers of its own.
+/// Evaluator of a surface's field at many points, with its own buffers.
 pub struct SurfaceField<'a> {
     prior: &'a Prior,
     mean: MeanField,
 }
 
 impl SurfaceField<'_> {
-    /// The mean at `p_w`, metres: negative inside.
+    /// Returns the mean at `p_w`, m: negative inside.
     pub fn value(&mut self, p_w: &Point3<f64>) -> f64 {
         self.prior.field(p_w).value + self.mean.value(p_w.coords.as_slice())
     }
 
-    /// The same with its gradient.
+    /// Returns the mean with its gradient.
     pub fn at(&mut self, p_w: &Point3<f64>) -> Field {
         let mut gradient = [0.0; 3];
         let prior = self.prior.field(p_w);

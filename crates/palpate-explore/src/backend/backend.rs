@@ -1,4 +1,5 @@
-//! One control tick of a body: its command, its reading, its capabilities, and the trait.
+//! Backend trait: one control tick of a real or simulated robot, with its command, reading and
+//! capabilities.
 
 use super::fault::Fault;
 use crate::robot::arm::chain::MAX_JOINTS;
@@ -8,7 +9,7 @@ use crate::robot::sensor::{IdealContact, Sample, Wrench};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// What a body can do, known before it is connected.
+/// Capabilities of a backend, known before it is connected.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Capabilities {
     /// Joint names; commands and readings follow their order.
@@ -17,16 +18,16 @@ pub struct Capabilities {
     pub q_limits: Vec<[f64; 2]>,
     /// Largest speed of each joint, rad/s or m/s.
     pub qdot_limits: Vec<f64>,
-    /// Duration of one tick.
+    /// Control period, s.
     pub period_s: f64,
     /// Whether `reset` restores the same state for the same seed.
     pub resettable: bool,
-    /// Whether its time passes by itself.
+    /// Whether its time runs by itself, in real time.
     pub real_time: bool,
 }
 
 impl Capabilities {
-    /// Of a simulated `chain` with a tick of `period_s`.
+    /// Capabilities of a simulated `chain` with a control period of `period_s`.
     pub fn of(chain: &Chain, period_s: f64) -> Self {
         let joints = &chain.joints;
         Self {
@@ -39,19 +40,19 @@ impl Capabilities {
         }
     }
 
-    /// Whether the body moves the joints of `chain`.
+    /// Checks that the backend has as many joints as `chain`.
     ///
     /// # Errors
-    /// If their numbers differ.
+    /// If the numbers of joints differ.
     pub fn fit(&self, chain: &Chain) -> Result<(), Fault> {
         let (expected, found) = (chain.joints.len(), self.joints.len());
         if expected == found { Ok(()) } else { Err(Fault::joints(expected, found)) }
     }
 
-    /// The command as numbers, one for each joint.
+    /// Returns the command as a vector, one number per joint.
     ///
     /// # Errors
-    /// [`Fault::Refused`] if one is missing, too many or not finite.
+    /// [`Fault::Refused`] if a number is missing, superfluous or not finite.
     pub fn accept(&self, command: &Command) -> Result<Joints, Fault> {
         let qdot = &command.qdot;
         let fits = qdot.len() == self.joints.len()
@@ -68,29 +69,30 @@ impl Capabilities {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Command {
     /// One entry per joint, in the order of [`Capabilities::joints`](super::Capabilities::joints):
-    /// rad/s, or m/s where the joint slides.
+    /// rad/s, or m/s for a prismatic joint.
     pub qdot: Vec<f64>,
 }
 
-/// What a body returns after a tick. Time stands in it and is never read from a clock.
+/// State and samples of a backend after a tick. It contains the time, which is never read from a
+/// clock.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Reading {
-    /// Since reset.
+    /// Time since reset, s.
     pub time_s: f64,
-    /// Joint positions, rad, or m where the joint slides.
+    /// Joint positions, rad, or m for a prismatic joint.
     pub q: Vec<f64>,
     /// Joint velocities, rad/s or m/s.
     pub qdot: Vec<f64>,
-    /// What the force/torque sensor at the finger's mount says, if there is one.
+    /// Wrench of the force/torque sensor at the finger's mount, if there is one.
     pub wrench: Option<Wrench>,
-    /// Samples of the fingertip's sensor that arrived during the tick, oldest first.
+    /// Samples of the fingertip sensor that arrived during the tick, oldest first.
     pub samples: Vec<Sample>,
-    /// The command as it was really applied after limiting.
+    /// The command as applied after limiting.
     pub applied: Command,
 }
 
 impl Reading {
-    /// Becomes the same as `other` in the memory that it has.
+    /// Copies `other` into `self` without allocating.
     pub fn copy(&mut self, other: &Self) {
         let Self { time_s, q, qdot, wrench, samples, applied } = self;
         (*time_s, *wrench) = (other.time_s, other.wrench);
@@ -100,7 +102,7 @@ impl Reading {
         applied.qdot.clone_from(&other.applied.qdot);
     }
 
-    /// Frames of a BioTac that arrived during the tick, oldest first.
+    /// Returns the BioTac frames that arrived during the tick, oldest first.
     pub fn frames(&self) -> impl DoubleEndedIterator<Item = &Frame> {
         self.samples.iter().filter_map(|sample| match sample {
             Sample::BioTac(frame) => Some(frame),
@@ -108,7 +110,7 @@ impl Reading {
         })
     }
 
-    /// The same, to be altered.
+    /// Returns the same frames for modification.
     pub fn frames_mut(&mut self) -> impl Iterator<Item = &mut Frame> {
         self.samples.iter_mut().filter_map(|sample| match sample {
             Sample::BioTac(frame) => Some(frame),
@@ -116,7 +118,7 @@ impl Reading {
         })
     }
 
-    /// The contact as a simulator knows it, in a scene that leaves out the sensor which would tell.
+    /// Returns the exact contact of a simulator, for scenes without a simulated tactile sensor.
     pub fn ideal(&self) -> Option<IdealContact> {
         self.samples.iter().find_map(|sample| match sample {
             Sample::Ideal(contact) => Some(*contact),
@@ -124,8 +126,8 @@ impl Reading {
         })
     }
 
-    /// Whether the numbers that a controller acts on are numbers. Tactile frames are judged one by
-    /// one, by who reads them.
+    /// Checks that all numbers used by a controller are finite. Tactile frames are checked one by
+    /// one by their consumers.
     ///
     /// # Errors
     /// [`Fault::BadReading`] with the first quantity that is not finite.
@@ -146,29 +148,30 @@ impl Reading {
     }
 }
 
-/// A body that is commanded and read: simulated, recorded or real.
+/// A robot that accepts commands and returns readings: simulated, recorded or real.
 ///
-/// Object-safe, synchronous and of plain data, so that the code that drives the simulator
-/// drives the arm. Limits, recording and fault injection are wrappers that are backends too.
+/// The trait is object-safe and synchronous and uses plain data, so that the code that drives the
+/// simulator also drives the arm. Limits, recording and fault injection are backends that wrap
+/// another.
 pub trait Backend: Send {
-    /// What it can do; does not need a connection.
+    /// Returns its capabilities; needs no connection.
     fn capabilities(&self) -> &Capabilities;
 
-    /// Brings it to its start and returns the first reading.
+    /// Moves it to its start and returns the first reading.
     ///
     /// # Errors
-    /// If it cannot be reached or brought there.
+    /// If it cannot be reached or moved there.
     fn reset(&mut self, seed: u64) -> Result<&Reading, Fault>;
 
-    /// Applies `command` for one period. The reading stays the body's, so that a tick allocates
-    /// nothing.
+    /// Applies `command` for one period. The reading is borrowed from the backend, so that a tick
+    /// does not allocate.
     ///
     /// # Errors
-    /// A fault ends the touch; the body is left at rest.
+    /// A fault ends the touch; the backend is left at rest.
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault>;
 
     /// Stops by the brakes instead of the servos: a simulated arm for its next step, which commands
-    /// it to stand still; an arm behind topics until an operator clears it. A body without brakes
-    /// does nothing.
+    /// zero velocity; an arm behind topics until an operator clears it. A backend without brakes
+    /// ignores the call.
     fn brake(&mut self) {}
 }

@@ -1,22 +1,22 @@
-//! Commands that take effect late, around any body.
+//! Backend wrapper that delays commands.
 
 use super::{Backend, Capabilities, Command, Fault, Reading};
 use std::collections::VecDeque;
 
-/// Longest delay of a command; chosen, far beyond what the controller stands.
+/// Largest delay of a command; a heuristic: far beyond the controller's stability limit.
 pub const DELAY_MAX_S: f64 = 1.0;
 
-/// A body that hears every command some ticks after it was given; until the first arrives it is
-/// told to stand still.
+/// A backend that applies every command some ticks later; until the first one arrives it is
+/// commanded to rest.
 pub struct Delayed {
     inner: Box<dyn Backend>,
     ticks: usize,
-    /// Commands on their way, oldest first.
+    /// Pending commands, oldest first.
     waiting: VecDeque<Command>,
 }
 
 impl Delayed {
-    /// `delay_s`, at most a second, is rounded to whole periods of the body.
+    /// Wraps `inner` with a delay of `delay_s`, at most one second, rounded to whole periods.
     pub fn new(inner: Box<dyn Backend>, delay_s: f64) -> Self {
         let ticks = (delay_s.clamp(0.0, DELAY_MAX_S) / inner.capabilities().period_s).round();
         let mut body = Self { inner, ticks: ticks as usize, waiting: VecDeque::new() };
@@ -42,7 +42,7 @@ impl Backend for Delayed {
     }
 
     fn step(&mut self, command: &Command) -> Result<&Reading, Fault> {
-        // Refused when given, not when it takes effect.
+        // Invalid commands are refused on arrival, not when they take effect.
         self.inner.capabilities().accept(command)?;
         let Some(mut slot) = self.waiting.pop_front() else { return self.inner.step(command) };
         let reading = self.inner.step(&slot);
@@ -51,7 +51,7 @@ impl Backend for Delayed {
         reading
     }
 
-    /// Brakes need nobody's command.
+    /// Brakes are not delayed.
     fn brake(&mut self) {
         self.inner.brake();
     }

@@ -1,11 +1,12 @@
-//! Why a body or a touch could not go on.
+//! Faults: reasons why a backend or a touch could not continue.
 
 use crate::robot::arm::ArmError;
 use palpate_input::error::Invalid;
 use std::fmt;
 use thiserror::Error;
 
-/// Why a body or a touch could not go on. A fault is data: it reaches the trial's row.
+/// Reason why a backend or a touch could not continue. A fault is data and is stored in the trial's
+/// row.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum Fault {
     /// A command or an approach with a number that is not finite, or of the wrong length.
@@ -14,175 +15,177 @@ pub enum Fault {
         /// The command or approach.
         values: Vec<f64>,
     },
-    /// What was read is not a number.
+    /// A reading that is not finite.
     #[error("bad reading at {time_s:.3} s: {quantity} is {values:?}")]
     BadReading {
-        /// When.
+        /// Time since reset, s.
         time_s: f64,
-        /// What was read, as in `joint positions`.
+        /// Quantity, e.g. `joint positions`.
         quantity: &'static str,
-        /// As it was read.
+        /// Values as read.
         values: Vec<f64>,
     },
-    /// No posture within the joint limits brings the tip to where it was sent.
+    /// No posture within the joint limits brings the tip to its target.
     #[error(
-        "out of reach at {time_s:.3} s: on the way to {phase} the tip stays {:.1} mm and {:.1} deg away",
+        "out of reach at {time_s:.3} s: on the way to {phase} the tip misses its goal by {:.1} mm and {:.1} deg",
         1e3 * distance_m, angle_rad.to_degrees()
     )]
     OutOfReach {
-        /// Where it was sent.
+        /// Target of the movement.
         phase: &'static str,
-        /// When.
+        /// Time since reset, s.
         time_s: f64,
-        /// Smallest distance found.
+        /// Smallest distance found, m.
         distance_m: f64,
-        /// Angle at that distance.
+        /// Angle at that distance, rad.
         angle_rad: f64,
     },
-    /// The state is no longer finite or left its limits.
+    /// The state is not finite or outside its limits.
     #[error("diverged at {time_s:.3} s: {state:.3?}")]
     Diverged {
-        /// When.
+        /// Time since reset, s.
         time_s: f64,
-        /// The state.
+        /// State of the simulation.
         state: Vec<f64>,
     },
-    /// The fingertip's centre is inside the object: the skin no longer keeps them apart.
+    /// The fingertip's centre is inside the object: the skin no longer separates them.
     #[error("at {time_s:.3} s the finger is inside the object, its tip at {p_wt:.4?}")]
     Inside {
-        /// When.
+        /// Time since reset, s.
         time_s: f64,
-        /// The tip in `W`.
+        /// Position of the tip in `W`.
         p_wt: [f64; 3],
     },
-    /// A movement within reach did not end in its time: something is in the way, or the joints do
-    /// not follow.
-    #[error("at {time_s:.3} s the movement to {phase} has not ended; joints at {q:.3?}")]
+    /// A movement within reach exceeded its timeout: an obstacle blocks it, or the joints do not
+    /// follow.
+    #[error("at {time_s:.3} s the movement to {phase} timed out; joints at {q:.3?}")]
     Late {
-        /// Where it led.
+        /// Target of the movement.
         phase: &'static str,
-        /// When.
+        /// Time since reset, s.
         time_s: f64,
-        /// Joint positions.
+        /// Joint positions, rad or m.
         q: Vec<f64>,
     },
-    /// No way to an approach around an object is known that was tried out.
+    /// No checked path to an approach around an object exists.
     #[error(
-        "at {time_s:.3} s no way is known from joints at {q:.3?} to this approach, nor home: bring the arm to \
-         arm.home_deg by hand, or leave this approach out"
+        "at {time_s:.3} s no collision-free path from joints {q:.3?} to the approach or home; \
+         jog the arm to arm.home_deg, or skip this approach"
     )]
     NoWay {
-        /// When.
+        /// Time since reset, s.
         time_s: f64,
-        /// Joint positions.
+        /// Joint positions, rad or m.
         q: Vec<f64>,
     },
-    /// A recording cannot be written: what cannot be kept is not done.
-    #[error("the recording fails at {time_s:.3} s: {message}")]
+    /// A recording cannot be written; motion stops, since it would not be recorded.
+    #[error("cannot write the recording at {time_s:.3} s: {message}")]
     Unrecorded {
-        /// When.
+        /// Time since reset, s.
         time_s: f64,
-        /// What the system says.
+        /// Message of the operating system.
         message: String,
     },
-    /// A recording is played to who commands something else than was commanded then.
+    /// A replayed recording received a command that differs from the recorded one.
     #[error(
-        "tick {tick} after {time_s:.3} s: joint {} is told {now:?}, in the recording {recorded:?}",
+        "tick {tick} after {time_s:.3} s: the command of joint {} is {now:?}, in the recording {recorded:?}",
         joint + 1
     )]
     Differs {
         /// Ticks since the reset.
         tick: u64,
-        /// Of the reading that the command was made of.
+        /// Time of the reading that the command was computed from.
         time_s: f64,
-        /// Which joint, the first is 0.
+        /// Index of the joint, from 0.
         joint: usize,
-        /// What it was told then.
+        /// Recorded command.
         recorded: f64,
-        /// What it is told now.
+        /// Current command.
         now: f64,
     },
-    /// A recording is played beyond its end.
+    /// A recording is replayed beyond its end.
     #[error("the recording ends at {time_s:.3} s")]
     RecordingEnds {
-        /// Of its last reading.
+        /// Time of its last reading.
         time_s: f64,
     },
-    /// A recording is played of a body that was not reset with that seed.
+    /// A replayed recording has no reset with this seed.
     #[error("the recording has no reset with seed {seed}")]
     NeverReset {
         /// The seed.
         seed: u64,
     },
-    /// Whoever watched it had it stopped.
+    /// Stopped by the user in the viewer.
     #[error("stopped at {time_s:.3} s")]
     Stopped {
-        /// When.
+        /// Time since reset, s.
         time_s: f64,
     },
-    /// An interlock stopped the body; it moves no more until it is cleared.
+    /// An interlock stopped the robot; it does not move until the fault is cleared.
     #[error("stopped at {time_s:.3} s: {trip}")]
     Interlock {
-        /// When.
+        /// Time since reset, s.
         time_s: f64,
-        /// By which, and why.
+        /// The interlock that tripped, and the reason.
         trip: Trip,
     },
-    /// The body stopped answering.
+    /// The backend stopped responding.
     #[error("no answer since {time_s:.3} s")]
     Lost {
-        /// When it last answered.
+        /// Time of its last response.
         time_s: f64,
     },
-    /// The arm behind topics cannot be driven on.
+    /// A failure of the connection to an arm behind topics.
     #[error("at {time_s:.3} s {cause}")]
     Link {
-        /// When.
+        /// Time since reset, s.
         time_s: f64,
-        /// Why.
+        /// Cause.
         cause: LinkFault,
     },
-    /// The body cannot be made of its scene, or cannot go on for a reason of which no caller asks.
+    /// The backend cannot be built from its scene, or cannot continue for a reason that no caller
+    /// distinguishes.
     #[error(transparent)]
     Invalid(#[from] Invalid),
 }
 
 impl Fault {
-    /// The fault of a body that cannot be made of a scene without `part`.
+    /// Returns the fault of a backend that needs `part`, which its scene lacks.
     pub fn lacks(part: &str) -> Self {
-        Invalid::new(format!("the body needs {part}, which its scene lacks")).into()
+        Invalid::new(format!("this simulator needs {part}, which the scene lacks")).into()
     }
 
-    /// The fault of a body of `found` joints for an arm of `expected`.
+    /// Returns the fault of a backend with `found` joints for an arm with `expected`.
     pub fn joints(expected: usize, found: usize) -> Self {
-        Invalid::new(format!("a body of {found} joints for an arm of {expected}")).into()
+        Invalid::new(format!("the backend has {found} joints and the arm {expected}")).into()
     }
 
-    /// The fault of a controller that has no command for where the arm stands and is to go.
+    /// Returns the fault of a controller that cannot compute a command for the arm's position and
+    /// goal.
     pub fn no_command(time_s: f64, cause: ArmError) -> Self {
-        Invalid::new(format!("no command at {time_s:.3} s: {cause}")).into()
+        Invalid::new(format!("cannot compute a command at {time_s:.3} s: {cause}")).into()
     }
 }
 
 /// An error of an arm behind topics.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LinkFault {
-    /// The arm's own computer refuses to move.
-    #[error("the arm does not move: {0}")]
+    /// The arm's computer refuses to move.
+    #[error("the arm refuses to move: {0}")]
     Arm(String),
-    /// The transport, a topic or a service does not work.
+    /// Failure of the transport, a topic or a service.
     #[error(transparent)]
     Link(#[from] Invalid),
 }
 
-/// An interlock's reason to stop the body: what was found where, and what is allowed.
+/// Reason of an interlock for stopping the robot: what was measured, and the limit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trip {
     /// The interlock.
     pub interlock: &'static str,
-    /// Of what: a joint, a pair of links, an electrode; empty where there is only one.
+    /// The monitored part: a joint, a pair of links, an electrode; empty if there is only one.
     pub part: String,
-    /// What was measured or foreseen.
+    /// Measured or predicted value.
     pub found: f64,
     /// The limit.
     pub limit: f64,
@@ -194,7 +197,7 @@ impl Trip {
     /// Returns the trip of `interlock` unless `is_fine`.
     ///
     /// # Errors
-    /// With what was `found` of `part`, its `limit`, and their unit.
+    /// The trip, with the value `found` of `part`, its `limit`, and their unit.
     pub fn unless(
         is_fine: bool,
         interlock: &'static str,

@@ -1,7 +1,7 @@
-//! Bodies that are commanded and read: simulated, recorded or real.
+//! Backends: robots that accept commands and return readings, simulated, recorded or real.
 //!
-//! [`Backend`] is the trait of a body, one control tick at a time. `delay`, `interlock`, `trace`
-//! and `watched` are bodies around other bodies.
+//! [`Backend`] is the trait, one control tick at a time. `delay`, `interlock`, `trace` and
+//! `watched` are backends that wrap another.
 
 #[allow(clippy::module_inception)]
 mod backend;

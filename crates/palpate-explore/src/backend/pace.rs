@@ -1,30 +1,30 @@
-//! Keeps a loop in step with the clock; the time of day.
+//! Real-time pacing of a loop, and the time of day.
 
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Seconds since 1970.
+/// Returns the seconds since 1970.
 pub fn now_s() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
 }
 
-/// Ticks of a fixed period.
+/// Paces ticks of a fixed period.
 pub struct Pace {
     period: Duration,
-    /// When the tick in hand ends.
+    /// Deadline of the current tick.
     next: Instant,
     overruns: u64,
 }
 
 impl Pace {
-    /// From now on.
+    /// Starts pacing now.
     pub fn new(period_s: f64) -> Self {
         let period = Duration::try_from_secs_f64(period_s).unwrap_or_default();
         Self { period, next: Instant::now(), overruns: 0 }
     }
 
-    /// Waits until the tick in hand ends. Who is late by more than `slack` periods does not catch
-    /// up: that is an overrun.
+    /// Waits for the deadline of the current tick. A deadline missed by more than `slack` periods
+    /// is counted as an overrun and skipped.
     pub fn wait(&mut self, slack: u32) {
         let now = Instant::now();
         self.next += self.period;
@@ -35,12 +35,12 @@ impl Pace {
         sleep(self.next.saturating_duration_since(Instant::now()));
     }
 
-    /// Begins anew: what was waited for was no tick.
+    /// Restarts the deadlines now, without counting an overrun.
     pub fn restart(&mut self) {
         self.next = Instant::now();
     }
 
-    /// How often it was late.
+    /// Returns the number of overruns.
     pub fn overruns(&self) -> u64 {
         self.overruns
     }

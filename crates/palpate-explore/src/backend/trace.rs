@@ -1,4 +1,4 @@
-//! Where a body was during a touch.
+//! Trace of a backend's motion during a touch.
 
 use crate::backend::{Backend, Capabilities, Command, Fault, Reading};
 use crate::robot::arm::Chain;
@@ -8,18 +8,18 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// One control tick.
 #[derive(Clone, Debug)]
 pub struct Tick {
-    /// Since reset.
+    /// Time since reset, s.
     pub time_s: f64,
-    /// How the fingertip stood and moved.
+    /// Pose and velocity of the fingertip.
     pub motion: TipMotion,
 }
 
-/// The ticks of a body so far, shared with whoever wants to look.
+/// The ticks of a backend so far, shared with its readers.
 #[derive(Clone, Debug, Default)]
 pub struct Ticks(Arc<Mutex<Vec<Tick>>>);
 
 impl Ticks {
-    /// Hands out the ticks since it was last asked.
+    /// Returns the ticks since the last call.
     pub fn take(&self) -> Vec<Tick> {
         std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -29,7 +29,7 @@ impl Ticks {
     }
 }
 
-/// A body that writes down its ticks.
+/// A backend that records its ticks.
 pub struct Trace {
     inner: Box<dyn Backend>,
     chain: Chain,
@@ -37,7 +37,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Around `inner`, which moves `chain`.
+    /// Wraps `inner`, which moves `chain`.
     pub fn new(inner: Box<dyn Backend>, chain: Chain) -> (Self, Ticks) {
         let ticks = Ticks::default();
         (Self { inner, chain, ticks: ticks.clone() }, ticks)

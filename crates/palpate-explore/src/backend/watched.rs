@@ -1,4 +1,4 @@
-//! Lets any body be watched: it says where it stands and keeps pace with the clock.
+//! Wraps a backend: publishes its joint state and runs it in real time.
 
 use super::{Backend, Capabilities, Command, Fault, Reading};
 use nalgebra::Point3;
@@ -6,25 +6,25 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// What is seen of a body.
+/// State of a backend for display.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Seen {
-    /// Its time since reset.
+    /// Time since reset, s.
     pub time_s: f64,
     /// Joint positions, rad or m.
     pub q: Vec<f64>,
-    /// Points that were marked, in `W`.
+    /// Marked points, in `W`.
     pub marks_w: Vec<Point3<f64>>,
-    /// Whether nobody watches any more.
+    /// Whether the window was closed.
     pub is_closed: bool,
 }
 
-/// What is seen, shared between the thread that moves a body and the one that draws it.
+/// The displayed state, shared between the thread that moves the robot and the one that draws it.
 #[derive(Clone, Debug, Default)]
 pub struct Sight(Arc<Mutex<Seen>>);
 
 impl Sight {
-    /// As it is now.
+    /// Returns the current state.
     pub fn seen(&self) -> Seen {
         self.lock().clone()
     }
@@ -34,7 +34,7 @@ impl Sight {
         self.lock().marks_w.push(p_w);
     }
 
-    /// Has the body stopped before its next tick.
+    /// Requests a stop before the next tick.
     pub fn close(&self) {
         self.lock().is_closed = true;
     }
@@ -50,19 +50,19 @@ impl Sight {
     }
 }
 
-/// A body that shows every reading and is no faster than `speed` times the clock. Its readings are
-/// those of the body inside: time stands in them, whatever the clock says.
+/// A backend that publishes every reading and runs at no more than `speed` times real time. Its
+/// readings, including their time, are those of the wrapped backend, whatever the clock says.
 pub struct Watched {
     inner: Box<dyn Backend>,
     sight: Sight,
-    /// Seconds of the body in one of the clock.
+    /// Simulated seconds per second of the clock.
     speed: f64,
-    /// A moment of the clock and the body's time then.
+    /// Reference: an instant of the clock and the backend's time then.
     since: Option<(Instant, f64)>,
 }
 
 impl Watched {
-    /// `speed` seconds of the body pass in one of the clock.
+    /// Wraps `inner` so that `speed` of its seconds pass per second of the clock.
     pub fn new(inner: Box<dyn Backend>, speed: f64) -> (Self, Sight) {
         let sight = Sight::default();
         (Self { inner, sight: sight.clone(), speed, since: None }, sight)
@@ -100,8 +100,9 @@ impl Backend for Watched {
     }
 }
 
-/// Shorter waits are saved up: a system cannot sleep for much less (chosen).
+/// Shortest wait; shorter ones are accumulated. A heuristic: the operating system cannot sleep for
+/// much less.
 const GRAIN_S: f64 = 0.004;
 
-/// Who is later than this does not catch up: a plan was made meanwhile (chosen).
+/// Delay above which lost time is not made up, as after planning; a heuristic.
 const LATE_S: f64 = 0.1;

@@ -1,4 +1,4 @@
-//! The heights of a surface over a zone: a Gaussian process, and where it is unsure.
+//! Belief of the heights of a surface over a zone: a Gaussian process with its uncertainty.
 
 use crate::free_space::Ceiling;
 use crate::gp_settings::{Band, GpSettings};
@@ -14,36 +14,36 @@ use palpate_gp::math::normal::BAND_95;
 use palpate_gp::posterior::Posterior;
 use palpate_gp::{Hyperparameters, Observation, Observations, Range, SearchBox, Slope, TouchNoise};
 
-/// A contact farther than this from its target, in units of the zone's sides, leaves the target
-/// unreached; chosen well above rounding, below any grid a figure shows.
+/// Distance between contact and target above which the target counts as unreached, in units of the
+/// zone's sides; a heuristic: well above rounding, below any grid of a figure.
 const REACHED_WITHIN: f64 = 1e-3;
 
-/// A normal whose y in the zone is smaller is dropped: the slope that follows from it is nearly
-/// infinite, and a small error of the normal changes its sign. Chosen, 87° from the approach.
+/// Smallest y of a normal in the zone that is used: below it the slope is nearly infinite, and a
+/// small error of the normal changes its sign; a heuristic, 87° from the approach.
 const NORMAL_Y_MIN: f64 = 0.05;
 
-/// The belief of one trial.
+/// Belief of a height field over a zone.
 #[derive(Clone)]
 pub struct HeightField {
     zone: Zone,
     kernels: Choice,
     settings: GpSettings,
     contacts: Observations,
-    /// What is known to be free, if that is asked for.
+    /// Upper bound from free space, if that is enabled.
     ceiling: Option<Ceiling>,
     presence: Presence,
-    /// Whether the last touch met nothing.
+    /// Whether the last touch was a miss.
     has_missed: bool,
     targets: Vec<Vec<f64>>,
     unreached: Vec<Vec<f64>>,
     fit: Option<Fit>,
     surface: Option<Posterior>,
-    /// As `surface`, and told that asking for an unreached target again brings nothing.
+    /// `surface`, conditioned also on the unreached targets, which are not worth another touch.
     explored: Option<Posterior>,
 }
 
 impl HeightField {
-    /// Knows nothing yet. Kernels are chosen [`between`](Choice::between).
+    /// Creates a belief without data. Kernels are selected [`between`](Choice::between).
     pub fn new(zone: Zone, settings: GpSettings) -> Self {
         let contacts = Observations::new(zone.dimension());
         Self {
@@ -62,7 +62,7 @@ impl HeightField {
         }
     }
 
-    /// Takes in one touch; the belief changes with the next [`refit`](Self::refit).
+    /// Adds a touch; the belief changes at the next [`refit`](Self::refit).
     pub fn observe(&mut self, target: &[f64], touch: &Touch) {
         self.targets.push(target.into());
         self.has_missed = *touch == Touch::Miss;
@@ -84,8 +84,8 @@ impl HeightField {
         }
     }
 
-    /// Takes in what the last touch swept: of a contact that the surface is below, of a miss that
-    /// there is none.
+    /// Adds the volume swept by the last touch: the surface is below it after a contact, and absent
+    /// there after a miss.
     pub fn observe_swept(&mut self, swept: &Swept) {
         self.presence.passed(swept, self.has_missed);
         if let Some(ceiling) = self.ceiling.as_mut().filter(|_| !self.has_missed) {
@@ -93,12 +93,12 @@ impl HeightField {
         }
     }
 
-    /// The slopes (g_x, g_z) = (−n_x, −n_z) / n_y that a normal n means, if they are asked for, and
-    /// how much noisier they are than those of a surface square to the approach.
+    /// Computes the slopes (g_x, g_z) = (−n_x, −n_z) / n_y from a normal n, if slopes are used, and
+    /// their noise relative to that of a surface perpendicular to the approach.
     ///
-    /// Of an error dθ of the normal, √(1 + g²)·dθ reaches the slope across the steepest way and
-    /// (1 + g²)·dθ that along it. The smaller is taken for both, chosen: with the larger, a curve
-    /// as steep as the toy is passed off as noise.
+    /// An error dθ of the normal changes the slope by √(1 + g²)·dθ across the steepest direction
+    /// and by (1 + g²)·dθ along it. The smaller value is used for both, a heuristic: with the
+    /// larger one, a curve as steep as that of the toy is explained as noise.
     fn slope(&self, normal_w: &Vector3<f64>) -> Option<(Vec<f64>, f64)> {
         let normal_z = self.zone.x_wz().inverse_transform_vector(normal_w);
         let is_usable = self.settings.normals
@@ -109,7 +109,7 @@ impl HeightField {
         is_usable.then(|| (slopes[..self.zone.dimension()].into(), noise))
     }
 
-    /// Finds the most likely kernel and hyperparameters and conditions on all contacts.
+    /// Fits kernel and hyperparameters by maximum likelihood and conditions on all contacts.
     ///
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
@@ -117,8 +117,8 @@ impl HeightField {
         let search_box = self.search_box();
         let mut fit = match self.inducing() {
             None => self.kernels.fit(&search_box, &self.contacts),
-            // Evenly thinned, so that some are near each other and tell the noise; and the same
-            // ones for as long as possible, so that what the last fit knows still holds.
+            // Thinned evenly, so that some touches are close to each other and determine the noise;
+            // the same ones for as long as possible, so that the last fit remains a valid start.
             Some(most) => {
                 let thinned = self.contacts.every(self.contacts.len() / most);
                 self.kernels.fit(&search_box, &thinned)
@@ -129,7 +129,7 @@ impl HeightField {
             let mut posterior =
                 Posterior::new(self.kernels.kernel(), hyperparameters, self.contacts.clone())?;
             posterior.widen(widening(&posterior.left_out()));
-            // Below it is conditioned again, to be what the recorded numbers make to the last bit.
+            // Conditioned again below, so that the recorded numbers are reproduced to the last bit.
             fit.hyperparameters = posterior.hyperparameters().clone();
         }
         let (posterior, left_sd) = self.posterior(fit.hyperparameters.clone())?;
@@ -138,7 +138,7 @@ impl HeightField {
         Ok((self.fit.insert(fit), self.surface.insert(posterior)))
     }
 
-    /// Conditions on all contacts with what a fit found, as when a recorded belief is drawn again.
+    /// Conditions on all contacts with the given fit, e.g. to draw a recorded belief.
     ///
     /// # Errors
     /// If the covariance of the contacts cannot be factored.
@@ -150,13 +150,14 @@ impl HeightField {
         Ok(())
     }
 
-    /// Through how many touches all are taken in, if not exactly.
+    /// Number of inducing touches, if the posterior is not exact.
     fn inducing(&self) -> Option<usize> {
         let most = self.settings.inducing_touches? as usize;
         (self.contacts.len() > most).then_some(most)
     }
 
-    /// Conditioned on all contacts; and what of them is lost, if that is not exact.
+    /// Returns the posterior given all contacts, and the standard deviation lost by an
+    /// approximation.
     fn posterior(
         &self,
         hyperparameters: Hyperparameters,
@@ -176,7 +177,7 @@ impl HeightField {
         Ok((posterior, left_sd))
     }
 
-    /// Adds the unreached targets to what `surface` knows of its variance.
+    /// Conditions the variance of `surface` on the unreached targets.
     fn explore(&mut self, surface: &Posterior) -> Result<(), CovarianceError> {
         let unreached = self.unreached.iter().map(Vec::as_slice);
         self.explored = match self.inducing() {
@@ -193,7 +194,7 @@ impl HeightField {
         Ok(())
     }
 
-    /// Largest jitter that a covariance of this belief needed, relative to its diagonal.
+    /// Largest jitter added to a covariance of this belief, relative to its diagonal.
     pub fn jitter(&self) -> f64 {
         let posteriors = self.surface.iter().chain(&self.explored);
         posteriors.map(Posterior::jitter).fold(0.0, f64::max)
@@ -204,7 +205,7 @@ impl HeightField {
         let squares: f64 = heights.iter().map(|y| y * y).sum();
         let rms = (squares / heights.len().max(1) as f64).sqrt();
         let extents_m = self.zone.extents_m();
-        // Heights that are all zero have no scale of their own.
+        // Heights that are all zero have no scale.
         let scale = if rms > 0.0 { rms } else { extents_m[0] };
         let [shortest, longest] = self.settings.length_scale;
         let [quietest, loudest] = self.settings.noise;
@@ -239,42 +240,42 @@ impl HeightField {
         }
     }
 
-    /// What is explored.
+    /// The zone that is explored.
     pub fn zone(&self) -> &Zone {
         &self.zone
     }
 
-    /// What the last [`refit`](Self::refit) found.
+    /// Returns the result of the last [`refit`](Self::refit).
     pub fn fit(&self) -> Option<&Fit> {
         self.fit.as_ref()
     }
 
-    /// The posterior of the surface, once fitted.
+    /// Posterior of the surface, after the first fit.
     pub fn surface(&self) -> Option<&Posterior> {
         self.surface.as_ref()
     }
 
-    /// What a further touch would start from: the posterior, given also that targets missed, or
-    /// contacted elsewhere, are no news. Its variance is what a touch could still remove; its mean
-    /// means nothing.
+    /// Posterior for planning: conditioned also on targets that missed or were contacted elsewhere,
+    /// which are not worth another touch. Its variance is what a touch can still remove; its mean
+    /// is meaningless.
     pub fn explorable(&self) -> Option<&Posterior> {
         self.explored.as_ref().or(self.surface.as_ref())
     }
 
-    /// What the touches say of where there is a surface.
+    /// Evidence of the touches for the presence of a surface.
     pub fn presence(&self) -> &Presence {
         &self.presence
     }
 
-    /// Every target asked for so far.
+    /// All targets so far.
     pub fn targets(&self) -> &[Vec<f64>] {
         &self.targets
     }
 }
 
-/// What takes the band of 95 % to where it holds that share of the deviations `z`: the smallest
-/// that holds (n + 1)·95 % of n, or all of them where that is more, in units of 1.96; never below
-/// 1, since a few contacts do not show how far off the rest may be.
+/// Factor that makes the 95 % band cover that share of the leave-one-out deviations `z`: the
+/// smallest that covers (n + 1)·95 % of n, or all of them where that exceeds n, in units of 1.96.
+/// It is at least 1, since a few contacts do not show the largest deviations.
 fn widening(z: &[f64]) -> f64 {
     let mut far: Vec<f64> = z.iter().map(|z| z.abs()).collect();
     far.sort_by(f64::total_cmp);

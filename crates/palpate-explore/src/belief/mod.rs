@@ -1,4 +1,4 @@
-//! The belief after some touches: a Gaussian process, over a zone or in space.
+//! Belief after some touches: a Gaussian process over a zone or in space.
 
 mod height_field;
 
@@ -13,7 +13,7 @@ use palpate_gp::Posterior;
 use palpate_gp::covariance::CovarianceError;
 use palpate_gp::fit::Fit;
 
-/// The belief of one trial. Either kind is large, and few are held at once.
+/// Belief of one trial. Both variants are large, and few exist at a time.
 #[derive(Clone)]
 #[allow(clippy::large_enum_variant)]
 pub enum Belief {
@@ -24,7 +24,7 @@ pub enum Belief {
 }
 
 impl Belief {
-    /// Knows nothing yet of what `task` explores with `finger`, which may be soft.
+    /// Creates a belief without data for `task` and `finger`; a soft finger is marked so.
     pub fn new(
         task: &Task,
         (finger, is_soft): (&Finger, bool),
@@ -40,8 +40,8 @@ impl Belief {
         }
     }
 
-    /// Adds a touch that went the way of `approach` because of `target`, and what it swept; the
-    /// belief changes with the next [`refit`](Self::refit).
+    /// Adds a touch at `target` that followed `approach`, and the volume it swept; the belief
+    /// changes at the next [`refit`](Self::refit).
     pub fn observe(
         &mut self,
         target: &Target,
@@ -60,7 +60,7 @@ impl Belief {
         }
     }
 
-    /// Finds the most likely hyperparameters and conditions on all touches.
+    /// Fits the hyperparameters by maximum likelihood and conditions on all touches.
     ///
     /// # Errors
     /// If the covariance of the touches cannot be factored.
@@ -83,7 +83,7 @@ impl Belief {
         }
     }
 
-    /// What the last [`refit`](Self::refit) found.
+    /// Returns the result of the last [`refit`](Self::refit).
     pub fn fit(&self) -> Option<&Fit> {
         match self {
             Self::HeightField(field) => field.fit(),
@@ -91,7 +91,7 @@ impl Belief {
         }
     }
 
-    /// The Gaussian process, once fitted: of heights over places of a zone, or of a field over
+    /// The Gaussian process, after the first fit: heights over places of a zone, or a field over
     /// points of `W` whose zero set is the surface.
     pub fn posterior(&self) -> Option<&Posterior> {
         match self {
@@ -100,7 +100,7 @@ impl Belief {
         }
     }
 
-    /// Largest jitter that a covariance of this belief needed, relative to its diagonal.
+    /// Largest jitter added to a covariance of this belief, relative to its diagonal.
     pub fn jitter(&self) -> f64 {
         match self {
             Self::HeightField(field) => field.jitter(),
@@ -108,7 +108,7 @@ impl Belief {
         }
     }
 
-    /// Every target asked for so far.
+    /// All targets so far.
     pub fn targets(&self) -> Vec<Target> {
         match self {
             Self::HeightField(field) => field.targets().iter().cloned().map(Target::from).collect(),
@@ -118,7 +118,7 @@ impl Belief {
         }
     }
 
-    /// The belief over a zone, if it is one.
+    /// Returns the belief over a zone, if it is one.
     pub fn height_field(&self) -> Option<&HeightField> {
         match self {
             Self::HeightField(field) => Some(field),
@@ -126,7 +126,7 @@ impl Belief {
         }
     }
 
-    /// The belief in space, if it is one.
+    /// Returns the belief of a whole object, if it is one.
     pub fn implicit_surface(&self) -> Option<&ImplicitSurface> {
         match self {
             Self::HeightField(_) => None,

@@ -1,5 +1,5 @@
-//! Algorithm 1 of Yi et al. 2016: touch where the belief's standard deviation is largest. Around an
-//! object it is that of where the surface lies along its normal.
+//! Planner `active`: touches where the posterior standard deviation is largest (Yi et al. 2016,
+//! Algorithm 1). For a whole object, it is the standard deviation of the surface along its normal.
 
 use super::candidates::Candidates;
 use super::plan::{Entry, Plan};
@@ -8,7 +8,7 @@ use crate::belief::Belief;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "active",
-    about: "largest posterior standard deviation, by DIRECT then BFGS (the paper's)",
+    about: "largest posterior standard deviation, by DIRECT then BFGS (Yi et al. 2016)",
     zone_only: None,
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
@@ -16,7 +16,8 @@ pub(super) const ENTRY: Entry = Entry {
     },
 };
 
-/// The variance has its maximum where its root has, and its gradient is finite everywhere.
+/// Finds the maximum of the variance instead of its root: both have the same maximum, and the
+/// gradient of the variance is finite everywhere.
 fn plan(search: &mut Search, belief: &Belief) -> Plan {
     match belief {
         Belief::HeightField(field) => match field.explorable() {

@@ -1,5 +1,5 @@
-//! Around a whole object: places of the believed surface among which planners choose, whether the
-//! finger can go straight at them, and where nothing was met or swept yet.
+//! Candidate targets on the estimated surface of a whole object: whether a straight approach to
+//! them is free, and where the space is still unexplored.
 
 use super::plan::{Plan, Stall};
 use super::sample::{any_side, in_ball};
@@ -10,32 +10,33 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Cells along the surface's box on which candidates are sought, and most of them; chosen.
+/// Cells per side of the surface's box for the candidate mesh, and the largest number of
+/// candidates; heuristics.
 const CELLS: u32 = 28;
 const MOST: usize = 400;
 
-/// A place of the believed surface.
+/// A point on the estimated surface.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// In `W`.
+    /// Position in `W`.
     pub p_w: Point3<f64>,
-    /// Unit outward normal there.
+    /// Unit outward normal at the point.
     pub normal_w: UnitVector3<f64>,
-    /// How far the surface may lie from there, σ / |∇f|.
+    /// Standard deviation of the surface's position along the normal, σ / |∇f|.
     pub offset_m: f64,
 }
 
-/// Places all over the believed surface.
+/// Candidate targets spread over the estimated surface.
 pub struct Candidates<'a> {
     belief: &'a ImplicitSurface,
     surface: &'a Surface,
-    /// In no order.
+    /// The candidates, in no particular order.
     pub all: Vec<Candidate>,
 }
 
 impl<'a> Candidates<'a> {
-    /// Of what `belief` holds for the surface, thinned evenly; none before the first fit, or where
-    /// no surface is believed.
+    /// Computes the candidates on the surface of `belief`, thinned evenly. Returns `None` before
+    /// the first fit, or if the belief has no surface.
     pub fn of(belief: &'a ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Self> {
         let surface = belief.surface()?;
         let mesh = surface.mesh(CELLS)?;
@@ -54,8 +55,8 @@ impl<'a> Candidates<'a> {
         Some(Self { belief, surface, all: all.collect() })
     }
 
-    /// To go where the scores that `score` gives the candidates are highest and the way is free, or
-    /// now and then where nothing is known; anywhere where no surface is believed.
+    /// Plans a touch at the candidate with the highest score whose approach is free, or from time
+    /// to time into unexplored space. Plans a random touch if the belief has no surface.
     pub fn choose(
         belief: &ImplicitSurface,
         rng: &mut ChaCha8Rng,
@@ -71,13 +72,13 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// The surface they are of.
+    /// The surface of the candidates.
     pub fn surface(&self) -> &Surface {
         self.surface
     }
 
-    /// To go where the score, one of each in their order, is highest and the way is free;
-    /// `anywhere` if none is.
+    /// Plans a touch at the candidate with the highest score whose approach is free; `anywhere` if
+    /// none is. `scores` has one value per candidate, in their order.
     pub fn best(&self, scores: impl Iterator<Item = f64>, anywhere: &Aim) -> Plan {
         let mut order: Vec<(f64, &Candidate)> = scores.zip(&self.all).collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -91,26 +92,26 @@ impl<'a> Candidates<'a> {
     }
 }
 
-/// Room that the believed surface must leave around the way, and the way's first and later steps,
-/// in radii of the fingertip; chosen.
+/// Clearance from the estimated surface along an approach, and the lengths of the first and of
+/// later steps along it, in fingertip radii; heuristics.
 const ROOM: f64 = 0.7;
 const FIRST: f64 = 1.5;
 const STEP: f64 = 0.7;
 
-/// How far ways are tilted sideways from the normal, as a tangent; chosen, 35°.
+/// Sideways tilt of an approach from the normal, as a tangent (35°); a heuristic.
 const TILT: f64 = 0.7;
 
-/// Least cosine between way and normal; chosen.
+/// Smallest cosine between approach and normal; a heuristic.
 const SLANT: f64 = 0.3;
 
-/// Aims this near to an earlier one bring nothing new: distance in radii of the fingertip, and
-/// cosine of the directions. Chosen.
+/// Two aims closer than this count as the same: distance in fingertip radii, and cosine between
+/// their directions; heuristics.
 const NEAR: f64 = 0.25;
 const ALONG: f64 = 0.97;
 
-/// An aim at `p_w` of the believed surface with the outward normal `normal_w`, along whose way the
-/// belief leaves room for the fingertip: against the normal if it can be, or from another side.
-/// None if there is none that was not asked for before.
+/// Returns an aim at the surface point `p_w` with outward normal `normal_w` whose approach is clear
+/// of the estimated surface: against the normal if possible, tilted otherwise. Returns `None` if
+/// there is none that differs from all earlier targets.
 pub fn free_aim(
     belief: &ImplicitSurface,
     surface: &mut SurfaceField,
@@ -140,7 +141,7 @@ pub fn free_aim(
         })
 }
 
-/// A unit vector square to another.
+/// Returns a unit vector orthogonal to another.
 fn any_orthogonal(to: &UnitVector3<f64>) -> Vector3<f64> {
     let axis = if to.x.abs() < 0.8 { Vector3::x() } else { Vector3::y() };
     to.cross(&axis).normalize()
@@ -153,7 +154,7 @@ fn is_new(belief: &ImplicitSurface, aim: &Aim) -> bool {
     })
 }
 
-/// Whether the belief leaves the fingertip room along the way of `aim` outside the object.
+/// Whether the approach of `aim` outside the object is clear of the estimated surface.
 fn has_room(belief: &ImplicitSurface, surface: &mut SurfaceField, aim: &Aim) -> bool {
     let (ball, radius_m) = (&belief.scope().ball, belief.scope().radius_m);
     let back = |radii: f64| aim.p_w - aim.ahead_w.scale(radii * radius_m);
@@ -167,21 +168,22 @@ fn has_room(belief: &ImplicitSurface, surface: &mut SurfaceField, aim: &Aim) -> 
     true
 }
 
-/// While the ball about the contacts is smaller than this share of the one in which there is
-/// something to touch, one touch in so many goes where nothing is known; chosen.
+/// While the ball around the contacts is smaller than this share of the whole ball, one touch in
+/// `EVERY` goes into unexplored space; heuristics.
 const KNOWN: f64 = 0.6;
 const EVERY: usize = 5;
 
-/// Places looked at, and sides from which each of the emptiest is aimed at; chosen.
+/// Points sampled, number of the emptiest that are considered, and directions tried for each;
+/// heuristics.
 const PLACES: usize = 200;
 const EMPTIEST: usize = 10;
 const SIDES: usize = 5;
 
-/// A hole of less than this share of the ball's radius is left; chosen.
+/// Holes smaller than this share of the ball's radius are ignored; a heuristic.
 const HOLE: f64 = 0.15;
 
-/// An aim into the largest hole between all that was met and swept, if it is time for one and there
-/// is a large one that can be reached.
+/// Returns an aim into the largest hole between all contacts and swept space, if it is the turn of
+/// one and a large, reachable hole exists.
 pub fn unseen(belief: &ImplicitSurface, rng: &mut ChaCha8Rng) -> Option<Aim> {
     let scope = belief.scope();
     let whole = &scope.ball;

@@ -1,10 +1,10 @@
-//! A lattice from coarse to fine: the corners, then the middles between them, and so on.
+//! Planner `grid`: a lattice refined from coarse to fine, corners first, then midpoints, and so on.
 //!
-//! Level k is the lattice of 2ᵏ + 1 places along each side, borders included, without those of
-//! the levels before; within a level, places come in bit-reversed (van der Corput) order, so that
-//! a trial may end at any touch. Each axis sees few distinct coordinates: a surface whose period
-//! the lattice shares is not seen until a finer level. Around an object it is a lattice of equal
-//! areas on the sphere of directions.
+//! Level k is the lattice of 2ᵏ + 1 points per side, borders included, without the points of
+//! earlier levels. Within a level, points come in bit-reversed (van der Corput) order, so that a
+//! trial may end at any touch. Each axis has few distinct coordinates: a surface with the period of
+//! the lattice is resolved only at a finer level. For a whole object, it is an equal-area lattice
+//! on the sphere of directions.
 
 use super::plan::{Entry, Plan};
 use super::sample::sampled;
@@ -16,7 +16,7 @@ pub(super) const ENTRY: Entry = Entry {
     zone_only: None,
     make: |_, _| {
         let mut next_level = 0;
-        // Remaining nodes of this level, the next one last: fractions 0..1.
+        // Remaining nodes of this level, the next one last, as fractions in 0..1.
         let mut rest: Vec<Vec<f64>> = Vec::new();
         Box::new(move |belief: &Belief| {
             let target = sampled(belief, |dimension| {
@@ -35,10 +35,10 @@ pub(super) const ENTRY: Entry = Entry {
     },
 };
 
-/// Finest level: beyond the most touches that a trial may have, in one dimension as in two.
+/// Finest level, beyond the largest number of touches of a trial in one and in two dimensions.
 const FINEST: u32 = 11;
 
-/// The nodes that `level` adds, last to first.
+/// Returns the nodes added by `level`, last to first.
 fn lattice(dimension: usize, level: u32) -> Vec<Vec<f64>> {
     let last = 1u32 << level;
     let is_new = |node: &[u32]| level == 0 || node.iter().any(|index| index % 2 == 1);
@@ -52,7 +52,7 @@ fn lattice(dimension: usize, level: u32) -> Vec<Vec<f64>> {
     nodes.iter().map(|node| node.iter().map(fraction).collect()).collect()
 }
 
-/// The bits of a node's indices, those of all axes in turn, the smallest first.
+/// Interleaves the bits of a node's indices over all axes, lowest bits first.
 fn order(node: &[u32]) -> u64 {
     (0..=FINEST).fold(0, |order, bit| {
         node.iter().fold(order, |order, index| order << 1 | u64::from(index >> bit & 1))

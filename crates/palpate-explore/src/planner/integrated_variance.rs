@@ -1,5 +1,5 @@
-//! Touch where the variance of the whole surface falls most: the active learning of Cohn (1996),
-//! also called integrated variance reduction.
+//! Planner `integrated_variance`: maximises the reduction of the variance over the whole surface
+//! (active learning, Cohn 1996; also called integrated variance reduction).
 
 use super::candidates::Candidates;
 use super::plan::{Entry, Plan};
@@ -13,11 +13,12 @@ use rand::RngExt;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "integrated_variance",
-    about: "largest fall of the variance over the whole surface (Cohn's active learning)",
+    about: "largest reduction of the variance over the whole surface (Cohn 1996)",
     zone_only: None,
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
-        // Of the places of a zone at which the variance is computed; drawn with the first plan.
+        // Seed of the places at which the variance over a zone is computed; drawn with the first
+        // plan.
         let mut seed = None;
         Box::new(move |belief: &Belief| {
             Ok(match belief {

@@ -1,6 +1,6 @@
-//! Where to touch next. A planner sees the belief and nothing else.
+//! Planners: they choose the next target from the belief alone.
 //!
-//! To add a planner: write its file here and give it a line in [`PLANNERS`].
+//! To add a planner, write its file here and add a line to [`PLANNERS`].
 
 mod active;
 pub mod candidates;
@@ -21,7 +21,7 @@ pub use plan::{Entry, Plan, PlanError, Planner, PlannerFactory, Stall, over_zone
 pub use sample::uniform;
 pub use settings::PlanningSettings;
 
-/// Every planner; one line to add one.
+/// All built-in planners; add one line per planner.
 pub const PLANNERS: &[Entry] = &[
     active::ENTRY,
     random::ENTRY,
@@ -34,15 +34,16 @@ pub const PLANNERS: &[Entry] = &[
     ucb::ENTRY,
 ];
 
-/// Whether `name` is that of a planner that is not built in: `MODULE:NAME`. An experiment may list
-/// such ones; what runs it must have [their factories](PlannerFactory), what reads it need not.
+/// Whether `name` names an external planner, `MODULE:NAME`. An experiment may list external
+/// planners: a program that runs it needs [their factories](PlannerFactory), one that only reads it
+/// does not.
 pub fn is_own(name: &str) -> bool {
     let is_plain = |c: char| c.is_alphanumeric() || "_.<>".contains(c);
     let is_word = |word: &str| !word.is_empty() && word.chars().all(is_plain);
     name.split_once(':').is_some_and(|(module, name)| is_word(module) && is_word(name))
 }
 
-/// The planner called `name`.
+/// Returns the planner with this name.
 pub fn by_name(name: &str) -> Option<&'static Entry> {
     PLANNERS.iter().find(|entry| entry.name == name)
 }

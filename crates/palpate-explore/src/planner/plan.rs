@@ -1,4 +1,4 @@
-//! The planner's trait: a planner gets the belief and nothing else, and chooses where to touch.
+//! The planner trait: chooses the next target from the belief alone.
 
 use super::settings::PlanningSettings;
 use crate::belief::{Belief, HeightField};
@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Chooses targets. It is given the belief only: the ground truth is no part of it.
+/// A planner: chooses targets from the belief, without access to the ground truth.
 ///
 /// ```
 /// use palpate_explore::belief::Belief;
@@ -24,52 +24,52 @@ use thiserror::Error;
 /// }
 /// ```
 ///
-/// A planner cannot ask for more: this crate knows no simulator and no truth.
+/// This crate depends on no simulator and no ground truth, so a planner cannot access them.
 pub trait Planner: Send {
-    /// The next target.
+    /// Returns the next target.
     ///
     /// # Errors
-    /// If it names none, which ends the trial.
+    /// If the planner returns no target; this ends the trial.
     fn plan(&mut self, belief: &Belief) -> Result<Plan, PlanError>;
 }
 
-/// A planner's choice.
+/// The choice of a planner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Where to touch.
     pub target: Target,
-    /// Standard deviation there, if the planner looked at it: the root of
-    /// the belief's variance.
+    /// Standard deviation at the target, if the planner computed it: the root of the belief's
+    /// variance.
     pub sd_m: Option<f64>,
-    /// Why the planner's own rule could not decide, if it could not.
+    /// Reason for a fallback to a random target, if the planner's own rule could not decide.
     pub stall: Option<Stall>,
 }
 
 impl Plan {
-    /// To touch `target`.
+    /// A plan to touch `target`.
     pub fn at(target: impl Into<Target>) -> Self {
         Self { target: target.into(), sd_m: None, stall: None }
     }
 }
 
-/// Why a planner's own rule could not decide; the target is then random, because any fixed
-/// pattern may be just the one the surface hides behind.
+/// Reasons why a planner's own rule could not decide. The target is then random, because a fixed
+/// pattern might coincide with a pattern of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Stall {
-    /// The belief is sure of the best place: that it is the best one is rounding.
+    /// The variance at the best place is below rounding error.
     Collapsed,
-    /// The same target as before would have been asked for again.
+    /// The target would repeat an earlier one.
     Repeated,
-    /// Around an object: no way is free to anything that it would ask for.
+    /// No approach to any candidate on a whole object is free.
     Blocked,
 }
 
-/// Why a planner named no target.
+/// Error of a planner that returned no target.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("the planner named no target: {reason}")]
+#[error("the planner returned no target: {reason}")]
 pub struct PlanError {
-    /// In its own words.
+    /// The planner's own message.
     pub reason: String,
 }
 
@@ -85,43 +85,44 @@ impl<F: FnMut(&Belief) -> Result<Plan, PlanError> + Send> Planner for F {
     }
 }
 
-/// A planner that explores zones only; around an object it names no target.
+/// Wraps a planner that supports zones only; it returns an error for a whole object.
 pub fn over_zone(mut plan: impl FnMut(&HeightField) -> Plan + Send + 'static) -> Box<dyn Planner> {
     Box::new(move |belief: &Belief| {
-        Ok(plan(belief.height_field().ok_or("it explores zones only")?))
+        Ok(plan(belief.height_field().ok_or("this planner supports zones only")?))
     })
 }
 
-/// A planner as an experiment file names it.
+/// A built-in planner.
 pub struct Entry {
-    /// Its name.
+    /// Name in an experiment file.
     pub name: &'static str,
-    /// One line for `--help`.
+    /// One-line description for `--help`.
     pub about: &'static str,
-    /// Why it explores zones only and cannot go around an object, if so.
+    /// Reason why it supports zones only and no whole objects, if so.
     pub zone_only: Option<&'static str>,
-    /// Makes one; the generator is its only randomness.
+    /// Creates a planner; the generator is its only source of randomness.
     pub make: fn(&PlanningSettings, ChaCha8Rng) -> Box<dyn Planner>,
 }
 
-/// Makes the planners of one name: an [`Entry`], or what a program adds to its simulation.
+/// Factory of the planners of one name: a built-in [`Entry`], or one that a program adds to its
+/// simulation.
 pub trait PlannerFactory: Send + Sync {
-    /// As in an experiment's list; if it is not that of an entry, it is an
-    /// [own](super::is_own) one's.
+    /// Name in an experiment's list; a name other than a built-in one's is an
+    /// [external](super::is_own) planner's.
     fn name(&self) -> &str;
 
-    /// The source text that decides its plans, whose hash becomes part of a run's identity; `None`
-    /// for what is compiled into the program, which a run's manifest names.
+    /// Source text that determines the plans; its hash becomes part of a run's identity. `None` for
+    /// planners compiled into the program, which the run's manifest names.
     fn source(&self) -> Option<String> {
         None
     }
 
-    /// Why it cannot go around a whole object, if it cannot.
+    /// Reason why it does not support whole objects, if so.
     fn zone_only(&self) -> Option<&str> {
         None
     }
 
-    /// Makes one for a trial; the generator is its only randomness.
+    /// Creates a planner for a trial; the generator is its only source of randomness.
     fn make(&self, settings: &PlanningSettings, random: ChaCha8Rng) -> Box<dyn Planner>;
 }
 

@@ -1,4 +1,4 @@
-//! Uniformly random targets: the paper's baseline.
+//! Planner `random`: uniformly random targets, the baseline of Yi et al. 2016.
 
 use super::plan::{Entry, Plan};
 use super::sample::anywhere;
@@ -6,7 +6,7 @@ use crate::belief::Belief;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "random",
-    about: "uniformly random targets (the paper's baseline)",
+    about: "uniformly random targets (baseline of Yi et al. 2016)",
     zone_only: None,
     make: |_, mut rng| Box::new(move |belief: &Belief| Ok(Plan::at(anywhere(belief, &mut rng)))),
 };

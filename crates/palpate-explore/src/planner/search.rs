@@ -1,7 +1,7 @@
-//! Where an acquisition function is largest over a zone: DIRECT finds its hills, climbs go up side
-//! by side.
+//! Maximisation of an acquisition function over a zone: DIRECT finds the hills, and BFGS climbs
+//! several of them together.
 //!
-//! The function is asked for whole lists of places: values of many cost less than many values.
+//! The function is evaluated for lists of places, which costs less than single evaluations.
 
 use super::plan::{Plan, Stall};
 use super::sample::uniform;
@@ -16,60 +16,60 @@ use palpate_gp::posterior::Scratch;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Two targets nearer than this, in units of the zone's sides, are the same touch; chosen.
+/// Two targets closer than this are the same touch, in units of the zone's sides; a heuristic.
 const SAME_TARGET: f64 = 1e-6;
 
-/// Below this fraction of the signal's standard deviation, the posterior's is the rounding error
-/// of a covariance with the least noise allowed; chosen.
+/// Smallest posterior standard deviation above rounding error, as a fraction of the signal's: the
+/// rounding error of a covariance with the smallest noise allowed; a heuristic.
 const LOST_IN_ROUNDING: f64 = 1e-5;
 
-/// Hills that are climbed, see [`MARGIN`].
+/// Number of hills climbed; see [`MARGIN`].
 const HILLS: usize = 8;
 
-/// DIRECT searches the zone with this fraction of its sides added all around, and what it asks
-/// outside is answered from the nearest place inside: it divides from the middles of rectangles
-/// and would reach the zone's border, where the variance often peaks, only in the limit. On 78
-/// beliefs of the bird, 200 evaluations and one climb came within 2 % of the maximum on a dense
-/// grid 23 times; with the margin and eight climbs 73 times, and 500 evaluations 76 times.
+/// Margin that DIRECT adds around the zone, as a fraction of its sides; places outside are clamped
+/// to the nearest place inside. DIRECT divides from the middles of rectangles and would otherwise
+/// reach the zone's border, where the variance often peaks, only in the limit. On 78 beliefs of the
+/// bird, 200 evaluations and one climb came within 2 % of the maximum on a dense grid 23 times;
+/// with the margin and eight climbs 73 times, and 500 evaluations 76 times.
 const MARGIN: f64 = 0.1;
 
-/// A climb is given up that would stay below the highest if it won so many times what its parabola
-/// says; chosen.
+/// A climb is stopped if it would stay below the highest even with this many times its predicted
+/// gain; a heuristic.
 const HOPE: f64 = 4.0;
 
-/// First step of a climb in units of the zone's sides, half the distance of two hills; and the
-/// share of the value that is not worth another step, far below what changes a plan. Chosen.
+/// First step of a climb in units of the zone's sides, half the distance between two hills; and the
+/// relative gain at which a climb ends, far below what changes a plan; heuristics.
 const FIRST_STEP: f64 = 0.02;
 const RELATIVE_GAIN: f64 = 1e-6;
 
-/// Places nearer than this, in units of the zone's sides, are taken for the same hill; chosen.
+/// Places closer than this belong to the same hill, in units of the zone's sides; a heuristic.
 const SAME_HILL: f64 = 0.04;
 
 /// Step of a central difference in units of the zone's sides, near the cube root of the rounding
-/// error, where its own and the rounding error balance.
+/// error, where truncation and rounding error balance.
 const STEP: f64 = 1e-5;
 
-/// Finds where an acquisition function is largest over a zone.
+/// Maximises an acquisition function over a zone.
 pub struct Search {
     /// Settings of all planners.
     pub settings: PlanningSettings,
-    /// All of the randomness.
+    /// Random number generator, the only source of randomness.
     pub rng: ChaCha8Rng,
 }
 
 impl Search {
-    /// Whose only randomness is `rng`.
+    /// Creates a search with `rng` as its only source of randomness.
     pub fn new(settings: &PlanningSettings, rng: ChaCha8Rng) -> Self {
         Self { settings: settings.clone(), rng }
     }
 
-    /// A random place, of a belief that knows nothing.
+    /// Returns a plan at a random place, for a belief without data.
     pub fn anywhere(&mut self, zone: &Zone) -> Plan {
         Plan::at(uniform(zone, &mut self.rng))
     }
 
-    /// The place where `score` is largest; `score` returns the values of places and writes their
-    /// gradients into its second argument unless that is empty.
+    /// Plans a touch where `score` is largest; `score` returns the values at places and writes
+    /// their gradients into its second argument unless that is empty.
     pub fn plan(
         &mut self,
         belief: &HeightField,
@@ -79,7 +79,7 @@ impl Search {
         self.conclude(belief, place)
     }
 
-    /// Plans to touch `place`, or a random one if a touch there would tell nothing.
+    /// Plans a touch at `place`, or at a random one if a touch there would bring no information.
     pub fn conclude(&mut self, belief: &HeightField, place: Vec<f64>) -> Plan {
         let stall = stalled(belief, &place);
         let target = if stall.is_none() { place } else { uniform(belief.zone(), &mut self.rng) };
@@ -87,7 +87,7 @@ impl Search {
         Plan { target: target.into(), sd_m, stall }
     }
 
-    /// The largest value of `score` that was found, and its place.
+    /// Returns the largest value of `score` found and its place.
     pub fn maximum(
         &self,
         zone: &Zone,
@@ -140,12 +140,12 @@ impl Search {
         best
     }
 
-    /// Evenly spread places, others each time: none was asked for before.
+    /// Returns evenly spread places, different ones on each call.
     pub fn scattered(&mut self, zone: &Zone, count: u32) -> Vec<Vec<f64>> {
         sobol::places(zone, count, self.rng.random())
     }
 
-    /// `values` with their gradients by central differences, one-sided at the zone's border.
+    /// Returns `values` and their gradients by central differences, one-sided at the zone's border.
     pub fn differentiated<V: FnMut(&[Vec<f64>]) -> Vec<f64>>(
         &self,
         zone: &Zone,
@@ -156,7 +156,7 @@ impl Search {
             if gradients.is_empty() {
                 return values(places);
             }
-            // Each place, then the one before and after it along each axis.
+            // Each place, followed by the one before and after it along each axis.
             let mut all: Vec<Vec<f64>> = Vec::new();
             for place in places {
                 all.push(place.clone());
@@ -184,7 +184,7 @@ impl Search {
     }
 }
 
-/// Lowest and highest corner of the zone, moved out by `margin` of its sides.
+/// Lowest and highest corner of the zone, moved outwards by `margin` of its sides.
 fn corners(zone: &Zone, margin: f64) -> (Vec<f64>, Vec<f64>) {
     let moved = |[low, high]: [f64; 2]| {
         let step = margin * (high - low);
@@ -197,7 +197,7 @@ fn clamped(zone: &Zone, place: &[f64]) -> Vec<f64> {
     place.iter().zip(zone.sides()).map(|(at, [low, high])| at.clamp(low, high)).collect()
 }
 
-/// The best places seen that are not next to a better one.
+/// Returns the best places evaluated that have no better neighbour.
 fn hills(zone: &Zone, mut seen: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
     seen.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut hills: Vec<Vec<f64>> = Vec::new();
@@ -213,7 +213,7 @@ fn hills(zone: &Zone, mut seen: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
     hills
 }
 
-/// Why a touch at `place` would tell nothing, if so.
+/// Returns the reason why a touch at `place` would bring no information, if so.
 fn stalled(belief: &HeightField, place: &[f64]) -> Option<Stall> {
     let lost_sd = LOST_IN_ROUNDING * belief.surface()?.hyperparameters().signal_sd;
     let same = |target: &Vec<f64>| belief.zone().distance(target, place) < SAME_TARGET;

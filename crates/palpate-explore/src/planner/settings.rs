@@ -1,33 +1,33 @@
-//! What the planners' rules depend on.
+//! Settings of the planners.
 
 use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How planners search, and the settings of single ones under their names.
+/// Settings of the planners: the search, and those of single planners under their names.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlanningSettings {
-    /// Evaluations of the acquisition function that DIRECT may spend on one plan.
+    /// DIRECT evaluations of the acquisition function per plan.
     pub direct_evaluations: u32,
-    /// Evaluations that each climb (BFGS) may spend on refining it.
+    /// BFGS evaluations per climb that refines a plan.
     pub lbfgs_evaluations: u32,
-    /// Of `integrated_variance`.
+    /// Settings of `integrated_variance`.
     pub integrated_variance: IntegratedVarianceSettings,
-    /// Of `silhouette`.
+    /// Settings of `silhouette`.
     pub silhouette: SilhouetteSettings,
-    /// Of `oracle`.
+    /// Settings of `oracle`.
     pub oracle: OracleSettings,
-    /// Of `slope`.
+    /// Settings of `slope`.
     pub slope: SlopeSettings,
-    /// Of `travel`.
+    /// Settings of `travel`.
     pub travel: TravelSettings,
-    /// Of `ucb`.
+    /// Settings of `ucb`.
     pub ucb: UcbSettings,
 }
 
 impl Default for PlanningSettings {
-    /// Chosen: on a hundred touches more evaluations rarely find a larger variance.
+    /// Heuristic: over a hundred touches, more evaluations rarely find a larger variance.
     fn default() -> Self {
         Self {
             direct_evaluations: 500,
@@ -46,12 +46,12 @@ impl Default for PlanningSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct IntegratedVarianceSettings {
-    /// Places over which the variance is summed.
+    /// Number of places over which the variance is summed.
     pub places: u32,
 }
 
 impl Default for IntegratedVarianceSettings {
-    /// Chosen: about as many as the hundred touches of a trial tell apart, twice over.
+    /// Heuristic: about twice as many as a trial of a hundred touches resolves.
     fn default() -> Self {
         Self { places: 256 }
     }
@@ -61,18 +61,18 @@ impl Default for IntegratedVarianceSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SilhouetteSettings {
-    /// Places over which the variance is summed.
+    /// Number of places over which the variance is summed.
     pub places: u32,
-    /// Places at which a touch is considered; other ones for each touch.
+    /// Number of candidate targets, drawn anew for each touch.
     pub candidates: u32,
-    /// The way along the zone that takes as long as a touch does from first to last. With it values
-    /// are those per time; without it, per touch.
+    /// Travel distance along the zone that costs as much time as one touch; values are then per
+    /// unit time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub touch_way_m: Option<f64>,
 }
 
 impl Default for SilhouetteSettings {
-    /// Chosen: twice as many candidates gain nothing on the suite.
+    /// Heuristic: twice as many candidates bring no gain on the suite.
     fn default() -> Self {
         Self { places: 256, candidates: 500, touch_way_m: None }
     }
@@ -82,15 +82,14 @@ impl Default for SilhouetteSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OracleSettings {
-    /// Touches that are tried out for each that is made.
+    /// Number of touches simulated for each one made.
     pub candidates: u32,
-    /// Whether the belief is fitted again after each that is tried, as it is after one that is
-    /// made; otherwise its hyperparameters stay.
+    /// Whether hyperparameters are refitted after each simulated touch; otherwise they stay fixed.
     pub refit: bool,
 }
 
 impl Default for OracleSettings {
-    /// Chosen: a trial of thirty touches takes a second or two, with free space ten times that.
+    /// Heuristic: a trial of thirty touches takes a second or two, with free space ten times that.
     fn default() -> Self {
         Self { candidates: 120, refit: false }
     }
@@ -100,12 +99,12 @@ impl Default for OracleSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SlopeSettings {
-    /// Weight of the slope; at 0 the planner is `active`.
+    /// Weight of the slope; 0 gives the planner `active`.
     pub weight: f64,
 }
 
 impl Default for SlopeSettings {
-    /// Chosen: a place of average slope counts double a flat one.
+    /// Heuristic: a place of average slope counts twice as much as a flat one.
     fn default() -> Self {
         Self { weight: 1.0 }
     }
@@ -115,13 +114,13 @@ impl Default for SlopeSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TravelSettings {
-    /// Touches planned together; with 1 the planner is `active`.
+    /// Number of touches planned together; 1 gives the planner `active`.
     pub tour: u32,
 }
 
 impl Default for TravelSettings {
-    /// Chosen: of 10, 15 and 20 the one with the fewest touches to equal error on container and
-    /// bird, see `docs/paper.md`.
+    /// Heuristic: of 10, 15 and 20, the value with the fewest touches to equal error on container
+    /// and bird; see `docs/paper.md`.
     fn default() -> Self {
         Self { tour: 15 }
     }
@@ -131,12 +130,12 @@ impl Default for TravelSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct UcbSettings {
-    /// Standard deviations κ above the mean.
+    /// Number κ of standard deviations added to the mean.
     pub sds: f64,
 }
 
 impl Default for UcbSettings {
-    /// Chosen: about the upper end of the 95 % band.
+    /// Heuristic: about the upper end of the 95 % band.
     fn default() -> Self {
         Self { sds: 2.0 }
     }

@@ -1,15 +1,15 @@
-//! Touch where the variance of the surface that there probably is falls most, times the chance that
-//! a touch meets anything.
+//! Planner `silhouette`: maximises integrated variance reduction over the probable surface,
+//! weighted by the probability of contact.
 //!
-//! Places count with the square root of their hoped probability, chosen: on the suite's objects for
-//! choosing the error is 0.904 of that of a Sobol sequence, with the probability itself and without
-//! the hope 0.937.
+//! Places are weighted by the square root of their optimistic probability, a heuristic: on the
+//! suite's tuning objects the error is 0.904 of that of a Sobol sequence; with the probability
+//! itself and without optimism it is 0.937.
 //!
-//! With `planning.silhouette.touch_way_m` what counts is the fall per time: a touch takes as long
-//! as so much way, and the way to it comes on top.
+//! With `planning.silhouette.touch_way_m`, the reduction is divided by time: a touch takes as long
+//! as travelling this distance, and the travel to it is added.
 //!
-//! How far touches speak for their surroundings is what a few touches tell least: the variance is
-//! that of a committee of beliefs, whose length scales differ from the fitted ones.
+//! A few touches determine the length scales poorly, so the variance is that of a committee of
+//! beliefs whose length scales differ from the fitted ones.
 
 use super::plan::{Entry, Plan, over_zone};
 use super::search::Search;
@@ -21,18 +21,18 @@ use rand::RngExt;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "silhouette",
-    about: "integrated_variance where there probably is a surface, times the chance to meet one",
-    zone_only: Some("its silhouette is that of a surface seen along one approach"),
+    about: "integrated_variance over the probable surface, times the probability of contact",
+    zone_only: Some("the silhouette is defined along a single approach direction"),
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
-        // Of the places at which the variance is computed.
+        // Seed of the places at which the variance is computed.
         let seed = search.rng.random();
         over_zone(move |belief| plan(&mut search, seed, belief))
     },
 };
 
-/// Length scales of the committee in units of the fitted ones. Chosen on the suite's objects for
-/// choosing, where the fitted ones alone, and a third and three times, did no better.
+/// Length scales of the committee, in units of the fitted ones. A heuristic: on the suite's tuning
+/// objects, the fitted ones alone, and a third and three times, did no better.
 const COMMITTEE: [f64; 3] = [0.5, 1.0, 2.0];
 
 fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
@@ -63,7 +63,7 @@ fn plan(search: &mut Search, seed: u32, belief: &HeightField) -> Plan {
         }
     };
     let candidates = search.scattered(belief.zone(), search.settings.silhouette.candidates);
-    // In units of a touch that begins where the last one was.
+    // Time in units of a touch that begins where the last one ended.
     let time = |place: &[f64]| {
         let way = search.settings.silhouette.touch_way_m.zip(belief.targets().last());
         let travel_m =

@@ -1,6 +1,7 @@
-//! Touch where the belief is unsure and steep: a smooth belief is most wrong at edges.
+//! Planner `slope`: touches where the belief is uncertain and steep, since smooth beliefs err most
+//! at edges.
 //!
-//! α(x) = σ(x)·(1 + w·|∇μ(x)| / mean|∇μ|), the mean taken over the zone.
+//! α(x) = σ(x)·(1 + w·|∇μ(x)| / mean|∇μ|), with the mean over the zone.
 
 use super::plan::{Entry, Plan, over_zone};
 use super::search::Search;
@@ -12,14 +13,14 @@ use palpate_gp::posterior::Scratch;
 pub(super) const ENTRY: Entry = Entry {
     name: "slope",
     about: "standard deviation weighted by the slope of the posterior mean",
-    zone_only: Some("it follows the slope of a surface over a plane"),
+    zone_only: Some("it uses the slope of a height field"),
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
         over_zone(move |belief| plan(&mut search, belief))
     },
 };
 
-/// Places over which the slope is averaged; chosen.
+/// Number of places over which the slope is averaged; a heuristic.
 const MEAN_PLACES: u32 = 256;
 
 fn plan(search: &mut Search, belief: &HeightField) -> Plan {
@@ -31,7 +32,7 @@ fn plan(search: &mut Search, belief: &HeightField) -> Plan {
     let slopes = places.iter().map(|place| slope(surface, place, &mut scratch));
     let mean = slopes.sum::<f64>() / places.len() as f64;
     let weight = search.settings.slope.weight;
-    // A flat belief is steep nowhere.
+    // A flat belief has no slope to weight.
     let per_slope = if mean > 0.0 { weight / mean } else { 0.0 };
     let score = search.differentiated(belief.zone(), |places| {
         let variances = known.variances(places, &mut []);
@@ -42,7 +43,7 @@ fn plan(search: &mut Search, belief: &HeightField) -> Plan {
     search.plan(belief, score)
 }
 
-/// |∇μ| at `place`.
+/// Returns |∇μ| at `place`.
 fn slope(surface: &Posterior, place: &[f64], scratch: &mut Scratch) -> f64 {
     // A zone has at most two coordinates.
     let mut gradient = [0.0; 2];

@@ -1,4 +1,4 @@
-//! A scrambled Sobol sequence: evenly spread targets without any model.
+//! Planner `sobol`: a scrambled Sobol sequence, evenly spread targets without a model.
 
 use super::plan::{Entry, Plan};
 use super::sample::sampled;
@@ -8,7 +8,7 @@ use rand::RngExt;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "sobol",
-    about: "a scrambled Sobol sequence: evenly spread, no model (the fairer baseline)",
+    about: "a scrambled Sobol sequence: evenly spread, no model (stronger baseline)",
     zone_only: None,
     make: |_, mut rng| {
         let (seed, mut index) = (rng.random(), 0);
@@ -23,13 +23,13 @@ pub(super) const ENTRY: Entry = Entry {
     },
 };
 
-/// The first `count` places of the sequence that `seed` scrambles: evenly spread, with no period in
-/// common with a surface's.
+/// Returns the first `count` places of the sequence scrambled by `seed`: evenly spread, with no
+/// period in common with a surface's.
 pub(super) fn places(zone: &Zone, count: u32, seed: u32) -> Vec<Vec<f64>> {
     (0..count).map(|index| zone.at(&fractions(zone.dimension(), index, seed))).collect()
 }
 
-/// Entry `index` of the sequence in `dimension` dimensions that `seed` scrambles.
+/// Returns entry `index` of the sequence in `dimension` dimensions, scrambled by `seed`.
 fn fractions(dimension: usize, index: u32, seed: u32) -> Vec<f64> {
     (0..dimension).map(|axis| f64::from(sobol_burley::sample(index, axis as u32, seed))).collect()
 }

@@ -1,10 +1,10 @@
-//! Short ways: several touches are planned together and made on a short tour.
+//! Planner `travel`: plans several touches together and makes them in the order of a short tour.
 //!
-//! The variance does not depend on the heights, so that what `active` would ask for next is known
-//! ahead as long as the fit stays: the place where σ is largest, then the one where it is largest
-//! given a touch there too, and so on. These places are touched in the order of a short way through
-//! them; then the next tour is planned with what was learnt. Every tour has the place where σ is
-//! largest, so that none is put off for ever.
+//! The variance does not depend on the heights, so the next targets of `active` are known ahead as
+//! long as the hyperparameters stay: the place where σ is largest, then the one where it is largest
+//! given a touch there too, and so on. These places are touched in the order of a short tour
+//! through them; then the next tour is planned from the updated belief. Every tour contains the
+//! place where σ is largest, so that none is postponed forever.
 
 use super::candidates::{Candidates, unseen};
 use super::plan::{Entry, Plan};
@@ -31,7 +31,7 @@ pub(super) const ENTRY: Entry = Entry {
 };
 
 struct Travel {
-    /// What is left of this tour, the next touch last.
+    /// Remaining touches of this tour, the next one last.
     tour: Vec<Plan>,
     search: Search,
 }
@@ -56,7 +56,8 @@ impl Travel {
             }
         };
         match &plan {
-            // Touches of this tour may have told what this one was to tell.
+            // Earlier touches of this tour may have removed the variance that this one was planned
+            // for.
             Plan { stall: None, target: Target::Place(place), .. } => {
                 self.search.conclude(field, place.clone())
             }
@@ -64,7 +65,8 @@ impl Travel {
         }
     }
 
-    /// The places of a tour, at least one: each where σ is largest given touches at those before.
+    /// Returns the places of a tour, at least one: each where σ is largest given touches at those
+    /// before.
     fn largest(&self, field: &HeightField) -> Vec<Vec<f64>> {
         let mut places: Vec<Vec<f64>> = Vec::new();
         let mut known = field.explorable().cloned();
@@ -95,8 +97,8 @@ impl Travel {
         self.tour.pop().unwrap_or_else(|| Plan::at(aside))
     }
 
-    /// The aims of a tour: each where the surface may lie farthest off, given touches at those
-    /// before.
+    /// Returns the aims of a tour: each where the position of the surface is most uncertain, given
+    /// touches at those before.
     fn farthest(
         &self,
         surface: &ImplicitSurface,
@@ -129,8 +131,8 @@ impl Travel {
     }
 }
 
-/// Puts a tour in the order of a short way from `start`: always the nearest first, then parts of it
-/// turned round as long as that shortens it (2-opt, Croes 1958).
+/// Puts a tour in the order of a short path from `start`: nearest neighbour first, then segments
+/// are reversed as long as that shortens it (2-opt, Croes 1958).
 fn shorten(tour: &mut [Plan], start: &Target, travel_m: &dyn Fn(&Target, &Target) -> f64) {
     for i in 0..tour.len() {
         let here = before(tour, start, i);
@@ -143,7 +145,7 @@ fn shorten(tour: &mut [Plan], start: &Target, travel_m: &dyn Fn(&Target, &Target
     }
 }
 
-/// A part of the way that shortens it when turned round, if there is one.
+/// Reverses a segment of the path if that shortens it.
 fn turn(
     tour: &[Plan],
     start: &Target,
@@ -159,12 +161,12 @@ fn turn(
     })
 }
 
-/// Where the finger comes from to the `index`-th place.
+/// The position of the finger before the `index`-th target.
 fn before<'a>(tour: &'a [Plan], start: &'a Target, index: usize) -> &'a Target {
     index.checked_sub(1).map_or(start, |last| &tour[last].target)
 }
 
-/// A way must shorten by more than rounding, or it could be turned for ever.
+/// Smallest reduction of a path's length, above rounding error, so that the reversal terminates.
 const SHORTER_M: f64 = 1e-9;
 
 #[cfg(test)]
@@ -182,8 +184,8 @@ mod tests {
         (0..tour.len()).map(|i| travel_m(before(tour, start, i), &tour[i].target)).sum()
     }
 
-    /// The slow twin tries every order. 2-opt is known to end within some 5 % of the shortest way
-    /// on average (Johnson & McGeoch 1997).
+    /// Compares with a reference that tries every order. 2-opt is known to end within some 5 % of
+    /// the shortest tour on average (Johnson & McGeoch 1997).
     #[test]
     fn tours_are_nearly_the_shortest() {
         fn best_m(tour: &mut [Plan], from: usize, start: &Target) -> f64 {
@@ -214,7 +216,7 @@ mod tests {
         assert!(mean < 1.05, "{mean}");
     }
 
-    /// Places on a line are passed one after the other; the same place twice ends too.
+    /// Places on a line are visited in order; a repeated place terminates too.
     #[test]
     fn a_line_is_swept() {
         let on_line = [0.4, 0.1, 0.9, 0.1, 0.6];

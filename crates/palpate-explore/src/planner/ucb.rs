@@ -1,12 +1,13 @@
-//! Seek the highest point by its upper confidence bound (Srinivas et al. 2010): μ + κ·σ.
+//! Planner `ucb`: seeks the highest point by the upper confidence bound μ + κ·σ (Srinivas et al.
+//! 2010).
 
 use super::plan::{Entry, over_zone};
 use super::search::Search;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "ucb",
-    about: "seeks the highest point: upper confidence bound",
-    zone_only: Some("it looks for the highest point, and an object has none"),
+    about: "upper confidence bound (UCB): seeks the highest point",
+    zone_only: Some("it seeks the highest point of a height field"),
     make: |settings, rng| {
         let mut search = Search::new(settings, rng);
         over_zone(move |belief| {

@@ -1,4 +1,4 @@
-//! Puts the interlocks around a body: of the robot and the task they make what interlocks know.
+//! Construction of the interlocks of a backend from the robot and the task.
 
 use super::servo::{BEYOND_M, standoff, turning_point};
 use crate::backend::interlock::{InterlockSettings, Interlocked, Site};
@@ -8,11 +8,11 @@ use crate::task::{Region, Task};
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::distance::{HalfSpace, OrientedBox};
 
-/// `body`, which moves `robot`, stopped where it has no business in `task` or something is wrong;
-/// `object` is what the arm's links must keep away from, if that is known.
+/// Wraps `body`, which moves `robot`, in interlocks that stop it outside the workspace of `task` or
+/// on a fault. `object` is the collision geometry that the arm's links must avoid, if known.
 ///
 /// # Errors
-/// If the body is another arm.
+/// If the backend drives a different arm.
 pub fn interlocked(
     body: Box<dyn Backend>,
     robot: &Robot,
@@ -32,7 +32,7 @@ pub fn interlocked(
             let reach = Vector3::repeat(around_m.max(beyond_m));
             (low, high) = (low.inf(&(ball.centre_w - reach)), high.sup(&(ball.centre_w + reach)));
         }
-        // Ways are parallel and the zone is a rectangle: its corners span them all.
+        // Approaches are parallel and the zone is a rectangle, so its corners span all of them.
         Region::Zone(zone) => {
             let corners = zone.grid(2).into_iter();
             for approach in corners.filter_map(|place| task.approach(&place.into())) {

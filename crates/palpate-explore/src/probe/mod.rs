@@ -1,4 +1,4 @@
-//! One touch: go the way of an approach, get a contact or a miss.
+//! A touch: follows an approach and returns a contact or a miss.
 
 pub mod interlocks;
 pub mod servo;
@@ -8,18 +8,18 @@ use crate::robot::Finger;
 use crate::task::{Approach, Zone};
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// What a touch ended with.
+/// Result of a touch.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Touch {
-    /// The finger met the surface.
+    /// The finger made contact with the surface.
     Contact(Contact),
-    /// The finger travelled its whole way and met nothing.
+    /// The finger travelled the whole approach without contact.
     Miss,
-    /// Force or pressure rose above its limit, or the place of contact could not be told.
+    /// Force or pressure exceeded its limit, or the contact could not be located.
     Overload,
 }
 
-/// Where a touch met the surface.
+/// A contact with the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contact {
     /// The point of contact in `W`; its place may differ from the target.
@@ -28,45 +28,45 @@ pub struct Contact {
     pub normal_w: Vector3<f64>,
 }
 
-/// A body that can be sent to touch.
+/// A robot, real or simulated, that can make touches.
 pub trait Probe: Send {
-    /// Goes the way of `approach` until contact, and returns.
+    /// Follows `approach` until contact, and retracts.
     ///
     /// # Errors
-    /// A fault of the body, or an approach that is not finite.
+    /// If the backend reports a fault, or a coordinate of the approach is not finite.
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault>;
 
-    /// The space that the last touch found free; none if it is not known.
+    /// The volume found free by the last touch; `None` if unknown.
     fn swept(&self) -> Option<Swept> {
         None
     }
 
-    /// Pose of the fingertip in `W`, by forward kinematics, where the last contact was read; none
-    /// of a probe that has no finger, or before a contact.
+    /// Pose of the fingertip in `W`, by forward kinematics, at the reading of the last contact;
+    /// `None` for a probe without a finger, or before a contact.
     fn tip(&self) -> Option<Isometry3<f64>> {
         None
     }
 
-    /// Time of the body since its start; none where a touch is no motion.
+    /// Time since the start of the backend, s; `None` for a probe that does not move.
     fn time_s(&self) -> Option<f64> {
         None
     }
 }
 
-/// The space that a touch has found free: where an approach along the zone's axis ended. The hull
-/// came there straight, so no surface is above its front.
+/// Volume swept by a touch, which is free: the hull at the end of an approach along the zone's
+/// axis. The hull moved there in a straight line, so no surface lies above its front.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Swept {
-    /// The hull.
+    /// The finger's hull.
     pub finger: Finger,
-    /// The centre of the fingertip's hemisphere in `W`: at rest on the surface, or for a miss where
-    /// the finger turned back.
+    /// Centre of the fingertip's hemisphere in `W` at the end of the approach: at rest on the
+    /// surface, or, after a miss, at the turning point.
     pub p_wt: Point3<f64>,
 }
 
 impl Swept {
-    /// The greatest height above the datum that the surface can have at each of `places` of `zone`;
-    /// none where the hull did not pass.
+    /// Returns the upper bound of the surface's height above the datum at each of `places` of
+    /// `zone`; `None` where the hull did not pass.
     pub fn ceilings_m<'a>(
         &'a self,
         zone: &'a Zone,
@@ -82,10 +82,10 @@ impl Swept {
     }
 }
 
-/// An approach must be of numbers.
+/// Checks that all coordinates of an approach are finite.
 ///
 /// # Errors
-/// [`Fault::Refused`] if one is not finite.
+/// [`Fault::Refused`] if a coordinate is not finite.
 pub fn refuse_unless_finite(approach: &Approach) -> Result<(), Fault> {
     let points = [approach.p_near_w, approach.p_far_w];
     match approach.is_finite() {

@@ -1,4 +1,4 @@
-//! Which touches of a known body tell the most of where the finger and the body stand.
+//! Design of registration touches: the most informative touches of a known body.
 
 use super::hand_eye::{FELT, HandEyeFit, PARAMETERS, RegistrationTouch, parameters, undetermined};
 use super::known_body::{KnownBody, Outline};
@@ -21,60 +21,61 @@ use palpate_input::error::Invalid;
 use rand::Rng;
 use rand::seq::SliceRandom;
 
-/// Touches to make, in order, and what they would tell.
+/// Touches to make, in order, and their predicted information.
 #[derive(Clone, Debug)]
 pub struct Design {
-    /// How each is made.
+    /// Approaches of the touches.
     pub approaches: Vec<Approach>,
-    /// Foreseen standard deviation of each parameter, in its own unit, from the expected scatter.
+    /// Predicted standard deviation of each parameter, in its own unit, from the expected scatter.
     pub sds: [f64; PARAMETERS],
     /// Parameters that these touches would not determine.
     pub undetermined: Vec<&'static str>,
-    /// Condition number of the rest.
+    /// Condition number of the determined parameters.
     pub condition: f64,
 }
 
-/// Greatest condition number of a design; chosen: a residual's error reaches no parameter more than
-/// so many times as much as another, all in units of what is plausible.
+/// Largest condition number of a design; a heuristic: the largest ratio between the effects of a
+/// residual's error on two parameters, all in plausible units.
 const CONDITION_MAX: f64 = 1000.0;
 
-/// How far before and behind the place where the body is expected the finger looks for it; chosen:
-/// what finger and body may be off.
+/// Search distance before and behind the expected place of the body; a heuristic: the plausible
+/// error of finger and body.
 const MARGIN_M: f64 = 0.012;
 
-/// Clear way in front of that, so that the finger passes from one side of the body to another;
-/// chosen.
+/// Free distance in front of that, so that the finger can move from one side of the body to
+/// another; a heuristic.
 const STANDOFF_M: f64 = 0.05;
 
-/// Fastest approach: in the 10 ms between two frames the finger goes 50 µm. Chosen.
+/// Largest approach speed: 50 µm in the 10 ms between two frames; a heuristic.
 const APPROACH_M_S: f64 = 0.005;
 
-/// Frames averaged; chosen: a fifth of a single frame's noise.
+/// Number of frames averaged; a heuristic: a fifth of a single frame's noise.
 const FRAMES: usize = 25;
 
-/// Where on the finger it is touched: part of its radius before the origin of `T`, or part of its
-/// length behind it; and degrees around it from the pad. Chosen: pad and tip, as far to the sides
-/// as liquid is under the skin.
+/// Touched points of the finger: fraction of its radius before the origin of `T`, or of its length
+/// behind it; and degrees around it from the pad. A heuristic: pad and tip, to the sides as far as
+/// there is fluid under the skin.
 const SITES: [f64; 6] = [0.8, 0.55, 0.2, -0.25, -0.6, -0.88];
 const TURNS_DEG: [f64; 5] = [-65.0, -25.0, 0.0, 25.0, 65.0];
 
-/// From where the body is touched: angles from its free side, and how many on that circle; chosen.
+/// Directions from which the body is touched: angles from its free side, and number on that circle;
+/// a heuristic.
 const SIDES: [(f64, usize); 3] = [(0.0, 1), (25.0, 6), (50.0, 8)];
 
-/// Turns of the finger about the normal of the contact; chosen.
+/// Number of rotations of the finger about the contact normal; a heuristic.
 const SPINS: usize = 12;
 
-/// Touches among which the best are looked for; chosen.
+/// Largest number of candidate touches; a heuristic.
 const CANDIDATES: usize = 600;
 
-/// One touch more for each so many, of which the arm turns out not to be able to make some; chosen.
+/// One additional touch per this many, since the arm cannot make some; a heuristic.
 const SPARE: usize = 2;
 
-/// How far a candidate may reach into the body elsewhere than where it is meant to touch.
+/// Allowed penetration of the body by a candidate away from its point of contact.
 const INTO_M: f64 = 2e-4;
 
-/// How far a finger goes on, on average, after its pressure has passed the threshold until it is
-/// held and read: as many frames as must agree, half a frame for the first, and the firmer press.
+/// Mean distance that a finger travels after its pressure passes the threshold until it is held and
+/// read: the frames that must agree, half a frame for the first, and the press.
 pub fn pressed_m(robot: &Robot, touch: &TouchSettings) -> f64 {
     if !robot.is_soft {
         return 0.0;
@@ -83,7 +84,7 @@ pub fn pressed_m(robot: &Robot, touch: &TouchSettings) -> f64 {
     touch.press_m + touch.approach_m_s * frames * FRAME_S
 }
 
-/// How registration touches: slowly and from afar, all else as the task says.
+/// Returns the touch settings of a registration: slow and from afar, otherwise as in the task.
 pub fn touch_settings(touch: &TouchSettings) -> TouchSettings {
     TouchSettings {
         approach_m_s: touch.approach_m_s.min(APPROACH_M_S),
@@ -93,7 +94,7 @@ pub fn touch_settings(touch: &TouchSettings) -> TouchSettings {
     }
 }
 
-/// A touch that could be made.
+/// A candidate touch.
 struct Candidate {
     touch: RegistrationTouch,
     approach: Approach,
@@ -101,7 +102,7 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// The way that it takes if the body is where it is believed to be: it ends there.
+    /// Returns its approach if the body is at its expected place: it ends there.
     fn expected(&self) -> Approach {
         let beyond_m = MARGIN_M + BEYOND_M;
         let back_w = self.approach.direction_w().scale(beyond_m);
@@ -110,13 +111,12 @@ impl Candidate {
 }
 
 impl Design {
-    /// The `count` touches of `body` that tell the most: each is the one that shrinks the
-    /// parameters' ellipsoid most, given those before it, among those that `robot` reaches. Then
-    /// they are rehearsed in the order in which they will be made, and those left out that do not
-    /// follow on from the one before.
+    /// Returns the `count` most informative touches of `body`: greedily the one that shrinks the
+    /// parameters' ellipsoid most, among those that `robot` reaches. Then they are simulated in the
+    /// order of execution, and those that cannot follow their predecessor are dropped.
     ///
     /// # Errors
-    /// If it reaches too few, or they would determine too little.
+    /// If the robot reaches too few, or they would determine too little.
     pub fn new(
         robot: &Robot,
         touch: &TouchSettings,
@@ -131,7 +131,7 @@ impl Design {
         let free_w = free_side(robot, body);
         let mut all = candidates(&outline, robot, body, &free_w, rng);
         let tried = all.len();
-        // What was plausible before; it keeps the first picks finite.
+        // Prior of plausible values; it keeps the first selections finite.
         let mut information = SMatrix::<f64, PARAMETERS, PARAMETERS>::identity();
         let mut chosen: Vec<Candidate> = Vec::new();
         while chosen.len() < count + count / SPARE && !all.is_empty() {
@@ -176,12 +176,12 @@ impl Design {
         })
     }
 
-    /// Whether these touches are worth making.
+    /// Checks whether these touches are worth making.
     ///
     /// # Errors
-    /// If they leave something undetermined, or determine it badly.
+    /// If they leave a parameter undetermined, or determine it poorly.
     pub fn check(&self) -> Result<(), Invalid> {
-        // What the finger feels may stay unknown; where it stands may not.
+        // Parameters of the sensing may remain undetermined; the poses must not.
         let sought = self.undetermined.iter().filter(|name| !FELT.contains(name));
         let lost: Vec<&'static str> = sought.copied().collect();
         if !lost.is_empty() {
@@ -189,12 +189,12 @@ impl Design {
             return Err(Invalid::new(format!(
                 "these {touches} touches would not determine {lost}"
             ))
-            .mend("make more (--touches)"));
+            .mend("increase --touches"));
         }
         match self.condition <= CONDITION_MAX {
             true => Ok(()),
             false => Err(Invalid::new(format!(
-                "the condition number of these touches is {:.0}, and {CONDITION_MAX} is allowed",
+                "the condition number of these touches is {:.0}; allowed is at most {CONDITION_MAX}",
                 self.condition
             ))),
         }
@@ -203,16 +203,16 @@ impl Design {
 
 fn unreachable(reached: usize, tried: usize, wanted: usize) -> Invalid {
     Invalid::new(format!(
-        "the robot reaches {reached} of {tried} touches of the body, and {wanted} are wanted"
+        "the robot reaches {reached} of {tried} touches of the body; required are {wanted}"
     ))
     .mend(
-        "a finger must be turned to find where it stands, which a stage cannot do; bring the body \
-         nearer (--at)",
+        "a finger must be turned to find its pose, which a stage cannot do; move the body closer \
+         (--at)",
     )
 }
 
-/// The side from which the robot comes: from the body's centre to the fingertip at home; a plate's
-/// normal.
+/// Returns the side from which the robot comes: from the body's centre to the fingertip at home; a
+/// plate's normal.
 fn free_side(robot: &Robot, body: &KnownBody) -> UnitVector3<f64> {
     match body {
         KnownBody::Plate { normal_w, .. } => *normal_w,
@@ -223,8 +223,8 @@ fn free_side(robot: &Robot, body: &KnownBody) -> UnitVector3<f64> {
     }
 }
 
-/// Touches at every site of the finger, from every side of the body, at every spin; some of them,
-/// where they are many.
+/// Returns touches at every site of the finger, from every side of the body, at every spin; a
+/// subset if there are too many.
 fn candidates(
     outline: &Outline,
     robot: &Robot,
@@ -254,7 +254,7 @@ fn candidates(
             let fit = HandEyeFit::new(outline, &only);
             let state = HandEyeFit::start(*body);
             let count = fit.residuals(&state).len();
-            // The last is of no touch.
+            // The last row belongs to no touch.
             let rows = jacobian(&fit, &state, count).remove_row(count - 1);
             Candidate { touch, approach: approach(&x_wt, &side_w, &robot.finger), rows }
         })
@@ -262,7 +262,8 @@ fn candidates(
     made.take(CANDIDATES).collect()
 }
 
-/// Directions from the body towards the finger: around the free side of a ball; a plate has one.
+/// Returns directions from the body towards the finger: around the free side of a ball; one for a
+/// plate.
 fn sides(body: &KnownBody, free_w: &UnitVector3<f64>) -> Vec<UnitVector3<f64>> {
     if let KnownBody::Plate { normal_w, .. } = body {
         return vec![*normal_w];
@@ -279,8 +280,8 @@ fn sides(body: &KnownBody, free_w: &UnitVector3<f64>) -> Vec<UnitVector3<f64>> {
     SIDES.iter().copied().flat_map(circle).collect()
 }
 
-/// Pose of `T` at which the finger's place with this outward normal lies on the body on `side_w`,
-/// turned by `spin` about that normal; none if no turn brings it there.
+/// Returns the pose of `T` at which the finger's point with this outward normal touches the body on
+/// `side_w`, rotated by `spin` about that normal; `None` if there is none.
 fn pose(
     body: &KnownBody,
     side_w: &UnitVector3<f64>,
@@ -300,20 +301,20 @@ fn pose(
     Some(Isometry3::from_parts(Translation3::from(p_wt.coords), r_wt))
 }
 
-/// The way to that pose against `side_w`.
+/// Returns the approach to that pose against `side_w`.
 fn approach(x_wt: &Isometry3<f64>, side_w: &UnitVector3<f64>, finger: &Finger) -> Approach {
     let p_wt = Point3::from(x_wt.translation.vector);
     let [across, _] = KnownBody::axes(side_w);
     let axes = [across, side_w.into_inner(), across.cross(side_w)];
     let r_wa = Rotation3::from_basis_unchecked(&axes);
     let r_wa = UnitQuaternion::from_rotation_matrix(&r_wa);
-    // The servo keeps the hull's bulge and radius off what an approach names.
+    // The servo offsets an approach by the hull's bulge and radius.
     let ahead_m = [finger.bulge_m() - MARGIN_M, MARGIN_M - finger.radius_m];
     let [p_near_w, p_far_w] = ahead_m.map(|ahead_m| p_wt - side_w.scale(ahead_m));
     Approach { p_near_w, p_far_w, r_wa, r_at: r_wa.inverse() * x_wt.rotation, around: None }
 }
 
-/// Whether `robot` has a posture at the ends of the way.
+/// Whether `robot` has a posture at both ends of the approach.
 fn is_reached(robot: &Robot, approach: &Approach) -> bool {
     let ahead_w = approach.direction_w();
     let bulge_m = robot.finger.bulge_m();
@@ -327,7 +328,7 @@ fn is_reached(robot: &Robot, approach: &Approach) -> bool {
     })
 }
 
-/// In an order in which the finger turns little from one to the next, beginning at home.
+/// Sorts touches so that the finger turns little between them, starting from home.
 fn in_order(robot: &Robot, mut left: Vec<Candidate>) -> Vec<Candidate> {
     let mut ordered: Vec<Candidate> = Vec::new();
     let mut at = robot.chain.forward(&robot.chain.home).rotation;
@@ -341,7 +342,7 @@ fn in_order(robot: &Robot, mut left: Vec<Candidate>) -> Vec<Candidate> {
     ordered
 }
 
-/// An arm in empty space: no mass, no object, no sensor.
+/// A purely kinematic arm: no mass, no object, no sensor.
 struct Rehearsal {
     chain: Chain,
     capabilities: Capabilities,
@@ -349,7 +350,7 @@ struct Rehearsal {
     reading: Reading,
 }
 
-/// Its tick; chosen: what a resolved-rate controller needs, not what a servo does.
+/// Its control period; a heuristic: sufficient for a resolved-rate controller, not for a servo.
 const PERIOD_S: f64 = 0.01;
 
 impl Rehearsal {
@@ -390,11 +391,11 @@ impl Backend for Rehearsal {
     }
 }
 
-/// How far the rehearsed joints keep from their limits, because touches do not end exactly where
-/// they are rehearsed; chosen.
+/// Margin of the simulated joints to their limits, since touches do not end exactly where they were
+/// simulated; a heuristic.
 const SLACK_RAD: f64 = 0.25;
 
-/// Those of `approaches` that `robot` can go one after the other from home, by number.
+/// Returns the indices of those `approaches` that `robot` can make one after the other from home.
 ///
 /// # Errors
 /// If the robot cannot be driven at all.
@@ -407,7 +408,7 @@ fn rehearsed(
     for joint in robot.chain.joints.iter_mut().filter(|joint| joint.kind == Kind::Revolute) {
         joint.q_limits = [joint.q_limits[0] + SLACK_RAD, joint.q_limits[1] - SLACK_RAD];
     }
-    // By the servo that will make them, on the arm's kinematics alone.
+    // Simulated with the servo that will make them, on the arm's kinematics alone.
     let mut left: Vec<usize> = (0..approaches.len()).collect();
     'again: loop {
         let body = Box::new(Rehearsal::new(&robot.chain));

@@ -1,11 +1,11 @@
-//! Where the finger stands on its mount and where a known body stands, from touches of the body.
+//! Hand-eye calibration by touch: pose of the finger on its mount and of a known body.
 //!
-//! A touch says that the finger's outline, at the pose of forward kinematics times the sought
-//! correction, reaches into the body until the liquid under its skin tells of contact: by the same
-//! volume each time, and by what it then went on. Where the electrodes feel the body does not
-//! enter, so their errors do not either. Of a turn about the finger's own axis the outline says
-//! little, but that its tip has a corner; there the electrodes are asked too on which side they
-//! feel the body, with a gain that is fitted and as far as a finger is its own mirror image.
+//! In a touch, the finger's outline, at the pose of forward kinematics times the unknown
+//! correction, penetrates the body until the fluid under its skin indicates contact: by the same
+//! volume each time, and by the subsequent press. The contact location by the electrodes is not
+//! used, so its errors do not enter. The outline constrains a rotation about the finger's own axis
+//! only weakly, by the corner of its tip. There, the side of contact according to the electrodes is
+//! used too, with a fitted gain, within the region where a finger is mirror-symmetric.
 
 use super::known_body::{KnownBody, Outline};
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -14,67 +14,67 @@ use palpate_gp::math::least_squares::{Problem, Solution};
 /// One touch of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegistrationTouch {
-    /// Pose of `T` by forward kinematics when the contact was read.
+    /// Pose of `T` by forward kinematics at the reading of the contact.
     pub x_wt: Isometry3<f64>,
-    /// How much deeper that is than where contact is told.
+    /// Depth of that pose beyond the detection of contact.
     pub pressed_m: f64,
-    /// Where the finger felt it, in its own `T`; none if it says nothing of that.
+    /// Contact located by the sensor, in its own `T`; `None` if it was not located.
     pub felt_t: Option<Point3<f64>>,
 }
 
-/// What touches of a known body tell.
+/// Estimate from touches of a known body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandEye {
-    /// Pose of the finger's own `T` in the `T` of the kinematics.
+    /// Pose of the actual `T` in the `T` of the kinematics.
     pub correction: Isometry3<f64>,
-    /// The body.
+    /// Pose of the body.
     pub body: KnownBody,
-    /// How far the finger gives way before contact is told, [`Outline::meet`].
+    /// Indentation of the finger before contact is detected; see [`Outline::meet`].
     pub give_m: f64,
-    /// How far aside contacts are felt for each metre that they lie aside.
+    /// Gain of the lateral contact position: measured over actual.
     pub gain: f64,
-    /// How far aside a contact in the middle is felt.
+    /// Measured lateral position of a central contact.
     pub aside_m: f64,
 }
 
-/// Numbers that are fitted: three each of the finger's place, its turn and the body, and three of
-/// what the finger feels.
+/// Number of fitted parameters: three each for the finger's position, its rotation and the body,
+/// and three for the sensing.
 pub const PARAMETERS: usize = 6 + KnownBody::PARAMETERS + 3;
 
-/// How far the finger could plausibly stand off on its mount; chosen: built by hand.
+/// Plausible position error of the finger on its mount; a heuristic: assembled by hand.
 const FINGER_M: f64 = 0.01;
 const FINGER_RAD: f64 = 0.2;
-/// The same of the skin's give and the electrodes' gain; chosen.
+/// Plausible values of the skin's indentation and the electrodes' gain; heuristics.
 const GIVE_M: f64 = 0.5e-3;
 const GAIN: f64 = 0.5;
-/// The same of what an electrode finger feels aside of a contact in its middle: its halves are
-/// never quite alike. Chosen: three times what `make contacts` finds on a sphere.
+/// Plausible lateral offset of a central contact for an electrode finger, whose halves are never
+/// identical. A heuristic: three times the value of `make contacts` on a sphere.
 const ASIDE_M: f64 = 3e-4;
-/// And of a finger that tells the exact point.
+/// Plausible lateral offset for a finger with exact contacts.
 const ASIDE_EXACT_M: f64 = 1e-6;
 
-/// What a finger is believed to give way before the first touch; chosen.
+/// Initial value of the indentation; a heuristic.
 const START_M: f64 = 3e-4;
 
-/// Expected scatter of a touch's depth, and of the side on which it is felt; chosen from
-/// simulated touches, `docs/your-robot.md`.
+/// Expected scatter of a touch's depth, and of its lateral position; heuristics from simulated
+/// touches, `docs/your-robot.md`.
 const DEPTH_SD_M: f64 = 5e-5;
 const FELT_SD_M: f64 = 3e-4;
 
-/// Contacts felt farther aside than this part of the finger's radius are not asked: the gain falls
-/// there. Chosen.
+/// Largest lateral position of a contact that is used, as a fraction of the finger's radius: the
+/// gain decreases beyond it; a heuristic.
 const ASKED: f64 = 0.45;
 
-/// What is fitted to touches of a known body.
+/// Least-squares problem of touches of a known body.
 pub struct HandEyeFit<'a> {
     outline: &'a Outline,
     touches: &'a [RegistrationTouch],
-    /// Touches whose felt side is asked.
+    /// Touches whose lateral position is used.
     felt: Vec<(usize, f64)>,
 }
 
 impl<'a> HandEyeFit<'a> {
-    /// Of `touches` with a finger of this outline.
+    /// Creates the problem from `touches` with a finger of this outline.
     pub fn new(outline: &'a Outline, touches: &'a [RegistrationTouch]) -> Self {
         let limit_m = ASKED * outline.radius_m();
         let felt = touches.iter().enumerate().filter_map(|(i, touch)| {
@@ -84,7 +84,7 @@ impl<'a> HandEyeFit<'a> {
         Self { outline, felt: felt.collect(), touches }
     }
 
-    /// What is believed before the first touch.
+    /// Returns the initial estimate.
     pub fn start(body: KnownBody) -> HandEye {
         HandEye {
             correction: Isometry3::identity(),
@@ -120,7 +120,8 @@ impl Problem for HandEyeFit<'_> {
         }
     }
 
-    /// The depth of each touch, the side of those that are asked, and what is plausible of that.
+    /// Returns the residuals: the depth of each touch, the lateral position where used, and the
+    /// deviation from plausible values.
     fn residuals(&self, state: &HandEye) -> DVector<f64> {
         let meetings = self.touches.iter().map(|touch| {
             let x_wt = touch.x_wt * state.correction;
@@ -146,10 +147,10 @@ impl Problem for HandEyeFit<'_> {
     }
 }
 
-/// What the parameters of what the finger feels are called.
-pub const FELT: [&str; 3] = ["give", "gain", "felt aside"];
+/// Names of the sensing parameters.
+pub const FELT: [&str; 3] = ["give", "gain", "lateral offset"];
 
-/// What each parameter is called, and one unit of a step of it in m, rad or 1.
+/// Returns the name of each parameter and the unit of its step in m, rad or 1.
 pub fn parameters(body: &KnownBody) -> [(&'static str, f64); PARAMETERS] {
     let ([a, b, c], units) = (body.names(), body.units());
     [
@@ -168,11 +169,11 @@ pub fn parameters(body: &KnownBody) -> [(&'static str, f64); PARAMETERS] {
     ]
 }
 
-/// A parameter of which more than this part of a direction's square lies in directions that are not
-/// determined is not determined itself; chosen.
+/// Largest fraction of a parameter's squared direction in undetermined directions for which it
+/// still counts as determined; a heuristic.
 const LOST: f64 = 0.05;
 
-/// Which parameters a fit leaves undetermined.
+/// Returns the parameters that a fit leaves undetermined.
 pub fn undetermined(fit: &Solution<HandEye>, body: &KnownBody) -> Vec<&'static str> {
     let lost = |i: usize| {
         fit.undetermined.iter().map(|direction| direction[i].powi(2)).sum::<f64>() > LOST
@@ -181,7 +182,7 @@ pub fn undetermined(fit: &Solution<HandEye>, body: &KnownBody) -> Vec<&'static s
     named.filter(|(i, _)| lost(*i)).map(|(_, (name, _))| name).collect()
 }
 
-/// Residuals of a fit: depth of each touch, m.
+/// Returns the depth residuals of a fit, one per touch, m.
 pub fn depths_m(fit: &Solution<HandEye>, touches: usize) -> Vec<f64> {
     fit.residuals.iter().take(touches).map(|r| r * DEPTH_SD_M).collect()
 }

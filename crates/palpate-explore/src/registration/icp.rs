@@ -1,4 +1,4 @@
-//! Lays a cloud of contacts onto a mesh (point-to-plane, Chen and Medioni 1992).
+//! Registers a contact cloud to a mesh (point-to-plane ICP, Chen and Medioni 1992).
 
 use super::register::pose_table;
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -7,29 +7,29 @@ use palpate_gp::math::least_squares::{FitError, Problem, Solution, fit};
 use palpate_input::error::Invalid;
 use toml_edit::{Array, DocumentMut, Table, value};
 
-/// Where the mesh stands.
+/// Estimated pose of the mesh.
 #[derive(Clone, Debug)]
 pub struct Aligned {
     /// Pose of the mesh's frame in that of the cloud.
     pub x_wo: Isometry3<f64>,
-    /// Standard deviation of its place along each axis, m, then of its turn about each axis through
-    /// the mesh's middle, rad.
+    /// Standard deviation of its position along each axis, m, then of its rotation about each axis
+    /// through the mesh's centre, rad.
     pub sds: [f64; 6],
-    /// Unit vectors of what the cloud does not determine: place in units of 2 cm, then turn in
-    /// units of 0.2 rad. The mesh stays there as it was.
+    /// Unit vectors of directions that the cloud does not determine: position in units of 2 cm,
+    /// then rotation in units of 0.2 rad. The mesh keeps its initial pose along them.
     pub undetermined: Vec<DVector<f64>>,
     /// Root mean square distance of the points used from the mesh.
     pub rms_m: f64,
-    /// Points used.
+    /// Number of points used.
     pub used: usize,
-    /// Points left out: they did not fit the others.
+    /// Number of outliers, which were left out.
     pub outliers: usize,
-    /// Rounds of matching.
+    /// Number of matching iterations.
     pub rounds: usize,
 }
 
 impl Aligned {
-    /// The keys of a scene's `[object]`, and how sure they are, as TOML.
+    /// Returns the keys of a scene's `[object]` with their uncertainty, as TOML.
     pub fn tables(&self) -> String {
         let [a, b, c, d, e, f] = self.sds;
         let undetermined = self.undetermined.iter().map(|v| Array::from_iter(v.iter().copied()));
@@ -47,31 +47,31 @@ impl Aligned {
     }
 }
 
-/// Numbers of a pose; and a point more than those for a residual.
+/// Number of parameters of a pose; a residual needs one more point.
 const PARAMETERS: usize = 6;
 const LEAST: usize = PARAMETERS + 1;
 
-/// Rounds of matching at most, and the movement, as a part of the mesh's size, below which they
-/// end; chosen.
+/// Largest number of iterations, and the movement, as a fraction of the mesh's size, below which
+/// they end; heuristics.
 const ROUNDS: usize = 200;
 const SETTLED: f64 = 1e-9;
 
-/// How far the start could plausibly be off, in place and turn; chosen.
+/// Plausible error of the start, in position and rotation; heuristics.
 const PLACE_M: f64 = 0.02;
 const TURN_RAD: f64 = 0.2;
 
-/// A direction that moves the points off the mesh by less than this part of what another does is
-/// not determined: so much does a mesh's facets alone let a round body seem not to turn freely.
-/// Chosen.
+/// A direction counts as undetermined if its effect on the distances is less than this fraction of
+/// another's. A heuristic: the facets of a mesh alone restrict the free rotation of a round body by
+/// this much.
 const RESOLUTION: f64 = 0.03;
 
-/// Expected scatter of contacts; chosen: that of the electrodes' contacts on smooth objects.
+/// Expected scatter of contacts; a heuristic: that of the electrodes' contacts on smooth objects.
 const SCATTER_M: f64 = 3e-4;
 
-/// One round's matches: each point held against the plane through the mesh's point nearest to it.
+/// Matches of one iteration: each point with the plane through its nearest point of the mesh.
 struct Planes<'a> {
     points_w: &'a [Point3<f64>],
-    /// In the mesh's frame.
+    /// Planes in the mesh's frame.
     planes_o: Vec<(Point3<f64>, Vector3<f64>)>,
     middle_o: Point3<f64>,
 }
@@ -87,7 +87,7 @@ impl Problem for Planes<'_> {
         RESOLUTION
     }
 
-    /// A step is of place and turn about the mesh's middle.
+    /// Applies a step of position and rotation about the mesh's centre.
     fn moved(&self, x_wo: &Isometry3<f64>, step: &DVector<f64>) -> Isometry3<f64> {
         let [place, turn] = [0, 3].map(|i| Vector3::new(step[i], step[i + 1], step[i + 2]));
         let rotation = UnitQuaternion::from_scaled_axis(turn * TURN_RAD) * x_wo.rotation;
@@ -103,13 +103,13 @@ impl Problem for Planes<'_> {
     }
 }
 
-/// Moves `mesh` from `start` until the points of the cloud lie on it.
+/// Registers `mesh` to the points of the cloud, from `start`.
 ///
-/// Each round matches every point with the mesh's nearest and fits the pose to these planes; it
-/// finds the nearest valley, so `start` must be near.
+/// Each iteration matches every point with the mesh's nearest and fits the pose to these planes. It
+/// finds the nearest local minimum, so `start` must be close.
 ///
 /// # Errors
-/// If there are too few points, or they cannot be fitted.
+/// If there are too few points, or the fit fails.
 pub fn align(
     mesh: &MeshBvh,
     points_w: &[Point3<f64>],
@@ -117,7 +117,9 @@ pub fn align(
 ) -> Result<Aligned, Invalid> {
     if points_w.len() < LEAST {
         let count = points_w.len();
-        return Err(Invalid::new(format!("{count} points, and at least {LEAST} are needed")));
+        return Err(Invalid::new(format!(
+            "the cloud has {count} points; at least {LEAST} are needed"
+        )));
     }
     let (low, high) = mesh.mesh().bounds();
     let (middle_o, size_m) = (nalgebra::center(&low, &high), (high - low).norm());
@@ -136,8 +138,8 @@ pub fn align(
     Err(Invalid::new(FitError::Unsettled.to_string()))
 }
 
-/// The plane through the mesh's point nearest to `p_o`: square to the way there, or the triangle's
-/// where the point lies on it.
+/// Returns the plane through the mesh's point nearest to `p_o`: orthogonal to the connecting line,
+/// or the triangle's plane if the point lies on it.
 fn plane(mesh: &MeshBvh, p_o: &Point3<f64>) -> (Point3<f64>, Vector3<f64>) {
     let nearest = mesh.closest_point(p_o);
     let [a, b, c] = mesh.mesh().corners(nearest.triangle as usize);

@@ -1,40 +1,40 @@
-//! A body whose shape is known and whose place is sought, a ball or a plate, and how the finger's
-//! outer surface meets it.
+//! A body of known shape and unknown pose, a ball or a plate, and its contact with the finger's
+//! outer surface.
 
 use crate::robot::Robot;
 use crate::robot::finger::profile::Profile;
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3};
 use std::f64::consts::{PI, TAU};
 
-/// Where a known body stands in `W`.
+/// Pose of a known body in `W`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum KnownBody {
     /// A ball.
     Ball {
-        /// Its centre.
+        /// Centre.
         centre_w: Point3<f64>,
-        /// Its radius, which is known.
+        /// Known radius.
         radius_m: f64,
     },
-    /// A flat plate, large beside the finger.
+    /// A flat plate, large relative to the finger.
     Plate {
-        /// A point of it, about which it is touched.
+        /// A point of it, around which it is touched.
         point_w: Point3<f64>,
-        /// Its normal, towards the finger.
+        /// Normal, towards the finger.
         normal_w: UnitVector3<f64>,
     },
 }
 
-/// How far its place could plausibly be off from where somebody says: along each axis, and in a
-/// plate's turn. Chosen: laid down against a mark.
+/// Plausible error of its given pose: position along each axis, and tilt of a plate; heuristics:
+/// laid down against a mark.
 const PLACE_M: f64 = 0.01;
 const TURN_RAD: f64 = 0.1;
 
 impl KnownBody {
-    /// How many numbers its place has.
+    /// Number of pose parameters.
     pub const PARAMETERS: usize = 3;
 
-    /// How far a point of `W` is from its surface; negative inside.
+    /// Signed distance of a point of `W` from its surface; negative inside.
     pub fn distance_m(&self, p_w: &Point3<f64>) -> f64 {
         match self {
             Self::Ball { centre_w, radius_m } => (p_w - centre_w).norm() - radius_m,
@@ -42,8 +42,8 @@ impl KnownBody {
         }
     }
 
-    /// Moved by a step in units of what is plausible: a ball along x, y, z; a plate along its
-    /// normal, then turned about two axes in it.
+    /// Returns the body moved by a step in plausible units: a ball along x, y, z; a plate along its
+    /// normal, then rotated about two axes in it.
     pub fn moved(&self, step: [f64; Self::PARAMETERS]) -> Self {
         match *self {
             Self::Ball { centre_w, radius_m } => {
@@ -60,7 +60,7 @@ impl KnownBody {
         }
     }
 
-    /// Two directions square to `normal_w` and to each other.
+    /// Returns two directions orthogonal to `normal_w` and to each other.
     pub(super) fn axes(normal_w: &UnitVector3<f64>) -> [Vector3<f64>; 2] {
         let least = normal_w.iamin();
         let mut axis = Vector3::zeros();
@@ -69,7 +69,7 @@ impl KnownBody {
         [across, normal_w.cross(&across)]
     }
 
-    /// What its three numbers are called, with their unit.
+    /// Names of its three parameters.
     pub fn names(&self) -> [&'static str; Self::PARAMETERS] {
         match self {
             Self::Ball { .. } => ["ball x", "ball y", "ball z"],
@@ -77,7 +77,7 @@ impl KnownBody {
         }
     }
 
-    /// One unit of a step of each, m or rad.
+    /// Units of the steps of its parameters, m or rad.
     pub fn units(&self) -> [f64; Self::PARAMETERS] {
         match self {
             Self::Ball { .. } => [PLACE_M; 3],
@@ -85,7 +85,7 @@ impl KnownBody {
         }
     }
 
-    /// Pose in `W` of its frame: a ball's centre, or a point of a plate whose +y is its normal.
+    /// Pose of its frame in `W`: a ball's centre, or a point of a plate whose +y is its normal.
     pub fn x_wo(&self) -> Isometry3<f64> {
         match self {
             Self::Ball { centre_w, .. } => {
@@ -103,43 +103,43 @@ impl KnownBody {
     }
 }
 
-/// Points along the finger and around it; chosen: a tenth of what is touched.
+/// Number of points along the finger and around it; a heuristic: a tenth of the contact's size.
 const ALONG: usize = 48;
 const AROUND: usize = 64;
 
-/// Part of their distance to which a rigid finger's nearest point is refined; chosen: the square of
-/// it is what the distance is off by, in parts of a millimetre.
+/// Fraction of the point spacing to which a rigid finger's nearest point is refined; a heuristic:
+/// the square of it is the error of the distance, in fractions of a millimetre.
 const REFINED: f64 = 1e-5;
 
-/// Points that lie farther behind the foremost than this part of the radius are not met; chosen: no
-/// contact that can be read is as deep.
+/// Largest distance of a point behind the foremost for contact, as a fraction of the radius; a
+/// heuristic: no readable contact is as deep.
 const DEEPEST: f64 = 0.5;
 
-/// Steps of Newton's method on a curve that only bends one way; chosen, twice what is usual.
+/// Number of Newton steps on a convex curve; a heuristic: twice the usual number.
 const STEPS: usize = 30;
 
-/// The outer surface of the finger in `T`.
+/// Outer surface of the finger in `T`.
 #[derive(Clone, Debug)]
 pub struct Outline {
     profile: Profile,
     is_soft: bool,
     points: Vec<Sample>,
-    /// Distance of places: m along the finger, rad around it.
+    /// Spacing of points: m along the finger, rad around it.
     steps: [f64; 2],
 }
 
 #[derive(Clone, Debug)]
 struct Sample {
-    /// m along the finger, rad around it.
+    /// Coordinates: m along the finger, rad around it.
     place: [f64; 2],
     p_t: Point3<f64>,
     area_m2: f64,
-    /// Whether fluid flows under the skin there.
+    /// Whether there is fluid under the skin.
     wet: bool,
 }
 
 impl Outline {
-    /// Of a soft finger, a BioTac's; of a rigid one its hull.
+    /// Creates the outline: a BioTac's for a soft finger, the hull for a rigid one.
     pub fn of(robot: &Robot) -> Self {
         let profile = match robot.is_soft {
             true => Profile::biotac(&robot.finger),
@@ -166,7 +166,7 @@ impl Outline {
         Sample { place, p_t: self.profile.skin_t(x_m, turn), area_m2, wet }
     }
 
-    /// From one side of a place to the other, along the finger and around it.
+    /// Returns the vectors across a surface element, along the finger and around it.
     fn edges(&self, x_m: f64, turn: f64, [far_m, far]: [f64; 2]) -> [Vector3<f64>; 2] {
         let skin_t = |x_m, turn| self.profile.skin_t(x_m, turn);
         [
@@ -175,7 +175,7 @@ impl Outline {
         ]
     }
 
-    /// The point of it at `x_m` along the finger and `turn` from −z towards +y, with its outward
+    /// Returns the point at `x_m` along the finger and `turn` from −z towards +y, with its outward
     /// normal, in `T`.
     pub fn at(&self, x_m: f64, turn: f64) -> (Point3<f64>, UnitVector3<f64>) {
         let [along, around] = self.edges(x_m, turn, [1e-3 * self.steps[0], 1e-3 * self.steps[1]]);
@@ -185,12 +185,12 @@ impl Outline {
         (self.profile.skin_t(x_m, turn), outward)
     }
 
-    /// The point in `T` at which it meets `body` when the fingertip stands at `x_wt`, and how far
-    /// it would have to go on until it has given way by `give_m`; negative if it has gone too far.
+    /// Returns the point in `T` of contact with `body` for the fingertip pose `x_wt`, and the
+    /// remaining travel until the indentation is `give_m`; negative if it is exceeded.
     ///
-    /// A soft finger tells contact when a certain volume of liquid is displaced: that which a
-    /// sphere of its own radius displaces by going in so far, V = π r give². So a blunt place gives
-    /// way by less than a sharp one. A rigid finger gives way alike everywhere.
+    /// A soft finger indicates contact at a certain displaced volume of fluid: that which a sphere
+    /// of its own radius displaces at this indentation, V = π r give². Therefore a blunt site is
+    /// indented less than a sharp one. A rigid finger has the same value everywhere.
     pub fn meet(&self, body: &KnownBody, x_wt: &Isometry3<f64>, give_m: f64) -> (Point3<f64>, f64) {
         match self.is_soft {
             true => self.meet_soft(body, x_wt, give_m),
@@ -201,7 +201,8 @@ impl Outline {
         }
     }
 
-    /// The volume within `level` of the body is V(level) = Σ area · max(0, level − distance).
+    /// Computes the volume within `level` of the body, V(level) = Σ area · max(0, level −
+    /// distance).
     fn meet_soft(
         &self,
         body: &KnownBody,
@@ -216,10 +217,10 @@ impl Outline {
             return (Point3::origin(), f64::INFINITY);
         };
         met.retain(|(far_m, _)| *far_m < foremost_m + DEEPEST * self.profile.radius_m);
-        // Less than no give is a way that is missing: a fit that tries it finds back.
+        // A negative indentation is added to the travel, so that a fit that tries it recovers.
         let (give_m, missing_m) = (give_m.max(0.0), give_m.min(0.0));
         let wanted_m3 = PI * self.profile.radius_m * give_m * give_m;
-        // From above, where the curve is steeper, it is never overshot.
+        // Started from above, where the curve is steeper, Newton's method never overshoots.
         let mut level_m = foremost_m + DEEPEST * self.profile.radius_m;
         for _ in 0..STEPS {
             let under = met.iter().filter(|(far_m, _)| *far_m < level_m);
@@ -241,8 +242,8 @@ impl Outline {
         (p_t, level_m + missing_m)
     }
 
-    /// Its point nearest to `body` when the fingertip stands at `x_wt`, and how far that is from
-    /// it; negative inside.
+    /// Returns the outline's point nearest to `body` for the fingertip pose `x_wt`, and its signed distance;
+    /// negative inside.
     pub fn nearest(&self, body: &KnownBody, x_wt: &Isometry3<f64>) -> (Point3<f64>, f64) {
         let far = |p_t: &Point3<f64>| body.distance_m(&(x_wt * p_t));
         let first = |best: ([f64; 2], f64), point: &Sample| {
@@ -271,12 +272,12 @@ impl Outline {
         (at(place), distance_m)
     }
 
-    /// Whether it gives way.
+    /// Whether the finger is soft.
     pub fn is_soft(&self) -> bool {
         self.is_soft
     }
 
-    /// From the axis to the skin at the sides.
+    /// Distance from the axis to the skin at the sides.
     pub fn radius_m(&self) -> f64 {
         self.profile.radius_m
     }

@@ -1,8 +1,8 @@
-//! Where things really are, found by touch: the finger on its mount and a known body, or an object
-//! whose mesh is known.
+//! Registration by touch: pose of the finger on its mount and of a known body, or of an object with
+//! a known mesh.
 //!
-//! [`Design`] says which touches of a ball or a plate tell the most; [`register`] makes them with
-//! any probe and fits what they tell. [`icp`] lays a cloud of contacts onto a mesh.
+//! [`Design`] selects the most informative touches of a ball or a plate; [`register`] makes them
+//! with any probe and fits the poses. [`icp`] registers a cloud of contacts to a mesh.
 
 pub mod design;
 pub mod hand_eye;

@@ -1,4 +1,4 @@
-//! Makes the touches of a design and fits what they tell.
+//! Makes the touches of a design and fits the poses.
 
 use super::design::{Design, pressed_m};
 use super::hand_eye::{
@@ -15,46 +15,46 @@ use palpate_gp::math::pose::parts;
 use palpate_input::error::Invalid;
 use toml_edit::{Array, DocumentMut, Item, Table, value};
 
-/// What touches of a known body told.
+/// Result of a registration by touch.
 #[derive(Clone, Debug)]
 pub struct Registered {
-    /// The finger on its mount, the body and the skin's give.
+    /// Pose of the finger on its mount, pose of the body, and the skin's indentation.
     pub found: HandEye,
     /// Standard deviation of each of [`parameters`], in its own unit.
     pub sds: [f64; PARAMETERS],
-    /// What the touches did not determine; it stands where it was believed to be.
+    /// Parameters that the touches did not determine; they keep their initial values.
     pub undetermined: Vec<&'static str>,
-    /// Condition number of the rest.
+    /// Condition number of the determined parameters.
     pub condition: f64,
-    /// Root mean square of the depths' residuals, of the touches used.
+    /// Root mean square of the depth residuals of the touches used.
     pub rms_m: f64,
-    /// Touches that met the body.
+    /// Number of touches with contact.
     pub contacts: usize,
-    /// Touches of these that were left out: they did not fit the others.
+    /// Number of contacts left out as outliers.
     pub outliers: usize,
-    /// Touches that met nothing or were broken off.
+    /// Number of misses and interrupted touches.
     pub lost: usize,
-    /// Why not all touches of the design were made; what they told until then counts.
+    /// Fault that ended the touches early; earlier touches count.
     pub ended: Option<Fault>,
 }
 
 impl Registered {
-    /// Pose of `T` at the end of the mount, for `arm.tool_position_m` and `arm.tool_rotation_deg`;
-    /// `before` is what they said when it was touched.
+    /// Returns the pose of `T` at the end of the mount, for `arm.tool_position_m` and
+    /// `arm.tool_rotation_deg`; `before` is their value during the touches.
     pub fn tool(&self, before: Option<Isometry3<f64>>) -> Isometry3<f64> {
         before.map_or(self.found.correction, |before| before * self.found.correction)
     }
 
-    /// The keys of a scene's `[arm]` and `[object]` that were found (of the body a ball's centre,
-    /// or a plate's point with +y along its normal), and how sure they are, as TOML; `before` as in
+    /// Returns the keys of a scene's `[arm]` and `[object]` (for the body, a ball's centre, or a
+    /// plate's point with +y along its normal) with their uncertainty, as TOML; `before` as in
     /// [`tool`](Self::tool).
     pub fn tables(&self, before: Option<Isometry3<f64>>) -> String {
         let [a, b, c, d, e, f, g, h, i, ..] = self.sds;
         let mut sure = Table::new();
         sure["tool_position_sd_m"] = value(Array::from_iter([a, b, c]));
-        // Of small turns about the axes of the mount.
+        // Small rotations about the axes of the mount.
         sure["tool_turn_sd_deg"] = value(Array::from_iter([d, e, f].map(f64::to_degrees)));
-        // Of a ball along x, y and z; of a plate along its normal, then of its tilts in rad.
+        // Along x, y and z for a ball; along the normal for a plate, then its tilts in rad.
         sure["body_sd"] = value(Array::from_iter([g, h, i]));
         sure["undetermined"] = value(Array::from_iter(self.undetermined.iter().copied()));
         sure["residual_rms_m"] = value(self.rms_m);
@@ -77,7 +77,7 @@ impl Registered {
     }
 }
 
-/// The place and the turn of a pose as a scene's keys, which begin with `prefix`.
+/// Returns position and rotation of a pose as a scene's keys, which begin with `prefix`.
 pub(super) fn pose_table(prefix: &str, pose: &Isometry3<f64>) -> Item {
     let (position_m, rotation_deg) = parts(pose);
     let mut table = Table::new();
@@ -86,11 +86,11 @@ pub(super) fn pose_table(prefix: &str, pose: &Isometry3<f64>) -> Item {
     table.into()
 }
 
-/// Touches the body as `design` says, with the finger of `robot`, by a probe that touches as
-/// `touch` says; `made` is called after each touch.
+/// Touches the body according to `design`, with the finger of `robot` and a probe with the settings
+/// `touch`; calls `made` after each touch.
 ///
 /// # Errors
-/// If too few touches can be made or meet the body, or they cannot be fitted.
+/// If too few touches can be made or make contact, or the fit fails.
 pub fn register(
     probe: &mut dyn Probe,
     robot: &Robot,
@@ -114,7 +114,7 @@ pub fn register(
         made_count += 1;
         if let Touch::Contact(contact) = &ending {
             let x_wt = probe.tip().ok_or_else(|| {
-                Invalid::new("this body does not say where its finger was when it touched")
+                Invalid::new("this probe does not report the pose of its finger at contact")
             })?;
             let felt_t = Some(x_wt.inverse_transform_point(&contact.p_wc));
             touches.push(RegistrationTouch { x_wt, pressed_m, felt_t });
@@ -127,7 +127,7 @@ pub fn register(
                 Invalid::new(fault.to_string()).at(format!("touch {touch} of {of}"))
             }
             None => Invalid::new(format!(
-                "{} of {of} touches met the body, and {least} are needed; is it where --at says?",
+                "{} of {of} touches made contact with the body; at least {least} are needed; check --at",
                 touches.len()
             )),
         });
@@ -136,10 +136,10 @@ pub fn register(
     Ok(Registered { ended: ended.map(|(_, fault)| fault), ..told })
 }
 
-/// What `touches` tell, of `of` that were made.
+/// Fits the poses to `touches`, of `of` that were made.
 ///
 /// # Errors
-/// If they cannot be fitted.
+/// If the fit fails.
 pub fn conclude(
     touches: &[RegistrationTouch],
     robot: &Robot,

@@ -1,4 +1,4 @@
-//! What is bolted on: the arm, and what a real finger has too.
+//! Robot: the arm, the finger and its sensors.
 
 pub mod arm;
 pub mod finger;

@@ -1,26 +1,27 @@
-//! An arm with a finger.
+//! Robot: an arm with a finger.
 
 use super::arm::{Chain, LinkCapsule, Part};
 use super::finger::Finger;
 use nalgebra::Point3;
 
-/// What is bolted on.
+/// An arm with a finger.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Robot {
     /// The arm or stage, from its base to the fingertip.
     pub chain: Chain,
-    /// The finger's shape.
+    /// The finger's geometry.
     pub finger: Finger,
-    /// Whether the finger has a skin that yields.
+    /// Whether the finger has a soft skin.
     pub is_soft: bool,
 }
 
 impl Robot {
-    /// The capsules of its arm, its adapter and its finger: what of it can bump into something.
+    /// Returns the collision capsules of its arm, adapter and finger.
     pub fn capsules(&self) -> Vec<LinkCapsule> {
         let Self { chain, finger, .. } = self;
         let mut all = chain.capsules.clone();
-        // As the model draws it: from the flange to the finger's heel, twice the finger's width.
+        // The adapter as in the model: from the flange to the finger's heel, twice as wide as the
+        // finger.
         let mount_m = chain.tool.translation.vector.norm();
         let heel_m = (mount_m - finger.length_m).max(0.0);
         let on_flange = |z_m: f64| chain.flange * Point3::new(0.0, 0.0, z_m);

@@ -1,5 +1,5 @@
-//! The way of one touch: from where, in which direction, how far; and the ball around a whole
-//! object that is touched from any side.
+//! The approach of one touch: start, direction and length; and the ball around a whole object that
+//! is touched from any side.
 
 use super::target::Aim;
 use crate::robot::Finger;
@@ -9,30 +9,31 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// Distance that the finger's hull goes beyond the farthest depth before it turns back; chosen.
+/// Distance that the finger's hull travels beyond the farthest depth before it turns back; a
+/// heuristic.
 pub const BEYOND_M: f64 = 0.01;
 
-/// What a probe is told of a touch: the centre of the fingertip's hemisphere comes over `p_near_w`
-/// and goes straight on over `p_far_w`, wherever the surface between them is.
+/// Approach of a touch: the centre of the fingertip's hemisphere moves over `p_near_w` and straight
+/// on over `p_far_w`, wherever the surface between them is.
 ///
-/// Given by a frame `A` whose −y is the direction of the approach.
+/// It is defined by a frame `A` whose −y is the direction of the approach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Approach {
-    /// Where the way comes to what may be touched, in `W`.
+    /// Start of the region that may be touched, in `W`.
     pub p_near_w: Point3<f64>,
-    /// Where it leaves that, in `W`.
+    /// End of that region, in `W`.
     pub p_far_w: Point3<f64>,
     /// Attitude of `A` in `W`.
     pub r_wa: UnitQuaternion<f64>,
     /// Attitude of the fingertip `T` in `A`.
     pub r_at: UnitQuaternion<f64>,
-    /// What lies between this approach and others; none where the finger goes straight from one to
-    /// the next.
+    /// Ball between this approach and others; `None` if the finger moves straight from one to the
+    /// next.
     pub around: Option<Ball>,
 }
 
 impl Approach {
-    /// Which way the finger goes, in `W`.
+    /// Direction of the finger's motion, in `W`.
     pub fn direction_w(&self) -> UnitVector3<f64> {
         UnitVector3::new_unchecked(self.r_wa * -Vector3::y())
     }
@@ -42,7 +43,7 @@ impl Approach {
         self.r_wa * self.r_at
     }
 
-    /// `p_w` moved along the approach until it is as far on as `level_w`.
+    /// Returns `p_w` moved along the approach to the level of `level_w`.
     pub fn level_with(&self, p_w: &Vector3<f64>, level_w: &Vector3<f64>) -> Vector3<f64> {
         let r_aw = self.r_wa.inverse();
         let (mut p_a, level_a) = (r_aw * p_w, r_aw * level_w);
@@ -50,7 +51,7 @@ impl Approach {
         self.r_wa * p_a
     }
 
-    /// Whether every number is finite.
+    /// Whether all numbers are finite.
     pub fn is_finite(&self) -> bool {
         let points = [self.p_near_w.coords, self.p_far_w.coords];
         let turns = [self.r_wa.coords, self.r_at.coords];
@@ -58,29 +59,28 @@ impl Approach {
     }
 }
 
-/// Table `[around]`: the ball in which there is something to touch. Stands in place of a zone.
+/// Table `[around]`: the ball to explore around a whole object, instead of a zone.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Around {
-    /// Centre of the ball in `W`. Left out, a simulation takes the middle of the box that its
-    /// object spans; a real robot must be told.
+    /// Centre of the ball in `W`; default in simulation: centre of the object's box. Required
+    /// for a real robot.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centre_m: Option<[f64; 3]>,
-    /// Radius of the ball. Left out, a simulation takes a tenth more than half the diagonal of
-    /// that box; a real robot must be told.
+    /// Radius of the ball; default in a simulation: half the box's diagonal plus a tenth. Required
+    /// for a real robot.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_m: Option<f64>,
-    /// Lowest z in `W` to which the finger's hull may come, above what the object stands on. Left
-    /// out, nothing is below the object.
+    /// Lowest z in `W` allowed for the finger's hull, above the support; unlimited if omitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lowest_m: Option<f64>,
 }
 
-/// Radii that a ball may have, m.
-// heuristic: from a hundredth of a fingertip to an object that no arm reaches around.
+/// Allowed radii of a ball, m.
+// heuristic: from a hundredth of a fingertip to an object beyond any arm's reach.
 pub const RADIUS_M: RangeInclusive<f64> = 1e-4..=10.0;
 
-/// Farthest centre of a ball; far beyond any arm's reach.
+/// Largest distance of a ball's centre; far beyond any arm's reach.
 const REACH_M: f64 = 1e3;
 
 impl Checked for Around {
@@ -94,47 +94,48 @@ impl Checked for Around {
 }
 
 impl Around {
-    /// The ball it says, if it does.
+    /// Returns the ball, if centre and radius are given.
     pub fn ball(&self) -> Option<Ball> {
         let centre_w = self.centre_m?.into();
         Some(Ball { centre_w, radius_m: self.radius_m?, lowest_m: self.lowest_m })
     }
 }
 
-/// A ball in which there is something to touch, or around which the finger goes between approaches.
+/// A ball that contains the object, or that the finger travels around between approaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball {
-    /// Its centre in `W`.
+    /// Centre in `W`.
     pub centre_w: Point3<f64>,
-    /// Its radius.
+    /// Radius.
     pub radius_m: f64,
-    /// Lowest z in `W` to which the finger's hull may come; none where nothing is below.
+    /// Lowest z in `W` allowed for the finger's hull; `None` if unlimited.
     pub lowest_m: Option<f64>,
 }
 
-/// Rolls of the finger about its approach that are tried, in this order.
+/// Rolls of the finger about its approach, in the order in which they are tried.
 // heuristic: eighths of a turn, the smallest first.
 pub(super) const ROLLS_DEG: [f64; 8] = [0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0, 180.0];
 
-/// How much larger than the ball around an object's box one is that nobody gave; chosen, so that
+/// Ratio of the default radius to that of the ball around the object's box; a heuristic, so that
 /// approaches begin beside the object.
 const ROOMIER: f64 = 1.1;
 
 impl Ball {
-    /// About a box from its least to its greatest corner, with some room.
+    /// Returns a ball around a box given by its lowest and highest corner, with a margin.
     pub fn about([low, high]: [Point3<f64>; 2], lowest_m: Option<f64>) -> Self {
         let radius_m = ROOMIER * (high - low).norm() / 2.0;
         Self { centre_w: nalgebra::center(&low, &high), radius_m, lowest_m }
     }
 
-    /// Whether it aims at a point of the ball.
+    /// Whether the aim's point lies in the ball.
     pub fn contains(&self, aim: &Aim) -> bool {
-        // A little more than rounding beside the surface, from where planners may aim.
+        // The tolerance is slightly above rounding, since planners may aim at points on the
+        // surface.
         (aim.p_w - self.centre_w).norm() <= self.radius_m * (1.0 + 1e-9)
     }
 
-    /// Where the line of an aim enters the ball and leaves it, counted from the point that is aimed
-    /// at along its direction; twice where it is nearest, if it passes beside.
+    /// Distances along an aim's direction, from its point, at which its line enters and leaves the
+    /// ball; both are those of the nearest point if the line misses the ball.
     pub fn chord_m(&self, aim: &Aim) -> [f64; 2] {
         let to_centre_w = self.centre_w - aim.p_w;
         let along_m = to_centre_w.dot(&aim.ahead_w);
@@ -143,13 +144,13 @@ impl Ball {
         [along_m - half_m, along_m + half_m]
     }
 
-    /// The way of `finger` straight over the point, from where the line enters the ball to where it
-    /// leaves it, or to where the hull would come too low. It sets out `standoff_m` before the
-    /// ball, and goes around it to come there.
+    /// Returns the approach of `finger` straight over the aim's point, from where the line enters
+    /// the ball to where it leaves it, or to where the hull would be too low. It starts
+    /// `standoff_m` before the ball, and the finger travels around the ball to get there.
     ///
-    /// The finger lies behind and below its tip, as far as the direction lets it: z of `A` points
-    /// up in `W`, or towards +y where the approach itself is vertical; then `A` is rolled by
-    /// `roll_rad` about the approach's direction backwards, its y.
+    /// The finger lies behind and below its tip, as far as the direction permits: z of `A` points
+    /// up in `W`, or towards +y if the approach is vertical; then `A` is rolled by `roll_rad` about
+    /// its y, the reverse of the approach's direction.
     pub fn approach(&self, aim: &Aim, finger: &Finger, standoff_m: f64, roll_rad: f64) -> Approach {
         let roll = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), roll_rad);
         let r_wa = attitude(&aim.ahead_w) * roll;
@@ -164,24 +165,24 @@ impl Ball {
         Approach { p_near_w, p_far_w, r_wa, r_at: finger.r_at(), around }
     }
 
-    /// Where a fingertip stays outside between approaches, to keep its stand-off from the ball.
+    /// Returns the ball that a fingertip stays out of between approaches, to keep the stand-off.
     pub fn keep_out(&self, finger: &Finger, standoff_m: f64) -> Self {
         Self { radius_m: self.radius_m + finger.bulge_m() + standoff_m, ..*self }
     }
 
-    /// Where the straight line that comes to `p_w` along `ahead_w` enters the ball; the point
-    /// nearest to the centre, if it passes beside it.
+    /// Returns the point at which the straight line to `p_w` along `ahead_w` enters the ball; the
+    /// point nearest to the centre, if it misses the ball.
     pub fn entrance_w(&self, p_w: &Point3<f64>, ahead_w: &UnitVector3<f64>) -> Point3<f64> {
         p_w + ahead_w.scale(self.chord_m(&Aim { p_w: *p_w, ahead_w: *ahead_w })[0])
     }
 
-    /// How deep `p_w` is in the ball; negative outside.
+    /// Depth of `p_w` in the ball; negative outside.
     pub fn depth_m(&self, p_w: &Point3<f64>) -> f64 {
         self.radius_m - (p_w - self.centre_w).norm()
     }
 
-    /// How far the hull is above the lowest z when its tip is at `p_wt`; none where nothing is
-    /// below.
+    /// Height of the hull above the lowest z with the tip at `p_wt`; `None` if there is no lowest
+    /// z.
     fn room_m(
         &self,
         p_wt: &Point3<f64>,
@@ -191,21 +192,21 @@ impl Ball {
         Some(p_wt.z - finger.drop_m(r_wa) - self.lowest_m?)
     }
 
-    /// Whether the hull stays above the lowest z on an `approach` of [`Self::approach`], and comes
-    /// to the point that is aimed at.
+    /// Whether the hull stays above the lowest z on an `approach` of [`Self::approach`], and
+    /// reaches the aim's point.
     pub fn is_free(&self, aim: &Aim, approach: &Approach, finger: &Finger) -> bool {
         let ahead_w = approach.direction_w();
         let keep_out = approach.around.as_ref();
         let start_w = keep_out.map_or(approach.p_near_w, |out| out.entrance_w(&aim.p_w, &ahead_w));
         let sets_out =
             self.room_m(&start_w, finger, &approach.r_wa).is_none_or(|room_m| room_m >= 0.0);
-        // The hull's front, when the finger turns back, is beyond the far end by this much.
+        // At the turning point, the hull's front is beyond the far end by this distance.
         let arrives = (approach.p_far_w - aim.p_w).dot(&ahead_w) + BEYOND_M >= 0.0;
         sets_out && (arrives || self.lowest_m.is_none())
     }
 }
 
-/// Attitude in `W` of a frame whose −y is `ahead_w`.
+/// Returns the attitude in `W` of a frame whose −y is `ahead_w`.
 pub fn attitude(ahead_w: &UnitVector3<f64>) -> UnitQuaternion<f64> {
     let y_w = -ahead_w.into_inner();
     let above = |up_w: Vector3<f64>| UnitVector3::try_new(up_w - y_w * y_w.dot(&up_w), 1e-3);
@@ -221,8 +222,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The way of an aim goes over its point along its direction, from the ball's surface to
-        /// its surface.
+        /// The approach of an aim passes over its point along its direction, from the ball's
+        /// surface to its surface.
         #[test]
         fn an_approach_goes_over_its_point(
             at in prop::array::uniform3(-0.5f64..0.5),

@@ -1,4 +1,4 @@
-//! What the robot is told: where to explore, how to touch, and the way of each touch.
+//! Task of the robot: where to explore, how to touch, and the approach of each touch.
 
 pub mod approach;
 mod target;

@@ -1,10 +1,10 @@
-//! A target: where a planner sends the finger.
+//! Target of a touch.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A target: what the robot explores next, as a planner decides.
+/// A target: the next touch as selected by a planner.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(into = "Written", try_from = "Read")]
 #[schemars(with = "Written")]
@@ -16,7 +16,7 @@ pub enum Target {
 }
 
 impl Target {
-    /// The place of a zone, if it is one.
+    /// Returns the place of a zone, if it is one.
     pub fn place(&self) -> Option<&[f64]> {
         match self {
             Self::Place(place) => Some(place),
@@ -24,7 +24,7 @@ impl Target {
         }
     }
 
-    /// The aim into a ball, if it is one.
+    /// Returns the aim into a ball, if it is one.
     pub fn aim(&self) -> Option<&Aim> {
         match self {
             Self::Place(_) => None,
@@ -32,8 +32,8 @@ impl Target {
         }
     }
 
-    /// Its coordinates for a table: (x) or (x, z) of a place; x, y and z of the point and then of
-    /// the direction of an aim.
+    /// Returns the coordinates for a table: (x) or (x, z) of a place; for an aim, x, y and z of the
+    /// point, then of the direction.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Place(place) => place.clone(),
@@ -41,8 +41,8 @@ impl Target {
         }
     }
 
-    /// The target whose [`numbers`](Self::numbers) they are: one or two of a place, six of an aim.
-    /// Returns `None` for another count, and for an aim without a direction.
+    /// Returns the target with these [`numbers`](Self::numbers): one or two for a place, six for an
+    /// aim. Returns `None` for another count, and for an aim without a direction.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
         match *numbers {
             [_] | [_, _] => Some(Self::Place(numbers.to_vec())),
@@ -86,14 +86,15 @@ pub struct Aim {
 }
 
 impl Aim {
-    /// At `p_w` against the outward direction `outward_w`; along −z where that has no length.
+    /// Returns an aim at `p_w` against the outward direction `outward_w`; along −z if that has
+    /// length zero.
     pub fn against(p_w: Point3<f64>, outward_w: &Vector3<f64>) -> Self {
         let down_w = -Vector3::z_axis();
         Self { p_w, ahead_w: UnitVector3::try_new(-outward_w, 1e-12).unwrap_or(down_w) }
     }
 
-    /// At the point `p_w` along `ahead_w`, kept as it is if its length is 1. Returns `None` if a
-    /// number is not finite or the direction has no length.
+    /// Returns an aim at the point `p_w` along `ahead_w`, unchanged if its length is 1. Returns
+    /// `None` if a number is not finite or the direction has length zero.
     pub fn along(p_w: [f64; 3], ahead_w: [f64; 3]) -> Option<Self> {
         let (p_w, ahead_w) = (Point3::from(p_w), Vector3::from(ahead_w));
         let is_finite = p_w.iter().chain(&ahead_w).all(|number| number.is_finite());
@@ -106,13 +107,13 @@ impl Aim {
     }
 }
 
-/// A target as a row writes it.
+/// A target as written in a row.
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum Written {
     /// The place (x) or (x, z) of a zone, m.
     Place(Vec<f64>),
-    /// An approach of a whole object.
+    /// An approach to a whole object.
     Aim {
         /// The point aimed at, in `W`, m.
         p_w: [f64; 3],
@@ -132,7 +133,7 @@ impl From<Target> for Written {
     }
 }
 
-/// A target as a row may have it: version 0.1 wrote its numbers without a name.
+/// A target as read from a row: version 0.1 wrote its numbers without a name.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Read {
@@ -148,10 +149,12 @@ impl TryFrom<Read> for Target {
             Read::Written(Written::Place(place)) => Ok(Self::Place(place)),
             Read::Written(Written::Aim { p_w, ahead_w }) => {
                 let aim = Aim::along(p_w, ahead_w);
-                aim.map(Self::Aim).ok_or_else(|| format!("no direction in {ahead_w:?}"))
+                aim.map(Self::Aim).ok_or_else(|| {
+                    format!("the direction {ahead_w:?} has length zero or is not finite")
+                })
             }
             Read::Numbers(numbers) => Self::from_numbers(&numbers)
-                .ok_or_else(|| format!("{} numbers are no target", numbers.len())),
+                .ok_or_else(|| format!("a target has 1, 2 or 6 numbers, not {}", numbers.len())),
         }
     }
 }
@@ -162,7 +165,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// A target is read as it was written, bit by bit, by its name or by its numbers.
+        /// A target is read exactly as it was written, by its name or by its numbers.
         #[test]
         fn a_target_is_read_as_it_was_written(
             at in prop::array::uniform3(-0.5f64..0.5),

@@ -1,4 +1,4 @@
-//! A task: the region where something may be touched, and how each target is.
+//! Task: the region to explore, and the approach to each target.
 
 use super::approach::{Approach, Ball, ROLLS_DEG};
 use super::target::{Aim, Target};
@@ -11,7 +11,7 @@ use palpate_input::error::Invalid;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-/// Where to explore.
+/// Region to explore.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Region {
     /// A rectangle or an interval, touched from one side.
@@ -21,7 +21,7 @@ pub enum Region {
 }
 
 impl Region {
-    /// The zone, if it is one.
+    /// Returns the zone, if it is one.
     pub fn zone(&self) -> Option<&Zone> {
         match self {
             Self::Zone(zone) => Some(zone),
@@ -29,7 +29,7 @@ impl Region {
         }
     }
 
-    /// The ball, if it is one.
+    /// Returns the ball, if it is one.
     pub fn ball(&self) -> Option<&Ball> {
         match self {
             Self::Zone(_) => None,
@@ -46,8 +46,8 @@ impl Region {
         }
     }
 
-    /// Travel between two targets in a straight line, m: between places of the zone, or between
-    /// the points where two approaches enter the ball. 0 if one is no target of the region.
+    /// Straight-line distance between two targets, m: between places of the zone, or between the
+    /// points where two approaches enter the ball. 0 if one is not a target of the region.
     pub fn travel_m(&self, from: &Target, to: &Target) -> f64 {
         match (self, from, to) {
             (Self::Zone(_), Target::Place(from), Target::Place(to)) => {
@@ -74,30 +74,30 @@ impl From<Ball> for Region {
     }
 }
 
-/// Whether a body can come to where an approach of a whole object sets out, go it to its end, and
-/// come back.
+/// Predicate: whether a robot can reach the start of an approach of a whole object, complete it,
+/// and return.
 type Reach = dyn Fn(&Approach) -> bool + Send + Sync;
 
-/// The complete task of the robot: everything between a planner's target and an [`Approach`].
+/// The complete task of the robot: maps a planner's target to an [`Approach`].
 #[derive(Clone)]
 pub struct Task {
     region: Region,
     touch: TouchSettings,
     finger: Finger,
-    /// Nearest and farthest depth of a zone.
+    /// Nearest and farthest depth of the zone.
     depth_m: [f64; 2],
-    /// `None` for a body that reaches everything.
+    /// `None` for a robot that reaches everything.
     reach: Option<Arc<Reach>>,
-    /// Whether the middle of the ball is reached along the directions of each cell, found when
-    /// first asked for.
+    /// Whether the ball's centre is reachable along the directions of each cell; computed on first
+    /// use.
     cells: Arc<[OnceLock<bool>]>,
 }
 
 impl Task {
-    /// To explore `region` with `finger`, touching as `touch` says.
+    /// Creates the task to explore `region` with `finger` and the settings `touch`.
     ///
     /// # Errors
-    /// If a zone does not say its depth.
+    /// If a zone has no depth.
     pub fn new(
         region: impl Into<Region>,
         touch: TouchSettings,
@@ -112,7 +112,7 @@ impl Task {
         Ok(Self { region, touch, finger, depth_m, reach: None, cells })
     }
 
-    /// Limits the approaches of a whole object to those that `reach` allows.
+    /// Restricts the approaches of a whole object to those for which `reach` is true.
     pub fn within(mut self, reach: impl Fn(&Approach) -> bool + Send + Sync + 'static) -> Self {
         if self.ball().is_some() {
             self.reach = Some(Arc::new(reach));
@@ -121,45 +121,45 @@ impl Task {
         self
     }
 
-    /// Where to explore.
+    /// The region to explore.
     pub fn region(&self) -> &Region {
         &self.region
     }
 
-    /// The ball in which a whole object is explored, if it is one.
+    /// Returns the ball in which a whole object is explored, if there is one.
     pub fn ball(&self) -> Option<&Ball> {
         self.region.ball()
     }
 
-    /// The zone that is explored, if it is one.
+    /// Returns the zone to explore, if there is one.
     pub fn zone(&self) -> Option<&Zone> {
         self.region.zone()
     }
 
-    /// How to touch.
+    /// Settings of a touch.
     pub fn touch(&self) -> &TouchSettings {
         &self.touch
     }
 
-    /// Nearest and farthest depth along the approach from the origin of `Z`; zeros of a ball.
+    /// Nearest and farthest depth along the approach from the origin of `Z`; zeros for a ball.
     pub fn depth_m(&self) -> [f64; 2] {
         self.depth_m
     }
 
-    /// Whether `target` lies in the region and the finger can be brought there, above what is
-    /// below the object and within the body's reach.
+    /// Whether `target` lies in the region and the finger can reach it, above the support and
+    /// within the robot's reach.
     pub fn contains(&self, target: &Target) -> bool {
         self.region.contains(target) && self.approach(target).is_some()
     }
 
-    /// Whether the finger can be brought over the point of the ball that is aimed at.
+    /// Whether the finger can reach the aim's point of the ball.
     pub fn reaches(&self, aim: &Aim) -> bool {
         self.contains(&Target::Aim(*aim))
     }
 
-    /// Whether [`reaches`](Self::reaches) holds for about this direction and the middle of the
-    /// ball: found once for directions near to each other, for use in searches. Nothing limits it
-    /// without a body's reach and something below.
+    /// Approximates [`reaches`](Self::reaches) for this direction and the ball's centre: computed
+    /// once per cell of directions, for use in searches. Always true without a limit of reach and a
+    /// lowest z.
     pub fn may_reach(&self, aim: &Aim) -> bool {
         let Some(ball) = self.ball() else { return false };
         if self.reach.is_none() && ball.lowest_m.is_none() {
@@ -170,8 +170,8 @@ impl Task {
         self.cells.get(cell).is_some_and(|found| *found.get_or_init(find))
     }
 
-    /// Those of `of` outward directions, spread evenly, against which the finger cannot be brought
-    /// over the middle of the ball.
+    /// Returns those of `of` evenly spread outward directions against which the finger cannot reach
+    /// the ball's centre.
     pub fn unreached(&self, of: usize) -> Vec<UnitVector3<f64>> {
         let Some(ball) = self.ball() else { return Vec::new() };
         let is_missed =
@@ -179,8 +179,9 @@ impl Task {
         directions(of).filter(is_missed).collect()
     }
 
-    /// The approach of `target`: of a place along the zone's own axis, of an aim straight over its
-    /// point. Returns `None` if the target is none of the region's kind, or cannot be reached.
+    /// Returns the approach of `target`: along the zone's axis for a place, straight over the point
+    /// for an aim. Returns `None` if the target does not match the region's kind, or cannot be
+    /// reached.
     pub fn approach(&self, target: &Target) -> Option<Approach> {
         match (&self.region, target) {
             (Region::Zone(zone), Target::Place(place)) => {
@@ -195,8 +196,8 @@ impl Task {
         }
     }
 
-    /// With the finger rolled about the approach as little as it must be for its hull to stay
-    /// above the lowest z and for the body to reach it. Returns `None` if no roll does.
+    /// Returns the approach with the smallest roll of the finger for which its hull stays above the
+    /// lowest z and the robot reaches it. Returns `None` if there is none.
     fn over(&self, ball: &Ball, aim: &Aim) -> Option<Approach> {
         let Self { finger, touch, reach, .. } = self;
         let mut rolled = ROLLS_DEG
@@ -217,7 +218,7 @@ impl fmt::Debug for Task {
 }
 
 impl PartialEq for Task {
-    /// Whatever the body reaches.
+    /// Compares tasks without their reach.
     fn eq(&self, other: &Self) -> bool {
         let of = |Self { region, touch, finger, .. }: &Self| {
             (region.clone(), touch.clone(), finger.clone())
@@ -226,18 +227,19 @@ impl PartialEq for Task {
     }
 }
 
-/// A zone that does not say its depth.
+/// Message for a zone without a depth.
 const NO_DEPTH: &str = "zone.depth_m is missing: nearest and farthest depth along the approach, \
                         in metres, at which there may be something to touch";
 
-/// Directions from which an object's middle is tried, to say what is out of reach; chosen.
+/// Number of directions tried towards an object's centre to report what is out of reach; a
+/// heuristic.
 pub const DIRECTIONS: usize = 64;
 
-/// Directions in cells: faces of a cube in squares.
+/// Number of cells per side of a cube's face, for cells of directions.
 const PER_SIDE: usize = 8;
 const CELLS: usize = 6 * PER_SIDE * PER_SIDE;
 
-/// The cell of a direction.
+/// Returns the cell of a direction.
 fn cell(direction: &Vector3<f64>) -> usize {
     let axis = direction.iamax();
     let side = usize::from(direction[axis] < 0.0);
@@ -249,7 +251,7 @@ fn cell(direction: &Vector3<f64>) -> usize {
     ((2 * axis + side) * PER_SIDE + square(1)) * PER_SIDE + square(2)
 }
 
-/// The direction in the middle of a cell.
+/// Returns the direction at the centre of a cell.
 fn middle(cell: usize) -> Vector3<f64> {
     let across = |square: usize| (2 * square + 1) as f64 / PER_SIDE as f64 - 1.0;
     let (face, squares) = (cell / (PER_SIDE * PER_SIDE), cell % (PER_SIDE * PER_SIDE));
@@ -261,7 +263,7 @@ fn middle(cell: usize) -> Vector3<f64> {
     direction
 }
 
-/// Cells of which none has been searched.
+/// Creates the cells, all without a result.
 fn cells() -> Arc<[OnceLock<bool>]> {
     (0..CELLS).map(|_| OnceLock::new()).collect()
 }
@@ -270,13 +272,13 @@ fn cells() -> Arc<[OnceLock<bool>]> {
 mod tests {
     use super::*;
 
-    /// And each cell has a part of the sphere that its middle lies in.
+    /// Each cell also contains the part of the sphere around its centre.
     #[test]
     fn every_direction_is_in_the_cell_that_lies_around_it() {
         for at in 0..CELLS {
             assert_eq!(cell(&middle(at)), at);
         }
-        // Half the diagonal of a square in the middle of a face.
+        // Half the diagonal of a square at the centre of a face.
         let widest = (2f64.sqrt() / PER_SIDE as f64).atan();
         for direction in directions(5000) {
             assert!(direction.angle(&middle(cell(&direction))) < widest + 1e-9);

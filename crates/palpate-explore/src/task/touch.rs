@@ -1,5 +1,4 @@
-//! How a touch is carried out by a body that moves: travel, approach, contact, settle, read,
-//! retract.
+//! Settings of a touch by a moving robot: travel, approach, contact, settle, read, retract.
 
 use crate::robot::finger::Detection;
 use crate::robot::finger::contact_point::ContactEstimate;
@@ -8,42 +7,42 @@ use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Table `[touch]`.
+/// Table `[touch]`: settings of a touch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TouchSettings {
-    /// Duration of one control tick; left out, that of the body.
+    /// Control period, s; default: that of the backend.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
-    /// Speed of travel in front of the object, and of the way back.
+    /// Speed of travel in front of the object, and of the retraction, m/s.
     pub travel_m_s: f64,
-    /// Speed of the approach.
+    /// Speed of the approach, m/s.
     pub approach_m_s: f64,
-    /// Distance kept between the finger's hull and the object's foremost point while travelling.
+    /// Distance between the finger's hull and the object's foremost point during travel, m.
     pub standoff_m: f64,
-    /// When pressure or electrodes say contact.
+    /// Contact detection by pressure or electrodes.
     pub detection: Detection,
-    /// Force that says contact where no pressure is sensed, or what else `detection.by` names.
+    /// Force threshold of contact, N, without a pressure sensor or as `detection.by` selects.
     pub detection_n: f64,
-    /// How far beyond the place where contact was told a soft finger is held and read; a rigid one
-    /// stays there.
+    /// Distance that a soft finger is pressed beyond the point of detection for reading, m; unused
+    /// for a rigid one.
     pub press_m: f64,
-    /// Time the finger rests on the object before it is read.
+    /// Time at rest on the object before reading, s.
     pub settle_s: f64,
-    /// Tactile frames averaged, at rest before the approach and on the object; before the first
-    /// one at least 20 with `detection.threshold_sds`, which learns from them.
+    /// Number of tactile frames averaged at rest and on the object; `detection.threshold_sds` needs
+    /// at least 20 at first.
     pub frames: usize,
-    /// Force at which the finger retreats without reading.
+    /// Force at which the finger retracts without reading, N.
     pub force_limit_n: f64,
-    /// Rise of the pressure (PDC) at which it does.
+    /// Rise of the pressure (PDC) at which it retracts without reading, counts.
     pub pressure_limit_counts: f64,
-    /// Which point counts as the contact.
+    /// Point of the finger that is recorded as the contact.
     pub point: ContactEstimate,
 }
 
 impl Default for TouchSettings {
-    /// Chosen, but for the detection: an approach slow enough that
-    /// the skin is pressed by less than a millimetre before the pressure has spoken.
+    /// Heuristics, except the detection: the approach is slow enough that the skin is indented by
+    /// less than a millimetre before the pressure detects contact.
     fn default() -> Self {
         Self {
             period_s: None,
@@ -62,16 +61,16 @@ impl Default for TouchSettings {
     }
 }
 
-/// Fastest that a body takes speed away; the stage's largest acceleration.
+/// Largest deceleration of a robot; the stage's largest acceleration.
 const BRAKE_M_S2: f64 = 1.0;
 
 impl TouchSettings {
-    /// Approach at which the finger comes to rest within `depth_m` of the first contact, when
-    /// contact is told by force, or by frames that arrive in batches of `batch`, with control ticks
-    /// of `period_s`.
+    /// Largest approach speed at which the finger stops within `depth_m` of the first contact, if
+    /// contact is detected by force, or by frames that arrive in batches of `batch`, with control
+    /// ticks of `period_s`.
     ///
-    /// Contact begins just after a frame; then as many frames as must agree, the rest of their
-    /// batch, and the tick that brings them go by: v t + v² / 2a = depth.
+    /// Contact begins just after a frame; the delay t is the frames that must agree, the rest of
+    /// their batch, and the tick that delivers them: v t + v² / 2a = depth.
     pub fn approach_limit_m_s(&self, period_s: f64, batch: Option<usize>, depth_m: f64) -> f64 {
         let wait_s = match batch {
             Some(batch) => {

@@ -1,4 +1,4 @@
-//! The rectangle that is explored.
+//! Zone: the rectangle to explore.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use palpate_gp::math::pose::pose;
@@ -6,35 +6,33 @@ use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// An interval of x, or a rectangle of (x, z), in the frame `Z` of the zone; heights are y above a
-/// datum, and the finger comes along −y.
+/// An interval of x, or a rectangle of (x, z), in the frame `Z` of the zone. Heights are y above a
+/// datum, and the finger approaches along −y.
 ///
-/// `Z` stands at [`position_m`](Self::position_m) in `W`, turned by
-/// [`rotation_deg`](Self::rotation_deg). Left out, it is `W`: the object is then explored along −y
-/// of the robot's base. A zone turned by −90° about z explores its side towards +x.
+/// `Z` is at [`position_m`](Self::position_m) in `W`, rotated by
+/// [`rotation_deg`](Self::rotation_deg). By default it is `W`: the object is then explored along −y
+/// of the robot's base. A zone rotated by −90° about z explores the object's side towards +x.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Zone {
-    /// Smallest and largest x.
+    /// Smallest and largest x, m.
     pub x_m: [f64; 2],
-    /// Smallest and largest z; left out, the zone is an interval of x.
+    /// Smallest and largest z, m; if omitted, the zone is an interval of x.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z_m: Option<[f64; 2]>,
-    /// The y from which heights are measured. A zero-mean belief returns to it away from all
-    /// touches, and Eq. 5 depends on it. Left out, a simulation takes the middle of what the
-    /// object's surface spans over the zone; a function and a real robot take 0.
+    /// Height datum (y), m; default: middle of a simulated object's surface, 0 for functions and
+    /// real robots.
+    // A zero-mean belief returns to it far from all touches, and Eq. 5 depends on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub datum_y_m: Option<f64>,
-    /// Nearest and farthest depth at which there may be something to touch, along the approach from
-    /// the origin of `Z`: depth = −y. The finger keeps its stand-off from the nearest and turns
-    /// back behind the farthest. Left out, a simulation takes what its object spans; a real robot
-    /// must be told.
+    /// Nearest and farthest depth (−y) of the surface, m; default in a simulation: the object's.
+    /// Required for a real robot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_m: Option<[f64; 2]>,
-    /// Where the origin of `Z` stands in `W`.
+    /// Origin of `Z` in `W`, m.
     #[serde(default)]
     pub position_m: [f64; 3],
-    /// Turns of `Z` about the fixed axes x, then y, then z of `W`.
+    /// Rotation of `Z` about the fixed axes x, then y, then z of `W`, deg.
     #[serde(default)]
     pub rotation_deg: [f64; 3],
 }
@@ -67,13 +65,13 @@ impl Checked for Zone {
 }
 
 impl Zone {
-    /// An interval of x or a rectangle of (x, z) in `W`, heights measured from y = 0.
+    /// Creates an interval of x or a rectangle of (x, z) in `W`, with the datum y = 0.
     pub const fn new(x_m: [f64; 2], z_m: Option<[f64; 2]>) -> Self {
         let (position_m, rotation_deg) = ([0.0; 3], [0.0; 3]);
         Self { x_m, z_m, datum_y_m: None, depth_m: None, position_m, rotation_deg }
     }
 
-    /// The y from which heights are measured: what it says, or 0.
+    /// The datum y from which heights are measured; 0 if not given.
     pub fn datum_y_m(&self) -> f64 {
         self.datum_y_m.unwrap_or(0.0)
     }
@@ -83,7 +81,7 @@ impl Zone {
         self.sides().count()
     }
 
-    /// [smallest, largest] of each coordinate.
+    /// The bounds [smallest, largest] of each coordinate.
     pub fn sides(&self) -> impl Iterator<Item = [f64; 2]> + Clone {
         std::iter::once(self.x_m).chain(self.z_m)
     }
@@ -93,7 +91,7 @@ impl Zone {
         self.sides().map(|[low, high]| high - low).collect()
     }
 
-    /// Its widest side.
+    /// Length of the longest side.
     pub fn widest_m(&self) -> f64 {
         self.extents_m().into_iter().fold(0.0, f64::max)
     }
@@ -104,7 +102,7 @@ impl Zone {
             && self.sides().zip(place).all(|([low, high], at)| (low..=high).contains(at))
     }
 
-    /// The place at fractions 0..1 of the sides.
+    /// Returns the place at fractions 0..1 of the sides.
     pub fn at(&self, fractions: &[f64]) -> Vec<f64> {
         self.sides().zip(fractions).map(|([low, high], t)| low + (high - low) * t).collect()
     }
@@ -114,29 +112,29 @@ impl Zone {
         pose(self.position_m, self.rotation_deg)
     }
 
-    /// The place (x) or (x, z) of a point in `W`.
+    /// Returns the place (x) or (x, z) of a point in `W`.
     pub fn place(&self, p_w: &Point3<f64>) -> Vec<f64> {
         let p_z = self.x_wz().inverse_transform_point(p_w);
         [p_z.x, p_z.z].into_iter().take(self.dimension()).collect()
     }
 
-    /// How high a point of `W` is above the datum.
+    /// Height of a point of `W` above the datum.
     pub fn height_m(&self, p_w: &Point3<f64>) -> f64 {
         self.x_wz().inverse_transform_point(p_w).y - self.datum_y_m()
     }
 
-    /// The point of `W` at `place` and `height_m` above the datum.
+    /// Returns the point of `W` at `place` and `height_m` above the datum.
     pub fn point(&self, place: &[f64], height_m: f64) -> Point3<f64> {
         self.x_wz() * self.local(place, self.datum_y_m() + height_m)
     }
 
-    /// The point of `Z` at `place` and `y_m`; z = 0 in an interval.
+    /// Returns the point of `Z` at `place` and `y_m`; z = 0 for an interval.
     pub fn local(&self, place: &[f64], y_m: f64) -> Point3<f64> {
         let z = place.get(1).copied().unwrap_or(0.0);
         Point3::new(place.first().copied().unwrap_or(0.0), y_m, z)
     }
 
-    /// In which frame points of this zone are written, and how they were touched: the head of a
+    /// Describes the frame of this zone's points and the direction of touch, for the head of a
     /// file.
     pub fn frame_words(&self) -> String {
         let [x, y, z] = self.ahead_w().into_inner().into();
@@ -145,12 +143,13 @@ impl Zone {
         format!("metres in the frame W of the robot's base: z up, touched along ({x}, {y}, {z})")
     }
 
-    /// Which way the finger goes, in `W`: against the growing heights.
+    /// Direction of the finger's motion, in `W`: opposite to increasing heights.
     pub fn ahead_w(&self) -> UnitVector3<f64> {
         UnitVector3::new_unchecked(self.x_wz().rotation * -Vector3::y())
     }
 
-    /// An even grid with `per_side` places along each side, edges included, x varying fastest.
+    /// Returns a regular grid with `per_side` places along each side, edges included, x varying
+    /// fastest.
     pub fn grid(&self, per_side: usize) -> Vec<Vec<f64>> {
         let step = |i: usize| i as f64 / (per_side.max(2) - 1) as f64;
         match self.z_m {
@@ -161,7 +160,7 @@ impl Zone {
         }
     }
 
-    /// Whether `place` lies in the outer tenth: within a tenth of a side of that side's ends.
+    /// Whether `place` lies in the outer tenth: within a tenth of a side from its ends.
     pub fn is_edge(&self, place: &[f64]) -> bool {
         self.sides().zip(place).any(|([low, high], &at)| {
             let margin = 0.1 * (high - low);
@@ -169,7 +168,7 @@ impl Zone {
         })
     }
 
-    /// Distance of two places in units of the sides.
+    /// Distance between two places in units of the sides.
     pub fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let squares = self.sides().zip(a.iter().zip(b)).map(|([low, high], (a, b))| {
             let step = (a - b) / (high - low);
@@ -179,8 +178,8 @@ impl Zone {
     }
 }
 
-/// The triangles between the places of a [`grid`](Zone::grid) with `per_side` along each of two
-/// sides, as their numbers, counter-clockwise seen from where the finger comes.
+/// Returns the triangles between the places of a [`grid`](Zone::grid) with `per_side` places along
+/// each of two sides, as indices, counter-clockwise as seen by the approaching finger.
 pub fn grid_triangles(per_side: usize) -> impl Iterator<Item = [usize; 3]> {
     let cells = (1..per_side).flat_map(move |j| (1..per_side).map(move |i| j * per_side + i));
     cells.flat_map(move |here| {

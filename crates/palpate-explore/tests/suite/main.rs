@@ -1,3 +1,3 @@
-//! Tests of the explorer, in one program.
+//! Tests of palpate-explore, in one binary.
 
 mod planners;

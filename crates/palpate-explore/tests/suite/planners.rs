@@ -1,4 +1,4 @@
-//! Planners against what they promise.
+//! Tests of the planners' guarantees.
 
 use nalgebra::{Point3, Vector3};
 use palpate_explore::belief::{Belief, HeightField};
@@ -17,8 +17,8 @@ use rand::RngExt;
 const SQUARE: Zone = Zone { datum_y_m: Some(-0.6), ..Zone::new([-0.05, 0.05], Some([0.4, 0.52])) };
 const LINE: Zone = Zone::new([-2.0, 2.0], None);
 
-/// A belief after `count` touches of a bumpy surface; every `elsewhere`-th contact lies beside
-/// its target, as a finger's does on a slope.
+/// Returns a belief after `count` touches of a bumpy surface; every `elsewhere`-th contact lies
+/// beside its target, like those of a finger on a slope.
 fn belief(zone: &Zone, trial: u64, count: usize, elsewhere: usize) -> HeightField {
     let mut rng = seed::stream(7, trial, "test");
     let mut belief = HeightField::new(zone.clone(), GpSettings::default());
@@ -37,7 +37,7 @@ fn belief(zone: &Zone, trial: u64, count: usize, elsewhere: usize) -> HeightFiel
     belief
 }
 
-/// A planner that is asked for targets in a zone.
+/// A planner that plans targets in a zone.
 struct InZone(Box<dyn planner::Planner>);
 
 impl InZone {
@@ -51,8 +51,8 @@ fn make(name: &str) -> InZone {
     InZone((entry.make)(&PlanningSettings::default(), seed::stream(1, 0, name)))
 }
 
-/// The slow twin of DIRECT and L-BFGS is a dense grid. Measured: the plan is never below the grid's
-/// best; a thousandth leaves room for the rounding of other machines.
+/// Compares DIRECT and BFGS with a dense grid. Measured: the plan is never below the grid's best;
+/// the tolerance of 1e-3 allows for rounding on other machines.
 #[test]
 fn active_finds_the_largest_explorable_variance() {
     for (zone, per_side) in [(&LINE, 2001), (&SQUARE, 81)] {
@@ -125,8 +125,8 @@ fn a_belief_without_any_contact_still_plans() {
     }
 }
 
-/// The slow twin takes the candidate in and looks at every reference again. Two ways to round the
-/// same numbers: they differ by less than 1e-9 of the prior variance.
+/// Compares with a refit that includes the candidate, evaluated at every reference point. The two
+/// computations round differently: they differ by less than 1e-9 of the prior variance.
 #[test]
 fn reduction_is_what_a_refit_with_the_candidate_finds() {
     for (zone, noisy) in [(&LINE, false), (&SQUARE, true)] {
@@ -156,7 +156,8 @@ fn reduction_is_what_a_refit_with_the_candidate_finds() {
     }
 }
 
-/// The difference errs by rounding over its step of a millionth. Measured: below 1e-7 of the scale.
+/// The difference quotient has the rounding error over its step of 1e-6. Measured: below 1e-7 of
+/// the scale.
 #[test]
 fn mean_gradient_is_its_central_difference() {
     for zone in [&LINE, &SQUARE] {
@@ -184,11 +185,11 @@ fn mean_gradient_is_its_central_difference() {
     }
 }
 
-/// What a place is worth.
+/// An acquisition function.
 type Formula<'a> = Box<dyn Fn(&[f64], &mut Scratch) -> f64 + 'a>;
 
-/// A planner's plan against a dense grid of its formula, written out again, as a share of the way
-/// from the grid's worst to its best. Measured: at least 0.9990.
+/// Compares a planner's plan with a dense grid of a second implementation of its acquisition
+/// function, on a scale from the grid's worst to its best. Measured: at least 0.9990.
 fn finds(name: &str, formula: impl for<'a> Fn(&'a HeightField, &[Vec<f64>]) -> Formula<'a>) {
     for (zone, per_side) in [(&LINE, 1001), (&SQUARE, 61)] {
         for trial in 0..8 {
@@ -250,8 +251,8 @@ fn integrated_variance_finds_the_largest_fall() {
     });
 }
 
-/// A tour is what `active` would ask for with the same fit, in another order: as many different
-/// places, the one of the largest deviation among them, on a shorter way.
+/// A tour consists of the targets of `active` with the same fit, in another order: the same number
+/// of different places, including the one of the largest deviation, on a shorter path.
 #[test]
 fn travel_tours_the_places_of_active_on_a_shorter_way() {
     let tour = PlanningSettings::default().travel.tour as usize;
@@ -279,7 +280,7 @@ fn travel_tours_the_places_of_active_on_a_shorter_way() {
     }
 }
 
-/// Counted in one dimension, and without repeats in two.
+/// Checks the order in one dimension, and that nothing repeats in two.
 #[test]
 fn grid_goes_from_coarse_to_fine() {
     let belief = HeightField::new(LINE, GpSettings::default());

@@ -1,7 +1,7 @@
-//! The bytes behind a glTF document: buffers, buffer views, accessors.
+//! Binary data of a glTF document: buffers, buffer views, accessors.
 //!
-//! Every offset, stride and count is checked against the bytes that are really there before
-//! anything is read or allocated.
+//! Every offset, stride and count is checked against the available bytes before anything is read or
+//! allocated.
 
 use std::io;
 use std::path::{Path, PathBuf, absolute};
@@ -16,13 +16,13 @@ use super::source::{BYTES_MAX, Source};
 use palpate_input::error::Invalid;
 use palpate_input::files;
 
-/// A glTF document and the bytes of its buffers.
+/// A glTF document with the bytes of its buffers.
 pub(super) struct Document {
     pub root: Root,
     buffers: Vec<Vec<u8>>,
 }
 
-/// Elements of an accessor as they lie in memory.
+/// Elements of an accessor in memory.
 struct Elements<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -38,7 +38,7 @@ impl<'a> Elements<'a> {
 }
 
 impl Document {
-    /// Fetches the buffers of `root`: from the binary chunk, from data URIs, or from files.
+    /// Loads the buffers of `root`: from the binary chunk, from data URIs, or from files.
     pub fn load(source: &Source, root: Root, mut chunk: Option<Vec<u8>>) -> Result<Self, Invalid> {
         let mut buffers = Vec::with_capacity(root.buffers.len());
         let mut left = BYTES_MAX;
@@ -56,14 +56,14 @@ impl Document {
             });
             let bytes =
                 checked.map_err(|reason| Invalid::new(format!("buffer {number}: {reason}")))?;
-            // Many buffers may name one large file.
+            // Several buffers may refer to one large file.
             left = left.saturating_sub(bytes.len() as u64);
             buffers.push(bytes);
         }
         Ok(Self { root, buffers })
     }
 
-    /// Vertex positions.
+    /// Returns vertex positions.
     pub fn positions(&self, index: Index<Accessor>) -> Result<Vec<[f32; 3]>, Invalid> {
         let is_vec3 = |component, kind| component == ComponentType::F32 && kind == Type::Vec3;
         let values = self.values(index, "float VEC3", is_vec3)?;
@@ -72,7 +72,7 @@ impl Document {
         Ok(floats.as_chunks().0.to_vec())
     }
 
-    /// Vertex indices.
+    /// Returns vertex indices.
     pub fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, Invalid> {
         let is_index = |component, kind| unsigned_size(component).is_some() && kind == Type::Scalar;
         let values = self.values(index, "unsigned SCALAR", is_index)?;
@@ -88,7 +88,7 @@ impl Document {
         }
     }
 
-    /// All elements of an accessor, tightly packed, with sparse values in place.
+    /// Returns all elements of an accessor, tightly packed, with sparse values in place.
     fn values(
         &self,
         index: Index<Accessor>,
@@ -114,8 +114,8 @@ impl Document {
                     .copied()
                     .collect()
             }
-            // Zeros, to be replaced by sparse values: no bytes stand behind the count, so it may
-            // not exceed those of the whole file.
+            // Zeros, to be replaced by sparse values: the count is not backed by data, so it may
+            // not exceed the bytes of the whole file.
             None if count > self.buffers.iter().map(Vec::len).sum::<usize>() as u64 => {
                 return Err(Invalid::new(format!(
                     "accessor {number} declares {count} elements and no data"
@@ -156,7 +156,7 @@ impl Document {
         Ok(())
     }
 
-    /// `count` elements of `size` bytes from `offset` within a buffer view.
+    /// Returns `count` elements of `size` bytes from `offset` within a buffer view.
     fn elements(
         &self,
         accessor: usize,
@@ -196,7 +196,7 @@ impl Document {
     }
 }
 
-/// The object a document's index refers to.
+/// Returns the object at a document's index.
 pub(super) fn find<'a, T, K>(
     objects: &'a [T],
     kind: &str,
@@ -217,7 +217,7 @@ fn unsigned_size(component: ComponentType) -> Option<usize> {
     }
 }
 
-/// A little-endian number of one to four bytes.
+/// Decodes a little-endian number of one to four bytes.
 fn unsigned(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |number, &byte| (number << 8) | u32::from(byte))
 }
@@ -232,25 +232,25 @@ fn fetch(source: &Source, uri: &str, most: u64) -> Result<Vec<u8>, Invalid> {
     let name = percent_decoded(uri).filter(|name| !name.contains("://")).ok_or_else(unknown)?;
     let path = source.path.with_file_name("").join(&name);
     let unreadable = |error| Invalid::new(format!("{} cannot be read: {error}", path.display()));
-    // Where it is in truth: `..` and links may lead anywhere.
+    // The actual location: `..` and links may lead anywhere.
     let real = path.canonicalize().map_err(unreadable)?;
     let folder = folder(source.path).map_err(unreadable)?;
     if !source.outside_buffers && !real.starts_with(folder) {
         return Err(Invalid::new(format!(
-            "{} lies outside the mesh's folder; if that is meant, allow it by \
-             object.outside_buffers = true in a scene, or by --outside-buffers",
+            "{} lies outside the mesh's folder; to allow it, set \
+             object.outside_buffers = true in the scene, or use --outside-buffers",
             real.display()
         )));
     }
     files::bytes(&real, most).map_err(unreadable)
 }
 
-/// The folder that a file is named in, without links.
+/// Returns the folder of a file, with links resolved.
 fn folder(file: &Path) -> io::Result<PathBuf> {
     absolute(file)?.with_file_name("").canonicalize()
 }
 
-/// `%20` and its like replaced by the bytes they stand for; `None` if that is not UTF-8.
+/// Decodes percent escapes such as `%20`; returns `None` if the result is not UTF-8.
 fn percent_decoded(uri: &str) -> Option<String> {
     let mut parts = uri.split('%');
     let mut bytes = parts.next()?.as_bytes().to_vec();

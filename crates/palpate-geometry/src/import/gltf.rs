@@ -1,9 +1,9 @@
-//! glTF 2.0, as `.gltf` or `.glb`: the triangles of the default scene, or of all root nodes if
-//! there is none. The format's up (+y) becomes z and its front (+z) becomes y, so that a model
-//! stands upright and faces the finger. Skins, morph targets and animations are not applied.
+//! glTF 2.0 import, `.gltf` or `.glb`: the triangles of the default scene, or of all root nodes if
+//! there is none. The format's up (+y) becomes z and its front (+z) becomes y, so that a model is
+//! upright and faces the finger. Skins, morph targets and animations are not applied.
 //!
 //! Only the JSON model of the `gltf` crate is used: its readers and its validation panic on some
-//! broken documents.
+//! invalid documents.
 
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::scene::Node;
@@ -18,11 +18,11 @@ use palpate_input::error::Invalid;
 use palpate_input::files::unmarked;
 use palpate_input::words;
 
-/// Extensions with these prefixes leave the geometry alone.
+/// Prefixes of extensions that do not affect the geometry.
 const HARMLESS_EXTENSIONS: [&str; 4] =
     ["KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_"];
 
-/// From glTF's frame to ours: (x, y, z) becomes (-x, z, y).
+/// Transform from glTF's frame to this crate's: (x, y, z) becomes (-x, z, y).
 #[rustfmt::skip]
 const UPRIGHT: Matrix4<f64> = Matrix4::new(
     -1.0, 0.0, 0.0, 0.0,
@@ -53,7 +53,7 @@ fn parse(bytes: &[u8]) -> Result<(Root, Option<Vec<u8>>), Invalid> {
     if !bytes.starts_with(b"glTF") {
         return Ok((root(unmarked(bytes))?, None));
     }
-    // The crate subtracts the header's size from the stated length without looking.
+    // The crate subtracts the header's size from the stated length without a check.
     if let Some(&[a, b, c, d]) = bytes.get(8..12).and_then(<[u8]>::first_chunk) {
         let length = u32::from_le_bytes([a, b, c, d]);
         if length < 12 {
@@ -77,8 +77,8 @@ fn root(json: &[u8]) -> Result<Root, Invalid> {
 /// A node with its pose.
 type PlacedNode = (Index<Node>, Matrix4<f64>);
 
-/// The nodes of the scene, parents before children, each with its pose in our upright frame S: the
-/// point p of a node N is `x_sn` p in S.
+/// Returns the nodes of the scene, parents before children, each with its pose in the upright frame
+/// S: the point p of a node N is `x_sn` p in S.
 fn placed_nodes(root: &Root) -> Result<Vec<PlacedNode>, Invalid> {
     let roots = match root.scene {
         Some(scene) => find(&root.scenes, "scene", scene)?.nodes.clone(),
@@ -104,7 +104,7 @@ fn not_a_tree(node: usize) -> Invalid {
     Invalid::new(format!("node {node} is reached twice; nodes must form a tree"))
 }
 
-/// Nodes without a parent. If every node has one, they form a cycle.
+/// Returns the nodes without a parent. If every node has one, they form a cycle.
 fn orphans(root: &Root) -> Result<Vec<Index<Node>>, Invalid> {
     let mut is_child = vec![false; root.nodes.len()];
     for &child in root.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
@@ -122,7 +122,7 @@ fn orphans(root: &Root) -> Result<Vec<Index<Node>>, Invalid> {
     Ok(orphans)
 }
 
-/// The pose of a node in its parent.
+/// Returns the pose of a node in its parent.
 fn local_pose(index: Index<Node>, node: &Node) -> Result<Matrix4<f64>, Invalid> {
     if let Some(columns) = node.matrix {
         let matrix = Matrix4::from_column_slice(&columns.map(f64::from));
@@ -177,7 +177,7 @@ fn add_mesh(
     Ok(())
 }
 
-/// The vertices of a primitive in drawing order.
+/// Returns the vertices of a primitive in drawing order.
 fn corners(
     document: &Document,
     primitive: &Primitive,
@@ -189,7 +189,7 @@ fn corners(
     }
 }
 
-/// Triangles of a list, strip or fan. Corners that do not fill a triangle are left out.
+/// Returns the triangles of a list, strip or fan. Corners that do not fill a triangle are dropped.
 fn assemble(mode: Mode, corners: &[u32]) -> Box<dyn Iterator<Item = [u32; 3]> + '_> {
     match mode {
         Mode::TriangleStrip => {

@@ -1,4 +1,4 @@
-//! Mesh files. To add a format: write its file here and give it a line in `FORMATS`.
+//! Import of mesh files. To add a format, write its file here and add a line to `FORMATS`.
 
 use std::io;
 use std::path::Path;
@@ -19,7 +19,7 @@ mod stl;
 
 use source::{BYTES_MAX, Source};
 
-/// A reader of a format.
+/// Reader of a format.
 type Read = fn(&Source) -> Result<RawMesh, Invalid>;
 
 /// Extensions, in lower case, and their readers.
@@ -34,8 +34,8 @@ const FORMATS: &[(&str, Read)] = &[
 /// Reads a mesh file, scales it by `metres_per_unit` and repairs it. Buffers that a glTF document
 /// refers to must lie in its folder or below.
 ///
-/// The extension decides the format: OBJ, glTF (`.gltf` or `.glb`), STL, PLY. A glTF file is in
-/// metres by its specification; the scale multiplies all the same.
+/// The extension determines the format: OBJ, glTF (`.gltf` or `.glb`), STL, PLY. A glTF file is in
+/// metres by its specification; the scale is applied nevertheless.
 ///
 /// # Errors
 /// If the file cannot be read or repaired; the place is the file.
@@ -43,10 +43,11 @@ pub fn import(path: &Path, metres_per_unit: f64) -> Result<(Mesh, MeshReport), I
     import_with(path, metres_per_unit, false)
 }
 
-/// As [`import`], with buffers of a glTF document anywhere if `outside_buffers`.
+/// Runs [`import`], with buffers of a glTF document outside its folder allowed if
+/// `outside_buffers`.
 ///
 /// # Errors
-/// As [`import`].
+/// The errors of [`import`].
 pub fn import_with(
     path: &Path,
     metres_per_unit: f64,

@@ -1,5 +1,5 @@
-//! Wavefront OBJ. Polygons become triangle fans, which is exact if they are flat and convex; all
-//! objects and groups become one mesh; materials, normals, texture coordinates, colours, points
+//! Wavefront OBJ import. Polygons become triangle fans, which is exact if they are flat and convex;
+//! all objects and groups become one mesh; materials, normals, texture coordinates, colours, points
 //! and lines are ignored.
 
 use nalgebra::Point3;
@@ -31,9 +31,9 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
     Ok(raw)
 }
 
-/// Keeps objects, positions and the position indices of faces, and checks them where their lines
-/// are still known. tobj would overflow on the other indices of a face if they are out of range,
-/// and names no line in its errors.
+/// Keeps objects, positions and the position indices of faces, and checks them while their line
+/// numbers are known. tobj would overflow on the other indices of a face if they are out of range,
+/// and its errors contain no line number.
 fn geometry_only(text: &str) -> Result<String, Invalid> {
     let is_vertex = |line: &&str| line.split_whitespace().next() == Some("v");
     let vertices = text.lines().filter(is_vertex).count();

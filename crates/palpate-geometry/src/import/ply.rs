@@ -1,5 +1,5 @@
-//! PLY, as text or binary of either byte order. Polygons become triangle fans, as those of OBJ;
-//! what a file holds beside positions and faces is ignored.
+//! PLY import, text or binary of either byte order. Polygons become triangle fans, as for OBJ;
+//! everything except positions and faces is ignored.
 
 use nalgebra::Point3;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
@@ -11,9 +11,9 @@ use crate::raw::RawMesh;
 use palpate_input::error::Invalid;
 use palpate_input::files::unmarked;
 
-/// The properties of a position.
+/// Properties of a position.
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// What programs call the list of a face's vertices.
+/// Usual names of the list of a face's vertices.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// Reads a PLY file.
@@ -21,7 +21,7 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
     let (vertices, faces) = elements(source.bytes)?;
     if faces.is_empty() && !vertices.is_empty() {
         return Err(Invalid::new(format!(
-            "holds {} points and no faces, as a scan does; to be touched it needs a surface: a mesh",
+            "holds {} points and no faces (a point cloud); a mesh with faces is required",
             vertices.len()
         )));
     }
@@ -34,10 +34,10 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
     Ok(raw)
 }
 
-/// The vertices of a PLY file, in metres.
+/// Returns the vertices of a PLY file, in metres.
 ///
 /// # Errors
-/// If it is broken, or a coordinate is not finite.
+/// If it is invalid, or a coordinate is not finite.
 pub fn points(bytes: &[u8]) -> Result<Vec<Point3<f64>>, Invalid> {
     let (vertices, _) = elements(bytes)?;
     let is_lost = |vertex: &Vertex| !vertex.0.iter().all(|coordinate| coordinate.is_finite());
@@ -55,7 +55,7 @@ fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), Invalid> {
     let header = header.map_err(|error| fault(&error, bytes, &Encoding::Ascii))?;
     let (mut vertices, mut faces) = (Vec::<Vertex>::new(), Vec::<Face>::new());
     for (name, element) in &header.elements {
-        // Each takes a byte at least, unless it has no properties.
+        // Each element takes at least one byte, unless it has no properties.
         if element.count > bytes.len() {
             let count = element.count;
             return Err(Invalid::new(format!(
@@ -88,7 +88,7 @@ fn elements(bytes: &[u8]) -> Result<(Vec<Vertex>, Vec<Face>), Invalid> {
     Ok((vertices, faces))
 }
 
-/// Insists that an element has the properties it needs.
+/// Checks that an element has the required properties.
 fn require(element: &ElementDef, has: bool, needed: &str) -> Result<(), Invalid> {
     match has {
         true => Ok(()),
@@ -99,7 +99,7 @@ fn require(element: &ElementDef, has: bool, needed: &str) -> Result<(), Invalid>
     }
 }
 
-/// The fault with its line, if that lies in text.
+/// Returns the error with its line number, if it is in text.
 fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> Invalid {
     match error.line().filter(|_| *encoding == Encoding::Ascii) {
         Some(line) => {
@@ -108,7 +108,7 @@ fn fault(error: &ParseError, bytes: &[u8], encoding: &Encoding) -> Invalid {
             bad_line(line, "PLY as its header declares it", &found)
         }
         None => {
-            // Behind "Line 7: ": what is no text has no lines.
+            // Removes the prefix "Line 7: ": binary data has no lines.
             let words = error.to_string();
             let message = words.split_once(": ").filter(|_| error.line().is_some());
             let message = message.map_or(words.as_str(), |(_, message)| message);
@@ -142,7 +142,7 @@ impl PropertyAccess for Vertex {
     }
 }
 
-/// The vertices around a polygon.
+/// Vertex indices of a polygon.
 struct Face(Vec<u32>);
 
 impl PropertyAccess for Face {
@@ -160,7 +160,7 @@ impl PropertyAccess for Face {
     }
 }
 
-/// What is passed over.
+/// An element that is skipped.
 struct Other;
 
 impl PropertyAccess for Other {

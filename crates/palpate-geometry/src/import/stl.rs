@@ -1,4 +1,4 @@
-//! STL, binary or as text. Normals, colours and names are ignored; all solids become one mesh.
+//! STL import, binary or text. Normals, colours and names are ignored; all solids become one mesh.
 
 use std::io::{self, Cursor, Read, Seek, SeekFrom};
 
@@ -10,12 +10,12 @@ use crate::raw::RawMesh;
 use palpate_input::error::Invalid;
 use palpate_input::files::unmarked;
 
-/// Bytes before the triangles of a binary file: a text, then how many there are.
+/// Bytes before the triangles of a binary file: a text, then their number.
 const HEADER: usize = 84;
-/// Bytes of a binary triangle.
+/// Bytes per binary triangle.
 const TRIANGLE: u64 = 50;
 
-/// What a text is made of.
+/// Expected syntax of a text file.
 const STATEMENTS: &str = "solid, then facets (facet normal, outer loop, three times vertex and \
                           three finite numbers, endloop, endfacet), then endsolid";
 
@@ -23,7 +23,7 @@ const STATEMENTS: &str = "solid, then facets (facet normal, outer loop, three ti
 pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
     let mut raw = RawMesh::default();
     if is_binary(source.bytes)? {
-        // Its own text may begin as if all of it were text.
+        // The header of a binary file may begin with "solid" like a text file.
         let bytes = [&[0; HEADER - 4], &source.bytes[HEADER - 4..]].concat();
         let triangles = create_stl_reader(&mut Cursor::new(bytes)).and_then(Iterator::collect);
         add(triangles.map_err(|error| Invalid::new(format!("STL: {error}")))?, &mut raw)?;
@@ -48,8 +48,8 @@ pub(super) fn read(source: &Source) -> Result<RawMesh, Invalid> {
     Ok(raw)
 }
 
-/// Whether a file is binary. One as long as its number of triangles asks for is; another is told
-/// by how a text begins, and if it is no text, it is cut short or padded.
+/// Whether a file is binary. A file whose length matches its number of triangles is; others are
+/// distinguished by the first word of a text; if it is not a text, it is truncated or padded.
 fn is_binary(bytes: &[u8]) -> Result<bool, Invalid> {
     let is_text = unmarked(bytes).trim_ascii_start().to_ascii_lowercase().starts_with(b"solid");
     let count = bytes.get(HEADER - 4..HEADER).and_then(<[u8]>::first_chunk);
@@ -61,14 +61,14 @@ fn is_binary(bytes: &[u8]) -> Result<bool, Invalid> {
         true => Ok(true),
         false if is_text => Ok(false),
         false => Err(Invalid::new(format!(
-            "STL: {actual} bytes, which is no text that begins with \"solid\", and binary with \
-             {count} triangles takes {needed}"
+            "STL: not a text that begins with \"solid\", and a binary file of {count} triangles has \
+             {needed} bytes, not {actual}"
         ))),
     }
 }
 
-/// The text line by line, without names and normals, which may be anything: `solid` bare and
-/// `facet normal nan nan nan` are common.
+/// Returns the text line by line, without names and normals, which may be anything: a bare `solid`
+/// and `facet normal nan nan nan` are common.
 fn plain(text: &str) -> String {
     let line = |line: &str| {
         let line = line.to_lowercase();
@@ -82,12 +82,12 @@ fn plain(text: &str) -> String {
     text.lines().map(line).collect()
 }
 
-/// The text in pieces that end with `endsolid`, without what is blank behind the last.
+/// Splits the text into pieces that end with `endsolid`, without trailing blanks.
 fn solids(text: &str) -> impl Iterator<Item = &str> {
     text.split_inclusive("endsolid\n").filter(|solid| !solid.trim().is_empty())
 }
 
-/// A text that is read a line at a time, so that it is known where a reader stopped.
+/// A text that is read line by line, so that the position of an error is known.
 struct Lines<'a> {
     text: &'a str,
     at: usize,

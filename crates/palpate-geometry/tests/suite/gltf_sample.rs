@@ -1,4 +1,4 @@
-//! A tetrahedron as glTF, with its bytes in itself and as a binary container.
+//! Sample glTF of a tetrahedron, with embedded data and as a binary container.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -35,7 +35,7 @@ pub fn tetrahedron() -> (Value, Vec<u8>) {
     (document, bytes)
 }
 
-/// The same as a binary container.
+/// Returns the document as a binary container.
 pub fn glb(document: &Value, binary: &[u8]) -> Vec<u8> {
     let mut text = document.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -57,7 +57,7 @@ pub fn glb(document: &Value, binary: &[u8]) -> Vec<u8> {
     .concat()
 }
 
-/// A document with its bytes in itself.
+/// Returns a document with embedded data.
 pub fn with_data_uri(mut document: Value, binary: &[u8]) -> Vec<u8> {
     let data = STANDARD.encode(binary);
     document["buffers"][0]["uri"] = json!(format!("data:application/octet-stream;base64,{data}"));

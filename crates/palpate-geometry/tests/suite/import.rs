@@ -1,4 +1,4 @@
-//! Mesh files: every accepted variation, and a table of broken ones that must be refused.
+//! Tests of mesh import: every accepted variant, and a table of invalid files that must be refused.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 type Outcome = Result<(Mesh, MeshReport), Invalid>;
 
-/// What the import of a file returns; an error names the file.
+/// Imports a file; checks that an error names the file.
 fn import(path: &Path, metres_per_unit: f64) -> Outcome {
     let outcome = palpate_geometry::import::import(path, metres_per_unit);
     if let Err(error) = &outcome {
@@ -49,7 +49,7 @@ fn is_tetrahedron(outcome: Outcome, count: usize) -> MeshReport {
     report
 }
 
-/// The tetrahedron after a change to its document and its bytes.
+/// Imports the tetrahedron after a change of its document and its bytes.
 fn changed(change: impl Fn(&mut Value, &mut Vec<u8>)) -> Outcome {
     let (mut document, mut bytes) = tetrahedron();
     change(&mut document, &mut bytes);
@@ -138,7 +138,7 @@ fn gltf_interleaved_positions() {
 fn gltf_sparse_positions() {
     for base in [true, false] {
         let outcome = changed(|document, bytes| {
-            // Corner 3 moves to height 2; without a base, the zeros get corners 1 to 3.
+            // Corner 3 moves to height 2; without a base, the zeros are replaced by corners 1 to 3.
             let places: &[u8] = if base { &[3] } else { &[1, 2, 3] };
             let news = [CORNERS[1], CORNERS[2], [0.0, 0.0, 2.0]];
             let start = bytes.len();
@@ -177,7 +177,7 @@ fn gltf_nodes_nest_and_share_meshes() {
     });
     let (mesh, report) = outcome.unwrap();
     assert_eq!(report.components, 3);
-    // Scaled by 2 along x, turned so that x points along y, moved by 5 and then by 10.
+    // Scaled by 2 along x, rotated so that x points along y, moved by 5 and then by 10.
     assert!((mesh.volume_m3() - 4.0 / 6.0).abs() < 1e-6);
     // The format's x becomes -x, its y (up) z, its z (front) y.
     let (low, high) = mesh.bounds();
@@ -287,10 +287,10 @@ fn repair_knows_open_inverted_and_one_sided() {
 fn size_hints_at_the_unit() {
     let (_folder, path) = write("mesh.obj", TETRA_OBJ.as_bytes());
     let shown = |scale| import(&path, scale).unwrap().1.to_string();
-    assert!(shown(80.0).contains("for a file in millimetres say unit = \"mm\""));
+    assert!(shown(80.0).contains("for a file in millimetres, set unit = \"mm\""));
     assert!(shown(1e-4).contains("smaller than 1 mm"));
     let error = import(&path, 1e5).unwrap_err();
-    assert!(error.to_string().contains("say unit = \"mm\""), "{error}");
+    assert!(error.to_string().contains("set unit = \"mm\""), "{error}");
 }
 
 #[test]
@@ -324,7 +324,7 @@ fn broken_obj_files_are_refused() {
         ("not a number", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "is not finite"),
         ("infinite", "v 0 0 inf\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "is not finite"),
         ("beyond f64", "v 0 0 1e999\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "is not finite"),
-        ("ten kilometres off", "v 0 0 10001\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "say unit = \"mm\""),
+        ("ten kilometres off", "v 0 0 10001\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "set unit = \"mm\""),
         ("beyond any unit", "v 0 0 1e30\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "more than 10000 m"),
         ("one vertex thrice", &format!("{v}f 1 1 1\n"), "all 1 triangles are degenerate"),
         ("one vertex twice", &format!("{v}f 1 2 2\n"), "all 1 triangles"),
@@ -340,7 +340,7 @@ fn broken_obj_files_are_refused() {
     for (case, text, says) in cases {
         refused(case, import_bytes("mesh.obj", text.as_bytes()), says);
     }
-    // tobj overflows on these if it gets to see them.
+    // tobj overflows on these if it receives them.
     for word in ["1/-9/-9", "1/9/9", "1/0/0", "1/2/3/4", "1/x"] {
         let _ = import_bytes("mesh.obj", format!("{v}vt 0 0\nvn 0 0 1\nf {word} 2 3\n").as_bytes());
     }
@@ -400,7 +400,7 @@ fn broken_gltf_documents_are_refused() {
             "fewer positions than indices",
             "/accessors/0/count",
             json!(3),
-            "names vertex 3, but there are 3",
+            "refers to vertex 3, but there are 3",
         ),
         (
             "indices without data",
@@ -572,7 +572,8 @@ fn broken_gltf_documents_are_refused() {
     }
 }
 
-/// A sparse table that reads its indices from byte `offset` of the positions: byte 14 is 128.
+/// Returns a sparse table that reads its indices from byte `offset` of the positions: byte 14 is
+/// 128.
 fn sparse(count: u64, component: u32, offset: u32) -> Value {
     json!({
         "count": count,

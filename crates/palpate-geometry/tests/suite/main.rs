@@ -1,4 +1,4 @@
-//! Tests of mesh files, in one program.
+//! Tests of palpate-geometry, in one binary.
 
 mod gltf_sample;
 mod import;

@@ -1,57 +1,57 @@
-//! Symmetric matrices with a band, factorised once and solved often.
+//! Symmetric banded matrices, factorised once and solved often.
 //!
-//! The factor is kept in single precision: half the memory is what a solution waits for. It is
-//! meant for corrections whose residual is known in double precision. Rows are solved in blocks
-//! whose triangle is inverted beforehand, so that only blocks wait for each other.
+//! The factor is stored in single precision, since a solution is limited by memory bandwidth. It is
+//! meant for corrections whose residual is computed in double precision. Rows are solved in blocks
+//! with precomputed inverse triangles, so that only blocks depend on each other.
 
 use super::simd::{dot, widest_fn};
 
-/// Rows of a block: single-precision numbers in a vector of 256 bits.
+/// Number of rows per block: single-precision numbers in a vector of 256 bits.
 const LANES: usize = 8;
 
-/// A pivot below this part of its diagonal is taken for it: so singular a matrix has no factor in
-/// single precision (chosen).
+/// Smallest pivot as a fraction of its diagonal; smaller ones are replaced by it, since a nearly
+/// singular matrix has no factor in single precision; a heuristic.
 const LEAST_PIVOT: f64 = 1e-9;
 
-/// The lower half of a symmetric matrix, row by row, the diagonal last.
+/// Lower half of a symmetric banded matrix, row by row, the diagonal last.
 #[derive(Clone, Debug)]
 pub struct Banded {
     rows: Vec<f64>,
     width: usize,
 }
 
-/// L and Lᵀ of A = L Lᵀ.
+/// Factors L and Lᵀ of A = L Lᵀ.
 #[derive(Clone, Debug)]
 pub struct Factor {
     lower: Triangle,
     upper: Triangle,
 }
 
-/// A triangular matrix by blocks of rows: `width` columns beside the block, then the inverse of its
+/// Triangular matrix by blocks of rows: `width` columns beside the block, then the inverse of its
 /// own triangle, both by columns.
 #[derive(Clone, Debug)]
 struct Triangle {
     columns: Vec<[f32; LANES]>,
     width: usize,
-    /// Whether known columns come after the block instead of before.
+    /// Whether the known columns come after the block instead of before.
     upper: bool,
 }
 
 impl Banded {
-    /// Zero: `size` rows with `width` entries left of the diagonal.
+    /// Creates a zero matrix with `size` rows and `width` entries left of the diagonal.
     pub fn zeros(size: usize, width: usize) -> Self {
         Self { rows: vec![0.0; size * (width + 1)], width }
     }
 
-    /// Adds to the entry in row `i` and column `j`; the upper half is ignored, as is what lies
-    /// outside the band.
+    /// Adds to the entry in row `i` and column `j`; the upper half, and entries outside the band,
+    /// are ignored.
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
         if j <= i && i - j <= self.width {
             self.rows[i * (self.width + 1) + self.width + j - i] += value;
         }
     }
 
-    /// Cholesky's factor, by rows.
+    /// Returns the Cholesky factor, by rows.
     pub fn factor(mut self) -> Factor {
         let (width, stride) = (self.width, self.width + 1);
         for i in 0..self.rows.len() / stride {
@@ -87,20 +87,21 @@ impl Factor {
         solve(self, x);
     }
 
-    /// Bytes held.
+    /// Returns the memory size in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(self.lower.columns.as_slice()) + size_of_val(self.upper.columns.as_slice())
     }
 }
 
 impl Triangle {
-    /// Of the entries in row i and column j, which are asked for inside the triangle only.
+    /// Creates a triangle from the entries in row i and column j, which are read inside the
+    /// triangle only.
     fn new(size: usize, width: usize, upper: bool, entry: impl Fn(usize, usize) -> f64) -> Self {
         let mut columns = Vec::new();
         for first in (0..size).step_by(LANES) {
             let rows = first..(first + LANES).min(size);
             for column in 0..width {
-                // Places before the first column or after the last hold nothing.
+                // Places before the first column or after the last are zero.
                 let j = if upper {
                     first + LANES + column
                 } else {
@@ -113,7 +114,7 @@ impl Triangle {
                 };
                 columns.push(std::array::from_fn(of));
             }
-            // Row by row from where the triangle has one entry.
+            // Row by row from the first row with an entry.
             let mut inverse = [[0.0; LANES]; LANES];
             for k in 0..LANES {
                 let order = |n: usize| if upper { LANES - 1 - n } else { n };

@@ -1,54 +1,54 @@
-//! A climb to the top of a smooth hill in a box, one evaluation at a time.
+//! Local maximisation of a smooth function in a box by BFGS, one evaluation at a time.
 //!
-//! Quasi-Newton with a bound on the step: in so few coordinates the whole matrix of curvatures is
-//! kept (BFGS, Nocedal & Wright 2006, chapters 6 and 18.3). The climb says where it wants to know
-//! the value and the gradient, so that several climbs can ask together; it says what it may still
-//! win, so that it stops in units of the value, and another may be given up for it.
+//! Quasi-Newton method with a trust region: in so few coordinates the full Hessian is stored (BFGS,
+//! Nocedal & Wright 2006, chapters 6 and 18.3). The climb requests evaluations of value and
+//! gradient, so that several climbs can share a batch. It also predicts its remaining gain, so that
+//! it stops in units of the value, and can be cancelled in favour of another.
 
 use super::optimize::{Bounds, Optimum, Stop};
 
-/// How a climb goes.
+/// Options of a BFGS climb.
 #[derive(Clone, Copy, Debug)]
 pub struct Manner {
-    /// Length of the first step while nothing is known of the curvature, in units of the box's
-    /// sides.
+    /// Length of the first step while the curvature is unknown, in units of the box's sides.
     pub first_step: f64,
-    /// It has arrived where less than this is to be won...
+    /// Absolute predicted gain below which it has converged.
     pub gain: f64,
-    /// ... or less than this share of the value.
+    /// Predicted gain, as a fraction of the value, below which it has converged.
     pub relative_gain: f64,
-    /// Evaluations allowed.
+    /// Largest number of evaluations.
     pub budget: u32,
 }
 
-/// A step must win this share of what the slope promises (Nocedal & Wright 2006, section 3.1).
+/// Smallest gain of a step, as a fraction of that predicted by the gradient (Nocedal & Wright 2006,
+/// section 3.1).
 const ARMIJO: f64 = 1e-4;
-/// Steps of less than this share of the box's sides are rounding; chosen.
+/// Steps shorter than this fraction of the box's sides are rounding; a heuristic.
 const STEP_MIN: f64 = 1e-9;
-/// Curvature presumed of an axis, in units of what is not worth a step, over its whole side; chosen
-/// so low that no climb stops for it.
+/// Initial curvature of an axis, in units of the negligible gain, over its whole side; a heuristic:
+/// so low that no climb stops because of it.
 const PRESUMED: f64 = 1e4;
-/// The curvature along a step is taken for at least this share of what was believed of it (Powell's
-/// damping, Nocedal & Wright 2006, procedure 18.2).
+/// Smallest curvature along a step, as a fraction of the previous estimate (Powell's damping,
+/// Nocedal & Wright 2006, procedure 18.2).
 const DAMPING: f64 = 0.2;
 
-/// One climb.
+/// A BFGS climb.
 #[derive(Clone, Debug)]
 pub struct Climb<'a> {
     bounds: Bounds<'a>,
     manner: Manner,
-    /// The highest place so far.
+    /// Highest place so far.
     top: Optimum,
-    /// The same in units of the box's sides, and the gradient there.
+    /// Highest place in units of the box's sides, with the gradient there.
     here: Vec<f64>,
     gradient: Vec<f64>,
-    /// Minus the second derivatives, row by row, as far as they are known.
+    /// Estimated negative Hessian, row by row.
     curvature: Vec<f64>,
     is_measured: bool,
-    /// Longest step allowed.
+    /// Trust-region radius: longest allowed step.
     reach: f64,
     step: Vec<f64>,
-    /// What the step should win, and what it would without a bound on it.
+    /// Predicted gain of the step, and of the step without the trust region.
     promised: f64,
     left: f64,
     asked: Vec<f64>,
@@ -56,7 +56,8 @@ pub struct Climb<'a> {
 }
 
 impl<'a> Climb<'a> {
-    /// From `start`, with the curvature that a climb in the same box ended with, if there was one.
+    /// Starts at `start`, with the final curvature of an earlier climb in the same box, if there
+    /// was one.
     pub fn new(
         bounds: Bounds<'a>,
         start: &[f64],
@@ -95,13 +96,13 @@ impl<'a> Climb<'a> {
         climb
     }
 
-    /// Where it wants to know value and gradient; none once it has ended.
+    /// Returns the place at which value and gradient are needed; `None` after the end.
     pub fn asked(&self) -> Option<&[f64]> {
         (!self.is_done).then_some(&self.asked)
     }
 
-    /// Takes in what it [`asked`](Self::asked) for. A value that is not finite is a place where
-    /// nobody can stand.
+    /// Passes the value and gradient at the [`asked`](Self::asked) place. A value that is not
+    /// finite marks an infeasible place.
     pub fn tell(&mut self, value: f64, gradient: &[f64]) {
         self.top.evaluations += 1;
         let is_finite = value.is_finite() && gradient.iter().all(|slope| slope.is_finite());
@@ -119,22 +120,23 @@ impl<'a> Climb<'a> {
         self.go_on();
     }
 
-    /// The most that it may still reach, if what is left is no more than `times` what it believes.
+    /// Returns an upper bound of the final value, if the remaining gain is at most `times` the
+    /// predicted one.
     pub fn hope(&self, times: f64) -> f64 {
         self.top.value + times * self.left
     }
 
-    /// Whether the curvature was seen, and not only presumed.
+    /// Whether the curvature was estimated from steps, and not only initialised.
     pub fn is_measured(&self) -> bool {
         self.is_measured
     }
 
-    /// The highest place so far.
+    /// Returns the highest place so far.
     pub fn top(&self) -> &Optimum {
         &self.top
     }
 
-    /// Where it ended, and the curvature there.
+    /// Returns the final optimum, and the curvature there.
     pub fn finish(self) -> (Optimum, Vec<f64>) {
         (self.top, self.curvature)
     }
@@ -148,7 +150,7 @@ impl<'a> Climb<'a> {
         self.bounds.lower.iter().zip(self.bounds.upper).map(|(lower, upper)| upper - lower)
     }
 
-    /// Makes the place asked for the highest one.
+    /// Accepts the requested place as the highest one.
     fn stand(&mut self, value: f64, gradient: &[f64]) {
         self.top.value = value;
         self.top.x.clone_from(&self.asked);
@@ -159,19 +161,20 @@ impl<'a> Climb<'a> {
         }
     }
 
-    /// Little curvature, so that every axis is worth a step until more of it is known.
+    /// Initialises with a small curvature, so that every axis is worth a step until its curvature
+    /// is known.
     fn presume(&mut self) {
         let count = self.here.len();
         let little = (PRESUMED * self.enough()).max(f64::MIN_POSITIVE);
         (0..count).for_each(|i| self.curvature[i * count + i] = little);
     }
 
-    /// What is not worth another step.
+    /// Returns the gain below which a step is not worth taking.
     fn enough(&self) -> f64 {
         self.manner.gain + self.manner.relative_gain * self.top.value.abs()
     }
 
-    /// Learns the curvature from a step, and goes there if it is up.
+    /// Updates the curvature from a step, and accepts the step if it is uphill.
     fn judge(&mut self, value: f64, gradient: &[f64], is_finite: bool) {
         let length = self.step.iter().fold(0.0, |longest: f64, step| longest.max(step.abs()));
         if !is_finite {
@@ -195,7 +198,7 @@ impl<'a> Climb<'a> {
         }
     }
 
-    /// Plans the next step, or ends where none is worth it.
+    /// Plans the next step, or ends if none is worth taking.
     fn go_on(&mut self) {
         self.left = self.plan(f64::INFINITY);
         let is_worth = self.left > self.enough();
@@ -222,7 +225,7 @@ impl<'a> Climb<'a> {
         }));
     }
 
-    /// BFGS, damped.
+    /// Damped BFGS update.
     fn learn(&mut self, bend: &[f64]) {
         let count = self.step.len();
         let along = dot(bend, &self.step);
@@ -247,14 +250,15 @@ impl<'a> Climb<'a> {
         self.is_measured |= along > 0.0;
     }
 
-    /// The step to the top of the parabola within the box and within `reach`, by an active set
-    /// (Nocedal & Wright 2006, algorithm 16.3); returns what it should win.
+    /// Plans the step to the maximum of the quadratic model within the box and the trust region
+    /// `reach`, by an active set (Nocedal & Wright 2006, algorithm 16.3); returns its predicted
+    /// gain.
     fn plan(&mut self, reach: f64) -> f64 {
         let count = self.here.len();
         self.step.fill(0.0);
         let limits: Vec<[f64; 2]> =
             (self.here.iter()).map(|here| [(-here).max(-reach), (1.0 - here).min(reach)]).collect();
-        // At a limit, and uphill is beyond it.
+        // At a bound, and uphill is beyond it.
         let is_held = |i: usize, step: f64, slope: f64| {
             step <= limits[i][0] && slope <= 0.0 || step >= limits[i][1] && slope >= 0.0
         };
@@ -266,7 +270,7 @@ impl<'a> Climb<'a> {
             let entry =
                 |row: usize, column: usize| self.curvature[free[row] * count + free[column]];
             solve(free.len(), entry, &mut way);
-            // As far as the first limit.
+            // Fraction of the step up to the first bound.
             let mut share = 1.0;
             let mut first = None;
             for (&i, way) in free.iter().zip(&way) {
@@ -293,13 +297,13 @@ impl<'a> Climb<'a> {
         self.promise()
     }
 
-    /// The parabola's slope along an axis after the step.
+    /// Returns the model's slope along an axis after the step.
     fn slope(&self, i: usize) -> f64 {
         let count = self.step.len();
         self.gradient[i] - dot(&self.curvature[i * count..(i + 1) * count], &self.step)
     }
 
-    /// What the parabola says of the step.
+    /// Returns the gain of the step predicted by the model.
     fn promise(&self) -> f64 {
         let rows = self.curvature.chunks_exact(self.step.len().max(1)).zip(&self.step);
         let bend: f64 = rows.map(|(row, step)| step * dot(row, &self.step)).sum();
@@ -307,7 +311,7 @@ impl<'a> Climb<'a> {
     }
 }
 
-/// Climbs alone, as long as `is_worth` going on; `objective` writes its gradient into its second
+/// Runs a single climb while `is_worth` is true; `objective` writes its gradient into its second
 /// argument.
 pub fn climb(
     mut climb: Climb,
@@ -325,7 +329,7 @@ pub fn climb(
     climb.finish()
 }
 
-/// Replaces b by M⁻¹·b, M symmetric and positive definite.
+/// Replaces b by M⁻¹·b for a symmetric positive definite M.
 fn solve(count: usize, entry: impl Fn(usize, usize) -> f64, b: &mut [f64]) {
     let mut matrix: Vec<f64> = (0..count * count).map(|k| entry(k / count, k % count)).collect();
     for pivot in 0..count {

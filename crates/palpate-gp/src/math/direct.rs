@@ -1,37 +1,38 @@
-//! Global maximisation by dividing rectangles (Jones, Perttunen & Stuckman 1993), which asks for
-//! the values of a whole division at once.
+//! Global maximisation by DIRECT, dividing rectangles (Jones, Perttunen & Stuckman 1993), with
+//! batch evaluation of whole divisions.
 //!
-//! Places, their order and every tie are those of NLopt's `GN_DIRECT` (S. G. Johnson), which asks
-//! for one value after the other: the rectangles that will be divided are known before any of them
-//! is, but for the few that a better value found meanwhile rules out.
+//! Places, their order and all ties are those of NLopt's `GN_DIRECT` (S. G. Johnson), which
+//! evaluates one value after the other. The rectangles of a round are selected before any of them
+//! is divided, so a few are evaluated that a better value found meanwhile would have excluded.
 
 use super::optimize::Bounds;
 use std::ops::Range;
 
-/// Sides that differ by less than this share count as equal.
+/// Relative difference below which sides count as equal.
 const EQUAL_SIDES: f64 = 5e-2;
 const THIRD: f64 = 1.0 / 3.0;
 
-/// A part of the unit cube; its middle and sides lie beside those of all others.
+/// A part of the unit cube; its centre and sides are stored in the arrays of all rectangles.
 struct Rectangle {
-    /// Minus the value at its middle.
+    /// Negative value at its centre.
     cost: f64,
     age: u32,
-    /// From the middle to a corner; rounded, so that equal rectangles are equal to the last bit.
+    /// Distance from the centre to a corner; rounded, so that equal rectangles agree to the last
+    /// bit.
     radius: f32,
 }
 
-/// The rectangles of one radius.
+/// Rectangles of one radius.
 struct Equals {
     radius: f32,
-    /// The one of least cost last, of these the oldest.
+    /// Keys sorted so that the lowest cost comes last, the oldest of equal ones.
     keys: Vec<Key>,
 }
 
-/// Cost, made to be compared as an integer, age and number of a rectangle.
+/// Cost as an integer for comparison, age and index of a rectangle.
 type Key = (u64, u32, usize);
 
-/// A rectangle on the lower hull of costs over radii, as it was before this round's divisions.
+/// A rectangle on the lower hull of costs over radii, before this round's divisions.
 #[derive(Clone, Copy)]
 struct Corner {
     radius: f64,
@@ -41,26 +42,26 @@ struct Corner {
 
 struct Division<'a, F> {
     bounds: Bounds<'a>,
-    /// Returns the values of places.
+    /// Function that returns the values at places.
     values: F,
     rectangles: Vec<Rectangle>,
-    /// As many numbers for each rectangle as there are coordinates.
+    /// Centres, one coordinate vector per rectangle.
     middles: Vec<f64>,
     sides: Vec<f64>,
-    /// By growing radius; one that was once there stays, if empty.
+    /// Groups by increasing radius; empty groups stay.
     sorted: Vec<Equals>,
     least: f64,
     age: u32,
     left: u32,
-    /// Used again in each round.
+    /// Buffer reused in each round.
     hull: Vec<Corner>,
     chosen: Vec<usize>,
     places: Vec<Vec<f64>>,
     pairs: Vec<(usize, [f64; 2])>,
 }
 
-/// Looks for the largest value in a box by exactly `evaluations` of them. `values` is given places
-/// and returns the value of each.
+/// Searches the largest value in a box with exactly `evaluations` evaluations. `values` receives
+/// places and returns the value at each.
 pub fn direct(bounds: Bounds, evaluations: u32, values: impl FnMut(&[Vec<f64>]) -> Vec<f64>) {
     let count = bounds.lower.len();
     if count == 0 || evaluations == 0 {
@@ -104,7 +105,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         (0.5 * squares.sqrt()) as f32
     }
 
-    /// The axes along which a rectangle is divided: of a cube all, otherwise the longest.
+    /// Returns the axes along which a rectangle is divided: all for a cube, otherwise the longest.
     fn axes(&self, index: usize) -> Range<usize> {
         let sides = self.sides(index);
         let mut longest = 0;
@@ -118,8 +119,8 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         if is_cube { 0..sides.len() } else { longest..longest + 1 }
     }
 
-    /// Costs of the first `count` places, or of as many as the budget has left, which are taken
-    /// from the unit cube to the box.
+    /// Returns the costs of the first `count` places, or of as many as the budget has left, after
+    /// mapping them from the unit cube to the box.
     fn costs(&mut self, count: usize) -> Vec<f64> {
         let places = &mut self.places[..count.min(self.left as usize)];
         self.left -= places.len() as u32;
@@ -130,7 +131,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
             }
         }
         let mut values = (self.values)(places);
-        // Where there is no value nobody looks; and zero has one sign.
+        // Places without a finite value have the largest cost; zero has a single sign.
         let cost = |value: f64| if value.is_finite() { 0.0 - value } else { f64::MAX };
         values.iter_mut().for_each(|value| *value = cost(*value));
         values
@@ -143,7 +144,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         (ordered, age, index)
     }
 
-    /// Adds the rectangle whose middle and sides were added last.
+    /// Adds the rectangle whose centre and sides were added last.
     fn add(&mut self, cost: f64) {
         let index = self.rectangles.len();
         let radius = self.radius(index);
@@ -171,7 +172,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         }
     }
 
-    /// Divides all rectangles that may hold the least cost, whatever its slope.
+    /// Divides all potentially optimal rectangles.
     fn round(&mut self) {
         let mut hull = std::mem::take(&mut self.hull);
         let mut chosen = std::mem::take(&mut self.chosen);
@@ -201,8 +202,8 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         (self.hull, self.chosen) = (hull, chosen);
     }
 
-    /// Writes the middles of the outer thirds along each axis of a rectangle behind the first
-    /// `count` places; returns how many there are then.
+    /// Writes the centres of the outer thirds along each axis of a rectangle after the first
+    /// `count` places; returns the new number of places.
     fn hand_out(&mut self, index: usize, mut count: usize) -> usize {
         let middle = index * self.dimension()..(index + 1) * self.dimension();
         for axis in self.axes(index) {
@@ -249,10 +250,10 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         self.pairs = pairs;
     }
 
-    /// Finds the lower hull of (radius, cost), with all that are equal, by growing radius.
+    /// Computes the lower hull of (radius, cost), including ties, by increasing radius.
     fn find_hull(&self, hull: &mut Vec<Corner>) {
         hull.clear();
-        // Of each radius those of least cost; of these the first corner stands for all.
+        // The rectangles of lowest cost for each radius; the first one represents all.
         let lowest = |equals: &Equals| {
             let (_, _, index) = *equals.keys.last()?;
             Some((equals.radius.into(), self.rectangles[index].cost))
@@ -265,14 +266,14 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
             let slope = (to.1 - from.1) / (to.0 - from.0);
             from.1 + (radius - from.0) * slope
         };
-        // The hull's groups; those in between are dropped where they make a right turn.
+        // Hull points; those at a right turn are dropped.
         let mut kept: Vec<((f64, f64), &Equals)> = vec![first];
         for (new, equals) in groups {
             if new.1 > chord(new.0) {
                 continue;
             }
             while let [earlier @ .., (before, group), (last, _)] = kept.as_slice() {
-                // As NLopt's, which drops nothing that only one corner stands before.
+                // As in NLopt, which drops no point that has a single predecessor.
                 if earlier.is_empty() && group.lowest().nth(1).is_none() {
                     break;
                 }
@@ -290,8 +291,8 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
         }
     }
 
-    /// Whether the line through the corner and a neighbour comes as low as the least cost at radius
-    /// 0. The neighbour before may have been divided meanwhile: its radius is that of today.
+    /// Whether the line through the corner and a neighbour reaches the lowest cost at radius 0. The
+    /// preceding neighbour may have been divided meanwhile: its current radius is used.
     fn may_hold_least(&self, hull: &[Corner], at: usize) -> bool {
         let radius = |corner: &Corner| f64::from(self.rectangles[corner.index].radius);
         let here = &hull[at];
@@ -305,7 +306,7 @@ impl<F: FnMut(&[Vec<f64>]) -> Vec<f64>> Division<'_, F> {
 }
 
 impl Equals {
-    /// All of least cost, by growing age.
+    /// Returns all rectangles of lowest cost, by increasing age.
     fn lowest(&self) -> impl Iterator<Item = usize> {
         let least = self.keys.last().map(|key| key.0);
         let is_least = move |key: &&Key| Some(key.0) == least;

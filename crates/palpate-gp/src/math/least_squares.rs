@@ -1,122 +1,123 @@
-//! Nonlinear least squares that says what the data do not determine, and leaves out what does not
-//! fit the rest.
+//! Nonlinear least squares with detection of undetermined directions and rejection of outliers.
 //!
-//! Gauss-Newton with halved steps. The step is found by singular values, and along a direction of
-//! parameters that the residuals say next to nothing of, nothing moves.
+//! Gauss-Newton with step halving. The step is computed by singular values, and undetermined
+//! directions of the parameters are not changed.
 
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 use thiserror::Error;
 
-/// What is fitted.
+/// A least-squares problem.
 ///
-/// Parameters are counted in units of what they could plausibly be off, residuals in units of
-/// their expected standard deviation. Then a singular value of the Jacobian says how much narrower
-/// the data make a direction than it was believed to be.
+/// Parameters are in units of their plausible error, residuals in units of their expected standard
+/// deviation. A singular value of the Jacobian is then the factor by which the data narrow a
+/// direction relative to its prior.
 pub trait Problem {
-    /// Everything that is fitted.
+    /// State that is fitted.
     type State: Clone;
 
-    /// How many parameters a step has.
+    /// Returns the number of parameters of a step.
     fn parameters(&self) -> usize;
 
-    /// `state` moved by a step.
+    /// Returns `state` moved by a step.
     fn moved(&self, state: &Self::State, step: &DVector<f64>) -> Self::State;
 
-    /// The residuals at `state`, as many each time.
+    /// Returns the residuals at `state`, a fixed number of them.
     fn residuals(&self, state: &Self::State) -> DVector<f64>;
 
-    /// Part of the greatest singular value below which one says nothing, whatever its size.
+    /// Fraction of the largest singular value below which a direction counts as undetermined.
     fn resolution(&self) -> f64 {
         0.0
     }
 
-    /// A step that gains no more than this part of the cost is the last.
+    /// Relative decrease of the cost below which a step is the last.
     fn gained(&self) -> f64 {
         GAINED
     }
 
-    /// Part of a unit over which slopes are taken, by central differences: near the cube root of
-    /// the residuals' precision.
+    /// Step of the central differences in units of the parameters: near the cube root of the
+    /// residuals' precision.
     fn difference(&self) -> f64 {
         DIFFERENCE
     }
 
-    /// Of which kind residual `i` is: each kind has a scatter of its own.
+    /// Returns the kind of residual `i`: each kind has its own scatter.
     fn kind(&self, _i: usize) -> usize {
         0
     }
 }
 
-/// A fit.
+/// Result of a least-squares fit.
 #[derive(Clone, Debug)]
 pub struct Solution<S> {
-    /// The best parameters.
+    /// Best parameters.
     pub state: S,
-    /// Covariance in the problem's units, s²(JᵀJ)⁻¹ in the determined directions; 1, the plausible,
-    /// in the others.
+    /// Covariance in the problem's units: s²(JᵀJ)⁻¹ in the determined directions, and 1, the
+    /// plausible value, in the others.
     pub covariance: DMatrix<f64>,
     /// Unit vectors of the directions that the data do not determine.
     pub undetermined: Vec<DVector<f64>>,
-    /// Greatest singular value over the least of those that count.
+    /// Largest singular value over the smallest determined one.
     pub condition: f64,
-    /// Residuals at the end, all of them.
+    /// Final residuals, including outliers.
     pub residuals: DVector<f64>,
-    /// Whether each residual was used; an outlier was not.
+    /// Whether each residual was used; outliers were not.
     pub used: Vec<bool>,
 }
 
-/// What cannot be fitted.
+/// Error of a problem that cannot be fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum FitError {
-    /// A residual is not a number.
-    #[error("a residual is not a number")]
+    /// A residual is not finite.
+    #[error("a residual is not finite")]
     NotFinite,
-    /// There is nothing to fit to.
-    #[error("no residuals")]
+    /// There are no residuals.
+    #[error("there are no residuals to fit")]
     Empty,
-    /// Every step made it worse.
-    #[error("the fit does not settle")]
+    /// No step decreases the cost.
+    #[error("the fit does not converge")]
     Unsettled,
 }
 
-/// A direction counts as determined if the data make it at least this much narrower than what was
-/// plausible; chosen.
+/// Smallest factor by which the data must narrow a direction relative to its plausible error to
+/// count as determined; a heuristic.
 pub const NARROWER: f64 = 3.0;
 
-/// Unless a problem says otherwise; chosen, for residuals precise to rounding.
+/// Default step of central differences; a heuristic: for residuals precise to rounding.
 const DIFFERENCE: f64 = 1e-4;
 
-/// Rounds of steps, and of leaving out; chosen, several times what is usual.
+/// Largest number of steps, and of outlier rejections; heuristics: several times the usual number.
 const STEPS: usize = 250;
 const ROUNDS: usize = 12;
 
-/// A step shorter than this part of a unit is the last; chosen.
+/// Step length, in units of the parameters, below which a step is the last; a heuristic.
 const SETTLED: f64 = 1e-7;
 
-/// A step that gains no more than this part of the cost is the last; chosen.
+/// Default relative decrease of the cost below which a step is the last; a heuristic.
 const GAINED: f64 = 1e-9;
 
-/// A residual beyond this many robust standard deviations is an outlier; chosen: 1 in 2000 of a
+/// Robust standard deviations beyond which a residual is an outlier; a heuristic: 1 in 2000 of a
 /// normal distribution.
 const OUTLIER: f64 = 3.5;
 
-/// Residuals up to this many count with their square, beyond it with their amount (Huber 1964).
+/// Limit up to which residuals count with their square, and beyond with their absolute value (Huber
+/// 1964).
 const HUBER: f64 = 1.345;
 
 /// Standard deviations per median absolute deviation of a normal distribution.
 const SD_PER_MAD: f64 = 1.4826;
 
-/// Scatter of a kind below this part of the expected one is taken for it; chosen.
+/// Smallest scatter of a kind as a fraction of the expected one; smaller values are replaced by it;
+/// a heuristic.
 const LEAST_SCATTER: f64 = 0.05;
 
 /// Fits `problem` from `start`.
 ///
-/// At first a residual far off counts with its amount only; then those are left out that lie
-/// beyond 3.5 robust standard deviations of their kind, until the same are.
+/// At first, large residuals count with their absolute value only; then those beyond 3.5 robust
+/// standard deviations of their kind are rejected, repeatedly until the set is stable.
 ///
 /// # Errors
-/// If a residual is not finite, there is none, or no step helps.
+/// If a residual is not finite, there is none, or no step decreases the cost.
 pub fn fit<P: Problem>(problem: &P, start: &P::State) -> Result<Solution<P::State>, FitError> {
     let count = problem.residuals(start).len();
     if count == 0 {
@@ -138,11 +139,11 @@ pub fn fit<P: Problem>(problem: &P, start: &P::State) -> Result<Solution<P::Stat
     conclude(problem, state, used)
 }
 
-/// The best parameters from `start` and their cost, no residual left out: one far off counts with
-/// its amount only.
+/// Returns the best parameters from `start` and their cost without rejection of outliers: large
+/// residuals count with their absolute value only.
 ///
 /// # Errors
-/// If a residual is not finite, there is none, or no step helps.
+/// If a residual is not finite, there is none, or no step decreases the cost.
 pub fn robust<P: Problem>(problem: &P, start: &P::State) -> Result<(P::State, f64), FitError> {
     if problem.residuals(start).is_empty() {
         return Err(FitError::Empty);
@@ -152,7 +153,8 @@ pub fn robust<P: Problem>(problem: &P, start: &P::State) -> Result<(P::State, f6
     Ok((state, cost))
 }
 
-/// How well a problem's data would determine its parameters at `state`, before there are any.
+/// Predicts how well a problem's data determine its parameters at `state`, before they are
+/// measured.
 ///
 /// # Errors
 /// If a residual is not finite, or there is none.
@@ -164,7 +166,7 @@ pub fn foresee<P: Problem>(problem: &P, state: &P::State) -> Result<Solution<P::
     Ok(foreseen)
 }
 
-/// ∂r/∂step at no step, by central differences.
+/// Returns ∂r/∂step at a zero step, by central differences.
 pub fn jacobian<P: Problem>(problem: &P, state: &P::State, count: usize) -> DMatrix<f64> {
     let parameters = problem.parameters();
     let mut jacobian = DMatrix::zeros(count, parameters);
@@ -178,10 +180,10 @@ pub fn jacobian<P: Problem>(problem: &P, state: &P::State, count: usize) -> DMat
     jacobian
 }
 
-/// Covariance of the parameters at `state` of a robust fit some of whose residuals err together,
+/// Returns the covariance of the parameters at `state` of a robust fit with clustered residuals,
 /// A⁻¹ (Σ g gᵀ) A⁻¹ · n/(n − 1) with A = JᵀWJ and the n clusters' gradients g = Σ Jᵢᵀ wᵢ rᵢ (Liang
-/// & Zeger 1986). Residuals without a cluster, those of what was believed before, count in A only.
-/// None if A has no inverse.
+/// & Zeger 1986). Residuals without a cluster, those of priors, count in A only. Returns `None` if
+/// A is singular.
 pub fn clustered_covariance<P: Problem>(
     problem: &P,
     state: &P::State,
@@ -207,8 +209,8 @@ pub fn clustered_covariance<P: Problem>(
     Some(&inverse * spread * &inverse * (count / (count - 1.0).max(1.0)))
 }
 
-/// Steps until they are too short to matter. `weigh` gives each residual its weight and the whole
-/// its cost.
+/// Iterates steps until they are negligible. `weigh` returns the weight of each residual and the
+/// total cost.
 fn settle<P: Problem>(
     problem: &P,
     start: &P::State,
@@ -242,7 +244,7 @@ fn settle<P: Problem>(
     Err(FitError::Unsettled)
 }
 
-/// Weights and cost in which an outlier counts with its amount; the scatter stays the expected one.
+/// Returns Huber weights and cost; the scatter is the expected one.
 fn huber(residuals: &DVector<f64>) -> (DVector<f64>, f64) {
     let weights = residuals.map(huber_weight);
     let costs = residuals.iter().map(|r| match r.abs() <= HUBER {
@@ -253,12 +255,13 @@ fn huber(residuals: &DVector<f64>) -> (DVector<f64>, f64) {
     (weights, cost)
 }
 
-/// Weight of a residual that beyond a limit counts with its amount (Huber 1964).
+/// Returns the Huber weight of a residual, which beyond a limit counts with its absolute value
+/// (Huber 1964).
 pub fn huber_weight(residual: f64) -> f64 {
     HUBER / residual.abs().max(HUBER)
 }
 
-/// Weights and cost of the residuals that are used.
+/// Returns weights and cost of the residuals that are used.
 fn kept(residuals: &DVector<f64>, used: &[bool]) -> (DVector<f64>, f64) {
     let weights =
         DVector::from_iterator(used.len(), used.iter().map(|&used| f64::from(u8::from(used))));
@@ -266,7 +269,7 @@ fn kept(residuals: &DVector<f64>, used: &[bool]) -> (DVector<f64>, f64) {
     (weights, cost)
 }
 
-/// The robust standard deviation of each kind.
+/// Returns the robust standard deviation of each kind.
 fn scatters<P: Problem>(problem: &P, residuals: &DVector<f64>) -> Vec<f64> {
     let kinds = (0..residuals.len()).map(|i| problem.kind(i)).max().map_or(0, |last| last + 1);
     let of = |kind: usize| {
@@ -280,7 +283,7 @@ fn scatters<P: Problem>(problem: &P, residuals: &DVector<f64>) -> Vec<f64> {
     (0..kinds).map(of).collect()
 }
 
-/// Covariance and rank at the end.
+/// Computes covariance and rank of the solution.
 fn conclude<P: Problem>(
     problem: &P,
     state: P::State,
@@ -298,7 +301,7 @@ fn conclude<P: Problem>(
     let squares: f64 =
         residuals.iter().zip(&used).filter(|(_, used)| **used).map(|(r, _)| r * r).sum();
     let count = used.iter().filter(|used| **used).count();
-    // As many data as parameters leave no scatter to see: then the expected one stands.
+    // With as many data as parameters the scatter cannot be estimated: the expected one is used.
     let variance = match count.checked_sub(spectrum.rank()) {
         Some(freedom) if freedom > 0 => squares / freedom as f64,
         _ => 1.0,
@@ -313,13 +316,13 @@ fn conclude<P: Problem>(
     })
 }
 
-/// Singular values of a Jacobian with their directions of parameters.
+/// Singular values of a Jacobian with their parameter directions.
 struct Spectrum {
-    /// JᵀJ's eigenvalues' roots.
+    /// Square roots of the eigenvalues of JᵀJ.
     values: DVector<f64>,
     directions: DMatrix<f64>,
     slopes: DMatrix<f64>,
-    /// The least value that counts.
+    /// Smallest value of a determined direction.
     least: f64,
 }
 
@@ -329,7 +332,7 @@ impl Spectrum {
             return Err(FitError::NotFinite);
         }
         let parameters = slopes.ncols();
-        // Rows of zeros make the decomposition's directions complete where data are few.
+        // Zero rows complete the decomposition's directions if there are few data.
         let rows = slopes.nrows().max(parameters);
         let svd = slopes
             .clone()
@@ -349,7 +352,7 @@ impl Spectrum {
         (0..self.values.len()).filter(|&i| self.counts(i)).count()
     }
 
-    /// The least step that explains `residuals`, along determined directions only.
+    /// Returns the smallest step that explains `residuals`, along determined directions only.
     fn solve(&self, residuals: &DVector<f64>) -> DVector<f64> {
         let gradient = self.slopes.transpose() * residuals;
         let mut step = DVector::zeros(self.directions.nrows());

@@ -1,4 +1,4 @@
-//! Mathematics that knows nothing of touch.
+//! General mathematics, independent of touch.
 
 pub mod banded;
 pub mod climb;

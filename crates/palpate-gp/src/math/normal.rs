@@ -2,21 +2,21 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-/// Deviations within which 95 % of a normal variable lies.
+/// Standard deviations that contain 95 % of a normal distribution.
 pub const BAND_95: f64 = 1.959_963_984_540_054;
 
-/// Density φ(z).
+/// Returns the density φ(z).
 pub fn density(z: f64) -> f64 {
     (-0.5 * z * z).exp() / (2.0 * PI).sqrt()
 }
 
-/// Cumulative probability Φ(z).
+/// Returns the cumulative probability Φ(z).
 pub fn cumulative(z: f64) -> f64 {
     0.5 * libm::erfc(-z / SQRT_2)
 }
 
-/// φ(z) / Φ(z). For z below −30, where Φ nears the smallest numbers, by the first terms of its
-/// series −z − 1/z + 2/z³; both agree to 1e-6 there.
+/// Returns φ(z) / Φ(z). For z below −30, where Φ approaches the smallest numbers, it uses the first
+/// terms of the series −z − 1/z + 2/z³; both agree to 1e-6 there.
 pub fn inverse_mills(z: f64) -> f64 {
     if z > -30.0 {
         return density(z) / cumulative(z);

@@ -1,32 +1,32 @@
-//! What optimisers have in common: they maximise in a box; and the simplest of them.
+//! Common types of the optimisers, which maximise in a box; and a compass search.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Why an optimiser returned.
+/// Reason why an optimiser returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
-    /// No more was to be won.
+    /// Converged.
     Converged,
-    /// The budget of evaluations was spent.
+    /// The budget of evaluations is exhausted.
     Budget,
-    /// Rounding errors kept it from going on; what it returns is the best it saw.
+    /// Rounding errors prevented progress; the result is the best place found.
     Roundoff,
-    /// It could not begin or broke off; what it returns is the best it saw.
+    /// It could not start or was aborted; the result is the best place found.
     Failed,
 }
 
-/// Where an optimiser ended.
+/// Result of an optimiser.
 #[derive(Clone, Debug)]
 pub struct Optimum {
-    /// The best point seen, inside the box.
+    /// Best point found, inside the box.
     pub x: Vec<f64>,
-    /// The objective there.
+    /// Value of the objective there.
     pub value: f64,
-    /// How often the objective was evaluated.
+    /// Number of evaluations of the objective.
     pub evaluations: u32,
-    /// Why it returned.
+    /// Reason why it returned.
     pub stop: Stop,
 }
 
@@ -39,16 +39,16 @@ pub struct Bounds<'a> {
     pub upper: &'a [f64],
 }
 
-/// A few steps uphill along the axes from `start` to larger values of `f` within `bounds`, for
-/// functions that cost too much for more: compass search (Kolda, Lewis & Torczon 2003, SIAM Review
-/// 45, 385). Returns the best place asked for, and what else `f` told of it.
+/// Maximises `f` within `bounds` by a few steps along the axes from `start`, for expensive
+/// functions: compass search (Kolda, Lewis & Torczon 2003, SIAM Review 45, 385). Returns the best
+/// place found, and the additional result of `f` there.
 ///
-/// The first step is tried along `axis`; of the `steps` the first is halved where no axis leads
-/// uphill, down to the last. `budget` places may be asked for, and one more where the last axis is
-/// tried both ways.
+/// The first step is tried along `axis`; the step is halved from the first of `steps` to the last
+/// whenever no axis improves. Uses at most `budget` evaluations, and one more if the last axis is
+/// tried in both directions.
 ///
 /// # Errors
-/// The first of `f`.
+/// The first error of `f`.
 pub fn compass<T, E>(
     start: Vec<f64>,
     bounds: &[[f64; 2]],
@@ -59,7 +59,7 @@ pub fn compass<T, E>(
 ) -> Result<(Optimum, T), E> {
     let (value, mut told) = f(&start)?;
     let mut best = Optimum { x: start, value, evaluations: 1, stop: Stop::Budget };
-    // Axes in a row along which neither way led uphill.
+    // Number of consecutive axes without an improvement.
     let mut idle = 0;
     for axis in (0..bounds.len()).cycle().skip(axis) {
         if step < shortest {
@@ -97,8 +97,8 @@ mod tests {
     use std::convert::Infallible;
 
     proptest! {
-        /// The top of a bowl turned over is found to the shortest step, or the wall before it;
-        /// never a place outside, and what was told is of the place that is returned.
+        /// The maximum of a concave paraboloid is found to the shortest step, or the bound before
+        /// it; no place is outside, and the additional result belongs to the place returned.
         #[test]
         fn it_climbs_to_the_top_within_its_box(
             top in prop::array::uniform3(-2f64..2.0),
@@ -123,7 +123,7 @@ mod tests {
             }
         }
 
-        /// It asks for at most one place more than it may, and keeps the best of them.
+        /// It evaluates at most one place more than the budget, and keeps the best.
         #[test]
         fn it_keeps_to_its_budget(budget in 1u32..20) {
             let mut best = f64::NEG_INFINITY;
@@ -138,7 +138,7 @@ mod tests {
             prop_assert_eq!(found.value, best);
         }
 
-        /// An error ends it.
+        /// An error ends the search.
         #[test]
         fn an_error_ends_it(at in 1u32..6) {
             let mut asked = 0;

@@ -1,8 +1,8 @@
-//! Poses as files give them.
+//! Poses in the notation of files.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
-/// The pose of a frame whose origin stands at `position_m`, turned by `rotation_deg` about the
+/// Returns the pose of a frame with its origin at `position_m`, rotated by `rotation_deg` about the
 /// fixed axes x, then y, then z.
 pub fn pose(position_m: [f64; 3], rotation_deg: [f64; 3]) -> Isometry3<f64> {
     let [roll, pitch, yaw] = rotation_deg.map(f64::to_radians);
@@ -12,7 +12,7 @@ pub fn pose(position_m: [f64; 3], rotation_deg: [f64; 3]) -> Isometry3<f64> {
     )
 }
 
-/// What files give of a pose: the inverse of [`pose`].
+/// Returns position and rotation of a pose in the notation of files: the inverse of [`pose`].
 pub fn parts(pose: &Isometry3<f64>) -> ([f64; 3], [f64; 3]) {
     let (roll, pitch, yaw) = pose.rotation.euler_angles();
     (pose.translation.vector.into(), [roll, pitch, yaw].map(f64::to_degrees))

@@ -1,13 +1,13 @@
-//! One random stream per (root seed, trial, purpose), and no other source of randomness.
+//! Random streams: one per (root seed, trial, purpose), the only source of randomness.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-/// The stream of `purpose` in `trial` of an experiment with root seed `root`.
+/// Returns the random stream of `purpose` in `trial` of an experiment with root seed `root`.
 ///
 /// ChaCha's 32-byte key holds root, trial, and two FNV-1a hashes of the purpose. Streams do not
-/// depend on the order in which they are asked for: trials may run on any thread and resume
-/// after a kill.
+/// depend on the order in which they are created: trials may run on any thread and resume after a
+/// kill.
 pub fn stream(root: u64, trial: u64, purpose: &str) -> ChaCha8Rng {
     let mut key = [0; 32];
     key[..8].copy_from_slice(&root.to_le_bytes());
@@ -17,7 +17,7 @@ pub fn stream(root: u64, trial: u64, purpose: &str) -> ChaCha8Rng {
     ChaCha8Rng::from_seed(key)
 }
 
-/// The 64-bit hash of Fowler, Noll and Vo, variant 1a, from a chosen start.
+/// Returns the 64-bit hash of Fowler, Noll and Vo, variant 1a, from the given start value.
 fn fnv1a(start: u64, text: &str) -> u64 {
     text.bytes().fold(start, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }

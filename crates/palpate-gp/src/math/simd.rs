@@ -1,9 +1,9 @@
-//! Plain loops, compiled for the widest vectors this processor has.
+//! Plain loops, compiled for the widest vectors of the processor.
 
 use nalgebra::Vector3;
 
-/// Defines a function whose loops are compiled for the widest vectors of this processor, as those
-/// of [`widest`]. All references among its arguments have the one lifetime.
+/// Defines a function whose loops are compiled for the widest vectors of the processor, like those
+/// of [`widest`]. All references among its arguments share one lifetime.
 macro_rules! widest_fn {
     ($(#[$meta:meta])* $vis:vis fn $name:ident<$life:lifetime> $($rest:tt)*) => {
         $crate::math::simd::widest_fn!(
@@ -41,18 +41,17 @@ macro_rules! widest_fn {
 }
 pub(crate) use widest_fn;
 
-/// Runs `work` with its loops compiled once for each vector width and the widest one chosen.
+/// Runs `work` with its loops compiled for each vector width; the widest one is used.
 ///
-/// What it calls must be `#[inline(always)]` to be compiled along, and so must a `work` that is
-/// long or multiplies and adds in one rounding, which `widest_fn!` then writes instead of a
-/// closure. Sums keep the order in which they are written, so that the width changes speed and not
-/// results.
+/// Functions that it calls must be `#[inline(always)]` to be compiled along, and so must a `work`
+/// that is long or uses fused multiply-add; use `widest_fn!` for these instead of a closure. Sums
+/// keep the order in which they are written, so that the width changes speed and not results.
 #[inline(always)]
 pub fn widest<Work: pulp::NullaryFnOnce>(work: Work) -> Work::Output {
     pulp::Arch::new().dispatch(work)
 }
 
-/// Σ a_i b_i in eight independent sums, which the processor adds side by side.
+/// Returns Σ a_i b_i in eight independent sums, which the processor adds in parallel.
 #[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
@@ -69,14 +68,13 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 widest_fn! {
-    /// The same with the widest vectors, where it does not stand in a loop that is compiled for
-    /// them.
+    /// Returns [`dot`] with the widest vectors, for use outside a loop that is compiled for them.
     pub fn widest_dot<'a>(a: &'a [f64], b: &'a [f64]) -> f64 {
         dot(a, b)
     }
 }
 
-/// The same in single precision, in sixteen sums.
+/// Returns [`dot`] in single precision, in sixteen sums.
 #[inline(always)]
 pub fn dot_single(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0; 16];
@@ -91,48 +89,48 @@ pub fn dot_single(a: &[f32], b: &[f32]) -> f32 {
     sums.iter().sum::<f32>() + rest
 }
 
-/// A vector with a zero behind it: what a processor takes at once.
+/// A 3-vector padded with a zero: the size of a vector register.
 pub type Quad = [f64; 4];
 
-/// Of a vector.
+/// Pads a vector.
 #[inline(always)]
 pub fn quad(v: &Vector3<f64>) -> Quad {
     [v.x, v.y, v.z, 0.0]
 }
 
-/// a + b.
+/// Returns a + b.
 #[inline(always)]
 pub fn sum(a: &Quad, b: &Quad) -> Quad {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }
 
-/// s a.
+/// Returns s a.
 #[inline(always)]
 pub fn scaled(a: &Quad, s: f64) -> Quad {
     [s * a[0], s * a[1], s * a[2], s * a[3]]
 }
 
-/// a · b.
+/// Returns a · b.
 #[inline(always)]
 pub fn dot_quad(a: &Quad, b: &Quad) -> f64 {
     (a[0] * b[0] + a[2] * b[2]) + (a[1] * b[1] + a[3] * b[3])
 }
 
-/// a × b.
+/// Returns a × b.
 #[inline(always)]
 pub fn cross(a: &Quad, b: &Quad) -> Quad {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0], 0.0]
 }
 
-/// e^x for x ≤ 0, to within a unit in the last place; 0 below -708, where e^x leaves the normal
-/// numbers, and NaN for NaN.
+/// Returns e^x for x ≤ 0, to within a unit in the last place; 0 below -708, where e^x is subnormal,
+/// and NaN for NaN.
 ///
 /// Branch-free, so that a loop over it is vectorised, and the same bits on every machine:
 /// x = k·ln 2 + r with |r| ≤ ln 2 / 2, and e^r by its Taylor series to r¹³ / 13!, whose
 /// remainder is below 5e-18.
 #[inline(always)]
 pub fn exp_of_negative(x: f64) -> f64 {
-    /// Adding it leaves the nearest integer in the low bits of the sum.
+    /// Constant whose addition leaves the nearest integer in the low bits of the sum.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     /// ln 2 in two parts; the first has trailing zeros, so that its multiples are exact.
     const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;

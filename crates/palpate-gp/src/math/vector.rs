@@ -1,27 +1,26 @@
-//! Vectors of numbers by name, for the loops whose speed hangs on what stays in registers; other
-//! loops are [plain](super::simd).
+//! Explicit vectors, for loops whose speed depends on register allocation; other loops are
+//! [plain](super::simd).
 
-/// As many numbers as one instruction takes. Sums are the same bits with every kind: all of them
-/// multiply and add in one rounding.
+/// A vector register. Sums have the same bits with every width: all of them use fused multiply-add.
 pub trait Vector: Copy {
-    /// How many: a divisor of 8.
+    /// Number of lanes: a divisor of 8.
     const LANES: usize;
-    /// The same number in all lanes.
+    /// Returns a vector with the same number in all lanes.
     fn splat(value: f64) -> Self;
-    /// The first numbers of a slice; zeros where it is too short.
+    /// Loads the first numbers of a slice; zeros if it is too short.
     fn load(from: &[f64]) -> Self;
-    /// Writes all lanes to the beginning of a slice that has room for them.
+    /// Writes all lanes to the beginning of a slice, which must be long enough.
     fn store(self, to: &mut [f64]);
-    /// self·b + c.
+    /// Returns self·b + c.
     fn mul_add(self, b: Self, c: Self) -> Self;
-    /// self·b.
+    /// Returns self·b.
     fn mul(self, b: Self) -> Self;
-    /// self − b.
+    /// Returns self − b.
     fn sub(self, b: Self) -> Self;
 }
 
-/// Defines a function that is written in vectors of the widest kind of this processor. All that it
-/// calls is `#[inline(always)]`, and all references among its arguments have the one lifetime.
+/// Defines a function written in vectors of the processor's widest kind. All functions that it
+/// calls must be `#[inline(always)]`, and all references among its arguments share one lifetime.
 macro_rules! vectorised_fn {
     ($(#[$meta:meta])* $vis:vis fn $name:ident<
         $life:lifetime, $vector:ident: Vector $(, const $n:ident: usize)?
@@ -48,22 +47,22 @@ macro_rules! vectorised_fn {
 }
 pub(crate) use vectorised_fn;
 
-/// Work that is written in vectors.
+/// Work written in vectors.
 pub trait Vectorised {
-    /// What it returns.
+    /// Return type.
     type Output;
 
-    /// Does it: `#[inline(always)]`, as all that it calls.
+    /// Runs the work; must be `#[inline(always)]`, like all functions that it calls.
     fn call<V: Vector>(self) -> Self::Output;
 }
 
-/// Runs `work` with the widest vectors of this processor.
+/// Runs `work` with the widest vectors of the processor.
 #[inline(always)]
 pub fn vectorised<Work: Vectorised>(work: Work) -> Work::Output {
     #[cfg(target_arch = "x86_64")]
     {
         if is_x86_feature_detected!("avx512f") {
-            // SAFETY: the processor has what the function is compiled for.
+            // SAFETY: the processor has the features that the function is compiled for.
             return unsafe { x86::with_512_bits(work) };
         }
         if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
@@ -123,11 +122,11 @@ mod x86 {
         work.call::<Narrow>()
     }
 
-    /// Only [`with_512_bits`] makes one.
+    /// Created only in [`with_512_bits`].
     #[derive(Clone, Copy)]
     struct Wide(__m512d);
 
-    /// Only [`with_256_bits`] makes one.
+    /// Created only in [`with_256_bits`].
     #[derive(Clone, Copy)]
     struct Narrow(__m256d);
 
@@ -139,14 +138,14 @@ mod x86 {
 
                 #[inline(always)]
                 fn splat(value: f64) -> Self {
-                    // SAFETY: whoever runs this has checked that the processor can.
+                    // SAFETY: the caller has checked that the processor has the features.
                     Self(unsafe { $splat(value) })
                 }
 
                 #[inline(always)]
                 fn load(from: &[f64]) -> Self {
                     match from.first_chunk::<$lanes>() {
-                        // SAFETY: as above, and there are as many numbers as are read.
+                        // SAFETY: as above, and the slice has as many numbers as are read.
                         Some(from) => Self(unsafe { $load(from.as_ptr()) }),
                         None => Self::splat(0.0),
                     }
@@ -155,7 +154,7 @@ mod x86 {
                 #[inline(always)]
                 fn store(self, to: &mut [f64]) {
                     if let Some(to) = to.first_chunk_mut::<$lanes>() {
-                        // SAFETY: as above, and there is room for what is written.
+                        // SAFETY: as above, and the slice is long enough for the numbers written.
                         unsafe { $store(to.as_mut_ptr(), self.0) }
                     }
                 }

@@ -1,4 +1,5 @@
-//! The Gaussian process against values to 80 digits, against laws, and against slow twins.
+//! Tests of the Gaussian process against 80-digit values, invariants, and reference
+//! implementations.
 
 use nalgebra::{DMatrix, DVector, Dyn, linalg::Cholesky};
 use palpate_gp::kernel::{Hyperparameters, SquaredExponential};
@@ -12,8 +13,8 @@ use serde::Deserialize;
 
 static KERNEL: SquaredExponential = SquaredExponential;
 
-/// `data/gp_reference.json`: made with mpmath at 80 digits and rounded to the nearest float64;
-/// its `model` field says of what.
+/// Contents of `data/gp_reference.json`: computed with mpmath at 80 digits and rounded to the
+/// nearest float64; its `model` field describes the model.
 #[derive(Deserialize)]
 struct Reference {
     cases: Vec<Case>,
@@ -69,13 +70,13 @@ fn posterior(at: Hyperparameters, observations: Observations) -> Posterior {
     Posterior::new(&KERNEL, at, observations).unwrap()
 }
 
-/// How far rounding may move a prediction.
+/// Bounds of the rounding error of a prediction.
 ///
-/// A Cholesky solution is the exact one of a covariance K + δK with ‖δK‖ ≤ ε·tr K or so (Higham
-/// 2002, Theorem 10.3 without its factor n, which rounding does not reach), and a covariance
-/// k = s²·exp(−r²/2) has an error of ε·(1 + r²)·k. To first order these move the mean kᵀK⁻¹y by
-/// kᵀK⁻¹·δK·K⁻¹y and δkᵀK⁻¹y, and the variance alike. No condition number: what is well determined
-/// may lose nothing though K is nearly singular.
+/// A Cholesky solution is the exact one of a covariance K + δK with ‖δK‖ ≤ about ε·tr K (Higham
+/// 2002, Theorem 10.3 without its factor n, which rounding does not reach), and a covariance k =
+/// s²·exp(−r²/2) has an error of ε·(1 + r²)·k. To first order these change the mean kᵀK⁻¹y by
+/// kᵀK⁻¹·δK·K⁻¹y and δkᵀK⁻¹y, and the variance likewise. No condition number enters: a
+/// well-determined value may be accurate although K is nearly singular.
 struct Rounding<'a> {
     posterior: &'a Posterior,
     factor: Cholesky<f64, Dyn>,
@@ -99,7 +100,7 @@ impl<'a> Rounding<'a> {
         Self { posterior, factor, weights, trace }
     }
 
-    /// ‖K⁻¹k‖ and the norm of the error of k, in roundings, at `place`.
+    /// Returns ‖K⁻¹k‖ and the norm of the error of k, in roundings, at `place`.
     fn norms(&self, place: &[f64]) -> (f64, f64) {
         let observed = self.posterior.observations();
         let at = self.posterior.hyperparameters();
@@ -124,7 +125,7 @@ impl<'a> Rounding<'a> {
     }
 }
 
-/// s²·exp(−r²/2) without noise, and r².
+/// Returns s²·exp(−r²/2) without noise, and r².
 fn covariance(at: &Hyperparameters, a: &[f64], b: &[f64]) -> (f64, f64) {
     let steps = a.iter().zip(b).zip(&at.length_scales).map(|((a, b), length)| (a - b) / length);
     let r2: f64 = steps.map(|step| step * step).sum();
@@ -154,7 +155,8 @@ fn posterior_keeps_the_digits_that_the_data_determine() {
 #[test]
 fn likelihood_and_gradient_keep_the_digits_the_condition_number_allows() {
     for case in reference() {
-        // Measured: at most a sixtieth of what the condition number allows. Three times that.
+        // Measured: at most a sixtieth of the bound by the condition number. The tolerance is three
+        // times that.
         let tolerance = f64::EPSILON * (0.05 * case.condition_number).max(case.y.len() as f64);
         let observations = case.observations();
         let mut gradient = vec![0.0; case.gradient_log_sf_l_sw.len()];
@@ -205,7 +207,7 @@ fn coinciding_places_without_noise_need_jitter_and_say_so() {
     assert!((ours.mean(&[0.0], &mut Scratch::default()) - 1.0).abs() < 1e-6);
 }
 
-/// Between 1 and 25 distinct touches on [-1, 1]², with sane hyperparameters.
+/// Generates between 1 and 25 distinct touches on [-1, 1]², with plausible hyperparameters.
 fn any_belief() -> impl Strategy<Value = (Hyperparameters, Vec<([f64; 2], f64)>)> {
     let touch = ([-1.0..1.0f64, -1.0..1.0f64], -1.0..1.0f64);
     let at = (0.1..3.0f64, 0.1..2.0f64, 0.1..2.0f64, 1e-3..0.3f64).prop_map(|(s, a, b, ratio)| {
@@ -261,7 +263,7 @@ proptest! {
         }
     }
 
-    /// However signal and mean are chosen, the profiled gradient is a central difference.
+    /// The profiled gradient equals a central difference for every model of signal and mean.
     #[test]
     fn profiled_gradients_are_central_differences((at, touches) in any_belief(), choice in 0..3usize) {
         let touches = all(&touches);
@@ -293,8 +295,8 @@ proptest! {
         }
     }
 
-    /// However it is taken in: one by one, by conditioning anew, or as imagined. Taken in one by
-    /// one, the first entries of L⁻¹k* stay the same bits and one more square is added to their
+    /// Holds for all three ways of adding: one by one, by conditioning anew, or as a fantasy. One
+    /// by one, the first entries of L⁻¹k* keep their bits and one more square is added to their
     /// sum, so that only the rounding of that sum could raise the variance.
     #[test]
     fn a_touch_never_raises_the_variance((at, touches) in any_belief(), place in [-1.5..1.5f64, -1.5..1.5f64]) {
@@ -316,7 +318,7 @@ proptest! {
             prop_assert!(difference <= allowed, "{i}: {difference:e} of {allowed:e}");
             last = now;
         }
-        // What was touched is known at least as well as its touch says.
+        // The variance at a touched place is at most that of its touch.
         for (touched, _) in &touches {
             let known = grown.variance(touched, &mut scratch);
             let noise2 = at.noise_sd.powi(2);
@@ -359,7 +361,7 @@ proptest! {
     }
 }
 
-/// What all others say of an observation is what a belief without it says.
+/// Leave-one-out predictions equal those of a belief without the observation.
 #[test]
 fn an_observation_left_out_is_told_as_by_a_belief_without_it() {
     let places: Vec<[f64; 2]> =
@@ -388,7 +390,7 @@ fn an_observation_left_out_is_told_as_by_a_belief_without_it() {
     assert!((wide_sd - 3.0 * sd).abs() < 1e-12);
 }
 
-/// Side by side it is as one place at a time, for every number of touches and of places.
+/// Batch predictions equal those of single places, for every number of touches and of places.
 #[test]
 fn many_places_at_once_are_each_of_them_alone() {
     for is_sloped in [false, true] {

@@ -1,4 +1,4 @@
-//! A posterior through a few of its touches is what its equations say, and near the exact one.
+//! Tests of the posterior from inducing points: its equations, and its distance from the exact one.
 
 use nalgebra::{DMatrix, DVector};
 use palpate_gp::covariance::CovarianceError;
@@ -8,7 +8,7 @@ use palpate_gp::{Observations, Posterior};
 
 const KERNELS: [&dyn Kernel; 2] = [&SquaredExponential, &Matern52];
 
-/// Noisy heights of waves at the places of a Kronecker sequence.
+/// Returns noisy heights of waves at the places of a Kronecker sequence.
 fn touches(count: usize) -> Observations {
     let mut touches = Observations::new(2);
     for i in 0..count {
@@ -51,7 +51,7 @@ fn places(observations: &Observations) -> Vec<[f64; 2]> {
     (0..observations.len()).map(|i| [0, 1].map(|axis| observations.column(axis)[i])).collect()
 }
 
-/// The slow twin: Snelson & Ghahramani 2006, Eq. 8, as it stands there.
+/// Compares with a literal implementation of Snelson & Ghahramani 2006, Eq. 8.
 #[test]
 fn it_is_the_posterior_of_its_equations() {
     for kernel in KERNELS {
@@ -88,7 +88,7 @@ fn it_is_the_posterior_of_its_equations() {
     }
 }
 
-/// Where as many may be kept as there are touches, none is lost.
+/// With as many inducing points as touches, the posterior is exact.
 #[test]
 fn through_all_of_them_it_is_exact() {
     for kernel in KERNELS {
@@ -105,8 +105,9 @@ fn through_all_of_them_it_is_exact() {
     }
 }
 
-/// The less it loses, the nearer it is to the exact one; where that is a tenth of the noise, its
-/// means are within a tenth of the noise and its deviations within a tenth of theirs.
+/// The smaller the residual, the closer the posterior is to the exact one; with a residual of a
+/// tenth of the noise, its means are within a tenth of the noise and its standard deviations within
+/// a tenth of the exact ones.
 #[test]
 fn it_says_how_near_it_is() {
     let touches = touches(1500);
@@ -119,7 +120,7 @@ fn it_says_how_near_it_is() {
         for most in [40, 80, 160, 320, 640] {
             let Induced { posterior, left_sd } =
                 Posterior::through(most, kernel, at.clone(), &touches).unwrap();
-            // Once it is negligible no more are kept.
+            // No inducing points are added once the residual is negligible.
             assert!(left_sd <= last.max(0.02 * at.noise_sd), "{left_sd} {last}");
             assert!(posterior.observations().len() <= most);
             last = left_sd;
@@ -140,7 +141,7 @@ fn it_says_how_near_it_is() {
     assert!(near > 3, "{near}");
 }
 
-/// Touches at the same places are kept once, and their mean counts.
+/// Touches at the same place share one inducing point, with their mean.
 #[test]
 fn touches_at_one_place_are_kept_once() {
     let mut touches = Observations::new(1);

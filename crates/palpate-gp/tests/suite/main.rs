@@ -1,4 +1,4 @@
-//! Tests of the Gaussian process and its numerics, in one program.
+//! Tests of palpate-gp, in one binary.
 
 mod gp;
 mod inducing;

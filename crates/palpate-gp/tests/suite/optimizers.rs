@@ -1,4 +1,4 @@
-//! DIRECT asks for the places that NLopt's asks for; climbs reach their tops with few steps.
+//! Tests of the optimisers: DIRECT evaluates the places of NLopt's; climbs converge in few steps.
 
 use palpate_gp::math::climb::{Climb, Manner, climb};
 use palpate_gp::math::direct::direct;
@@ -14,7 +14,7 @@ fn hills(x: &[f64]) -> f64 {
     hill(-1.3, 0.4) + 1.2 * hill(1.1, -1.6)
 }
 
-/// Value and place of what was asked for, in the order in which it was.
+/// Returns value and place of all evaluations, in their order.
 fn asked(evaluations: u32, lower: &[f64], upper: &[f64], f: Objective) -> Vec<Vec<f64>> {
     let mut all = Vec::new();
     direct(Bounds { lower, upper }, evaluations, |places| {
@@ -24,9 +24,8 @@ fn asked(evaluations: u32, lower: &[f64], upper: &[f64], f: Objective) -> Vec<Ve
     all
 }
 
-/// The outside reference: of up to 800 places those that NLopt asks for, one at a time, are the
-/// same to the last bit and in the same order, but for those that a whole division asks for too
-/// many.
+/// External reference: up to 800 places that NLopt evaluates, one at a time, are the same to the
+/// last bit and in the same order, except for the additional ones of whole divisions.
 #[test]
 fn direct_asks_for_the_places_of_nlopts() {
     let line = |x: &[f64]| (3.0 * x[0]).sin() + 0.5 * (17.0 * x[0]).cos();
@@ -55,7 +54,7 @@ fn direct_asks_for_the_places_of_nlopts() {
         let mut next = ours.iter();
         let found = theirs.iter().filter(|place| next.any(|ours| ours == *place)).count();
         assert_eq!((theirs.len(), found), (800, 800), "{dimension}: {}", ours.len());
-        // More only where a better value was found within a round.
+        // More evaluations only where a better value was found within a round.
         assert!(ours.len() < 900, "{}", ours.len());
     }
 }
@@ -88,8 +87,8 @@ fn a_climb_reaches_the_end_of_rosenbrocks_valley() {
     assert!(top.evaluations < 100, "{top:?}");
 }
 
-/// Of a parabola the curvature is known after as many steps as it has axes; with it known from
-/// before, one step is enough. Where the top is outside, the climb ends on the border.
+/// The curvature of a parabola is known after as many steps as it has axes; with a known curvature,
+/// one step is enough. If the maximum is outside, the climb ends on the border.
 #[test]
 fn a_climb_of_a_parabola_is_short_and_stays_in_the_box() {
     let parabola = |x: &[f64], gradient: &mut [f64]| {
@@ -111,7 +110,7 @@ fn a_climb_of_a_parabola_is_short_and_stays_in_the_box() {
     assert_eq!((top.x, top.stop), (vec![2.0, 2.0], Stop::Converged));
 }
 
-/// What a climb may still reach is never below where it ends.
+/// The upper bound of a climb is never below its final value.
 #[test]
 fn hope_holds_the_top_near_it_and_a_climb_without_a_value_ends() {
     let hill = |x: &[f64], gradient: &mut [f64]| {

@@ -1,4 +1,4 @@
-//! Observed slopes: against values alone, against laws, and against slow twins.
+//! Tests of observed slopes against values alone, invariants, and reference implementations.
 
 use palpate_gp::kernel::{Hyperparameters, KERNELS, Kernel};
 use palpate_gp::likelihood::Likelihood;
@@ -7,7 +7,7 @@ use palpate_gp::{Mean, NoiseRatio, Observation, Observations, Posterior, Scale, 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-/// A place with its height and, of every second one, slopes.
+/// A place with its height and, for every second one, slopes.
 #[derive(Clone, Debug)]
 struct Touch {
     place: [f64; 2],
@@ -48,7 +48,7 @@ fn any_parameters() -> impl Strategy<Value = Hyperparameters> {
     })
 }
 
-/// The kernels with which slopes can be observed.
+/// Returns a kernel that supports slopes.
 fn kernel(choice: usize) -> &'static dyn Kernel {
     let smooth: Vec<_> = KERNELS.iter().filter(|(_, kernel)| kernel.has_slopes()).collect();
     assert_eq!(smooth.len(), 2);
@@ -66,7 +66,7 @@ fn only_surfaces_with_continuous_slopes_can_be_told_slopes() {
     assert_eq!(without, ["matern_32"]);
 }
 
-/// Without noise the mean passes through the height with the slope that was observed.
+/// Without noise the mean passes through the height with the observed slope.
 #[test]
 fn the_mean_has_the_slope_that_was_observed() {
     let at = Hyperparameters {
@@ -97,11 +97,11 @@ fn the_mean_has_the_slope_that_was_observed() {
     }
 }
 
-/// Half the way between two near heights that stand for a slope.
+/// Half the distance of two nearby heights that replace a slope.
 const HALF: f64 = 1e-3;
 
-/// Every touch as four heights around it. With errors of n each, their mean has an error of n / 2
-/// and a difference over its way, a slope, one of n·√2 / way, independent of it.
+/// Returns every touch as four heights around it. With errors of n each, their mean has an error of
+/// n / 2, and a difference over their distance, a slope, one of n·√2 / distance, independent of it.
 fn crosses(touches: &[Touch]) -> Observations {
     let mut crosses = Observations::new(2);
     for Touch { place, height, slope, .. } in touches {
@@ -122,8 +122,8 @@ fn crosses(touches: &[Touch]) -> Observations {
 }
 
 proptest! {
-    // The same cases each time: heights near each other stand for a slope up to the square of their
-    // distance, and one case in many thousands is worse than the bounds here.
+    // The cases are fixed: nearby heights replace a slope up to the square of their distance, and
+    // one case in many thousands exceeds the bounds here.
     #![proptest_config(ProptestConfig {
         rng_seed: RngSeed::Fixed(2016), ..ProptestConfig::default()
     })]
@@ -150,7 +150,7 @@ proptest! {
         prop_assert!(error < 1e-3 * at.signal_sd.powi(2), "{variances:?}");
     }
 
-    /// Their densities differ by a factor that no length scale changes.
+    /// The densities differ by a factor that does not depend on the length scale.
     #[test]
     fn the_likelihood_is_that_of_heights_very_near_each_other(
         touches in any_touches(), choice in 0..2usize, lengths in [0.5..1.5f64, 0.5..1.5f64],

@@ -1,14 +1,14 @@
-//! What can be wrong with a configuration, and where.
+//! Errors of a configuration, with their place.
 
 use crate::words::brief;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Where a value came from.
+/// Origin of a value.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Origin {
-    /// A file, and the line if the key stands in it.
+    /// A file, and the line if it contains the key.
     File {
         /// Its path as given.
         path: PathBuf,
@@ -29,41 +29,41 @@ impl fmt::Display for Origin {
     }
 }
 
-/// The error of a configuration: a message with its place, and its parts.
+/// Error of a configuration: a message with its place, and its parts.
 #[derive(Debug, Error)]
 #[error("{message}")]
 pub struct ConfigError {
     pub(super) message: String,
-    /// Where it stands; `None` of a `--set` that is no assignment.
+    /// Origin of the value; `None` for a `--set` that is not an assignment.
     pub origin: Option<Box<Origin>>,
     /// The key.
     pub key: Option<String>,
     /// The value found there.
     pub value: Option<String>,
-    /// What may stand there.
+    /// Allowed values.
     pub allowed: Option<String>,
 }
 
 impl ConfigError {
-    /// With the place and the message about it.
+    /// Creates an error from the place and the message.
     pub(super) fn new(origin: Origin, message: impl fmt::Display) -> Self {
         let message = format!("{origin}: {message}");
         Self { message, origin: Some(Box::new(origin)), key: None, value: None, allowed: None }
     }
 
-    /// A file that cannot be read.
+    /// Creates the error of a file that cannot be read.
     pub fn unreadable(path: &Path, cause: &std::io::Error) -> Self {
         Self::new(Origin::File { path: path.into(), line: None }, cause)
     }
 
-    /// A value that is not allowed.
+    /// Creates the error of a value that is not allowed.
     pub fn not_allowed(origin: Origin, key: String, value: String, allowed: String) -> Self {
         let message = format!("`{key}` = {}: allowed is {allowed}", brief(&value));
         let (key, value, allowed) = (Some(key), Some(value), Some(allowed));
         Self { key, value, allowed, ..Self::new(origin, message) }
     }
 
-    /// A value of the wrong type, an unknown choice, or a key given twice.
+    /// Creates the error of a value of the wrong type, an unknown choice, or a repeated key.
     pub(super) fn invalid(
         origin: Origin,
         key: String,
@@ -75,16 +75,16 @@ impl ConfigError {
         Self { key: Some(key), value, allowed: Some(allowed), ..Self::new(origin, message) }
     }
 
-    /// A file that is not TOML.
+    /// Creates the error of a file that is not TOML.
     pub(super) fn syntax(origin: Origin, expected: String) -> Self {
         let message = format!("not valid TOML: {expected}");
         Self { allowed: Some(expected), ..Self::new(origin, message) }
     }
 
-    /// A `--set` that is not `key=value`, or whose key leads through a value.
+    /// Creates the error of a `--set` that is not `key=value`, or whose key leads through a value.
     pub(super) fn assignment(text: &str) -> Self {
         let message = format!(
-            "--set {}: write it as key=value, with dots between tables, as in gp.noise=[1e-4,0.1]",
+            "--set {}: use key=value, with dots between tables, e.g. gp.noise=[1e-4,0.1]",
             brief(text)
         );
         Self { message, origin: None, key: None, value: Some(text.into()), allowed: None }

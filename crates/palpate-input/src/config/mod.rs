@@ -1,4 +1,5 @@
-//! Configuration: defaults → file → `--set key=value` → checked, with errors that say where.
+//! Configuration: defaults → file → `--set key=value` → validation, with errors that name the
+//! place.
 
 mod error;
 mod rules;
@@ -11,31 +12,31 @@ use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
-/// A file's text with the place of each of its keys.
+/// Text of a file, with the place of each of its keys.
 struct Source {
     path: PathBuf,
-    /// The key under which the file was included; empty for the outermost.
+    /// Key under which the file was included; empty for the outermost.
     prefix: String,
     document: toml_edit::Document<String>,
 }
 
-/// Most tables around a key that is set; chosen beyond any that there is, because tables within
-/// tables are walked by recursion.
+/// Largest nesting depth of a key that is set; a heuristic: beyond any existing one, since nested
+/// tables are traversed by recursion.
 const DEPTH_MAX: usize = 16;
 
-/// Whether a setting is left at its default, and need not be written.
+/// Whether a setting has its default, and need not be written.
 pub fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// A word that no setting knows.
+/// A word that is not a valid name of any setting.
 const UNKNOWN: &str = "\u{0}";
 
-/// A configuration while it is put together.
+/// A configuration during loading.
 pub struct Loader {
     table: Table,
     sources: Vec<Source>,
-    /// Keys set on the command line and how they were typed.
+    /// Keys set on the command line, with their text as typed.
     sets: Vec<(String, String)>,
     /// A table that is read as another one, and that one.
     read_as: Option<[&'static str; 2]>,
@@ -51,7 +52,7 @@ impl Loader {
         Self::of(path, text.map_err(|cause| ConfigError::unreadable(path, &cause))?)
     }
 
-    /// Takes `text`, which stands in `path`.
+    /// Creates a loader from `text`, the contents of `path`.
     ///
     /// # Errors
     /// If it is not TOML.
@@ -61,8 +62,7 @@ impl Loader {
         Ok(Self { table, sources: vec![source], sets: Vec::new(), read_as: None })
     }
 
-    /// Reads the table `key` as if it stood under `other`, unless there is one; messages name
-    /// `key`.
+    /// Reads the table `key` as if it were under `other`, unless that exists; messages name `key`.
     pub fn read_as(&mut self, key: &'static str, other: &'static str) {
         if let (false, Some(table)) = (self.table.contains_key(other), self.table.remove(key)) {
             self.table.insert(other.into(), table);
@@ -70,7 +70,7 @@ impl Loader {
         }
     }
 
-    /// The key under which `key` was given.
+    /// Returns the key under which `key` was given.
     fn given(&self, key: &str) -> String {
         match self.read_as.and_then(|[given, other]| Some((given, key.strip_prefix(other)?))) {
             Some((given, rest)) if rest.is_empty() || rest.starts_with(['.', '[']) => {
@@ -80,17 +80,17 @@ impl Loader {
         }
     }
 
-    /// Whether something stands under the dotted key.
+    /// Whether there is a value under the dotted key.
     pub fn has_value(&self, key: &str) -> bool {
         self.value(key).is_some()
     }
 
-    /// Whether the file itself, or an assignment so far, has the key.
+    /// Whether the file itself, or an assignment so far, contains the key.
     pub fn has(&self, key: &str) -> bool {
         self.table.contains_key(key)
     }
 
-    /// Takes the dotted key out of the table, with what stands there.
+    /// Removes the dotted key from the table and returns its value.
     pub fn take(&mut self, key: &str) -> Option<Value> {
         let (tables, last) = key.rsplit_once('.').unwrap_or(("", key));
         let mut table = &mut self.table;
@@ -100,12 +100,12 @@ impl Loader {
         table.remove(last)
     }
 
-    /// That `key` may not have this value.
+    /// Returns the error that `key` may not have this value.
     pub fn not_allowed(&self, key: &str, value: &str, allowed: &str) -> ConfigError {
         ConfigError::not_allowed(self.origin(key), key.into(), value.into(), allowed.into())
     }
 
-    /// That what was read is `found`, and not what was asked for.
+    /// Returns the error that the file is `found`, and not of the requested kind.
     pub fn other(&self, found: &'static str, remedy: &'static str) -> ConfigError {
         let path = self.sources.first().map(|source| source.path.clone()).unwrap_or_default();
         let origin = Origin::File { path, line: None };
@@ -113,7 +113,7 @@ impl Loader {
         ConfigError { allowed: Some(remedy.into()), ..ConfigError::new(origin, message) }
     }
 
-    /// If `key` names a file, puts that file's table in its place.
+    /// If `key` names a file, replaces it by that file's table.
     ///
     /// # Errors
     /// If the file cannot be read or is not TOML.
@@ -126,13 +126,13 @@ impl Loader {
         })?;
         let (table, document) = parse(&path, text)?;
         self.table.insert(key.into(), Value::Table(table));
-        // From here on, what stands under the key comes from the file.
+        // The values under the key now come from the file.
         self.sets.retain(|(set, _)| set != key);
         self.sources.push(Source { path, prefix: format!("{key}."), document });
         Ok(())
     }
 
-    /// Applies `key=value` as typed after `--set`; a value that is not TOML is taken as text.
+    /// Applies `key=value` as typed after `--set`; a value that is not TOML is read as text.
     ///
     /// # Errors
     /// If it is not of that form, or its key leads through something that is not a table.
@@ -180,16 +180,16 @@ impl Loader {
         }
     }
 
-    /// The table under the dotted `key`, the outermost if it is empty.
+    /// Returns the table under the dotted `key`, the outermost if it is empty.
     pub fn table_mut(&mut self, key: &str) -> Option<&mut Table> {
         let mut parts = steps(key);
         parts.try_fold(&mut self.table, |table, part| table.get_mut(part)?.as_table_mut())
     }
 
-    /// Fills in defaults and checks everything.
+    /// Fills in defaults and validates everything.
     ///
     /// # Errors
-    /// The first thing that is wrong, with its origin.
+    /// The first invalid value, with its origin.
     pub fn finish<T: DeserializeOwned + Checked>(self) -> Result<T, ConfigError> {
         let config: T = serde_path_to_error::deserialize(self.table.clone()).map_err(|error| {
             self.explain::<T>(&error.path().to_string(), error.inner().message())
@@ -226,7 +226,7 @@ impl Loader {
         }
         if let (true, Some(twice)) = (message.starts_with("duplicate field"), names.next()) {
             let key = join(path, &twice);
-            let message = "given by its present name and by a former one: keep one".into();
+            let message = "given by its current and by a former name; keep one".into();
             return ConfigError::invalid(self.origin(&key), key, None, message);
         }
         let key = String::from(path);
@@ -238,7 +238,7 @@ impl Loader {
         ConfigError::invalid(self.origin(&key), key, value, message)
     }
 
-    /// The names of which `key` must be one, told by asking for one that there is not.
+    /// Returns the allowed names of `key`, found by parsing an invalid one.
     fn choices<T: DeserializeOwned>(&self, key: &str) -> Option<String> {
         let mut table = self.table.clone();
         let mut parts = steps(key);
@@ -254,7 +254,7 @@ impl Loader {
         words::allowed(error.inner().message()).filter(|_| error.path().to_string() == key)
     }
 
-    /// The value under the dotted `key`.
+    /// Returns the value under the dotted `key`.
     pub fn value(&self, key: &str) -> Option<&Value> {
         let mut parts = steps(key);
         let mut value = self.table.get(parts.next()?)?;
@@ -267,7 +267,7 @@ impl Loader {
         Some(value)
     }
 
-    /// `name` as meant by whoever wrote it under `key`.
+    /// Resolves `name` relative to the origin of `key`.
     fn beside(&self, key: &str, name: &Path) -> PathBuf {
         match self.origin(key) {
             Origin::File { path, .. } => {
@@ -277,7 +277,7 @@ impl Loader {
         }
     }
 
-    /// Whether no file says anything of `key`, so that only `--set` can have made it.
+    /// Whether no file contains `key`, so that it can only come from `--set`.
     fn in_no_file(&self, key: &str) -> bool {
         self.sources.iter().all(|source| {
             let inner = key.strip_prefix(source.prefix.as_str()).unwrap_or(key);
@@ -306,17 +306,17 @@ impl Loader {
     }
 }
 
-/// `name` in the table at `path`, where `.` is the outermost.
+/// Joins `name` to the table at `path`, where `.` is the outermost.
 fn join(path: &str, name: &str) -> String {
     if path == "." { name.into() } else { format!("{path}.{name}") }
 }
 
-/// The parts of a dotted key; an index in brackets is a part of its own.
+/// Splits a dotted key into its parts; an index in brackets is a separate part.
 fn steps(key: &str) -> impl Iterator<Item = &str> {
     key.split(['.', '[', ']']).filter(|part| !part.is_empty())
 }
 
-/// Line of the innermost part of `key` that stands in the document.
+/// Returns the line of the innermost part of `key` that the document contains.
 fn line_of(document: &toml_edit::Document<String>, key: &str) -> Option<usize> {
     let mut table: &dyn toml_edit::TableLike = document.as_table();
     let mut found = None;
@@ -348,7 +348,7 @@ fn parse(path: &Path, text: String) -> Result<(Table, toml_edit::Document<String
     Ok((table, document))
 }
 
-/// Removes `.` and `folder/..` without asking the file system.
+/// Removes `.` and `folder/..` without accessing the file system.
 fn tidy(path: &Path) -> PathBuf {
     use std::path::Component;
     let mut tidy = PathBuf::new();

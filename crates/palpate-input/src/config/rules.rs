@@ -1,29 +1,29 @@
-//! What values may be: written once, used for the check and for the message.
+//! Validation rules: defined once, used for the check and for the message.
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::RangeInclusive;
 
-/// Checks values against what is allowed and keeps the first violation.
+/// Checks values against the rules and keeps the first violation.
 #[derive(Default)]
 pub struct Rules {
     prefix: String,
-    /// The first violation: the key, the value found, what is allowed.
+    /// First violation: key, value found, allowed values.
     pub(super) violation: Option<(String, String, String)>,
-    /// What is allowed under each key, if that is asked for.
+    /// Allowed values of each key, if they are recorded.
     record: Option<BTreeMap<String, String>>,
 }
 
 impl Rules {
-    /// What is allowed under each key of `checked`, as messages say it: ranges and names, not what
-    /// one key demands of another.
+    /// Returns the allowed values of each key of `checked`, as in messages: ranges and names, not
+    /// constraints between keys.
     pub fn of(checked: &impl Checked) -> BTreeMap<String, String> {
         let mut rules = Self { record: Some(BTreeMap::new()), ..Self::default() };
         checked.check(&mut rules);
         rules.record.unwrap_or_default()
     }
 
-    /// Whether `checked` breaks none.
+    /// Whether `checked` satisfies all rules.
     pub fn hold(checked: &impl Checked) -> bool {
         let mut rules = Self::default();
         checked.check(&mut rules);
@@ -36,28 +36,28 @@ impl Rules {
         }
     }
 
-    /// `key` must be a number in `allowed`; NaN never is.
+    /// Requires `key` to be a number in `allowed`; NaN never is.
     pub fn number(&mut self, key: &str, value: f64, allowed: RangeInclusive<f64>) {
         let described = || format!("{} to {}", allowed.start(), allowed.end());
         self.note(key, described);
         self.require(key, value, allowed.contains(&value), described);
     }
 
-    /// As [`number`](Self::number), of a key that may be left out.
+    /// Checks an optional key like [`number`](Self::number).
     pub fn given(&mut self, key: &str, value: Option<f64>, allowed: RangeInclusive<f64>) {
         if let Some(value) = value {
             self.number(key, value, allowed);
         }
     }
 
-    /// Each entry of `key` must be a number in `allowed`.
+    /// Requires each entry of `key` to be a number in `allowed`.
     pub fn numbers(&mut self, key: &str, values: &[f64], allowed: RangeInclusive<f64>) {
         for (i, &value) in values.iter().enumerate() {
             self.number(&format!("{key}[{i}]"), value, allowed.clone());
         }
     }
 
-    /// `key` must be an interval [smallest, largest] within `allowed`.
+    /// Requires `key` to be an interval [smallest, largest] within `allowed`.
     pub fn interval(&mut self, key: &str, [low, high]: [f64; 2], allowed: RangeInclusive<f64>) {
         self.numbers(key, &[low, high], allowed);
         self.require(key, format!("[{low}, {high}]"), low < high, || {
@@ -65,14 +65,15 @@ impl Rules {
         });
     }
 
-    /// `key` must be one of `names`.
+    /// Requires `key` to be one of `names`.
     pub fn one_of(&mut self, key: &str, value: &str, names: &[&str]) {
         self.note(key, || names.join(", "));
         let known = names.contains(&value);
         self.require(key, format!("\"{value}\""), known, || format!("one of {}", names.join(", ")));
     }
 
-    /// `key` with `value` must hold `condition`; if it does not, `allowed` says what would.
+    /// Requires `condition` of `key` with `value`; `allowed` describes the allowed values
+    /// otherwise.
     pub fn require(
         &mut self,
         key: &str,
@@ -85,7 +86,7 @@ impl Rules {
         }
     }
 
-    /// Checks the table under `key`.
+    /// Validates the table under `key`.
     pub fn table(&mut self, key: &str, checked: &impl Checked) {
         let outer = self.prefix.len();
         self.prefix += key;
@@ -95,7 +96,7 @@ impl Rules {
     }
 }
 
-/// A configuration that knows what its values may be.
+/// A configuration with validation rules.
 pub trait Checked {
     /// Applies every rule to `rules`.
     fn check(&self, rules: &mut Rules);

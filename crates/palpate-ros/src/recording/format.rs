@@ -1,4 +1,4 @@
-//! The contents of a recording: its metadata, its topics and the messages that only it has.
+//! Contents of a recording: its metadata, topics and custom messages.
 
 use crate::definition::{Definition, Described};
 use crate::message::{BioTacHand, JointState, JointTrajectory, Marker, WrenchStamped};
@@ -13,36 +13,36 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
-/// What a recording is of.
+/// Metadata of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct About {
-    /// Of the program that wrote it.
+    /// Version of the program that wrote it.
     pub version: String,
-    /// The experiment with every default written out, as TOML.
+    /// Experiment with all defaults written out, as TOML.
     pub experiment: String,
-    /// The planner's name.
+    /// Name of the planner.
     pub planner: String,
-    /// The trial's number.
+    /// Number of the trial.
     pub trial: u32,
-    /// What the body was reset with.
+    /// Seed of the reset.
     pub seed: u64,
-    /// What the body can do.
+    /// Capabilities of the backend.
     pub capabilities: Capabilities,
 }
 
-/// How what was recorded ended.
+/// End of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ending {
-    /// Why it ended before its last touch, if it did.
+    /// Reason why it ended before its last touch, if so.
     pub failure: Option<String>,
-    /// Whether it was interrupted from outside after a touch, so that it can be continued.
+    /// Whether it was interrupted externally after a touch, so that it can be continued.
     pub is_interrupted: bool,
 }
 
-/// Name of the metadata that an [`About`] is written to.
+/// Name of the metadata entry of an [`About`].
 pub(super) const ABOUT: &str = "palpate";
 
-/// Name of the metadata that an [`Ending`] is written to.
+/// Name of the metadata entry of an [`Ending`].
 pub(super) const ENDING: &str = "palpate_ending";
 
 const FAILURE: &str = "failure";
@@ -50,7 +50,7 @@ const INTERRUPTED: &str = "interrupted";
 
 impl About {
     pub(super) fn texts(&self) -> BTreeMap<String, String> {
-        // Names and numbers always have a JSON.
+        // Names and numbers can always be written as JSON.
         let capabilities = serde_json::to_string(&self.capabilities).unwrap_or_default();
         let texts = [
             ("version", self.version.clone()),
@@ -102,7 +102,7 @@ fn bad(texts: &BTreeMap<String, String>, name: &str) -> Invalid {
     Invalid::new(format!("in its metadata `{name}` is {found}"))
 }
 
-/// A channel, by its place in [`TOPICS`].
+/// A channel, by its index in [`TOPICS`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Topic {
     Joints,
@@ -127,39 +127,40 @@ pub const TOPICS: [(&str, &Definition); 8] = [
     ("/palpate/contacts", &Marker::DEFINITION),
 ];
 
-/// `palpate_msgs/Tick`: a command and the reading after it, or a reset and the reading after that.
+/// `palpate_msgs/Tick`: a command and the subsequent reading, or a reset and the subsequent
+/// reading.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tick<'a> {
-    /// Ticks since the reset; 0 is the reset.
+    /// Number of ticks since the reset; 0 is the reset.
     pub tick: u64,
-    /// What a reset was given; 0 in a tick.
+    /// Seed of a reset; 0 in a tick.
     pub seed: u64,
-    /// What was commanded, rad/s or m/s; empty in a reset.
+    /// Commanded velocities, rad/s or m/s; empty in a reset.
     pub command: Cow<'a, [f64]>,
-    /// Why there is no reading; empty if there is one.
+    /// Fault if there is no reading; otherwise empty.
     pub fault: Cow<'a, str>,
-    /// Since reset.
+    /// Time since reset, s.
     pub time_s: f64,
     /// Joint positions, rad or m.
     pub q: Cow<'a, [f64]>,
     /// Joint velocities, rad/s or m/s.
     pub qdot: Cow<'a, [f64]>,
-    /// The command as it was applied.
+    /// Command as applied.
     pub applied: Cow<'a, [f64]>,
-    /// Force, then torque in `T`; or empty.
+    /// Force, then torque, in `T`; or empty.
     pub wrench: Cow<'a, [f64]>,
     /// Point and normal in `T`, and force, of an ideal contact; or empty.
     pub ideal: Cow<'a, [f64]>,
-    /// Frames that arrived.
+    /// Tactile frames that arrived.
     #[serde(with = "frames")]
     pub frames: Cow<'a, [Frame]>,
-    /// The same frames: of each whether the skin slipped. It stands last, so that recordings
-    /// without it are beginnings of such a message.
+    /// Slip state of each of the same frames. It is the last field, so that recordings without it
+    /// are prefixes of such a message.
     #[serde(with = "slips")]
     pub slips: Cow<'a, [Frame]>,
 }
 
-/// Fields of a tick with `more` at their end.
+/// Defines the fields of a tick with `more` at their end.
 macro_rules! fields {
     ($($more:literal),*) => {
         concat!(
@@ -198,12 +199,12 @@ impl Described for Tick<'_> {
 }
 
 impl Tick<'_> {
-    /// A tick of a recording that does not say whether the skin slipped.
+    /// A tick of a recording without slip states.
     pub(super) const WITHOUT_SLIPS: Definition =
         Definition { fields: fields!(), ..Self::DEFINITION };
 }
 
-/// The loads and frames of a reading, where they lie while a tick is written.
+/// Loads and frames of a reading, stored while a tick is written.
 #[derive(Default)]
 pub(super) struct Loads {
     wrench: Option<[f64; 6]>,
@@ -212,7 +213,7 @@ pub(super) struct Loads {
 }
 
 impl Loads {
-    /// Takes those of `reading`, in the memory that it has.
+    /// Copies those of `reading`, without allocating.
     pub(super) fn take(&mut self, reading: &Reading) {
         self.wrench = reading
             .wrench
@@ -226,7 +227,7 @@ impl Loads {
 }
 
 impl<'a> Tick<'a> {
-    /// With what `reading` holds; `loads` are its own.
+    /// Fills in the contents of `reading`; `loads` are those of the same reading.
     pub(super) fn read(self, reading: &'a Reading, loads: &'a Loads) -> Self {
         Self {
             time_s: reading.time_s,
@@ -241,7 +242,7 @@ impl<'a> Tick<'a> {
         }
     }
 
-    /// Puts what was read into `reading`.
+    /// Copies the recorded values to `reading`.
     pub(super) fn write_to(self, reading: &mut Reading) {
         let mut frames = self.frames.into_owned();
         for (frame, said) in frames.iter_mut().zip(&*self.slips) {
@@ -272,7 +273,7 @@ impl<'a> Tick<'a> {
     }
 }
 
-/// Frames as lists, of which those that a frame lacks are empty.
+/// Serialises frames as lists; channels that a frame lacks are empty.
 mod frames {
     use palpate_explore::robot::finger::Frame;
     use serde::de::{Error, Unexpected};
@@ -330,8 +331,7 @@ mod frames {
     }
 }
 
-/// Of each frame whether the skin slipped: 1, 0, or 2 if that is not known; nothing if it is of
-/// none.
+/// Serialises the slip state of each frame: 1, 0, or 2 if it is not known; empty if none is known.
 mod slips {
     use palpate_explore::robot::finger::Frame;
     use serde::{Deserialize, Deserializer, Serializer};
@@ -352,22 +352,22 @@ mod slips {
     }
 }
 
-/// `palpate_msgs/Touch`: what a touch was asked for and found, written when it is done.
+/// `palpate_msgs/Touch`: target and result of a touch, written at its end.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Touch<'a> {
-    /// Counted from 1.
+    /// Number, from 1.
     pub touch: u32,
-    /// The body's time at its end.
+    /// The backend's time at its end.
     pub time_s: f64,
-    /// Where the finger was sent: (x) or (x, z) of the zone.
+    /// Target: (x) or (x, z) of the zone.
     pub target: Cow<'a, [f64]>,
     /// `contact`, `miss` or `overload`.
     pub outcome: Cow<'a, str>,
-    /// The point of contact in `W`, m; or empty.
+    /// Point of contact in `W`, m; or empty.
     pub contact: Cow<'a, [f64]>,
-    /// The contact's unit normal in `W`, towards the finger; or empty.
+    /// Unit normal of the contact in `W`, towards the finger; or empty.
     pub normal: Cow<'a, [f64]>,
-    /// The touch with the belief after it, as the trial's row holds it: JSON.
+    /// The touch with the subsequent belief, as in the trial's row, as JSON.
     pub row: Cow<'a, str>,
 }
 
@@ -386,17 +386,17 @@ impl Described for Touch<'_> {
     };
 }
 
-/// Says little-endian CDR (DDSI-RTPS 2.3, 10.2).
+/// Header of little-endian CDR (DDSI-RTPS 2.3, 10.2).
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 
-/// Puts `message` into `bytes`, in place of what was there.
+/// Serialises `message` to `bytes`, replacing the contents.
 pub(super) fn encode(bytes: &mut Vec<u8>, message: &impl Serialize) -> cdr_encoding::Result<()> {
     bytes.clear();
     bytes.extend_from_slice(&LITTLE_ENDIAN);
     cdr_encoding::to_writer::<_, LittleEndian, _>(bytes, message)
 }
 
-/// The message that `bytes` hold; none if they do not.
+/// Returns the message in `bytes`; `None` if they are invalid.
 pub fn decoded<'a, M: Deserialize<'a>>(bytes: &'a [u8]) -> Option<M> {
     let payload = bytes.strip_prefix(&LITTLE_ENDIAN)?;
     let (message, _) = cdr_encoding::from_bytes::<M, LittleEndian>(payload).ok()?;

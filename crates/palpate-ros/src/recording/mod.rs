@@ -1,13 +1,13 @@
-//! Recordings of bodies: everything that was commanded and read, in a file that others open too.
+//! Recordings of a robot: all commands and readings, in a standard file format.
 //!
 //! A [`Recording`] is an MCAP file with ROS 2 messages (schemas `ros2msg`, encoding `cdr`, profile
-//! `ros2`), so that Foxglove, Rerun and Python read it. A [`Recorder`] is a body around a body that
-//! writes every tick; who runs the trial adds its touches to the same recording and ends it.
-//! [`Recorded`] is such a file read back, also one that was cut short, and a [`Player`] is a body
-//! that plays it.
+//! `ros2`), so that Foxglove, Rerun and Python can read it. A [`Recorder`] is a backend that wraps
+//! another and writes every tick; the program that runs the trial adds its touches to the same
+//! recording and ends it. [`Recorded`] is such a file after reading, even if it was truncated, and
+//! a [`Player`] is a backend that replays it.
 //!
-//! The messages of the lab's kind hold what they can; `palpate_msgs/msg/Tick` holds every number of
-//! a tick to the bit, and is all that a player needs.
+//! The standard messages contain what they can represent; `palpate_msgs/msg/Tick` contains every
+//! number of a tick to the bit, and suffices for replay.
 
 mod format;
 mod reader;

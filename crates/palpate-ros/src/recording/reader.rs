@@ -1,4 +1,4 @@
-//! A recording read back, and the body that plays it.
+//! Reader of recordings, and the backend that replays them.
 
 use super::format::{ABOUT, About, ENDING, Ending, Tick, Touch, decoded};
 use crate::definition::{Definition, Described};
@@ -13,24 +13,23 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Most bytes of a recording that is read; chosen: a day of the PA-10.
+/// Largest size of a recording, in bytes; a heuristic: a day of the PA-10.
 const FILE_MAX: u64 = 16 << 30;
 
-/// A recording read back whole, or as far as it goes if it was cut short.
+/// A recording in memory, complete or up to its truncation.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// What it is of.
+    /// Metadata.
     pub about: About,
-    /// Its touches.
+    /// Touches.
     pub touches: Vec<Touch<'static>>,
-    /// How many of the touches were made before the recording began: those of a trial that was
-    /// continued.
+    /// Number of touches made before the recording began, in a trial that was continued.
     pub made: usize,
-    /// How many ticks it has, resets among them.
+    /// Number of ticks, including resets.
     pub tick_count: usize,
-    /// How the trial ended; none of a file that was cut short.
+    /// End of the trial; `None` for a truncated file.
     pub ending: Option<Ending>,
-    /// The file: ticks are many, and read again when they are asked for.
+    /// Contents of the file; the many ticks are decoded on request.
     bytes: Arc<[u8]>,
 }
 
@@ -38,16 +37,16 @@ impl Recorded {
     /// Reads a file.
     ///
     /// # Errors
-    /// If it cannot be read, is no recording or damaged. A file that was cut short is not damaged:
-    /// it ends there.
+    /// If it cannot be read, or is not a recording or is damaged. A truncated file is not damaged:
+    /// it ends early.
     pub fn read(path: &Path) -> Result<Self, Invalid> {
         Self::of(files::bytes(path, FILE_MAX).map_err(|error| Invalid::new(error.to_string()))?)
     }
 
-    /// The recording that `bytes` are.
+    /// Reads the recording in `bytes`.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// The errors of [`read`](Self::read).
     pub fn of(bytes: Vec<u8>) -> Result<Self, Invalid> {
         let bytes: Arc<[u8]> = bytes.into();
         let (mut about, mut ending) = (None, None);
@@ -66,21 +65,21 @@ impl Recorded {
         }
         let about = about.ok_or_else(|| {
             Invalid::new(
-                "not a recording of palpate, or cut before it says of what: it has no metadata `palpate`",
+                "not a palpate recording, or truncated at the start: the metadata `palpate` is missing",
             )
         })?;
         Ok(Self { about, touches, made, tick_count, ending, bytes })
     }
 
-    /// Its ticks, from the first.
+    /// Returns its ticks, from the first.
     pub fn ticks(&self) -> impl Iterator<Item = Tick<'static>> + use<> {
         let mut entries = Entries::new(Arc::clone(&self.bytes));
         std::iter::from_fn(move || next_tick(&mut entries))
     }
 }
 
-/// A body that returns what was read, as long as it is told what was told: every bit of every
-/// command is compared.
+/// A backend that returns the recorded readings, as long as it receives the recorded commands:
+/// every bit of every command is compared.
 pub struct Player {
     recorded: Recorded,
     entries: Entries,
@@ -88,7 +87,7 @@ pub struct Player {
 }
 
 impl Player {
-    /// Plays `recorded`.
+    /// Creates a player of `recorded`.
     pub fn new(recorded: Recorded) -> Self {
         let entries = Entries::new(Arc::clone(&recorded.bytes));
         Self { recorded, entries, reading: Reading::default() }
@@ -100,7 +99,7 @@ impl Backend for Player {
         &self.recorded.about.capabilities
     }
 
-    /// Goes back to the first reset with that seed.
+    /// Returns to the first reset with this seed.
     fn reset(&mut self, seed: u64) -> Result<&Reading, Fault> {
         self.entries = Entries::new(Arc::clone(&self.recorded.bytes));
         let mut ticks = std::iter::from_fn(|| next_tick(&mut self.entries));
@@ -129,8 +128,8 @@ impl Backend for Player {
     }
 }
 
-/// The first joint whose bits differ, with both values; one that only one of them has is not a
-/// number in the other.
+/// Compares commands bit by bit; returns the first joint that differs, with both values; a missing
+/// value is NaN.
 fn compare(recorded: &[f64], now: &[f64]) -> Result<(), (usize, f64, f64)> {
     let value = |list: &[f64], joint| list.get(joint).copied().unwrap_or(f64::NAN);
     for joint in 0..recorded.len().max(now.len()) {
@@ -143,10 +142,10 @@ fn compare(recorded: &[f64], now: &[f64]) -> Result<(), (usize, f64, f64)> {
     Ok(())
 }
 
-/// Bytes that no record of ours reaches; chosen.
+/// Largest size of a record, in bytes; a heuristic: beyond all records written by this program.
 const RECORD_MAX: usize = 64 << 20;
 
-/// What a reader of recordings looks for.
+/// An entry that a reader uses.
 enum Entry {
     About(BTreeMap<String, String>),
     Tick(Tick<'static>),
@@ -157,18 +156,18 @@ enum Entry {
 /// Decodes a message.
 type Decode = fn(&[u8]) -> Option<Entry>;
 
-/// Messages that are read back. The slips of a tick stand last, so that a tick without them is the
-/// beginning of one that ends with an empty list of them.
+/// Messages that are read. The slips of a tick are its last field, so that a tick without them is
+/// the prefix of one with an empty list of them.
 const DECODERS: [(Definition, Decode); 3] = [
     (Tick::DEFINITION, |data| decoded(data).map(Entry::Tick)),
     (Tick::WITHOUT_SLIPS, |data| decoded(&[data, &EMPTY_LIST].concat()).map(Entry::Tick)),
     (Touch::DEFINITION, |data| decoded(data).map(Entry::Touch)),
 ];
 
-/// An empty list: its length, behind lists that leave it aligned.
+/// An empty list: its length, after lists that keep it aligned.
 const EMPTY_LIST: [u8; 4] = [0; 4];
 
-/// The entries of a file up to its end, also if that lies in the midst of a record.
+/// Entries of a file up to its end, even if that is within a record.
 struct Entries {
     bytes: Arc<[u8]>,
     at: usize,
@@ -188,7 +187,7 @@ impl Entries {
         Self { bytes, at: 0, reader, schemas, channels, is_over: false }
     }
 
-    /// The next entry; none at the end of what is there, and after an error.
+    /// Returns the next entry; `None` at the end, and after an error.
     fn next(&mut self) -> Result<Option<Entry>, Invalid> {
         if self.is_over {
             return Ok(None);
@@ -212,7 +211,7 @@ impl Entries {
                     self.reader.notify_read(part.len());
                     self.at += part.len();
                 }
-                // What follows repeats what stood before it.
+                // The rest repeats earlier content.
                 LinearReadEvent::Record { opcode: op::DATA_END, .. } => return Ok(None),
                 LinearReadEvent::Record { opcode, data } => {
                     let is_known = [op::SCHEMA, op::CHANNEL, op::MESSAGE, op::METADATA];
@@ -230,7 +229,8 @@ impl Entries {
     }
 }
 
-/// What a record says, or nothing if it is only a part of the file's order or for others.
+/// Decodes a record; returns `None` if it only belongs to the file's structure or is of another
+/// type.
 fn entry(
     record: McapResult<Record>,
     (schemas, channels): (&mut HashMap<u16, Decode>, &mut HashMap<u16, Decode>),
@@ -245,7 +245,7 @@ fn entry(
                 let (_, decode) = found.ok_or_else(|| {
                     let name = &header.name;
                     Invalid::new(format!(
-                        "its messages {name} have other fields than this version's"
+                        "the fields of its messages {name} differ from this version's"
                     ))
                 })?;
                 schemas.insert(header.id, *decode);
@@ -265,29 +265,30 @@ fn entry(
         }),
         Record::Message { header, data } => {
             let Some(decode) = channels.get(&header.channel_id) else { return Ok(None) };
-            let unreadable = || damaged(at, "a message that is shorter or longer than its fields");
+            let unreadable = || damaged(at, "a message whose length does not match its fields");
             decode(&data).map(Some).ok_or_else(unreadable)
         }
         _ => Ok(None),
     }
 }
 
-/// The error of a file of which `at` bytes were read.
+/// Returns the error of a file of which `at` bytes were read.
 fn damaged(at: usize, error: impl fmt::Display) -> Invalid {
     Invalid::new(format!("damaged before byte {at}: {error}"))
 }
 
-/// The error of the MCAP reader.
+/// Returns the error of the MCAP reader.
 fn unreadable(at: usize, error: McapError) -> Invalid {
     match error {
         McapError::BadMagic if at <= mcap::MAGIC.len() => {
-            Invalid::new("not a recording: it does not begin as an MCAP file does")
+            Invalid::new("not a recording: it does not begin like an MCAP file")
         }
         error => damaged(at, error),
     }
 }
 
-/// The next tick among `entries`; an error ends them, for what was read once can be read again.
+/// Returns the next tick among `entries`; an error ends them, since the file was already read once
+/// without errors.
 fn next_tick(entries: &mut Entries) -> Option<Tick<'static>> {
     loop {
         if let Entry::Tick(tick) = entries.next().ok()?? {

@@ -1,4 +1,4 @@
-//! A recording while it is written, and the body around any body that writes its ticks.
+//! Writer of recordings, and the backend wrapper that records its ticks.
 
 use super::format::{ABOUT, About, ENDING, Ending, Loads, TOPICS, Tick, Topic, Touch, encode};
 use crate::message::{
@@ -19,33 +19,33 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 
-/// Nanoseconds since 1970.
+/// Clock in nanoseconds since 1970.
 pub type Clock = fn() -> u64;
 
-/// The time of day.
+/// Returns the time of day.
 pub fn wall_clock() -> u64 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// Bytes of a chunk at which it is written although its touch goes on; chosen: a minute of the
-/// PA-10. So much address space is set aside at once, so that no tick asks for memory.
+/// Chunk size at which a chunk is written although its touch is not done; a heuristic: a minute of
+/// the PA-10. The address space is reserved in advance, so that ticks do not allocate.
 const CHUNK_MAX: u64 = 16 << 20;
 
-/// A recording, shared by the body that is recorded and whoever runs its trial.
+/// A recording, shared by the recorded backend and the program that runs its trial.
 ///
 /// A touch is one chunk of the file: it is kept in memory while it lasts, so that no tick waits for
-/// a disk, and is handed to the operating system at its end. A process that is killed loses the
-/// touch in hand.
+/// a disk, and is passed to the operating system at its end. A process that is killed loses the
+/// current touch.
 ///
-/// A message's `log_time` is the wall clock's when it is written, its `publish_time` and the stamp
-/// in its header are the body's own time since reset.
+/// A message's `log_time` is the wall clock's when it is written; its `publish_time` and the stamp
+/// in its header are the backend's time since reset.
 #[derive(Clone)]
 pub struct Recording(Arc<Mutex<Sheet>>);
 
-/// What a recording is written on.
+/// State of the writer.
 struct Sheet {
-    /// None once it is ended.
+    /// `None` after the end.
     writer: Option<Writer<NoSeek<Box<dyn Write + Send>>>>,
     channels: [u16; TOPICS.len()],
     message: Vec<u8>,
@@ -54,7 +54,7 @@ struct Sheet {
 }
 
 impl Recording {
-    /// Begins the file `path`, in place of what was there.
+    /// Creates the file `path`, replacing an existing one.
     ///
     /// # Errors
     /// [`Fault::Unrecorded`] if it cannot be written.
@@ -64,7 +64,7 @@ impl Recording {
         Self::new(Box::new(BufWriter::new(file)), about, wall_clock)
     }
 
-    /// Begins a recording that is written to `out`, its messages logged by `clock`.
+    /// Creates a recording that is written to `out`, with log times from `clock`.
     ///
     /// # Errors
     /// [`Fault::Unrecorded`] if it cannot be written.
@@ -73,8 +73,8 @@ impl Recording {
         Ok(Self(Arc::new(Mutex::new(sheet))))
     }
 
-    /// Adds a touch that is done, with the `shapes` that show what was then known: the belief and
-    /// the contacts. What was recorded so far is handed to the operating system.
+    /// Adds a finished touch, with `shapes` that show the belief and the contacts at that time. The
+    /// recording so far is passed to the operating system.
     ///
     /// # Errors
     /// [`Fault::Unrecorded`] if it cannot be written.
@@ -90,7 +90,7 @@ impl Recording {
         sheet.write(touch.time_s, |writer| writer.flush())
     }
 
-    /// Ends the file with why the trial ended before its last touch, if it did.
+    /// Ends the file with the reason why the trial ended before its last touch, if so.
     ///
     /// # Errors
     /// [`Fault::Unrecorded`] if it cannot be written.
@@ -129,7 +129,7 @@ impl Sheet {
         Ok(Self { writer: Some(writer), channels, message: Vec::new(), sequence: 0, clock })
     }
 
-    /// Adds a message of the body's time `time_s`.
+    /// Adds a message with the backend's time `time_s`.
     fn put(&mut self, topic: Topic, time_s: f64, message: &impl Serialize) -> Result<(), Fault> {
         let mut bytes = std::mem::take(&mut self.message);
         encode(&mut bytes, message).map_err(|error| unrecorded(time_s, &error))?;
@@ -150,7 +150,7 @@ impl Sheet {
         time_s: f64,
         write: impl FnOnce(&mut Writer<NoSeek<Box<dyn Write + Send>>>) -> McapResult<()>,
     ) -> Result<(), Fault> {
-        let ended = || unrecorded(time_s, &"it is ended");
+        let ended = || unrecorded(time_s, &"it has already ended");
         let writer = self.writer.as_mut().ok_or_else(ended)?;
         write(writer).map_err(|error| unrecorded(time_s, &error))
     }
@@ -164,15 +164,15 @@ fn unrecorded(time_s: f64, message: &dyn std::fmt::Display) -> Fault {
     Fault::Unrecorded { time_s, message: message.to_string() }
 }
 
-/// A body whose ticks are recorded. A tick that cannot be kept is a fault, also where the body
-/// made it.
+/// A backend that records the ticks of another. A tick that cannot be recorded is a fault, even if
+/// the backend executed it.
 pub struct Recorder {
     inner: Box<dyn Backend>,
     recording: Recording,
     page: Page,
 }
 
-/// What is kept from tick to tick, so that none asks for memory.
+/// Buffers kept from tick to tick, so that ticks do not allocate.
 struct Page {
     loads: Loads,
     tick: u64,
@@ -184,7 +184,7 @@ struct Page {
 }
 
 impl Recorder {
-    /// Writes to `recording` what `inner` is told and reads.
+    /// Records the commands and readings of `inner` to `recording`.
     pub fn new(inner: Box<dyn Backend>, recording: Recording) -> Self {
         let page = Page::new(inner.capabilities());
         Self { inner, recording, page }
@@ -252,7 +252,7 @@ impl Page {
         }
     }
 
-    /// Writes `tick` with what `reading` holds.
+    /// Writes `tick` with the contents of `reading`.
     fn write(&mut self, sheet: &mut Sheet, reading: &Reading, tick: Tick) -> Result<(), Fault> {
         let time_s = reading.time_s;
         self.time_s = time_s;

@@ -1,4 +1,4 @@
-//! The publishers that the master of ROS 1 knows, and connections to them without delay.
+//! Publishers known to the ROS 1 master, and TCP connections without delay.
 
 use crate::topics::{Topic, Topics};
 use std::io::{Read, Write};
@@ -9,23 +9,23 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long the master is waited for; chosen.
+/// Timeout of the master; a heuristic.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// How often it is asked; chosen: it takes milliseconds to answer.
+/// Interval of queries; a heuristic: the master answers within milliseconds.
 const EVERY: Duration = Duration::from_millis(250);
 
-/// Known publishers of each topic, counted in a thread of its own, so that nobody waits for the
-/// master; it looks after new connections, too.
+/// Count of known publishers of each topic, in its own thread, so that no caller waits for the
+/// master; the thread also configures new connections.
 pub struct Census {
     counts: Arc<[AtomicUsize; Topic::ALL.len()]>,
-    /// Ends the thread when it is gone.
+    /// Ends the thread when dropped.
     stop: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Census {
-    /// Of `topics`, as the master at `uri` says.
+    /// Creates the census of `topics` at the master `uri`.
     pub fn new(uri: &str, topics: &Topics) -> Self {
         let counts: Arc<[AtomicUsize; Topic::ALL.len()]> = Arc::default();
         let (uri, topics, shared) = (uri.to_owned(), topics.clone(), Arc::clone(&counts));
@@ -47,7 +47,7 @@ impl Census {
         Self { counts, stop: Some(stop), thread: Some(thread) }
     }
 
-    /// How many nodes publish `topic`; none if the master does not say.
+    /// Returns the number of nodes that publish `topic`; `None` if the master does not answer.
     pub fn publishers(&self, topic: Topic) -> usize {
         self.counts[topic as usize].load(Ordering::Relaxed)
     }
@@ -62,7 +62,7 @@ impl Drop for Census {
     }
 }
 
-/// What the master answers to `getSystemState`.
+/// Returns the master's answer to `getSystemState`.
 fn state(uri: &str) -> Option<String> {
     let host = uri.strip_prefix("http://")?.trim_end_matches('/');
     let address = host.to_socket_addrs().ok()?.next()?;
@@ -81,9 +81,9 @@ fn state(uri: &str) -> Option<String> {
     Some(text)
 }
 
-/// Has every TCP connection of this process send without delay. ROS 1 asks for that in a
-/// connection's header, and roslibrust 0.26 does not do as asked: a small message then waits for
-/// the acknowledgement of the one before, for up to 40 ms.
+/// Sets TCP_NODELAY on every TCP connection of this process. ROS 1 requests it in a connection's
+/// header, but roslibrust 0.26 ignores the request: a small message then waits for the
+/// acknowledgement of the previous one, for up to 40 ms.
 #[cfg(unix)]
 fn send_at_once() {
     use socket2::SockRef;
@@ -94,15 +94,16 @@ fn send_at_once() {
     let numbers = open.flatten().filter_map(|entry| entry.file_name().to_str()?.parse().ok());
     let numbers: Vec<RawFd> = numbers.collect();
     for number in numbers {
-        // SAFETY: used for one call only. Closed meanwhile, it names nothing or another file, of
-        // which the call refuses all but connections.
+        // SAFETY: used for one call only. If it is closed meanwhile, it refers to nothing or to
+        // another file, and the call fails on everything except connections.
         let descriptor = unsafe { BorrowedFd::borrow_raw(number) };
         let _ = SockRef::from(&descriptor).set_tcp_nodelay(true);
     }
 }
 
-/// How many nodes publish `topic` by an answer to `getSystemState`, which is `[code, words,
-/// [publishers, subscribers, services]]`; each of the three is a list of `[topic, [node…]]`.
+/// Returns the number of nodes that publish `topic` in an answer to `getSystemState`, which is
+/// `[code, words, [publishers, subscribers, services]]`; each of the three is a list of `[topic,
+/// [node…]]`.
 fn count(text: &str, topic: &str) -> Option<usize> {
     let compact: String = text.chars().filter(|c| !c.is_whitespace()).collect();
     let publishers = list_at(compact.split_once("<methodResponse>")?.1, 3)?;
@@ -112,7 +113,7 @@ fn count(text: &str, topic: &str) -> Option<usize> {
     Some(nodes.matches("<string>").count())
 }
 
-/// What the first list holds that lies in `depth` lists, itself among them.
+/// Returns the contents of the first list at nesting depth `depth`.
 fn list_at(text: &str, depth: usize) -> Option<&str> {
     let mut start = 0;
     for _ in 0..depth {

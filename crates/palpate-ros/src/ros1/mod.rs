@@ -1,4 +1,4 @@
-//! ROS 1, by roslibrust: for labs whose drivers are of that age.
+//! ROS 1 transport by roslibrust, for drivers of ROS 1.
 
 mod master;
 mod wire;
@@ -21,34 +21,34 @@ use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use wire::{Counted, Request, Trigger};
 
-/// Messages that wait in a reader or writer; chosen, more than come while a thread is held up.
+/// Queue length of a reader or writer; a heuristic: more than arrive while a thread is delayed.
 const QUEUE: usize = 64;
 
-/// How long an answer to a call from outside is waited for; chosen.
+/// Timeout of the answer to an incoming call; a heuristic.
 const ANSWER: Duration = Duration::from_millis(500);
 
-/// Publishes a packet if it is of its topic and type.
+/// Publishes a packet if its topic and type match.
 type Writer = Box<dyn Fn(&Runtime, &Packet) -> Option<Result<(), String>>>;
 
-/// One side's end in a ROS 1 network.
+/// One side in a ROS 1 network.
 pub struct Ros1 {
     runtime: Runtime,
     node: NodeHandle,
     census: Census,
     topics: Topics,
-    /// What arrives is put in, by any thread; `None` only wakes.
+    /// Received items from any thread; `None` only wakes the receiver.
     inlet: Sender<Option<Delivery>>,
     outlet: Receiver<Option<Delivery>>,
     writers: Vec<Writer>,
-    /// Kept, for a service ends with it.
+    /// Kept alive, since a service ends when it is dropped.
     _servers: Vec<ServiceServer>,
-    /// Calls from outside that wait for their answer.
+    /// Incoming calls that wait for their answer.
     waiting: Arc<Mutex<HashMap<u64, Sender<TriggerResponse>>>>,
 }
 
-/// Spares ROS 1 the loading of certificates, which nobody uses there: each attempt to reach a dead
-/// publisher would load them anew and hold messages up for 200 ms. To be called before any thread
-/// runs, as a program's first act.
+/// Disables the loading of TLS certificates, which ROS 1 does not use: each attempt to reach a dead
+/// publisher would load them again and delay messages for 200 ms. Call it before any thread runs,
+/// at the start of a program.
 pub fn spare_certificates() {
     // SAFETY: no other thread reads the environment yet.
     unsafe {
@@ -58,10 +58,10 @@ pub fn spare_certificates() {
 }
 
 impl Ros1 {
-    /// An end on one side of the arm of `settings`; `services` are those that are served.
+    /// Opens one side of the arm of `settings`; `services` are those that are served.
     ///
     /// # Errors
-    /// If there is no master, or it does not take the node.
+    /// If there is no master, or it rejects the node.
     pub fn open(
         settings: &BackendSettings,
         side: Side,
@@ -114,7 +114,7 @@ impl Ros1 {
         }
     }
 
-    /// A topic with messages of type `M`, which have a header.
+    /// Creates a topic with messages of type `M`, which have a header.
     fn headed<M: Packed + Clone>(&mut self, side: Side, topic: Topic) -> Result<(), Invalid>
     where
         Counted<M>: RosMessageType,
@@ -130,8 +130,8 @@ impl Ros1 {
         )
     }
 
-    /// A topic with messages of type `M`: a writer on the side that publishes it, a reader on the
-    /// other.
+    /// Creates a topic with messages of type `M`: a writer on the side that publishes it, a reader
+    /// on the other.
     fn topic<M: RosMessageType>(
         &mut self,
         side: Side,
@@ -174,7 +174,7 @@ impl Ros1 {
         Ok(())
     }
 
-    /// A service is answered by the link's loop; the caller's task waits for it.
+    /// Registers a service; the link's loop answers it, and the caller's task waits for that.
     fn serve(&mut self, number: usize, service: Service) -> Result<(), Invalid> {
         let name = service.name(self.topics.namespace());
         let (inlet, waiting) = (self.inlet.clone(), Arc::clone(&self.waiting));
@@ -185,7 +185,7 @@ impl Ros1 {
             let _ = inlet.send(Some(Delivery::Call { service: service.clone(), call: number }));
             Ok(answer.recv_timeout(ANSWER).unwrap_or_else(|_| TriggerResponse {
                 success: false,
-                message: "not answered in time".into(),
+                message: "no answer within the timeout".into(),
             }))
         };
         let server = self
@@ -225,7 +225,7 @@ impl Transport for Ros1 {
         self.census.publishers(topic)
     }
 
-    /// A call asks the master for the server by itself.
+    /// Returns true: a call queries the master for the server itself.
     fn is_served(&mut self, _: &Service) -> bool {
         true
     }

@@ -1,4 +1,4 @@
-//! The messages as ROS 1 has them: those of ROS 2 but for the header, which counts too.
+//! Wire format of ROS 1 messages: as in ROS 2, except that the header has a sequence number.
 
 use crate::definition::{Described, Text};
 use crate::message::{
@@ -8,17 +8,18 @@ use crate::message::{
 use roslibrust::{MessageDescriptor, RosMessageType, RosServiceType};
 use serde::{Deserialize, Serialize};
 
-/// A message with a header as ROS 1 sends it: the header's number comes before its other fields,
-/// which are the first of the message.
+/// A message with a header as sent by ROS 1: the header's sequence number comes before its other
+/// fields, which are the first of the message.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Counted<M> {
-    /// Consecutive number.
+    /// Sequence number.
     pub seq: u32,
     /// The message.
     pub message: M,
 }
 
-/// Message types with their names in ROS 1 and the MD5 sums of their definitions (genmsg 0.6).
+/// Implements message types with their ROS 1 names and the MD5 sums of their definitions (genmsg
+/// 0.6).
 macro_rules! ros1 {
     ($($type:ty: $message:ident = $name:literal, $md5:literal;)*) => {$(
         impl RosMessageType for $type {
@@ -47,10 +48,10 @@ ros1! {
         "std_msgs/Float64MultiArray", "4b7d974086d4060e7db4613a7e6c3ba4";
 }
 
-/// `std_srvs/Trigger`.
+/// The service `std_srvs/Trigger`.
 pub struct Trigger;
 
-/// Its request, which is empty.
+/// Empty request.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Request {}
 

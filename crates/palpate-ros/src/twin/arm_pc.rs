@@ -1,49 +1,49 @@
-//! What an arm's own computer does between the network and the servos: it takes velocity commands
-//! that are fresh and whole, stops the arm when they cease, and brakes.
+//! Simulated arm computer between the network and the servos: accepts recent, complete velocity
+//! commands, stops the arm when they cease, and brakes.
 
 use crate::joints::JointNames;
 use crate::settings::CLOCK_AHEAD_S;
 use crate::status::ArmStatus;
 use crate::transport::Packet;
 
-/// The arm is stopped when the last command has not been valid for so long; chosen: two periods at
+/// Time after the expiry of the last command at which the arm stops; a heuristic: two periods at
 /// 250 Hz.
 const GRACE_S: f64 = 0.008;
 
-/// How long a stop takes; chosen: the servos' own lag of 0.02 s makes it soft, and the arm is at
+/// Duration of a stop; a heuristic: the servos' own lag of 0.02 s smooths it, and the arm is at
 /// rest 0.1 s later.
 const RAMP_S: f64 = 0.01;
 
-/// Share of a limit that rounding may exceed it by.
+/// Relative tolerance of a limit for rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Two that command within this time are two at once.
+/// Time within which commands from two publishers count as simultaneous.
 const TOGETHER_S: f64 = 0.5;
 
-/// The state between network and servos. Times are seconds of a monotonic clock.
+/// State between network and servos. Times are seconds of a monotonic clock.
 pub struct ArmPc {
     names: JointNames,
-    /// Largest speed of each joint, rad/s or m/s.
+    /// Speed limit of each joint, rad/s or m/s.
     qdot_limits: Vec<f64>,
-    /// Silence after which the arm is stopped.
+    /// Time without a command after which the arm stops.
     silence_s: f64,
     status: ArmStatus,
-    /// The last command.
+    /// Last command.
     wanted: Vec<f64>,
     incoming: Vec<f64>,
     applied: Vec<f64>,
     commanded_s: Option<f64>,
-    /// Who commanded last, and when.
+    /// Last publisher and the time of its command.
     sender: Option<(u64, f64)>,
-    /// When and from which velocities a stop began.
+    /// Start time and initial velocities of a stop.
     stop: Option<(f64, Vec<f64>)>,
     refused: u64,
     refusal: String,
 }
 
 impl ArmPc {
-    /// Returns one at rest with closed brakes. Commands are valid for `valid_s`; one beyond
-    /// `qdot_limits`, the largest speeds of the joints, is refused and stops the arm.
+    /// Creates an arm at rest with closed brakes. Commands are valid for `valid_s`; one beyond
+    /// `qdot_limits`, the speed limits of the joints, is refused and stops the arm.
     pub fn new(names: JointNames, qdot_limits: Vec<f64>, valid_s: f64) -> Self {
         let count = names.names().len();
         let status = ArmStatus { brake: true, deadman: true, ..ArmStatus::default() };
@@ -63,17 +63,17 @@ impl ArmPc {
         }
     }
 
-    /// As it is told.
+    /// Returns the status that it reports.
     pub fn status(&self) -> &ArmStatus {
         &self.status
     }
 
-    /// Commands that were not taken.
+    /// Returns the number of refused commands.
     pub fn refused(&self) -> u64 {
         self.refused
     }
 
-    /// Tells how often time was not kept.
+    /// Sets the number of overruns.
     pub fn set_overruns(&mut self, overruns: u64) {
         self.status.overruns = overruns;
     }
@@ -90,7 +90,7 @@ impl ArmPc {
         self.brake_at_once(!is_held);
     }
 
-    /// Stops and stays, or listens again.
+    /// Starts or ends a hold, during which commands are ignored.
     pub fn set_hold(&mut self, is_held: bool, now_s: f64) {
         self.status.hold = is_held;
         if is_held {
@@ -106,14 +106,14 @@ impl ArmPc {
         self.begin_stop(now_s);
     }
 
-    /// Forgets alarms; the emergency stop stays as it is pressed.
+    /// Clears alarms; the emergency stop stays as it is.
     pub fn clear(&mut self) {
         self.status.alarm.clear();
         self.refusal.clear();
         self.sender = None;
     }
 
-    /// Takes a command that came at `now_s`, at `wall_s` since 1970.
+    /// Processes a command that arrived at `now_s`, at `wall_s` since 1970.
     pub fn take(&mut self, packet: &Packet, sender: u64, now_s: f64, wall_s: f64) {
         let mut incoming = std::mem::take(&mut self.incoming);
         let read = self.names.read_command(packet, &mut incoming);
@@ -148,9 +148,9 @@ impl ArmPc {
             return;
         }
         if !self.status.servo_on {
-            // It begins with a command to stand still.
+            // Commands must begin with zero velocity.
             if self.incoming.iter().any(|&qdot| qdot != 0.0) {
-                return self.refuse("a movement before a command to stand still".into());
+                return self.refuse("the first command is not a zero velocity".into());
             }
             (self.status.servo_on, self.status.brake) = (true, false);
         }
@@ -159,7 +159,7 @@ impl ArmPc {
         self.commanded_s = Some(now_s);
     }
 
-    /// The velocities for the next tick.
+    /// Returns the velocities for the next tick.
     pub fn advance(&mut self, now_s: f64) -> &[f64] {
         let is_silent = self.commanded_s.is_some_and(|at_s| now_s - at_s > self.silence_s);
         if self.status.servo_on && self.stop.is_none() && is_silent {

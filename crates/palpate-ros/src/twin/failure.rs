@@ -1,4 +1,4 @@
-//! Failures of a twin on purpose, and what is sent with them.
+//! Injected failures of a twin, and the sender that applies them.
 
 use crate::link::Link;
 use crate::message::{DiagnosticStatus, JointState, Time};
@@ -10,30 +10,30 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::collections::VecDeque;
 
-/// A failure by name.
+/// A failure that can be injected.
 pub struct Failure {
-    /// Its name in `--inject` and in services.
+    /// Name in `--inject` and in services.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub about: &'static str,
-    /// What it does.
+    /// Effect.
     pub act: Act,
 }
 
-/// What a failure does.
+/// Effect of a failure.
 #[derive(Clone, Copy)]
 pub enum Act {
-    /// Does not send one packet in five.
+    /// Drops one packet in five.
     Lose,
-    /// Sends nothing on a topic.
+    /// Stops sending on a topic.
     Cease(Topic),
-    /// Sends the first message of a topic again and again, with fresh stamps.
+    /// Repeats the first message of a topic, with new stamps.
     Freeze(Topic),
     /// Changes packets.
     Change(fn(&mut Packet, &mut Memory)),
-    /// Writes the flag of this name in a status, or all, as one of these texts: off, on.
+    /// Writes the flag of this name in a status, or all flags, as one of these texts: off, on.
     Flags(Option<&'static str>, [&'static str; 2]),
-    /// Holds what is sent back by this time.
+    /// Delays packets by this time, s.
     Delay(f64),
     /// Presses the emergency stop.
     Estop,
@@ -41,35 +41,35 @@ pub enum Act {
     Deadman,
 }
 
-/// What failures remember and draw from.
+/// State of the failures.
 pub struct Memory {
-    /// Of noise and loss.
+    /// Random number generator for noise and loss.
     pub rng: ChaCha8Rng,
-    /// The first packet of each topic since the failure began.
+    /// First packet of each topic since the failure began.
     pub kept: [Option<Packet>; Topic::ALL.len()],
 }
 
 impl Memory {
-    /// The first packet of the topic of `packet` since the failure began: this one, if none was
-    /// before.
+    /// Returns the first packet of the topic of `packet` since the failure began: this one, if
+    /// there was none before.
     fn first(&mut self, packet: &Packet) -> &mut Packet {
         self.kept[packet.topic() as usize].get_or_insert_with(|| packet.clone())
     }
 }
 
-/// Share of packets that are lost.
+/// Fraction of packets that are lost.
 const LOST: f64 = 0.2;
 
-/// Force of a spike; chosen, beyond every threshold.
+/// Force of a spike; a heuristic: beyond every threshold.
 const SPIKE_N: f64 = 60.0;
 
-/// Standard deviation of the noise on a force; chosen.
+/// Standard deviation of the noise on a force; a heuristic.
 const NOISE_N: f64 = 0.3;
 
-/// Lead of a clock that goes wrong; chosen.
+/// Lead of a wrong clock; a heuristic.
 const AHEAD_S: i32 = 1;
 
-/// Decrement of the stamps with each message where they run backwards.
+/// Decrement of the stamps per message if they run backwards.
 // heuristic: hundreds of messages stay within the age limit of 50 ms.
 const BACKWARD_S: f64 = 1e-4;
 
@@ -77,68 +77,72 @@ const fn failure(name: &'static str, about: &'static str, act: Act) -> Failure {
     Failure { name, about, act }
 }
 
-/// Every failure; one line to add one.
+/// All failures; add one line per failure.
 pub static FAILURES: &[Failure] = &[
-    failure("loss", "one packet in five does not arrive", Act::Lose),
+    failure("loss", "one packet in five is lost", Act::Lose),
     failure("latency", "packets are sent 20 ms late", Act::Delay(0.02)),
-    failure("noise", "0.3 N of noise on the force", Act::Change(add_noise)),
-    failure("frozen", "the same tactile frame again and again", Act::Freeze(Topic::Tactile)),
+    failure("noise", "the force has noise of 0.3 N", Act::Change(add_noise)),
+    failure("frozen", "the same tactile frame is repeated", Act::Freeze(Topic::Tactile)),
     failure(
         "frozen_joints",
-        "the same joint positions and velocities again and again, with fresh stamps",
+        "the same joint positions and velocities are repeated, with new stamps",
         Act::Freeze(Topic::Joints),
     ),
     failure(
         "frozen_wrench",
-        "the same force and torque again and again, with fresh stamps",
+        "the same force and torque are repeated, with new stamps",
         Act::Freeze(Topic::Wrench),
     ),
-    failure("force_spike", "60 N along z", Act::Change(add_spike)),
-    failure("nan", "a joint position that is not a number", Act::Change(spoil_position)),
-    failure("six_names", "joint states of six joints", Act::Change(drop_seventh)),
+    failure("force_spike", "the force has a spike of 60 N along z", Act::Change(add_spike)),
+    failure("nan", "a joint position is NaN", Act::Change(spoil_position)),
+    failure("six_names", "joint states contain six joints", Act::Change(drop_seventh)),
     failure(
         "swapped_names",
-        "the first two joints under each other's names",
+        "the names of the first two joints are swapped",
         Act::Change(|packet, _| with_joints(packet, |message| message.name.swap(0, 1))),
     ),
     failure(
         "other_joints",
-        "every other joint state is that of a hand",
+        "every other joint state belongs to a hand",
         Act::Change(alternate_joints),
     ),
-    failure("future", "stamps a second ahead", Act::Change(lead)),
-    failure("unstamped", "stamps of zero", Act::Change(clear_stamp)),
-    failure("backward", "stamps that run backwards by 0.1 ms a message", Act::Change(turn_back)),
-    failure("no_joints", "joint states cease", Act::Cease(Topic::Joints)),
-    failure("no_wrench", "forces cease", Act::Cease(Topic::Wrench)),
-    failure("no_tactile", "tactile frames cease", Act::Cease(Topic::Tactile)),
+    failure("future", "stamps are one second ahead", Act::Change(lead)),
+    failure("unstamped", "stamps are zero", Act::Change(clear_stamp)),
+    failure("backward", "stamps run backwards by 0.1 ms per message", Act::Change(turn_back)),
+    failure("no_joints", "joint states stop arriving", Act::Cease(Topic::Joints)),
+    failure("no_wrench", "forces stop arriving", Act::Cease(Topic::Wrench)),
+    failure("no_tactile", "tactile frames stop arriving", Act::Cease(Topic::Tactile)),
     failure("estop", "the emergency stop is pressed", Act::Estop),
     failure("deadman", "the dead-man switch is released", Act::Deadman),
     failure(
         "hold",
-        "the status says hold; the arm obeys commands all the same",
+        "the status reports a hold, but the arm follows commands",
         Act::Flags(Some("hold"), ["true"; 2]),
     ),
     failure(
         "brake",
-        "the status says that the brakes are closed; the arm obeys commands all the same",
+        "the status reports closed brakes, but the arm follows commands",
         Act::Flags(Some("brake"), ["true"; 2]),
     ),
     failure(
         "python_flags",
-        "flags of the status as Python writes them: True, False",
+        "the flags of the status are Python booleans: True, False",
         Act::Flags(None, ["False", "True"]),
     ),
-    failure("number_flags", "flags of the status as numbers: 1, 0", Act::Flags(None, ["0", "1"])),
-    failure("no_flags", "a status without values", Act::Change(clear_flags)),
+    failure(
+        "number_flags",
+        "the flags of the status are numbers: 1, 0",
+        Act::Flags(None, ["0", "1"]),
+    ),
+    failure("no_flags", "the status has no values", Act::Change(clear_flags)),
     failure(
         "unknown_flag",
-        "an emergency stop of which the status says \"unknown\"",
+        "the status reports the emergency stop as \"unknown\"",
         Act::Flags(Some("estop"), ["unknown"; 2]),
     ),
 ];
 
-/// The failure of a name.
+/// Returns the index of the failure of a name.
 pub fn by_name(name: &str) -> Option<usize> {
     FAILURES.iter().position(|failure| failure.name == name)
 }
@@ -232,16 +236,16 @@ fn write_flags(packet: &mut Packet, key: Option<&str>, texts: [&str; 2]) {
     }
 }
 
-/// Sends packets through the failures that are on.
+/// Sends packets through the active failures.
 pub struct Sender {
     is_on: Vec<bool>,
     memory: Memory,
-    /// What is sent later, and when.
+    /// Delayed packets with their time of sending.
     delayed: VecDeque<(f64, Packet)>,
 }
 
 impl Sender {
-    /// Without failures.
+    /// Creates a sender without failures.
     pub fn new(seed: u64) -> Self {
         Self {
             is_on: vec![false; FAILURES.len()],
@@ -250,7 +254,7 @@ impl Sender {
         }
     }
 
-    /// Begins or ends a failure, by its place in the table.
+    /// Starts or ends a failure, by its index in the table.
     pub fn set(&mut self, failure: usize, is_on: bool) {
         if let Some(slot) = self.is_on.get_mut(failure) {
             *slot = is_on;
@@ -258,12 +262,12 @@ impl Sender {
         self.memory.kept = Default::default();
     }
 
-    /// Whether a failure is on.
+    /// Whether a failure is active.
     pub fn is_on(&self, failure: usize) -> bool {
         self.is_on.get(failure).copied().unwrap_or(false)
     }
 
-    /// Sends a packet at `now_s`, changed, late or not at all if a failure says so.
+    /// Sends a packet at `now_s`, changed, delayed or dropped by the active failures.
     pub fn send(&mut self, link: &Link, mut packet: Packet, now_s: f64) {
         let mut delay_s = 0.0;
         for (failure, _) in FAILURES.iter().zip(&self.is_on).filter(|(_, is_on)| **is_on) {
@@ -285,7 +289,7 @@ impl Sender {
         }
     }
 
-    /// Sends what was held back until `now_s`.
+    /// Sends the delayed packets that are due at `now_s`.
     pub fn send_due(&mut self, link: &Link, now_s: f64) {
         while self.delayed.front().is_some_and(|(at_s, _)| *at_s <= now_s) {
             if let Some((_, packet)) = self.delayed.pop_front() {

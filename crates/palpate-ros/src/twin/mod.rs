@@ -1,7 +1,7 @@
-//! A simulated arm behind a laboratory's topics, in real time: what an explorer of the real arm is
-//! tried on.
+//! Simulated arm behind ROS topics, in real time, for tests of an explorer before it commands the
+//! real arm.
 //!
-//! [`arm_pc`] is the layer between network and servos, [`failure`] what may go wrong on purpose,
+//! [`arm_pc`] is the layer between network and servos, [`failure`] the injected failures,
 //! [`serve`](mod@serve) the loop.
 
 pub mod arm_pc;

@@ -1,4 +1,5 @@
-//! The loop of a twin: commands in, one tick of the simulated body, readings out, in real time.
+//! Loop of a twin: receives commands, runs one tick of the simulated robot, sends readings, in real
+//! time.
 
 use super::arm_pc::ArmPc;
 use super::failure::{Act, FAILURES, Sender, by_name};
@@ -19,64 +20,64 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-/// Joints slower than this are at rest, rad/s or m/s; chosen, the sag of the servos is below it.
+/// Largest joint speed at rest, rad/s or m/s; a heuristic: above the sag of the servos.
 const REST: f64 = 2e-3;
 
-/// Ticks that a twin may be late before it drops time: it catches up with less.
+/// Largest delay, in ticks, that a twin makes up; with more it skips time.
 const SLACK_TICKS: u32 = 10;
 
-/// How often the arm's state, its joints and the force are published, as drivers do.
+/// Rate at which the arm's state, joints and force are published, as by drivers.
 const STATUS_HZ: f64 = 50.0;
 const JOINTS_HZ: f64 = 250.0;
 const WRENCH_HZ: f64 = 500.0;
 
-/// Something that a twin tells while it runs.
+/// Event reported by a running twin.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Event {
-    /// It can be heard.
+    /// The twin is publishing.
     Serving,
     /// The first movement after rest.
     Moving,
-    /// The joints stand still again.
+    /// The joints are at rest again.
     AtRest,
-    /// A failure begins or ends.
+    /// A failure starts or ends.
     Failure {
-        /// Its name.
+        /// Name of the failure.
         name: &'static str,
-        /// Whether it begins.
+        /// Whether it starts.
         is_on: bool,
     },
-    /// What the arm's computer says has changed.
+    /// The reported status has changed.
     Status(ArmStatus),
     /// The explorer called a service.
     Called(Service),
 }
 
-/// A failure that begins by itself.
+/// A failure that starts by itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Injection {
-    /// Its place in the table of failures.
+    /// Index in the table of failures.
     pub failure: usize,
-    /// When, seconds after the first movement.
+    /// Start time, in seconds after the first movement.
     pub at_s: f64,
-    /// For how long; without end if none.
+    /// Duration; `None` for unlimited.
     pub for_s: Option<f64>,
 }
 
-/// Services that a twin answers.
+/// Returns the services of a twin.
 pub fn services() -> Vec<Service> {
     let own = FAILURES.iter().map(|failure| Service::Twin(failure.name));
     Service::COMMON.into_iter().chain(own).collect()
 }
 
-/// A simulated arm behind topics.
+/// Simulated arm behind topics.
 pub struct Twin {
     body: Box<dyn Backend>,
     settings: BackendSettings,
     names: JointNames,
     pc: ArmPc,
-    /// Deliveries, kept until the loop looks.
+    /// Deliveries, queued for the loop.
     inbox: Receiver<Delivery>,
     link: Link,
     sender: Sender,
@@ -84,7 +85,7 @@ pub struct Twin {
     /// Pose of `T` in the sensor's frame.
     x_mt: Isometry3<f64>,
     bias: Wrench,
-    /// What the sensor says next becomes its zero.
+    /// Whether the next sensor reading becomes its zero.
     wants_bias: bool,
     since: Instant,
     moved_s: Option<f64>,
@@ -92,15 +93,15 @@ pub struct Twin {
     told: ArmStatus,
     tick: u64,
     period_s: f64,
-    /// Events that `run` has not passed on yet, with their time since 1970.
+    /// Events that `run` has not reported yet, with their time since 1970.
     events: Vec<(f64, Event)>,
 }
 
 impl Twin {
-    /// Puts `body`, which moves `chain`, behind the topics of `settings`.
+    /// Serves `body`, which moves `chain`, behind the topics of `settings`.
     ///
     /// # Errors
-    /// If the network cannot be joined, or the body cannot be brought to its start.
+    /// If the network cannot be joined, or the backend cannot be moved to its start.
     pub fn new(
         mut body: Box<dyn Backend>,
         chain: &Chain,
@@ -112,7 +113,7 @@ impl Twin {
         body.reset(seed)?;
         let names = settings.joint_names(chain);
         let (sink, inbox) = channel();
-        // The loop looks at its own pace; the link only has to hand on.
+        // The loop polls at its own rate; the link only passes deliveries on.
         let take = move |delivery| drop(sink.send(delivery));
         let link = Link::open(connect, Duration::from_millis(20), take, || None)?;
         let limits = chain.joints.iter().map(|joint| joint.qdot_limit).collect();
@@ -139,10 +140,10 @@ impl Twin {
         })
     }
 
-    /// Serves until `stop` becomes true; `tell` gets events with their time since 1970.
+    /// Serves until `stop` becomes true; `tell` receives events with their time since 1970.
     ///
     /// # Errors
-    /// If the simulated body cannot go on.
+    /// If the simulated robot cannot continue.
     pub fn run(
         &mut self,
         stop: &AtomicBool,
@@ -186,12 +187,12 @@ impl Twin {
         self.events.push((pace::now_s(), event));
     }
 
-    /// How often real time was not kept.
+    /// Returns the number of real-time overruns.
     pub fn overruns(&self) -> u64 {
         self.told.overruns
     }
 
-    /// Commands that were not taken.
+    /// Returns the number of refused commands.
     pub fn refused(&self) -> u64 {
         self.pc.refused()
     }
@@ -248,7 +249,7 @@ impl Twin {
         self.tell(Event::Failure { name: entry.name, is_on });
     }
 
-    /// Begins and ends the failures whose time has come.
+    /// Starts and ends the failures that are due.
     fn fail(&mut self, now_s: f64) {
         let Some(moved_s) = self.moved_s else { return };
         for i in 0..self.injections.len() {
@@ -261,7 +262,7 @@ impl Twin {
         }
     }
 
-    /// Publishes the arm's state at its rate, and at once when it changes.
+    /// Publishes the arm's state at its rate, and immediately when it changes.
     fn publish_status(&mut self, now_s: f64) {
         let status = self.pc.status().clone();
         let is_new = ArmStatus { overruns: self.told.overruns, ..status.clone() } != self.told;
@@ -306,7 +307,7 @@ impl Twin {
         self.sender.send(&self.link, packet, now_s);
     }
 
-    /// Whether this tick is one of those at which something is sent `rate_hz` times a second.
+    /// Whether something sent `rate_hz` times a second is due in this tick.
     fn is_due(&self, rate_hz: f64) -> bool {
         let every = (1.0 / (rate_hz * self.period_s)).round().max(1.0) as u64;
         self.tick.is_multiple_of(every)

@@ -1,4 +1,4 @@
-//! The layer between network and servos: what it takes, and how it stops.
+//! Tests of the layer between network and servos: accepted commands, and stops.
 
 use palpate_ros::joints::JointNames;
 use palpate_ros::message::{JointTrajectory, JointTrajectoryPoint};
@@ -18,14 +18,14 @@ fn topic() -> CommandTopic {
     CommandTopic { age_s: VALID_S, ..CommandTopic::default() }
 }
 
-/// Faster than any of these commands.
+/// A limit above all of these commands.
 const LIMIT: f64 = 2.0;
 
 fn arm_pc() -> ArmPc {
     ArmPc::new(names(), vec![LIMIT; 3], VALID_S)
 }
 
-/// An arm's computer that has been told to stand still and then to move, 4 ms apart, until 0.1 s.
+/// Returns an arm computer that was commanded to rest and then to move, 4 ms apart, until 0.1 s.
 fn moving() -> ArmPc {
     let mut pc = arm_pc();
     pc.take(&names().command(0.0, &[0.0; 3], &topic()), 1, 0.0, 0.0);
@@ -38,7 +38,7 @@ fn moving() -> ArmPc {
     pc
 }
 
-/// The largest speed that is still commanded at each of the ticks from 0.1 s on.
+/// Returns the largest commanded speed at each of the ticks from 0.1 s on.
 fn speeds(pc: &mut ArmPc, ticks: u32) -> Vec<f64> {
     let at = |tick| 0.1 + f64::from(tick) * PERIOD_S;
     let fastest = |qdot: &[f64]| qdot.iter().fold(0.0, |most: f64, qdot| most.max(qdot.abs()));
@@ -54,7 +54,7 @@ fn it_moves_after_a_command_to_stand_still_only() {
     moving();
 }
 
-/// 28 ms of silence and 10 ms of ramp; and never faster on the way.
+/// Stops after 28 ms without a command and a ramp of 10 ms, and never accelerates meanwhile.
 #[test]
 fn when_commands_cease_it_stops_and_brakes_and_tells() {
     let mut pc = moving();
@@ -67,7 +67,7 @@ fn when_commands_cease_it_stops_and_brakes_and_tells() {
     assert_eq!(pc.status().refusal(), Some("alarm: commands ceased".into()));
 }
 
-/// What was queued while the sender stood still is old when it comes, and moves nothing.
+/// Commands that were queued while the sender was blocked are old on arrival, and move nothing.
 #[test]
 fn old_commands_move_nothing_neither_before_nor_after_a_stop() {
     let mut pc = moving();
@@ -138,7 +138,7 @@ fn what_is_no_command_of_this_arm_stops_it() {
         (command(&["S1", "S2"], &[0.0; 2]), "no joint \"S3\""),
         (command(&["S1", "S2", "S2"], &[0.0; 3]), "\"S2\" is named twice"),
         (command(&["S1", "S2", "S3", "S3"], &[0.0; 4]), "named twice"),
-        (command(&["S1", "S2", "E1"], &[0.0; 3]), "is no joint"),
+        (command(&["S1", "S2", "E1"], &[0.0; 3]), "is not a joint"),
         (command(&["S1", "S2", "S3"], &[0.0; 2]), "2 velocities for 3 joints"),
         (command(&["S1", "S2", "S3"], &[0.0, f64::NAN, 0.0]), "velocities of \"S2\" is NaN"),
         (Packet::Command(JointTrajectory::default()), "0 points"),
@@ -152,7 +152,7 @@ fn what_is_no_command_of_this_arm_stops_it() {
     }
 }
 
-/// None is clamped: who commands it cannot mean it.
+/// Commands are not clamped: one beyond a limit cannot be intended.
 #[test]
 fn a_velocity_beyond_a_joints_limit_stops_the_arm() {
     for fast in [1e9, LIMIT * 1.001, -LIMIT * 1.001] {
@@ -178,8 +178,8 @@ fn swapped_names_move_the_joints_that_they_name() {
 }
 
 proptest! {
-    /// Whatever comes whenever: it never goes faster than the fastest command, and a tick after
-    /// 36 ms without a timely one it stands.
+    /// For any sequence of commands: it never exceeds the fastest command, and a tick after 36 ms
+    /// without a timely one it is at rest.
     #[test]
     fn it_stands_after_every_silence(
         sent in prop::collection::vec((0.0..0.05f64, -0.03..0.03f64, -1.0..1.0f64), 1..60),

@@ -1,4 +1,4 @@
-//! Keys of `[backend]` in files of version 0.1 that are no settings any more.
+//! Tests of keys of `[backend]` in files of version 0.1 that are no longer settings.
 
 use palpate_input::config::{Checked, ConfigError, Loader, Rules};
 use palpate_ros::settings::{BackendKind, BackendSettings, take_former_keys};
@@ -23,7 +23,7 @@ fn read(text: &str) -> Result<File, ConfigError> {
     loader.finish()
 }
 
-/// As version 0.1 wrote them, with every default; some had no effect on a run.
+/// File as written by version 0.1, with every default; some keys had no effect on a run.
 const OLD: &str = r#"
 [backend]
 kind = "ros2"

@@ -1,4 +1,4 @@
-//! Tests of what is sent over topics, in one program.
+//! Tests of palpate-ros, in one binary.
 
 mod arm_pc;
 mod former_keys;

@@ -1,4 +1,4 @@
-//! The force sensor over UDP, against a sensor that speaks as the manual says.
+//! Tests of the force sensor over UDP, against a simulated sensor that follows the manual.
 
 use palpate_ros::net_ft::{NetFt, NetFtSettings, record};
 use proptest::prelude::*;

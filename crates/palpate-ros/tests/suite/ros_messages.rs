@@ -1,14 +1,14 @@
-//! Definitions of messages against the standard ones.
+//! Tests of the message definitions against the standard ones.
 
 use palpate_ros::definition::{Definition, Described};
 use palpate_ros::message::*;
 use std::collections::BTreeMap;
 
-/// The types of fields that are no messages.
+/// Types of fields that are not messages.
 const PRIMITIVES: [&str; 9] =
     ["bool", "byte", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"];
 
-/// The lines of each standard definition, with the packages of all types.
+/// Returns the lines of each standard definition, with the packages of all types.
 fn standard() -> BTreeMap<String, Vec<String>> {
     let text = include_str!("../data/ros_messages.txt");
     let mut all: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -67,7 +67,7 @@ fn every_message_has_the_fields_of_its_standard_definition() {
         let wanted = &standard[&name];
         let text = definition.text();
         let fields = text.split(&"=".repeat(80)).next().unwrap();
-        // Constants may be left out: no message depends on them.
+        // Constants may be missing: no message depends on them.
         let is_constant = |line: &&str| line.contains('=');
         for constant in fields.lines().filter(is_constant) {
             assert!(wanted.iter().any(|line| line.replace(' ', "") == constant.replace(' ', "")));
@@ -100,7 +100,7 @@ fn a_schema_has_the_definition_of_each_of_its_parts_once() {
     }
 }
 
-/// A marker that leaves everything out is drawn where its frame is.
+/// A marker with all defaults is drawn at its frame.
 #[test]
 fn defaults_are_those_of_the_definitions() {
     let Quaternion { x, y, z, w } = Marker::default().pose.orientation;

@@ -1,4 +1,4 @@
-//! What of the robot may not come near to what.
+//! Collision interlock: distances between links, table and object.
 
 use super::interlock::{Ahead, Entry, Interlock, Now, Site};
 use super::settings::InterlockSettings;
@@ -9,7 +9,8 @@ use nalgebra::{Point3, Vector3};
 use palpate_geometry::distance::{HalfSpace, OrientedBox};
 use palpate_geometry::sweep::Capsule;
 
-/// Stops the body before links come near to each other, to the table or to the object.
+/// Interlock that stops the robot before links come too close to each other, the table or the
+/// object.
 pub const CLEARANCE: Entry = Entry {
     name: "clearance",
     make: |site, settings, _| {
@@ -18,17 +19,17 @@ pub const CLEARANCE: Entry = Entry {
     },
 };
 
-/// Looks at the capsules of the links where the body cannot help going.
+/// Checks the capsules of the links along the stopping path.
 struct Guard {
     links: Vec<LinkCapsule>,
-    /// Each link with what it must not meet.
+    /// Each link with an obstacle that it must avoid.
     pairs: Vec<(usize, Other)>,
     clearance_m: f64,
     reaction_s: f64,
-    /// The links in `W` at the posture looked at last.
+    /// The links in `W` at the last posture checked.
     placed: Vec<Capsule>,
-    /// A posture, and the clearance there: it is computed again when some point can have moved by
-    /// that much.
+    /// The last posture checked and its clearance; it is computed again when a point may have moved
+    /// by that much.
     looked: Option<(Joints, f64)>,
 }
 
@@ -65,7 +66,7 @@ impl Guard {
         }
     }
 
-    /// The smallest distance at `q`, and the pair that has it.
+    /// Returns the smallest distance at `q` and its pair.
     fn nearest(&mut self, now: &Now, q: &Joints) -> (f64, usize) {
         let frames = now.chain.frames(q);
         self.placed.clear();

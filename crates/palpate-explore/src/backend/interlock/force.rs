@@ -1,9 +1,9 @@
-//! How hard the finger may be pressed, by the force/torque sensor alone.
+//! Force interlock: limits of the contact force from the force/torque sensor alone.
 
 use super::interlock::{Entry, Interlock, Now};
 use crate::backend::{Reading, Trip};
 
-/// Stops the body above a force, a torque, or a rise of the force.
+/// Interlock that stops the robot above a limit of the force, the torque, or the force's rate.
 pub const FORCE: Entry = Entry {
     name: "force",
     make: |site, settings, _| {
@@ -19,36 +19,36 @@ pub const FORCE: Entry = Entry {
     },
 };
 
-/// Rise of the force from which the body is stopped, N/s.
+/// Rate of the force above which the robot is stopped, N/s.
 // heuristic: 0.1 m/s, the speed of travel, against 20 N/mm.
 pub const RISE_N_S: f64 = 2000.0;
 
-/// Speed at which the finger goes back after too much force, m/s.
+/// Speed of the retraction after excessive force, m/s.
 // heuristic: four times the slowest contact, far below the reduced speed.
 pub const RETRACT_M_S: f64 = 0.02;
 
-/// Rise of the force at which the finger stops going back, N.
+/// Rise of the force at which the retraction stops, N.
 // heuristic: well above the sensor's noise, far below a fault.
 pub const RETRACT_RISE_N: f64 = 2.0;
 
-/// Length that is added to the finger's own when its lever is taken.
-// heuristic: what adapter and skin may add.
+/// Length added to the finger's own for its lever.
+// heuristic: allowance for adapter and skin.
 const SPARE_M: f64 = 0.01;
 
-/// Readings in a row above a limit: one alone may be a disturbance.
+/// Consecutive readings above a limit; a single one may be a disturbance.
 const SAMPLES: u32 = 2;
 
-/// Time over which a rise is measured: longer than the noise of single readings matters, shorter
-/// than a finger at 0.1 m/s needs for a millimetre.
+/// Time over which the rate is measured: long enough to average the noise of single readings, and
+/// shorter than a finger at 0.1 m/s needs for a millimetre.
 // heuristic: between the two.
 const RISE_S: f64 = 0.01;
 
 struct Force {
     force_n: f64,
     torque_nm: f64,
-    /// Readings in a row above the limits of force and torque.
+    /// Consecutive readings above the limits of force and torque.
     above: [u32; 2],
-    /// Time and force from which the rise is measured.
+    /// Time and force at the start of the current rate measurement.
     before: Option<(f64, f64)>,
 }
 
@@ -64,7 +64,7 @@ impl Interlock for Force {
         }
         let (since_s, before_n) = *self.before.get_or_insert((now.time_s, force_n));
         let passed_s = now.time_s - since_s;
-        // Rounding of the time must not double the wait.
+        // Rounding of the time must not double the interval.
         if passed_s > 0.999 * RISE_S {
             self.before = Some((now.time_s, force_n));
             let found = (force_n - before_n) / passed_s;

@@ -1,4 +1,4 @@
-//! What must hold before a body is moved for the first time.
+//! Start checks: conditions before a robot moves for the first time.
 
 use crate::backend::{Backend, Command, Fault, Reading, Wrench};
 use crate::robot::arm::Chain;
@@ -10,13 +10,13 @@ use palpate_input::error::Invalid;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How a body is looked at before it moves; figures without a source are chosen.
+/// Settings of the start checks; values without a source are heuristics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GateSettings {
-    /// Largest drift of the force at rest, from the mean of the first to that of the last quarter.
+    /// Largest drift of the force at rest, N, between the means of the first and last quarter.
     pub drift_n: f64,
-    /// Largest standard deviation of an electrode: real ones have 3 to 11 counts.
+    /// Largest standard deviation of an electrode, counts; real ones have 3 to 11.
     pub noise_counts: f64,
 }
 
@@ -33,18 +33,18 @@ impl Checked for GateSettings {
     }
 }
 
-/// How long the body is held still.
+/// Duration of the check at rest.
 // heuristic: 200 tactile frames, enough for a standard deviation to 5 %.
 pub const HOLD_S: f64 = 2.0;
 
-/// Largest movement of a joint meanwhile, rad or m.
+/// Largest movement of a joint during the check, rad or m.
 // heuristic: 2 mm of the tip at a reach of 1 m.
 pub const STILL: f64 = 2e-3;
 
-/// Holds `body`, which moves `chain`, still after its reset, and checks joints and sensors.
+/// Commands `body`, which moves `chain`, to rest after its reset, and checks joints and sensors.
 ///
 /// # Errors
-/// The first thing that is not as it must be.
+/// The first check that fails.
 pub fn check_start(
     body: &mut dyn Backend,
     chain: &Chain,
@@ -74,13 +74,13 @@ fn check_joints(readings: &[Reading], chain: &Chain) -> Result<(), Invalid> {
             places.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| (a.min(q), b.max(q)));
         if let Some(q) = [least, most].into_iter().find(|q| !(low..=high).contains(q)) {
             return Err(Invalid::new(format!(
-                "joint {name} stands at {q:.4}, outside its limits {low:.4} to {high:.4}"
+                "the position {q:.4} of joint {name} is outside its limits {low:.4} to {high:.4}"
             )));
         }
         let moved = most - least;
         if moved > STILL {
             return Err(Invalid::new(format!(
-                "joint {name} moved by {moved:.5} while told to stand still; allowed are {STILL}"
+                "joint {name} moved by {moved:.5} while commanded to rest; allowed is {STILL}"
             )));
         }
     }
@@ -101,16 +101,16 @@ fn check_force(readings: &[Reading], allowed_n: f64) -> Result<(), Invalid> {
     match drift_n > allowed_n {
         false => Ok(()),
         true => Err(Invalid::new(format!(
-            "the force at rest drifts by {drift_n:.3} N; allowed are {allowed_n} N"
+            "the force at rest drifts by {drift_n:.3} N; allowed is {allowed_n} N"
         ))),
     }
 }
 
-/// Frames must come; an electrode without noise is frozen, if the sensor is `noisy`.
+/// Checks that frames arrive and that electrodes change, if the sensor is `noisy`.
 fn check_electrodes(readings: &[Reading], allowed_counts: f64, noisy: bool) -> Result<(), Invalid> {
     let frames: Vec<&Frame> = readings.iter().flat_map(Reading::frames).collect();
     if frames.is_empty() {
-        return Err(Invalid::new(format!("no tactile frame in {HOLD_S} s")));
+        return Err(Invalid::new(format!("no tactile frame received in {HOLD_S} s")));
     }
     let all: Vec<[f64; ELECTRODES]> =
         frames.iter().filter_map(|frame| frame.electrode_counts).collect();

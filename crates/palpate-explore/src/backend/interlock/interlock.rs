@@ -1,4 +1,4 @@
-//! What an interlock is, what it knows, and the path that it looks along.
+//! Interlock trait, the robot state that interlocks use, and the stopping path.
 
 use super::settings::InterlockSettings;
 use crate::backend::{Capabilities, Reading, Trip};
@@ -7,121 +7,124 @@ use crate::robot::arm::{Chain, Jacobian, Joints};
 use nalgebra::{Isometry3, Point3};
 use palpate_geometry::distance::{HalfSpace, OrientedBox};
 
-/// One reason not to move.
+/// An interlock: one reason to stop the robot.
 pub trait Interlock: Send {
-    /// Shortens what is about to be commanded, or refuses it before it is.
+    /// Limits the next command, or refuses it before it is applied.
     ///
     /// # Errors
-    /// If the body must stop instead.
+    /// If the robot must stop instead.
     fn command(&mut self, now: &Now, qdot: &mut Joints) -> Result<(), Trip> {
         let _ = (now, qdot);
         Ok(())
     }
 
-    /// Judges what was read after a tick, which `now` has taken in.
+    /// Checks the reading after a tick; `now` already includes it.
     ///
     /// # Errors
-    /// If the body must stop.
+    /// If the robot must stop.
     fn reading(&mut self, now: &Now, reading: &Reading) -> Result<(), Trip> {
         let _ = (now, reading);
         Ok(())
     }
 }
 
-/// How the body stands.
+/// State of the robot as used by interlocks.
 pub struct Now {
-    /// What is moved.
+    /// The chain.
     pub chain: Chain,
-    /// For each joint, what any point of the robot moves by per rad or m at most.
+    /// For each joint, the largest motion of any point of the robot per rad or m.
     pub reaches_m: Joints,
-    /// Duration of a tick.
+    /// Control period, s.
     pub period_s: f64,
-    /// Ticks since the reset; goes on also when the body's time does not.
+    /// Number of ticks since the reset; it advances even if the backend's time does not.
     pub tick: u64,
-    /// Time of the last reading.
+    /// Time of the last reading, s.
     pub time_s: f64,
-    /// Joint positions as read last.
+    /// Joint positions of the last reading.
     pub q: Joints,
-    /// Joint velocities as read last.
+    /// Joint velocities of the last reading.
     pub qdot: Joints,
-    /// What was commanded last.
+    /// The last command.
     pub sent: Joints,
-    /// Commanded movement of each joint since its position as read last changed, rad or m:
-    /// where the body may be beyond `q`.
+    /// Commanded movement of each joint since its position reading last changed, rad or m: how far
+    /// the robot may be beyond `q`.
     pub unseen: Joints,
     /// Pose of the fingertip.
     pub x_wt: Isometry3<f64>,
-    /// The Jacobian there.
+    /// Jacobian at the fingertip.
     pub jacobian: Jacobian,
-    /// Force and torque at the mount beyond those at the reset, N and N·m; none without a sensor.
+    /// Force and torque at the mount relative to those at the reset, N and N·m; `None` without a
+    /// sensor.
     pub load: Option<[f64; 2]>,
 }
 
 impl Now {
-    /// Speed of the fingertip that `qdot` gives, m/s.
+    /// Returns the fingertip speed for the joint velocities `qdot`, m/s.
     pub fn tip_speed_m_s(&self, qdot: &Joints) -> f64 {
         (self.jacobian.fixed_rows::<3>(0) * qdot).norm()
     }
 }
 
-/// A line of the table of interlocks.
+/// An entry of the table of interlocks.
 pub struct Entry {
-    /// As documentation and tests name it.
+    /// Name in documentation and tests.
     pub name: &'static str,
-    /// Makes it anew at each reset; `None` where there is nothing to watch.
+    /// Creates it at each reset; `None` if there is nothing to monitor.
     pub make: fn(&Site, &InterlockSettings, &Capabilities) -> Option<Box<dyn Interlock>>,
 }
 
-/// The robot, and where it has business: plain numbers, whoever knows them.
+/// Safety context of the interlocks: the robot and its workspace, as plain numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Site {
-    /// What is moved.
+    /// The robot.
     pub robot: Robot,
-    /// Smallest and largest coordinates in `W` of the places that the fingertip is sent to.
+    /// Bounding box in `W` of the planned fingertip positions.
     pub tip_w: Option<[Point3<f64>; 2]>,
-    /// The farthest that the fingertip's centre is sent to: out of the half-space it must not go.
+    /// Half-space that contains all planned fingertip centres; the tip must not leave it.
     pub farthest: Option<HalfSpace>,
-    /// Around the object: no link of the arm may come near.
+    /// Box around the object; no link of the arm may come close to it.
     pub object: Option<OrientedBox>,
-    /// Force at which a touch retreats by itself.
+    /// Force at which a touch retracts by itself, N.
     pub touch_force_n: f64,
-    /// Fastest that the fingertip is sent.
+    /// Largest planned speed of the fingertip, m/s.
     pub travel_m_s: f64,
 }
 
-/// The path of a body that cannot be avoided: one tick on, and then to rest. It is a straight line
-/// in joint space: braking keeps the directions of the joints' speeds.
+/// Unavoidable path of a robot: one more tick, then braking to rest. It is a straight line in joint
+/// space, since braking preserves the direction of the joint velocities.
 pub struct Ahead<'a> {
     now: &'a Now,
     from: Joints,
     by: Joints,
 }
 
-/// How much nearer than asked something may come unseen; chosen, a hundredth of an arm's link.
+/// Tolerance of the distance checks between sampled postures; a heuristic: a hundredth of an arm's
+/// link.
 pub const GRAIN_M: f64 = 1e-3;
 
-/// Postures looked at along one way at most; chosen. A way that needs more keeps near to its limit
-/// over centimetres.
+/// Largest number of postures checked along one path; a heuristic. A path that needs more stays
+/// close to its limit over centimetres.
 const LOOKS: usize = 32;
 
 impl<'a> Ahead<'a> {
-    /// If `qdot` is commanded for one tick, takes effect `reaction_s` later, and is then braked;
-    /// and if the body has moved as commanded since its position was last seen to change.
+    /// Returns the path if `qdot` is commanded for one tick, takes effect `reaction_s` later, and
+    /// is then braked; and if the robot has moved as commanded since its position reading last
+    /// changed.
     pub fn of(now: &'a Now, qdot: &Joints, reaction_s: f64) -> Self {
         let time_s = now.period_s + reaction_s + 0.5 * stopping_s(now, qdot);
         Self { now, from: now.q, by: now.unseen + qdot * time_s }
     }
 
-    /// What any point of the robot moves by at most, until the end, from where it would stand at
-    /// `q`.
+    /// Returns the largest motion of any point of the robot until the end of the path, with the
+    /// robot at `q`.
     pub fn farthest_m(&self, q: &Joints) -> f64 {
         let ends = (self.from - q).abs().sup(&(self.from + self.by - q).abs());
         ends.dot(&self.now.reaches_m)
     }
 
-    /// The first clearance below `least_m` along the way, where `clearance_m` of a posture cannot
-    /// fall faster than points move: from each posture the way goes on as far as its clearance
-    /// allows (conservative advancement). None if there is none.
+    /// Returns the first clearance below `least_m` along the path, if the `clearance_m` of a
+    /// posture cannot decrease faster than points move: from each posture the path advances by its
+    /// clearance (conservative advancement). Returns `None` if there is none.
     pub fn below(&self, least_m: f64, mut clearance_m: impl FnMut(&Joints) -> f64) -> Option<f64> {
         let length_m = self.by.abs().dot(&self.now.reaches_m);
         let mut part = 0.0;
@@ -134,14 +137,15 @@ impl<'a> Ahead<'a> {
             if length_m <= 0.0 || part >= 1.0 {
                 return None;
             }
-            // The end is looked at itself.
+            // The end is always checked.
             part = (part + (found_m - least_m + GRAIN_M) / length_m).min(1.0);
         }
         Some(found_m)
     }
 }
 
-/// Time in which the joints come to rest from `qdot` together, none braking harder than it may.
+/// Returns the time in which the joints come to rest from `qdot` together, each within its
+/// deceleration limit.
 pub fn stopping_s(now: &Now, qdot: &Joints) -> f64 {
     let joints = now.chain.joints.iter().zip(qdot.iter());
     joints.map(|(joint, qdot)| qdot.abs() / joint.qddot_limit).fold(0.0, f64::max)

@@ -1,4 +1,4 @@
-//! The last line before a body moves.
+//! Backend wrapper that enforces the interlocks before commands reach the robot.
 
 use super::INTERLOCKS;
 use super::force::{FORCE, RETRACT_M_S, RETRACT_RISE_N};
@@ -11,12 +11,13 @@ use nalgebra::Isometry3;
 use palpate_input::error::Invalid;
 use std::collections::VecDeque;
 
-/// A body that is stopped when something is wrong, whatever it is told.
+/// A backend that stops the robot on a fault, independently of the commands.
 ///
-/// The controller keeps limits along the tip's direction; this body keeps them joint by joint, and
-/// passes a command within all of them unchanged. What cannot be kept by shortening a command trips
-/// an interlock: the body is braked within its joints' accelerations and does not move again. A
-/// reset clears that of a simulated body, of a real one only [`Interlocked::clear_fault`] does.
+/// The controller keeps limits along the tip's direction; this backend enforces them joint by
+/// joint, and passes a command within all of them unchanged. A limit that cannot be kept by scaling
+/// a command trips an interlock: the robot is braked within its joints' accelerations and does not
+/// move again. A reset clears the fault of a simulated robot; for a real one, only
+/// [`Interlocked::clear_fault`] does.
 pub struct Interlocked {
     inner: Box<dyn Backend>,
     interlocks: Vec<Box<dyn Interlock>>,
@@ -24,17 +25,17 @@ pub struct Interlocked {
     settings: InterlockSettings,
     now: Now,
     way_back: WayBack,
-    /// What the wrench was at the reset.
+    /// Wrench at the reset.
     rest: Option<Wrench>,
     reading: Reading,
     command: Command,
     fault: Option<Fault>,
-    /// Whether the next reset clears the fault of a real body.
+    /// Whether the next reset clears the fault of a real robot.
     is_cleared: bool,
 }
 
 impl Interlocked {
-    /// Around `inner`, which moves the joints of the site's robot.
+    /// Wraps `inner`, which moves the joints of the robot in `site`.
     ///
     /// # Errors
     /// If their numbers of joints differ.
@@ -82,12 +83,12 @@ impl Interlocked {
         self.interlocks = INTERLOCKS.iter().filter_map(make).collect();
     }
 
-    /// Lets the next reset succeed after a fault of a real body: an operator found it fit.
+    /// Lets the next reset clear a fault of a real robot, after an operator has checked it.
     pub fn clear_fault(&mut self) {
         self.is_cleared = true;
     }
 
-    /// Has the inner body do `qdot` for a tick, and takes in what it says.
+    /// Applies `qdot` for a tick and updates the state from the reading.
     fn advance(&mut self, qdot: &Joints) -> Result<(), Fault> {
         self.command.qdot.iter_mut().zip(qdot.iter()).for_each(|(to, from)| *to = *from);
         self.now.sent = *qdot;
@@ -95,7 +96,7 @@ impl Interlocked {
         match self.inner.step(&self.command) {
             Ok(reading) => self.reading.copy(reading),
             Err(fault) => {
-                // It said itself that it stops; what was commanded must not hold on.
+                // The backend reported the stop itself; the last command must not persist.
                 if self.inner.capabilities().real_time {
                     self.command.qdot.fill(0.0);
                     let _ = self.inner.step(&self.command);
@@ -106,7 +107,7 @@ impl Interlocked {
         self.take()
     }
 
-    /// Where the body stands by the last reading.
+    /// Updates the state from the last reading.
     fn take(&mut self) -> Result<(), Fault> {
         let Self { now, reading, .. } = self;
         reading.check()?;
@@ -117,7 +118,7 @@ impl Interlocked {
         let (before, passed_s) = (now.q, reading.time_s - now.time_s);
         (now.q, now.qdot) = (joints(&reading.q)?, joints(&reading.qdot)?);
         now.time_s = reading.time_s;
-        // A pause between two ticks is spent at rest.
+        // The robot rests during a pause between two ticks.
         let moved_s = passed_s.clamp(0.0, HELD_TICKS * now.period_s);
         let unseen = (now.unseen + now.sent * moved_s)
             .zip_map(&(now.q - before), |unseen, by| if by == 0.0 { unseen } else { 0.0 });
@@ -130,32 +131,32 @@ impl Interlocked {
         Ok(())
     }
 
-    /// Shortens `qdot`, or says why it must not be.
+    /// Limits `qdot`, or returns the trip that forbids it.
     fn shorten(&mut self, qdot: &mut Joints) -> Result<(), Trip> {
         self.interlocks.iter_mut().try_for_each(|one| one.command(&self.now, qdot))
     }
 
-    /// Why a body at rest must not even stand where it does.
+    /// Returns the trip that forbids even the current position at rest.
     fn stands_badly(&mut self) -> Option<Trip> {
         let is_at_rest = self.now.sent == Joints::zeros();
         is_at_rest.then(|| self.shorten(&mut Joints::zeros()).err()).flatten()
     }
 
-    /// The fault of a body that must be brought elsewhere by hand.
+    /// Returns the fault of a robot that must be moved by hand.
     fn astray(&self, trip: &Trip) -> Fault {
         let joints = self.now.chain.joints.iter().zip(self.now.chain.home.iter());
         let home: Vec<_> = joints.map(|(joint, q)| format!("{} {q:.3}", joint.name)).collect();
         let p_wt = self.now.x_wt.translation.vector;
         Invalid::new(format!(
-            "the arm is not moved from where it stands, its tip at [{:.3}, {:.3}, {:.3}] m: {trip}; bring \
-             it near its home posture by hand: {}",
+            "the arm cannot start with its tip at [{:.3}, {:.3}, {:.3}] m: {trip}; jog it close to its \
+             home posture: {}",
             p_wt.x, p_wt.y, p_wt.z, home.join(", ")
         ))
         .into()
     }
 
-    /// What is wrong with the last reading: the first thing, but too much force only where nothing
-    /// else is.
+    /// Checks the last reading and returns the first trip; excessive force is reported only if
+    /// there is no other trip.
     fn judge(&mut self) -> Result<(), Trip> {
         let Self { interlocks, now, reading, .. } = self;
         let mut trips = interlocks.iter_mut().filter_map(|one| one.reading(now, reading).err());
@@ -164,7 +165,7 @@ impl Interlocked {
         Err(other.unwrap_or(first))
     }
 
-    /// Braked, and from now on refused.
+    /// Brakes and refuses all further commands.
     fn latch(&mut self, fault: Fault) -> Fault {
         self.fault = Some(fault.clone());
         fault
@@ -180,8 +181,8 @@ impl Interlocked {
         self.latch(fault)
     }
 
-    /// Brings the joints to rest together, in a straight line. Whether nothing but too much force
-    /// was found wrong meanwhile.
+    /// Brakes the joints to rest together, along a straight line. Returns whether excessive force
+    /// was the only trip meanwhile.
     fn brake(&mut self) -> bool {
         let mut is_sound = true;
         let ticks = (stopping_s(&self.now, &self.now.sent) / self.now.period_s).ceil() as usize + 1;
@@ -201,7 +202,7 @@ impl Interlocked {
         is_sound
     }
 
-    /// Takes the finger off what it was pressed on.
+    /// Retracts the finger from the object.
     fn go_back(&mut self) {
         let retract_m = self.settings.retract_m;
         let from = self.now.x_wt.translation.vector;
@@ -226,12 +227,12 @@ impl Interlocked {
     }
 }
 
-/// Ticks for which a command moves the body at most if no other follows: the arm's side takes a
-/// stale one for a stop.
+/// Largest number of ticks for which a command moves the robot if no other follows: the arm treats
+/// a stale command as a stop.
 // heuristic: 30 ms at 250 Hz.
 const HELD_TICKS: f64 = 8.0;
 
-/// Ticks beyond twice those of a way back at full speed: to start and to stop.
+/// Ticks in addition to twice those of a retraction at full speed, to start and to stop.
 const PATIENCE_TICKS: usize = 100;
 
 impl Backend for Interlocked {
@@ -276,7 +277,7 @@ impl Backend for Interlocked {
         }
         self.way_back.push(&self.now.q);
         if let Err(fault) = self.advance(&qdot) {
-            // Readings that make no sense say nothing of where it brakes; it brakes all the same.
+            // Invalid readings carry no information about braking; the robot brakes nevertheless.
             if matches!(fault, Fault::BadReading { .. }) {
                 self.brake();
             }
@@ -285,7 +286,7 @@ impl Backend for Interlocked {
         match self.judge() {
             Ok(()) => Ok(&self.reading),
             Err(trip) => {
-                // Where readings cannot be trusted, nothing watches how the servos brake.
+                // If readings are unreliable, braking by the servos cannot be monitored.
                 if trip.interlock != FORCE.name && self.inner.capabilities().real_time {
                     self.inner.brake();
                 }
@@ -295,26 +296,26 @@ impl Backend for Interlocked {
     }
 }
 
-/// How much of the way is kept; chosen: 10 mm at 5 mm/s, the slowest contact.
+/// Duration of the stored path; a heuristic: 10 mm at 5 mm/s, the slowest contact.
 const KEPT_S: f64 = 2.0;
 
-/// Most postures kept.
+/// Largest number of stored postures.
 const MOST: usize = 4096;
 
-/// Postures of the last ticks, oldest first; holds no more than what it was made for.
+/// Retract path: the postures of the last ticks, oldest first, within a fixed capacity.
 struct WayBack {
     postures: VecDeque<Joints>,
     most: usize,
 }
 
 impl WayBack {
-    /// Of a body with ticks of `period_s`.
+    /// Creates the path for a backend with ticks of `period_s`.
     fn new(period_s: f64) -> Self {
         let most = ((KEPT_S / period_s) as usize).clamp(1, MOST);
         Self { postures: VecDeque::with_capacity(most), most }
     }
 
-    /// Adds where the body stands.
+    /// Adds the current posture.
     fn push(&mut self, q: &Joints) {
         if self.postures.len() >= self.most {
             self.postures.pop_front();
@@ -322,8 +323,8 @@ impl WayBack {
         self.postures.push_back(*q);
     }
 
-    /// Joint velocities that lead back with the tip at `speed_m_s`, dropping the postures passed;
-    /// none where the way ends.
+    /// Returns joint velocities that move back along the path with the tip at `speed_m_s`, dropping
+    /// the postures passed; `None` at the end of the path.
     fn velocity(&mut self, now: &Now, speed_m_s: f64) -> Option<Joints> {
         while let Some(q) = self.postures.back() {
             let by = q - now.q;

@@ -1,14 +1,15 @@
-//! Limits of the fingertip's speed, and of each joint's position, speed and acceleration.
+//! Interlocks of the fingertip's speed, and of each joint's position, speed and acceleration.
 
 use super::interlock::{Entry, Interlock, Now};
 use crate::backend::{Reading, Trip};
 use crate::robot::arm::Joints;
 
-/// Shortens commands to the speed limit of the tip, and stops a tip whose reading is faster.
+/// Interlock that limits commands to the tip's speed limit, and stops a tip that is measured
+/// faster.
 pub const TIP_SPEED: Entry = Entry {
     name: "tip speed",
     make: |site, settings, capabilities| {
-        // What the controller may ask for: its way and its fastest correction.
+        // Largest speed requested by the controller: along the path plus the largest correction.
         let asked_m_s = site.travel_m_s + REDUCED_M_S;
         let usual_m_s = if capabilities.real_time { REDUCED_M_S } else { asked_m_s };
         let limit_m_s = settings.tip_speed_m_s.unwrap_or(usual_m_s);
@@ -16,18 +17,18 @@ pub const TIP_SPEED: Entry = Entry {
     },
 };
 
-/// Keeps commands within the limits, and stops a joint whose reading is far beyond one.
+/// Interlock that limits commands to the joint limits, and stops a joint measured far beyond one.
 pub const JOINT_POSITION: Entry =
     Entry { name: "joint position", make: |_, _, _| Some(Box::new(JointLimits)) };
 
 /// The reduced speed of EN ISO 10218-1.
 const REDUCED_M_S: f64 = 0.25;
 
-/// Ratio of a tip speed as read to its limit from which the body is stopped.
-// heuristic: what servos overshoot.
+/// Ratio of measured tip speed to its limit above which the robot is stopped.
+// heuristic: overshoot of the servos.
 const OVERSHOOT: f64 = 1.2;
 
-/// Readings in a row that say so.
+/// Number of consecutive readings above the limit.
 const SAMPLES: u32 = 2;
 
 struct TipSpeed {
@@ -52,18 +53,17 @@ impl Interlock for TipSpeed {
     }
 }
 
-/// Share by which a limit may be exceeded before it is applied: rounding, so that a command within
-/// the limits passes unchanged.
+/// Relative tolerance of a limit: rounding, so that a command within the limits passes unchanged.
 const ROUNDING: f64 = 1e-9;
 
-/// How far beyond its limit the reading of a joint may be, rad or m.
-// heuristic: twice where the stops of the simulated arm stand.
+/// Largest distance of a joint reading beyond its limit, rad or m.
+// heuristic: twice the distance of the simulated arm's end stops.
 const BEYOND: f64 = 0.1;
 
 struct JointLimits;
 
-/// `wanted` with every joint, one by one, within its speed, within its acceleration since what was
-/// commanded last, and slow enough to stop before its limit of position.
+/// Returns `wanted` limited joint by joint: in speed, in acceleration relative to the last command,
+/// and so that it can stop before its position limit.
 pub fn limited(now: &Now, wanted: &Joints) -> Joints {
     let mut qdot = *wanted;
     let joints = now.chain.joints.iter().zip(now.q.iter().zip(now.sent.iter()));

@@ -1,8 +1,8 @@
-//! Interlocks: reasons to stop a body that hold whatever it is told.
+//! Interlocks: conditions that stop the robot independently of the commands.
 //!
-//! An [`Interlock`] is an [`Entry`] of [`INTERLOCKS`]; [`Interlocked`] is a body around another
-//! that asks each of them in every tick. Before a body is moved, [`check_start`] commands it to
-//! stand still and checks its sensors.
+//! An [`Interlock`] is an [`Entry`] of [`INTERLOCKS`]; [`Interlocked`] is a backend that wraps
+//! another and evaluates all of them in every tick. Before the robot moves, [`check_start`]
+//! commands it to rest and checks its sensors.
 
 mod collision;
 mod force;
@@ -21,8 +21,8 @@ pub use interlock::{Entry, Interlock, Now, Site};
 pub use interlocked::Interlocked;
 pub use settings::{InterlockSettings, defaults};
 
-/// In the order in which they act: those that shorten a command come before those that judge what
-/// is left of it.
+/// All interlocks in the order in which they act: those that limit a command come before those that
+/// check the result.
 pub const INTERLOCKS: &[Entry] = &[
     limits::TIP_SPEED,
     limits::JOINT_POSITION,
@@ -37,7 +37,7 @@ pub const INTERLOCKS: &[Entry] = &[
     tracking::POSITION,
 ];
 
-/// Keys of `[backend]` in files of version 0.1 that are constants now, with their values.
+/// Keys of `[backend]` in files of version 0.1 that are now constants, with their values.
 pub const FORMER_KEYS: [(&str, f64); 7] = [
     ("interlocks.force_rate_n_s", force::RISE_N_S),
     ("interlocks.tracking_error_s", tracking::VELOCITY_S),

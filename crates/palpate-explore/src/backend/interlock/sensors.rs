@@ -1,11 +1,11 @@
-//! Sensors that are silent, and electrodes that cannot be right.
+//! Sensor interlocks: timeouts, and implausible electrode values.
 
 use super::interlock::{Entry, Interlock, Now};
 use crate::backend::{Reading, Trip};
 use crate::robot::finger::frame::{ELECTRODES, FULL_SCALE_COUNTS};
 use nalgebra::Vector3;
 
-/// Stops a body whose joints, force/torque sensor or tactile sensor are silent.
+/// Interlock that stops a robot when joint states, force/torque or tactile data time out.
 pub const SILENCE: Entry = Entry {
     name: "silence",
     make: |_, settings, capabilities| {
@@ -16,8 +16,9 @@ pub const SILENCE: Entry = Entry {
     },
 };
 
-/// Stops a real body if an electrode stands at an end of its range or does not change at all: its
-/// noise is several counts. A simulated one may have no noise, and be pressed to the end.
+/// Interlock that stops a real robot if an electrode is at an end of its range or does not change
+/// at all: its noise is several counts. A simulated one may be free of noise, and be pressed to the
+/// end.
 pub const ELECTRODE: Entry = Entry {
     name: "electrode",
     make: |_, settings, capabilities| {
@@ -27,14 +28,14 @@ pub const ELECTRODE: Entry = Entry {
     },
 };
 
-const NAMES: [&str; 3] = ["silence of the joints", "silence of the force", "silence of the skin"];
+const NAMES: [&str; 3] = ["joint state age", "wrench age", "tactile frame age"];
 
 struct Silence {
     limits_s: [f64; 3],
-    /// Whether a force that is the same to the last bit counts as none: a simulated one may be free
+    /// Whether a force that repeats to the last bit counts as missing: a simulated one may be free
     /// of noise.
     repeats: bool,
-    /// The tick of the last reading of each; `None` before the first.
+    /// Tick of the last reading of each sensor; `None` before the first.
     heard: [Option<u64>; 3],
     time_s: f64,
     force_n: Option<Vector3<f64>>,
@@ -55,7 +56,7 @@ impl Interlock for Silence {
                 *heard = Some(now.tick);
             }
             let Some(heard) = heard else { continue };
-            // By ticks: the body's own time may be what stands still.
+            // Ages are counted in ticks, since the backend's own time may stand still.
             let (found, limit) = ((now.tick - *heard) as f64 * now.period_s, self.limits_s[i]);
             Trip::unless(found <= limit, NAMES[i], "", [found, limit], "s")?;
         }
@@ -63,12 +64,12 @@ impl Interlock for Silence {
     }
 }
 
-/// Frames in a row at an end of the range.
+/// Number of consecutive frames at an end of the range.
 const FRAMES: u32 = 2;
 
-/// Frames in a row with the same value that are no chance, whatever time lies between them: there
-/// are no readings while the next touch is planned. Noise of several counts makes two the same in
-/// one of ten, so many in one of a hundred thousand.
+/// Number of consecutive frames with the same value that cannot be chance, whatever time lies
+/// between them: there are no readings while the next touch is planned. With a noise of several
+/// counts, two frames are equal with probability 0.1, and this many with 1e-5.
 const STILL_FRAMES: u32 = 6;
 
 const NOTHING: [Still; ELECTRODES] =
@@ -78,16 +79,16 @@ const NOTHING: [Still; ELECTRODES] =
 #[derive(Clone, Copy)]
 struct Still {
     count: f64,
-    /// Since when it has been that.
+    /// Time since which it has this value.
     since_s: f64,
-    /// In how many frames.
+    /// Number of frames with this value.
     frames: u32,
 }
 
 struct Electrodes {
     frozen_s: f64,
     still: [Still; ELECTRODES],
-    /// Frames in a row at an end of the range.
+    /// Consecutive frames at an end of the range.
     ends: [u32; ELECTRODES],
 }
 

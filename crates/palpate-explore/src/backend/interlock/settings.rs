@@ -1,79 +1,74 @@
-//! Thresholds of the interlocks.
+//! Settings of the interlocks: limits and timeouts.
 
 use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Table `[interlocks]`: beyond these the body is stopped, whatever it was told. EN ISO 10218-1 has
-/// the reduced speed; where nothing else is said the figures are chosen.
+/// Table `[interlocks]`: limits beyond which the robot is stopped. The reduced speed is from EN ISO
+/// 10218-1; values without a source are heuristics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct InterlockSettings {
-    /// Fastest that the fingertip may be. Left out, 0.25 m/s for a real body (EN ISO 10218-1,
-    /// reduced speed), for a simulated one what its controller may ask for.
+    /// Largest fingertip speed, m/s; default 0.25 for a real robot (EN ISO 10218-1), the
+    /// controller's maximum in simulation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tip_speed_m_s: Option<f64>,
-    /// How far the tip may be from the box around its home and the ways of all its touches.
+    /// Largest distance of the tip from the box around home and all approaches, m.
     pub tip_margin_m: f64,
-    /// A box in `W`, [smallest, largest] of x, y and z, that neither tip nor elbow may leave. Left
-    /// out, there is none.
+    /// Workspace of tip and elbow in `W`, [smallest, largest] of x, y, z, m; unlimited if omitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workspace_m: Option<[[f64; 2]; 3]>,
-    /// Height in `W` of the table or floor that nothing of the robot but its foot may come near.
-    /// Left out, there is none; a real robot must be told.
+    /// Height in `W` of table or floor, m, avoided by all links except the foot; required for a real
+    /// robot.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lowest_m: Option<f64>,
-    /// How far the tip may go beyond where a touch turns back.
+    /// Largest distance of the tip beyond the turning point of a touch, m.
     pub depth_margin_m: f64,
-    /// Distance that links keep from each other, from the table and from the object.
+    /// Smallest distance between links, and from links to table and object, m.
     pub clearance_m: f64,
-    /// From a command until the body heeds it, as the interlocks that look ahead take it.
+    /// Delay from a command until the robot reacts, s, assumed by predictive interlocks.
     pub reaction_s: f64,
-    /// Force, beyond that at the start, that is a fault. Left out, 10 N above
-    /// `touch.force_limit_n`, at which a touch retreats by itself: 25 N with the default.
+    /// Force above that at the start that is a fault, N; default 10 above `touch.force_limit_n`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub force_limit_n: Option<f64>,
-    /// The same of the torque about the fingertip. Left out, that force at the lever of the
-    /// finger's length.
+    /// Torque about the fingertip that is a fault, N·m; default: the force limit times the finger's
+    /// length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_limit_nm: Option<f64>,
-    /// Longest that the time of the joints may stand still.
+    /// Timeout of joint states, s.
     pub joint_silence_s: f64,
-    /// Longest without a new reading of the force/torque sensor.
+    /// Timeout of the force/torque sensor, s.
     pub wrench_silence_s: f64,
-    /// Longest without a tactile frame.
+    /// Timeout of tactile frames, s.
     pub frame_silence_s: f64,
-    /// Stop a real body if an electrode, or a joint that is commanded to move, has read the same
-    /// value for this long: seven tactile frames.
+    /// Time after which a constant electrode or position of a commanded joint stops a real robot, s.
+    // heuristic: seven tactile frames.
     pub frozen_s: f64,
-    /// Stop if the velocity tracking error of a joint has been larger for 0.2 s, as a share of its
-    /// largest velocity.
+    /// Largest velocity tracking error over 0.2 s, as a fraction of the joint's velocity limit.
     #[serde(alias = "follow_share")]
     pub tracking_error_ratio: f64,
-    /// Longest delay with which the joints of a real body may follow their commands: what they move
-    /// within a second is compared with what was commanded up to this much earlier.
+    /// Largest delay of a real robot's joints, s, that position tracking allows.
     pub tracking_lag_s: f64,
-    /// How far the finger goes back, the way it came, when too much force has stopped it; 0 for not
-    /// at all.
+    /// Retract distance along the approach path after excessive force, m; 0 disables it.
     pub retract_m: f64,
 }
 
-/// By how much a force that is a fault lies above that at which a touch retreats; chosen: what a
-/// finger at 20 mm/s adds within 10 ms against 20 N/mm is 4 N.
+/// Margin of the fault force above that at which a touch retracts; a heuristic: a finger at 20 mm/s
+/// adds 4 N within 10 ms against 20 N/mm.
 const ABOVE_TOUCH_N: f64 = 10.0;
 
-/// Defaults that a rehearsal of motions keeps to as well.
+/// Defaults that the check of planned motions uses as well.
 pub mod defaults {
-    /// Farthest that the tip may leave the box around home and its touches.
+    /// Largest distance of the tip from the box around home and its touches.
     pub const TIP_MARGIN_M: f64 = 0.2;
-    /// Least distance between links.
+    /// Smallest distance between links.
     pub const CLEARANCE_M: f64 = 0.02;
-    /// From a command until the joints begin to brake.
+    /// Delay from a command until the joints begin to brake.
     pub const REACTION_S: f64 = 0.01;
 }
 
 impl Default for InterlockSettings {
-    /// No touch of the scenes that ship comes near to them.
+    /// No touch of the built-in scenes comes close to these limits.
     fn default() -> Self {
         Self {
             tip_speed_m_s: None,
@@ -97,16 +92,16 @@ impl Default for InterlockSettings {
 }
 
 impl InterlockSettings {
-    /// The force that is a fault where a touch retreats at `touch_force_n`.
+    /// Returns the force that is a fault, if a touch retracts at `touch_force_n`.
     pub fn force_n(&self, touch_force_n: f64) -> f64 {
         self.force_limit_n.unwrap_or(touch_force_n + ABOVE_TOUCH_N)
     }
 
-    /// The fault must lie above what is none: `touch_force_n` is `touch.force_limit_n`.
+    /// Checks that the fault force exceeds `touch_force_n`, the value of `touch.force_limit_n`.
     pub fn check_beside(&self, touch_force_n: f64, rules: &mut Rules) {
         let force_n = self.force_n(touch_force_n);
         rules.require("force_limit_n", force_n, force_n > touch_force_n, || {
-            format!("more than touch.force_limit_n = {touch_force_n} N, at which a touch retreats")
+            format!("more than touch.force_limit_n = {touch_force_n} N")
         });
     }
 }

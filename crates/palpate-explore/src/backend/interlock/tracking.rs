@@ -1,5 +1,5 @@
-//! Joints that do not follow their commands: by their velocity, by how far they have moved at any
-//! speed, and by a position that never changes.
+//! Tracking interlocks: velocity tracking error, position tracking error, and position readings
+//! that never change.
 
 use super::interlock::{Entry, Interlock, Now};
 use crate::backend::{Reading, Trip};
@@ -7,8 +7,9 @@ use crate::robot::arm::Joints;
 use crate::robot::arm::chain::MAX_JOINTS;
 use std::collections::VecDeque;
 
-/// Stops a real body when a joint reads one and the same position while it is commanded to move:
-/// its driver repeats itself, and every limit would look at where the arm no longer is.
+/// Interlock that stops a real robot if a joint position reading stays constant while the joint is
+/// commanded to move: the driver repeats old data, and all limits would be checked at a wrong
+/// position.
 pub const STANDSTILL: Entry = Entry {
     name: "joint standstill",
     make: |_, settings, capabilities| {
@@ -21,7 +22,8 @@ pub const STANDSTILL: Entry = Entry {
     },
 };
 
-/// Stops a body one of whose joints moves at another velocity than was applied for some time.
+/// Interlock that stops a robot if the velocity of a joint differs from the applied one for some
+/// time.
 pub const VELOCITY: Entry = Entry {
     name: "velocity tracking error",
     make: |_, settings, _| {
@@ -30,12 +32,12 @@ pub const VELOCITY: Entry = Entry {
     },
 };
 
-/// Stops a real body one of whose joints has moved by another angle than was commanded.
+/// Interlock that stops a real robot if a joint has moved by a different angle than commanded.
 ///
-/// A joint that follows with any delay up to `tracking_lag_s`, or smoothed over as much, has moved
-/// over a span by an amount between the least and the most that was commanded over spans of the
-/// same length which ended up to that much earlier. Short spans find a fast joint soon, long ones a
-/// joint at 0.1 mm/s, which moves less than the error that is always allowed for many seconds.
+/// A joint that follows with any delay up to `tracking_lag_s`, or smoothed over that time, has
+/// moved over a span by an amount between the smallest and the largest commanded over spans of the
+/// same length that ended up to that much earlier. Short spans detect a fast joint early, long ones
+/// a joint at 0.1 mm/s, which stays below the allowed error for many seconds.
 pub const POSITION: Entry = Entry {
     name: "position tracking error",
     make: |_, settings, capabilities| {
@@ -46,21 +48,21 @@ pub const POSITION: Entry = Entry {
     },
 };
 
-/// Movement of any point of the robot that a position must show.
+/// Movement of any point of the robot that a position reading must show.
 // heuristic: three steps of an encoder of 1e-4 rad at a reach of 1 m.
 const SEEN_M: f64 = 3e-4;
 
-/// Movement of any point of the robot after which it is stopped sooner, and how soon, as a share of
-/// the time after which joints count as silent.
-// heuristic: with the way on which the arm then brakes from 0.1 m/s, below 10 mm; and later than
-// the age limit of 50 ms of joint states over topics, so that a silent topic is reported as one.
+/// Movement of any point of the robot after which it is stopped earlier, and that earlier time, as
+/// a fraction of the joint state timeout.
+// heuristic: including the braking distance from 0.1 m/s, below 10 mm; and later than the age limit
+// of 50 ms of joint states over topics, so that a topic without messages is reported as such.
 const BLIND_M: f64 = 5e-3;
 const BLIND_SHARE: f64 = 1.5;
 
 struct Standstill {
     frozen_s: f64,
     blind_s: f64,
-    /// Since when each joint has been commanded without a change of its position.
+    /// Time since which each joint has been commanded without a change of its position.
     since_s: [Option<f64>; MAX_JOINTS],
 }
 
@@ -81,14 +83,14 @@ impl Interlock for Standstill {
     }
 }
 
-/// Time for which a velocity tracking error may be larger than allowed.
+/// Duration for which a velocity tracking error may exceed its limit.
 // heuristic: ten times the lag of the simulated arm's servos.
 pub const VELOCITY_S: f64 = 0.2;
 
 struct VelocityTracking {
-    /// Of the joint's speed limit.
+    /// Fraction of the joint's speed limit.
     share: f64,
-    /// Since when each joint's error has been too large.
+    /// Time since which each joint's error has exceeded its limit.
     since_s: [Option<f64>; MAX_JOINTS],
 }
 
@@ -109,25 +111,26 @@ impl Interlock for VelocityTracking {
     }
 }
 
-/// Time between the samples of each span.
+/// Sample intervals of the spans.
 const STEPS_S: [f64; 5] = [0.0025, 0.01, 0.04, 0.16, 0.64];
 
-/// Steps of a span: they last 0.25, 1, 4, 16 and 64 s, the first a tick each at least.
+/// Number of steps per span: the spans last 0.25, 1, 4, 16 and 64 s, the first at least one tick
+/// per step.
 const SPAN_STEPS: usize = 100;
 
-/// A pause between readings after which the body was at rest and all begins anew.
+/// Pause between readings after which the robot was at rest and all spans restart.
 const PAUSE_S: f64 = 0.1;
 
-/// Error that is always allowed, as movement of any point of the robot.
-// heuristic: several times the sag of a loaded servo and the skin's give; a finger at 5 mm/s that
-// does not follow is found within half a second.
+/// Absolute error that is always allowed, as movement of any point of the robot.
+// heuristic: several times the sag of a loaded servo and the compliance of the skin; a finger at 5
+// mm/s that does not follow is detected within half a second.
 const FLOOR_M: f64 = 2e-3;
 
-/// Error that is allowed besides, as a share of the commanded movement.
-// heuristic: steady error of a velocity servo.
+/// Additional allowed error, as a fraction of the commanded movement.
+// heuristic: steady-state error of a velocity servo.
 const SHARE: f64 = 0.05;
 
-/// A joint's position and the integral of its commands at some time.
+/// A joint's position and the integral of its commands at one time.
 #[derive(Clone, Copy)]
 struct Sample {
     time_s: f64,
@@ -139,7 +142,7 @@ struct Sample {
 struct Span {
     step_s: f64,
     lag_steps: usize,
-    /// At steps of `step_s`, oldest first; never more than it was made for.
+    /// Samples at steps of `step_s`, oldest first, within a fixed capacity.
     samples: VecDeque<Sample>,
     most: usize,
 }
@@ -151,9 +154,9 @@ impl Span {
         Self { step_s, lag_steps, samples: VecDeque::with_capacity(most), most }
     }
 
-    /// Adds a sample if a step has passed since the last one; returns whether it did.
+    /// Adds a sample if a step has passed since the last one; returns whether it was added.
     fn push(&mut self, sample: Sample, period_s: f64) -> bool {
-        // Half a tick's slack, so that a late one does not skip a step.
+        // Half a tick of tolerance, so that a late tick does not skip a step.
         let due_s = self.step_s - 0.5 * period_s;
         if self.samples.back().is_some_and(|last| sample.time_s - last.time_s < due_s) {
             return false;
@@ -165,8 +168,8 @@ impl Span {
         true
     }
 
-    /// How far the joints have moved, and the least and the most that they were commanded to.
-    /// Before the first sample the body was at rest.
+    /// Returns the movement of the joints, and the smallest and largest commanded movement. The
+    /// robot was at rest before the first sample.
     fn moved(&self) -> [Joints; 3] {
         let last = self.samples.len() - 1;
         let steps = SPAN_STEPS.min(last);

@@ -1,4 +1,4 @@
-//! Where fingertip and elbow may be, and how deep the finger may go.
+//! Workspace interlocks: bounds of fingertip and elbow, and of the finger's depth.
 
 use super::interlock::{Ahead, Entry, Interlock, Now};
 use crate::backend::Trip;
@@ -6,8 +6,8 @@ use crate::robot::arm::Joints;
 use nalgebra::{Point3, Vector3};
 use palpate_geometry::distance::HalfSpace;
 
-/// Stops the body before its tip leaves the places of its touches by more than a margin, or tip or
-/// elbow the workspace.
+/// Interlock that stops the robot before its tip leaves the box of its touches by more than a
+/// margin, or tip or elbow leave the workspace.
 pub const WORKSPACE: Entry = Entry {
     name: "workspace",
     make: |site, settings, _| {
@@ -27,7 +27,7 @@ pub const WORKSPACE: Entry = Entry {
     },
 };
 
-/// Stops the body before its tip goes beyond where it is to turn back by more than a margin.
+/// Interlock that stops the robot before its tip passes the turning point by more than a margin.
 pub const DEPTH: Entry = Entry {
     name: "depth",
     make: |site, settings, _| {
@@ -50,7 +50,7 @@ struct Room {
 }
 
 impl Room {
-    /// Distance of the point at `q` from the nearest side, in m; negative outside.
+    /// Distance of the point at `q` from the nearest side of the box, m; negative outside.
     fn clearance_m(&self, now: &Now, q: &Joints) -> f64 {
         let p_w: Point3<f64> = match self.elbow {
             None if *q == now.q => now.x_wt.translation.vector.into(),

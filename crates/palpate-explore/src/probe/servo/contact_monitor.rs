@@ -1,4 +1,4 @@
-//! The contact monitor: combines the finger's sensors during a touch.
+//! Contact monitor: combines the finger's sensors during a touch.
 
 use crate::backend::Reading;
 use crate::robot::finger::Finger;
@@ -6,8 +6,8 @@ use crate::robot::sensor::{BioTac, ForceTorqueTip, IdealSensor, SensedContact, S
 use crate::task::touch::TouchSettings;
 use nalgebra::Vector3;
 
-/// The sensors that a touch asks, in this order: the first that a body has decides where contacts
-/// are.
+/// Returns the sensors of a touch in order of priority: the first that the backend has locates the
+/// contacts.
 fn sensors(settings: &TouchSettings, finger: &Finger) -> Vec<Box<dyn Sensor>> {
     let TouchSettings { detection, point, pressure_limit_counts, .. } = settings;
     vec![
@@ -17,21 +17,21 @@ fn sensors(settings: &TouchSettings, finger: &Finger) -> Vec<Box<dyn Sensor>> {
     ]
 }
 
-/// What ends an approach.
+/// Event that ends an approach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ApproachEnd {
-    /// The object is felt.
+    /// Contact with the object.
     Contact,
-    /// Force or pressure is above its limit.
+    /// Force or pressure above its limit.
     Overload,
 }
 
-/// The readings of one touch, as far as they matter.
+/// Sensor state during one touch.
 pub(super) struct ContactMonitor {
     settings: TouchSettings,
     sensors: Vec<Box<dyn Sensor>>,
     force_n: f64,
-    /// Mean of the sensor's force while at rest: its bias and the finger's weight.
+    /// Mean force at rest: the sensor's bias and the finger's weight.
     force_at_rest_n: Option<Vector3<f64>>,
     /// Sum and count of the forces since [`forget`](Self::forget).
     forces: (Vector3<f64>, f64),
@@ -48,12 +48,12 @@ impl ContactMonitor {
         }
     }
 
-    /// Asks `sensor` before the others.
+    /// Adds `sensor` with priority over the others.
     pub(super) fn add(&mut self, sensor: Box<dyn Sensor>) {
         self.sensors.insert(0, sensor);
     }
 
-    /// Takes in what a tick brought.
+    /// Adds the reading of a tick.
     pub(super) fn take(&mut self, reading: &Reading) {
         let Reading { time_s, samples, wrench, .. } = reading;
         for sensor in &mut self.sensors {
@@ -69,7 +69,7 @@ impl ContactMonitor {
         };
     }
 
-    /// What is felt now.
+    /// Returns the current contact state.
     pub(super) fn approach_end(&self) -> Option<ApproachEnd> {
         if self.force_n > self.settings.force_limit_n
             || self.sensors.iter().any(|sensor| sensor.is_overloaded())
@@ -81,13 +81,13 @@ impl ContactMonitor {
         is_felt.then_some(ApproachEnd::Contact)
     }
 
-    /// Samples that the next [`tare`](Self::tare) needs.
+    /// Number of samples required by the next [`tare`](Self::tare).
     pub(super) fn samples_of_tare(&self) -> usize {
         let wanted = self.sensors.iter().map(|sensor| sensor.samples_of_tare());
         wanted.fold(self.settings.frames, usize::max)
     }
 
-    /// What was felt since [`forget`](Self::forget) is the rest.
+    /// Tares the sensors with the samples since [`forget`](Self::forget).
     pub(super) fn tare(&mut self) {
         self.sensors.iter_mut().for_each(|sensor| sensor.tare());
         self.force_at_rest_n = (self.forces.1 > 0.0).then(|| self.forces.0 / self.forces.1);
@@ -99,18 +99,18 @@ impl ContactMonitor {
         self.forces = (Vector3::zeros(), 0.0);
     }
 
-    /// Samples since [`forget`](Self::forget) of the sensor that has most.
+    /// Number of samples since [`forget`](Self::forget), of the sensor with the most.
     pub(super) fn collected(&self) -> usize {
         self.sensors.iter().filter_map(|sensor| sensor.collected()).max().unwrap_or(0)
     }
 
-    /// When the last valid sample came; `None` for a body whose sensors are read in every tick.
+    /// Time of the last valid sample, s; `None` if the sensors are read in every tick.
     pub(super) fn last_sample_s(&self) -> Option<f64> {
         self.sensors.iter().filter_map(|sensor| sensor.last_sample_s()).reduce(f64::max)
     }
 
-    /// The contact in `T`, by the samples since [`forget`](Self::forget) of the first sensor that
-    /// the body has.
+    /// Returns the contact in `T`, from the samples since [`forget`](Self::forget) of the first
+    /// sensor that the backend has.
     pub(super) fn contact(&self, finger: &Finger) -> Option<SensedContact> {
         self.sensors.iter().find(|sensor| sensor.is_present())?.locate(finger)
     }

@@ -1,4 +1,4 @@
-//! One touch by a body that moves and feels: travel, tare, approach, settle, read, retract.
+//! Servo: carries out a touch with a backend: travel, tare, approach, settle, read, retract.
 
 mod contact_monitor;
 mod reach;
@@ -22,19 +22,18 @@ pub use crate::task::approach::BEYOND_M;
 pub use reach::{ArmReach, check_reach};
 pub(super) use reach::{standoff, turning_point};
 
-/// A movement has arrived when the tip is this near to its end; chosen: below what a touch
-/// resolves.
+/// Position tolerance at the end of a movement; a heuristic: below what a touch resolves.
 const ARRIVED_M: f64 = 5e-5;
 
-/// A finger that is no farther beyond the stand-off goes there at once; chosen: less than any
-/// object is high.
+/// Distance beyond the stand-off up to which a finger moves there directly; a heuristic: smaller
+/// than the height of any object.
 const DEEPER_M: f64 = 5e-3;
 
-/// Joints are home when each is this near; chosen, as for a finger that is turned.
+/// Tolerance of each joint at home; a heuristic, the same as for a finger that is turned.
 const HOME_RAD: f64 = 2e-3;
 
-/// Drives any [`Backend`] through touches. The same code drives simulators, recordings and the
-/// real arm: it knows the robot, how to touch, and what it is told of each touch.
+/// Carries out touches with any [`Backend`]. The same code drives simulators, recordings and the
+/// real arm; its inputs are the robot, the touch settings, and one approach per touch.
 pub struct Servo {
     robot: Robot,
     body: Box<dyn Backend>,
@@ -42,21 +41,21 @@ pub struct Servo {
     settings: TouchSettings,
     monitor: ContactMonitor,
     command: Command,
-    /// Of the last reading.
+    /// Time of the last reading.
     time_s: f64,
     q: Vec<f64>,
     swept: Option<Swept>,
-    /// Where the last contact was read.
+    /// Pose of the tip at the reading of the last contact.
     tip: Option<Isometry3<f64>>,
-    /// Of an arm, which tries a way around an object out before it goes.
+    /// Reach of an arm, which checks each path around an object before moving.
     reach: Option<ArmReach>,
 }
 
 impl Servo {
-    /// Brings `body`, which moves the robot's chain, to its start.
+    /// Creates a servo and resets `body`, which moves the robot's chain.
     ///
     /// # Errors
-    /// If the body cannot be brought there, or is another arm.
+    /// If the reset fails, or the backend drives a different arm.
     pub fn new(
         robot: Robot,
         settings: TouchSettings,
@@ -85,13 +84,13 @@ impl Servo {
         })
     }
 
-    /// Asks `sensor` before those that Palpate knows.
+    /// Adds `sensor` with priority over the built-in ones.
     pub fn with_sensor(mut self, sensor: Box<dyn Sensor>) -> Self {
         self.monitor.add(sensor);
         self
     }
 
-    /// Pose of the fingertip by forward kinematics.
+    /// Returns the pose of the fingertip by forward kinematics.
     fn x_wt(&mut self) -> Isometry3<f64> {
         let x_wt = self.control.x_wt(&self.q);
         x_wt.unwrap_or(self.control.chain().base)
@@ -101,14 +100,14 @@ impl Servo {
         self.body.capabilities().period_s
     }
 
-    /// One tick towards `goal`.
+    /// Runs one tick towards `goal`.
     fn tick(&mut self, goal: &Goal) -> Result<(), Fault> {
         let motion = self.control.step(&self.q, goal);
         let motion = motion.map_err(|cause| Fault::no_command(self.time_s, cause))?;
         self.carry_out(&motion.qdot)
     }
 
-    /// One tick in which the joints move at `qdot`.
+    /// Runs one tick with the joint velocities `qdot`.
     fn carry_out(&mut self, qdot: &Joints) -> Result<(), Fault> {
         self.command.qdot.iter_mut().zip(qdot.iter()).for_each(|(to, from)| *to = *from);
         let reading = self.body.step(&self.command)?;
@@ -124,7 +123,7 @@ impl Servo {
         }
     }
 
-    /// Moves straight to `to`, until there or, if `alert`, until something is felt.
+    /// Moves in a straight line to `to`; if `alert`, stops at contact or overload.
     fn go(
         &mut self,
         phase: &'static str,
@@ -136,7 +135,7 @@ impl Servo {
         self.follow(phase, Path::straight(from, to, speed_m_s), alert)
     }
 
-    /// Moves along `path`, until at its end or, if `alert`, until something is felt.
+    /// Moves along `path` to its end; if `alert`, stops at contact or overload.
     fn follow(
         &mut self,
         phase: &'static str,
@@ -144,8 +143,8 @@ impl Servo {
         alert: bool,
     ) -> Result<Option<ApproachEnd>, Fault> {
         let to = path.to;
-        // From the first reading on: the clock of a real arm goes on while the next touch is
-        // thought about.
+        // The deadline counts from the first reading: the clock of a real arm runs on while the
+        // next touch is planned.
         let mut deadline_s = None;
         let period_s = self.period_s();
         loop {
@@ -167,8 +166,8 @@ impl Servo {
         }
     }
 
-    /// Goes straight back to the level of the stand-off `above` where the finger is beyond it:
-    /// after a touch that was broken off there may be something beside it.
+    /// Moves straight back to the level of the stand-off `above` if the finger is beyond it: after
+    /// an interrupted touch the finger may be beside the object.
     fn withdraw(&mut self, approach: &Approach, above: &Isometry3<f64>) -> Result<(), Fault> {
         let here = self.x_wt();
         let from_w = here.translation.vector;
@@ -177,11 +176,11 @@ impl Servo {
             return Ok(());
         }
         let back = Isometry3::from_parts(back_w.into(), here.rotation);
-        self.go("the way back", back, self.settings.approach_m_s, false).map(|_| ())
+        self.go("the retract position", back, self.settings.approach_m_s, false).map(|_| ())
     }
 
-    /// Goes around what lies between two approaches to the stand-off `above`, an arm on a way that
-    /// it has tried out.
+    /// Travels around the object to the stand-off `above`; an arm follows a path that was checked
+    /// beforehand.
     fn travel_around(
         &mut self,
         around: &Ball,
@@ -220,8 +219,8 @@ impl Servo {
         Ok(())
     }
 
-    /// Brings all joints home together, from where an arm comes to all that it reaches; on a line
-    /// that is tried out from where they really are.
+    /// Moves all joints home along a straight line in joint space, from where an arm reaches every
+    /// approach. The line is checked from the measured joint positions.
     fn go_home(&mut self, around: &Ball) -> Result<(), Fault> {
         let q = self.robot.chain.joints_from(&self.q);
         let line = self.reach.as_ref().zip(q).and_then(|(reach, q)| reach.line_home(&q, around));
@@ -246,8 +245,8 @@ impl Servo {
         }
     }
 
-    /// Goes straight back out of the sphere the way the finger points, where the tip is in it:
-    /// after a touch that was broken off there may be something beside it.
+    /// Moves straight out of the ball, opposite to the finger's direction, if the tip is in it:
+    /// after an interrupted touch the finger may be beside the object.
     fn leave(&mut self, around: &Ball, ahead_t: &UnitVector3<f64>) -> Result<(), Fault> {
         let here = self.x_wt();
         let p_wt = here.translation.vector.into();
@@ -264,14 +263,14 @@ impl Servo {
                 return Err(self.no_way());
             }
         }
-        self.go("the way back", out, speed_m_s, false).map(|_| ())
+        self.go("the retract position", out, speed_m_s, false).map(|_| ())
     }
 
     fn no_way(&self) -> Fault {
         Fault::NoWay { time_s: self.time_s, q: self.q.clone() }
     }
 
-    /// Why a movement to `to` has not ended in its time.
+    /// Returns the fault of a movement to `to` that exceeded its timeout.
     fn overdue(&self, phase: &'static str, to: &Isometry3<f64>) -> Fault {
         let time_s = self.time_s;
         match posture(&self.robot.chain, to) {
@@ -282,8 +281,8 @@ impl Servo {
         }
     }
 
-    /// Stands still at `x_wt` until `count` more frames have arrived, or their time has passed in a
-    /// body without sensor.
+    /// Rests at `x_wt` until `count` more frames have arrived; without a tactile sensor, for the
+    /// same duration.
     fn rest(&mut self, x_wt: Isometry3<f64>, count: usize) -> Result<Option<ApproachEnd>, Fault> {
         self.monitor.forget();
         let here = Goal::still(x_wt);
@@ -300,8 +299,8 @@ impl Servo {
         Ok(None)
     }
 
-    /// Stops, settles where contact was told, and reads it: what the finger overran while its
-    /// servos stopped it is taken back, so that the depth does not depend on them.
+    /// Stops at the point of detection, settles and reads the contact. The overrun while the servos
+    /// stop the finger is reversed, so that the depth does not depend on them.
     fn read(&mut self, approach: &Approach) -> Result<Option<Contact>, Fault> {
         let until_s = self.time_s + self.settings.settle_s;
         let mut held = self.x_wt();
@@ -324,16 +323,15 @@ impl Servo {
     }
 }
 
-/// Depth to which the object may be in the skin before the finger stops; chosen: the fluid's gap.
+/// Indentation of the skin during which the finger can still stop; a heuristic: the fluid's gap.
 const GIVES_WAY_M: f64 = 1.5e-3;
 
-/// Silence of a sensor after which it counts as lost; chosen: three batches of five frames, in
-/// which an approach goes 3 mm.
+/// Time without samples after which a sensor counts as lost; a heuristic: three batches of five
+/// frames, in which an approach travels 3 mm.
 const SILENCE_S: f64 = 0.15;
 
 impl Probe for Servo {
-    /// The centre of the fingertip's hemisphere travels to the stand-off and goes the approach's
-    /// way.
+    /// Moves the centre of the fingertip's hemisphere to the stand-off and along the approach.
     fn touch(&mut self, approach: &Approach) -> Result<Touch, Fault> {
         refuse_unless_finite(approach)?;
         let TouchSettings { travel_m_s, approach_m_s, .. } = self.settings;
@@ -363,7 +361,7 @@ impl Probe for Servo {
         let here_w = self.x_wt().translation.vector;
         let back_w = approach.level_with(&here_w, &above.translation.vector);
         let back = Isometry3::from_parts(back_w.into(), above.rotation);
-        self.go("the way back", back, travel_m_s, false)?;
+        self.go("the retract position", back, travel_m_s, false)?;
         Ok(touch)
     }
 

@@ -1,7 +1,7 @@
-//! Which touches a robot can make: the poses between which each goes, and movements of an arm that
-//! are tried out on its kinematics before they are made. Around an object an arm comes from home,
-//! goes all of the way, and is home again, within the joints' limits, clear of itself and of the
-//! object.
+//! Reachability: the start and end poses of each touch, and movements of an arm, which are checked
+//! on its kinematics before they are carried out. For a whole object, an arm must come from home,
+//! complete the approach, and return home, within the joints' limits, without collision with itself
+//! or the object.
 
 use super::trajectory::{Line, Path, Round, rounds};
 use crate::backend::interlock::defaults;
@@ -16,7 +16,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use palpate_geometry::sweep::Capsule;
 use palpate_input::error::Invalid;
 
-/// The tip in front of all that may be touched.
+/// Returns the pose of the tip in front of everything that may be touched.
 pub(in crate::probe) fn standoff(
     robot: &Robot,
     standoff_m: f64,
@@ -32,7 +32,7 @@ pub(in crate::probe) fn standoff(
     Isometry3::from_parts(p_wt.into(), approach.r_wt())
 }
 
-/// The tip behind all that may be touched.
+/// Returns the pose of the tip behind everything that may be touched.
 pub(in crate::probe) fn turning_point(robot: &Robot, approach: &Approach) -> Isometry3<f64> {
     let ahead_w = approach.direction_w().into_inner();
     let hull_w = ahead_w * robot.finger.radius_m;
@@ -40,15 +40,15 @@ pub(in crate::probe) fn turning_point(robot: &Robot, approach: &Approach) -> Iso
     Isometry3::from_parts(p_wt.into(), approach.r_wt())
 }
 
-/// Places along each side of the zone that are tried; chosen.
+/// Number of places checked along each side of the zone; a heuristic.
 const TRIED_PER_SIDE: usize = 5;
 
-/// Whether `robot` has postures to touch over all of the task's zone: in front of each place of a
-/// grid and where it turns back behind the farthest depth. Around a whole object: whether it comes
-/// to its middle from some side.
+/// Checks that `robot` reaches the whole zone of the task: in front of each place of a grid, and
+/// at the turning point behind the farthest depth. For a whole object, checks that it reaches the
+/// centre from at least one direction.
 ///
 /// # Errors
-/// If it has not, with the place that is missed by most.
+/// If it does not; the error names the place with the largest deviation.
 pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), Invalid> {
     let Some(zone) = task.zone() else {
         let of = DIRECTIONS;
@@ -56,11 +56,11 @@ pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), Invalid> {
         return match is_any {
             true => Ok(()),
             false => Err(Invalid::new(format!(
-                "the finger cannot be brought to the object from any of {of} directions"
+                "the finger cannot reach the object from any of {of} directions"
             ))
             .mend(
-                "bring it nearer (object.position_m), move arm.base_position_m, or make \
-                 around.radius_m or around.lowest_m smaller",
+                "move it closer (object.position_m), move arm.base_position_m, or decrease \
+                 around.radius_m or around.lowest_m",
             )),
         };
     };
@@ -88,11 +88,11 @@ pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), Invalid> {
         Some((place, phase, distance_m, angle_rad)) => {
             let away = format!("{:.0} mm and {:.0} deg", 1e3 * distance_m, angle_rad.to_degrees());
             Err(Invalid::new(format!(
-                "the arm does not reach {count} of {of} places of the zone: over {place:?} the tip \
-                 stays {away} away from {phase}"
+                "the arm does not reach {count} of {of} places of the zone: at {place:?} the tip \
+                 misses {phase} by {away}"
             ))
             .mend(
-                "bring the object and the zone nearer (object.position_m, zone), move \
+                "move the object and the zone closer (object.position_m, zone), move \
                  arm.base_position_m, or make the zone smaller",
             ))
         }
@@ -100,35 +100,35 @@ pub fn check_reach(robot: &Robot, task: &Task) -> Result<(), Invalid> {
     }
 }
 
-/// Shares of an approach after which it is tried to turn back, of which a contact may be any: how
-/// long the finger has gone decides on which side the elbow is then. Chosen.
+/// Fractions of an approach at which the return is checked, since contact may occur at any of them:
+/// the length of the approach decides the side of the elbow; a heuristic.
 const TURNS: [f64; 2] = [0.0, 1.0];
 
-/// What an arm reaches.
+/// The reach of an arm.
 pub struct ArmReach {
     robot: Robot,
     standoff_m: f64,
     travel_m_s: f64,
     approach_m_s: f64,
-    /// Where the tip is at home.
+    /// Pose of the tip at home.
     home: Isometry3<f64>,
     links: Vec<LinkCapsule>,
-    /// Links that must not meet.
+    /// Pairs of links that must not collide.
     pairs: Vec<[usize; 2]>,
 }
 
-/// A part of an arm's way to an approach.
+/// A segment of an arm's path to an approach.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Leg {
-    /// Around the ball, until the tip is there.
+    /// Around the ball to this pose of the tip.
     Around(Isometry3<f64>),
-    /// Straight in the space of the joints, until they are home.
+    /// Along a straight line in joint space to home.
     Home,
 }
 
 impl ArmReach {
-    /// Of `robot`, touching as `touch` says. Returns `None` for a robot whose joints slide or turn
-    /// without end, which reaches everything.
+    /// Creates the reach of `robot` with the settings `touch`. Returns `None` for a robot with
+    /// prismatic or continuous joints, which reaches everything.
     pub fn new(robot: &Robot, touch: &TouchSettings) -> Option<Self> {
         let is_arm = robot.chain.joints.iter().any(|joint| {
             let [low, high] = joint.q_limits;
@@ -146,13 +146,13 @@ impl ArmReach {
         Some(Self { robot, standoff_m, travel_m_s, approach_m_s, home, links, pairs })
     }
 
-    /// Where it must keep clear, with this share of the slack.
+    /// Returns the clearance constraints, with this fraction of the margins.
     fn clear(&self, around: &Ball, slack: f64) -> Clear {
         Clear::of(around, &self.robot, self.standoff_m, slack)
     }
 
-    /// Where the joints are after going around from `q` to `to`, and where the tip stops on the
-    /// way: nowhere, or over the top of what it goes around.
+    /// Moves around the object from `q` to `to`; returns the final joints and the stop on the way,
+    /// if any: over the top of the ball.
     fn around(
         &self,
         q: &Joints,
@@ -176,15 +176,17 @@ impl ArmReach {
         })
     }
 
-    /// The line of the joints from `q` home, with this share of the slack; none if it is not clear.
+    /// Returns the straight joint-space line from `q` to home, with this fraction of the margins;
+    /// `None` if it is not clear.
     fn line(&self, q: &Joints, around: &Ball, slack: f64) -> Option<Line> {
         let chain = &self.robot.chain;
         let line = Line::new(chain, q, &chain.home, self.travel_m_s);
         self.allows(&line, &self.clear(around, slack)).then_some(line)
     }
 
-    /// The way home from `q`: first with the tip, then with the joints, which by then may be wound
-    /// up or have the elbow on the other side; or with the joints alone. None if none is known.
+    /// Returns the path home from `q`: first of the tip, then of the joints, which may by then be
+    /// wound up or have the elbow on the other side; or of the joints alone. `None` if there is
+    /// none.
     fn homeward(&self, q: &Joints, approach: &Approach, slack: f64) -> Option<Vec<Leg>> {
         let around = approach.around.as_ref()?;
         let by_tip = || {
@@ -196,8 +198,8 @@ impl ArmReach {
         by_tip().or_else(|| self.line(q, around, slack).map(|_| vec![Leg::Home]))
     }
 
-    /// The way from `q` to the stand-off of `approach`; none if the arm does not come there, along
-    /// the approach and home again, wherever on the approach it turns back.
+    /// Returns the path from `q` to the stand-off of `approach`; `None` if the arm cannot get
+    /// there, along the approach and home again from any turning point on it.
     fn way(&self, q: &Joints, approach: &Approach) -> Option<Vec<Leg>> {
         let clear = self.clear(approach.around.as_ref()?, LATER);
         let above = standoff(&self.robot, self.standoff_m, approach);
@@ -217,14 +219,13 @@ impl ArmReach {
         Some(stop.into_iter().chain([above]).map(Leg::Around).collect())
     }
 
-    /// Whether it can come from home to where `approach` sets out, go it to its end, and be home
-    /// again.
+    /// Whether the arm can move from home to the start of `approach`, complete it, and return home.
     pub fn reaches(&self, approach: &Approach) -> bool {
         self.way(&self.robot.chain.home, approach).is_some()
     }
 
-    /// The way from `q` to the stand-off of `approach`, directly or by way of home; none if the arm
-    /// comes there on neither.
+    /// Returns the path from `q` to the stand-off of `approach`, direct or via home; `None` if both
+    /// are blocked.
     pub(super) fn plan(&self, q: &Joints, approach: &Approach) -> Option<Vec<Leg>> {
         let by_home = || {
             let mut legs = self.homeward(q, approach, NOW)?;
@@ -234,70 +235,72 @@ impl ArmReach {
         self.way(q, approach).or_else(by_home)
     }
 
-    /// The line of the joints home from `q`, where the arm stands; none if it is not clear.
+    /// Returns the straight joint-space line from the current joints `q` to home; `None` if it is
+    /// not clear.
     pub(super) fn line_home(&self, q: &Joints, around: &Ball) -> Option<Line> {
         self.line(q, around, NOW)
     }
 
-    /// Whether the tip can go straight back out of the ball from `q`.
+    /// Whether the tip can move straight out of the ball from `q`.
     pub(super) fn leaves(&self, q: &Joints, path: Path, around: &Ball) -> bool {
         self.follow(*q, [path], &self.clear(around, NOW)).is_some()
     }
 }
 
-/// Its tick; chosen: coarse, for the controller's gain of 5 per second.
+/// Tick of the check; a heuristic: coarse, for the controller's gain of 5 per second.
 const PERIOD_S: f64 = 0.05;
 
-/// How far tip and attitude may lag behind their path before the arm counts as stuck; chosen: near
-/// a singularity it slows down and catches up.
+/// Largest lag of tip position and attitude behind their path before the arm counts as stuck; a
+/// heuristic: near a singularity it slows down and catches up.
 const LAG_M: f64 = 0.1;
 const LAG_RAD: f64 = 1.0;
 
-/// How near they must come to its end, and the ticks they are given for that; chosen.
+/// Tolerance at the end of a path, and the number of ticks to reach it; heuristics.
 const NEAR_M: f64 = 1e-3;
 const NEAR_RAD: f64 = 0.01;
 const TICKS_TO_END: usize = 40;
 
-/// How far joints keep from their limits, and links from each other beyond that distance, because
-/// nothing moves exactly as it is tried out; chosen.
+/// Margins to the joints' limits, and between links in addition to the clearance, since the actual
+/// motion differs from the checked one; heuristics.
 const SLACK_RAD: f64 = 0.1;
 const SLACK_M: f64 = 5e-3;
 
-/// How far the tip may be from the box around home and ball, as a share of what interlocks allow.
-// heuristic: a quarter is left for what the rehearsal does not know.
+/// Allowed distance of the tip from the box around home and ball, as a fraction of the interlocks'
+/// limit.
+// heuristic: a quarter remains for deviations from the checked motion.
 const TIP_MARGIN: f64 = 0.75;
 
-/// How far anything moves from one posture that is looked at to the next, straight in the space of
-/// the joints; chosen: no more than is asked beyond the interlocks' clearance.
+/// Largest motion of any point between two checked postures on a joint-space line; a heuristic: no
+/// more than the margin beyond the interlocks' clearance.
 const GRAIN_M: f64 = 2e-3;
 
-/// From a command until the joints begin to brake, as a multiple of what interlocks take.
-// heuristic: a tick more.
+/// Delay from a command until the joints begin to brake, as a multiple of the interlocks' value.
+// heuristic: one tick more.
 const REACTION: f64 = 2.0;
 
-/// Where an arm must keep clear while it tries.
+/// Clearance constraints of a checked motion.
 #[derive(Clone, Copy)]
 struct Clear {
-    /// The ball that links, and what the hand carries while it travels, stay out of.
+    /// Ball that the links, and the hand during travel, stay out of.
     ball: (Point3<f64>, f64),
-    /// Lowest z of what carries the finger; the finger's own ways keep above it.
+    /// Lowest z of the links that carry the finger; the finger's own paths stay above it too.
     lowest_m: Option<f64>,
-    /// Box that the tip stays in.
+    /// Box that contains the tip.
     tip_w: [Point3<f64>; 2],
-    /// Share of the slack that is asked.
+    /// Fraction of the margins that is required.
     slack: f64,
 }
 
-/// Of a way home from where the arm stands; chosen: it was promised from a little beside, and must
-/// be found again.
+/// Fraction for a path home from the current joints; a heuristic: the path was checked from nearby
+/// joints, and must be found again.
 const NOW: f64 = 0.4;
 
-/// Of everything else.
+/// Fraction for all other paths.
 const LATER: f64 = 1.0;
 
 impl Clear {
-    /// Of the ball that a finger of `robot` goes `around`, at `standoff_m` from it, with
-    /// this share of the slack.
+    /// Returns the constraints for the ball that a finger of `robot` travels `around`, at
+    /// `standoff_m` from it, with this fraction of the margins.
     fn of(around: &Ball, robot: &Robot, standoff_m: f64, slack: f64) -> Self {
         let radius_m = around.radius_m - standoff_m - robot.finger.bulge_m();
         let home_w = Point3::from(robot.chain.forward(&robot.chain.home).translation.vector);
@@ -311,7 +314,7 @@ impl Clear {
 }
 
 impl ArmReach {
-    /// Where the joints are after `paths` from `q`; none if it does not come along one of them.
+    /// Returns the joints after following `paths` from `q`; `None` if one of them is blocked.
     fn follow(
         &self,
         q: Joints,
@@ -349,7 +352,7 @@ impl ArmReach {
         }
     }
 
-    /// Whether all of `line` is clear; joints that brake on it stay on it.
+    /// Whether all of `line` is clear; braking joints stay on it.
     fn allows(&self, line: &Line, clear: &Clear) -> bool {
         line.postures(GRAIN_M).all(|q| {
             self.is_clear(&q, clear, false)
@@ -358,7 +361,7 @@ impl ArmReach {
         })
     }
 
-    /// Where joints stop that brake together from `qdot`.
+    /// Returns the joints after all of them have braked together from `qdot`.
     fn stops(&self, q: &Joints, qdot: &Joints) -> Joints {
         let joints = self.robot.chain.joints.iter().zip(qdot.iter());
         let braking_s = joints.map(|(joint, qdot)| qdot.abs() / joint.qddot_limit);
@@ -366,7 +369,7 @@ impl ArmReach {
         self.robot.chain.clamp(&(q + qdot * time_s))
     }
 
-    /// Whether links keep from each other.
+    /// Whether the links keep their distance from each other.
     fn is_apart(&self, q: &Joints, clear: &Clear) -> bool {
         let frames = self.robot.chain.frames(q);
         let least_m = defaults::CLEARANCE_M + clear.slack * SLACK_M;
@@ -374,8 +377,9 @@ impl ArmReach {
         self.pairs.iter().all(|&[k, i]| placed(k).to_capsule_m(&placed(i)) > least_m)
     }
 
-    /// Whether joints keep from their limits, the tip in its box, links from the ball, and what
-    /// carries the finger above the lowest z; on an approach hand and finger go into the ball.
+    /// Whether the joints are within their limits, the tip in its box, the links outside the ball,
+    /// and the links that carry the finger above the lowest z; on an approach, hand and finger may
+    /// enter the ball.
     fn is_clear(&self, q: &Joints, clear: &Clear, is_approach: bool) -> bool {
         let slack_rad = clear.slack * SLACK_RAD;
         let within = self.robot.chain.joints.iter().zip(q.iter()).all(|(joint, q)| {
@@ -397,7 +401,7 @@ impl ArmReach {
                 || far.all(|link| link.at(&frames[link.link]).to_capsule_m(&ball) > 0.0))
     }
 
-    /// Whether the links of which `holds` is true are above the lowest z.
+    /// Whether the links for which `holds` is true are above the lowest z.
     fn is_above(
         &self,
         frames: &[Isometry3<f64>],
@@ -426,7 +430,7 @@ mod tests {
     use crate::robot::arm::ArmSettings;
     use crate::task::Aim;
 
-    /// A PA-10 as it stands before the container.
+    /// A PA-10 in front of the container.
     fn reach() -> (ArmReach, Approach) {
         let arm = ArmSettings {
             base_rotation_deg: [0.0, 0.0, -90.0],
@@ -442,7 +446,7 @@ mod tests {
         (ArmReach::new(&robot, &touch).unwrap(), approach)
     }
 
-    /// Behind the object, where a touch of a PA-10 ended: the hand would be drawn through it.
+    /// Behind the object, after a touch of a PA-10: the hand would move through the object.
     #[test]
     fn a_line_of_the_joints_through_the_object_is_refused_and_the_tip_goes_around() {
         let (reach, approach) = reach();
@@ -455,7 +459,7 @@ mod tests {
         assert!(matches!(legs[..], [Leg::Around(_), .., Leg::Home]), "{legs:?}");
     }
 
-    /// The elbow on the other side, from where no standing with the tip at home brings it back.
+    /// The elbow is on the other side, from where moving the tip home does not bring it back.
     #[test]
     fn joints_are_home_in_the_end_on_whichever_side_the_elbow_was() {
         let (reach, approach) = reach();
@@ -469,7 +473,7 @@ mod tests {
         assert!(reach.line_home(&wound, &approach.around.unwrap()).is_none());
     }
 
-    /// What is promised for later is asked more, or it would not be found again.
+    /// Paths that are planned for later need larger margins, so that they are found again.
     #[test]
     fn a_way_home_is_found_from_where_none_is_promised() {
         let (reach, approach) = reach();

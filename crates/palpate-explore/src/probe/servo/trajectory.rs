@@ -1,4 +1,4 @@
-//! Movements, point by point: straight, around a sphere, or straight in the space of the joints.
+//! Trajectories: straight, around a sphere, or straight in joint space.
 
 use crate::control::Goal;
 use crate::robot::Finger;
@@ -6,49 +6,50 @@ use crate::robot::arm::{Chain, Joints};
 use crate::task::Ball;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3, Vector6};
 
-/// From the wrist's centre to the fingertip: turning, the wrist goes no faster than the tip may,
-/// and no joint turns faster than that. Chosen, as in the controller.
+/// Distance from the wrist's centre to the fingertip: while turning, the wrist moves no faster than
+/// the tip may, and no joint turns faster than that; a heuristic, as in the controller.
 const LEVER_M: f64 = 0.2;
 
-/// A movement has turned the finger when it is this near to its last attitude; chosen: it moves the
-/// finger's heel by less than a touch resolves.
+/// Attitude tolerance at the end of a movement; a heuristic: it moves the finger's heel by less
+/// than a touch resolves.
 const TURNED_RAD: f64 = 2e-3;
 
-/// A movement of the fingertip with an end, straight or around a sphere.
+/// A finite path of the fingertip, straight or around a sphere.
 pub(super) struct Path {
     from: Vector3<f64>,
-    /// Where it ends.
+    /// End pose.
     pub(super) to: Isometry3<f64>,
-    /// `None` of a straight movement.
+    /// Path around a sphere; `None` for a straight path.
     round: Option<Round>,
     pub(super) pace: Pace,
 }
 
 impl Path {
-    /// Straight from `from` to `to` at `speed_m_s` at most; the attitude is that of `to` all along.
+    /// Creates a straight path from `from` to `to` at no more than `speed_m_s`, with the constant
+    /// attitude of `to`.
     pub(super) fn straight(from: Vector3<f64>, to: Isometry3<f64>, speed_m_s: f64) -> Self {
         let length_m = (to.translation.vector - from).norm();
         Self { from, to, round: None, pace: Pace::new(length_m, speed_m_s) }
     }
 
-    /// Along `round` at `speed_m_s` at most.
+    /// Creates a path along `round` at no more than `speed_m_s`.
     pub(super) fn round(round: Round, speed_m_s: f64) -> Self {
         let (from, to) = (round.from.translation.vector, round.to);
         let pace = Pace::new(round.length_m(), speed_m_s);
         Self { from, to, round: Some(round), pace }
     }
 
-    /// Whether it is straight.
+    /// Whether the path is straight.
     pub(super) fn is_straight(&self) -> bool {
         self.round.is_none()
     }
 
-    /// Whether the attitude `here` is that of its end; a straight movement has it all along.
+    /// Whether the attitude of `here` is that of the end; always true for a straight path.
     pub(super) fn has_turned(&self, here: &Isometry3<f64>) -> bool {
         self.is_straight() || here.rotation.angle_to(&self.to.rotation) < TURNED_RAD
     }
 
-    /// Moves the point on by `dt_s`.
+    /// Advances the set point by `dt_s`.
     pub(super) fn advance(&mut self, dt_s: f64) -> Goal {
         let Some([travelled_m, now_m_s]) = self.pace.advance(dt_s) else {
             return Goal::still(self.to);
@@ -67,11 +68,11 @@ impl Path {
     }
 }
 
-/// Acceleration of the point that the fingertip follows; chosen, half of what the stage and the
-/// slowest joints of the arm can do.
+/// Acceleration of the set point; a heuristic: half of what the stage and the slowest joints of the
+/// arm can do.
 const ACCELERATION_M_S2: f64 = 0.5;
 
-/// How far a point has run that speeds up and slows down evenly.
+/// A trapezoidal velocity profile along a path.
 pub(super) struct Pace {
     length_m: f64,
     speed_m_s: f64,
@@ -80,22 +81,22 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// Over `length_m` at `speed_m_s` at most.
+    /// Creates a profile over `length_m` at no more than `speed_m_s`.
     fn new(length_m: f64, speed_m_s: f64) -> Self {
         Self { length_m, speed_m_s, travelled_m: 0.0, now_m_s: 0.0 }
     }
 
-    /// Whether it has arrived.
+    /// Whether the end is reached.
     pub(super) fn is_done(&self) -> bool {
         self.travelled_m >= self.length_m
     }
 
-    /// Goes on for `dt_s`: the way travelled and the speed, none once it has arrived.
+    /// Advances by `dt_s`; returns distance and speed, or `None` at the end.
     fn advance(&mut self, dt_s: f64) -> Option<[f64; 2]> {
         let left_m = self.length_m - self.travelled_m;
         let stops = (2.0 * ACCELERATION_M_S2 * left_m.max(0.0)).sqrt();
         let faster = self.now_m_s + ACCELERATION_M_S2 * dt_s;
-        // Without the floor the last step would take for ever.
+        // Without this minimum speed the last step would take forever.
         let crawl = ACCELERATION_M_S2 * dt_s;
         self.now_m_s = faster.min(self.speed_m_s).min(stops.max(crawl));
         let step_m = (self.now_m_s * dt_s).min(left_m);
@@ -107,30 +108,30 @@ impl Pace {
         Some([self.travelled_m, self.now_m_s])
     }
 
-    /// Longest time it may take before something is wrong; chosen: four times what it should.
+    /// Timeout of the movement, s; a heuristic: four times its planned duration.
     pub(super) fn patience_s(&self) -> f64 {
         let least_s = self.length_m / self.speed_m_s + self.speed_m_s / ACCELERATION_M_S2;
         4.0 * least_s + 2.0
     }
 }
 
-/// Poses looked at along one way to see what it comes near to; chosen.
+/// Number of poses checked along one path for clearance; a heuristic.
 const LOOKS: usize = 48;
 
-/// A pose that runs around a centre: while the tip goes along a great circle and its distance from
-/// the centre changes evenly, the finger is carried along the circle, its own direction is turned
-/// from the first to the last one the shortest way, and it is rolled about that direction.
+/// A path around a centre: the tip moves along a great circle while its distance from the centre
+/// changes linearly; the finger is carried along the circle, its direction is turned from the first
+/// to the last by the shortest rotation, and it is rolled about that direction.
 ///
-/// At the share t of the way, with rotation vectors a, b, c of those three turns in `W`:
+/// At the fraction t of the path, with rotation vectors a, b, c of those three turns in `W`:
 /// `R(t) = exp(t a) exp(t b) exp(t c) R(0)` and `p(t) = centre + ρ(t) exp(t a) u`.
 #[derive(Clone)]
 pub(super) struct Round {
     centre_w: Vector3<f64>,
     from: Isometry3<f64>,
     to: Isometry3<f64>,
-    /// Distances from the centre at start and end.
+    /// Distances from the centre at the start and the end.
     distance_m: [f64; 2],
-    /// From the centre to the start.
+    /// Direction from the centre to the start.
     outward_w: Vector3<f64>,
     carried: Vector3<f64>,
     tilted: Vector3<f64>,
@@ -138,7 +139,8 @@ pub(super) struct Round {
 }
 
 impl Round {
-    /// From `from` to `to` about `centre_w`, for a finger that goes along `ahead_t` in `T`.
+    /// Creates a path from `from` to `to` about `centre_w`, for a finger that points along
+    /// `ahead_t` in `T`.
     pub(super) fn new(
         centre_w: &Point3<f64>,
         from: Isometry3<f64>,
@@ -148,7 +150,7 @@ impl Round {
         let away = |x_wt: &Isometry3<f64>| x_wt.translation.vector - centre_w.coords;
         let outward = |x_wt| UnitVector3::try_new(away(x_wt), 1e-9).unwrap_or(Vector3::z_axis());
         let [first_w, last_w] = [&from, &to].map(outward);
-        // Half around, over the top.
+        // Opposite directions: half a turn, over the top.
         let carry = turn(&first_w, &last_w, &Vector3::z());
         let ahead_w = from.rotation * ahead_t;
         let brought = carry.inverse() * to.rotation;
@@ -166,8 +168,8 @@ impl Round {
         }
     }
 
-    /// The pose over the top of the centre, as far from it as the farther end, to which the finger
-    /// comes without rolling, pointing down.
+    /// Returns the pose above the centre, at the larger distance of both ends, which the finger
+    /// reaches without rolling, pointing down.
     pub(super) fn over_the_top(&self, ahead_t: &UnitVector3<f64>) -> Isometry3<f64> {
         let up = Vector3::z_axis();
         let carry = turn(&UnitVector3::new_unchecked(self.outward_w), &up, &Vector3::y());
@@ -178,7 +180,8 @@ impl Round {
         Isometry3::from_parts(p_wt.into(), tilt * carried)
     }
 
-    /// Where it is at the share `t` of its way, and the change of tip and attitude with t.
+    /// Returns the pose at the fraction `t` of the path, and the derivatives of tip and attitude by
+    /// t.
     fn at(&self, t: f64) -> (Isometry3<f64>, Vector6<f64>) {
         let [carry, tilt, roll] = [self.carried, self.tilted, self.rolled]
             .map(|turn| UnitQuaternion::from_scaled_axis(turn * t));
@@ -193,14 +196,14 @@ impl Round {
         (Isometry3::from_parts(p_wt.into(), r_wt), change)
     }
 
-    /// Poses along the way, the last one its end.
+    /// Returns poses along the path, the last one its end.
     fn poses(&self) -> impl Iterator<Item = Isometry3<f64>> {
         let poses = (1..LOOKS).map(|i| self.at(i as f64 / LOOKS as f64).0);
         poses.chain(std::iter::once(self.to))
     }
 
-    /// Whether the hull of `finger`, of attitude `r_at` in its approach's frame, stays above
-    /// `lowest_m` on all of the way.
+    /// Whether the hull of `finger`, with attitude `r_at` in its approach's frame, stays above
+    /// `lowest_m` along the whole path.
     fn is_above(&self, lowest_m: f64, finger: &Finger, r_at: &UnitQuaternion<f64>) -> bool {
         self.poses().all(|x_wt| {
             let r_wa = x_wt.rotation * r_at.inverse();
@@ -208,7 +211,7 @@ impl Round {
         })
     }
 
-    /// What the point runs along: the way of the tip, or that of the wrist, whichever is longer.
+    /// Length of the path: of the tip or of the wrist, whichever is longer.
     fn length_m(&self) -> f64 {
         let [near_m, far_m] = self.distance_m;
         let around_m = near_m.max(far_m) * self.carried.norm();
@@ -217,8 +220,8 @@ impl Round {
     }
 }
 
-/// The ways from one pose outside the sphere to another: around it, or over its top where that way
-/// would come too low.
+/// Returns the paths from one pose outside the sphere to another: around it, or over its top if
+/// that path would come too low.
 pub(super) fn rounds(
     around: &Ball,
     from: Isometry3<f64>,
@@ -238,10 +241,11 @@ pub(super) fn rounds(
     }
 }
 
-/// More than rounding changes a height by.
+/// Tolerance for the rounding error of a height.
 const ROUNDING_M: f64 = 1e-9;
 
-/// The shortest turn from one direction to another; from one to its opposite through `over`.
+/// Returns the shortest rotation from one direction to another; through `over` if they are
+/// opposite.
 fn turn(
     from: &UnitVector3<f64>,
     to: &UnitVector3<f64>,
@@ -262,16 +266,16 @@ fn turn(
     second * first
 }
 
-/// Cosine from which the shortest turn is left to chance.
+/// Cosine below which the axis of the shortest rotation is undefined.
 const NEARLY_OPPOSITE: f64 = -1.0 + 1e-6;
 
-/// Steps in which the length of a line is measured; chosen.
+/// Number of steps for the length of a line; a heuristic.
 const STEPS: usize = 64;
 
-/// A movement straight in the space of the joints.
+/// A straight line in joint space.
 ///
-/// All joints set out and arrive together, so that only where they are on one line decides what
-/// they come near to.
+/// All joints start and arrive together, so that their position on one line alone decides the
+/// clearance.
 pub(super) struct Line {
     from: Joints,
     by: Joints,
@@ -279,24 +283,26 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Of `chain` from one posture to another, on which nothing goes faster than `speed_m_s`.
+    /// Creates a line of `chain` between two postures, on which no point moves faster than
+    /// `speed_m_s`.
     pub(super) fn new(chain: &Chain, from: &Joints, to: &Joints, speed_m_s: f64) -> Self {
         let by = to - from;
         let at = |i: usize| chain.frames(&(from + by * (i as f64 / STEPS as f64)));
         let tip = chain.flange * chain.tool;
         let steps = (0..STEPS).map(|i| farthest_m(&at(i), &at(i + 1), &tip));
-        // As though it went everywhere as fast as where it is fastest.
+        // Assumes the largest speed along the whole line.
         let longest_m = steps.fold(LEVER_M * by.amax() / STEPS as f64, f64::max);
         Self { from: *from, by, pace: Pace::new(longest_m * STEPS as f64, speed_m_s) }
     }
 
-    /// Postures along it, its ends too, between which nothing moves by more than `step_m`.
+    /// Returns postures along it, including its ends, between which no point moves more than
+    /// `step_m`.
     pub(super) fn postures(&self, step_m: f64) -> impl Iterator<Item = Joints> {
         let count = (self.pace.length_m / step_m).ceil().max(1.0) as usize;
         (0..=count).map(move |i| self.from + self.by * (i as f64 / count as f64))
     }
 
-    /// Moves the joints on by `dt_s`: where they should be and how they should move.
+    /// Advances by `dt_s`; returns the desired joint positions and velocities.
     pub(super) fn advance(&mut self, dt_s: f64) -> [Joints; 2] {
         let Some([travelled_m, now_m_s]) = self.pace.advance(dt_s) else {
             return [self.from + self.by, Joints::zeros()];
@@ -306,7 +312,7 @@ impl Line {
     }
 }
 
-/// The farthest that a joint or the tip moves between two postures.
+/// Largest motion of a joint or the tip between two postures.
 fn farthest_m(from: &[Isometry3<f64>], to: &[Isometry3<f64>], tip: &Isometry3<f64>) -> f64 {
     let moved_m = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
         let away_m = (b.translation.vector - a.translation.vector).norm();
@@ -330,8 +336,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(100))]
 
-        /// Neither tip nor any joint's frame goes faster than asked, none by more than a step from
-        /// one posture to the next, and all joints arrive.
+        /// Neither the tip nor any joint's frame exceeds the speed, none moves by more than a step
+        /// from one posture to the next, and all joints arrive.
         #[test]
         fn nothing_on_a_line_is_faster_than_asked(
             from in prop::array::uniform7(-1.5..1.5f64),
@@ -347,7 +353,7 @@ mod tests {
             let postures: Vec<Joints> = line.postures(0.01).collect();
             prop_assert!((postures[0] - from).amax() < 1e-12);
             prop_assert!((postures[postures.len() - 1] - to).amax() < 1e-12);
-            // Of steps whose length is measured along their chords.
+            // The lengths of steps are measured along their chords.
             prop_assert!(postures.windows(2).all(|two| moved_m(&two[0], &two[1]) < 0.01 * 1.02));
             let (mut q, dt_s) = (from, 0.01);
             while !line.pace.is_done() {
@@ -365,7 +371,7 @@ mod tests {
         Robot { chain: stage(Point3::origin(), finger.r_at()), finger, is_soft: true }
     }
 
-    /// An aim from a direction and a point of the unit ball.
+    /// Returns an aim from a direction and a point of the unit ball.
     fn aim(ball: &Ball, [x, y, z, u, v, w]: [f64; 6]) -> Option<Aim> {
         let (inside, outward_w) = (Vector3::new(x, y, z), Vector3::new(u, v, w));
         let is_usable = inside.norm() < 1.0 && outward_w.norm() > 0.01;
@@ -375,8 +381,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(300))]
 
-        /// Between two stand-offs the tip is never nearer to the centre than they are, the hull
-        /// never in the ball and never too low; the pose changes as the motion says.
+        /// Between two stand-offs the tip is never closer to the centre than they are, the hull
+        /// never in the ball and never too low; the pose changes at the given rates.
         #[test]
         fn ways_lead_around(
             numbers in prop::array::uniform12(-1.0f64..1.0),

@@ -1,4 +1,4 @@
-//! A serial chain: where its tip is and how it moves, and the capsules that move with its links.
+//! A serial chain: forward kinematics, Jacobian, and the collision capsules of its links.
 
 use nalgebra::{Isometry3, Point3, SMatrix, SVector, UnitQuaternion, UnitVector3, Vector3};
 use palpate_geometry::sweep::Capsule;
@@ -6,35 +6,35 @@ use palpate_input::error::Invalid;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Most joints of a chain.
+/// Largest number of joints of a chain.
 pub const MAX_JOINTS: usize = 7;
 
-/// One number per joint, rad or m and their rates; entries beyond the chain's joints are zero.
+/// One number per joint: rad or m, or their rates; entries beyond the chain's joints are zero.
 pub type Joints = SVector<f64, MAX_JOINTS>;
 
 /// Geometric Jacobian in `W` at the origin of `T`: rows 0 to 2 linear, rows 3 to 5 angular
 /// velocity per joint velocity. Columns beyond the chain's joints are zero.
 pub type Jacobian = SMatrix<f64, 6, MAX_JOINTS>;
 
-/// How a joint moves.
+/// Type of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Turns about its axis, rad.
+    /// Revolute: rotates about its axis, rad.
     Revolute,
-    /// Slides along its axis, m.
+    /// Prismatic: translates along its axis, m.
     Prismatic,
 }
 
-/// A joint. Positions are rad where it turns and m where it slides.
+/// A joint. Positions are in rad if revolute and in m if prismatic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// The manufacturer's name; joints are matched by name, never by number.
     pub name: Arc<str>,
-    /// How it moves.
+    /// Type.
     pub kind: Kind,
-    /// Its origin in the frame of the joint before it; all frames are parallel at q = 0.
+    /// Origin in the frame of the previous joint; all frames are parallel at q = 0.
     pub origin_m: Vector3<f64>,
-    /// Its axis in the same frame.
+    /// Axis in the same frame.
     pub axis: UnitVector3<f64>,
     /// Smallest and largest position.
     pub q_limits: [f64; 2],
@@ -45,8 +45,8 @@ pub struct Joint {
 }
 
 impl Joint {
-    /// Largest speed in the direction of `qdot` from which the joint still stops before its limit,
-    /// commanded once in a period: `v² / 2a + v · period = distance`.
+    /// Largest speed in the direction of `qdot` from which the joint can stop before its limit, if
+    /// commanded once per period: `v² / 2a + v · period = distance`.
     pub fn fastest(&self, q: f64, qdot: f64, period_s: f64) -> f64 {
         let [low, high] = self.q_limits;
         let distance = if qdot > 0.0 { high - q } else { q - low };
@@ -55,7 +55,7 @@ impl Joint {
         stops.min(self.qdot_limit)
     }
 
-    /// Pose of the joint's moved frame, if that of the frame before it is `x`.
+    /// Returns the pose of the joint's moved frame, if the previous frame has the pose `x`.
     #[inline]
     fn moved(&self, x: &Isometry3<f64>, q: f64) -> Isometry3<f64> {
         let (origin_m, rotation) = match self.kind {
@@ -68,7 +68,7 @@ impl Joint {
     }
 }
 
-/// A part of a robot that a capsule covers.
+/// Part of a robot covered by a capsule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// A link of the arm.
@@ -82,56 +82,55 @@ pub enum Part {
 /// A capsule that moves with a link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinkCapsule {
-    /// Name in messages: of its link, `tool` or `finger`.
+    /// Name in messages: that of its link, `tool` or `finger`.
     pub name: Arc<str>,
-    /// The part of the robot that it covers.
+    /// Part of the robot that it covers.
     pub part: Part,
-    /// Number of joints that move it: the place of its frame in
-    /// [`Chain::frames`].
+    /// Number of joints that move it: the index of its frame in [`Chain::frames`].
     pub link: usize,
     /// Ends of its axis in that frame.
     pub ends: [Point3<f64>; 2],
     /// Radius.
     pub radius_m: f64,
-    /// Whether its link is too near to the foot to come to the object or the table.
+    /// Whether its link is too close to the base to reach the object or the table.
     pub near_base: bool,
-    /// Whether what the hand carries can fold back onto it.
+    /// Whether the tool or finger can fold back onto it.
     pub folds: bool,
 }
 
 impl LinkCapsule {
-    /// Where it is when its link's frame stands at `x_wl`.
+    /// Returns the capsule in `W` for the pose `x_wl` of its link's frame.
     pub fn at(&self, x_wl: &Isometry3<f64>) -> Capsule {
         let [p0_w, p1_w] = self.ends.map(|p| x_wl * p);
         Capsule { p0_w, p1_w, radius_m: self.radius_m }
     }
 
-    /// Whether it can meet `other` in the joints' limits and must not: they are three joints apart.
-    /// Nearer neighbours touch where they are joined; of those one that [`folds`](Self::folds) is
-    /// met by what the hand carries.
+    /// Whether a collision with `other` is possible within the joints' limits: they are at least
+    /// three joints apart. Closer neighbours touch where they are joined, except that one that
+    /// [`folds`](Self::folds) is checked against the tool and finger.
     pub fn may_meet(&self, other: &Self) -> bool {
         let (near, far) = if self.link < other.link { (self, other) } else { (other, self) };
         far.link >= near.link + 3 || (near.folds && far.is_carried())
     }
 
-    /// Whether it is beyond the flange: the tool or the finger.
+    /// Whether it lies beyond the flange: the tool or the finger.
     pub fn is_carried(&self) -> bool {
         self.part != Part::Link
     }
 }
 
-/// Joints from the base to the fingertip `T`.
+/// A serial chain of joints from the base to the fingertip `T`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {
     /// Pose of the base in `W`.
     pub base: Isometry3<f64>,
-    /// At most [`MAX_JOINTS`], from the base on; more are ignored.
+    /// Joints from the base on, at most [`MAX_JOINTS`]; more are ignored.
     pub joints: Vec<Joint>,
     /// Pose of the flange in the last joint's frame.
     pub flange: Isometry3<f64>,
     /// Pose of `T` in the flange's frame.
     pub tool: Isometry3<f64>,
-    /// The posture to start from and to prefer.
+    /// Home posture: the start, and the preferred posture.
     pub home: Joints,
     /// Collision capsules of its links.
     pub capsules: Vec<LinkCapsule>,
@@ -140,18 +139,18 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// Joint positions from a slice of the chain's length, or none if its length differs.
+    /// Returns joint positions from a slice, or `None` if its length differs from the chain's.
     pub fn joints_from(&self, q: &[f64]) -> Option<Joints> {
         let fits = q.len() == self.joints.len() && q.len() <= MAX_JOINTS;
         fits.then(|| Joints::from_fn(|i, _| q.get(i).copied().unwrap_or(0.0)))
     }
 
-    /// The home posture, one number per joint.
+    /// Returns the home posture, one number per joint.
     pub fn start(&self) -> &[f64] {
         self.home.as_slice().get(..self.joints.len()).unwrap_or_default()
     }
 
-    /// `q` with every joint moved into its limits.
+    /// Returns `q` with every joint clamped to its limits.
     pub fn clamp(&self, q: &Joints) -> Joints {
         let mut clamped = *q;
         for (joint, q) in self.joints.iter().zip(clamped.iter_mut()) {
@@ -160,20 +159,20 @@ impl Chain {
         clamped
     }
 
-    /// Whether any joint turns; a chain of slides alone cannot change its attitude.
+    /// Whether any joint is revolute; a purely prismatic chain cannot change its attitude.
     pub fn turns(&self) -> bool {
         self.joints.iter().any(|joint| joint.kind == Kind::Revolute)
     }
 
-    /// Forward kinematics, the pose of `T` in `W`:
+    /// Returns the pose of `T` in `W` by forward kinematics:
     /// `X_WT = X_WB · Π X_i(q_i) · X_flange · X_tool`.
     pub fn forward(&self, q: &Joints) -> Isometry3<f64> {
         let moved = self.joints.iter().zip(q.iter());
         moved.fold(self.base, |x, (joint, &q)| joint.moved(&x, q)) * self.flange * self.tool
     }
 
-    /// Poses in `W` of the base and then of each joint's moved frame; beyond the chain's joints
-    /// that of the last.
+    /// Returns the poses in `W` of the base and of each joint's moved frame; entries beyond the
+    /// chain's joints repeat the last.
     pub fn frames(&self, q: &Joints) -> [Isometry3<f64>; MAX_JOINTS + 1] {
         let mut frames = [self.base; MAX_JOINTS + 1];
         let mut x = self.base;
@@ -186,8 +185,9 @@ impl Chain {
         frames
     }
 
-    /// For each joint, the farthest that any point moved by it within `beyond_m` of `T` can lie
-    /// from its axis, in m: what such a point moves by per rad, at most. 1 where the joint slides.
+    /// For each joint, the largest distance from its axis of any point that it moves within
+    /// `beyond_m` of `T`, in m: an upper bound of the motion of such a point per rad. 1 for a
+    /// prismatic joint.
     pub fn reaches_m(&self, beyond_m: f64) -> Joints {
         let end_m = self.flange.translation.vector.norm() + self.tool.translation.vector.norm();
         let mut reaches = Joints::zeros();
@@ -205,9 +205,9 @@ impl Chain {
         reaches
     }
 
-    /// [`forward`](Self::forward) with the geometric Jacobian: column i is
-    /// `[a × (p_T − p_i); a]` where joint i turns and `[a; 0]` where it slides, with its axis a
-    /// and origin p_i in `W` (Siciliano et al. 2009, Robotics, Eq. 3.30).
+    /// Returns [`forward`](Self::forward) with the geometric Jacobian: column i is `[a × (p_T −
+    /// p_i); a]` for a revolute and `[a; 0]` for a prismatic joint i, with its axis a and origin
+    /// p_i in `W` (Siciliano et al. 2009, Robotics, Eq. 3.30).
     pub fn jacobian(&self, q: &Joints) -> (Isometry3<f64>, Jacobian) {
         let mut x = self.base;
         let mut axes = [(Vector3::zeros(), Vector3::zeros()); MAX_JOINTS];
@@ -232,18 +232,18 @@ impl Chain {
     }
 }
 
-/// The error of a command or posture that cannot be computed.
+/// Error of a command or posture that cannot be computed.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ArmError {
-    /// The wrong number of joints, or a position, goal or period that is not a usable number.
+    /// Wrong number of joints, or an unusable position, goal or period.
     #[error(transparent)]
     Invalid(#[from] Invalid),
-    /// No posture within the joint limits brings the tip there.
-    #[error("out of reach: the tip stays {distance_m} m and {angle_rad} rad away")]
+    /// No posture within the joint limits reaches the pose of the tip.
+    #[error("out of reach: the closest pose of the tip is {distance_m} m and {angle_rad} rad away")]
     OutOfReach {
-        /// Smallest distance found.
+        /// Smallest distance found, m.
         distance_m: f64,
-        /// Angle at that distance.
+        /// Angle at that distance, rad.
         angle_rad: f64,
     },
 }

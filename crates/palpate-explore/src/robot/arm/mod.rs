@@ -1,4 +1,4 @@
-//! The arm or the three-axis stage that carries the finger, as a chain of joints.
+//! The arm or three-axis stage that carries the finger, as a chain of joints.
 
 pub mod chain;
 pub mod model;

@@ -1,4 +1,4 @@
-//! An arm's model: a file with its joints, home posture, collision capsules and topics.
+//! Model of an arm: a file with its joints, home posture, collision capsules and topics.
 
 use super::chain::{Joint, Joints, Kind, LinkCapsule, MAX_JOINTS, Part};
 use nalgebra::{Isometry3, UnitVector3, Vector3};
@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The arms that come with Palpate, by name: model and MJCF.
+/// Built-in arms by name: model and MJCF.
 pub const MODELS: [(&str, [&str; 2]); 2] = [
     (
         "pa10",
@@ -27,7 +27,7 @@ pub const MODELS: [(&str, [&str; 2]); 2] = [
     ),
 ];
 
-/// An arm as its file describes it. Frames of all links are parallel at q = 0.
+/// Model of an arm as described by its file. Frames of all links are parallel at q = 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ArmModel {
@@ -35,15 +35,15 @@ pub struct ArmModel {
     pub name: String,
     /// Namespace of the topics and services of its driver.
     pub namespace: String,
-    /// MJCF file beside this one, for a dynamic simulation.
+    /// MJCF file next to this one, for a dynamic simulation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mjcf: Option<PathBuf>,
-    /// Name of the joint that the workspace interlock watches beside the tip.
+    /// Name of the joint at the elbow, which the workspace interlock monitors besides the tip.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elbow: Option<String>,
     /// Origin of the flange in the last joint's frame, m. The tool points along the flange's +z.
     pub flange_m: [f64; 3],
-    /// Turns of the flange about the fixed axes x, then y, then z of that frame.
+    /// Rotation of the flange about the fixed axes x, then y, then z of that frame, deg.
     #[serde(default)]
     pub flange_rotation_deg: [f64; 3],
     /// Joints, from the base on.
@@ -53,74 +53,74 @@ pub struct ArmModel {
     pub capsule: Vec<CapsuleModel>,
 }
 
-/// A joint as a file describes it.
+/// A joint in an arm model file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum JointModel {
-    /// Turns about its axis.
+    /// Revolute joint: rotates about its axis.
     Revolute {
         /// The manufacturer's name.
         name: String,
-        /// Its origin in the frame of the joint before it, m.
+        /// Origin in the frame of the previous joint, m.
         origin_m: [f64; 3],
-        /// Its axis in the same frame.
+        /// Axis in the same frame.
         axis: [f64; 3],
-        /// Smallest and largest position.
+        /// Smallest and largest position, deg.
         limits_deg: [f64; 2],
-        /// Largest speed.
+        /// Largest speed, rad/s.
         speed_rad_s: f64,
-        /// Largest acceleration.
+        /// Largest acceleration, deg/s².
         acceleration_deg_s2: f64,
-        /// Position at home.
+        /// Position at home, deg.
         home_deg: f64,
     },
-    /// Slides along its axis.
+    /// Prismatic joint: translates along its axis.
     Prismatic {
         /// The manufacturer's name.
         name: String,
-        /// Its origin in the frame of the joint before it, m.
+        /// Origin in the frame of the previous joint, m.
         origin_m: [f64; 3],
-        /// Its axis in the same frame.
+        /// Axis in the same frame.
         axis: [f64; 3],
-        /// Smallest and largest position.
+        /// Smallest and largest position, m.
         limits_m: [f64; 2],
-        /// Largest speed.
+        /// Largest speed, m/s.
         speed_m_s: f64,
-        /// Largest acceleration.
+        /// Largest acceleration, m/s².
         acceleration_m_s2: f64,
-        /// Position at home.
+        /// Position at home, m.
         home_m: f64,
     },
 }
 
-/// A collision capsule as a file describes it.
+/// A collision capsule in an arm model file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CapsuleModel {
     /// Joint that moves its link, or `base`.
     pub link: String,
-    /// Name in messages; that of the link if left out.
+    /// Name in messages; default: that of the link.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// One end of its axis in the link's frame, m.
     pub from_m: [f64; 3],
-    /// The other end.
+    /// Other end of its axis, m.
     pub to_m: [f64; 3],
-    /// Its radius.
+    /// Radius, m.
     pub radius_m: f64,
-    /// Whether its link is too near to the foot to come to the object or the table.
+    /// Whether its link is too close to the base to reach the object or the table.
     #[serde(default)]
     pub near_base: bool,
-    /// Whether the tool can fold back onto it, although it is fewer than three joints away.
+    /// Whether the tool can fold back onto it although fewer than three joints lie between.
     #[serde(default)]
     pub folds: bool,
 }
 
-/// Name of the link that no joint moves.
+/// Name of the fixed link.
 const BASE: &str = "base";
 
 impl ArmModel {
-    /// The model of this name, or that in the file `model`.
+    /// Loads the built-in model of this name, or the file `model`.
     ///
     /// # Errors
     /// If the file cannot be read or does not describe an arm.
@@ -131,17 +131,17 @@ impl ArmModel {
         }
     }
 
-    /// The joints of the chain.
+    /// Returns the joints of the chain.
     pub fn joints(&self) -> Vec<Joint> {
         self.joint.iter().map(JointModel::joint).collect()
     }
 
-    /// Pose of the flange in the last joint's frame.
+    /// Returns the pose of the flange in the last joint's frame.
     pub fn flange(&self) -> Isometry3<f64> {
         pose(self.flange_m, self.flange_rotation_deg)
     }
 
-    /// The home posture, deg, or m where a joint slides.
+    /// Returns the home posture, deg for revolute and m for prismatic joints.
     pub fn home(&self) -> Vec<f64> {
         let home = |joint: &JointModel| match joint {
             JointModel::Revolute { home_deg, .. } => *home_deg,
@@ -150,7 +150,7 @@ impl ArmModel {
         self.joint.iter().map(home).collect()
     }
 
-    /// A posture in the file's units as positions of the chain.
+    /// Converts a posture from the file's units to positions of the chain.
     pub fn positions(&self, posture: &[f64]) -> Joints {
         let position = |i: usize| match (self.joint.get(i), posture.get(i)) {
             (Some(JointModel::Revolute { .. }), Some(q_deg)) => q_deg.to_radians(),
@@ -160,13 +160,13 @@ impl ArmModel {
         Joints::from_fn(|i, _| position(i))
     }
 
-    /// Capsules that move with its links.
+    /// Returns the collision capsules of its links.
     pub fn capsules(&self) -> Vec<LinkCapsule> {
         let on_link = |capsule: &CapsuleModel| Some(capsule.on(self.link(&capsule.link)?));
         self.capsule.iter().filter_map(on_link).collect()
     }
 
-    /// Number of joints that move the link of this name.
+    /// Returns the number of joints that move the link of this name.
     fn link(&self, name: &str) -> Option<usize> {
         match name == BASE {
             true => Some(0),
@@ -174,13 +174,13 @@ impl ArmModel {
         }
     }
 
-    /// Number of joints that move the elbow's link.
+    /// Returns the number of joints that move the elbow's link.
     pub fn elbow(&self) -> Option<usize> {
         self.link(self.elbow.as_deref()?)
     }
 }
 
-/// MJCF of the arm `model`, if it has one.
+/// Returns the MJCF of the arm `model`, if it has one.
 ///
 /// # Errors
 /// If its file cannot be read.
@@ -201,7 +201,7 @@ impl JointModel {
         name
     }
 
-    /// Origin and axis in the frame of the joint before it.
+    /// Origin and axis in the frame of the previous joint.
     fn placement(&self) -> (&[f64; 3], &[f64; 3]) {
         let (Self::Revolute { origin_m, axis, .. } | Self::Prismatic { origin_m, axis, .. }) = self;
         (origin_m, axis)
@@ -231,7 +231,7 @@ impl JointModel {
 }
 
 impl CapsuleModel {
-    /// On the link that `link` joints move.
+    /// Returns the capsule on the link that `link` joints move.
     fn on(&self, link: usize) -> LinkCapsule {
         LinkCapsule {
             name: self.name.as_deref().unwrap_or(&self.link).into(),
@@ -245,18 +245,18 @@ impl CapsuleModel {
     }
 }
 
-/// Farthest that one link lies from the next.
-// heuristic: ten times the reach of an arm on a table.
+/// Largest distance between consecutive links.
+// heuristic: ten times the reach of a table-mounted arm.
 const FAR_M: f64 = 10.0;
 
 impl Checked for ArmModel {
     fn check(&self, rules: &mut Rules) {
         let (count, most) = (self.joint.len(), MAX_JOINTS);
         rules.require("joint", count, (1..=most).contains(&count), || {
-            format!("1 to {most} tables [[joint]]")
+            format!("1 to {most} [[joint]] tables")
         });
         rules.require("namespace", &self.namespace, self.namespace.starts_with('/'), || {
-            "a slash and a name".into()
+            "a name that begins with a slash".into()
         });
         rules.numbers("flange_m", &self.flange_m, -FAR_M..=FAR_M);
         rules.numbers("flange_rotation_deg", &self.flange_rotation_deg, -360.0..=360.0);
@@ -267,7 +267,7 @@ impl Checked for ArmModel {
                 &format!("{key}.name"),
                 names[i],
                 !names[..i].contains(&names[i]),
-                || "a name of its own".into(),
+                || "a unique name".into(),
             );
             match joint {
                 JointModel::Revolute {

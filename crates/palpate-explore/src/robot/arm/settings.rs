@@ -1,4 +1,4 @@
-//! The arm in a scene: which, where, and how it stands.
+//! Settings of the arm in a scene: model, mounting and home posture.
 
 use super::chain::{Chain, Kind};
 use super::model::{ArmModel, MODELS};
@@ -10,42 +10,40 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
-/// An arm with the finger along its flange's axis.
+/// Settings of an arm with the finger along its flange's axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmSettings {
-    /// The arm: `"pa10"` (PA-10-7C), `"pa10_a"` (the older PA-10), or a file like
+    /// Arm model: `"pa10"` (PA-10-7C), `"pa10_a"` (the older PA-10), or a file such as
     /// `models/pa10/c.toml`.
     #[serde(alias = "links", deserialize_with = "model")]
     pub model: String,
-    /// Where the base stands in `W`.
+    /// Position of the base in `W`, m.
     pub base_position_m: [f64; 3],
-    /// Turns of the base about the fixed axes x, then y, then z of `W`.
+    /// Rotation of the base about the fixed axes x, then y, then z of `W`, deg.
     pub base_rotation_deg: [f64; 3],
-    /// The posture to start from and to prefer, a number for each joint: deg, or m where it slides.
-    /// Left out, that of the model.
+    /// Home posture, one number per joint, deg or m (prismatic); default: the model's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub home_deg: Option<Vec<f64>>,
-    /// From the flange along its axis to the origin of `T`.
+    /// Distance from the flange along its axis to the origin of `T`, m.
     pub mount_m: f64,
-    /// Where the origin of `T` really is, in the frame that `T` has at the end of the mount, as
-    /// `palpate register` finds it.
+    /// Calibrated origin of `T` in its nominal frame, m, as found by `palpate register`.
     #[serde(skip_serializing_if = "is_zero")]
     pub tool_position_m: [f64; 3],
-    /// Turns of `T` about the fixed axes x, then y, then z of that frame.
+    /// Calibrated rotation of `T` about the fixed axes x, then y, then z of that frame, deg.
     #[serde(skip_serializing_if = "is_zero")]
     pub tool_rotation_deg: [f64; 3],
-    /// Mass of adapter and finger, which a `dynamic` body moves.
+    /// Mass of adapter and finger in a `dynamic` simulation, kg.
     pub tool_kg: f64,
 }
 
-/// Mass of adapter and finger beyond the force/torque sensor; chosen.
+/// Mass of adapter and finger beyond the force/torque sensor; a heuristic.
 pub const TOOL_KG: f64 = 0.15;
 
 impl Default for ArmSettings {
     /// A PA-10 with its base at `W`: at home the elbow is up and the finger points along -y, 45
-    /// degrees up, 0.56 m in front of the base's axis and 0.48 m above its foot. The mount
-    /// leaves room for a force/torque sensor and an adapter.
+    /// degrees up, 0.56 m in front of the base's axis and 0.48 m above its foot. The mount leaves
+    /// space for a force/torque sensor and an adapter.
     fn default() -> Self {
         Self {
             model: MODELS[0].0.into(),
@@ -61,26 +59,26 @@ impl Default for ArmSettings {
 }
 
 impl ArmSettings {
-    /// Pose of `T` in the frame that it has at the end of the mount; none if it is that frame.
+    /// Pose of `T` in its nominal frame at the end of the mount; `None` if they coincide.
     pub fn correction(&self) -> Option<Isometry3<f64>> {
         let is_there = is_zero(&self.tool_position_m) && is_zero(&self.tool_rotation_deg);
         (!is_there).then(|| pose(self.tool_position_m, self.tool_rotation_deg))
     }
 
-    /// Writes out the home posture that is left to the model; a model that cannot be read is an
-    /// error where the arm is built.
+    /// Sets an omitted home posture to that of the model; an unreadable model is reported where the
+    /// arm is built.
     pub fn complete(&mut self) {
         if let (None, Ok(model)) = (&self.home_deg, ArmModel::load(&self.model)) {
             self.home_deg = Some(model.home());
         }
     }
 
-    /// Whether its model is a file, and not one of [`MODELS`].
+    /// Whether its model is a file instead of one of [`MODELS`].
     pub fn is_file(&self) -> bool {
         Path::new(&self.model).extension().is_some_and(|extension| extension == "toml")
     }
 
-    /// The arm as a chain from `W` to `T`.
+    /// Returns the arm as a chain from `W` to `T`.
     ///
     /// # Errors
     /// If its model cannot be read, or `home_deg` is not within the model's limits.
@@ -105,13 +103,13 @@ impl ArmSettings {
         })
     }
 
-    /// Key, value and allowed values of the first number of `home_deg` that is beyond the limits of
-    /// `model`.
+    /// Returns key, value and allowed values of the first number of `home_deg` outside the limits
+    /// of `model`.
     fn check_home(&self, model: &ArmModel) -> Option<(String, String, String)> {
         let home = self.home_deg.as_ref()?;
         let joints = model.joints();
         if home.len() != joints.len() {
-            let allowed = format!("{} numbers, one for each joint", joints.len());
+            let allowed = format!("{} numbers, one per joint", joints.len());
             return Some(("home_deg".into(), format!("{home:?}"), allowed));
         }
         home.iter().zip(&joints).enumerate().find_map(|(i, (&home, joint))| {
@@ -126,7 +124,7 @@ impl ArmSettings {
     }
 }
 
-/// Reads `model`; version 0.1 had `links = "C"` or `"A"` in its place.
+/// Reads `model`; version 0.1 had `links = "C"` or `"A"` instead.
 fn model<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     let model = String::deserialize(deserializer)?;
     Ok(match model.as_str() {
@@ -157,7 +155,7 @@ impl Checked for ArmSettings {
             let names: Vec<String> = MODELS.iter().map(|(name, _)| format!("\"{name}\"")).collect();
             format!("{}, or a file ending in .toml", names.join(", "))
         });
-        // A file is read when the arm is built: a run's folder is read without it.
+        // The file is read when the arm is built: the folder of a run can be read without it.
         if let Some(model) = is_known.then(|| ArmModel::load(&self.model).ok()).flatten()
             && let Some((key, value, allowed)) = self.check_home(&model)
         {

@@ -1,24 +1,24 @@
-//! A stage of three slides, with or without a wrist: the first three of q are the position of `T`
-//! in `W`.
+//! A stage of three prismatic joints, with or without a wrist: the first three of q are the
+//! position of `T` in `W`.
 
 use super::chain::{Chain, Joint, Joints, Kind};
 use super::settings::tool;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
 
-/// Distance from the stage's mount to the origin of `T`; chosen, that of the arm.
+/// Distance from the stage's mount to the origin of `T`; a heuristic: that of the arm.
 pub const MOUNT_M: f64 = 0.12;
 
-/// Travel to either side of the middle; chosen.
+/// Travel to either side of the centre; a heuristic.
 const TRAVEL_M: f64 = 0.5;
 
-/// Largest speed; chosen, the reduced speed of EN ISO 10218-1.
+/// Largest speed; a heuristic: the reduced speed of EN ISO 10218-1.
 const SPEED_M_S: f64 = 0.25;
 
-/// Largest acceleration; chosen.
+/// Largest acceleration; a heuristic.
 const ACCELERATION_M_S2: f64 = 1.0;
 
-/// Hinges about `T`, from the slides outwards: one more than attitudes need, so that the others
-/// turn the finger on where two of them fall into line. They turn without end.
+/// Hinges about `T`, from the prismatic joints outwards: one more than an attitude needs, so that
+/// the others can turn the finger where two axes align. They are continuous.
 const WRIST: [(&str, [f64; 3]); 4] = [
     ("A", [0.0, 0.0, 1.0]),
     ("B", [1.0, 0.0, 0.0]),
@@ -26,16 +26,16 @@ const WRIST: [(&str, [f64; 3]); 4] = [
     ("D", [1.0, 0.0, 0.0]),
 ];
 
-/// So far that a hinge never comes to its end in a trial.
+/// Limit so large that a hinge never reaches it in a trial.
 const ENDLESS_RAD: f64 = 1e4;
 
-/// Largest speed and acceleration of a hinge; chosen, a finger's length from `T` somewhat more than
-/// those of the slides.
+/// Largest speed and acceleration of a hinge; a heuristic: at a finger's length from `T`, slightly
+/// more than those of the prismatic joints.
 const TURN_RAD_S: f64 = 3.0;
 const TURN_RAD_S2: f64 = 10.0;
 
-/// The stage with the middle of its travel, which is its home, at `p_wt` and the finger's
-/// attitude `r_wt`, which it keeps.
+/// Creates the stage with the centre of its travel, its home, at `p_wt` and the constant attitude
+/// `r_wt` of the finger.
 pub fn stage(p_wt: Point3<f64>, r_wt: UnitQuaternion<f64>) -> Chain {
     let tool = tool(MOUNT_M);
     Chain {
@@ -49,8 +49,8 @@ pub fn stage(p_wt: Point3<f64>, r_wt: UnitQuaternion<f64>) -> Chain {
     }
 }
 
-/// The stage with a wrist, which goes all around `middle_w` at distances up to `around_m`. Its home
-/// is at `p_wt` with the finger's attitude `r_wt`.
+/// Creates the stage with a wrist, which reaches all around `middle_w` at distances up to
+/// `around_m`. Its home is at `p_wt` with the finger's attitude `r_wt`.
 pub fn stage_with_wrist(
     (middle_w, around_m): (Point3<f64>, f64),
     p_wt: Point3<f64>,

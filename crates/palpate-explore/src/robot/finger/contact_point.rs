@@ -1,4 +1,4 @@
-//! From a tactile frame to the point of contact (Eq. 1 of Yi et al. 2016).
+//! Point of contact from a tactile frame (Yi et al. 2016, Eq. 1).
 
 use super::electrode_table;
 use super::frame::{FULL_SCALE_COUNTS, Frame};
@@ -7,47 +7,46 @@ use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Electrodes that fell by less than this in all say nothing of a place (chosen: below the noise
-/// of 19 electrodes).
+/// Smallest total fall of the electrodes that locates a contact, counts; a heuristic: below the
+/// noise of 19 electrodes.
 const LEAST_COUNTS: f64 = 10.0;
 
-/// An electrode that reads less than this untouched is open: pressed hardest, a sound one reads 259
-/// (MiaoLi/syntouchcontact, F2).
+/// Resting value below which an electrode counts as open: when pressed hardest, an intact one reads
+/// 259 (MiaoLi/syntouchcontact, F2).
 pub(super) const OPEN_COUNTS: f64 = 200.0;
 
-/// The estimate from the electrodes that is taken as the point of contact.
+/// Estimator of the point of contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ContactEstimate {
     /// The centroid of Eq. 1, projected onto the skin.
     #[default]
     Skin,
-    /// The centroid of Eq. 1 itself, among the electrodes, as in Yi et al. 2016.
+    /// The centroid of Eq. 1 itself, inside the core, as in Yi et al. 2016.
     Electrodes,
-    /// Where a plane presses that explains all electrodes best, together with a skin that is
-    /// carried sideways; for fingers that press hard, or shear.
+    /// Fit of a pressed plane and a sheared skin to all electrodes; for large forces or shear.
     Plane,
 }
 
-/// Where the skin is touched, in `T`.
+/// Point of contact on the skin, in `T`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointOfContact {
-    /// Weighted mean of the electrodes' positions: inside the core.
+    /// Weighted mean of the electrodes' positions; it lies inside the core.
     pub centroid_t: Point3<f64>,
-    /// That, projected onto the skin: a sphere for x > 0, else a cylinder, of the finger's radius
-    /// (tams_biotac: 7 mm).
+    /// The centroid projected onto the skin: a sphere for x > 0, else a cylinder, of the finger's
+    /// radius (tams_biotac: 7 mm).
     pub surface_t: Point3<f64>,
-    /// Outward normal of the skin there; minus it estimates the direction of the force.
+    /// Outward normal of the skin at the point; its negative estimates the direction of the force.
     pub normal_t: Vector3<f64>,
 }
 
-/// The point of contact as the weighted centroid of the electrodes,
-/// p = Σ eᵢ² pᵢ / Σ eᵢ² with eᵢ the fall of electrode i, normalised by its tare.
+/// Computes the point of contact as the weighted centroid of the electrodes, p = Σ eᵢ² pᵢ / Σ eᵢ²,
+/// where eᵢ is the fall of electrode i, normalised by its tare.
 ///
-/// Only electrodes that fell count, as in tams_biotac: fluid that a contact pushes aside makes
-/// others rise on the far side, and they would draw the centroid into the core. Their positions are
-/// a BioTac's in the size of `finger`. An open electrode says nothing. None without electrodes, or
-/// if none fell.
+/// Only electrodes that fell count, as in tams_biotac: the fluid displaced by a contact makes
+/// others rise on the far side, and they would pull the centroid into the core. The positions are
+/// those of a BioTac, scaled to the size of `finger`. Open electrodes are ignored. Returns `None`
+/// without electrodes, or if none fell.
 pub fn locate(finger: &Finger, tare: &Frame, frame: &Frame) -> Option<PointOfContact> {
     let (rest, now) = (tare.electrode_counts?, frame.electrode_counts?);
     let (mut sum, mut weights, mut fall_counts) = (Vector3::zeros(), 0.0, 0.0);

@@ -1,5 +1,5 @@
-//! From tactile frames to contact: is there one? By how far a frame is from the sensor at rest, of
-//! which each channel's mean and scatter are remembered.
+//! Contact detection from tactile frames: the deviation of a frame from the sensor at rest,
+//! relative to the stored mean and scatter of each channel.
 
 use super::contact_point::OPEN_COUNTS;
 use super::frame::{ELECTRODES, FULL_SCALE_COUNTS, Frame};
@@ -7,21 +7,21 @@ use palpate_input::config::{Checked, Rules, is_default};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What says contact.
+/// Channels that detect contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Alarm {
-    /// A rise of the fluid's pressure (PDC).
+    /// The fluid's pressure (PDC).
     #[default]
     Pressure,
-    /// Electrodes that change otherwise than all of them do together.
+    /// The electrodes, by changes that differ from their common drift.
     Electrodes,
-    /// Either.
+    /// Pressure or electrodes.
     Both,
 }
 
 impl Alarm {
-    /// Whether a sensor with these channels can say it.
+    /// Whether a sensor with these channels supports this detection.
     pub fn is_heard(self, pressure: bool, electrodes: bool) -> bool {
         let [by_pressure, by_electrodes] = self.by();
         by_pressure && pressure || by_electrodes && electrodes
@@ -32,26 +32,26 @@ impl Alarm {
     }
 }
 
-/// When a frame counts as contact.
+/// Settings of contact detection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Detection {
-    /// What says contact; electrodes do by `threshold_sds` only.
+    /// Channels that detect contact; electrodes require `threshold_sds`.
     #[serde(skip_serializing_if = "is_default")]
     pub by: Alarm,
-    /// Rise of PDC above its tare; without meaning beside `threshold_sds`.
+    /// Threshold of PDC above its tare, counts; ignored with `threshold_sds`.
     pub threshold_counts: f64,
-    /// Change since the tare, in standard deviations of the sensor's own noise as tares show it.
-    /// Left out, `threshold_counts` decides.
+    /// Threshold in standard deviations of the sensor's noise at rest; `threshold_counts` is used
+    /// if omitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threshold_sds: Option<f64>,
-    /// Frames in a row that must agree.
+    /// Number of consecutive frames that must agree.
     pub frames: u32,
 }
 
 impl Default for Detection {
-    /// Threshold: tams_biotac and balakumar-s/biotac_force_net. Frames: chosen, 30 ms; the latter
-    /// waits for 10.
+    /// Threshold: tams_biotac and balakumar-s/biotac_force_net. Frames: a heuristic, 30 ms; the
+    /// latter waits for 10.
     fn default() -> Self {
         Self { by: Alarm::Pressure, threshold_counts: 10.0, threshold_sds: None, frames: 3 }
     }
@@ -65,7 +65,8 @@ impl Checked for Detection {
         }
         let is_told = self.by == Alarm::Pressure || self.threshold_sds.is_some();
         rules.require("threshold_sds", "(none)", is_told, || {
-            "a number, because only standard deviations say when electrodes tell contact".into()
+            "a number, since detection by electrodes needs a threshold in standard deviations"
+                .into()
         });
         rules.require("frames", self.frames, (1..=1000).contains(&self.frames), || {
             "1 to 1000".into()
@@ -73,7 +74,7 @@ impl Checked for Detection {
     }
 }
 
-/// Says whether there is contact, and changes its mind only when enough frames agree.
+/// Contact detector; its state changes only when enough consecutive frames agree.
 #[derive(Clone, Debug)]
 pub struct Detector {
     detection: Detection,
@@ -84,18 +85,18 @@ pub struct Detector {
 }
 
 impl Detector {
-    /// A detector that knows no sensor yet.
+    /// Creates a detector without data of a sensor.
     pub fn new(detection: Detection) -> Self {
         Self { detection, tare: None, rest: Rest::default(), touching: false, against: 0 }
     }
 
-    /// Frames at rest that it wants at the next [`tare`](Self::tare), at least.
+    /// Smallest number of frames at rest for the next [`tare`](Self::tare).
     pub fn wants(&self) -> usize {
         self.detection.threshold_sds.map_or(0, |_| self.rest.wants())
     }
 
-    /// What untouched frames read is the rest, and nothing is touched. How much they scatter is
-    /// remembered from one tare to the next.
+    /// Sets the rest state to the mean of `frames`, without contact. The scatter is accumulated
+    /// over tares.
     pub fn tare(&mut self, frames: &[Frame]) {
         self.tare = Some(Frame::mean(frames));
         if self.detection.threshold_sds.is_some() {
@@ -104,7 +105,7 @@ impl Detector {
         (self.touching, self.against) = (false, 0);
     }
 
-    /// Whether `frame` can say anything about contact.
+    /// Whether `frame` has a channel that is used for detection.
     pub fn hears(&self, frame: &Frame) -> bool {
         let Some(tare) = &self.tare else { return false };
         let pressure = tare.pdc_counts.is_some() && frame.pdc_counts.is_some();
@@ -112,11 +113,12 @@ impl Detector {
         self.detection.by.is_heard(pressure, electrodes)
     }
 
-    /// Whether the skin is touched, after another frame. One that says nothing changes nothing.
+    /// Updates with a frame and returns whether there is contact. A frame without usable channels
+    /// changes nothing.
     ///
-    /// Where n frames must agree on a threshold of T standard deviations, noise alarms Q(T)ⁿ times
-    /// a frame by the electrodes. By the pressure it does so ∫ φ(u) Q(T √(1 + v) + u √v)ⁿ du times:
-    /// all frames share the error u of a tare of 1/v frames.
+    /// If n frames must agree on a threshold of T standard deviations, the rate of false alarms per
+    /// frame is Q(T)ⁿ for the electrodes, and ∫ φ(u) Q(T √(1 + v) + u √v)ⁿ du for the pressure: all
+    /// frames share the error u of a tare of 1/v frames.
     pub fn update(&mut self, frame: &Frame) -> bool {
         let Some(says) = self.says(frame) else { return self.touching };
         self.against = if says == self.touching { 0 } else { self.against + 1 };
@@ -126,7 +128,7 @@ impl Detector {
         self.touching
     }
 
-    /// Whether this frame alone says contact.
+    /// Whether this frame alone indicates contact.
     fn says(&self, frame: &Frame) -> Option<bool> {
         if !self.hears(frame) {
             return None;
@@ -142,38 +144,39 @@ impl Detector {
     }
 }
 
-/// Frames at rest over which the scatter of a channel is remembered, from one tare to the next;
-/// chosen: one second, so that a channel that grows noisy is known to within twenty touches.
+/// Number of frames at rest over which a channel's scatter is averaged across tares; a heuristic:
+/// one second, so that an increase of a channel's noise is followed within twenty touches.
 const MEMORY: f64 = 100.0;
 
-/// Frames that tell how much a channel scatters; chosen: from here on the rate of false alarms is
-/// that of many (`tests/suite/detection.rs`).
+/// Number of frames required for a channel's scatter; a heuristic: from here on the rate of false
+/// alarms is that of many frames (`tests/suite/detection.rs`).
 const LEARNT: usize = 20;
 
-/// Least standard deviation of an electrode: rounding, and no recorded one has less than 1.5
+/// Smallest standard deviation of an electrode, counts: rounding; no recorded one has less than 1.5
 /// (MiaoLi/syntouchcontact).
 const LEAST_COUNTS: f64 = 1.0;
 
-/// The same of PDC: recorded ones have up to half a count (RuihanGao/BioTacSP_setup).
+/// Smallest standard deviation of PDC, counts: recorded ones have up to 0.5
+/// (RuihanGao/BioTacSP_setup).
 const LEAST_PDC_COUNTS: f64 = 0.5;
 
-/// Mean of every channel over the frames of the last tare, and its variance over those of the last
-/// ones.
+/// Rest state: mean of every channel over the frames of the last tare, and its variance over recent
+/// tares.
 ///
-/// Electrodes drift together, as the fluid conducts better or worse: dE = E (1 − E/4095) d ln G. So
-/// each is taken in its difference to the median change of ln G over all that are not open. Two
-/// real sensors that nobody touches drift by 24 and 54 counts (standard deviations of means over
-/// 20 s) and by 2 about that law, 3 and 7 about an equal change of counts; they scatter about it as
-/// much over 20 s as over 20 ms (MiaoLi/syntouchcontact). A PDC at rest stays within a count for
-/// 20 s (I-Quotient-Robotics/syntouch_btd_decode). So between two tares nothing else is followed,
-/// and no contact is too slow.
+/// Electrodes drift together with the conductivity of the fluid: dE = E (1 − E/4095) d ln G.
+/// Therefore each is compared with the median change of ln G over all that are not open. Two real
+/// sensors at rest drift by 24 and 54 counts (standard deviations of means over 20 s), by 2 about
+/// this law, and by 3 and 7 about an equal change of counts; they scatter about it as much over 20
+/// s as over 20 ms (MiaoLi/syntouchcontact). PDC at rest stays within a count for 20 s
+/// (I-Quotient-Robotics/syntouch_btd_decode). No other drift is compensated between two tares, so
+/// slow contacts are detected too.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rest {
     electrodes: Option<[Channel; ELECTRODES]>,
     pdc: Option<Channel>,
-    /// Frames that the means are of.
+    /// Number of frames of the means.
     mean_of: f64,
-    /// Frames less one for each tare that the variances are of.
+    /// Number of frames of the variances, minus one per tare.
     variance_of: f64,
 }
 
@@ -184,12 +187,12 @@ struct Channel {
 }
 
 impl Rest {
-    /// Frames that the next tare should have so that evidence is what it says.
+    /// Number of frames that the next tare needs for a valid evidence.
     pub fn wants(&self) -> usize {
         LEARNT.saturating_sub(self.variance_of as usize)
     }
 
-    /// Takes in untouched frames: the means are theirs, the variances become so by and by.
+    /// Updates with frames at rest: sets the means to theirs, and the variances gradually.
     pub fn tare(&mut self, frames: &[Frame]) {
         self.mean_of = 0.0;
         frames.iter().for_each(|frame| self.learn(frame));
@@ -197,7 +200,7 @@ impl Rest {
 
     fn learn(&mut self, frame: &Frame) {
         let has = [frame.electrode_counts.is_some(), frame.pdc_counts.is_some()];
-        // A channel that comes or goes begins anew.
+        // A channel that appears or disappears starts anew.
         if [self.electrodes.is_some(), self.pdc.is_some()] != has {
             *self = Self::default();
         }
@@ -228,15 +231,15 @@ impl Rest {
         self.variance_of += f64::from(u8::from(!first));
     }
 
-    /// The rise of the pressure above rest, and the change of all electrodes together in whichever
-    /// way, in standard deviations of the normal distribution; none for a channel that
-    /// either lacks.
+    /// Computes the evidence of contact, in standard deviations of a normal distribution: the rise
+    /// of the pressure, and the joint change of all electrodes in either direction; `None` for a
+    /// channel that is missing in the frame or at rest.
     ///
-    /// A channel's difference over its standard deviation, t, is Student's with as many degrees of
-    /// freedom as frames tell of the latter, and is taken to the normal z of the same probability
-    /// by z² = ν ln(1 + t²/ν) ((8ν + 1)/(8ν + 3))² (Wallace 1959). The mean of z² over n electrodes
-    /// is χ²/ν' with ν' = n − 1, as the median change is taken out, and goes to a normal number by
-    /// its cube root (Wilson and Hilferty 1931).
+    /// A channel's difference over its standard deviation, t, follows Student's distribution with
+    /// as many degrees of freedom as frames determine the latter, and is mapped to the normal z of
+    /// the same probability by z² = ν ln(1 + t²/ν) ((8ν + 1)/(8ν + 3))² (Wallace 1959). The mean of
+    /// z² over n electrodes is χ²/ν' with ν' = n − 1, since the median change is removed, and is
+    /// mapped to a normal variable by its cube root (Wilson and Hilferty 1931).
     pub fn evidence(&self, frame: &Frame) -> [Option<f64>; 2] {
         if self.mean_of == 0.0 || self.variance_of == 0.0 {
             return [None; 2];
@@ -267,25 +270,26 @@ impl Rest {
         [pressure, electrodes]
     }
 
-    /// Variance of one more frame about the mean, in that of one frame about the truth.
+    /// Variance of one more frame about the mean, in units of that of one frame about the true
+    /// value.
     fn alone(&self) -> f64 {
         1.0 + 1.0 / self.mean_of
     }
 }
 
 impl Channel {
-    /// Whether it is no electrode that is open or at the end of its range.
+    /// Whether the electrode is neither open nor at the end of its range.
     fn is_sound(&self) -> bool {
         (OPEN_COUNTS..FULL_SCALE_COUNTS - 1.0).contains(&self.mean)
     }
 
-    /// Change of an electrode's counts for a change of ln G, of the voltage divider.
+    /// Derivative of an electrode's counts by ln G, from the voltage divider.
     fn sensitivity_counts(&self) -> f64 {
         self.mean * (1.0 - self.mean / FULL_SCALE_COUNTS)
     }
 }
 
-/// By how much ln G changed at the electrodes that are not open, in the middle.
+/// Median change of ln G over the electrodes that are not open.
 fn common_change(channels: &[Channel; ELECTRODES], moved: &[f64; ELECTRODES]) -> f64 {
     let mut sorted = [0.0; ELECTRODES];
     let mut count = 0;

@@ -1,5 +1,4 @@
-//! The finger as a lab knows it: its shape, where its electrodes are, what it sends, and what a
-//! frame says of a contact.
+//! Finger: its shape, electrodes, data frames, contact detection and contact location.
 
 pub mod contact_point;
 pub mod detection;

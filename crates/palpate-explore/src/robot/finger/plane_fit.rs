@@ -1,9 +1,9 @@
-//! The point of contact from all electrodes at once: which plane, pressed into the finger's shape,
-//! and which shift of the skin over the core explain best what they read.
+//! Point of contact from all electrodes together: fits a plane pressed into the finger and a shift
+//! of the skin over the core to the electrode readings.
 //!
-//! Eq. 1 takes each electrode that fell for a sign of contact. A skin that is carried sideways
-//! closes gaps on one side and opens them on the other, as no contact does, so both can be told
-//! apart. Gaps follow from counts by Z = Z0 g0/g.
+//! Eq. 1 attributes each fall of an electrode to contact. A skin that is sheared sideways closes
+//! gaps on one side and opens them on the other, unlike a contact, so the two can be separated.
+//! Gaps follow from counts by Z = Z0 g0/g.
 
 use super::contact_point::{OPEN_COUNTS, PointOfContact, locate};
 use super::electrode_table::{self, SPREAD_M};
@@ -13,58 +13,60 @@ use super::shape::Finger;
 use nalgebra::{Matrix4, Point3, SVector, UnitVector3, Vector3, Vector4};
 use std::f64::consts::FRAC_PI_2;
 
-/// Points along the finger and around it, from nail to nail (chosen: half a millimetre apart, a
-/// quarter of what an electrode spreads over).
+/// Number of points along the finger and around it, from nail to nail; a heuristic: half a
+/// millimetre apart, a quarter of an electrode's spread.
 const POINTS: [usize; 2] = [50, 36];
 
-/// Directions that face the plane: from, step and number of pitches and rolls, in radians (chosen:
-/// the pad up to the apex, and both sides; steps of a millimetre on the skin).
+/// Directions of the plane: first value, step and number of pitches and rolls, rad; a heuristic:
+/// the pad up to the apex, and both sides; steps of a millimetre on the skin.
 const PITCHES: (f64, f64, usize) = (-0.4, 0.1, 20);
 const ROLLS: (f64, f64, usize) = (-1.2, 0.15, 17);
 
-/// How deep the plane is in the skin of a BioTac, in metres (chosen: up to where the core carries
-/// all).
+/// Indentation depths of the plane in the skin of a BioTac, m; a heuristic: up to where the core
+/// carries the whole load.
 const DEPTHS_M: [f64; 9] = [7e-5, 1.5e-4, 3e-4, 5e-4, 7.5e-4, 1e-3, 1.3e-3, 1.6e-3, 2e-3];
 
-/// Where the gap is closed the core carries the load: a depth counts so many times as much towards
-/// the centre of pressure as over the fluid (chosen: an order of magnitude).
+/// Weight of indentation where the gap is closed and the core carries the load, relative to that
+/// over the fluid, for the centre of pressure; a heuristic: an order of magnitude.
 const CORE: f64 = 10.0;
 
-/// No electrode reads a gap as closed farther than this, or as so many gaps more (chosen): what is
-/// left conducts too little to tell, or all that there is.
+/// Largest closed fraction of a gap that is used, and largest opening in units of the gap; a
+/// heuristic: beyond it, the remaining conductance carries too little information.
 const CLOSED: f64 = 0.97;
 const OPENED: f64 = 10.0;
 
-/// An electrode senses no farther than so many spreads, where next to nothing is left (chosen).
+/// Sensing range of an electrode, in units of its spread, beyond which almost nothing remains; a
+/// heuristic.
 const REACH: f64 = 3.0;
 
-/// A millimetre, to weigh electrodes by the gap that they measure.
+/// Unit of the gap errors that weight the electrodes: one millimetre.
 const MM: f64 = 1e-3;
 
-/// Shift of the skin and bulge that are plausible, as what they may cost (chosen: centimetres, so
-/// that only what nothing determines is held).
+/// Regularisation of the skin's shift and bulge, as the scale of plausible values; a heuristic:
+/// centimetres, so that it affects only undetermined components.
 const HELD: f64 = 1e3;
 
-/// Presses count by how much worse they explain the gaps than the best: this part of its error,
-/// and what noise makes of it, in mm² (chosen: five frames of 5 counts of noise close 0.003 of each
-/// gap, 19 of them of about a millimetre).
+/// Scale of the weights by which presses count according to their error in excess of the best: a
+/// fraction of the best error, and the contribution of noise, mm²; a heuristic: five frames of 5
+/// counts of noise close 0.003 of each gap, 19 of them of about a millimetre.
 const WORSE: f64 = 0.3;
 const NOISE_MM2: f64 = 1e-4;
 
 type Gaps = SVector<f64, ELECTRODES>;
 
-/// A finger pressed on planes from all sides: the part of each gap that closes.
+/// Contact locator: closed fractions of the gaps for planes pressed on the finger from all
+/// directions.
 #[derive(Clone, Debug)]
 pub struct PlaneFit {
     finger: Finger,
     presses: Vec<Press>,
-    /// What closes with a metre of shift along x, y and z of `T`, and with one of common bulge.
+    /// Closed fractions per metre of shift along x, y and z of `T`, and per metre of common bulge.
     carried: [Gaps; 4],
     /// Weight of each electrode's error: the square of its gap.
     weights: Gaps,
 }
 
-/// One of the planes.
+/// One pressed plane.
 #[derive(Clone, Debug)]
 struct Press {
     closed: Gaps,
@@ -78,9 +80,10 @@ struct SkinPoint {
     direction: UnitVector3<f64>,
     outer_m: f64,
     gap_m: f64,
-    /// Area along its outward normal.
+    /// Area vector along its outward normal.
     area_m2: Vector3<f64>,
-    /// Electrodes that sense it, and what a metre inwards here closes of each one's gap.
+    /// Electrodes that sense it, with the closed fraction of each one's gap per metre of
+    /// indentation here.
     senses: Vec<(usize, f64)>,
 }
 
@@ -95,7 +98,7 @@ impl SkinPoint {
 }
 
 impl PlaneFit {
-    /// Presses the finger's shape on all planes.
+    /// Computes the presses of all planes on the finger's shape.
     pub fn new(finger: &Finger) -> Self {
         let profile = Profile::biotac(finger);
         let scale = profile.scale();
@@ -115,7 +118,7 @@ impl PlaneFit {
             }
             closed
         };
-        // As a sleeve that the apex holds, over a fluid whose volume stays.
+        // The skin moves like a sleeve held at the apex, over a fluid of constant volume.
         let follows = |point: &SkinPoint| 1.0 - point.direction.x.max(0.0).powi(2);
         let lifted_m2: Vector3<f64> = points.iter().map(|p| p.area_m2 * follows(p)).sum();
         let wet_m2: f64 = points.iter().map(SkinPoint::section_m2).sum();
@@ -135,8 +138,8 @@ impl PlaneFit {
         }
     }
 
-    /// Where the planes that explain a frame press on average; none where Eq. 1 says nothing
-    /// either.
+    /// Returns the mean point of contact of the planes that explain a frame; `None` if Eq. 1
+    /// returns `None`.
     pub fn locate(&self, tare: &Frame, frame: &Frame) -> Option<PointOfContact> {
         let found = locate(&self.finger, tare, frame)?;
         let (rest, now) = (tare.electrode_counts?, frame.electrode_counts?);
@@ -150,7 +153,7 @@ impl PlaneFit {
         let weighted = self.carried.map(|gaps| gaps.component_mul(&weights));
         let normal = Matrix4::from_fn(|i, j| weighted[i].dot(&self.carried[j]));
         let inverse = (normal + Matrix4::identity() * HELD).try_inverse()?;
-        // Error of a press when skin is carried as suits it best.
+        // Error of a press with the best-fitting shift of the skin.
         let error = |press: &Press| {
             let off = read - press.closed.map(|closed| closed.min(CLOSED));
             let along = Vector4::from_fn(|i, _| weighted[i].dot(&off));
@@ -180,7 +183,7 @@ fn steps((from, step, count): (f64, f64, usize)) -> impl Iterator<Item = f64> {
     (0..count).map(move |i| from + step * i as f64)
 }
 
-/// Points over the half of the finger that has fluid under its skin.
+/// Returns points over the half of the finger that has fluid under its skin.
 fn points(profile: &Profile) -> Vec<SkinPoint> {
     let [along, around] = POINTS;
     let cell_m = (profile.length_m + profile.radius_m) / along as f64;
@@ -224,12 +227,12 @@ fn points(profile: &Profile) -> Vec<SkinPoint> {
     points
 }
 
-/// Adds what planes that face `towards_t` do, from shallow to deep.
+/// Adds the presses of planes that face `towards_t`, from shallow to deep.
 fn press(points: &[SkinPoint], towards_t: Vector3<f64>, scale: f64, presses: &mut Vec<Press>) {
     let farthest_m = points.iter().map(|p| p.outer_t().coords.dot(&towards_t));
     let farthest_m = farthest_m.fold(f64::NEG_INFINITY, f64::max);
     let deepest_m = DEPTHS_M.iter().fold(0.0, |deepest: f64, &depth_m| deepest.max(depth_m));
-    // How far each point that any of them meets lies behind the first, along its ray.
+    // Distance of each point that any of them indents behind the first, along its ray.
     let met: Vec<(&SkinPoint, f64, f64)> = (points.iter())
         .map(|p| (p, farthest_m - p.outer_t().coords.dot(&towards_t), p.direction.dot(&towards_t)))
         .filter(|&(_, behind_m, facing)| behind_m < deepest_m * scale && facing > 0.0)

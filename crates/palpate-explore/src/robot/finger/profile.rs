@@ -1,7 +1,7 @@
-//! The shape of a BioTac: outer skin, skin thickness and fluid gap, along rays out of its axis.
+//! Shape of a BioTac: outer skin, skin thickness and fluid gap, along rays from its axis.
 //!
-//! All figures are from the FEM mesh of NVlabs/biotac_sim unless said otherwise. Behind the
-//! origin of `T` (x ≤ 0) rays leave the axis at right angles; before it they leave the origin.
+//! All figures are from the FEM mesh of NVlabs/biotac_sim unless noted otherwise. Behind the origin
+//! of `T` (x ≤ 0) rays leave the axis at right angles; before it they leave the origin.
 
 use super::shape::{BIOTAC_RADIUS_M, Finger};
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -18,15 +18,15 @@ const SKIN_M: f64 = 1.6e-3;
 /// The pad at the pulp is this much thicker than the sides, most at `BULGE_X_M`: 8.31 mm.
 const BULGE_M: f64 = 1.31e-3;
 const BULGE_X_M: f64 = -7.0e-3;
-/// How the bulge flattens, bulge = `BULGE_M` − c (x − `BULGE_X_M`)²: 8.02 mm at x = 0 and 8.03 mm
+/// Curvature of the bulge, bulge = `BULGE_M` − c (x − `BULGE_X_M`)²: 8.02 mm at x = 0 and 8.03 mm
 /// at −13.6.
 const BULGE_FALL_PER_M: f64 = 6.0;
 /// The tip's corner, 45° from −z: 8.72 mm there, 8.30 mm at 30°, almost nothing at 0.
 const CORNER_M: f64 = 1.175e-3;
 const CORNER_WIDTH: f64 = 0.041;
-/// The apex lies this much deeper than the sides: 6.65 mm.
+/// Depth of the apex below the sides: 6.65 mm.
 const APEX_M: f64 = 0.35e-3;
-/// A gap is at least this: at the apex skin and core touch (0.00 mm), but a film stays (chosen).
+/// Smallest gap; a heuristic: at the apex skin and core touch (0.00 mm), but a film remains.
 const FILM_M: f64 = 0.05e-3;
 
 /// Outer skin, skin and gap of a fingertip; lengths scale with the radius of its hull.
@@ -40,41 +40,41 @@ pub struct Profile {
     pub shaped: bool,
 }
 
-/// Where a ray out of the axis passes the layers of the fingertip.
+/// Layers of the fingertip along a ray from its axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layers {
-    /// From the axis to the outer skin.
+    /// Distance from the axis to the outer skin.
     pub outer_m: f64,
     /// Thickness of the skin.
     pub skin_m: f64,
     /// Thickness of the fluid under the skin.
     pub gap_m: f64,
-    /// Whether fluid flows there: not on the back, where the nail holds the skin (chosen: above
-    /// the axis).
+    /// Whether fluid flows there; a heuristic: not above the axis, on the back, where the nail
+    /// holds the skin.
     pub wet: bool,
 }
 
 impl Profile {
-    /// The BioTac in the finger's size.
+    /// The BioTac, scaled to the finger's size.
     pub fn biotac(finger: &Finger) -> Self {
         Self { length_m: finger.length_m, radius_m: finger.radius_m, shaped: true }
     }
 
-    /// A capsule whose layers are everywhere those of the BioTac's sides: a shape with closed
-    /// forms.
+    /// A capsule with the layers of the BioTac's sides everywhere: a shape with closed-form
+    /// solutions.
     pub fn capsule(finger: &Finger) -> Self {
         Self { shaped: false, ..Self::biotac(finger) }
     }
 
-    /// Every length of the BioTac is multiplied by this.
+    /// Ratio of all lengths to those of the BioTac.
     pub fn scale(&self) -> f64 {
         self.radius_m / BIOTAC_RADIUS_M
     }
 
-    /// Layers along the ray that leaves the axis at `x_m` ≤ 0 in direction `d`.
+    /// Returns the layers along the ray from the axis at `x_m` ≤ 0 in direction `d`.
     ///
-    /// At x < 0 the direction has no x. The pad is the sides' circle shifted towards −z: its
-    /// radius grows with the cosine of the angle from −z.
+    /// At x < 0 the direction has no x component. The pad is the sides' circle shifted towards −z:
+    /// its radius grows with the cosine of the angle from −z.
     pub fn layers(&self, x_m: f64, d: &Vector3<f64>) -> Layers {
         let scale = self.scale();
         let (skin_m, film_m) = (SKIN_M * scale, FILM_M * scale);
@@ -99,8 +99,8 @@ impl Profile {
         Layers { outer_m: outer_m * scale, skin_m, gap_m, wet: d.z <= 0.0 }
     }
 
-    /// Where the outer skin is over the capsule's point at height `x_m` and angle `turn` from −z
-    /// towards +y: start of the ray on the axis, direction.
+    /// Returns the ray to the outer skin over the capsule's point at height `x_m` and angle `turn`
+    /// from −z towards +y: its start on the axis, and its direction.
     ///
     /// `x_m` runs from −`length_m` to the apex at `radius_m`.
     pub fn ray(&self, x_m: f64, turn: f64) -> (Point3<f64>, UnitVector3<f64>) {
@@ -110,7 +110,7 @@ impl Profile {
         (Point3::new(x_m.min(0.0), 0.0, 0.0), UnitVector3::new_normalize(direction))
     }
 
-    /// The point of the outer skin along that ray, in `T`.
+    /// Returns the point of the outer skin along that ray, in `T`.
     pub fn skin_t(&self, x_m: f64, turn: f64) -> Point3<f64> {
         let (start, direction) = self.ray(x_m, turn);
         start + direction.scale(self.layers(start.x, &direction).outer_m)

@@ -1,47 +1,48 @@
-//! The fingertip's outer skin as a rigid hull, a cylinder closed by a hemisphere; how it stands and
-//! moves.
+//! Shape and pose of the fingertip: its outer skin as a rigid hull, a cylinder closed by a
+//! hemisphere.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3, Vector6};
 use palpate_input::config::{Checked, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Outer radius of a BioTac's sides (NVIDIA's FEM mesh of the sensor), to which its electrode table
-/// and its layers belong.
+/// Outer radius of a BioTac's sides (FEM mesh of NVlabs/biotac_sim), which its electrode table and
+/// its layers refer to.
 pub const BIOTAC_RADIUS_M: f64 = 7.0e-3;
 
 /// Shape and attitude of the finger.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Finger {
-    /// Radius of cylinder and hemisphere. A soft finger of another radius than a BioTac's 7 mm is
-    /// one in another size: skin, fluid, electrodes and where they place a contact scale with it.
-    /// Its contacts are farther off: RMSE on the container 0.30 mm at 7 mm, 0.46 at 8, 0.79 at 10.
+    /// Radius of cylinder and hemisphere, m; skin, fluid and electrodes of a soft finger scale with
+    /// it.
+    // Contacts are less accurate at other radii than a BioTac's 7 mm: RMSE on the container 0.30 mm
+    // at 7 mm, 0.46 at 8, 0.79 at 10.
     pub radius_m: f64,
-    /// Length of the cylinder behind the hemisphere's centre.
+    /// Length of the cylinder behind the hemisphere's centre, m.
     pub length_m: f64,
-    /// Angle of the finger's axis above the direction of approach: 0 touches with the tip's
-    /// apex, 90 with the finger's side.
+    /// Angle of the finger's axis above the approach, deg: 0 touches with the apex, 90 with the
+    /// side.
     pub pitch_deg: f64,
 }
 
 impl Default for Finger {
-    /// The BioTac: the outer skin lies 7.0 mm from the axis at the sides and the sensing part
-    /// is 28 mm long (NVIDIA's FEM mesh of the sensor). The pitch is chosen, half-way between
-    /// touching with the tip's apex and with the pad.
+    /// The BioTac: the outer skin lies 7.0 mm from the axis at the sides, and the sensing part is
+    /// 28 mm long (FEM mesh of NVlabs/biotac_sim). The pitch is a heuristic, half-way between
+    /// contact at the apex and at the pad.
     fn default() -> Self {
         Self { radius_m: BIOTAC_RADIUS_M, length_m: 0.021, pitch_deg: 45.0 }
     }
 }
 
 impl Finger {
-    /// Every length of a BioTac is multiplied by this.
+    /// Ratio of all lengths to those of a BioTac.
     pub fn scale(&self) -> f64 {
         self.radius_m / BIOTAC_RADIUS_M
     }
 
-    /// From the hemisphere's centre (origin of `T`) to the cylinder's far end, in a frame `A` along
-    /// whose −y the finger approaches.
+    /// Vector from the hemisphere's centre (origin of `T`) to the cylinder's far end, in a frame
+    /// `A` along whose −y the finger approaches.
     ///
     /// The finger points along the approach and up by its pitch, so its cylinder lies behind (+y)
     /// and below.
@@ -50,14 +51,14 @@ impl Finger {
         Vector3::new(0.0, forward, -up) * self.length_m
     }
 
-    /// Farthest that any part of the soft skin around the hemisphere's centre lies from it: the
-    /// pad's corner is 8.7 mm out where the sides are 7.0 (NVIDIA's FEM mesh).
+    /// Largest distance of the soft skin around the hemisphere's centre from it: the pad's corner
+    /// is at 8.7 mm where the sides are at 7.0 (FEM mesh of NVlabs/biotac_sim).
     pub fn bulge_m(&self) -> f64 {
         8.75 / 7.0 * self.radius_m
     }
 
-    /// How far the hull reaches below the hemisphere's centre in `W`, when a frame `A` along whose
-    /// −y the finger approaches stands at `r_wa`; the soft skin's bulge is taken for its radius.
+    /// Extent of the hull below the hemisphere's centre in `W`, where a frame `A` along whose −y
+    /// the finger approaches has the attitude `r_wa`; the radius includes the soft skin's bulge.
     pub fn drop_m(&self, r_wa: &UnitQuaternion<f64>) -> f64 {
         self.bulge_m() - (r_wa * self.axis_a()).z.min(0.0)
     }
@@ -71,23 +72,23 @@ impl Finger {
         UnitQuaternion::from_rotation_matrix(&rotation)
     }
 
-    /// The approach's direction in `T`.
+    /// Direction of the approach in `T`.
     pub fn ahead_t(&self) -> Vector3<f64> {
         self.r_at().inverse() * -Vector3::y()
     }
 
-    /// The hull as seen along the approach.
+    /// Returns the hull as seen along the approach.
     pub fn front(&self) -> Front {
         Front { radius_m: self.radius_m, axis: self.axis_a() }
     }
 
-    /// As [`Front::y_m`], for one place.
+    /// Returns [`Front::y_m`] for a single place.
     pub fn front_m(&self, dx_m: f64, dz_m: f64) -> Option<f64> {
         self.front().y_m(dx_m, dz_m)
     }
 }
 
-/// The hull as seen along the approach, with its axis in the frame `A` worked out once.
+/// The hull as seen along the approach, with its axis in the frame `A` precomputed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Front {
     radius_m: f64,
@@ -95,12 +96,12 @@ pub struct Front {
 }
 
 impl Front {
-    /// The y of the hull's foremost point (towards −y) at (`dx_m`, `dz_m`) beside the hemisphere's
-    /// centre, relative to it, in the frame `A`; none where the hull does not reach.
+    /// Returns the y of the hull's foremost point (towards −y) at (`dx_m`, `dz_m`) beside the
+    /// hemisphere's centre, relative to it, in the frame `A`; `None` outside the hull.
     ///
-    /// A sphere whose centre lies at s·(a_y, a_z) on the axis has its front at
-    /// s·a_y − sqrt(q² − (dz − s·a_z)²) with q² = r² − dx², which is least where
-    /// dz − s·a_z = sign(a_z)·q·a_y / |a|.
+    /// A sphere whose centre lies at s·(a_y, a_z) on the axis has its front at s·a_y − sqrt(q² −
+    /// (dz − s·a_z)²) with q² = r² − dx², which is smallest where dz − s·a_z = sign(a_z)·q·a_y /
+    /// |a|.
     pub fn y_m(&self, dx_m: f64, dz_m: f64) -> Option<f64> {
         let Self { radius_m, axis } = self;
         let q2 = radius_m * radius_m - dx_m * dx_m;
@@ -118,13 +119,13 @@ impl Front {
         (depth2 >= 0.0).then(|| s * axis.y - depth2.sqrt())
     }
 
-    /// How far above and below the hemisphere's centre the hull's axis reaches, in `A`.
+    /// Extent of the hull's axis below and above the hemisphere's centre, in `A`.
     pub fn axis_z_m(&self) -> [f64; 2] {
         [self.axis.z.max(0.0), -self.axis.z.min(0.0)]
     }
 }
 
-/// How the fingertip stands and moves in `W`.
+/// Pose and velocity of the fingertip in `W`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipMotion {
     /// Pose of `T`.
@@ -136,12 +137,12 @@ pub struct TipMotion {
 }
 
 impl TipMotion {
-    /// Standing still.
+    /// Motion at rest.
     pub fn at(x_wt: Isometry3<f64>) -> Self {
         Self::moving(x_wt, &Vector6::zeros())
     }
 
-    /// At `x_wt` with a twist: linear velocity of the origin of `T`, then angular, in `W`.
+    /// Motion at `x_wt` with a twist in `W`: linear velocity of the origin of `T`, then angular.
     pub fn moving(x_wt: Isometry3<f64>, twist: &Vector6<f64>) -> Self {
         let [linear_w, angular_w] = [0, 3].map(|part| twist.fixed_rows::<3>(part).into());
         Self { x_wt, linear_w, angular_w }
@@ -167,7 +168,7 @@ impl Checked for Finger {
 mod tests {
     use super::*;
 
-    /// The slow twin walks along the axis.
+    /// Compares with a reference that searches along the axis.
     #[test]
     fn the_front_is_the_foremost_of_all_spheres_along_the_axis() {
         for pitch_deg in [-60.0, 0.0, 20.0, 45.0, 90.0] {

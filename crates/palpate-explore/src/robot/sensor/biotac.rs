@@ -1,4 +1,4 @@
-//! The BioTac: contact by its fluid's pressure, place by its electrodes.
+//! BioTac sensor: detects contact by the fluid's pressure and locates it by the electrodes.
 
 use super::sample::{Sample, Wrench};
 use super::{SensedContact, Sensor};
@@ -6,11 +6,11 @@ use crate::robot::finger::contact_point::{self, ContactEstimate};
 use crate::robot::finger::plane_fit::PlaneFit;
 use crate::robot::finger::{Detection, Detector, Finger, Frame};
 
-/// Finds contacts in the frames of a BioTac.
+/// Contact detection and location from the frames of a BioTac.
 pub struct BioTac {
     detector: Detector,
     estimate: ContactEstimate,
-    /// Rise of PDC above its tare that is too much.
+    /// Limit of PDC above its tare.
     pressure_limit_counts: f64,
     plane_fit: Option<PlaneFit>,
     touching: bool,
@@ -20,7 +20,7 @@ pub struct BioTac {
 }
 
 impl BioTac {
-    /// In the size of `finger`.
+    /// Creates the sensor for the size of `finger`.
     pub fn new(
         finger: &Finger,
         detection: Detection,

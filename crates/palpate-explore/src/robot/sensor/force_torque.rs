@@ -1,15 +1,15 @@
-//! A rigid fingertip on a force-torque sensor: intrinsic contact sensing.
+//! Rigid fingertip on a force-torque sensor: intrinsic contact sensing.
 
 use super::sample::{Sample, Wrench};
 use super::{SensedContact, Sensor};
 use crate::robot::finger::Finger;
 use nalgebra::{Point3, Vector3};
 
-/// Least force whose line of action is taken for that of a contact.
+/// Smallest force whose line of action locates a contact.
 // heuristic: below it, the noise of a common sensor turns the force by more than 30°.
 const LEAST_N: f64 = 0.1;
 
-/// Locates contacts by the wrench above that of the untouched finger.
+/// Locates contacts by the wrench relative to that of the finger at rest.
 #[derive(Clone, Debug, Default)]
 pub struct ForceTorqueTip {
     at_rest: Option<Wrench>,
@@ -17,11 +17,11 @@ pub struct ForceTorqueTip {
     count: f64,
 }
 
-/// The point of a sphere of `radius_m` about the origin at which a pure force gives the wrench
-/// `(f, τ)`, pressing inwards: `p = (f × τ) / |f|² − λ f` with `|p| = radius` (Bicchi, Salisbury
-/// and Brock 1993, Int. J. Robotics Research 12, point contact with friction). A line of action
-/// that passes beside the sphere, by an error, meets its nearest point. Returns `None` for a
-/// force of less than 0.1 N.
+/// Returns the point of a sphere of `radius_m` about the origin at which a pure force produces the
+/// wrench `(f, τ)`, pressing inwards: `p = (f × τ) / |f|² − λ f` with `|p| = radius` (Bicchi,
+/// Salisbury and Brock 1993, Int. J. Robotics Research 12, point contact with friction). If
+/// measurement error makes the line of action miss the sphere, returns the sphere's nearest point.
+/// Returns `None` for a force of less than 0.1 N.
 pub fn point_on_sphere(radius_m: f64, wrench: &Wrench) -> Option<Point3<f64>> {
     let Wrench { force_n: f, torque_nm } = wrench;
     let squared = f.norm_squared();
@@ -55,7 +55,7 @@ impl Sensor for ForceTorqueTip {
         self.at_rest.is_some()
     }
 
-    /// The contact is on the hemisphere; its normal is that of the sphere there.
+    /// Locates the contact on the hemisphere, with the sphere's normal there.
     fn locate(&self, finger: &Finger) -> Option<SensedContact> {
         let (rest, now) = (self.at_rest?, self.mean()?);
         let load = Wrench {
@@ -68,7 +68,7 @@ impl Sensor for ForceTorqueTip {
 }
 
 impl ForceTorqueTip {
-    /// Mean of the wrenches since [`forget`](Sensor::forget).
+    /// Returns the mean of the wrenches since [`forget`](Sensor::forget).
     fn mean(&self) -> Option<Wrench> {
         let Self { sum, count, .. } = self;
         let mean = |sum: Vector3<f64>| sum / *count;
@@ -83,7 +83,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// A force at a point of the sphere, within its friction cone, is found where it acts.
+        /// A force at a point of the sphere, within its friction cone, is located at that point.
         #[test]
         fn a_force_is_found_where_it_acts(
             outward in prop::array::uniform3(-1f64..1.0),
@@ -103,7 +103,7 @@ mod tests {
         }
     }
 
-    /// A force along the finger's axis presses its tip; none presses nothing.
+    /// A force along the finger's axis is located at the tip; a zero force gives no contact.
     #[test]
     fn the_tip_is_pressed_by_a_force_along_the_axis() {
         let wrench = Wrench { force_n: -Vector3::x(), torque_nm: Vector3::zeros() };

@@ -1,10 +1,10 @@
-//! The ideal sensor of a simulated finger whose scene leaves out the sensor that would tell.
+//! Ideal sensor of a simulated finger, for scenes without a simulated tactile sensor.
 
 use super::sample::{IdealContact, Sample, Wrench};
 use super::{SensedContact, Sensor};
 use crate::robot::finger::Finger;
 
-/// Reads contacts as the simulator knows them.
+/// Returns the exact contacts of the simulator.
 #[derive(Clone, Debug, Default)]
 pub struct IdealSensor {
     contact: Option<IdealContact>,

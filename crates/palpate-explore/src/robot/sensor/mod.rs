@@ -1,4 +1,4 @@
-//! Fingertip sensors: what they send, and the trait that turns it into contacts.
+//! Fingertip sensors: their samples, and the trait that turns samples into contacts.
 
 mod biotac;
 mod force_torque;
@@ -13,7 +13,7 @@ pub use sample::{Channels, IdealContact, Sample, Wrench};
 use super::finger::Finger;
 use nalgebra::{Point3, Vector3};
 
-/// A contact as a sensor locates it, in the fingertip's frame `T`.
+/// A contact located by a sensor, in the fingertip's frame `T`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensedContact {
     /// The point of contact.
@@ -22,21 +22,21 @@ pub struct SensedContact {
     pub normal_t: Vector3<f64>,
 }
 
-/// A fingertip sensor: turns what a body returns into contacts.
+/// A fingertip sensor: turns samples of a backend into contacts.
 ///
-/// A touch tares it at rest, asks it during the approach whether there is contact, then lets it
-/// collect samples at rest and asks where the contact is.
+/// A touch tares the sensor at rest, polls it for contact during the approach, then lets it collect
+/// samples at rest on the object and locates the contact.
 pub trait Sensor: Send {
-    /// Takes the samples of a tick, and the wrench of the sensor at the finger's mount.
+    /// Adds the samples of a tick, and the wrench measured at the finger's mount.
     fn take(&mut self, time_s: f64, samples: &[Sample], wrench: Option<&Wrench>);
 
     /// Drops the samples collected so far.
     fn forget(&mut self);
 
-    /// Takes the samples collected so far as those of the untouched finger.
+    /// Tares the sensor with the samples collected so far, of the finger at rest.
     fn tare(&mut self);
 
-    /// Samples that the next [`tare`](Self::tare) needs, at least.
+    /// Smallest number of samples for the next [`tare`](Self::tare).
     fn samples_of_tare(&self) -> usize {
         0
     }
@@ -46,31 +46,31 @@ pub trait Sensor: Send {
         None
     }
 
-    /// When the last valid sample came; `None` for a sensor that is read in every tick, or before
+    /// Time of the last valid sample, s; `None` for a sensor that is read in every tick, or before
     /// the first.
     fn last_sample_s(&self) -> Option<f64> {
         None
     }
 
-    /// Whether this body has the sensor, so that it decides where contacts are.
+    /// Whether the backend has this sensor, so that it locates the contacts.
     fn is_present(&self) -> bool;
 
-    /// Whether there is contact now; `None` if the sensor cannot tell, and the force decides.
+    /// Whether there is contact; `None` if the sensor cannot detect it, and the force is used.
     fn is_touching(&self) -> Option<bool> {
         None
     }
 
-    /// Whether the touch must be ended to spare the sensor.
+    /// Whether the touch must end to protect the sensor.
     fn is_overloaded(&self) -> bool {
         false
     }
 
-    /// Force on the finger, if the sensor measures it and there is no wrench.
+    /// Force on the finger, N, if the sensor measures it and there is no wrench.
     fn force_n(&self) -> Option<f64> {
         None
     }
 
-    /// The contact with `finger` by the samples collected since [`forget`](Self::forget). Returns
-    /// `None` if they do not tell.
+    /// Locates the contact with `finger` from the samples collected since [`forget`](Self::forget).
+    /// Returns `None` if they do not determine it.
     fn locate(&self, finger: &Finger) -> Option<SensedContact>;
 }

@@ -1,33 +1,33 @@
-//! Samples: messages of the fingertip sensors of a body.
+//! Samples: messages of the fingertip sensors of a backend.
 
 use crate::robot::finger::Frame;
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// One message of a fingertip sensor.
-// Few are held at once, and none is moved in a tick: a box would allocate in each.
+// Few samples exist at once, and none is moved in a tick; a box would allocate in each tick.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sample {
     /// A frame of a BioTac.
     BioTac(Frame),
-    /// A contact as a simulator knows it, in a scene that leaves out the sensor which would tell.
+    /// The exact contact of a simulator, for scenes without a simulated tactile sensor.
     Ideal(IdealContact),
-    /// Numbers of a sensor that Palpate does not know.
+    /// Channels of a custom sensor.
     Channels(Channels),
 }
 
-/// Numbers of a sensor that a program adds, which knows what they mean.
+/// Channels of a custom sensor, interpreted by the program that adds it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Channels {
-    /// When they were sampled, since reset.
+    /// Sampling time since reset, s.
     pub time_s: f64,
-    /// A number for each channel.
+    /// One value per channel.
     pub values: Vec<f64>,
 }
 
-/// A contact as a simulator knows it: exact.
+/// The exact contact of a simulator.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IdealContact {
     /// Centre of pressure on the skin, in `T`.
@@ -48,8 +48,8 @@ pub struct Wrench {
 }
 
 impl Wrench {
-    /// The same load, given in a frame A about its origin, in a frame B about B's origin; `x_ba` is
-    /// the pose of A in B.
+    /// Transforms the same load from frame A, about A's origin, to frame B, about B's origin;
+    /// `x_ba` is the pose of A in B.
     pub fn moved(&self, x_ba: &Isometry3<f64>) -> Self {
         let force_n = x_ba.rotation * self.force_n;
         let lever = x_ba.translation.vector.cross(&force_n);
