@@ -1,5 +1,5 @@
-//! What a user should know of a scene before it is run: it can be built, and may not be meant. Each
-//! notice says so and how to change it.
+//! Warnings about likely configuration mistakes in a scene that can be built; each says how to
+//! change it.
 
 use super::scene::Unit;
 use clap::ValueEnum;
@@ -8,11 +8,11 @@ use palpate_explore::robot::finger::shape::BIOTAC_RADIUS_M;
 use palpate_explore::task::{DIRECTIONS, Task, Zone};
 use palpate_geometry::spread::directions;
 
-/// A soft finger without tables has those of a BioTac.
+/// Notice that a soft finger without tables gets those of a BioTac.
 pub(super) const DEFAULT_FINGER: &str = "the scene names no effects: its finger has the default \
     [effects.skin], [effects.fluid] and [effects.electrodes]";
 
-/// Constants of the sensor stand in the scene's effects, as in version 0.1.
+/// Notice that constants of the sensor are set in the scene's effects, as in version 0.1.
 pub(super) fn moved_keys(keys: &[String]) -> String {
     format!(
         "{}: constants of the sensor, which this version still reads here; put them into the table \
@@ -21,7 +21,7 @@ pub(super) fn moved_keys(keys: &[String]) -> String {
     )
 }
 
-/// A soft finger has another radius than the BioTac's.
+/// Notice that the radius of a soft finger differs from the BioTac's.
 pub(super) fn scaled_finger(radius_m: f64) -> String {
     format!(
         "finger.radius_m = {radius_m}: a BioTac scaled from {BIOTAC_RADIUS_M} m, which presses as hard \
@@ -31,11 +31,11 @@ pub(super) fn scaled_finger(radius_m: f64) -> String {
     )
 }
 
-/// The sides of an object, named as from the middle of the robot's foot, or of the home of a stage.
+/// Sides of an object, seen from the middle of the robot's foot or from the home of a stage.
 const SIDES: [&str; 6] = ["behind", "the robot's side", "the left", "the right", "above", "below"];
 
-/// From where a robot that stands at `foot_w` cannot bring its finger to the middle of a whole
-/// object; `None` if it reaches it from everywhere.
+/// Returns a notice of the directions from which a robot with its foot at `foot_w` cannot reach the
+/// middle of a whole object; `None` if it reaches it from everywhere.
 pub(super) fn out_of_sides(task: &Task, foot_w: &Point3<f64>) -> Option<String> {
     let away_w = (task.ball()?.centre_w - foot_w).xy().try_normalize(1e-6);
     let away_w = away_w.unwrap_or_else(Vector2::x);
@@ -66,16 +66,16 @@ pub(super) fn out_of_sides(task: &Task, foot_w: &Point3<f64>) -> Option<String> 
     })
 }
 
-/// Factor between the sizes of object and zone from which there is a notice.
-// heuristic: below that between an inch and a metre.
+// Ratio of the sizes of object and zone above which there is a notice.
+// heuristic: below the ratio of a metre to an inch.
 const MISMATCH: f64 = 20.0;
 
-/// Factor up to which an object fits its zone.
-// heuristic: far below the mismatch.
+// Largest ratio of sizes at which an object fits its zone.
+// heuristic: far below `MISMATCH`.
 const FITS: f64 = 5.0;
 
-/// An object that spans `low` to `high` in the frame of `zone` is far larger or smaller than the
-/// zone, as one is whose file is read in the wrong unit; `None` if it is not.
+/// Returns a notice if the object, which spans `low` to `high` in the frame of `zone`, is far
+/// larger or smaller than the zone (a sign of a wrong unit); otherwise `None`.
 pub(super) fn size_mismatch(
     zone: &Zone,
     unit: Unit,
