@@ -291,7 +291,7 @@ fn check_overlap(
     let is_before_or_behind = -high.y > far_m || -low.y < near_m;
     match is_beside || is_before_or_behind {
         true => Err(Invalid::new(format!(
-            "the object has no surface in the zone: in the zone's frame it spans x {} to {} m, z {} \
+            "the object has no surface in the zone: in the zone's frame its bounds are x {} to {} m, z {} \
              to {} m and depth {} to {} m{}",
             low.x,
             high.x,
@@ -327,7 +327,7 @@ fn check_front(zone: &Zone, bvh: &MeshBvh, near_m: f64, object_m: f64) -> Result
     }
     match met_m(zone, bvh, [object_m - CLEARANCE_M, near_m]).reduce(f64::min) {
         Some(front_m) if front_m < near_m => Err(Invalid::new(format!(
-            "zone.depth_m begins at {near_m} m, but over the zone the object begins at {front_m} m: \
+            "zone.depth_m begins at {near_m} m, behind the front of the object at {front_m} m: \
              allowed is a nearest depth of at most that"
         ))),
         _ => Ok(()),
@@ -363,7 +363,7 @@ fn ball_around(around: &mut Around, mesh: &Mesh) -> Result<Ball, Invalid> {
     match RADIUS_M.contains(&radius_m) {
         true => Ok(Ball { centre_w: centre_m.into(), radius_m, ..own }),
         false => Err(Invalid::new(format!(
-            "the object is {:.3e} m large, and a ball around it has a radius of {radius_m:.3e} m; \
+            "the object's size is {:.3e} m, and the ball around it has a radius of {radius_m:.3e} m; \
              allowed is {} to {} m: are object.unit and object.scale right?",
             (high - low).norm(),
             RADIUS_M.start(),
@@ -385,7 +385,7 @@ fn task_around(
     if farthest_m > ball.radius_m {
         return Err(Invalid::new(format!(
             "around.radius_m is {} m, but the object reaches {farthest_m:.4} m from \
-             around.centre_m: the finger would set out inside it, or run into it on its way around",
+             around.centre_m: choose a larger radius, or the finger collides with it on its way around",
             ball.radius_m
         )));
     }
@@ -398,7 +398,7 @@ fn task_around(
     let inside_m = around.depth_m(&home_w);
     if inside_m > 0.0 {
         return Err(Invalid::new(format!(
-            "at arm.home_deg the tip is at {:?}, {inside_m:.3} m too near to the object to go around \
+            "at arm.home_deg the tip is at {:?}, {inside_m:.3} m too close to the object to go around \
              it: move object.position_m or arm.base_position_m, or choose another arm.home_deg",
             home_w.coords.map(|x| (1e3 * x).round() / 1e3).data.0[0]
         )));

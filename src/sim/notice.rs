@@ -9,14 +9,15 @@ use palpate_explore::task::{DIRECTIONS, Task, Zone};
 use palpate_geometry::spread::directions;
 
 /// Notice that a soft finger without tables gets those of a BioTac.
-pub(super) const DEFAULT_FINGER: &str = "the scene names no effects: its finger has the default \
+pub(super) const DEFAULT_FINGER: &str = "the scene has no [effects]: its finger gets the default \
     [effects.skin], [effects.fluid] and [effects.electrodes]";
 
 /// Notice that constants of the sensor are set in the scene's effects, as in version 0.1.
 pub(super) fn moved_keys(keys: &[String]) -> String {
     format!(
-        "{}: constants of the sensor, which this version still reads here; put them into the table \
-         [effects.sensor] or a file named by effects.sensor, as `palpate calibrate` writes it",
+        "{}: constants of the sensor, which will no longer be read here in the next version; move them \
+         to the table [effects.sensor], or to a file (written by `palpate calibrate`) and set \
+         effects.sensor to its name",
         keys.join(", ")
     )
 }
@@ -24,8 +25,8 @@ pub(super) fn moved_keys(keys: &[String]) -> String {
 /// Notice that the radius of a soft finger differs from the BioTac's.
 pub(super) fn scaled_finger(radius_m: f64) -> String {
     format!(
-        "finger.radius_m = {radius_m}: a BioTac scaled from {BIOTAC_RADIUS_M} m, which presses as hard \
-         before it detects contact; RMSE on the container after 20 touches was 0.39 mm at 0.005, 0.30 at \
+        "finger.radius_m = {radius_m}: this is a BioTac scaled from {BIOTAC_RADIUS_M} m that detects \
+         contact at the same force; RMSE on the container after 20 touches was 0.39 mm at 0.005, 0.30 at \
          0.007, 0.46 at 0.008 and 0.79 at 0.010, so gp.noise_sd_m of the shipped experiments may be too \
          small (docs/finger.md)"
     )
@@ -59,7 +60,7 @@ pub(super) fn out_of_sides(task: &Task, foot_w: &Point3<f64>) -> Option<String> 
         .collect();
     (!sides.is_empty()).then(|| {
         format!(
-            "from {} of {DIRECTIONS} directions the finger cannot be brought to the object: {}",
+            "the finger cannot reach the object from {} of {DIRECTIONS} directions: {}",
             unreached.len(),
             sides.join(", ")
         )
@@ -93,9 +94,9 @@ pub(super) fn size_mismatch(
     let remedy = match fitting.filter(|fitting| off_in(fitting) < FITS.ln()) {
         Some(fitting) => {
             let would_m = object_m / unit.metres() * fitting.metres();
-            format!(", in \"{fitting}\" it would measure {would_m:.4} m")
+            format!("; with object.unit = \"{fitting}\" it would measure {would_m:.4} m")
         }
-        None => " and object.scale multiplies it".into(),
+        None => "; correct object.unit or object.scale".into(),
     };
     let (factor, how) = match object_m > zone_m {
         true => (object_m / zone_m, "larger"),

@@ -42,7 +42,7 @@ pub fn is_reachable(
     let mut is_reachable = Vec::with_capacity(places.len());
     for (places, heights_m) in places.chunks(part).zip(heights_m.chunks(part)) {
         let percent = 100 * is_reachable.len() / (PARTS * part);
-        tell(&format!("looking where the finger can touch the surface: {percent} %"));
+        tell(&format!("computing where the finger can touch the surface: {percent} %"));
         is_reachable.par_extend(places.par_iter().zip(heights_m).map(|(place, height_m)| {
             height_m.is_some_and(|height_m| fingers.touch(place, height_m, &lowest_y_m))
         }));

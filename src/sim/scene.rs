@@ -247,7 +247,7 @@ impl Checked for Scene {
             given(rules, "object", self.object.is_some(), allowed);
             let allowed = "no around: body = \"function\" touches a curve";
             given(rules, "around", self.around.is_some(), allowed);
-            let allowed = "no arm: body = \"function\" is touched by none";
+            let allowed = "no arm: body = \"function\" needs none";
             given(rules, "arm", self.arm.is_some(), allowed);
             let is_deep = self.zone.as_ref().is_some_and(|zone| zone.z_m.is_some());
             let allowed = "no z_m: the surface of body = \"function\" is a curve over x";
@@ -260,8 +260,8 @@ impl Checked for Scene {
         }
         let turns = self.around.is_none() || self.arm.is_some() || self.body != Body::Dynamic;
         rules.require("body", "\"dynamic\"", turns, || {
-            "\"cast\" or \"kinematic\", or an [arm]: around an object the finger must be turned, and \
-             the stage of body = \"dynamic\" has slides alone"
+            "\"cast\" or \"kinematic\", or an [arm]: around an object the finger must turn, and the \
+             stage of body = \"dynamic\" has no wrist"
                 .into()
         });
         rules.table("effects", &self.effects);
@@ -293,11 +293,11 @@ impl Checked for Scene {
             });
         }
         let is_rigid = self.body == Body::Kinematic && self.felt_effects().skin.is_none();
-        let allowed = "a table, because body = \"kinematic\" feels with a soft skin (a rigid finger \
-                       is body = \"cast\"; without any [effects] it has a BioTac's)";
+        let allowed = "a table, because body = \"kinematic\" needs a soft skin (for a rigid finger \
+                       use body = \"cast\"; without any [effects] the skin is a BioTac's)";
         lacks(rules, "effects.skin", is_rigid, allowed);
         let bumps = self.body != Body::Dynamic && self.effects.collision.is_some();
-        let allowed = "no collision: only links of body = \"dynamic\" are kept apart by MuJoCo";
+        let allowed = "no collision: only body = \"dynamic\" computes collisions of links";
         given(rules, "effects.collision", bumps, allowed);
         if let (Some(wrench), false) = (&self.effects.wrench, self.frames_tell_contact()) {
             let least_n = SDS_OF_CONTACT * wrench.noise_max_n();
@@ -305,7 +305,7 @@ impl Checked for Scene {
             rules.require("touch.detection_n", self.touch.detection_n, told, || {
                 format!(
                     "at least {least_n} N, {SDS_OF_CONTACT} standard deviations of effects.wrench, \
-                     because no frame says contact"
+                     because contact is detected from the force alone"
                 )
             });
         }
@@ -314,7 +314,7 @@ impl Checked for Scene {
             rules.require("touch.approach_m_s", approach_m_s, approach_m_s <= limit_m_s, || {
                 format!(
                     "at most {:.4}: with this period_s, detection.frames and timing a faster finger \
-                     is pressed past its skin before contact is told",
+                     compresses its skin fully before contact is detected",
                     (1e4 * limit_m_s).floor() / 1e4
                 )
             });
@@ -391,8 +391,8 @@ impl Scene {
         if loader.has("planners") || loader.has("scene") {
             return Err(loader.other(
                 "an experiment",
-                "a scene is wanted here, as its key `scene` names one; palpate run, show and watch \
-                 take an experiment",
+                "a scene is needed here; use the file that the experiment's key `scene` names. palpate \
+                 run, show and watch take an experiment",
             ));
         }
         sets.iter().try_for_each(|set| loader.set(set))?;

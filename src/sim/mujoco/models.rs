@@ -40,7 +40,7 @@ impl Models {
                 Ok(Self { substeps: Some(Substeps { count, step_s, limit }), ..divided })
             }
             _ => Err(Invalid::new(format!(
-                "solver.step_s = {step_s} is too long, and cannot be divided so finely: {limit}"
+                "solver.step_s = {step_s} is too long, and no allowed substep is short enough: {limit}"
             ))),
         }
     }
@@ -127,7 +127,7 @@ impl Display for StepLimit {
         let Self { force_n, stiffness_n_m, mass_kg, limit_s } = self;
         write!(
             f,
-            "up to {force_n} N (touch.force_limit_n) the skin is as stiff as {stiffness_n_m:.0} N/m and the \
+            "up to {force_n} N (touch.force_limit_n) the skin's stiffness is {stiffness_n_m:.0} N/m and the \
              fingertip as light as {mass_kg:.3} kg, which needs at most {limit_s:.2e} s"
         )
     }

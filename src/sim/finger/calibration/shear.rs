@@ -109,7 +109,7 @@ pub struct Sheared {
 /// it is sheared.
 ///
 /// The errors of [`fit`].
-/// As [`fit`].
+/// The errors of [`fit`].
 pub fn compare(
     model: &Model,
     friction: &FrictionEffect,

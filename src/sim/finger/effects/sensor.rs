@@ -18,8 +18,8 @@ use toml::{Table, Value};
 pub fn load(loader: &mut Loader, effects: &str) -> Result<Vec<String>, ConfigError> {
     let flex = format!("{effects}.flex");
     if loader.has_value(&flex) {
-        let allowed = "no flex, which was removed: the skins are model = \"columns\" and \
-                       model = \"shell\" of [effects.skin]";
+        let allowed = "no flex, which was removed: use model = \"columns\" or \
+                       model = \"shell\" in [effects.skin]";
         return Err(loader.not_allowed(&flex, "(given)", allowed));
     }
     let key = format!("{effects}.sensor");
@@ -64,7 +64,7 @@ fn read(loader: &Loader, key: &str, name: &str) -> Result<Table, ConfigError> {
     });
     let setting = values(&sensor, "").into_iter().find(|(name, _)| value(&BIOTAC, name).is_none());
     let refused = setting.map(|(key, value)| {
-        let allowed = "a constant of the sensor; settings of effects stand in the scene";
+        let allowed = "a constant of the sensor; settings of effects belong in the scene";
         file.not_allowed(&key, &value.to_string(), allowed)
     });
     file.finish::<Effects>()?;
