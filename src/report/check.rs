@@ -1,5 +1,5 @@
-//! A check as tables and sentences, as Markdown, as the XML that continuous integration reads, and
-//! drawn.
+//! Report of a check: tables and sentences, Markdown, JUnit XML for continuous integration, and a
+//! drawing.
 
 use super::canvas::{Anchor, Area, Canvas};
 use super::style::{self, FAINT_INK, GRID, INK, SMALL_PX, TEXT_PX};
@@ -7,7 +7,7 @@ use super::table::{Cell, Column, Table};
 use crate::study::check::{Held, Judgement, Planner, Rules, Verdict};
 use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
-/// The name of a verdict.
+/// Returns the name of a verdict.
 pub fn word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Identical => "identical",
@@ -19,7 +19,8 @@ pub fn word(verdict: Verdict) -> &'static str {
     }
 }
 
-/// A row for each measure of each planner, or one for a planner without any.
+/// Returns a table with a row for each measure of each planner, or one row for a planner without
+/// measures.
 pub fn table(held: &Held) -> Table {
     let heads = ["planner", "measure", "change", "95 % interval, at any time", "verdict", "trials"];
     let mut table = Table::new(heads.map(Column::new));
@@ -50,7 +51,7 @@ fn percent(judgement: &Judgement, difference: f64) -> String {
     if percent.is_finite() { format!("{percent:+.1} %") } else { "–".into() }
 }
 
-/// Remarks on a check, a sentence each.
+/// Returns remarks on a check, a sentence each.
 pub fn remarks(held: &Held, rules: &Rules, most: u32) -> Vec<String> {
     let settings = "settings, or the object's file, are not those of the baseline";
     let mut remarks: Vec<String> =
@@ -78,18 +79,18 @@ pub fn remarks(held: &Held, rules: &Rules, most: u32) -> Vec<String> {
     remarks
 }
 
-/// The whole check as Markdown.
+/// Formats the whole check as Markdown.
 pub fn markdown(name: &str, held: &Held, rules: &Rules, most: u32) -> String {
     let mut text = format!("### {name}: {}\n\n{}", word(held.verdict()), table(held).markdown());
     remarks(held, rules, most).iter().for_each(|remark| text += &format!("\n* {remark}"));
     text + "\n"
 }
 
-/// The check as JUnit XML, a test case for each planner: worse and missing are failures, undecided
-/// is an error, because it must not pass.
+/// Formats the check as JUnit XML, a test case for each planner. Worse and missing are failures;
+/// undecided is an error, because it must not pass.
 ///
 /// # Errors
-/// If a name cannot stand in XML.
+/// If a name contains a character that XML does not allow.
 pub fn junit(name: &str, held: &Held, rules: &Rules, most: u32) -> Result<String, SerializeError> {
     let mut report = Report::new("palpate check");
     let mut suite = TestSuite::new(name);
@@ -122,10 +123,10 @@ const RIGHT_PX: f64 = 90.0;
 const TOP_PX: f64 = 46.0;
 const LINE_PX: f64 = 22.0;
 
-/// The axis reaches from −4 to 4 tolerances; what lies beyond is cut off there.
+/// Range of the axis, in tolerances on each side; values beyond are clipped.
 const REACH: f64 = 4.0;
 
-/// Draws each measure's change with its interval, and what is tolerated.
+/// Draws each measure's change with its interval, and the tolerance.
 pub fn draw(name: &str, held: &Held, rules: &Rules) -> String {
     let lines: usize = held.planners.iter().map(|planner| planner.judgements.len().max(1)).sum();
     let bottom = TOP_PX + lines as f64 * LINE_PX + 6.0;

@@ -1,5 +1,5 @@
-//! Planners over several runs, as tables, figures and a page: which is better on which object, by
-//! how much, and what it took.
+//! Comparison of planners over several runs, as tables, figures and a page: which is better on
+//! which object, by how much, and at what cost.
 
 use super::axes::{Axis, Panel};
 use super::canvas::Area;
@@ -18,10 +18,10 @@ use crate::study::compare::{
     profile,
 };
 
-/// The seed of all bootstraps.
+/// Seed of all bootstraps.
 const SEED: u64 = 0;
 
-/// A contender's error in units of the reference's on one object.
+/// Returns a planner's error on one object, relative to the reference.
 fn error_on(contender: &Contender, object: usize) -> Option<Estimate> {
     geometric(&[&contender.results[object].scores], SEED)
 }
@@ -31,7 +31,7 @@ fn judged(error: Option<Estimate>) -> Cell {
     Cell::estimate(error).judged(interval, 1.0, Direction::Less)
 }
 
-/// A row for each planner: over all objects.
+/// Returns a table with a row for each planner, over all objects.
 pub fn overall(compared: &Compared) -> Table {
     let count = compared.objects.len();
     let mut table = Table::new([
@@ -80,7 +80,7 @@ pub fn overall(compared: &Compared) -> Table {
     table.without_empty()
 }
 
-/// A row for each object, a column for each planner: geometric means.
+/// Returns a table of geometric means, with a row for each object and a column for each planner.
 pub fn each(compared: &Compared) -> Table {
     let rows = compared.objects.iter().enumerate().map(|(object, name)| (name.clone(), object));
     let columns = compared.contenders.iter().map(|it| (Column::new(&it.name), it)).collect();
@@ -89,7 +89,8 @@ pub fn each(compared: &Compared) -> Table {
     Table::cross("object", rows, columns, cell)
 }
 
-/// A row for each planner, a column for each object and one for all: interquartile means.
+/// Returns a table of interquartile means, with a row for each planner, a column for each object
+/// and one for all.
 pub fn interquartiles(compared: &Compared) -> Table {
     let rows = compared.contenders.iter().map(|it| (it.name.clone(), it.scores()));
     let objects = compared.objects.iter().enumerate();
@@ -105,7 +106,7 @@ pub fn interquartiles(compared: &Compared) -> Table {
     })
 }
 
-/// A note on the numbers.
+/// Returns the note that explains the numbers.
 pub fn note(against: &str) -> String {
     format!(
         "Errors are exp(mean log error over the touches after the initial ones) in units of {against}'s \
@@ -120,7 +121,7 @@ pub fn note(against: &str) -> String {
     )
 }
 
-/// The page.
+/// Returns the page.
 pub fn html(name: &str, question: &str, compared: &Compared) -> String {
     let note = note(&compared.against);
     let over_all = tables("Over all objects", &[overall(compared)], "named", &note);
@@ -138,7 +139,7 @@ pub fn html(name: &str, question: &str, compared: &Compared) -> String {
     page("Palpate suite", name, question, &[over_all, figures.concat(), each].concat())
 }
 
-/// The table of `suite.csv`: a row per object and planner.
+/// Returns the table of `suite.csv`, with a row per object and planner.
 pub fn file(compared: &Compared) -> Table {
     let mut table = Table::new([
         Column::new("object").note("Which object."),
@@ -181,9 +182,10 @@ pub fn file(compared: &Compared) -> Table {
     table
 }
 
-/// Performance profiles: which share of the trials has how small an error; none without a score.
+/// Draws performance profiles: the fraction of trials with an error below each value; `None`
+/// without a score.
 pub fn profiles(compared: &Compared) -> Option<String> {
-    // Finer than the eye.
+    // Finer than visible.
     const STEPS: u32 = 300;
     let scores = compared.contenders.iter().flat_map(Contender::scores).flatten().copied();
     let x = Axis::log(scores.chain([1.0]))?;
@@ -198,12 +200,13 @@ pub fn profiles(compared: &Compared) -> Option<String> {
     Some(draw(compared, (area, x, names), curves.collect(), [[1.0, 0.0], [1.0, 1.0]]))
 }
 
-/// Reliability over all objects: of the places that are given a probability of a surface, how many
-/// have one; none where every object fills its zone.
+/// Draws the reliability over all objects: the fraction of places with a surface, over its
+/// predicted probability; `None` if every object fills its zone.
 fn reliability(compared: &Compared) -> Option<String> {
-    /// Fewest places of a point, over all objects and trials. heuristic: 50 tell a share to 7 %.
+    /// Smallest number of places of a point, over all objects and trials, a heuristic: 50 determine
+    /// a fraction to 7 %.
     const PLACES_MIN: u32 = 50;
-    // The middle of each tenth, and the share of its places that have a surface.
+    // Middle of each tenth, and the fraction of its places that have a surface.
     let curve = |contender: &Contender| -> Vec<(f64, f64)> {
         let share = |tenth: usize| {
             let counts = contender.results.iter().map(|result| result.reliability[tenth]);
@@ -222,8 +225,7 @@ fn reliability(compared: &Compared) -> Option<String> {
     is_known.then(|| draw(compared, axes, curves, [[0.0, 0.0], [1.0, 1.0]]))
 }
 
-/// One panel with a curve for each contender, whose names are above it, and a dashed line of
-/// reference.
+/// Draws one panel with a curve for each planner, a legend above, and a dashed reference line.
 fn draw(
     compared: &Compared,
     (area, x, [x_name, y_name]): (Area, Axis, [&str; 2]),

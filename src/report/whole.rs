@@ -1,5 +1,5 @@
-//! Beliefs of whole objects as they were: recorded touches and hyperparameters, conditioned again
-//! and made to surfaces.
+//! Replay of beliefs of whole objects: recorded touches and hyperparameters, conditioned again and
+//! converted to surfaces.
 
 use super::figures::Figure;
 use super::replay::{self, swept, touched};
@@ -16,15 +16,16 @@ use palpate_explore::task::Task;
 use palpate_geometry::bvh::MeshBvh;
 use palpate_geometry::coarse::coarse;
 
-/// Triangles of a surface that is drawn. heuristic: a page stays a few megabytes.
+// Largest number of triangles of a surface that is drawn.
+// heuristic: a page stays a few megabytes.
 const TRIANGLES: usize = 3000;
 
-/// The true surface that the run keeps, with its search tree; none of a run without it.
+/// Returns the true surface that the run stores, with its search tree; `None` if it stores none.
 pub fn truth(run: &Run) -> Option<MeshBvh> {
     run.truth.mesh.as_deref().cloned().map(MeshBvh::new)
 }
 
-/// The part of the page that moves; empty of a run over a zone.
+/// Returns the interactive part of the page; empty for a run over a zone.
 ///
 /// # Errors
 /// If the recorded touches do not belong to the object or cannot be conditioned on.
@@ -41,7 +42,7 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     solid::section(&sequences, mesh, experiment.report.trial)
 }
 
-/// Believed whole objects, planner by planner and touch by touch; none of a run over a zone.
+/// Figure of believed whole objects, by planner and touch count; none for a run over a zone.
 pub const FIGURE: Figure = Figure {
     name: "solids",
     caption: |run| {
@@ -62,8 +63,8 @@ pub const FIGURE: Figure = Figure {
     },
 };
 
-/// The beliefs of `planners` in the trial that the report draws, after `counts` touches; `truth`
-/// gives the errors.
+/// Replays the beliefs of `planners` in the drawn trial, after `counts` touches; `truth` gives the
+/// errors.
 ///
 /// # Errors
 /// If the recorded touches do not belong to the object or cannot be conditioned on.
@@ -97,8 +98,8 @@ fn sequences(
     planners.iter().filter_map(|planner| replay::row(run, planner)).map(sequence).collect()
 }
 
-/// The belief after `count` touches, made coarser if it has more than `most` triangles; none if the
-/// trial ended before, or had no fit then.
+/// Returns the surface of the belief after `count` touches, simplified to at most `most` triangles;
+/// `None` if the trial ended before, or had no fit then.
 ///
 /// # Errors
 /// If its touches cannot be conditioned on.
@@ -133,10 +134,10 @@ pub fn frame(
     }))
 }
 
-/// The belief after `touches`; none without a fit then.
+/// Returns the belief after `touches`; `None` without a fit then.
 ///
 /// # Errors
-/// If they do not belong to the object or cannot be conditioned on.
+/// If the touches do not belong to the object or cannot be conditioned on.
 pub fn belief(
     experiment: &Experiment,
     touches: &[TouchRow],
@@ -151,7 +152,7 @@ pub fn belief(
     let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
     for touch in touches {
         let aim = touch.target.aim().context("a target that is no aim")?;
-        // However the finger was rolled, it went the same way.
+        // The roll of the finger does not change its path.
         let approach = ball.approach(aim, &scene.finger, scene.touch.standoff_m, 0.0);
         let swept = swept(scene.finger.clone(), touch);
         belief.observe(aim, &approach, (&touched(touch, None)?, swept.as_ref()));

@@ -1,4 +1,4 @@
-//! Where the finger was sent and where it met the object, seen along the approach.
+//! Figure of targets and contacts, seen along the approach.
 
 use super::Figure;
 use crate::experiment::statistics::summary::median_shift_m;
@@ -28,13 +28,13 @@ fn caption(run: &Run) -> String {
     )
 }
 
-/// Size of a panel at most: its axes are equal.
+/// Largest size of a panel with equal axes.
 const PANEL_PX: (f64, f64) = (300.0, 380.0);
 const LEFT_PX: f64 = 66.0;
 const TOP_PX: f64 = 66.0;
-/// Room for the words of a legend.
+/// Smallest width, for the labels of a legend.
 const WIDTH_MIN_PX: f64 = 420.0;
-/// Share of the zone's side drawn around it: contacts may lie outside.
+/// Margin around the zone as a fraction of its side, because contacts may lie outside.
 const MARGIN: f64 = 0.12;
 
 fn draw(run: &Run) -> anyhow::Result<Option<String>> {

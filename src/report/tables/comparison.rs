@@ -1,5 +1,5 @@
-//! The planners of a run against its baselines, in every measure and in touches to equal error: as
-//! tables of the page and as files.
+//! Comparison of the planners of a run with its baselines, in every measure and in touches to equal
+//! error: tables of the page and of files.
 
 use crate::experiment::measure::{Direction, MEASURES, Measure, in_files};
 use crate::experiment::statistics::comparison::Comparison;
@@ -7,7 +7,8 @@ use crate::experiment::statistics::equal_error::{EqualError, Estimate, errors};
 use crate::experiment::store::Run;
 use crate::report::table::{Cell, Column, Table, digits, titled, with_interval};
 
-/// The table of `comparison.csv`: a row per planner, baseline and measure after the last touch.
+/// Returns the table of `comparison.csv`, with a row per planner, baseline and measure after the
+/// last touch.
 pub fn comparison_file(found: &[Comparison]) -> Table {
     let mut table = Table::new([
         Column::new("planner").note("Which planner."),
@@ -29,7 +30,7 @@ pub fn comparison_file(found: &[Comparison]) -> Table {
     table
 }
 
-/// A table for each baseline: a row for each measure, a column for each other planner.
+/// Returns a table for each baseline: a row for each measure, a column for each other planner.
 pub fn comparisons(run: &Run, found: &[Comparison]) -> Vec<Table> {
     let table = |baseline: &str| {
         let rows = MEASURES.iter().map(|measure| (titled(measure), measure));
@@ -44,7 +45,7 @@ pub fn comparisons(run: &Run, found: &[Comparison]) -> Vec<Table> {
     tables(run, table)
 }
 
-/// A note on the cells of [`comparisons`].
+/// Returns the note that explains the cells of [`comparisons`].
 pub fn comparisons_note(run: &Run) -> String {
     let more: Vec<&str> = in_files(&run.rows)
         .filter(|measure| measure.direction == Direction::More)
@@ -72,8 +73,8 @@ fn difference(comparison: &Comparison) -> Cell {
     Cell::from(words).judged(paired.interval, 0.0, measure.direction)
 }
 
-/// The table of `equal_error.csv`: a row per planner, baseline and error; a count or ratio is left
-/// out where the error is not reached.
+/// Returns the table of `equal_error.csv`, with a row per planner, baseline and error; a count or
+/// ratio is empty if the error is not reached.
 pub fn equal_error_file(found: &[EqualError]) -> Table {
     let mut table = Table::new([
         Column::new("planner").note("Which planner."),
@@ -98,7 +99,7 @@ pub fn equal_error_file(found: &[EqualError]) -> Table {
     table
 }
 
-/// A table for each baseline: a row for each other planner, a column for each error.
+/// Returns a table for each baseline: a row for each other planner, a column for each error.
 pub fn equal_errors(run: &Run, found: &[EqualError]) -> Vec<Table> {
     let most = run.experiment.touches;
     let table = |baseline: &str| {
@@ -123,7 +124,7 @@ pub fn equal_errors(run: &Run, found: &[EqualError]) -> Vec<Table> {
     tables(run, table)
 }
 
-/// A note on the cells of [`equal_errors`].
+/// Returns the note that explains the cells of [`equal_errors`].
 pub fn equal_errors_note(run: &Run) -> String {
     format!(
         "Touches, initial ones included, after which a planner\u{2019}s median error stays at or \
@@ -159,12 +160,12 @@ fn touches(count: f64, most: u32) -> String {
     if count.is_finite() { format!("{count:.0}") } else { format!("over {most}") }
 }
 
-/// The planners of a run as columns.
+/// Returns the planners of a run as columns.
 fn planners(run: &Run) -> Vec<(Column, &String)> {
     run.experiment.planners.iter().map(|planner| (Column::new(planner), planner)).collect()
 }
 
-/// The tables of all baselines that have rows.
+/// Returns the tables of all baselines that have rows.
 fn tables(run: &Run, table: impl Fn(&str) -> Table) -> Vec<Table> {
     let tables = run.experiment.baselines().into_iter().map(table);
     tables.filter(|table| !table.rows.is_empty()).collect()
