@@ -18,7 +18,7 @@ const FAMILIES: [(&str, &str); 5] = [
     ("#e69f00", "soft skin"),
     ("#56b4e9", "and fluid"),
     ("#0072b2", "and electrodes"),
-    ("#009e73", "the same, a thin shell"),
+    ("#009e73", "electrodes, thin shell"),
 ];
 
 /// Value of a variant with its interval.
@@ -37,9 +37,9 @@ const NAME_PX: f64 = 140.0;
 type Measure = (fn(&Variant) -> Option<Spread>, f64, &'static str);
 
 const ERRORS: [Measure; 3] = [
-    (|it| it.contact_m, 1e-3, "contact off the reference's (mm)"),
-    (|it| it.force_n, 1.0, "force off the reference's (N)"),
-    (|it| it.off_truth_m, 1e-3, "contact off the true surface (mm)"),
+    (|it| it.contact_m, 1e-3, "contact error against reference (mm)"),
+    (|it| it.force_n, 1.0, "force error against reference (N)"),
+    (|it| it.off_truth_m, 1e-3, "contact error against true surface (mm)"),
 ];
 
 /// Draws the levels and effects that were compared; `None` if no variant differs from its
@@ -55,7 +55,7 @@ pub fn draw(
     let size = [LEFT_PX + 3.0 * STEP_PX - 60.0, top_px + lines_px + bottom_px];
     let families = FAMILIES.iter().map(|(colour, words)| (Swatch::Circle(dot(colour)), *words));
     let entries = families.chain([
-        (Swatch::Diamond(INK), "the scene as it is"),
+        (Swatch::Diamond(INK), "the scene"),
         (Swatch::Line(style::dashed(INK, 1.3, "5 3")), "front"),
         (Swatch::Line(reference_line()), "time of the reference"),
     ]);
@@ -161,9 +161,9 @@ fn draw_effects(canvas: &mut Canvas, effects: &[Variant], first: Area) -> Option
         Some((1e3 * change.mean, change.interval.unwrap_or([change.mean; 2]).map(|m| 1e3 * m)))
     };
     let panels: [TitledBar; 3] = [
-        (&|variant| Some(bar(variant.contact_m?, 1e-3)), "contact moves (mm)"),
-        (&time, "time of a touch changes (%)"),
-        (&verdict_mm, "active − random RMSE changes (mm)"),
+        (&|variant| Some(bar(variant.contact_m?, 1e-3)), "shift of the contact (mm)"),
+        (&time, "change of the time of a touch (%)"),
+        (&verdict_mm, "change of RMSE, active − random (mm)"),
     ];
     for (column, (measure, words)) in panels.into_iter().enumerate() {
         let inset = if column == 0 { NAME_PX } else { 0.0 };

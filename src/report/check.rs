@@ -22,7 +22,7 @@ pub fn word(verdict: Verdict) -> &'static str {
 /// Returns a table with a row for each measure of each planner, or one row for a planner without
 /// measures.
 pub fn table(held: &Held) -> Table {
-    let heads = ["planner", "measure", "change", "95 % interval, at any time", "verdict", "trials"];
+    let heads = ["planner", "measure", "change", "95 % interval, any time", "verdict", "trials"];
     let mut table = Table::new(heads.map(Column::new));
     table.rows =
         (held.planners.iter().flat_map(rows)).map(|cells| cells.map(Cell::from).into()).collect();
@@ -53,14 +53,14 @@ fn percent(judgement: &Judgement, difference: f64) -> String {
 
 /// Returns remarks on a check, a sentence each.
 pub fn remarks(held: &Held, rules: &Rules, most: u32) -> Vec<String> {
-    let settings = "settings, or the object's file, are not those of the baseline";
+    let settings = "settings or the object's file differ from the baseline";
     let mut remarks: Vec<String> =
         (!held.same_settings).then(|| settings.into()).into_iter().collect();
     for planner in &held.planners {
         let name = &planner.name;
         remarks.extend(planner.failed.as_ref().map(|(count, reason)| {
             format!(
-                "{name}: {count} trials failed that did not in the baseline; the first: {reason}"
+                "{name}: {count} trials failed that passed in the baseline; the first: {reason}"
             )
         }));
         remarks.extend(planner.judgements.first().map(|first| {
@@ -68,12 +68,14 @@ pub fn remarks(held: &Held, rules: &Rules, most: u32) -> Vec<String> {
             let wanted = first.wanted.map_or("more than 100000".into(), |count| count.to_string());
             let is_open = first.verdict == Verdict::Undecided;
             let then = if is_open {
-                format!("; {most} were allowed (--max-trials)")
+                format!("; the limit was {most} (--max-trials)")
             } else {
                 String::new()
             };
             let title = first.judged.title;
-            format!("{name}: a loss of {percent} % of {title} takes {wanted} trials to tell{then}")
+            format!(
+                "{name}: detecting a loss of {percent} % in {title} needs {wanted} trials{then}"
+            )
         }));
     }
     remarks
@@ -164,7 +166,7 @@ pub fn draw(name: &str, held: &Held, rules: &Rules) -> String {
         canvas.circle(at(sequence.mean), 4.0, &style::fill(colour, 1.0));
     }
     let percent = 100.0 * rules.tolerance;
-    let ticks = [format!("−{percent} %"), "as it was".into(), format!("+{percent} %")];
+    let ticks = [format!("−{percent} %"), "baseline".into(), format!("+{percent} %")];
     for (share, words) in [-1.0, 0.0, 1.0].into_iter().zip(ticks) {
         canvas.text([at(share), bottom + 14.0], &words, SMALL_PX, Anchor::Middle);
     }

@@ -4,7 +4,8 @@
 use super::axes::{Axis, Panel};
 use super::canvas::Area;
 use super::findings::HONEST;
-use super::html::{figure, page, tables};
+use super::glossary::explained;
+use super::html::{figure, fold, page, tables};
 use super::legend::{Sheet, Swatch};
 use super::style::{self, FAINT_INK};
 use super::table::{Cell, Column, Table, verdict};
@@ -36,17 +37,30 @@ pub fn overall(compared: &Compared) -> Table {
     let count = compared.objects.len();
     let mut table = Table::new([
         Column::new("planner"),
-        Column::new("error"),
-        Column::new("better on"),
-        Column::new("worse on"),
-        Column::new("gap closed").unit("%", 100.0, 0),
-        Column::new("missed").unit("%", 100.0, 1),
-        Column::new("stalled").unit("%", 100.0, 1),
-        Column::new("travel").unit("m", 1.0, 2),
-        Column::new("in the band"),
-        Column::new("Brier").unit("", 1.0, 3),
-        Column::new("IoU").unit("", 1.0, 3),
-        Column::new(format!("better than {}", compared.against)).unit("", 1.0, 2),
+        Column::new("error").note("Geometric mean over trials and objects, relative error."),
+        Column::new("better on").note("Objects with the 95 % interval of the error below 1."),
+        Column::new("worse on").note("Objects with the 95 % interval of the error above 1."),
+        Column::new("gap closed")
+            .note("Fraction of the way from random to the oracle, in mean log error.")
+            .unit("%", 100.0, 0),
+        Column::new("missed")
+            .note("Fraction of the touches after the initial ones without contact.")
+            .unit("%", 100.0, 1),
+        Column::new("stalled")
+            .note("Fraction of these touches for which the planner's own rule found no target.")
+            .unit("%", 100.0, 1),
+        Column::new("travel").note("Mean lateral travel of a trial.").unit("m", 1.0, 2),
+        Column::new("in the band")
+            .note("Objects with 90 to 98 % of the truth in the 95 % band after the last touch."),
+        Column::new("Brier")
+            .note("Mean squared error of the probability that a place has a surface.")
+            .unit("", 1.0, 3),
+        Column::new("IoU")
+            .note("Intersection over union of the believed and the true silhouette.")
+            .unit("", 1.0, 3),
+        Column::new(format!("better than {}", compared.against))
+            .note("Probability that a trial has a smaller error than one of the reference.")
+            .unit("", 1.0, 2),
     ]);
     let all: Vec<usize> = (0..count).collect();
     let reference = compared.contenders.iter().find(|it| it.name == compared.against);
@@ -109,15 +123,15 @@ pub fn interquartiles(compared: &Compared) -> Table {
 /// Returns the note that explains the numbers.
 pub fn note(against: &str) -> String {
     format!(
-        "Errors are exp(mean log error over the touches after the initial ones) in units of {against}'s \
-         in the same trial: the geometric mean over trials and objects, with the 95 % interval of a \
-         bootstrap over trials. Less is better; better and worse: the interval excludes 1. The gap is \
-         that from {FLOOR} to {ORACLE}, which looks at the truth, in mean log error. Missed: touches \
-         that met nothing; stalled: plans that the planner's own rule could not decide. After the last touch: on \
-         how many objects the band of 95 % holds 90 to 98 % of the truth; and where the object does not \
-         fill its zone, the mean squared error of the probability that a place has a surface (Brier), and \
-         the silhouette's intersection over union (IoU). Last: the probability that a trial is better \
-         than one of {against}."
+        "Error: exp(mean log error over the touches after the initial ones), relative to {against} in \
+         the same trial; geometric mean over trials and objects, with the 95 % interval of a bootstrap \
+         over trials. Less is better; better and worse mean that the interval excludes 1. Gap closed: \
+         fraction of the way from {FLOOR} to {ORACLE}, which uses the ground truth, in mean log error. \
+         Missed: touches without contact. Stalled: plans for which the planner's own rule found no \
+         target. In the band: objects with 90 to 98 % of the truth in the 95 % band after the last \
+         touch. Brier and IoU, for objects that do not fill their zone: mean squared error of the \
+         probability that a place has a surface, and intersection over union of the silhouettes. Last \
+         column: probability that a trial has a smaller error than one of {against}."
     )
 }
 
@@ -125,40 +139,51 @@ pub fn note(against: &str) -> String {
 pub fn html(name: &str, question: &str, compared: &Compared) -> String {
     let note = note(&compared.against);
     let over_all = tables("Over all objects", &[overall(compared)], "named", &note);
-    let each = tables("Object by object", &[each(compared)], "named", "");
-    let profiles = "Which share of the trials has how small an error, averaged over the objects; further \
-                    left is better.";
-    let reliability = "Of the places that are given a probability of a surface, how many have one; on the \
-                       diagonal the belief is honest.";
+    let each = tables("", &[each(compared)], "named", "");
+    let each = fold("Object by object", &each);
+    let objects = compared.objects.len();
+    let trials = compared.contenders.iter().flat_map(Contender::scores).map(<[f64]>::len).max();
+    let profiles = format!(
+        "Performance profiles: fraction of the trials whose error is at most the value on the x axis, \
+         averaged over {objects} objects with up to {} trials each. A curve farther left is better.",
+        trials.unwrap_or_default()
+    );
+    let reliability = format!(
+        "Reliability diagram over {objects} objects: fraction of the places with a surface, against its \
+         predicted probability. A calibrated belief lies on the diagonal."
+    );
     let figures = [
         ("profiles", self::profiles(compared), profiles),
         ("reliability", self::reliability(compared), reliability),
     ];
-    let figures = figures
-        .map(|(id, svg, caption)| svg.map_or(String::new(), |svg| figure(id, &svg, caption)));
+    let figures = figures.map(|(id, svg, caption)| {
+        svg.map_or(String::new(), |svg| figure(id, &svg, explained(&caption)))
+    });
     page("Palpate suite", name, question, &[over_all, figures.concat(), each].concat())
 }
 
 /// Returns the table of `suite.csv`, with a row per object and planner.
 pub fn file(compared: &Compared) -> Table {
     let mut table = Table::new([
-        Column::new("object").note("Which object."),
-        Column::new("planner").note("Which planner."),
-        Column::new("trials")
-            .note("Its trials that were finished, and have one of the reference beside them."),
+        Column::new("object").note("Name of the object."),
+        Column::new("planner").note("Name of the planner."),
+        Column::new("trials").note("Number of finished trials that the reference finished too."),
         Column::new("error")
-            .note("Geometric mean of its error in units of the reference's.")
+            .note("Geometric mean of the error, relative to the reference.")
             .interval(),
         Column::new("gap_closed")
-            .note("Share of the way from random to the oracle, in mean log error."),
-        Column::new("missed").note("Share of the touches after the initial ones that met nothing."),
+            .note("Fraction of the way from random to the oracle, in mean log error."),
+        Column::new("missed")
+            .note("Fraction of the touches after the initial ones without contact."),
         Column::new("stalled")
-            .note("Share of these touches that the planner's own rule could not decide."),
+            .note("Fraction of these touches for which the planner's own rule found no target."),
         Column::new("travel_m").note("Mean lateral travel of a trial."),
-        Column::new("coverage").note("Share of the truth in the 95 % band after the last touch."),
+        Column::new("coverage")
+            .note("Fraction of the truth in the 95 % band after the last touch."),
         Column::new("presence_brier")
-            .note("Mean squared error of the probability of a surface then."),
-        Column::new("silhouette_iou").note("Intersection over union of the silhouettes then."),
+            .note("Mean squared error of the probability of a surface after the last touch."),
+        Column::new("silhouette_iou")
+            .note("Intersection over union of the silhouettes after the last touch."),
     ]);
     for (object, name) in compared.objects.iter().enumerate() {
         for contender in &compared.contenders {
@@ -195,8 +220,8 @@ pub fn profiles(compared: &Compared) -> Option<String> {
         (0..=STEPS).map(|i| (at(i), profile(contender, at(i)))).collect()
     });
     let area = Area { left: 70.0, top: 60.0, width: 460.0, height: 300.0 };
-    let x_name = format!("error over the touches, in units of {}'s", compared.against);
-    let names = [x_name.as_str(), "share of the trials"];
+    let x_name = format!("error over the touches, relative to {}", compared.against);
+    let names = [x_name.as_str(), "fraction of the trials"];
     Some(draw(compared, (area, x, names), curves.collect(), [[1.0, 0.0], [1.0, 1.0]]))
 }
 
@@ -219,7 +244,7 @@ fn reliability(compared: &Compared) -> Option<String> {
     };
     let curves: Vec<_> = compared.contenders.iter().map(curve).collect();
     let area = Area { left: 70.0, top: 60.0, width: 300.0, height: 300.0 };
-    let names = ["probability of a surface, in tenths", "share that has one"];
+    let names = ["predicted probability of a surface", "fraction with a surface"];
     let is_known = curves.iter().any(|curve| !curve.is_empty());
     let axes = (area, Axis::linear(0.0, 1.0, 6.0), names);
     is_known.then(|| draw(compared, axes, curves, [[0.0, 0.0], [1.0, 1.0]]))

@@ -69,8 +69,9 @@ pub fn tree(svg: &str) -> anyhow::Result<Tree> {
 /// If it is not an SVG, or too large for memory.
 pub fn png(svg: &str) -> anyhow::Result<Vec<u8>> {
     let tree = tree(svg)?;
-    let size = tree.size().to_int_size().scale_by(PNG_SCALE).context("it has no size")?;
-    let mut pixels = Pixmap::new(size.width(), size.height()).context("it is too large")?;
+    let size = tree.size().to_int_size().scale_by(PNG_SCALE).context("the drawing has no size")?;
+    let mut pixels =
+        Pixmap::new(size.width(), size.height()).context("the drawing is too large")?;
     resvg::render(&tree, Transform::from_scale(PNG_SCALE, PNG_SCALE), &mut pixels.as_mut());
     let rgba = pixels.pixels().iter().flat_map(|pixel| {
         let colour = pixel.demultiply();
@@ -91,7 +92,7 @@ pub fn png(svg: &str) -> anyhow::Result<Vec<u8>> {
 /// If it is not an SVG, or has no size.
 pub fn pdf(svg: &str) -> anyhow::Result<Vec<u8>> {
     let drawn = svg2pdf::to_pdf(&tree(svg)?, Default::default(), Default::default());
-    let drawn = drawn.map_err(|error| anyhow!("it cannot be drawn: {error}"))?;
+    let drawn = drawn.map_err(|error| anyhow!("the drawing cannot be written as PDF: {error}"))?;
     Ok([&in_order(&drawn), SIGNED].concat())
 }
 

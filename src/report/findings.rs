@@ -29,9 +29,7 @@ pub fn sentences(run: &Run) -> Vec<String> {
         .filter(|(_, points)| !points.is_empty())
         .collect();
     if curves.is_empty() {
-        return vec![
-            "No trial got as far as its first fit, so there is nothing to say yet.".into(),
-        ];
+        return vec!["No trial has reached its first fit, so there are no results yet.".into()];
     }
     let verified = verified(run, &curves);
     let found = if run.experiment.scene.around.is_some() {
@@ -82,9 +80,7 @@ fn verified(run: &Run, curves: &[Curve]) -> Option<String> {
         (!parts.is_empty()).then(|| parts.join("; "))
     };
     let found = each(curves, words)?.join(" · ");
-    Some(format!(
-        "At verification touches, which the last belief predicted and did not learn from: {found}."
-    ))
+    Some(format!("At held-out verification touches the last belief has: {found}."))
 }
 
 /// Returns the scores at the last drawn touch count that any planner reached.
@@ -181,7 +177,7 @@ pub(super) fn share_in_band(points: &[CurvePoint]) -> Option<f64> {
 fn honesty(curves: &[Curve]) -> Option<String> {
     let words = |points: &[CurvePoint]| Some(format!("{:.0} %", 100.0 * share_in_band(points)?));
     let shares = each(curves, words)?.join(", ");
-    Some(format!("Of the truth the 95 % band of the last belief holds: {shares}."))
+    Some(format!("Fraction of the truth inside the 95 % band of the last belief: {shares}."))
 }
 
 /// Returns the verdict on a run as sentences, only with what its intervals establish; empty without
@@ -201,15 +197,18 @@ fn nearness(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
     let id = run.experiment.error().id;
     let found = analysis.comparisons.iter();
     let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
+    let trials = found.clone().map(|it| it.paired.trials).max()?;
     let verdicts =
         found.map(|it| (it.planner, verdict(it.paired.interval, 0.0, it.measure.direction)));
+    let error = run.experiment.error().title;
     let words = [
-        format!("nearer the truth than {baseline}"),
-        format!("farther from the truth than {baseline}"),
-        format!("not told apart from {baseline}"),
+        format!("a smaller {error} than {baseline}"),
+        format!("a larger {error} than {baseline}"),
+        format!("no established difference in {error} from {baseline}"),
     ];
-    let clauses = clauses(verdicts.map(by_verdict), ["is", "are"], words)?;
-    Some(format!("After {} touches {clauses}.", run.experiment.touches))
+    let clauses = clauses(verdicts.map(by_verdict), ["has", "have"], words)?;
+    let touches = run.experiment.touches;
+    Some(format!("After {touches} touches, {clauses} ({trials} trials, 95 % intervals)."))
 }
 
 /// Returns which planners need fewer touches than the first baseline for its final error.
@@ -218,10 +217,10 @@ fn effort(run: &Run, analysis: &Analysis, baseline: &str) -> Option<String> {
     let found = analysis.equal_errors.iter();
     let found = found.filter(|it| it.baseline == baseline && it.measure.id == id);
     let verdicts = found.map(|it| (it.planner, verdict(it.ratio.interval, 1.0, Direction::Less)));
-    let words = ["fewer touches", "more touches", "about as many, as far as these trials tell"];
+    let words = ["fewer touches", "more touches", "about as many (no established difference)"];
     let words = words.map(String::from);
     let clauses = clauses(verdicts.map(by_verdict), ["needs", "need"], words)?;
-    Some(format!("For the error that {baseline} reaches, {clauses}."))
+    Some(format!("To reach the final error of {baseline}, {clauses}."))
 }
 
 /// Returns which planners have calibrated bands after the last touch.
@@ -236,12 +235,12 @@ fn trust(run: &Run) -> Option<String> {
         Some((name.as_str(), group))
     });
     let words = [
-        "about as far off as it says",
-        "too sure of itself",
-        "less sure of itself than it could be",
+        "calibrated (90 to 98 % of the truth in its 95 % band)",
+        "overconfident (less than 90 %)",
+        "underconfident (more than 98 %)",
     ];
-    let clauses = clauses(groups, ["is", "is"], words.map(String::from))?;
-    Some(format!("The last belief of {clauses}."))
+    let clauses = clauses(groups, ["is", "are"], words.map(String::from))?;
+    Some(format!("Calibration of the last belief: {clauses}."))
 }
 
 /// Returns a planner with its group: better, worse, neither.

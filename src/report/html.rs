@@ -1,6 +1,7 @@
 //! HTML building blocks of the pages; each page is one self-contained file.
 
 use super::canvas::escape;
+use super::glossary::explained;
 use super::style::ON_DARK;
 use super::table::{Table, wide};
 use std::fmt::Display;
@@ -32,7 +33,23 @@ pub(super) fn tables(title: &str, tables: &[Table], class: &str, note: &str) -> 
     let tables = tables.iter().filter(|table| !table.rows.is_empty());
     match tables.map(|table| table.html(class)).collect::<String>() {
         body if body.is_empty() => body,
-        body => section(title, &format!("{body}<p class=\"note\">{}</p>\n", escape(note))),
+        body => section(title, &format!("{body}{}", paragraph(note))),
+    }
+}
+
+/// Returns a note with tooltips; empty without words.
+fn paragraph(note: &str) -> String {
+    match note {
+        "" => String::new(),
+        note => format!("<p class=\"note\">{}</p>\n", explained(note)),
+    }
+}
+
+/// Returns a part of a page that opens on a click on `summary`; empty without a body.
+pub(super) fn fold(summary: &str, body: &str) -> String {
+    match body {
+        "" => String::new(),
+        body => format!("<details>\n<summary>{summary}</summary>\n{body}</details>\n"),
     }
 }
 

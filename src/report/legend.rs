@@ -95,7 +95,7 @@ pub fn miss_entry(run: &Run) -> Option<(Swatch, &'static str)> {
 }
 
 /// Legend entry of missed touches.
-pub const MISS: (Swatch, &str) = (Swatch::Diamond(LATER), "touch that met nothing");
+pub const MISS: (Swatch, &str) = (Swatch::Diamond(LATER), "touch without contact");
 
 /// Returns the legend entries of touches that a surface may hide.
 pub fn touch_entries() -> [(Swatch, &'static str); 3] {

@@ -9,6 +9,7 @@ pub mod explorer;
 pub mod figures;
 pub mod files;
 pub mod findings;
+mod glossary;
 pub mod heat_map;
 mod html;
 pub mod legend;

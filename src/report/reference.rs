@@ -179,8 +179,8 @@ fn record<T: JsonSchema>() -> String {
 /// Returns the fields of a line of `trials.jsonl`, of each of its touches and of their parts.
 pub fn rows() -> String {
     format!(
-        "{}\nEach of `touches`:\n\n{}\nIts `metrics`:\n\n{}\nIts `shape`:\n\n{}\n\
-         Its `fit`:\n\n{}",
+        "{}\nEach of `touches`:\n\n{}\n`metrics` of a touch:\n\n{}\n`shape` of a touch:\n\n{}\n\
+         `fit` of a touch:\n\n{}",
         record::<TrialRow>(),
         record::<TouchRow>(),
         record::<Metrics>(),

@@ -50,7 +50,7 @@ impl<'a> Replay<'a> {
         for touch in touches {
             let target = touch.target.place().filter(|it| it.len() == zone.dimension());
             let target = target.with_context(|| {
-                format!("{}: a target that is no place of the zone: {:?}", place(), touch.target)
+                format!("{}: target outside the zone's coordinates: {:?}", place(), touch.target)
             })?;
             // A normal that is not recorded was not observed.
             let touched = touched(touch, Some(-zone.ahead_w().into_inner()))?;
@@ -116,8 +116,8 @@ impl<'a> Replay<'a> {
 pub fn drawn_words(run: &Run) -> &'static str {
     match run.truth.count() < run.truth.places.len() {
         true => {
-            " A belief is drawn where its touches make a surface likelier than none, and all of it \
-             as long as each has met something."
+            " A belief is drawn where a surface is more probable than none; all of it as long as every \
+             touch has made contact."
         }
         false => "",
     }
@@ -140,7 +140,7 @@ impl<'a> Grid<'a> {
         let (side, truth) = (run.experiment.grid as usize, &run.truth);
         ensure!(
             side > 1 && truth.places.len() == side.pow(dimension as u32),
-            "the true surface has {} places on a grid of {side} along each side",
+            "the true surface has {} places, but the experiment's grid has {side} along each side",
             truth.places.len()
         );
         let steps = (side - 1).min(most - 1);
@@ -199,7 +199,7 @@ pub(super) fn touched(touch: &TouchRow, normal_w: Option<Vector3<f64>>) -> anyho
             let normal_w = touch.normal.map(Vector3::from).or(normal_w);
             Touch::Contact(Contact {
                 p_wc,
-                normal_w: normal_w.context("a contact without its normal")?,
+                normal_w: normal_w.context("a recorded contact has no normal")?,
             })
         }
         None if touch.overload => Touch::Overload,

@@ -7,6 +7,7 @@ use crate::experiment::measure::{Direction, Measure};
 use crate::experiment::statistics::equal_error::Estimate;
 use crate::experiment::store::write_whole;
 use crate::report::canvas::escape;
+use crate::report::glossary::tooltip;
 use anyhow::Context;
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -236,12 +237,19 @@ impl Table {
 
     /// Formats the table as HTML in a scrollable box; `class` is its CSS class.
     pub fn html(&self, class: &str) -> String {
-        let head = |head: &String| format!("<th>{}</th>", escape(head));
-        let heads: String = self.heads(true).iter().map(head).collect();
+        let title = |explanation: Option<&str>| {
+            explanation.map_or(String::new(), |it| format!(" title=\"{}\"", escape(it)))
+        };
+        let head = |(head, column): (&String, &Column)| {
+            let own = (!column.note.is_empty()).then_some(column.note);
+            format!("<th{}>{}</th>", title(own.or_else(|| tooltip(head))), escape(head))
+        };
+        let heads: String = self.heads(true).iter().zip(&self.columns).map(head).collect();
         let cell = |(i, (words, verdict)): (usize, (String, Option<&str>))| {
+            let title = if i == 0 { title(tooltip(&words)) } else { String::new() };
             let words = escape(&words);
             match verdict {
-                _ if i == 0 => format!("<th scope=\"row\">{words}</th>"),
+                _ if i == 0 => format!("<th scope=\"row\"{title}>{words}</th>"),
                 Some(word) => format!("<td class=\"{word}\">{words}: {word}</td>"),
                 None => format!("<td>{words}</td>"),
             }

@@ -47,8 +47,8 @@ pub const FIGURE: Figure = Figure {
     name: "solids",
     caption: |run| {
         format!(
-            "Believed surfaces of trial {} from the front and from behind, coloured by how far they \
-             may lie from where they are believed, with the touches.",
+            "Believed surfaces of trial {} from the front and from behind, coloured by their standard \
+             deviation, with the touches.",
             run.experiment.report.trial
         )
     },
@@ -79,7 +79,7 @@ fn sequences(
         let place = |count: usize| format!("trial {} of {}, touch {count}", row.trial, row.planner);
         let mut sequence = Sequence { planner: row.planner.clone(), ..Sequence::default() };
         for (i, touch) in row.touches.iter().enumerate() {
-            let no_aim = || format!("{}: a target that is no aim", place(i + 1));
+            let no_aim = || format!("{}: target is not an aim at a whole object", place(i + 1));
             let aim = touch.target.aim().with_context(no_aim)?;
             sequence.touches.push(Touch {
                 aim_w: aim.p_w,
@@ -146,12 +146,12 @@ pub fn belief(
     let before = touches.len().checked_sub(2).and_then(|i| touches[i].fit.as_ref());
     let scene = &experiment.scene;
     let ball = scene.around.as_ref().and_then(|around| around.ball());
-    let ball = ball.context("the ball of [around] is not written out")?;
+    let ball = ball.context("the scene has no ball of [around]; resolved.toml is incomplete")?;
     let task = Task::new(ball, scene.touch.clone(), &scene.finger)?;
     let scope = Scope::new(ball, &task, (&scene.finger, scene.effects.skin.is_some()));
     let mut belief = ImplicitSurface::new(scope, experiment.space.clone());
     for touch in touches {
-        let aim = touch.target.aim().context("a target that is no aim")?;
+        let aim = touch.target.aim().context("target is not an aim at a whole object")?;
         // The roll of the finger does not change its path.
         let approach = ball.approach(aim, &scene.finger, scene.touch.standoff_m, 0.0);
         let swept = swept(scene.finger.clone(), touch);

@@ -60,7 +60,7 @@ impl Shell<'_> {
         let last = planners[0]["frames"].as_array().map_or(0, Vec::len).saturating_sub(1);
         format!(
             "<section id=\"explorer\">\n<style>{STYLE}</style>\n<h2>Touch by touch</h2>\n\
-             <noscript><p class=\"note\">This part needs JavaScript; the figures below do not.</p>\
+             <noscript><p class=\"note\">This view needs JavaScript; the figures do not.</p>\
              </noscript>\n<div class=\"controls\">\n{controls}</div>\n\
              <canvas class=\"{}\" role=\"img\" tabindex=\"0\"></canvas>\n\
              <div class=\"time\"><button type=\"button\">Play</button>\

@@ -25,12 +25,12 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     let Some(data) = data(run)? else { return Ok(String::new()) };
     // The true curve hides nothing, so it is visible by default.
     let (class, colours, is_shown, help) = match data["z"].is_null() {
-        true => ("curve", &[][..], true, "Drag the slider, or use the arrow keys."),
+        true => ("curve", &[][..], true, "Drag the slider, or press the arrow keys."),
         false => ("surface", &COLOURS[..], false, HELP),
     };
     let note = format!(
-        "Trial {}. Blue: the {} initial touches; red: those the planner chose; the last one is \
-         larger.{} {help}",
+        "Trial {}. Blue: the {} initial touches; red: those of the planner; the last one is larger.{} \
+         {help}",
         run.experiment.report.trial,
         run.experiment.initial_touches,
         drawn_words(run)
@@ -38,9 +38,9 @@ pub fn section(run: &Run) -> anyhow::Result<String> {
     Ok(Shell { colours, truth: Some(is_shown), class, note, scripts: &SCRIPTS }.html(&data))
 }
 
-const HELP: &str = "Hollow touches lie behind the surface, diamonds met nothing. Green: where the \
-                    true surface stands out of the belief. Lines join equal heights. Drag the \
-                    surface to turn it, the slider to go through the touches; both also follow the \
+const HELP: &str = "Hollow touches lie behind the surface; diamonds are touches without contact. \
+                    Green: the true surface in front of the belief. Lines join equal heights. Drag \
+                    the surface to turn it and the slider to step through the touches, or press the \
                     arrow keys.";
 
 // Largest number of places along the side of a curve and of a surface.

@@ -18,10 +18,9 @@ pub(crate) const FIGURE: Figure = Figure { name: "acquisition", caption, draw };
 fn caption(run: &Run) -> String {
     let planner = planner(run).unwrap_or("the planner");
     format!(
-        "Standard deviation that another touch could still remove, before and after one more \
-         touch of {planner} in trial {}: the circle marks the largest that \
-         was found. Crosses are points of contact, which may lie beside their targets.{} \
-         Corresponds to Fig. 6 of the paper.",
+        "Standard deviation that another touch could remove, before and after one touch of \
+         {planner} in trial {}. Circle: largest value found. Crosses: points of contact, which may \
+         lie beside their targets.{} Corresponds to Fig. 6 of the paper.",
         run.experiment.report.trial,
         drawn_words(run)
     )

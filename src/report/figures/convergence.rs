@@ -21,15 +21,14 @@ fn constant_r(run: &Run) -> Option<f64> {
 fn caption(run: &Run) -> String {
     let score = constant_r(run).map_or(String::new(), |score| {
         format!(
-            " R is not centred: a positive constant, however high, scores {score:.3} here (dashed), \
-             so the centred correlation stands beside it."
+            " R is not centred: any positive constant scores {score:.3} here (dashed), so the centred \
+             correlation is shown too."
         )
     });
     format!(
-        "Agreement with the true surface against touches, over {} trials of each planner, from the \
-         first belief on: all planners share the {} initial touches. Bands are one standard error \
-         of a mean and the 95 % bootstrap interval of a median.{score} Corresponds to Fig. 4 of \
-         the paper.",
+        "Accuracy of the belief against the number of touches, n = {} trials of each planner; all \
+         planners share the {} initial touches. Bands: one standard error of a mean, 95 % bootstrap \
+         interval of a median.{score} Corresponds to Fig. 4 of the paper.",
         run.experiment.trials, run.experiment.initial_touches
     )
 }

@@ -14,9 +14,9 @@ pub(crate) const FIGURE: Figure = Figure { name: "curves", caption, draw };
 
 fn caption(run: &Run) -> String {
     format!(
-        "Beliefs of trial {} after some touches: posterior mean, its 95 % band, and the true \
-         surface. Blue crosses are the {} initial touches, red ones those the planner chose.{} \
-         Corresponds to Fig. 3 of the paper.",
+        "Beliefs of trial {} by number of touches: posterior mean, its 95 % band, and the true \
+         surface. Blue crosses: the {} initial touches; red: those of the planner.{} Corresponds to \
+         Fig. 3 of the paper.",
         run.experiment.report.trial,
         run.experiment.initial_touches,
         drawn_words(run)

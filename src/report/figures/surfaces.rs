@@ -19,13 +19,13 @@ fn caption(run: &Run) -> String {
     let zone = run.experiment.scene.zone.as_ref();
     let stretch = zone.and_then(|zone| space(run, zone)).map_or(1.0, |space| space.stretch());
     let stretched = match stretch > 1.0 {
-        true => format!(" Heights are stretched {stretch:.1} times."),
+        true => format!(" Heights are scaled by {stretch:.1}."),
         false => String::new(),
     };
     format!(
-        "Posterior mean over the zone in trial {} after some touches, and the true object on the \
-         right, all in the same view, scale and colours. Blue points are the {} initial touches, \
-         red ones those the planner chose.{stretched}{} Corresponds to Figs. 5 and 7 of the paper.",
+        "Posterior mean over the zone in trial {} by number of touches, and the true object on the \
+         right, with the same view, scale and colours. Blue points: the {} initial touches; red: those \
+         of the planner.{stretched}{} Corresponds to Figs. 5 and 7 of the paper.",
         run.experiment.report.trial,
         run.experiment.initial_touches,
         drawn_words(run)

@@ -16,14 +16,14 @@ fn caption(run: &Run) -> String {
     let zone = run.experiment.scene.zone.as_ref();
     let shift = match zone.and_then(|zone| median_shift_m(zone, &run.rows)) {
         Some(shift_m) => format!(
-            " Over all trials, half of the contacts lie more than {} mm beside their target.",
+            " Over all trials, the median lateral distance from target to contact is {} mm.",
             digits(1e3 * shift_m)
         ),
         None => String::new(),
     };
     format!(
-        "Targets (rings) and contacts (points) of trial {}, seen along the approach: the finger is \
-         as wide as it is, and touches a slope beside its tip.{shift}",
+        "Targets (rings) and contacts (points) of trial {}, seen along the approach. Because \
+         of its width, the finger touches a slope beside its tip.{shift}",
         run.experiment.report.trial
     )
 }
@@ -54,7 +54,7 @@ fn draw(run: &Run) -> anyhow::Result<Option<String>> {
     let mut entries = vec![
         (Swatch::Circle(ring(LATER)), "target"),
         (Swatch::Circle(dot(INITIAL)), "contact of an initial touch"),
-        (Swatch::Circle(dot(LATER)), "of a later one"),
+        (Swatch::Circle(dot(LATER)), "contact of a later touch"),
     ];
     entries.extend(miss_entry(run));
     let most = Area { left: LEFT_PX, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };

@@ -74,7 +74,7 @@ pub fn figure(sequences: &[Sequence], truth: Option<&Mesh>, counts: &[u32]) -> O
 fn belief(view: &View, canvas: &mut Canvas, (sequence, count): (&Sequence, u32), axis: &Axis) {
     let title = format!("{}, {count} touches", sequence.planner);
     let Some(frame) = sequence.frames.iter().find(|frame| frame.touches == count) else {
-        return view.title(canvas, &title, "no belief after so many");
+        return view.title(canvas, &title, "no belief at this count");
     };
     view.title(canvas, &title, &frame.score);
     // Colour of a triangle by the mean of its corners.

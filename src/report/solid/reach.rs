@@ -38,10 +38,10 @@ pub fn picture(
     let width = 2.0 * PANEL.0;
     let size = [width + 2.0 * MARGIN.0, MARGIN.1 + PANEL.1 + FOOT_PX];
     let entries = [
-        (spots, Swatch::Box(LEGEND[0]), "the finger can touch it"),
-        (spots, Swatch::Box(LEGEND[1]), "no straight way leads there"),
-        (sides, Swatch::Circle(style::visible(MARKS[0])), "side it comes from"),
-        (sides, Swatch::Cross(MARKS[1]), "side it cannot come from"),
+        (spots, Swatch::Box(LEGEND[0]), "reachable"),
+        (spots, Swatch::Box(LEGEND[1]), "not reachable by a straight approach"),
+        (sides, Swatch::Circle(style::visible(MARKS[0])), "possible direction of approach"),
+        (sides, Swatch::Cross(MARKS[1]), "impossible direction of approach"),
     ];
     let entries = entries.into_iter().filter(|(marks, ..)| !marks.is_empty());
     let entries = entries.map(|(_, swatch, words)| (swatch, words));
@@ -51,7 +51,7 @@ pub fn picture(
     for (column, is_behind) in [false, true].into_iter().enumerate() {
         let view = View::new(sheet.area(column, 0.0), is_behind, px_per_m, &points);
         let canvas = &mut sheet.canvas;
-        view.title(canvas, "what can be touched", "");
+        view.title(canvas, "reachable surface", "");
         let relief = view.relief(canvas, &drawn, |triangle, light| {
             style::lit(&SURFACE[usize::from(!is_reached[triangle])], 0.0, light)
         });
@@ -110,8 +110,8 @@ mod tests {
         let mesh = Mesh::new(&vertices, &triangles).unwrap().0;
         let sides = [(corner(2.0, 0.0, 0.0), true), (corner(-2.0, 0.0, 0.0), false)];
         let svg = picture(&mesh, &spots, &sides);
-        assert!(svg.contains("side it cannot come from") && svg.contains("no straight way"));
+        assert!(svg.contains("impossible direction") && svg.contains("not reachable by"));
         let svg = picture(&mesh, &[], &[]);
-        assert!(!svg.contains("side it") && !svg.contains("straight way"));
+        assert!(!svg.contains("direction of") && !svg.contains("reachable by"));
     }
 }

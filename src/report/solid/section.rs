@@ -43,7 +43,7 @@ pub fn section(sequences: &[Sequence], truth: Option<&Mesh>, trial: u32) -> anyh
     let Some(data) = data(&shown, truth.as_ref())? else { return Ok(String::new()) };
     let initial = first.touches.iter().filter(|touch| touch.is_initial).count();
     let green = match truth {
-        Some(_) => " Green: where the true surface stands out of the belief.",
+        Some(_) => " Green: the true surface in front of the belief.",
         None => "",
     };
     let shell = Shell {
@@ -51,18 +51,18 @@ pub fn section(sequences: &[Sequence], truth: Option<&Mesh>, trial: u32) -> anyh
         truth: truth.as_ref().map(|_| false),
         class: "surface",
         note: format!(
-            "Trial {trial}. Blue: the {initial} initial touches; red: those the planner chose; the \
-             last one is larger, and an arrow shows how the finger came.{green} {HELP}"
+            "Trial {trial}. Blue: the {initial} initial touches; red: those of the planner; the last \
+             one is larger, with an arrow along the approach.{green} {HELP}"
         ),
         scripts: &SCRIPTS,
     };
     Ok(shell.html(&data))
 }
 
-const HELP: &str = "Hollow touches lie behind the surface, diamonds met nothing. Drag the surface \
-                    to turn it, the slider to go through the touches; both also follow the arrow \
-                    keys. Two fingers, the keys + and −, or the wheel once the surface was clicked \
-                    zoom; 0 is as at first.";
+const HELP: &str = "Hollow touches lie behind the surface; diamonds are touches without contact. \
+                    Drag the surface to turn it and the slider to step through the touches, or press \
+                    the arrow keys. Zoom with two fingers, the keys + and −, or the wheel after a \
+                    click on the surface; 0 resets the view.";
 
 // heuristic: smallest share of the range if all values are alike.
 const ALIKE_SHARE: f64 = 0.1;
@@ -230,7 +230,10 @@ impl Coded {
             }
         }
         let count = order.len();
-        ensure!(count <= VERTICES_MAX, "a mesh of {count} vertices; {VERTICES_MAX} can be drawn");
+        ensure!(
+            count <= VERTICES_MAX,
+            "a mesh of {count} vertices cannot be drawn: at most {VERTICES_MAX} are allowed"
+        );
         let offsets = order.iter().map(|&vertex| vertices[vertex as usize] - cube.low);
         let shares = offsets.flat_map(|offset| <[f64; 3]>::from(offset / cube.side_m));
         Ok(Self { positions: encode(shares), corners: STANDARD.encode(corners), order })

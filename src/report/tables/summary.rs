@@ -46,7 +46,7 @@ pub fn table(run: &Run) -> Table {
 
 /// Returns the note that explains the cells of [`table`].
 pub fn note(run: &Run) -> String {
-    format!("± is one standard error of the mean over {} trials.", run.experiment.trials)
+    format!("n = {} trials; ± is one standard error of the mean.", run.experiment.trials)
 }
 
 /// Returns the table for the terminal, followed by the other events.
@@ -96,7 +96,7 @@ pub fn json(run: &Run) -> Value {
 /// Returns the claims of a publication with the results: a row for each measure of each claim.
 pub fn claims(run: &Run) -> Table {
     let planners = &run.experiment.planners;
-    let heads = ["paper", "it says", "here after", "measure"].map(Column::new).into_iter();
+    let heads = ["paper", "reported", "here after", "measure"].map(Column::new).into_iter();
     let mut table = Table::new(heads.chain(planners.iter().map(Column::new)));
     let possible = run.experiment.initial_touches..=run.experiment.touches;
     let claims = run.experiment.report.claims.iter();
@@ -122,17 +122,14 @@ pub fn claims(run: &Run) -> Table {
 }
 
 /// Note that explains the cells of [`claims`].
-pub const CLAIMS_NOTE: &str = "What Yi et al. 2016 say, and the same here, over the trials.";
+pub const CLAIMS_NOTE: &str =
+    "Values reported by Yi et al. 2016, next to those of this run over the trials.";
 
 /// Returns the events in the trials besides their errors, a line for each planner.
 pub fn happened(run: &Run) -> Vec<String> {
     let of = |planner: &String| told(planner, &summary::events(&run.rows, planner));
     let unlisted = (run.unlisted > 0).then(|| {
-        format!(
-            "{} trials in the folder are kept but not shown, because the experiment does not list \
-             them",
-            run.unlisted
-        )
+        format!("{} stored trials are not shown: the experiment does not list them", run.unlisted)
     });
     run.experiment.planners.iter().filter_map(of).chain(unlisted).collect()
 }
@@ -141,13 +138,13 @@ pub fn happened(run: &Run) -> Vec<String> {
 fn told(planner: &str, events: &Events) -> Option<String> {
     let counts = [
         (events.failures, "failed trials"),
-        (events.misses, "touches met nothing"),
-        (events.overloads, "touches were broken off: too much force, or no place was felt"),
+        (events.misses, "touches without contact"),
+        (events.overloads, "touches aborted: force limit, or no contact location"),
         (
             events.collapsed,
-            "plans went to a random place instead, because the belief was sure of the best one",
+            "random targets instead of planned ones: no variance left at the best one",
         ),
-        (events.repeated, "plans went to a random place instead, because they repeated a target"),
+        (events.repeated, "random targets instead of planned ones: repeated target"),
     ];
     let told: Vec<String> = counts
         .iter()

@@ -11,6 +11,8 @@ macro_rules! effects {
         pub struct Effects {
             /// Constants of the sensor: `"biotac"`, a file like `models/biotac.toml`, or a table of
             /// constants that differ.
+            ///
+            /// Reading a scene copies them into the effects.
             pub sensor: Option<String>,
             $(
                 $(#[$doc])*
