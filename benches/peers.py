@@ -44,7 +44,7 @@ def correlation(f, g):
 
 
 class ScikitLearn:
-    """Two restarts, heights normalised, noise fitted: the settings a lab would start from."""
+    """Two restarts, heights normalised, noise fitted: typical settings."""
 
     def fit(self, x, y):
         kernel = ConstantKernel() * RBF(0.5, (1e-2, 10)) + WhiteKernel(1e-5, (1e-10, 1))
