@@ -13,8 +13,8 @@ const AMBIENT: f64 = 0.35;
 /// to it.
 const DEPTH_MIN: f64 = 0.25;
 
-// Default azimuth of the viewer, turned about z from y, the direction of touch.
-// heuristic: neither side of a bulge hides much.
+/// Default azimuth of the viewer, turned about z from y, the direction of touch; a heuristic:
+/// neither side of a bulge hides much.
 pub const AZIMUTH_DEG: f64 = 38.0;
 // Elevation of the viewer.
 // heuristic: neither side of a bulge hides much.

@@ -89,7 +89,7 @@ impl Facing {
         }
     }
 
-    /// Returns the directions for a glTF file, whose y axis became z, and z became −y, on import.
+    /// Returns the directions for a glTF file, whose y axis became z, and z became y, on import.
     pub fn of_gltf(up: Up) -> Self {
         let turned = |v: Vector3<f64>| Vector3::new(-v.x, v.z, v.y);
         let Self { front_o, up_o } = Self::of(up);

@@ -90,11 +90,12 @@ const CORE: Constant =
 const SPREAD: Constant =
     constant("electrodes.spread_m", [5e-4, 6e-3], 0.7, |model| &mut model.electrodes.spread_m);
 
-// Constants of columns.
-// heuristic: bounds and plausible deviations are a factor of ten for a stiffness, two for the
-// spread. The skin's modulus and the stiffness against inflation are taken from sources, because
-// counts alone would give a pressure ten times too low as well; the exponent is a gain that all
-// share.
+/// Constants of columns.
+///
+/// Bounds and plausible deviations are a heuristic: a factor of ten for a stiffness, two for the
+/// spread. The skin's modulus and the stiffness against inflation are taken from sources, because
+/// counts alone would give a pressure ten times too low as well; the exponent is a gain that all
+/// share.
 pub const CONSTANTS: [Constant; 3] = [
     constant("skin.flatten_pa_m", [1e4, 1e9], 2.3, |model| &mut model.skin.flatten_pa_m),
     CORE,
