@@ -56,7 +56,7 @@ pub fn draw(
     let families = FAMILIES.iter().map(|(colour, words)| (Swatch::Circle(dot(colour)), *words));
     let entries = families.chain([
         (Swatch::Diamond(INK), "the scene"),
-        (Swatch::Line(style::dashed(INK, 1.3, "5 3")), "front"),
+        (Swatch::Line(style::dashed(INK, 1.3, "5 3")), "Pareto front"),
         (Swatch::Line(reference_line()), "time of the reference"),
     ]);
     let first = Area { left: LEFT_PX, top: TOP_PX, width: PANEL_PX.0, height: PANEL_PX.1 };

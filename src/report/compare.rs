@@ -3,7 +3,7 @@
 
 use super::axes::{Axis, Panel};
 use super::canvas::Area;
-use super::findings::HONEST;
+use super::findings::{HONEST, by_verdict, clauses};
 use super::glossary::explained;
 use super::html::{figure, fold, page, tables};
 use super::legend::{Sheet, Swatch};
@@ -135,7 +135,24 @@ pub fn note(against: &str) -> String {
     )
 }
 
-/// Returns the page.
+/// Returns the verdict as a sentence; `None` without other planners than the reference.
+fn sentence(compared: &Compared) -> Option<String> {
+    let against = &compared.against;
+    let others = compared.contenders.iter().filter(|it| it.name != *against);
+    let verdicts = others.map(|it| {
+        let interval = geometric(&it.scores(), SEED).and_then(|error| error.interval);
+        (it.name.as_str(), verdict(interval, 1.0, Direction::Less))
+    });
+    let words = [
+        format!("a smaller error than {against}"),
+        format!("a larger error than {against}"),
+        format!("no established difference from {against}"),
+    ];
+    let clauses = clauses(verdicts.map(by_verdict), ["has", "have"], words)?;
+    Some(format!("Over {} objects, {clauses} (95 % intervals).", compared.objects.len()))
+}
+
+/// Returns the page: the verdict, the table over all objects, the figures, then each object.
 pub fn html(name: &str, question: &str, compared: &Compared) -> String {
     let note = note(&compared.against);
     let over_all = tables("Over all objects", &[overall(compared)], "named", &note);
@@ -159,7 +176,10 @@ pub fn html(name: &str, question: &str, compared: &Compared) -> String {
     let figures = figures.map(|(id, svg, caption)| {
         svg.map_or(String::new(), |svg| figure(id, &svg, explained(&caption)))
     });
-    page("Palpate suite", name, question, &[over_all, figures.concat(), each].concat())
+    let verdict = sentence(compared);
+    let verdict = verdict
+        .map_or(String::new(), |it| format!("<p class=\"verdict\">{}</p>\n", explained(&it)));
+    page("Palpate suite", name, question, &[verdict, over_all, figures.concat(), each].concat())
 }
 
 /// Returns the table of `suite.csv`, with a row per object and planner.

@@ -244,13 +244,13 @@ fn trust(run: &Run) -> Option<String> {
 }
 
 /// Returns a planner with its group: better, worse, neither.
-fn by_verdict<'a>((planner, verdict): (&'a str, Option<&str>)) -> (&'a str, usize) {
+pub(super) fn by_verdict<'a>((planner, verdict): (&'a str, Option<&str>)) -> (&'a str, usize) {
     (planner, verdict.map_or(2, |word| usize::from(word != "better")))
 }
 
 /// Returns a clause for each of three groups of planners that is not empty; `None` without
 /// planners.
-fn clauses<'a>(
+pub(super) fn clauses<'a>(
     planners: impl Iterator<Item = (&'a str, usize)>,
     [one, many]: [&str; 2],
     words: [String; 3],

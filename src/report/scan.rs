@@ -102,7 +102,7 @@ fn draw_object(
     // The coordinates of an object have longer numbers than those of a zone.
     let area = Area { left: area.left + LEFT_PX, width: area.width - LEFT_PX, ..area };
     let panel = ReliefPanel::new(unit, area, space);
-    panel.frame(canvas, "the object, and the zone on it", "");
+    panel.frame(canvas, "object and zone", "");
     let at = |x_m, height_m, z_m| panel.camera.at(&Vector3::new(x_m, height_m, z_m));
     let datum = zone.datum_y_m() * Vector3::y();
     let triangles = mesh.iter_corners().map(|corners| corners.map(|p_z| p_z.coords - datum));
