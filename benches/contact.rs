@@ -59,10 +59,10 @@ fn main() -> anyhow::Result<()> {
         .collect();
     let ours = exact(&cast, &truth)?;
     println!(
-        "| contact | a step, µs | × the first | rests off, mm: median | 95 % | max \
-         | point off, mm: median | 95 % | max | steps in contact |\n|---|---|---|---|---|---|---|---|---|---|"
+        "| contact | a step, µs | × the first | rest error, mm: median | 95 % | max \
+         | point error, mm: median | 95 % | max | steps in contact |\n|---|---|---|---|---|---|---|---|---|---|"
     );
-    println!("| cast onto the mesh | – | – | {} | – |", errors(&cast, &truth, &ours));
+    println!("| hull swept onto the mesh | – | – | {} | – |", errors(&cast, &truth, &ours));
     let mut first_us = None;
     for (name, sets) in bodies {
         let dynamic = |arm: &[&str]| environment(&[sets, arm, &["body=\"dynamic\""]].concat());

@@ -141,9 +141,9 @@ fn main() -> anyhow::Result<()> {
     let (curves, megabytes, off) = measure();
     print("seconds", &curves);
     print("MB", &megabytes);
-    println!("through at most {INDUCING}, at 1000 places, hyperparameters known");
+    println!("at most {INDUCING} inducing touches, 1000 places, hyperparameters known");
     println!(
-        "kernel                 touches    kept  left, of a noise  mean off, of a sd   sd, of the exact"
+        "kernel                 touches    kept residual/noise sd     mean error/sd         sd/exact sd"
     );
     off.iter().for_each(|line| println!("{line}"));
     let mut product = product();
