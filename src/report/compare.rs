@@ -37,7 +37,8 @@ pub fn overall(compared: &Compared) -> Table {
     let count = compared.objects.len();
     let mut table = Table::new([
         Column::new("planner"),
-        Column::new("error").note("Geometric mean over trials and objects, relative error."),
+        Column::new("error")
+            .note("Error relative to the reference, geometric mean over trials and objects."),
         Column::new("better on").note("Objects with the 95 % interval of the error below 1."),
         Column::new("worse on").note("Objects with the 95 % interval of the error above 1."),
         Column::new("gap closed")
