@@ -73,7 +73,7 @@ impl Simulator {
     /// Checks that the scene's arm or stage can reach all of its zone.
     ///
     /// # Errors
-    /// If it cannot.
+    /// If a part of the zone is out of reach.
     pub fn check_reach(&self) -> Result<(), Invalid> {
         let environment = &self.environment;
         match (environment.scene().body, environment.robot()) {
